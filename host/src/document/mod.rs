@@ -1,0 +1,1 @@
+//! Reading documents of materials: textures, glTF, measured BRDFs, factored files.

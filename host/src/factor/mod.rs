@@ -1,0 +1,1 @@
+//! A document's materials as a few bases and their weight maps.

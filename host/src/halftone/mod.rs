@@ -1,0 +1,1 @@
+//! One stack for every dot, in clusters no smaller than the inks can hold.

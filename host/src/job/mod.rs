@@ -1,0 +1,1 @@
+//! Placement on the page, the plan in words, and the bytes of a job.

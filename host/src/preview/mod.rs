@@ -1,0 +1,1 @@
+//! Pictures: the lit sheet, material balls, passes, separations.

@@ -1,0 +1,1 @@
+//! Sample documents made by the program itself.

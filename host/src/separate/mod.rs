@@ -1,0 +1,1 @@
+//! A sheet as the fewest ordered one-bit passes.

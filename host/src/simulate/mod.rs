@@ -1,0 +1,1 @@
+//! The printer, simulated: bytes in, sheet out.

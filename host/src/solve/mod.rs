@@ -1,0 +1,1 @@
+//! Least squares on the simplex, and equation 1 in the perceptual metric.

@@ -1,0 +1,1 @@
+//! Scenarios that join every part; the tests themselves stand in `tests/`.

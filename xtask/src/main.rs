@@ -1,0 +1,74 @@
+//! The project's own chores, so that a person and the gate type the same words.
+//!
+//! `cargo xtask test` is the whole gate: formatting, lints, documents, every test and the bare-metal build
+//! of `protocol`. It runs every step, then says which failed.
+
+use std::process::{Command, ExitCode};
+
+use clap::{Parser, Subcommand};
+
+/// Where the microcontroller's code is built for: Cortex-M0+, no atomics with compare-and-swap.
+const BARE_METAL: &str = "thumbv6m-none-eabi";
+
+#[derive(Parser)]
+#[command(name = "cargo xtask", about = "The project's own chores")]
+struct Args {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Format check, clippy, documents, all tests, bare-metal build: what has to pass before anything lands
+    Test,
+    /// The benchmarks (results are ratios to read, not tests that pass)
+    Bench,
+}
+
+fn main() -> ExitCode {
+    let steps: Vec<(&str, Command)> = match Args::parse().task {
+        Task::Test => vec![
+            ("bare-metal target", command("rustup", &["target", "add", BARE_METAL])),
+            ("formatting", cargo(&["fmt", "--all", "--check"])),
+            ("lints", cargo(&["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"])),
+            ("documents", {
+                let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
+                doc.env("RUSTDOCFLAGS", "-D warnings");
+                doc
+            }),
+            (
+                "bare-metal build",
+                cargo(&["build", "--package", "foilpress-protocol", "--target", BARE_METAL, "--locked"]),
+            ),
+            ("tests", cargo(&["test", "--workspace", "--locked"])),
+        ],
+        Task::Bench => vec![("benchmarks", cargo(&["bench", "--workspace", "--locked"]))],
+    };
+
+    let mut failed = Vec::new();
+    for (name, mut step) in steps {
+        eprintln!("== {name}: {step:?}");
+        match step.status() {
+            Ok(status) if status.success() => {}
+            Ok(status) => failed.push(format!("{name} ({status})")),
+            Err(error) => failed.push(format!("{name} (cannot start: {error})")),
+        }
+    }
+    if failed.is_empty() {
+        eprintln!("all steps passed");
+        ExitCode::SUCCESS
+    } else {
+        eprintln!("failed: {}", failed.join(", "));
+        ExitCode::FAILURE
+    }
+}
+
+fn cargo(args: &[&str]) -> Command {
+    command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()), args)
+}
+
+fn command(program: &str, args: &[&str]) -> Command {
+    let mut command = Command::new(program);
+    command.args(args);
+    command
+}
