@@ -3,6 +3,7 @@
 //! A finding is collected, not thrown, so that an owner sees all of them at once; only a file that is not TOML of
 //! the expected shape ends the reading early. A library with errors is not made.
 
+use std::f64::consts::FRAC_PI_2;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
@@ -81,7 +82,7 @@ pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
         Some(name) => {
             let problem = format!("`{}`: a library can be based on `built-in` or on nothing", name.get_ref());
             findings.error(Some(name.span().start), "based_on", problem);
-            None
+            return (None, findings.found);
         }
     };
     let library = build(parsed, base, folder, &mut findings);
@@ -305,6 +306,7 @@ fn measured(table: &MeasuredTable, folder: Option<&Path>, wanted: &mut Vec<Wante
     if wanted[place].measured.is_some() {
         findings.error(Some(offset), owner, "is measured twice");
     }
+    wanted[place].offset.get_or_insert(offset);
     wanted[place].measured = Some((curve, provenance));
 }
 
@@ -381,10 +383,11 @@ fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
     }
 }
 
-/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 90 degrees.
+/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. A lobe grows as
+/// 1 / cos towards 90 degrees, so the last value is held there rather than drawn towards a pole.
 fn grid() -> Vec<f64> {
-    const STEPS: usize = 512;
-    (0..=STEPS).map(|n| std::f64::consts::FRAC_PI_2 * (n as f64 / STEPS as f64).powi(2)).collect()
+    const STEPS: u32 = 512;
+    (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).powi(2)).collect()
 }
 
 /// The entry of a stack, after the checks that need its curve.
@@ -425,7 +428,8 @@ fn entry(
             break;
         }
     }
-    for rule in rules.iter().filter(|rule| rule.broken_by(&stack)) {
+    // Of a base's stacks the owner of this text has said nothing, so nothing is said to him.
+    for rule in rules.iter().filter(|rule| offset.is_some() && rule.broken_by(&stack)) {
         let problem = format!("{} ({}; {})", rule.says, rule.name, rule.certainty);
         findings.add(rule.severity, offset, field.clone(), problem);
     }
