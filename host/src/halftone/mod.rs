@@ -1,1 +1,2 @@
 //! One stack for every dot, in clusters no smaller than the inks can hold.
+pub(crate) mod rule;
