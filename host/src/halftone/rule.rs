@@ -116,6 +116,24 @@ pub(super) struct Rule {
     next_check: u32,
 }
 
+/// Walks to the end with the widest vectors the machine has; the result is the same with any.
+pub(super) fn walk<S: Source, K: Sink>(rule: &mut Rule, source: &mut S, sink: &mut K) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        /// The same code, compiled for AVX2: integer operations only, so equal bit for bit.
+        #[target_feature(enable = "avx2")]
+        fn wide<S: Source, K: Sink>(rule: &mut Rule, source: &mut S, sink: &mut K) {
+            rule.walk(source, sink);
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: the only requirement of `wide` is that the processor has AVX2, just detected.
+            unsafe { wide(rule, source, sink) };
+            return;
+        }
+    }
+    rule.walk(source, sink);
+}
+
 /// A class's best candidate.
 #[derive(Clone, Copy)]
 struct Candidate {
