@@ -6,4 +6,6 @@
 #![forbid(unsafe_code)]
 
 pub mod ink;
+pub mod packbits;
 pub mod paper;
+pub mod rgl;
