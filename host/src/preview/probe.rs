@@ -76,7 +76,9 @@ impl Probe {
         let (width, height) = decoder.dimensions();
         let (width, height) = (width as usize, height as usize);
         if width == 0 || height == 0 || width > WIDEST || width != 2 * height {
-            return Err(wrong(format!("{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide")));
+            return Err(wrong(format!(
+                "{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide"
+            )));
         }
         let mut limits = Limits::default();
         limits.max_image_width = Some(WIDEST as u32);
