@@ -4,8 +4,14 @@
 //! sequence of such quadratics.
 
 pub mod gram;
+pub mod mixture;
+pub mod root;
 pub mod simplex;
 pub mod vector;
 
+#[cfg(test)]
+mod modelled;
+
 pub use gram::{Gram, GramError};
+pub use mixture::{Best, Fit, Hull, Mixer, MixtureError, Target};
 pub use simplex::{Certificate, Simplex, SimplexError};
