@@ -29,4 +29,6 @@ pub mod simulate;
 
 pub mod preview;
 
+pub mod pipeline;
+
 pub mod cli;
