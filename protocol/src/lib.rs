@@ -7,3 +7,4 @@
 
 pub mod ink;
 pub mod paper;
+pub mod walk;
