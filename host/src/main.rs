@@ -1,3 +1,7 @@
-//! The program. Exit codes: 0 done, 1 failed, 2 wrong usage.
+//! The program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    foilpress::cli::main()
+}

@@ -1,1 +1,3 @@
 //! Placement on the page, the plan in words, and the bytes of a job.
+
+pub mod placement;
