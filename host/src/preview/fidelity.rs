@@ -143,3 +143,139 @@ fn blurred(lines: &Lines, first: usize, count: usize) -> Vec<f32> {
     }
     result
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::source::Area;
+    use super::*;
+    use crate::brdf::{Space, Table};
+    use crate::document::Materials;
+    use crate::observe::Silent;
+    use crate::sheet::Sheet;
+    use inks::Stack;
+    use protocol::paper::Paper;
+
+    /// A document with one row everywhere.
+    struct Uniform(Space, Vec<f64>);
+
+    impl Materials for Uniform {
+        fn width(&self) -> usize {
+            5
+        }
+        fn height(&self) -> usize {
+            4
+        }
+        fn space(&self) -> &Space {
+            &self.0
+        }
+        fn reflectance(&self, _pixel: usize, out: &mut [f32]) {
+            out.iter_mut().zip(&self.1).for_each(|(o, &v)| *o = v as f32);
+        }
+    }
+
+    fn stacks(space: &Space) -> Table {
+        let mut rows = Table::new(space.columns());
+        let row = |f: &dyn Fn(f64) -> f64| space.angles().iter().flat_map(|&t| [f(t); 3]).collect::<Vec<_>>();
+        rows.push(&row(&|_| 0.27));
+        rows.push(&row(&|t| 0.005 + 0.8 * inks::ggx::lobe(t, 0.06)));
+        rows
+    }
+
+    fn sheet(size: u16, inked: impl FnMut(usize) -> bool) -> Sheet {
+        let index = (0..usize::from(size).pow(2)).map(inked).map(u8::from).collect();
+        Sheet::new(
+            Paper::Custom { width: size, length: size },
+            vec![Stack::SUBSTRATE, "SF".parse().unwrap()],
+            index,
+        )
+        .unwrap()
+    }
+
+    fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> Report {
+        let target = Uniform(space.clone(), target);
+        let print = Source::Print { sheet, space, stacks: rows, area: Area::whole(sheet) };
+        let size = (sheet.width(), sheet.length());
+        fidelity(&Source::Document(&target), &print, size, metres, &Silent).unwrap()
+    }
+
+    #[test]
+    fn one_stack_is_as_far_from_another_as_the_metric_says() {
+        let space = Space::half_angle(32);
+        let rows = stacks(&space);
+        let expected = space.distance(rows.row(0), rows.row(1));
+        let report = report(&space, &rows, rows.row(1).to_vec(), &sheet(200, |_| false), 0.5);
+        for value in [report.mean, report.rmse, report.p95, report.max] {
+            assert!((value / expected - 1.0).abs() < 1e-5, "{value}, not {expected}");
+        }
+        assert_eq!((report.width, report.height), (200 / 12, 200 / 12));
+    }
+
+    #[test]
+    fn the_same_material_is_at_no_distance() {
+        let space = Space::half_angle(8);
+        let rows = stacks(&space);
+        let report = report(&space, &rows, rows.row(0).to_vec(), &sheet(100, |_| false), 0.3);
+        assert!(report.max < 1e-5, "{report:?}");
+    }
+
+    #[test]
+    fn dots_blend_into_their_mixture_as_the_eye_steps_back() {
+        let space = Space::half_angle(32);
+        let rows = stacks(&space);
+        let mixture: Vec<f64> = rows.row(0).iter().zip(rows.row(1)).map(|(a, b)| 0.5 * a + 0.5 * b).collect();
+        // 8 x 8 dots of either stack, which of the two by a mixed-up bit.
+        let rough = sheet(960, |i| {
+            let (x, y) = ((i % 960 / 8) as u32, (i / 960 / 8) as u32);
+            (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(2_246_822_519)).wrapping_mul(3_266_489_917) >> 31
+                == 1
+        });
+        let far: Vec<f64> = [0.3, 0.5, 1.0, 2.0]
+            .iter()
+            .map(|&m| report(&space, &rows, mixture.clone(), &rough, m).rmse)
+            .collect();
+        assert!(far.windows(2).all(|pair| pair[1] < 0.8 * pair[0]), "{far:?}");
+        let fine = sheet(960, |i| (i % 960 + i / 960) % 2 == 0);
+        assert!(report(&space, &rows, mixture, &fine, 0.5).max < 1e-3);
+    }
+
+    /// White noise of unit variance at every square degree passes the low-pass with the integral of its square
+    /// (in polar coordinates, summed by the midpoint rule), and a box of side b with 1 / b^2.
+    #[test]
+    fn the_spot_passes_noise_like_the_eye() {
+        let cycles = 0.525 * 11f64.ln() + 3.91;
+        let step = 1e-3;
+        let passed: f64 = (0..200_000)
+            .map(|i| (f64::from(i) + 0.5) * step)
+            .map(|f| (-2.0 * f / cycles).exp() * 2.0 * std::f64::consts::PI * f * step)
+            .sum();
+        let degrees = (spot_mm(0.5) / 500.0).to_degrees();
+        assert!((passed * degrees * degrees - 1.0).abs() < 1e-4);
+        // The window of taps 1/4, 1/2, 1/4 on cells of this size, rounded to dots.
+        let taps: f64 = [0.25f64, 0.5, 0.25].iter().map(|t| t * t).sum();
+        let side = cell_dots(0.5) as f64 / DOTS_PER_MM / taps;
+        assert!((side / spot_mm(0.5) - 1.0).abs() < 0.05, "{side} mm");
+    }
+
+    #[test]
+    fn reports_do_not_depend_on_the_number_of_threads() {
+        let space = Space::half_angle(4);
+        let rows = stacks(&space);
+        let noisy = sheet(700, |i| i % 7 == 3 || i % 11 == 1);
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| report(&space, &rows, rows.row(0).to_vec(), &noisy, 0.3))
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn prints_in_another_tabulation_are_refused() {
+        let (space, other) = (Space::half_angle(4), Space::half_angle(5));
+        let rows = stacks(&other);
+        let sheet = sheet(20, |_| false);
+        let target = Uniform(space.clone(), vec![0.1; 12]);
+        let print = Source::Print { sheet: &sheet, space: &other, stacks: &rows, area: Area::whole(&sheet) };
+        let result = fidelity(&Source::Document(&target), &print, (20, 20), 0.5, &Silent);
+        assert!(matches!(result, Err(PreviewError::Shape { expected: 12, found: 15, .. })));
+    }
+}

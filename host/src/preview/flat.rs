@@ -126,3 +126,134 @@ pub fn flat(
     };
     Ok((0..lights.len()).map(picture).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::source::Area;
+    use super::*;
+    use crate::brdf::{Space, Table};
+    use crate::observe::Silent;
+    use crate::sheet::Sheet;
+    use inks::{Curve, Stack};
+    use protocol::paper::Paper;
+    use std::f64::consts::PI;
+
+    /// A sheet of two stacks, the second on every dot where `inked` says so.
+    fn sheet(width: u16, length: u16, inked: impl Fn(usize, usize) -> bool) -> Sheet {
+        let index = (0..usize::from(width) * usize::from(length))
+            .map(|i| u8::from(inked(i % usize::from(width), i / usize::from(width))))
+            .collect();
+        let stacks = vec![Stack::SUBSTRATE, "SF".parse().unwrap()];
+        Sheet::new(Paper::Custom { width, length }, stacks, index).unwrap()
+    }
+
+    fn rows(space: &Space, curves: [&dyn Fn(f64) -> f64; 2]) -> Table {
+        let mut rows = Table::new(space.columns());
+        for f in curves {
+            rows.push(&space.row(&Curve::sampled(space.angles(), |t| [f(t); 3])));
+        }
+        rows
+    }
+
+    fn lit(sheet: &Sheet, space: &Space, stacks: &Table, lights: &[Light]) -> Vec<Radiance> {
+        let print = Source::Print { sheet, space, stacks, area: Area::whole(sheet) };
+        flat(&print, lights, sheet.width(), sheet.length(), &Silent).unwrap()
+    }
+
+    #[test]
+    fn lambertian_paper_under_a_lamp_falls_off_with_cosine_and_distance() {
+        let space = Space::half_angle(8);
+        let rows = rows(&space, [&|_| 0.6 / PI, &|_| 0.0]);
+        let (sheet, lamp) = (sheet(40, 20, |_, _| false), [0.3, -0.1, 0.8]);
+        let picture = &lit(&sheet, &space, &rows, &[Light::Point(lamp)])[0];
+        for (x, y) in [(0usize, 0usize), (39, 0), (20, 10), (7, 19), (31, 4)] {
+            // E = I cos_i / r^2 with I such that a surface at the middle turned to the lamp receives 1.
+            let to = [lamp[0] - (x as f64 - 19.5) / 40.0, lamp[1] + (y as f64 - 9.5) / 40.0, lamp[2]];
+            let intensity = lamp.iter().map(|v| v * v).sum::<f64>();
+            let r = to.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let expected = 0.6 / PI * intensity * to[2] / r.powi(3);
+            let found = f64::from(picture.pixels[y * 40 + x][1]);
+            assert!((found / expected - 1.0).abs() < 1e-5, "({x}, {y}): {found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn a_far_light_shows_the_curve_at_half_its_angle() {
+        let space = Space::half_angle(64);
+        let rows = rows(&space, [&|t| 1.0 + t, &|_| 0.0]);
+        let sheet = sheet(3, 2, |_, _| false);
+        for degrees in [0.0, 10.0, 47.0, 80.0f64] {
+            let angle = degrees.to_radians();
+            let light = Light::Far([0.0, 5.0 * angle.sin(), 5.0 * angle.cos()]);
+            let expected = (1.0 + angle / 2.0) * angle.cos();
+            let held = (1.0 + space.angles()[0]) * angle.cos();
+            for p in &lit(&sheet, &space, &rows, &[light])[0].pixels {
+                assert!((f64::from(p[0]) - expected.max(held)).abs() < 1e-5, "{degrees} degrees: {p:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_highlight_lies_beneath_the_lamp_and_is_sharper_on_foil_than_on_paper() {
+        let space = Space::half_angle(32);
+        let paper = |t| 0.27 + 0.04 * inks::ggx::lobe(t, 0.28);
+        let foil = |t| 0.005 + 0.85 * inks::ggx::lobe(t, 0.06);
+        let rows = rows(&space, [&paper, &foil]);
+        let sheet = sheet(120, 120, |x, _| x >= 60);
+        let at = |x: f64, y: f64| Light::Point([(x - 59.5) / 120.0, (59.5 - y) / 120.0, 0.7]);
+        let pictures = lit(&sheet, &space, &rows, &[at(30.0, 40.0), at(90.0, 70.0)]);
+        let mut widths = Vec::new();
+        for (picture, (x, y), half) in [(&pictures[0], (30, 40), 0..60), (&pictures[1], (90, 70), 60..120)] {
+            let row = |x: usize| picture.pixels[y * 120 + x][0];
+            let peak = half.clone().max_by(|&a, &b| row(a).total_cmp(&row(b))).unwrap();
+            assert!(peak.abs_diff(x) <= 1, "peak at {peak}, lamp over {x}");
+            widths.push(half.filter(|&x| row(x) > 0.5 * row(peak)).count());
+        }
+        assert!(widths[1] * 4 < widths[0], "half widths of paper and foil: {widths:?}");
+    }
+
+    #[test]
+    fn a_fine_mixture_is_lit_like_the_mean_of_its_parts() {
+        let space = Space::half_angle(16);
+        let rows = rows(&space, [&|t| 0.3 - 0.1 * t, &|t| 2.0 / (0.1 + t)]);
+        let quarter = sheet(80, 40, |x, y| (x + 2 * y) % 4 == 0);
+        let lights = [Light::Point([0.2, 0.1, 1.0]), Light::Far([-1.0, 0.5, 1.0])];
+        let picture = |sheet: &Sheet| {
+            let print = Source::Print { sheet, space: &space, stacks: &rows, area: Area::whole(sheet) };
+            flat(&print, &lights, 20, 10, &Silent).unwrap()
+        };
+        let (mixed, none, all) =
+            (picture(&quarter), picture(&sheet(80, 40, |_, _| false)), picture(&sheet(80, 40, |_, _| true)));
+        for light in 0..2 {
+            for i in 0..200 {
+                let expected = 0.75 * none[light].pixels[i][0] + 0.25 * all[light].pixels[i][0];
+                assert!((mixed[light].pixels[i][0] / expected - 1.0).abs() < 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn pictures_do_not_depend_on_the_number_of_threads() {
+        let space = Space::half_angle(8);
+        let rows = rows(&space, [&|t| 1.0 + t, &|t| 0.3 * t]);
+        let sheet = sheet(61, 33, |x, y| (x * y) % 3 == 1);
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| lit(&sheet, &space, &rows, &[Light::Point([0.1, 0.2, 0.9])]))
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn lights_below_the_sheet_and_tables_without_angles_are_refused() {
+        let space = Space::half_angle(2);
+        let rows = rows(&space, [&|_| 1.0, &|_| 1.0]);
+        let sheet = sheet(2, 2, |_, _| false);
+        let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area: Area::whole(&sheet) };
+        let lights = [Light::Far([0.0, 0.0, 1.0]), Light::Point([0.0, 0.0, -1.0])];
+        assert!(matches!(flat(&print, &lights, 2, 2, &Silent), Err(PreviewError::Light { light: 1, .. })));
+        let bare = Space::tabulated(&[1.0, 1.0], &[1.0, 1.0]).unwrap();
+        let print = Source::Print { sheet: &sheet, space: &bare, stacks: &rows, area: Area::whole(&sheet) };
+        assert!(matches!(flat(&print, &[], 2, 2, &Silent), Err(PreviewError::NoAngles { columns: 6 })));
+    }
+}

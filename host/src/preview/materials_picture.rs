@@ -135,3 +135,73 @@ fn wrapped(text: &str, room: usize, lines: usize) -> Vec<String> {
     }
     out.iter().map(|line| shortened(line.trim_end(), room)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::Silent;
+    use proptest::prelude::*;
+
+    fn stack(text: &str) -> Stack {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn mixtures_read_like_a_recipe() {
+        let mix =
+            [(stack("substrate"), 0.302), (stack("MS+C"), 0.617), (stack("F"), 0.08), (stack("K"), 0.001)];
+        assert_eq!(mix_in_words(&mix), "62 % MS+C, 30 % substrate, 8 % F");
+        assert_eq!(mix_in_words(&[]), "nothing");
+        assert_eq!(mix_in_words(&[(stack("K"), f64::NAN)]), "nothing");
+    }
+
+    proptest! {
+        #[test]
+        fn per_cents_of_a_recipe_sum_to_a_hundred(shares in prop::collection::vec(0.0f64..1.0, 1..57)) {
+            let mix: Vec<_> = shares.iter().map(|&s| (stack("C"), s)).collect();
+            if shares.iter().sum::<f64>() > 0.0 {
+                let words = mix_in_words(&mix);
+                let sum: u32 = words.split(", ").map(|p| p.split(' ').next().unwrap().parse::<u32>().unwrap()).sum();
+                prop_assert_eq!(sum, 100);
+            }
+        }
+    }
+
+    #[test]
+    fn long_recipes_break_at_their_commas() {
+        let lines = wrapped("62 % MS+C, 30 % substrate, 8 % F, 3 % K", 12, 2);
+        assert_eq!(lines, ["62 % MS+C,", "30 % subst.."]);
+    }
+
+    /// The balls of one row of the space are the same picture wherever they stand.
+    #[test]
+    fn equal_materials_have_equal_balls_on_both_sides_of_a_card() {
+        let space = Space::half_angle(16);
+        let row = space.row(&inks::Curve::sampled(space.angles(), |t| [0.5 * inks::ggx::lobe(t, 0.1); 3]));
+        let swatch =
+            Swatch { name: "basis 1".into(), target: &row, printed: &row, mix: vec![(stack("MS"), 1.0)] };
+        let ball = 40;
+        let picture = materials_picture(&space, &[swatch], &Probe::studio(16), ball, &Silent).unwrap();
+        let shift = (2 * ball + 6 + GAP) as u32;
+        // The balls' lines: below the title and the card's two lines of words.
+        let top = (GAP + Letters::Title.height() + GAP / 2 + 2 * (Letters::Plain.height() + 4)) as u32;
+        let mut lit = 0;
+        for y in top..top + ball as u32 {
+            for x in GAP as u32..(GAP + 2 * ball + 6) as u32 {
+                let left = picture.get_pixel(x, y);
+                assert_eq!(left, picture.get_pixel(x + shift, y), "({x}, {y})");
+                lit += u32::from(left.0[0] > 60);
+            }
+        }
+        assert!(lit > 300, "{lit} pixels lit");
+    }
+
+    #[test]
+    fn a_row_of_another_space_is_refused() {
+        let space = Space::half_angle(4);
+        let good = vec![0.1; 12];
+        let swatch = Swatch { name: String::new(), target: &good, printed: &good[..9], mix: Vec::new() };
+        let error = materials_picture(&space, &[swatch], &Probe::constant(1.0), 8, &Silent).unwrap_err();
+        assert!(matches!(error, PreviewError::Shape { expected: 12, found: 9, .. }), "{error}");
+    }
+}

@@ -221,3 +221,117 @@ fn smooth(from: f64, to: f64, x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::io::Cursor;
+
+    /// A flat (not run-length coded) file of RGBE pixels.
+    fn file(header: &str, width: usize, height: usize, pixels: &[[u8; 4]]) -> Vec<u8> {
+        let head = format!("#?RADIANCE\n{header}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
+        head.into_bytes().into_iter().chain(pixels.iter().flatten().copied()).collect()
+    }
+
+    fn read(bytes: Vec<u8>) -> Result<Probe, PreviewError> {
+        Probe::from_hdr(Cursor::new(bytes), Path::new("env.hdr"))
+    }
+
+    #[test]
+    fn rgbe_is_mantissa_times_a_power_of_two() {
+        let pixels = [[128, 64, 32, 129], [0, 0, 0, 0], [200, 100, 50, 136], [1, 2, 3, 130]];
+        let bytes = file("", 4, 2, &pixels.repeat(2));
+        let probe = read(bytes).unwrap();
+        assert_eq!((probe.width(), probe.height()), (4, 2));
+        for (found, [r, g, b, e]) in probe.rgb().iter().zip(pixels.iter().cycle()) {
+            let scale = 2f32.powi(i32::from(*e) - 136) * f32::from(u8::from(*e > 0));
+            for (found, mantissa) in found.iter().zip([r, g, b]) {
+                // Some readers put half a step on the mantissa.
+                assert!(
+                    (found - f32::from(*mantissa) * scale).abs() <= 0.5 * scale,
+                    "{found} {mantissa} {e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exposure_is_taken_out_again() {
+        let pixels = [[128, 64, 32, 129]; 2];
+        let plain = read(file("", 2, 1, &pixels)).unwrap();
+        let exposed = read(file("EXPOSURE=2.0\nEXPOSURE=4.0\n", 2, 1, &pixels)).unwrap();
+        for (a, b) in plain.rgb().iter().flatten().zip(exposed.rgb().iter().flatten()) {
+            assert!((a / 8.0 - b).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn huge_and_square_panoramas_are_refused_by_name() {
+        for (w, h) in [(1 << 20, 1 << 19), (64, 64), (0, 0), (16384, 8192)] {
+            let error = read(file("", w, h, &[])).unwrap_err().to_string();
+            assert!(error.contains("env.hdr"), "{error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn damaged_files_are_errors_or_panoramas_but_never_worse(
+            at in 0usize..140, byte in any::<u8>(), cut in 0usize..140,
+        ) {
+            let mut bytes = file("EXPOSURE=1\n", 8, 4, &[[2, 2, 0, 8]; 32]);
+            let len = bytes.len();
+            bytes[at % len] = byte;
+            bytes.truncate(len - cut % len);
+            if let Ok(probe) = read(bytes) {
+                prop_assert!(probe.rgb().iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
+            }
+        }
+
+        #[test]
+        fn shrinking_keeps_all_light(height in 1usize..5, k in 1usize..4, seed in any::<u32>()) {
+            let (h, w) = (height * k, 2 * height * k);
+            let value = |i: usize| ((i as u32).wrapping_mul(2_654_435_761).wrapping_add(seed) >> 16) as f32;
+            let probe = Probe::new(h, (0..w * h).map(|i| [value(i), value(i + 7), 1.0]).collect()).unwrap();
+            let small = probe.shrunk(height);
+            prop_assert!(small.height() <= height);
+            let light = |p: &Probe, c: usize| -> f64 {
+                (0..p.rgb().len()).map(|i| f64::from(p.rgb()[i][c]) * p.solid_angle(i / p.width())).sum()
+            };
+            for c in 0..3 {
+                prop_assert!((light(&small, c) / light(&probe, c) - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn texels_cover_the_whole_sphere() {
+        let probe = Probe::constant(1.0);
+        let sum: f64 = (0..probe.height()).map(|y| probe.solid_angle(y) * probe.width() as f64).sum();
+        assert!((sum - 4.0 * PI).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_middle_is_behind_the_eye_and_the_top_is_up() {
+        let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(direction(0.5, 0.5), [0.0, 0.0, 1.0]));
+        assert!(near(direction(0.0, 0.5), [0.0, 0.0, -1.0]));
+        assert!(near(direction(0.25, 0.5), [1.0, 0.0, 0.0]));
+        assert!(near(direction(0.1, 0.0), [0.0, 1.0, 0.0]));
+    }
+
+    #[test]
+    fn real_panoramas_open() {
+        let Ok(data) = std::env::var("FOILPRESS_DATA") else {
+            println!("skipped: FOILPRESS_DATA is not set");
+            return;
+        };
+        for name in ["studio.hdr", "venice.hdr"] {
+            let probe = Probe::read_hdr(&Path::new(&data).join("env").join(name)).unwrap();
+            assert_eq!((probe.width(), probe.height()), (1024, 512));
+            let small = probe.shrunk(128);
+            assert_eq!((small.width(), small.height()), (256, 128));
+            assert!(small.rgb().iter().flatten().any(|v| *v > 1.0));
+        }
+    }
+}

@@ -243,3 +243,128 @@ impl Lines<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::weights::{WeightMaps, quantise};
+    use inks::Stack;
+    use proptest::prelude::*;
+    use protocol::paper::Paper;
+
+    proptest! {
+        #[test]
+        fn every_dot_is_in_exactly_one_pixel(size in 1usize..300, pixels in 1usize..300) {
+            let mut times = vec![0; size];
+            for i in 0..pixels.min(size) {
+                let (start, end) = span(i, pixels.min(size), size);
+                times[start..end].iter_mut().for_each(|t| *t += 1);
+            }
+            prop_assert!(times.iter().all(|&t| t == 1));
+            for i in 0..pixels {
+                let (start, end) = span(i, pixels, size);
+                prop_assert!(start < end && end <= size);
+            }
+        }
+
+        #[test]
+        fn a_line_of_a_sheet_is_the_mean_of_its_dots(
+            dots in prop::collection::vec(0u8..3, 12 * 9), width in 1usize..15, height in 1usize..12,
+        ) {
+            let space = Space::half_angle(2);
+            let stacks: Vec<Stack> = ["substrate", "C", "MS"].iter().map(|s| s.parse().unwrap()).collect();
+            let mut rows = Table::new(6);
+            (0..3).for_each(|k| rows.push(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0].map(|v| v * f64::from(k + 1))));
+            let paper = Paper::Custom { width: 12, length: 9 };
+            let sheet = Sheet::new(paper, stacks, dots.clone()).unwrap();
+            let area = Area { left: 2, top: 1, width: 9, length: 7 };
+            let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area };
+            let lines = print.lines(width, height, 1).unwrap();
+            let mut out = vec![0.0; width * 6];
+            let mut scratch = Scratch::default();
+            for y in 0..height {
+                lines.read(y, &mut scratch, &mut out);
+                for x in 0..width {
+                    let (x0, x1) = (x * 9 / width, ((x + 1) * 9 / width).max(x * 9 / width + 1));
+                    let (y0, y1) = (y * 7 / height, ((y + 1) * 7 / height).max(y * 7 / height + 1));
+                    let all = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x + 2) + (y + 1) * 12));
+                    let mean = all.clone().map(|i| f64::from(dots[i]) + 1.0).sum::<f64>() / all.count() as f64;
+                    for (j, &found) in out[x * 6..][..6].iter().enumerate() {
+                        prop_assert!((f64::from(found) - mean * j as f64).abs() < 1e-4);
+                    }
+                }
+            }
+        }
+    }
+
+    /// A factored document as any other document.
+    struct Expanded<'a>(&'a Factored);
+
+    impl Materials for Expanded<'_> {
+        fn width(&self) -> usize {
+            self.0.maps.width()
+        }
+        fn height(&self) -> usize {
+            self.0.maps.height()
+        }
+        fn space(&self) -> &Space {
+            &self.0.space
+        }
+        fn reflectance(&self, pixel: usize, out: &mut [f32]) {
+            for (j, out) in out.iter_mut().enumerate() {
+                let terms = self.0.maps.at(pixel).iter().zip(self.0.bases.rows());
+                *out = terms.map(|(&w, b)| f32::from(w) / f32::from(ONE) * b[j] as f32).sum();
+            }
+        }
+    }
+
+    #[test]
+    fn a_factored_document_reads_like_the_same_document_expanded() {
+        let space = Space::half_angle(3);
+        let mut bases = Table::new(9);
+        (0..3).for_each(|k| bases.push(&[f64::from(k) + 0.5; 9]));
+        let (w, h) = (10, 7);
+        let mut data = vec![0; w * h * 3];
+        for (i, weights) in data.chunks_exact_mut(3).enumerate() {
+            quantise(&[i as f64, (i * 7 % 11) as f64, 3.0], weights);
+        }
+        let factored = Factored { space, bases, maps: WeightMaps::new(w, h, 3, data).unwrap() };
+        let expanded = Expanded(&factored);
+        for (width, height) in [(10, 7), (4, 3), (23, 9), (1, 1)] {
+            let read = |source: Source| {
+                let lines = source.lines(width, height, 64).unwrap();
+                let mut out = vec![0.0; width * 9];
+                let mut all = Vec::new();
+                for y in 0..height {
+                    lines.read(y, &mut Scratch::default(), &mut out);
+                    all.extend_from_slice(&out);
+                }
+                all
+            };
+            let pairs = read(Source::Factored(&factored)).into_iter().zip(read(Source::Document(&expanded)));
+            for (a, b) in pairs {
+                assert!((a - b).abs() < 1e-5, "{width} x {height}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        let space = Space::half_angle(2);
+        let sheet =
+            Sheet::new(Paper::Custom { width: 4, length: 4 }, vec![Stack::SUBSTRATE], vec![0; 16]).unwrap();
+        let mut one = Table::new(6);
+        one.push(&[0.1; 6]);
+        let print = |stacks, area| Source::Print { sheet: &sheet, space: &space, stacks, area };
+        let outside = Area { left: 2, top: 0, width: 3, length: 4 };
+        let error = print(&one, outside).lines(4, 4, 1).err().unwrap().to_string();
+        assert!(error.contains("(2, 0)") && error.contains("4 x 4"), "{error}");
+        let none = Table::new(6);
+        let error = print(&none, Area::whole(&sheet)).lines(4, 4, 1).err().unwrap().to_string();
+        assert!(error.contains("expected 1, found 0"), "{error}");
+        let narrow = Table::new(3);
+        assert!(print(&narrow, Area::whole(&sheet)).lines(4, 4, 1).is_err());
+        let error = print(&one, Area::whole(&sheet)).lines(0, 1 << 20, 1).err().unwrap().to_string();
+        assert!(error.contains("0 x 1048576"), "{error}");
+    }
+}

@@ -311,3 +311,151 @@ impl Tree {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::Silent;
+    use std::f64::consts::PI;
+
+    fn lobe(diffuse: f64, f0: f64, alpha: f64) -> impl Fn(f64) -> [f64; 3] {
+        move |t| {
+            let specular = f0 * inks::ggx::lobe(t, alpha);
+            [diffuse / PI + specular, 0.8 * diffuse / PI + specular, 0.3 * diffuse / PI + 0.7 * specular]
+        }
+    }
+
+    fn table(space: &Space, curves: &[&dyn Fn(f64) -> [f64; 3]]) -> Table {
+        let mut rows = Table::new(space.columns());
+        curves.iter().for_each(|f| rows.push(&space.row(&Curve::sampled(space.angles(), f))));
+        rows
+    }
+
+    /// `f(asin r) cos(asin r)`, averaged over a pixel by a much finer rule than the renderer's.
+    #[test]
+    fn a_ball_lit_from_the_eye_shows_its_curve() {
+        let (size, fine) = (48, 24);
+        let f = lobe(0.3, 0.5, 0.3);
+        let grid: Vec<f64> = (0..=2000).map(|i| PI / 2.0 * f64::from(i) / 2000.0).collect();
+        let ball = under_light(&Curve::sampled(&grid, &f), [0.0, 0.0, 3.0], size).unwrap();
+        for (i, pixel) in ball.pixels.iter().enumerate().filter(|(_, p)| p[3] == 1.0) {
+            let mut expected = 0.0;
+            for k in 0..fine * fine {
+                let at = |p: usize, s: usize| {
+                    (p as f64 + (s as f64 + 0.5) / fine as f64) / size as f64 * 2.0 - 1.0
+                };
+                let r = at(i % size, k % fine).hypot(at(i / size, k / fine)).min(1.0);
+                expected += f(r.asin())[0] * r.asin().cos() / (fine * fine) as f64;
+            }
+            let found = f64::from(pixel[0]);
+            // At the rim the curve's own slope has no bound; 0.001 is a hundredth of what the ball reflects there.
+            assert!(
+                (found - expected).abs() < 0.001 + 0.005 * expected,
+                "pixel {i}: {found}, not {expected}"
+            );
+        }
+    }
+
+    /// The mean of `cos theta` over the disc is 2/3.
+    #[test]
+    fn a_lambertian_ball_lit_from_the_eye_reflects_two_thirds() {
+        let white = Curve::sampled(&[0.0, PI / 2.0], |_| [1.0 / PI; 3]);
+        let ball = under_light(&white, [0.0, 0.0, 1.0], 200).unwrap();
+        let sum = |c: usize| ball.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>();
+        assert!((sum(0) / sum(3) * PI - 2.0 / 3.0).abs() < 1e-4);
+        assert!((sum(3) / 40_000.0 - PI / 4.0).abs() < 1e-3, "coverage of the disc");
+    }
+
+    #[test]
+    fn the_highlight_lies_where_the_normal_halves_light_and_eye() {
+        let size = 201;
+        let shiny = Curve::sampled(
+            &(0..400).map(|i| f64::from(i) * 0.0039).collect::<Vec<_>>(),
+            lobe(0.0, 0.8, 0.05),
+        );
+        // 60 degrees to the upper left: the half vector is 30 degrees off the eye, at r = 1/2.
+        let (side, front) = (60f64.to_radians().sin() / 2f64.sqrt(), 60f64.to_radians().cos());
+        let ball = under_light(&shiny, [-side, side, front], size).unwrap();
+        let (at, _) = ball.pixels.iter().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0])).unwrap();
+        let (x, y) = (at % size, at / size);
+        let expected = 100.0 - 100.5 * 0.5 / 2f64.sqrt();
+        assert!((x as f64 - expected).abs() <= 1.0 && (y as f64 - expected).abs() <= 1.0, "({x}, {y})");
+    }
+
+    #[test]
+    fn a_lambertian_in_a_furnace_reflects_its_albedo() {
+        let space = Space::half_angle(16);
+        let rows = table(&space, &[&|_| [0.5 / PI, 0.2 / PI, 1.0 / PI]]);
+        let ball = &under_probe(&space, &rows, &Probe::constant(2.0), 24, &Silent).unwrap()[0];
+        for p in ball.pixels.iter().filter(|p| p[3] == 1.0) {
+            for (found, albedo) in p.iter().zip([0.5, 0.2, 1.0]) {
+                assert!((found / (2.0 * albedo) - 1.0).abs() < 5e-3, "{found} for {albedo}");
+            }
+        }
+    }
+
+    /// The reflection integral texel by texel, with arc cosines and the curve itself.
+    fn texel_by_texel(curve: &Curve, probe: &Probe, n: [f64; 3]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for y in 0..probe.height() {
+            for x in 0..probe.width() {
+                let l = probe.direction(x, y);
+                let cos_i = dot(n, l);
+                if cos_i <= 0.0 {
+                    continue;
+                }
+                let h = [l[0], l[1], l[2] + 1.0];
+                let f = curve.at((dot(n, h) / dot(h, h).sqrt()).clamp(-1.0, 1.0).acos());
+                let light = probe.rgb()[y * probe.width() + x];
+                (0..3).for_each(|c| sum[c] += f[c] * cos_i * f64::from(light[c]) * probe.solid_angle(y));
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn groups_of_texels_light_a_ball_like_the_texels_themselves() {
+        let size = 23;
+        let space = Space::half_angle(32);
+        let rows = table(&space, &[&lobe(0.01, 0.9, 0.045), &lobe(0.1, 0.5, 0.27), &lobe(0.8, 0.04, 0.28)]);
+        let probe = Probe::studio(64);
+        let balls = under_probe(&space, &rows, &probe, size, &Silent).unwrap();
+        for (ball, row) in balls.iter().zip(rows.rows()) {
+            let curve = space.curve(row);
+            for (i, p) in ball.pixels.iter().enumerate().filter(|(_, p)| p[3] == 1.0) {
+                let at = |k: usize| (k as f64 + 0.5) / size as f64 * 2.0 - 1.0;
+                let (nx, ny) = (at(i % size), -at(i / size));
+                let expected = texel_by_texel(&curve, &probe, [nx, ny, (1.0 - nx * nx - ny * ny).sqrt()]);
+                for c in 0..3 {
+                    let relative = f64::from(p[c]) / expected[c] - 1.0;
+                    assert!(relative.abs() < 0.01, "pixel {i}: {} is {} of it too much", p[c], relative);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn balls_do_not_depend_on_the_number_of_threads() {
+        let space = Space::half_angle(8);
+        let rows = table(&space, &[&lobe(0.2, 0.3, 0.1), &lobe(0.7, 0.04, 0.3)]);
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| under_probe(&space, &rows, &Probe::studio(16), 20, &Silent).unwrap())
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn other_tabulations_and_rows_are_refused() {
+        let bare = Space::tabulated(&[1.0], &[1.0]).unwrap();
+        let error = under_probe(&bare, &Table::new(3), &Probe::constant(1.0), 8, &Silent).unwrap_err();
+        assert!(matches!(error, PreviewError::NoAngles { columns: 3 }), "{error}");
+        let space = Space::half_angle(4);
+        let error = under_probe(&space, &Table::new(3), &Probe::constant(1.0), 8, &Silent).unwrap_err();
+        assert!(matches!(error, PreviewError::Shape { expected: 12, found: 3, .. }), "{error}");
+        assert!(matches!(
+            under_light(&Curve::sampled(&[0.0], |_| [1.0; 3]), [0.0, f64::NAN, 1.0], 8),
+            Err(PreviewError::Light { .. })
+        ));
+    }
+}

@@ -1,8 +1,10 @@
 //! From radiance to the bytes of a picture.
 //!
-//! Method: one exposure for everything that is to be compared, then a curve that leaves darks and middles alone
-//! and bends only what would clip, on the largest channel so that a gold highlight stays gold; sRGB coding by
-//! `palette`. Limits: display-referred and not invertible above the bend; compare numbers on radiance.
+//! Method: one exposure for everything that is to be compared; then a curve that leaves darks and middles alone and
+//! bends what would clip, `x / (x + room)` above the knee, so that a highlight a hundred times white still has a
+//! shape. It is taken half on the largest channel (gold stays gold) and half channel by channel (the core of a
+//! highlight goes to white, as on film). sRGB coding by `palette`. Limits: display-referred; compare numbers on
+//! radiance, not on bytes.
 
 use palette::{LinSrgb, Srgb};
 
@@ -19,7 +21,7 @@ const PAPER: f32 = 3.0;
 pub struct Exposure(pub f32);
 
 impl Exposure {
-    /// An exposure under which 90 % of the covered pixels of `pictures` lie below the bend of the curve, but never
+    /// An exposure under which 70 % of the covered pixels of `pictures` lie below the bend of the curve, but never
     /// so far from that of white paper that black would look white: a factor of 4 at most either way.
     pub fn of(pictures: &[Radiance]) -> Exposure {
         let mut values: Vec<f32> = pictures
@@ -31,7 +33,7 @@ impl Exposure {
         if values.is_empty() {
             return Exposure(PAPER);
         }
-        let at = (values.len() - 1) * 9 / 10;
+        let at = (values.len() - 1) * 7 / 10;
         let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
         Exposure((KNEE / bright.max(1e-9)).clamp(PAPER / 4.0, PAPER * 4.0))
     }
@@ -43,10 +45,15 @@ impl Exposure {
         if most <= KNEE {
             return rgb;
         }
-        let room = 1.0 - KNEE;
-        let bent = KNEE + room * (1.0 - (-(most - KNEE) / room).exp());
-        rgb.map(|v| v * bent / most)
+        let together = bent(most) / most;
+        rgb.map(|v| 0.5 * (v * together + bent(v)))
     }
+}
+
+/// The curve: the identity below the knee, towards 1 above it, with one slope where they meet.
+fn bent(v: f32) -> f32 {
+    let (over, room) = (v - KNEE, 1.0 - KNEE);
+    if over <= 0.0 { v } else { KNEE + room * over / (over + room) }
 }
 
 /// Codes a linear colour of 0 to 1 as sRGB.
@@ -59,4 +66,58 @@ pub fn srgb(rgb: [f32; 3]) -> [u8; 3] {
 pub fn linear(rgb: [u8; 3]) -> [f32; 3] {
     let colour: LinSrgb<f32> = Srgb::new(rgb[0], rgb[1], rgb[2]).into_linear();
     [colour.red, colour.green, colour.blue]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(values: &[f32]) -> Radiance {
+        let pixels = values.iter().map(|&v| [v, 0.5 * v, 0.25 * v, 1.0]).collect();
+        Radiance { width: values.len(), height: 1, pixels }
+    }
+
+    #[test]
+    fn brighter_stays_brighter_and_below_white() {
+        let mut last = -1.0;
+        // From black to 130 times white: beyond, steps this fine fall below the digits of f32.
+        for i in 0..1200 {
+            let shown = Exposure(1.0).shown([1.5f32.powf(i as f32 / 100.0) - 1.0, 0.2, 0.1]);
+            assert!(shown[0] > last && shown[0] <= 1.0, "step {i}: {} after {last}", shown[0]);
+            last = shown[0];
+        }
+    }
+
+    #[test]
+    fn darks_and_middles_are_left_alone() {
+        assert_eq!(Exposure(2.0).shown([0.1, 0.2, 0.35]), [0.2, 0.4, 0.7]);
+    }
+
+    #[test]
+    fn highlights_go_towards_white_but_keep_their_order() {
+        let [r, g, b] = Exposure(1.0).shown([18.0, 14.0, 6.0]);
+        assert!(r > g && g > b && b > 0.5, "{r} {g} {b}");
+    }
+
+    #[test]
+    fn most_of_a_picture_lies_below_the_bend() {
+        let values: Vec<f32> = (1..=100).map(|i| i as f32 * 0.01).collect();
+        let exposure = Exposure::of(&[picture(&values)]);
+        let below = values.iter().filter(|&&v| v * exposure.0 <= 0.7 + 1e-6).count();
+        assert!((69..=71).contains(&below), "{below} of 100");
+        let black = Exposure::of(&[picture(&[0.0; 9])]);
+        assert!(black.0.is_finite() && black.0 <= 12.0, "{black:?}");
+    }
+
+    /// IEC 61966-2-1, by its formula.
+    #[test]
+    fn bytes_are_srgb() {
+        for i in 0..=1000 {
+            let v = f64::from(i) / 1000.0;
+            let coded = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+            let found = srgb([v as f32; 3])[1];
+            assert!((f64::from(found) - 255.0 * coded).abs() < 0.55, "{v}: {found}, not {}", 255.0 * coded);
+        }
+        assert_eq!(srgb(linear([0, 52, 255])), [0, 52, 255]);
+    }
 }
