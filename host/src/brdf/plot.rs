@@ -17,16 +17,16 @@ pub struct PlotError {
     pub problem: String,
 }
 
-/// Columns and rows of characters of a terminal plot.
-const TERMINAL: (u32, u32) = (72, 20);
+/// Characters across a terminal plot, and down a decade of it: the scale has a label every four rows.
+const TERMINAL: (u32, u32) = (72, 4);
 const INKS: [(u8, u8, u8); 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 
-/// Decades that hold the curve: whole powers of ten, at least one and at most six.
+/// Decades that hold the curve: whole powers of ten, at least three and at most six.
 fn decades(curve: &Curve) -> (i32, i32) {
     let values = || curve.rgb().iter().flatten().copied().filter(|v| *v > 0.0);
     let most = values().fold(1e-12, f64::max).log10().ceil() as i32;
     let least = values().fold(f64::MAX, f64::min).log10().floor() as i32;
-    (least.clamp(most - 6, most - 1), most)
+    (least.clamp(most - 6, most - 3), most)
 }
 
 /// Points in degrees and decades, close enough together for any plot.
@@ -54,7 +54,8 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
         .map(|c| points(curve, c, range).into_iter().map(|(x, y)| (x as f32, y as f32)).collect())
         .collect();
     let lines: Vec<Shape<'_>> = shapes.iter().map(|points| Shape::Lines(points)).collect();
-    let (width, height) = (TERMINAL.0 * 2, TERMINAL.1 * 4);
+    // A character is two dots wide and four high.
+    let (width, height) = (TERMINAL.0 * 2, TERMINAL.1 * 4 * range.0.abs_diff(range.1));
     let mut chart = Chart::new_with_y_range(width, height, 0.0, 90.0, range.0 as f32, range.1 as f32);
     let mut chart: &mut Chart<'_> = chart
         .x_label_format(LabelFormat::Custom(Box::new(|degrees| format!("{degrees:.0} deg"))))
@@ -69,13 +70,16 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
     chart.to_string()
 }
 
-/// A reflectance with two digits, however small.
+/// A reflectance with two significant digits, however small.
 fn number(value: f64) -> String {
-    match value {
-        v if v >= 10.0 => format!("{v:.0}"),
-        v if v >= 0.095 => format!("{v:.2}"),
-        v if v >= 0.00095 => format!("{v:.4}"),
-        v => format!("{v:.1e}"),
+    let decimals = 1 - value.max(1e-300).log10().floor() as i32;
+    if decimals > 5 {
+        return format!("{value:.0e}");
+    }
+    let text = format!("{value:.0$}", decimals.max(0) as usize);
+    match text.split_once('.') {
+        Some(_) => text.trim_end_matches('0').trim_end_matches('.').into(),
+        None => text,
     }
 }
 
@@ -120,10 +124,16 @@ mod tests {
     #[test]
     fn the_scale_holds_the_curve_and_no_more_than_six_decades() {
         let level = |v: f64| Curve::new(vec![0.0], vec![[v; 3]]).unwrap();
-        assert_eq!(decades(&level(0.25)), (-1, 0));
-        assert_eq!(decades(&level(0.0)), (-13, -12));
+        assert_eq!(decades(&level(0.25)), (-3, 0));
+        assert_eq!(decades(&level(0.0)), (-15, -12));
         let steep = Curve::new(vec![0.0, 1.0], vec![[30.0; 3], [1e-9; 3]]).unwrap();
         assert_eq!(decades(&steep), (-4, 2));
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let numbers = [100.0, 12.3, 1.0, 0.1, 0.034, 0.001, 1e-9].map(number);
+        assert_eq!(numbers, ["100", "12", "1", "0.1", "0.034", "0.001", "1e-9"]);
     }
 
     #[test]
@@ -131,7 +141,8 @@ mod tests {
         for values in [[0.0; 3], [1e300; 3], [1e-300, 1.0, 30.0], [5.0, 0.0, 1e-5]] {
             let curve = Curve::new(vec![0.0, 0.4], vec![values, [0.1; 3]]).unwrap();
             let text = terminal(&curve, false);
-            assert!(text.lines().count() > TERMINAL.1 as usize, "{text}");
+            let rows = TERMINAL.1 * decades(&curve).0.abs_diff(decades(&curve).1);
+            assert!(text.lines().count() > rows as usize, "{text}");
             assert!(text.contains("90 deg"));
             let picture = svg("a curve", &curve).unwrap();
             assert!(picture.starts_with("<svg") && picture.contains("a curve") && !picture.contains("NaN"));
