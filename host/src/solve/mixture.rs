@@ -6,7 +6,8 @@
 //! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, its second
 //! derivative corrected to the exact one where that is positive; the model is minimised exactly by
 //! [`Simplex`](super::Simplex) over the stacks in use and those whose gradient says they would help; Armijo's rule
-//! halves the step. It ends when the Frank-Wolfe gap or the relative drop is at rounding. All stacks are priced in
+//! halves the step. It ends when the gap is as small as asked or the
+//! objective drops by less than 1e-12 of itself. All stacks are priced in
 //! every step, only a dozen enter the quadratic.
 //! Cost: K m multiplications a step for the prices (K stacks, m columns), about 5 steps from the tangent start and
 //! 2 from a neighbour's answer; no allocation. Limits: E is convex where no sample of the mixture is more than 8
@@ -24,8 +25,6 @@ use super::vector::{add_scaled, dot};
 pub const LAYER_PRICE: f64 = 1e-6;
 /// Relative drop of the objective below which the search ends.
 const DROP: f64 = 1e-12;
-/// Gap, relative to the target's own squared length, that counts as none.
-const GAP: f64 = 1e-15;
 /// Steps taken at most; ten times what the slowest of a thousand random problems needs.
 const MOST_STEPS: u32 = 100;
 /// Stacks that may join the mixture in one step.
@@ -89,8 +88,6 @@ pub struct Hull {
 pub struct Target {
     radiance: Vec<f64>,
     root: Vec<f64>,
-    /// Squared length of the weighted roots: the scale of squared distances.
-    length: f64,
 }
 
 /// What is known of a mixture.
@@ -104,6 +101,13 @@ pub struct Fit {
     pub steps: u32,
     /// No sample of the mixture is above 8 times the target, so E is convex around it and the gap is a bound.
     pub convex: bool,
+}
+
+impl Target {
+    /// Integral of the cube root of the target's radiance over the metric's measure, all channels.
+    pub fn brightness(&self, hull: &Hull) -> f64 {
+        self.root.iter().zip(&hull.weight).map(|(root, w)| root * w * w).sum()
+    }
 }
 
 impl Fit {
@@ -204,7 +208,9 @@ impl Hull {
             return Err(MixtureError::Columns { what: "the target", expected: m, found: reflectance.len() });
         }
         target.radiance.clear();
-        target.radiance.extend(reflectance.zip(&self.radiance).map(|(f, c)| f.max(0.0) * c));
+        target
+            .radiance
+            .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
         target.root.clear();
         target.root.resize(m, 0.0);
         for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
@@ -212,15 +218,12 @@ impl Hull {
             let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));
             *root = t * r * r;
         }
-        target.length = 0.0;
-        for (w, r) in self.weight.iter().zip(&target.root) {
-            target.length += (w * r) * (w * r);
+        match target.radiance.iter().position(|t| !t.is_finite()) {
+            Some(column) => {
+                Err(MixtureError::Value { what: "the target", column, value: target.radiance[column] })
+            }
+            None => Ok(()),
         }
-        if !target.length.is_finite() {
-            let column = target.radiance.iter().position(|t| !t.is_finite()).unwrap_or(0);
-            return Err(MixtureError::Value { what: "the target", column, value: target.radiance[column] });
-        }
-        Ok(())
     }
 
     /// The distance d of a mixture to a target.
@@ -261,6 +264,8 @@ pub struct Mixer {
     stiffness: Vec<f64>,
     /// Half the gradient, one for each stack.
     slope: Vec<f64>,
+    /// Which stacks may not be used.
+    closed: Vec<bool>,
     /// The stacks of the quadratic, their stiffness-scaled rows, slopes and weights.
     working: Vec<usize>,
     scaled: Vec<f64>,
@@ -285,6 +290,7 @@ impl Mixer {
             pull: Vec::new(),
             stiffness: Vec::new(),
             slope: Vec::new(),
+            closed: Vec::new(),
             working: Vec::new(),
             scaled: Vec::new(),
             working_slope: Vec::new(),
@@ -377,19 +383,64 @@ impl Mixer {
 
     /// Refines a start to the minimum. `a` is the start, a point of the simplex, and receives the weights.
     pub fn refine(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::All, 0.0)
+    }
+
+    /// The same, ending when the gap (in squared distance) is at most `gap`: for a picture's worth of targets.
+    pub fn refine_to(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        gap: f64,
+    ) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::All, gap)
+    }
+
+    /// The best mixture of the stacks that have weight in `a`. The gap is over these stacks alone.
+    pub fn polish(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::Support, 0.0)
+    }
+
+    /// The same, ending when the gap (in squared distance) is at most `gap`.
+    pub fn polish_to(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        gap: f64,
+    ) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::Support, gap)
+    }
+
+    fn descend(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        reach: Reach,
+        enough: f64,
+    ) -> Result<Fit, MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
         let (k, m) = (hull.len(), hull.columns());
+        self.closed.clear();
+        self.closed.extend(a.iter().map(|&w| matches!(reach, Reach::Support) && w <= 0.0));
         hull.mix(a, &mut self.mix);
         let mut squared = self.linearise(hull, target);
         let mut steps = 0;
         let mut stalled = false;
         let gap = loop {
             for i in 0..k {
-                self.slope[i] = dot(hull.rows.row(i), &self.pull) + 0.5 * hull.price[i];
+                // A closed stack is so dear that it never joins.
+                self.slope[i] = if self.closed[i] {
+                    f64::MAX
+                } else {
+                    dot(hull.rows.row(i), &self.pull) + 0.5 * hull.price[i]
+                };
             }
             let gap = 2.0 * frank_wolfe_gap(&self.slope, a);
-            if stalled || steps >= MOST_STEPS || gap <= GAP * target.length.min(squared) || gap.is_nan() {
+            if stalled || steps >= MOST_STEPS || gap <= enough || gap.is_nan() {
                 break gap;
             }
             steps += 1;
@@ -508,6 +559,13 @@ impl Mixer {
         }
         (sum[0] + sum[1]) + (sum[2] + sum[3])
     }
+}
+
+/// Which stacks may get weight.
+#[derive(Clone, Copy)]
+enum Reach {
+    All,
+    Support,
 }
 
 #[derive(Clone, Copy)]

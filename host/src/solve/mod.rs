@@ -9,9 +9,6 @@ pub mod root;
 pub mod simplex;
 pub mod vector;
 
-#[cfg(test)]
-mod modelled;
-
 pub use gram::{Gram, GramError};
 pub use mixture::{Best, Fit, Hull, Mixer, MixtureError, Target};
 pub use simplex::{Certificate, Simplex, SimplexError};
