@@ -16,7 +16,7 @@ use crate::halftone::{self, HalftoneError, Placement};
 use crate::job::placement::{self, PlacementError, Size};
 use crate::job::stream::{self, StreamError};
 use crate::observe::Observer;
-use crate::separate::{self, Pass, SeparateError, Separation};
+use crate::separate::{self, Pass, SeparateError, Separation, Severity};
 use crate::sheet::Sheet;
 use crate::simulate::{self, Difference, PrintoutError, SimulateError};
 
@@ -78,6 +78,9 @@ pub enum PrintError {
     /// Writing the job.
     #[error(transparent)]
     Stream(#[from] StreamError),
+    /// The machine's rules forbid the job.
+    #[error("this must not be printed: {0}")]
+    Refused(String),
     /// The simulated printer.
     #[error("the simulated printer did not print the job: {0}")]
     Simulate(#[from] SimulateError),
@@ -105,10 +108,16 @@ pub fn print(
         settings.paper,
     )?;
     let (factored, factoring) = factor_document(document, &settings.factor, observer)?;
+    if let Some(report) = &factoring {
+        observer.note(&report.to_string());
+    }
     let printable = Printable::from_library(library, &settings.inks, &factored.space);
     let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
     let sheet = halftone_mix(&mapped.mix, library, &placement, observer)?;
     let separation = separate::separate(&sheet, observer)?;
+    if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Refuse) {
+        return Err(PrintError::Refused(check.text.clone()));
+    }
     let job = job_of(&separation.passes, settings.paper, settings.media, &settings.inks, observer)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)?;
     let printed = printout.sheet_with(sheet.stacks())?;

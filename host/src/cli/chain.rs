@@ -9,6 +9,7 @@ use clap::Args as ClapArgs;
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
 use super::output::Staged;
 use crate::document::{self, foil};
+use crate::gamut::files::Provenance;
 use crate::gamut::{self, Printable};
 use crate::job::placement;
 use crate::observe::Observer;
@@ -85,7 +86,13 @@ impl Map {
         let materials = document.as_ref().map(|document| document.materials());
         let mapped =
             gamut::map(&factored, materials, &printable, &self.gamut.settings(self.seed), observer)?;
-        gamut::files::write(&mapped.mix, read.size_mm, staged.path())?;
+        let provenance = Provenance {
+            document: read.name.clone(),
+            mapping: format!("intent {:?}, seed {}", mapped.report.intent, self.seed),
+            library: library.name().into(),
+            size_mm: read.size_mm,
+        };
+        gamut::files::save(&mapped.mix, &provenance, staged.path())?;
         staged.commit()
     }
 }
@@ -111,9 +118,9 @@ impl Halftone {
     /// Mixtures → one stack for every dot.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
-        let (mix, size_mm) = gamut::files::read(&self.mix)?;
+        let (mix, provenance) = gamut::files::load(&self.mix)?;
         let pixels = (mix.maps.width(), mix.maps.height());
-        let placement = placement::place(pixels, size_mm, self.page.size, self.page.paper)?;
+        let placement = placement::place(pixels, provenance.size_mm, self.page.size, self.page.paper)?;
         let staged = Staged::new(&self.output)?;
         pipeline::halftone_mix(&mix, &library, &placement, observer)?.save(staged.path())?;
         staged.commit()

@@ -224,7 +224,7 @@ fn report(
         "seed": settings.factor.seed,
         "factoring": print.factoring,
         "gamut": {
-            "intent": mapped.intent.to_string(), "gloss_scale": mapped.gloss_scale, "bases": bases,
+            "intent": mapped.intent, "gloss_scale": mapped.gloss_scale, "bases": bases,
             "given_up": given_up, "pixels": pixels,
         },
         "plan": plan,

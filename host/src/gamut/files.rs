@@ -75,7 +75,7 @@ pub enum MixFileError {
 }
 
 /// Where a mix comes from, in words; kept with it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
     /// The document it was made of.
@@ -87,6 +87,9 @@ pub struct Provenance {
     /// The ink library it was made with.
     #[serde(default)]
     pub library: String,
+    /// The document's own width and height on paper in millimetres.
+    #[serde(default)]
+    pub size_mm: Option<(f64, f64)>,
 }
 
 #[derive(Serialize, Deserialize)]

@@ -20,6 +20,7 @@ mod mix;
 mod sample;
 
 use inks::Stack;
+use serde::Serialize;
 use protocol::ink::Ink;
 
 use crate::brdf::Table;
@@ -42,7 +43,8 @@ const CARTRIDGE_SAMPLE: usize = 256;
 const FEW_MERGED: f64 = 0.01;
 
 /// What to do with materials outside the printer's gamut.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Intent {
     /// Clamp, unless that merges more than 1 % of pairs of materials that differ; then blend.
     #[default]

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::placement::size_mm;
 use crate::halftone::Placement;
-use crate::separate::Separation;
+use crate::separate::{Check, Separation};
 use crate::sheet::Sheet;
 
 /// What will be printed, from what, and what to think of it.
@@ -30,7 +30,7 @@ pub struct Plan {
     /// The stacks in use, most dots first; shares are of the document's dots.
     pub stacks: Vec<Share>,
     /// What the machine's rules say of the job.
-    pub checks: Vec<String>,
+    pub checks: Vec<Check>,
 }
 
 /// A cartridge to load.
@@ -119,7 +119,7 @@ impl Plan {
                 })
                 .collect(),
             stacks,
-            checks: separation.checks.iter().map(ToString::to_string).collect(),
+            checks: separation.checks.clone(),
         }
     }
 }

@@ -11,6 +11,7 @@
 use crate::brdf::{Space, Table};
 use crate::document::Materials;
 use crate::factor::Factored;
+use crate::halftone::Placement;
 use crate::sheet::Sheet;
 use crate::weights::ONE;
 
@@ -30,6 +31,13 @@ pub struct Area {
 }
 
 impl Area {
+    /// The area a document was placed on.
+    pub fn of(placement: &Placement) -> Area {
+        let [left, top, width, length] =
+            [placement.x, placement.y, placement.width, placement.height].map(usize::from);
+        Area { left, top, width, length }
+    }
+
     /// All of a sheet.
     pub fn whole(sheet: &Sheet) -> Area {
         Area { left: 0, top: 0, width: sheet.width(), length: sheet.length() }
