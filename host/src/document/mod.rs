@@ -5,14 +5,19 @@
 //! error that names the file and the field. Whatever a reader decided on the user's behalf (the colour space of
 //! a map, a channel it left out, relief it turned into roughness) is one of [`Document::notes`].
 
+pub mod average;
 pub mod error;
+pub mod foil;
 pub mod folder;
 pub mod materials;
+pub mod merl;
 pub mod names;
 pub mod picture;
 pub mod relief;
+pub mod rgl;
 pub mod source;
 pub mod surfaces;
+pub mod tensor;
 pub mod texture;
 
 use std::path::Path;
@@ -122,10 +127,18 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     let path = Path::new(spec);
     let mut source = Source::new(observer);
     if source.is_folder(path)? {
+        if path.join(foil::INDEX).is_file() {
+            return foil::open(path, source);
+        }
         return folder::open(path, options, space, source);
     }
+    let head = source.head(path)?;
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    if head.starts_with(b"tensor_file\0") || extension == "bsdf" {
+        return rgl::open(path, space, source);
+    }
     match extension.as_str() {
+        "binary" => merl::open(path, space, source),
         "csv" => surfaces::open_curve(path, space, source),
         _ => Err(DocumentError::Kind { path: path.to_path_buf() }),
     }

@@ -95,6 +95,14 @@ impl Picture {
         matches!(self.values, Values::Float(_))
     }
 
+    /// The values of a 16-bit grey picture, 0 to 65535.
+    pub fn sixteen(&self) -> Option<&[u16]> {
+        match &self.values {
+            Values::Sixteen(values) if self.channels == 1 => Some(values),
+            _ => None,
+        }
+    }
+
     /// Channels without alpha: 1 or 3.
     pub fn colours(&self) -> usize {
         if self.channels < 3 { 1 } else { 3 }
