@@ -9,6 +9,7 @@ pub mod average;
 pub mod error;
 pub mod foil;
 pub mod folder;
+pub mod gltf;
 pub mod materials;
 pub mod merl;
 pub mod names;
@@ -136,6 +137,9 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     if head.starts_with(b"tensor_file\0") || extension == "bsdf" {
         return rgl::open(path, space, source);
+    }
+    if head.starts_with(b"glTF") || extension == "gltf" || extension == "glb" {
+        return gltf::open(path, options, space, source);
     }
     match extension.as_str() {
         "binary" => merl::open(path, space, source),

@@ -266,3 +266,36 @@ pub fn encode(v: f32) -> u8 {
     use palette::encoding::{FromLinear, Srgb};
     byte(<Srgb as FromLinear<f32, f32>>::from_linear(v.clamp(0.0, 1.0)))
 }
+
+/// A smooth function of the place, sampled every few pixels and linear between.
+pub struct Coarse {
+    across: usize,
+    down: usize,
+    step: f32,
+    values: Vec<f32>,
+}
+
+impl Coarse {
+    /// Samples `f` every `step` pixels over a picture, on all cores.
+    pub fn sample(width: usize, height: usize, step: usize, f: impl Fn(Point) -> f32 + Sync) -> Coarse {
+        let (across, down) = (width / step + 2, height / step + 2);
+        let values = (0..across * down)
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|i| f([(i % across * step) as f32, (i / across * step) as f32]))
+            .collect();
+        Coarse { across, down, step: step as f32, values }
+    }
+
+    /// The value at a place; places outside count as the border's.
+    pub fn at(&self, p: Point) -> f32 {
+        let cell = |v: f32, n: usize| {
+            let v = (v / self.step).clamp(0.0, (n - 1) as f32);
+            let i = (v as usize).min(n - 2);
+            (i, v - i as f32)
+        };
+        let ((x, s), (y, t)) = (cell(p[0], self.across), cell(p[1], self.down));
+        let row = |y: usize| mix(self.values[y * self.across + x], self.values[y * self.across + x + 1], s);
+        mix(row(y), row(y + 1), t)
+    }
+}

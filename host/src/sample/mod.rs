@@ -4,7 +4,11 @@
 //! very same numbers. Deterministic: no clock, no random source but a hash.
 
 mod canvas;
+mod card;
+mod dove;
+mod flange;
 mod ladder;
+mod leaf;
 
 use std::path::Path;
 
@@ -29,11 +33,17 @@ pub struct Sample {
 }
 
 /// All samples.
-pub const SAMPLES: [Sample; 1] = [Sample {
-    name: "ladder",
-    about: "four steps of gloss over one colour, 100, 80, 50 and 10 percent",
-    draw: ladder::draw,
-}];
+pub const SAMPLES: [Sample; 5] = [
+    Sample { name: "leaf", about: "an autumn oak leaf with silver veins on matte paper", draw: leaf::draw },
+    Sample { name: "card", about: "a greeting card: gold, silver and glossy holly on matte green", draw: card::draw },
+    Sample { name: "dove", about: "a silver dove with a glossy olive twig on matte blue", draw: dove::draw },
+    Sample { name: "flange", about: "a rusted steel ring, bare metal beside rust", draw: flange::draw },
+    Sample {
+        name: "ladder",
+        about: "four steps of gloss over one colour, 100, 80, 50 and 10 percent",
+        draw: ladder::draw,
+    },
+];
 
 /// What else the pixels of a painting hold beside their base colour, 0 to 255 for 0 to 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
