@@ -289,7 +289,10 @@ mod tests {
             let t = (pixel % width) as f64 / (width - 1) as f64;
             quantise(&[1.0 - t, t], out);
         }
-        let matrix = vec![vec![crate::weights::ONE, 0, 0], vec![0, crate::weights::ONE / 4, 3 * crate::weights::ONE / 4]];
+        let matrix = vec![
+            vec![crate::weights::ONE, 0, 0],
+            vec![0, crate::weights::ONE / 4, crate::weights::ONE / 4 * 3],
+        ];
         let stacks = vec![Stack::SUBSTRATE, Stack::new([Ink::Cyan]), Stack::new([Ink::MetallicSilver])];
         let mix = InkMix { stacks, maps: WeightMaps::new(width, height, 2, data).unwrap(), matrix };
         let paper = Paper::Custom { width: 700, length: 640 };

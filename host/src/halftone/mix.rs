@@ -124,8 +124,10 @@ pub(super) struct Lattice<'a> {
     mix: &'a InkMix,
     /// Numbers in `mix.stacks` of the stacks with weight, ascending.
     pub(super) stacks: Vec<u8>,
-    /// Channels with weight, and their shares of the stacks above.
-    rows: Vec<(usize, Vec<Lanes>)>,
+    /// Channels with weight.
+    channels: Vec<usize>,
+    /// For each eight of the stacks above the shares of each of these channels.
+    shares: Vec<Lanes>,
     shapes: Vec<Shape>,
     across: Axis,
     down: Axis,
@@ -145,15 +147,15 @@ impl<'a> Lattice<'a> {
         let channels: Vec<usize> = (0..maps.channels()).filter(|&i| sums[i] > 0).collect();
         let used = |q: &usize| channels.iter().any(|&i| mix.matrix[i][*q] > 0);
         let stacks: Vec<u8> = (0..mix.stacks.len()).filter(used).map(|q| q as u8).collect();
-        let rows = channels
-            .iter()
-            .map(|&i| {
-                let mut row = vec![Lanes::default(); blocks(stacks.len())];
-                for (lane, &q) in stacks.iter().enumerate() {
-                    row[lane / LANES].0[lane % LANES] = i32::from(mix.matrix[i][usize::from(q)]);
-                }
-                (i, row)
-            })
+        let share = |block: usize, channel: usize| {
+            let stack = |l: usize| stacks.get(block * LANES + l);
+            Lanes(std::array::from_fn(|l| {
+                stack(l).map_or(0, |&q| i32::from(mix.matrix[channel][usize::from(q)]))
+            }))
+        };
+        let shares = (0..blocks(stacks.len()))
+            .flat_map(|block| channels.iter().map(move |&channel| (block, channel)))
+            .map(|(block, channel)| share(block, channel))
             .collect();
         let finer = (maps.width() > width, maps.height() > height);
         let axis =
@@ -174,7 +176,8 @@ impl<'a> Lattice<'a> {
         Lattice {
             mix,
             stacks,
-            rows,
+            channels,
+            shares,
             shapes,
             across: axis(finer.0, width, maps.width()),
             down: axis(finer.1, height, maps.height()),
@@ -247,25 +250,21 @@ impl<'a> Lattice<'a> {
     /// Shares in the rule's unit from basis weights.
     #[inline(always)]
     fn shares(&self, weights: &[u32], out: &mut [Lanes]) {
-        out.fill(Lanes::default());
-        for (channel, row) in &self.rows {
-            let weight = weights[*channel] as i32;
-            if weight == 0 {
-                continue;
-            }
-            for (sum, share) in out.iter_mut().zip(row) {
+        let (mut total, mut most) = ([0i32; LANES], [0i32; LANES]);
+        let channels = self.channels.len();
+        for (out, shares) in out.iter_mut().zip(self.shares.chunks_exact(channels)) {
+            let mut sum = [0i32; LANES];
+            for (&channel, share) in self.channels.iter().zip(shares) {
+                let weight = weights[channel] as i32;
                 for l in 0..LANES {
                     // The whole sum is about 2^31, and kept as the bits of an unsigned number.
-                    sum.0[l] = sum.0[l].wrapping_add(weight.wrapping_mul(share.0[l]));
+                    sum[l] = sum[l].wrapping_add(weight.wrapping_mul(share.0[l]));
                 }
             }
-        }
-        let (mut total, mut most) = ([0i32; LANES], [0i32; LANES]);
-        for sum in out.iter_mut() {
             for l in 0..LANES {
                 // From 2^-31 to 2^-18.
-                let share = ((sum.0[l] as u32 + (1 << 12)) >> 13) as i32;
-                sum.0[l] = share;
+                let share = ((sum[l] as u32 + (1 << 12)) >> 13) as i32;
+                out.0[l] = share;
                 total[l] += share;
                 most[l] = most[l].max(share);
             }

@@ -410,7 +410,13 @@ mod tests {
     #[test]
     fn outside_the_rectangle_is_bare_and_inside_only_what_has_weight() {
         let mix = plain(3, 3, 4, |_, _| vec![0.0, 0.4, 0.0, 0.6]);
-        let place = Placement { paper: Paper::Custom { width: 300, length: 200 }, x: 37, y: 61, width: 101, height: 99 };
+        let place = Placement {
+            paper: Paper::Custom { width: 300, length: 200 },
+            x: 37,
+            y: 61,
+            width: 101,
+            height: 99,
+        };
         let sheet = run(&mix, &place, 9);
         for (dot, &stack) in sheet.index().iter().enumerate() {
             let (x, y) = (dot % 300, dot / 300);
@@ -461,8 +467,10 @@ mod tests {
         assert!(census[0].abs_diff(census[1]) <= 64, "{census:?}");
         for y in (0..192).step_by(48) {
             for x in (0..192).step_by(48) {
-                let ones: usize =
-                    (y..y + 48).flat_map(|y| &sheet.index()[y * 240 + x..][..48]).map(|&s| usize::from(s)).sum();
+                let ones: usize = (y..y + 48)
+                    .flat_map(|y| &sheet.index()[y * 240 + x..][..48])
+                    .map(|&s| usize::from(s))
+                    .sum();
                 assert!(ones.abs_diff(1152) < 110, "{ones} of 2304 at ({x}, {y})");
             }
         }
@@ -509,7 +517,9 @@ mod tests {
         let error = |mix: &InkMix, place: &Placement, settings: &Settings| {
             halftone(mix, place, settings, &Silent).unwrap_err().to_string()
         };
-        for place in [Placement { x: 1, ..page }, Placement { height: 0, ..page }, Placement { y: u16::MAX, ..page }] {
+        for place in
+            [Placement { x: 1, ..page }, Placement { height: 0, ..page }, Placement { y: u16::MAX, ..page }]
+        {
             assert!(error(&mix, &place, &settings).contains("does not fit the 50 x 60"));
         }
         assert!(error(&mix, &page, &Settings::uniform(3, 9)).contains("3 minimum clusters"));

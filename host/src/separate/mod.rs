@@ -116,7 +116,10 @@ pub enum SeparateError {
         stack: Stack,
     },
     /// More passes than a sheet survives.
-    #[error("the sheet needs {passes} passes ({}), at most {MOST_PASSES} are printed; use stacks with fewer layers", names(inks))]
+    #[error(
+        "the sheet needs {passes} passes ({}), at most {MOST_PASSES} are printed; use stacks with fewer layers",
+        names(inks)
+    )]
     Passes {
         /// How many.
         passes: usize,
@@ -234,7 +237,9 @@ pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet,
     let stride = width.div_ceil(8);
     for (i, pass) in passes.iter().enumerate() {
         let plane = &pass.plane;
-        if (plane.width, plane.length, plane.stride, plane.bits.len()) != (width, length, stride, stride * length) {
+        if (plane.width, plane.length, plane.stride, plane.bits.len())
+            != (width, length, stride, stride * length)
+        {
             return Err(SeparateError::Plane {
                 pass: i + 1,
                 ink: pass.ink,
@@ -248,7 +253,8 @@ pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet,
         }
     }
     crate::sheet::check_stacks(stacks)?;
-    let numbers: HashMap<&[Ink], u16> = stacks.iter().zip(0..).map(|(stack, q)| (stack.layers(), q)).collect();
+    let numbers: HashMap<&[Ink], u16> =
+        stacks.iter().zip(0..).map(|(stack, q)| (stack.layers(), q)).collect();
     let layers = |mask: usize| -> Vec<Ink> {
         passes.iter().enumerate().filter(|(p, _)| mask >> p & 1 == 1).map(|(_, pass)| pass.ink).collect()
     };
@@ -262,5 +268,147 @@ pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet,
             let stack = Stack::new(layers(mask));
             Err(SeparateError::Unknown { x: dot % width, y: dot / width, stack, stacks: stacks.len() })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::Silent;
+    use proptest::prelude::*;
+
+    /// A sheet of random dots over random stacks of at most four inks, or of five given ones.
+    fn sheets() -> impl Strategy<Value = Sheet> {
+        let stack = prop::collection::vec(0usize..4, 1..4);
+        (1u16..60, 1u16..150, prop::collection::vec(stack, 0..12), any::<u32>()).prop_map(
+            |(width, length, stacks, seed)| {
+                let inks = [Ink::MetallicSilver, Ink::Cyan, Ink::Primer, Ink::Finish];
+                let mut all = vec![Stack::SUBSTRATE];
+                for stack in stacks {
+                    let stack = Stack::new(stack.into_iter().map(|i| inks[i]).collect::<Vec<_>>());
+                    if !all.contains(&stack) {
+                        all.push(stack);
+                    }
+                }
+                let random = |i: usize| ((i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 7) as usize;
+                let dots = usize::from(width) * usize::from(length);
+                let index = (0..dots).map(|i| (random(i) % all.len()) as u8).collect();
+                Sheet::new(Paper::Custom { width, length }, all, index).unwrap()
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn passes_rebuild_the_sheet_dot_for_dot(sheet in sheets()) {
+            let separation = separate(&sheet, &Silent).unwrap();
+            let again = compose(sheet.paper(), &separation.passes, sheet.stacks()).unwrap();
+            prop_assert_eq!(again, sheet);
+        }
+
+        #[test]
+        fn the_plan_counts_the_dots_of_the_planes(sheet in sheets()) {
+            let separation = separate(&sheet, &Silent).unwrap();
+            prop_assert_eq!(separation.plan.passes.len(), separation.passes.len());
+            for (planned, pass) in separation.plan.passes.iter().zip(&separation.passes) {
+                prop_assert_eq!((planned.ink, planned.dots), (pass.ink, pass.plane.dots()));
+                prop_assert!(planned.dots > 0);
+            }
+        }
+
+        #[test]
+        fn saved_passes_come_back_bit_by_bit(sheet in sheets()) {
+            let separation = separate(&sheet, &Silent).unwrap();
+            let folder = tempfile::tempdir().unwrap();
+            files::save(&separation, folder.path()).unwrap();
+            let saved = files::load(folder.path()).unwrap();
+            prop_assert_eq!((&saved.passes, &saved.stacks), (&separation.passes, &separation.stacks));
+            prop_assert_eq!(saved.paper, sheet.paper());
+        }
+    }
+
+    fn page(stacks: &[&str]) -> Sheet {
+        let stacks: Vec<Stack> = stacks.iter().map(|text| text.parse().unwrap()).collect();
+        let index = (0..20 * 20).map(|dot| (dot % stacks.len()) as u8).collect();
+        Sheet::new(Paper::Custom { width: 20, length: 20 }, stacks, index).unwrap()
+    }
+
+    #[test]
+    fn stacks_without_a_dot_cost_no_pass() {
+        let stacks = ["substrate", "C", "MS+K"].map(|text| text.parse().unwrap()).to_vec();
+        let sheet = Sheet::new(Paper::Custom { width: 2, length: 1 }, stacks, vec![0, 1]).unwrap();
+        let separation = separate(&sheet, &Silent).unwrap();
+        assert_eq!(separation.plan.cartridges, [Ink::Cyan]);
+        assert_eq!(separation.stacks.len(), 2);
+        let bare = Sheet::new(sheet.paper(), sheet.stacks().to_vec(), vec![0, 0]).unwrap();
+        assert!(separate(&bare, &Silent).unwrap().passes.is_empty());
+        assert_eq!(compose(bare.paper(), &[], bare.stacks()).unwrap(), bare);
+    }
+
+    #[test]
+    fn an_ink_at_two_depths_takes_two_passes_of_one_cartridge() {
+        let plan = separate(&page(&["substrate", "K+P+F+P+W"]), &Silent).unwrap().plan;
+        assert_eq!(plan.passes.len(), 5);
+        assert_eq!(plan.cartridges, [Ink::Black, Ink::Primer, Ink::Finish, Ink::White]);
+    }
+
+    #[test]
+    fn more_than_the_machine_holds_is_refused() {
+        let inks = ["substrate", "K", "C", "M", "Y", "MG", "MM", "MC", "MS"];
+        assert!(separate(&page(&inks[..8]), &Silent).is_ok());
+        let error = separate(&page(&inks), &Silent).unwrap_err().to_string();
+        assert!(error.contains("8 cartridges (black, cyan") && error.contains("holds 7"), "{error}");
+        let high = format!("C{}", "+C".repeat(16));
+        assert!(matches!(separate(&page(&["substrate", &high]), &Silent), Err(SeparateError::Layers { .. })));
+        let (cyan_first, black_first) = (vec!["C+K"; 8].join("+"), vec!["K+C"; 8].join("+"));
+        let error = separate(&page(&["substrate", &cyan_first, &black_first]), &Silent).unwrap_err();
+        assert!(matches!(error, SeparateError::Passes { passes: 17, .. }), "{error}");
+    }
+
+    #[test]
+    fn passes_that_make_no_sheet_are_refused_where_it_happens() {
+        let sheet = page(&["substrate", "C", "MS+C"]);
+        let separation = separate(&sheet, &Silent).unwrap();
+        let paper = sheet.paper();
+        let mut passes = separation.passes.clone();
+        passes[0].plane.bits[3] |= 0x80;
+        let fewer = [Stack::SUBSTRATE, "C".parse().unwrap()];
+        let error = compose(paper, &separation.passes, &fewer).unwrap_err().to_string();
+        assert!(error.contains("`MS+C` on dot (2, 0)"), "{error}");
+        // Dot 0 of row 1 is number 20, stack C; with a bit more of the first pass it is MS+C.
+        assert_eq!(compose(paper, &passes, sheet.stacks()).unwrap().index()[20], 2);
+        passes[1].plane.length = 19;
+        let error = compose(paper, &passes, sheet.stacks()).unwrap_err().to_string();
+        assert!(error.contains("pass 2 (cyan) has 20 x 19"), "{error}");
+        let many = vec![separation.passes[0].clone(); 17];
+        assert!(matches!(
+            compose(paper, &many, sheet.stacks()),
+            Err(SeparateError::Passes { passes: 17, .. })
+        ));
+    }
+
+    #[test]
+    fn a_changed_folder_is_refused_with_file_and_field() {
+        let folder = tempfile::tempdir().unwrap();
+        let separation = separate(&page(&["substrate", "C", "MS+C"]), &Silent).unwrap();
+        files::save(&separation, folder.path()).unwrap();
+        let path = folder.path().join(files::TEXT);
+        let good = std::fs::read_to_string(&path).unwrap();
+        for (from, to, words) in [
+            ("format = 1", "format = 2", "format: 2"),
+            ("\"cyan\"", "\"tin\"", "pass 2, ink: `tin`"),
+            ("02-cyan.png", "../02-cyan.png", "expected `02-cyan.png`"),
+            ("dots = 133", "dots = 134", "the picture was changed"),
+            ("dots = 133", "dots = 133\ninks = 2", "inks"),
+            ("width = 20", "width = 21", "expected 21 x 20 dots, One bits"),
+        ] {
+            assert!(good.contains(from), "{good}");
+            std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+            let error = files::load(folder.path()).unwrap_err().to_string();
+            assert!(error.contains(words), "{words}: {error}");
+        }
+        std::fs::write(&path, &good).unwrap();
+        std::fs::remove_file(folder.path().join("02-cyan.png")).unwrap();
+        assert!(files::load(folder.path()).unwrap_err().to_string().contains("02-cyan.png"));
     }
 }

@@ -143,7 +143,8 @@ impl Search<'_> {
                 let layers = self.wanted.iter().zip(next).map(|(w, &at)| w.len() - usize::from(at));
                 (self.bound(next), layers.sum::<usize>())
             };
-            let Some((ink, next)) = self.inks.iter().filter_map(step).min_by_key(|(_, next)| rest(next)) else {
+            let Some((ink, next)) = self.inks.iter().filter_map(step).min_by_key(|(_, next)| rest(next))
+            else {
                 break;
             };
             inks.push(ink);

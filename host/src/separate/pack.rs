@@ -14,7 +14,9 @@ const ROWS: usize = 64;
 
 /// Bit j of byte i to bit i of byte j.
 fn transpose(mut x: u64) -> u64 {
-    for (shift, mask) in [(7, 0x00aa_00aa_00aa_00aa), (14, 0x0000_cccc_0000_cccc), (28, 0x0000_0000_f0f0_f0f0)] {
+    for (shift, mask) in
+        [(7, 0x00aa_00aa_00aa_00aa), (14, 0x0000_cccc_0000_cccc), (28, 0x0000_0000_f0f0_f0f0)]
+    {
         let swap = (x ^ (x >> shift)) & mask;
         x ^= swap ^ (swap << shift);
     }
@@ -24,9 +26,8 @@ fn transpose(mut x: u64) -> u64 {
 /// A plane for each pass. `passes_of[stack]` has bit p set if the stack is in pass p, `passes` of them (16 at most).
 pub(super) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: usize) -> Vec<Plane> {
     let (stride, length) = (width.div_ceil(8), index.len() / width);
-    let mut planes: Vec<Plane> = (0..passes)
-        .map(|_| Plane { width, length, stride, bits: vec![0; stride * length] })
-        .collect();
+    let mut planes: Vec<Plane> =
+        (0..passes).map(|_| Plane { width, length, stride, bits: vec![0; stride * length] }).collect();
     // `slabs[i]` are the rows of slab i in each plane.
     let mut slabs: Vec<Vec<&mut [u8]>> = (0..length.div_ceil(ROWS)).map(|_| Vec::new()).collect();
     for plane in &mut planes {
@@ -41,7 +42,8 @@ pub(super) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: u
                 let (whole, rest) = dots.as_chunks::<8>();
                 let start = row * stride;
                 for (at, dots) in whole.iter().enumerate() {
-                    let bits = transpose(u64::from_be_bytes(dots.map(|dot| byte[usize::from(dot)]))).to_le_bytes();
+                    let bits =
+                        transpose(u64::from_be_bytes(dots.map(|dot| byte[usize::from(dot)]))).to_le_bytes();
                     for (plane, bits) in planes.iter_mut().zip(bits) {
                         plane[start + at] = bits;
                     }
@@ -64,7 +66,12 @@ pub(super) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: u
 
 /// Stack numbers from planes of one size: `stack_of[mask]` for the dots with these passes, where the table says
 /// [`NONE`] there is none. The error is the first such dot and its mask.
-pub(super) fn unpack(planes: &[&Plane], width: usize, length: usize, stack_of: &[u16]) -> Result<Vec<u8>, (usize, usize)> {
+pub(super) fn unpack(
+    planes: &[&Plane],
+    width: usize,
+    length: usize,
+    stack_of: &[u16],
+) -> Result<Vec<u8>, (usize, usize)> {
     let stride = width.div_ceil(8);
     let mask_of = |row: usize, at: usize| {
         let mut masks = [0usize; 8];

@@ -107,7 +107,13 @@ struct Rule {
 /// The undercoat that gives foil its grip.
 const UNDERCOAT: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];
 
-const fn rule(name: &'static str, severity: Severity, certainty: Certainty, when: When, text: &'static str) -> Rule {
+const fn rule(
+    name: &'static str,
+    severity: Severity,
+    certainty: Certainty,
+    when: When,
+    text: &'static str,
+) -> Rule {
     Rule { name, severity, certainty, when, text }
 }
 
@@ -278,7 +284,8 @@ pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan) -> Vec<Check> {
             }
         };
         // The sharper of two rules on the same size is enough.
-        let said = rule.name == "foil-fine" && checks.iter().any(|check: &Check| check.rule == "foil-speckle");
+        let said =
+            rule.name == "foil-fine" && checks.iter().any(|check: &Check| check.rule == "foil-speckle");
         if touched && !said {
             let Rule { name, severity, certainty, .. } = *rule;
             checks.push(Check { rule: name, severity, certainty, text, stacks });
@@ -297,7 +304,9 @@ impl When {
                     && layers[..i].iter().any(|below| lower.contains(&below.kind()))
                     && !(layer.kind() == Kind::Foil && beneath(i, &UNDERCOAT))
             }
-            When::OnTopOf(kind, below) => layer.kind() == *kind && i > 0 && below.contains(&layers[i - 1].kind()),
+            When::OnTopOf(kind, below) => {
+                layer.kind() == *kind && i > 0 && below.contains(&layers[i - 1].kind())
+            }
             When::Without(kind, inks) => layer.kind() == *kind && !beneath(i, inks),
             When::NotFirst(kind, on) => layer.kind() == *kind && i > 0 && !on.contains(&layers[i - 1].kind()),
             When::Single(kind) => {
@@ -337,7 +346,8 @@ mod tests {
 
     #[test]
     fn each_rule_is_touched_by_what_it_describes_and_not_by_what_it_allows() {
-        let has = |stack: &str, side: usize, rule: &str| touched(stack, side).iter().any(|(name, _)| *name == rule);
+        let has =
+            |stack: &str, side: usize, rule: &str| touched(stack, side).iter().any(|(name, _)| *name == rule);
         for (rule, wrong, right) in [
             ("foil-undercoat", "SF", "C+M+Y+K+SF"),
             ("foil-undercoat", "C+M+Y+SF", "K+Y+M+C+GF"),
