@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use inks::{Library, LibraryError, Problem, Provenance, Severity, Stack};
+use proptest::prelude::*;
 use protocol::ink::Ink;
 
 const BUILTIN: &str = include_str!("../library/library.toml");
@@ -227,4 +228,50 @@ fn what_is_no_library_is_an_error_with_its_path() {
         &[("library.toml", "format = 1\nbased_on = \"elsewhere\"\n")],
         &["library.toml:2:", "`built-in`"],
     );
+}
+
+/// The blocks of the guide that are fenced as `language`.
+fn blocks(language: &str) -> Vec<&'static str> {
+    let guide = include_str!("../../docs/measuring-inks.md");
+    let fence = format!("```{language}\n");
+    guide.split(fence.as_str()).skip(1).map(|rest| rest.split("```").next().unwrap()).collect()
+}
+
+#[test]
+fn the_examples_of_the_guide_are_libraries() {
+    let curve = blocks("csv")[0];
+    let examples = blocks("toml");
+    assert_eq!(examples.len(), 2);
+    for (example, changed) in examples.into_iter().zip(["MS+C", "K+F"]) {
+        let folder = folder(&[("library.toml", example), ("ms-c.csv", curve)]);
+        let library = Library::from_dir(folder.path()).unwrap();
+        let stack: Stack = changed.parse().unwrap();
+        assert_ne!(library.entry(&stack).unwrap().curve, Library::builtin().entry(&stack).unwrap().curve);
+    }
+}
+
+proptest! {
+    /// A library's text is an owner's or a stranger's: whatever it says, the answer is a library or a list of problems.
+    #[test]
+    fn a_damaged_library_is_told_and_never_panics(at in 0usize..BUILTIN.len(), cut in 0usize..200, put in "\\PC{0,8}") {
+        prop_assume!(BUILTIN.is_ascii());
+        let end = (at + cut).min(BUILTIN.len());
+        let text = format!("{}{put}{}", &BUILTIN[..at], &BUILTIN[end..]);
+        let folder = folder(&[("library.toml", &text)]);
+        match Library::from_dir(folder.path()) {
+            Ok(library) => prop_assert!(library.entries()[0].stack == Stack::SUBSTRATE),
+            Err(LibraryError::Problems { problems }) => {
+                prop_assert!(problems.iter().any(|p| p.severity == Severity::Error));
+            }
+        }
+    }
+
+    #[test]
+    fn a_damaged_curve_is_told_and_never_panics(rows in prop::collection::vec("[-0-9.,eEnNaAiIfF \"]{0,24}", 0..12)) {
+        let curve = format!("theta_h_deg,r,g,b\n{}", rows.join("\n"));
+        let folder = folder(&[("library.toml", &measured("C", "c.csv")), ("c.csv", &curve)]);
+        if let Ok(library) = Library::from_dir(folder.path()) {
+            prop_assert!(library.entries().iter().all(|e| e.curve.rgb().iter().flatten().all(|v| v.is_finite())));
+        }
+    }
 }

@@ -139,3 +139,26 @@ fn reflectance_agrees_with_the_published_figures_within_rounding() {
         }
     }
 }
+
+/// Gloss of stacks whose metal, if any, is not coloured: the published readings do not say how they weigh channels,
+/// nor how a metal's reflectance rises under a dark ink.
+#[test]
+fn gloss_agrees_with_the_published_readings() {
+    let library = Library::builtin();
+    for (stack, published) in [
+        ("substrate", 2.0),
+        ("C", 11.0),
+        ("K", 9.0),
+        ("P", 4.0),
+        ("F", 31.0),
+        ("MS", 19.0),
+        ("SF", 246.0),
+        ("MS+F", 43.0),
+        ("SF+F", 226.0),
+        ("P+SF", 328.0),
+        ("P+MS", 23.0),
+    ] {
+        let reading = inks::gloss::units(&library.optics().lobes(&stack.parse().unwrap()).unwrap());
+        assert!((reading - published).abs() < 0.6 + 0.03 * published, "{stack}: {reading} not {published}");
+    }
+}

@@ -105,6 +105,7 @@ fn draw(text: &mut String, title: &str, curve: &Curve) -> Result<(), Box<dyn std
         .configure_mesh()
         .x_desc("half angle, degrees")
         .y_desc("reflectance, 1/sr")
+        .x_label_formatter(&|degrees| format!("{degrees:.0}"))
         .y_label_formatter(&|value| number(*value))
         .x_labels(10)
         .light_line_style(BLACK.mix(0.06))

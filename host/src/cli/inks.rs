@@ -225,6 +225,12 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
             lines.push(format!("lobe      F0 {}, alpha {:.3}", rgb(lobe.f0), lobe.alpha));
         }
     }
+    if let Some(lobes) = &entry.lobes {
+        lines.push(format!(
+            "gloss     {:.0} units at 60 degrees, as a gloss meter would read the model",
+            inks::gloss::units(lobes)
+        ));
+    }
     lines.push(format!("cluster   {} dots of 1/600 inch or more", library.minimum_cluster(stack)));
     for (place, &ink) in stack.layers().iter().enumerate() {
         lines.push(String::new());
