@@ -65,9 +65,15 @@ impl Canvas {
     /// Writes a line with its top left corner at (x, y); what does not fit is cut off. Letters outside Latin-1
     /// appear as question marks.
     pub fn text(&mut self, x: usize, y: usize, letters: Letters, colour: [u8; 3], text: &str) {
+        let (width, height) = (self.image.width() as usize, self.image.height() as usize);
+        if x >= width || y >= height {
+            return;
+        }
         let style = MonoTextStyle::new(letters.font(), Rgb888::new(colour[0], colour[1], colour[2]));
-        let at = Point::new(x.min(i32::MAX as usize) as i32, y.min(i32::MAX as usize) as i32);
-        let Ok(_) = Text::with_baseline(text, at, style, Baseline::Top).draw(self);
+        // What lies outside is cut off here: the drawing library adds up widths without looking.
+        let visible: String = text.chars().take((width - x).div_ceil(letters.width())).collect();
+        let at = Point::new(x as i32, y as i32);
+        let Ok(_) = Text::with_baseline(&visible, at, style, Baseline::Top).draw(self);
     }
 
     /// Lays radiance over the ground with its top left corner at (x, y).
@@ -108,5 +114,45 @@ impl DrawTarget for Canvas {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_stay_where_they_are_put_and_what_does_not_fit_is_cut_off() {
+        let mut canvas = Canvas::new(40, 30).unwrap();
+        canvas.text(9, 8, Letters::Small, INK, "MS+C · 62 % ñ");
+        canvas.text(1 << 40, 5, Letters::Title, INK, "far away");
+        canvas.text(5, 1 << 40, Letters::Title, INK, "far below");
+        let image = canvas.finish();
+        let lit = |x: u32, y: u32| image.get_pixel(x, y).0 != GROUND;
+        let all = || (0..30).flat_map(|y| (0..40).map(move |x| (x, y)));
+        assert!(all().filter(|&(x, y)| lit(x, y)).count() > 40);
+        assert!(all().filter(|&(x, y)| lit(x, y)).all(|(x, y)| x >= 9 && (8..21).contains(&y)));
+    }
+
+    #[test]
+    fn half_covered_pixels_are_half_ground() {
+        let mut canvas = Canvas::new(3, 1).unwrap();
+        let pixels = vec![[0.2, 0.2, 0.2, 1.0], [0.1, 0.1, 0.1, 0.5], [0.0; 4]];
+        canvas.paste(0, 0, &Radiance { width: 3, height: 1, pixels }, Exposure(1.0));
+        let image = canvas.finish();
+        let value = |x| linear(image.get_pixel(x, 0).0)[0];
+        assert!((value(0) - 0.2).abs() < 2e-3);
+        assert!((value(1) - 0.5 * (0.2 + linear(GROUND)[0])).abs() < 2e-3);
+        assert_eq!(image.get_pixel(2, 0).0, GROUND);
+    }
+
+    #[test]
+    fn pictures_beyond_the_edge_are_cut_off() {
+        let mut canvas = Canvas::new(2, 2).unwrap();
+        let picture = Radiance { width: 3, height: 3, pixels: vec![[9.0, 9.0, 9.0, 1.0]; 9] };
+        canvas.paste(1, 1, &picture, Exposure(1.0));
+        let image = canvas.finish();
+        assert_eq!(image.get_pixel(0, 1).0, GROUND);
+        assert!(image.get_pixel(1, 1).0[0] > 240);
     }
 }

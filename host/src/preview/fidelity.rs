@@ -57,15 +57,14 @@ pub fn cell_dots(metres: f64) -> usize {
     (spot_mm(metres) * DOTS_PER_MM * 6.0 / 16.0).round().max(1.0) as usize
 }
 
-/// Compares a print with its target as seen from `metres` (0.5 is arm's length). `length_dots` is the target's
-/// printed size across and down, the size of the printed area.
+/// Compares a print with its target as seen from `metres` (0.5 is arm's length). The print's own pixels are dots of
+/// 1/600 inch, and the target lies over all of it.
 ///
 /// # Errors
 /// When the two are not in the same tabulation, or a table does not fit its source.
 pub fn fidelity(
     target: &Source,
     print: &Source,
-    length_dots: (usize, usize),
     metres: f64,
     observer: &dyn Observer,
 ) -> Result<Report, PreviewError> {
@@ -78,7 +77,8 @@ pub fn fidelity(
         });
     }
     let cell = cell_dots(metres);
-    let (width, height) = ((length_dots.0 / cell).max(1), (length_dots.1 / cell).max(1));
+    let (across, down) = print.size();
+    let (width, height) = ((across / cell).max(1), (down / cell).max(1));
     let target = target.lines(width, height, SAMPLES)?;
     let print = print.lines(width, height, SAMPLES)?;
     observer.begin("comparing print and document", height as u64);
@@ -194,8 +194,7 @@ mod tests {
     fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> Report {
         let target = Uniform(space.clone(), target);
         let print = Source::Print { sheet, space, stacks: rows, area: Area::whole(sheet) };
-        let size = (sheet.width(), sheet.length());
-        fidelity(&Source::Document(&target), &print, size, metres, &Silent).unwrap()
+        fidelity(&Source::Document(&target), &print, metres, &Silent).unwrap()
     }
 
     #[test]
@@ -275,7 +274,7 @@ mod tests {
         let sheet = sheet(20, |_| false);
         let target = Uniform(space.clone(), vec![0.1; 12]);
         let print = Source::Print { sheet: &sheet, space: &other, stacks: &rows, area: Area::whole(&sheet) };
-        let result = fidelity(&Source::Document(&target), &print, (20, 20), 0.5, &Silent);
+        let result = fidelity(&Source::Document(&target), &print, 0.5, &Silent);
         assert!(matches!(result, Err(PreviewError::Shape { expected: 12, found: 15, .. })));
     }
 }

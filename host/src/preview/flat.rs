@@ -37,14 +37,20 @@ impl Light {
         Ok(())
     }
 
+    /// The direction to the light from a point of the sheet, of any length.
+    pub fn direction(self, x: f64, y: f64) -> [f64; 3] {
+        match self {
+            Light::Far(v) => v,
+            Light::Point(p) => [p[0] - x, p[1] - y, p[2]],
+        }
+    }
+
     /// Half angle (radians) and `E cos_i` at a point of the sheet.
     pub fn at(self, x: f64, y: f64) -> (f64, f64) {
-        let (to, falloff) = match self {
-            Light::Far(v) => (v, 1.0),
-            Light::Point(p) => {
-                let to = [p[0] - x, p[1] - y, p[2]];
-                (to, dot(p, p) / dot(to, to))
-            }
+        let to = self.direction(x, y);
+        let falloff = match self {
+            Light::Far(_) => 1.0,
+            Light::Point(p) => dot(p, p) / dot(to, to),
         };
         let across = to[0].hypot(to[1]);
         (0.5 * across.atan2(to[2]), falloff * to[2] / dot(to, to).sqrt())

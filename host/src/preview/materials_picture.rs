@@ -61,7 +61,7 @@ pub fn materials_picture(
     // White paper joins the balls only to set the exposure of the probe.
     rows.push(&vec![0.85 / std::f64::consts::PI; space.columns()]);
     let mut around = under_probe(space, &rows, &probe.shrunk(PROBE_ROWS), ball, observer)?;
-    let paper = around.pop().map_or(Exposure(3.0), |p| Exposure::of(&[p]));
+    let paper = around.pop().map_or(Exposure::PAPER, |p| Exposure::of(&[p]));
     let near: Vec<Radiance> = (0..2 * swatches.len())
         .into_par_iter()
         .map(|i| under_light(&space.curve(rows.row(i)), LIGHT, ball))
@@ -90,7 +90,7 @@ pub fn materials_picture(
         canvas.text(x + pair + GAP, y + line, Letters::Small, FAINT, "print");
         for (side, left) in [(0, x), (1, x + pair + GAP)] {
             let top = y + 2 * line;
-            canvas.paste(left, top, &near[2 * i + side], Exposure(3.0));
+            canvas.paste(left, top, &near[2 * i + side], Exposure::PAPER);
             canvas.paste(left + ball + 6, top, &around[2 * i + side], paper);
         }
         let words = mix_in_words(&swatch.mix);

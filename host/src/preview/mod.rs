@@ -6,7 +6,7 @@
 //! Limits: one bounce, no shadows, no paper curl, BRDFs of the half angle only; an eye infinitely far away.
 //!
 //! [`sphere`] lights balls, [`probe`] is the light around them, [`source`] says what lies at a pixel of a
-//! document or a sheet, [`flat`] lights it, [`fidelity()`] compares two of them as the eye would, [`tone`] turns
+//! document or a sheet, [`mod@flat`] lights it, [`fidelity()`] compares two of them as the eye would, [`tone`] turns
 //! radiance to bytes, and [`sheet_picture()`] and [`materials_picture()`] lay the results out.
 
 pub mod fidelity;
@@ -30,7 +30,7 @@ pub use source::{Area, Source};
 use std::path::PathBuf;
 
 /// The longest side of any picture made here, in pixels: larger than every sheet in dots.
-pub const LONGEST_SIDE: usize = 16_384;
+pub const LONGEST_SIDE: usize = 8192;
 
 /// Linear radiance, row by row from the top; the fourth value is how much of the pixel is covered (0 to 1), and
 /// the colours are already multiplied by it.

@@ -124,7 +124,9 @@ impl Probe {
     /// does not divide both sides.
     pub fn shrunk(&self, height: usize) -> Probe {
         let k = (1..=self.height)
-            .find(|k| self.height / k <= height && self.height % k == 0 && self.width % k == 0)
+            .find(|k| {
+                self.height / k <= height && self.height.is_multiple_of(*k) && self.width.is_multiple_of(*k)
+            })
             .unwrap_or(1);
         let (w, h) = (self.width / k, self.height / k);
         let mut rgb = Vec::with_capacity(w * h);

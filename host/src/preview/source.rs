@@ -101,6 +101,11 @@ impl<'a> Source<'a> {
         samples: usize,
     ) -> Result<Lines<'a>, PreviewError> {
         check_size(width, height)?;
+        if let (Source::Document(_), (across, down)) = (self, self.size())
+            && (across == 0 || down == 0)
+        {
+            return Err(PreviewError::Size { width: across, height: down });
+        }
         let columns = self.space().columns();
         let table = match self {
             Source::Document(_) => None,

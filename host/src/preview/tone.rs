@@ -13,14 +13,14 @@ use super::Radiance;
 /// Where the curve begins to bend, as a share of white.
 const KNEE: f32 = 0.7;
 
-/// Radiance of white paper facing a light of irradiance 1, about 0.85 / pi, lands a little below white.
-const PAPER: f32 = 3.0;
-
 /// What radiance is multiplied by before it is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure(pub f32);
 
 impl Exposure {
+    /// White paper facing a light of irradiance 1 reflects about 0.85 / pi; this lands it a little below white.
+    pub const PAPER: Exposure = Exposure(3.0);
+
     /// An exposure under which 70 % of the covered pixels of `pictures` lie below the bend of the curve, but never
     /// so far from that of white paper that black would look white: a factor of 4 at most either way.
     pub fn of(pictures: &[Radiance]) -> Exposure {
@@ -31,11 +31,11 @@ impl Exposure {
             .map(|p| p[0].max(p[1]).max(p[2]))
             .collect();
         if values.is_empty() {
-            return Exposure(PAPER);
+            return Exposure::PAPER;
         }
         let at = (values.len() - 1) * 7 / 10;
         let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-        Exposure((KNEE / bright.max(1e-9)).clamp(PAPER / 4.0, PAPER * 4.0))
+        Exposure((KNEE / bright.max(1e-9)).clamp(Exposure::PAPER.0 / 4.0, Exposure::PAPER.0 * 4.0))
     }
 
     /// A colour (linear, before exposure) as it is shown: 0 to 1, linear.
