@@ -19,6 +19,9 @@ use crate::sheet::Sheet;
 /// Rows a thread takes at a time.
 const BAND: usize = 64;
 
+/// More sets than this are not collected: no sheet needs them, and a hostile stream could have one for each dot.
+const MOST_SETS: usize = 1 << 16;
+
 /// Up to this many passes the sets index an array.
 const DIRECT: usize = 12;
 
@@ -71,7 +74,7 @@ fn walk_row(rows: &[&[u8]], stride: usize, mut dots: impl FnMut(usize, [u32; 8])
 }
 
 /// The sets of passes that occur on the page, but not the empty one.
-fn occurring(passes: &[Pass], length: usize, stride: usize) -> BTreeSet<u32> {
+fn occurring(passes: &[&Pass], length: usize, stride: usize) -> BTreeSet<u32> {
     let bands: Vec<BTreeSet<u32>> = (0..length.div_ceil(BAND))
         .into_par_iter()
         .map(|band| {
@@ -84,7 +87,7 @@ fn occurring(passes: &[Pass], length: usize, stride: usize) -> BTreeSet<u32> {
                     for set in sets {
                         if let Some(seen) = seen.get_mut(set as usize) {
                             *seen = true;
-                        } else if set != last {
+                        } else if set != last && found.len() <= MOST_SETS {
                             last = set;
                             found.insert(set);
                         }
@@ -99,12 +102,12 @@ fn occurring(passes: &[Pass], length: usize, stride: usize) -> BTreeSet<u32> {
     bands.into_iter().flatten().collect()
 }
 
-fn rows_at(passes: &[Pass], y: usize, stride: usize) -> Vec<&[u8]> {
+fn rows_at<'a>(passes: &[&'a Pass], y: usize, stride: usize) -> Vec<&'a [u8]> {
     passes.iter().map(|pass| &pass.plane.bits[y * stride..(y + 1) * stride]).collect()
 }
 
 /// The stack of a set of passes.
-fn stack(passes: &[Pass], set: u32) -> Stack {
+fn stack(passes: &[&Pass], set: u32) -> Stack {
     let inks: Vec<Ink> =
         passes.iter().enumerate().filter(|(p, _)| set >> p & 1 != 0).map(|(_, pass)| pass.ink).collect();
     Stack::new(inks)
@@ -116,10 +119,12 @@ pub(super) fn sheet(paper: Paper, passes: &[Pass], stacks: Option<&[Stack]>) -> 
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     let stride = width.div_ceil(8);
     // Empty passes would only make the sets longer.
-    let passes: Vec<Pass> =
-        passes.iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).cloned().collect();
+    let passes: Vec<&Pass> = passes.iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).collect();
     let passes = &passes[..];
     let occurring = occurring(passes, length, stride);
+    if occurring.len() > MOST_SETS {
+        return Err(PrintoutError::TooManyStacks(occurring.len()));
+    }
 
     let mut list = stacks.map_or_else(|| vec![Stack::SUBSTRATE], <[Stack]>::to_vec);
     let mut numbers: HashMap<Stack, usize> = list.iter().cloned().zip(0..).collect();

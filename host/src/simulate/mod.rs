@@ -16,6 +16,9 @@ mod printout;
 mod status;
 mod words;
 
+#[cfg(test)]
+mod tests;
+
 use protocol::rgl::{Command, Fault, Step, parse};
 
 use crate::observe::Observer;

@@ -78,6 +78,8 @@ pub struct Printer {
     order: Order,
     /// The beginning of a command whose end has not come yet.
     carry: Vec<u8>,
+    /// A command that could not be done: it waits for the operator.
+    held: Vec<u8>,
     /// Offset of the command being read.
     offset: u64,
     refused: Option<Refused>,
@@ -105,6 +107,7 @@ impl Printer {
             stale: [0xff; PLACES + 1],
             order: Order::new(),
             carry: Vec::new(),
+            held: Vec::new(),
             offset: 0,
             refused: None,
             job: None,
@@ -121,80 +124,72 @@ impl Printer {
             if let Some(refused) = self.refused {
                 return Err(refused);
             }
+            if self.trouble.is_none() && !self.held.is_empty() {
+                let held = std::mem::take(&mut self.held);
+                self.offset -= held.len() as u64;
+                let next = self.next(&held)?;
+                self.act(next, &held)?;
+                continue;
+            }
+            let rest = &bytes[taken..];
             if self.carry.is_empty() {
-                match self.next(&bytes[taken..])? {
-                    Next::More(_) if self.trouble.is_some() && !self.is_question(&bytes[taken..]) => {
-                        return Ok(taken);
-                    }
+                if !self.hears(rest) {
+                    return Ok(taken);
+                }
+                match self.next(rest)? {
                     Next::More(_) => {
-                        self.carry.extend_from_slice(&bytes[taken..]);
+                        self.carry.extend_from_slice(rest);
                         return Ok(bytes.len());
                     }
-                    next => match self.act(next)? {
-                        0 => return Ok(taken),
-                        length => taken += length,
-                    },
+                    next => taken += self.act(next, rest)?,
                 }
-            } else {
-                // Rare: a command cut by the end of the piece before.
-                if self.trouble.is_some() && !self.is_question(&self.carry) {
-                    return Ok(taken);
-                }
-                let carry = std::mem::take(&mut self.carry);
-                let outcome = self.complete(carry, &bytes[taken..])?;
-                taken += outcome;
-                if !self.carry.is_empty() || taken == bytes.len() {
-                    return Ok(taken);
-                }
+                continue;
             }
-        }
-    }
-
-    /// Adds bytes to the beginning of a command until it is whole, and acts on it. Returns the bytes used.
-    fn complete(&mut self, mut carry: Vec<u8>, bytes: &[u8]) -> Result<usize, Refused> {
-        let mut used = 0;
-        loop {
+            // Rare: a command cut by the end of the piece before.
+            if !self.hears(&self.carry) {
+                return Ok(taken);
+            }
+            let mut carry = std::mem::take(&mut self.carry);
             match self.next(&carry)? {
                 Next::More(length) => {
-                    let piece = &bytes[used..bytes.len().min(used + length.saturating_sub(carry.len()))];
-                    if piece.is_empty() {
-                        self.carry = carry;
-                        return Ok(used);
-                    }
+                    let piece = &rest[..rest.len().min(length - carry.len())];
                     carry.extend_from_slice(piece);
-                    used += piece.len();
+                    taken += piece.len();
+                    self.carry = carry;
+                    if piece.is_empty() {
+                        return Ok(taken);
+                    }
                 }
                 next => {
-                    self.act(next)?;
-                    return Ok(used);
+                    self.act(next, &carry)?;
                 }
             }
         }
     }
 
-    /// Whether bytes at a command boundary are a question or the beginning of one.
-    fn is_question(&self, bytes: &[u8]) -> bool {
-        !bytes.is_empty() && (ASK.starts_with(bytes) || CLEAR.starts_with(bytes))
+    /// Whether the printer listens to what stands at a command boundary: when something is the matter, only to
+    /// questions. No command begins with the bytes those begin with.
+    fn hears(&self, bytes: &[u8]) -> bool {
+        self.trouble.is_none() || bytes.first().is_none_or(|&first| is_question(first))
     }
 
     fn next<'a>(&mut self, bytes: &'a [u8]) -> Result<Next<'a>, Refused> {
-        if bytes.first().is_some_and(|&first| first == ASK[0] || first == CLEAR[0]) {
+        let Some(&first) = bytes.first() else { return Ok(Next::More(1)) };
+        if is_question(first) {
             if self.trouble.is_none() && !self.order.is_idle() && !self.order.is_complete() {
                 return self.refuse(Fault::StatusInJob, 0);
             }
-            if bytes.starts_with(&ASK) {
-                return Ok(Next::Ask);
-            }
-            if bytes.starts_with(&CLEAR) {
-                return Ok(Next::Clear);
-            }
-            if self.is_question(bytes) {
-                return Ok(Next::More(if bytes[0] == ASK[0] { ASK.len() } else { CLEAR.len() }));
-            }
-            return self.refuse(Fault::UnknownCommand, 0);
-        }
-        if self.trouble.is_some() {
-            return Ok(Next::More(usize::MAX));
+            return if bytes.starts_with(&ASK) {
+                Ok(Next::Ask)
+            } else if bytes.starts_with(&CLEAR) {
+                Ok(Next::Clear)
+            } else if ASK.starts_with(bytes) {
+                Ok(Next::More(ASK.len()))
+            } else if CLEAR.starts_with(bytes) {
+                Ok(Next::More(CLEAR.len()))
+            } else {
+                self.refuse(Fault::UnknownCommand, 0)
+            };
         }
         match parse(bytes) {
             Ok(Step::Command(command, length)) => Ok(Next::Command(command, length)),
@@ -209,8 +204,9 @@ impl Printer {
         Err(refused)
     }
 
-    /// Acts on what stands at the boundary and returns its length; 0 when it has to wait for the operator.
-    fn act(&mut self, next: Next<'_>) -> Result<usize, Refused> {
+    /// Acts on what stands at the start of `bytes` and returns its length. A command that has to wait for the
+    /// operator is held.
+    fn act(&mut self, next: Next<'_>, bytes: &[u8]) -> Result<usize, Refused> {
         let length = match next {
             Next::Ask => {
                 let status = self.status();
@@ -227,10 +223,11 @@ impl Printer {
                 if let Err(refusal) = order.accept(&command) {
                     return self.refuse(refusal.fault, refusal.at);
                 }
-                if !self.perform(&command, &order) {
-                    return Ok(0);
+                if self.perform(&command, &order) {
+                    self.order = order;
+                } else {
+                    self.held.extend_from_slice(&bytes[..length]);
                 }
-                self.order = order;
                 length
             }
             Next::More(_) => 0,
@@ -240,7 +237,7 @@ impl Printer {
     }
 
     /// Does what a legal command says. `order` is the state after it. False when it could not be done: there is now
-    /// some trouble, and the command will come again.
+    /// some trouble.
     fn perform(&mut self, command: &Command<'_>, order: &Order) -> bool {
         match *command {
             Command::RasterStart => return self.begin(order),
@@ -449,6 +446,7 @@ impl Printer {
         self.eject(false);
         self.order = Order::new();
         self.carry.clear();
+        self.held.clear();
     }
 
     /// Takes the ejected sheet away; the printer is then ready for the next job. `None` while there is none.
@@ -462,6 +460,11 @@ impl Printer {
         }
         Some(printout)
     }
+}
+
+/// Whether a byte begins a question: a status question or "@RCL3".
+fn is_question(first: u8) -> bool {
+    first == ASK[0] || first == CLEAR[0]
 }
 
 impl Job {
