@@ -221,7 +221,7 @@ fn white_comes_out_twice_as_wide_in_a_job_of_1200_dpi_and_black_does_not() {
 fn questions_are_answered_between_jobs_and_refused_within() {
     let mut printer = loaded(&ALL_THREE);
     assert_eq!(printer.feed(&[0x05]), Ok(1));
-    assert_eq!(printer.answers(), []);
+    assert!(printer.answers().is_empty());
     assert_eq!(printer.feed(&[0x01]), Ok(1));
     assert_eq!(printer.answers().len(), STATUS_LENGTH);
     let job = job(SMALL, &three());
