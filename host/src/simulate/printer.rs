@@ -61,6 +61,8 @@ struct Job {
     /// Dots per inch across and along.
     dpi: (u16, u16),
     printout: Printout,
+    /// The line of the sheet under the head, in 1/600 inch from its upper edge.
+    position: u32,
     pass: Option<(Ink, Canvas)>,
     /// An ink whose cassette is still waited for.
     wanted: Option<Ink>,
@@ -250,8 +252,11 @@ impl Printer {
                 if !self.sheet_reaches(Some(row), order) {
                     return false;
                 }
-                if let Some((_, canvas)) = self.job.as_mut().and_then(|job| job.pass.as_mut()) {
-                    canvas.put(row, order.compression(), data);
+                if let Some(job) = &mut self.job {
+                    job.position = job.line_below(row + u32::from(order.declared().shift_y));
+                    if let Some((_, canvas)) = &mut job.pass {
+                        canvas.put(row, order.compression(), data);
+                    }
                 }
             }
             Command::BackFeed | Command::RasterEnd => {
@@ -259,6 +264,7 @@ impl Printer {
                     return false;
                 }
                 if let Some(job) = &mut self.job {
+                    job.position = job.top.into();
                     job.end_pass();
                 }
             }
@@ -279,6 +285,7 @@ impl Printer {
         let dpi = resolution.dpi();
         let code = declared.paper.unwrap_or(PaperCode::of(Paper::A4));
         let paper = code.paper(from_dots(declared.width, dpi.0), from_dots(declared.length, dpi.1));
+        let position = code.top().into();
         let printout = Printout {
             paper,
             resolution,
@@ -288,7 +295,7 @@ impl Printer {
             lost_dots: 0,
             complete: false,
         };
-        self.job = Some(Job { stock, top: code.top(), dpi, printout, pass: None, wanted: None });
+        self.job = Some(Job { stock, top: code.top(), dpi, printout, position, pass: None, wanted: None });
         if declared.mode == Some(Mode::BlackRaster) {
             self.begin_pass(Ink::Black, order);
         }
@@ -333,9 +340,8 @@ impl Printer {
     fn sheet_reaches(&mut self, row: Option<u32>, order: &Order) -> bool {
         let Some(job) = &self.job else { return true };
         let declared = order.declared();
-        let rows = row.map_or(u32::from(declared.length), |row| row + u32::from(declared.shift_y) + 1);
-        let end = rows * 600 / u32::from(job.dpi.1) + u32::from(job.top) + u32::from(BOTTOM);
-        let reaches = end <= u32::from(job.stock.length);
+        let last = row.map_or(u32::from(declared.length) - 1, |row| row + u32::from(declared.shift_y));
+        let reaches = job.line_below(last) + u32::from(BOTTOM) <= u32::from(job.stock.length);
         if !reaches {
             self.stop(Trouble::WrongSize);
         }
@@ -383,6 +389,11 @@ impl Printer {
     /// The cassettes.
     pub fn carousel(&self) -> &Carousel {
         &self.carousel
+    }
+
+    /// The line of the sheet under the head, in 1/600 inch from its upper edge; `None` while no sheet is in.
+    pub fn position(&self) -> Option<u32> {
+        self.job.as_ref().map(|job| job.position)
     }
 
     /// Offset of the command the printer is at.
@@ -468,6 +479,11 @@ fn is_question(first: u8) -> bool {
 }
 
 impl Job {
+    /// The line below a row of the page, in 1/600 inch from the sheet's upper edge.
+    fn line_below(&self, row: u32) -> u32 {
+        (row + 1) * 600 / u32::from(self.dpi.1) + u32::from(self.top)
+    }
+
     fn end_pass(&mut self) {
         if let Some((ink, canvas)) = self.pass.take() {
             self.printout.platen_dots += canvas.platen;

@@ -103,6 +103,24 @@ fn cassettes_are_on_the_carriage_in_the_order_of_the_passes() {
 }
 
 #[test]
+fn the_sheet_goes_back_between_passes_and_out_at_the_end() {
+    let mut printer = loaded(&ALL_THREE);
+    let mut seen = vec![];
+    for byte in job(SMALL, &three()) {
+        printer.feed(&[byte]).unwrap();
+        let position = printer.position();
+        if seen.last() != Some(&position) {
+            seen.push(position);
+        }
+    }
+    // The square ends below row 39, the last stripe below row 77, the diagonal below row 79; the margin is 284.
+    let turns: Vec<_> = seen.windows(2).filter(|w| w[1] < w[0]).map(|w| (w[0], w[1])).collect();
+    let top = Some(284);
+    assert_eq!(turns, [(Some(284 + 40), top), (Some(284 + 78), top), (Some(284 + 80), top), (top, None)]);
+    assert_eq!(seen[..2], [None, top]);
+}
+
+#[test]
 fn a_missing_cassette_is_asked_for_by_its_barcode_and_the_print_goes_on_with_it() {
     let job = job(SMALL, &three());
     let mut printer = loaded(&[Ink::Cyan, Ink::Black]);
@@ -312,6 +330,19 @@ fn stacks_that_are_not_in_the_list_are_named() {
     let list = [Stack::SUBSTRATE, "W".parse().unwrap(), "C".parse().unwrap(), "K".parse().unwrap()];
     let missing = printout.sheet_with(&list).unwrap_err();
     assert!(matches!(&missing, PrintoutError::UnknownStack(stack) if stack.layers().len() > 1), "{missing}");
+}
+
+#[test]
+fn an_eighth_cassette_is_refused_where_it_is_asked_for() {
+    let mut eight = raw(Resolution::Dpi600, 100, Ink::Black, &[1]);
+    let select = eight.windows(5).position(|w| w == [0x1b, 0x1a, 0x00, 0x80, 0x72]).unwrap();
+    let before: Vec<u8> = Ink::ALL[1..8]
+        .iter()
+        .flat_map(|&ink| bytes(&[Command::InkSelect { ink, last: false }, Command::BackFeed]))
+        .collect();
+    eight.splice(select..select, before.iter().copied());
+    let refused = Refused { offset: (select + before.len()) as u64, fault: Fault::TooManyCassettes };
+    assert_eq!(print(&eight, &Setup::default(), &Silent), Err(refused.into()));
 }
 
 /// Every outcome there is to see, whatever the pieces the bytes came in.
