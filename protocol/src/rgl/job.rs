@@ -2,7 +2,7 @@
 //!
 //! [`JobWriter`] takes one row after the other and gives the bytes for it; it holds no row and no page, so the same
 //! code serves a workstation and a microcontroller. What must never be sent has been refused by
-//! [`JobSetup`](super::setup::JobSetup) before, and every command passes through [`Order`] before it is written, so an
+//! [`JobSetup`] before, and every command passes through [`Order`] before it is written, so an
 //! illegal job cannot come out.
 
 use super::command::{Command, Compression, Mode, PaperCode};
