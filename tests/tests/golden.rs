@@ -247,14 +247,9 @@ fn the_simulated_printer_prints_every_stream_dot_for_dot() {
             let rows = plane(&image, from, golden.removal);
             let (left, top) = if name.starts_with("g8_") { (100, 200) } else { (0, 0) };
             let dot = |x: usize, y: usize| pass.plane.bits[y * pass.plane.stride + x / 8] >> (7 - x % 8) & 1;
-            let (width, height) = (image.width() as usize, image.height() as usize);
-            for y in 0..height {
-                for x in 0..width {
-                    assert_eq!(
-                        dot(left + x, top + y),
-                        rows[y][x / 8] >> (7 - x % 8) & 1,
-                        "{name} at ({x}, {y})"
-                    );
+            for (y, row) in rows.iter().enumerate() {
+                for x in 0..image.width() as usize {
+                    assert_eq!(dot(left + x, top + y), row[x / 8] >> (7 - x % 8) & 1, "{name} at ({x}, {y})");
                 }
             }
             let dots = |bits: &[u8]| bits.iter().map(|b| u64::from(b.count_ones())).sum::<u64>();

@@ -146,3 +146,146 @@ pub fn write_job(
     observer.end();
     Ok(Written { passes: inks, bytes: bytes + filled as u64 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::Silent;
+    use crate::separate::Plane;
+    use protocol::paper::Paper;
+    use protocol::rgl::{Command, Resolution, Step, parse};
+
+    const PAPER: Paper = Paper::Custom { width: 40, length: 30 };
+
+    fn pass(ink: Ink, width: usize, dots: &[(usize, usize)]) -> Pass {
+        let stride = width.div_ceil(8);
+        let mut bits = vec![0; stride * 30];
+        for &(x, y) in dots {
+            bits[y * stride + x / 8] |= 0x80 >> (x % 8);
+        }
+        Pass { ink, plane: Plane { width, length: 30, stride, bits } }
+    }
+
+    fn write(page: Page, passes: &[Pass]) -> Result<(Written, Vec<u8>), StreamError> {
+        let mut bytes = vec![];
+        let written = write_job(page, None, passes, &mut bytes, &Silent)?;
+        Ok((written, bytes))
+    }
+
+    fn commands(bytes: &[u8]) -> Vec<Command<'_>> {
+        let (mut at, mut all) = (0, vec![]);
+        while let Ok(Step::Command(command, length)) = parse(&bytes[at..]) {
+            all.push(command);
+            at += length;
+        }
+        assert_eq!(at, bytes.len());
+        all
+    }
+
+    #[test]
+    fn passes_without_a_dot_are_left_out_and_the_last_printing_one_is_announced() {
+        let passes = [pass(Ink::Cyan, 40, &[]), pass(Ink::White, 40, &[(3, 3)]), pass(Ink::Black, 40, &[])];
+        let (written, bytes) = write(Page::plain(PAPER), &passes).unwrap();
+        assert_eq!((written.passes, written.bytes), (vec![Ink::White], bytes.len() as u64));
+        let commands = commands(&bytes);
+        assert!(commands.contains(&Command::InkSelect { ink: Ink::White, last: true }));
+        assert!(!commands.contains(&Command::BackFeed));
+    }
+
+    #[test]
+    fn nothing_at_all_is_no_job() {
+        assert!(matches!(write(Page::plain(PAPER), &[]), Err(StreamError::NothingToPrint)));
+        let blank = [pass(Ink::Cyan, 40, &[])];
+        assert!(matches!(write(Page::plain(PAPER), &blank), Err(StreamError::NothingToPrint)));
+    }
+
+    #[test]
+    fn forbidden_jobs_leave_no_byte() {
+        let mut bytes = vec![];
+        let mut refused = |page, pass: Pass| match write_job(page, None, &[pass], &mut bytes, &Silent) {
+            Err(StreamError::Forbidden(fault)) => fault,
+            other => panic!("{other:?}"),
+        };
+        let fine = Page { resolution: Resolution::Dpi1200, ..Page::plain(PAPER) };
+        assert_eq!(refused(fine, pass(Ink::White, 80, &[(1, 1)])), Fault::SpotResolution);
+        assert_eq!(
+            refused(Page::plain(PAPER), pass(Ink::GoldFoil, 40, &[(1, 1)])),
+            Fault::FoilWithoutConsent
+        );
+        assert!(bytes.is_empty());
+        let consent = Some(FoilConsent::given_by_the_user());
+        write_job(Page::plain(PAPER), consent, &[pass(Ink::GoldFoil, 40, &[(1, 1)])], &mut bytes, &Silent)
+            .unwrap();
+    }
+
+    #[test]
+    fn planes_of_another_size_and_dots_beyond_the_page_are_named() {
+        let text = |page, passes: &[Pass]| write(page, passes).unwrap_err().to_string();
+        assert_eq!(
+            text(Page::plain(PAPER), &[pass(Ink::Cyan, 40, &[]), pass(Ink::White, 48, &[(0, 0)])]),
+            "pass 2 (white) has 48 x 30 dots, but the page has 40 x 30"
+        );
+        let down = Page { shift_y: 2, ..Page::plain(PAPER) };
+        assert!(write(down, &[pass(Ink::White, 40, &[(0, 27)])]).is_ok());
+        assert_eq!(
+            text(down, &[pass(Ink::White, 40, &[(0, 28)])]),
+            "pass 1 (white), row 28: the row lies beyond the page's length"
+        );
+        let right = Page { shift_x: 2, ..Page::plain(PAPER) };
+        assert!(write(right, &[pass(Ink::White, 40, &[(37, 0)])]).is_ok());
+        assert_eq!(
+            text(right, &[pass(Ink::White, 40, &[(38, 0)])]),
+            "pass 1 (white), row 0: the row reaches beyond the page's width"
+        );
+    }
+
+    #[test]
+    fn an_output_that_fails_is_reported() {
+        struct Full;
+        impl Write for Full {
+            fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+                Err(io::ErrorKind::StorageFull.into())
+            }
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let written =
+            write_job(Page::plain(PAPER), None, &[pass(Ink::White, 40, &[(0, 0)])], &mut Full, &Silent);
+        assert!(matches!(written, Err(StreamError::Output(_))));
+    }
+
+    #[test]
+    fn a_job_larger_than_the_buffer_is_the_same_row_by_row() {
+        // Incompressible rows: every byte differs from its neighbours, so that the buffer runs over many times.
+        let paper = Paper::A4;
+        let (width, length, stride) = (4800, 6372, 600);
+        let mut bits: Vec<u8> =
+            (0..stride * length).map(|i| (i as u32).wrapping_mul(2_654_435_761).to_be_bytes()[0]).collect();
+        bits.chunks_mut(stride).skip(400).for_each(|row| row.fill(0));
+        let plane = Plane { width, length, stride, bits: bits.clone() };
+        let (_, bytes) = write(Page::plain(paper), &[Pass { ink: Ink::Black, plane }]).unwrap();
+        assert!(bytes.len() > 3 << 16);
+        let sent: Vec<u8> = commands(&bytes)
+            .iter()
+            .scan(false, |packed, command| {
+                let mut row = vec![0; stride];
+                match *command {
+                    Command::Compression(c) => *packed = c == protocol::rgl::Compression::Packed,
+                    Command::Row { data, .. } if *packed => {
+                        protocol::packbits::unpack_into(data, &mut row).unwrap();
+                        return Some(row);
+                    }
+                    Command::Row { data, .. } => {
+                        row[..data.len()].copy_from_slice(data);
+                        return Some(row);
+                    }
+                    _ => {}
+                }
+                Some(vec![])
+            })
+            .flatten()
+            .collect();
+        assert!(sent == bits[..400 * stride]);
+    }
+}

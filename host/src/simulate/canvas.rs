@@ -48,8 +48,8 @@ impl Canvas {
         let stride = self.plane.stride;
         let start = (row as usize + self.shift_y) * stride;
         let Some(place) = self.plane.bits.get_mut(start..start + stride) else { return };
-        let simple = self.shift_x == 0 && self.spread == 1 && self.edge == self.plane.width;
-        let target = if simple { &mut *place } else { &mut self.row[..] };
+        let in_place = self.shift_x == 0 && self.spread == 1;
+        let target = if in_place { &mut *place } else { &mut self.row[..] };
         let length = match compression {
             Some(Compression::Packed) => packbits::unpack_into(data, target).unwrap_or(0),
             _ => {
@@ -58,25 +58,16 @@ impl Canvas {
                 length
             }
         };
-        if simple {
-            return;
-        }
-        for (i, &byte) in self.row[..length].iter().enumerate() {
-            let mut left = byte;
-            while left != 0 {
-                let bit = left.leading_zeros() as usize;
-                left &= !(0x80 >> bit);
-                for wide in 0..self.spread {
-                    let x = (i * 8 + bit + self.shift_x) * self.spread + wide;
-                    if x >= self.plane.width {
-                        self.lost += 1;
-                    } else if x >= self.edge {
-                        self.platen += 1;
-                    } else {
-                        place[x / 8] |= 0x80 >> (x % 8);
-                    }
-                }
+        if !in_place {
+            if self.spread == 1 {
+                shift_into(place, &self.row[..length], self.shift_x);
+            } else {
+                self.lost +=
+                    widen_into(place, &self.row[..length], self.shift_x, self.spread, self.plane.width);
             }
+        }
+        if self.edge < self.plane.width {
+            self.platen += cut(place, self.edge);
         }
     }
 
@@ -85,9 +76,54 @@ impl Canvas {
     }
 }
 
+/// Adds a row moved to the right; it is known to fit.
+fn shift_into(place: &mut [u8], row: &[u8], by: usize) {
+    let (bytes, bits) = (by / 8, by % 8);
+    for (i, &byte) in row.iter().enumerate() {
+        let [left, right] = (u16::from(byte) << 8 >> bits).to_be_bytes();
+        for (at, part) in [(i + bytes, left), (i + bytes + 1, right)] {
+            if part != 0
+                && let Some(place) = place.get_mut(at)
+            {
+                *place |= part;
+            }
+        }
+    }
+}
+
+/// Adds a row with every dot `spread` dots wide. Returns how many dots came out beyond `width`.
+fn widen_into(place: &mut [u8], row: &[u8], shift: usize, spread: usize, width: usize) -> u64 {
+    let mut lost = 0;
+    for (i, &byte) in row.iter().enumerate() {
+        for bit in (0..8).filter(|bit| byte << bit & 0x80 != 0) {
+            for wide in 0..spread {
+                let x = (i * 8 + bit + shift) * spread + wide;
+                if x < width {
+                    place[x / 8] |= 0x80 >> (x % 8);
+                } else {
+                    lost += 1;
+                }
+            }
+        }
+    }
+    lost
+}
+
+/// Takes away the dots of a row from column `edge` on and returns how many there were.
+fn cut(row: &mut [u8], edge: usize) -> u64 {
+    let mut dots = 0;
+    for (i, byte) in row.iter_mut().enumerate().skip(edge / 8) {
+        let keep = if i == edge / 8 { !(0xff >> (edge % 8)) } else { 0 };
+        dots += u64::from((*byte & !keep).count_ones());
+        *byte &= keep;
+    }
+    dots
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn plain(mut canvas: Canvas, data: &[u8]) -> (Vec<u8>, u64, u64) {
         canvas.put(0, Some(Compression::Plain), data);
@@ -101,6 +137,26 @@ mod tests {
         assert_eq!(plain(Canvas::new(16, 1, (0, 0), 99, 2), &[0x81]), (vec![0xc0, 0x03], 0, 0));
         assert_eq!(plain(Canvas::new(16, 1, (0, 0), 99, 2), &[0x80, 0x80]), (vec![0xc0, 0], 0, 2));
         assert_eq!(plain(Canvas::new(16, 1, (0, 0), 7, 1), &[0x83]), (vec![0x82, 0], 1, 0));
+    }
+
+    proptest! {
+        #[test]
+        fn every_dot_lands_where_the_shift_and_the_width_of_its_ink_put_it(
+            row in proptest::collection::vec(any::<u8>(), 1..9),
+            shift in 0..30usize, edge in 0..120usize, spread in 1..3usize,
+        ) {
+            let width = 101;
+            let dots: Vec<usize> = (0..row.len() * 8).filter(|x| row[x / 8] << (x % 8) & 0x80 != 0).collect();
+            let all: Vec<usize> =
+                dots.iter().flat_map(|x| (0..spread).map(move |wide| (x + shift) * spread + wide)).collect();
+            let mut want = vec![0; 13];
+            for x in all.iter().filter(|&&x| x < width.min(edge)) {
+                want[x / 8] |= 0x80 >> (x % 8);
+            }
+            let platen = all.iter().filter(|&&x| x < width && x >= edge).count() as u64;
+            let lost = all.iter().filter(|&&x| x >= width).count() as u64;
+            prop_assert_eq!(plain(Canvas::new(width, 1, (shift, 0), edge, spread), &row), (want, platen, lost));
+        }
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Passes as stacks: which inks lie on each dot.
 //!
-//! Method: a first walk over the planes finds which sets of passes occur, the sets get their stack's number, a second
-//! walk writes the numbers. Eight dots of eight passes are looked up at a time.
-//! Cost: two walks over the planes, one byte a dot. Both walks share the rows among the cores; the numbers follow from
-//! the sets alone, so they are the same for any number of threads.
+//! Method: eight passes at a time. What lies on a dot after them is what lay there before (a number) and which of the
+//! eight print it (a byte); one walk over the page finds the pairs that occur, they get their stacks' numbers, a second
+//! walk writes the numbers.
+//! Cost: two walks and one byte a dot for each eight passes. Rows are shared among the cores; the numbers follow from
+//! the pairs that occur, whoever found them, so they are the same for any number of threads.
+//! Limits: at most 256 different stacks after any eight passes, which is what a sheet can tell apart.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 
 use inks::Stack;
 use protocol::ink::Ink;
@@ -19,8 +21,8 @@ use crate::sheet::Sheet;
 /// Rows a thread takes at a time.
 const BAND: usize = 64;
 
-/// Up to this many passes the sets index an array.
-const DIRECT: usize = 12;
+/// Stacks a number can stand for, and sets of eight passes.
+const NUMBERS: usize = 256;
 
 /// `SPREAD[byte]`: bit 7 - i of the byte as the lowest bit of byte i.
 const SPREAD: [u64; 256] = {
@@ -37,139 +39,119 @@ const SPREAD: [u64; 256] = {
     table
 };
 
-/// The passes that print each of the eight dots of one byte, pass p as bit p.
-fn sets(rows: &[&[u8]], byte: usize) -> [u32; 8] {
-    let mut sets = [0; 8];
-    for (group, rows) in rows.chunks(8).enumerate() {
-        let mut lanes = 0;
-        for (p, row) in rows.iter().enumerate() {
-            lanes |= SPREAD[usize::from(row[byte])] << p;
-        }
-        for (set, lane) in sets.iter_mut().zip(lanes.to_le_bytes()) {
-            *set |= u32::from(lane) << (8 * group);
-        }
-    }
-    sets
+/// Up to eight passes, and what the walks over their planes need to know.
+struct Group<'a> {
+    passes: &'a [&'a Pass],
+    width: usize,
+    stride: usize,
+    /// Nothing lies on any dot yet.
+    first: bool,
 }
 
-/// Calls `dots(byte, sets)` for every byte of a row in which any pass prints.
-fn walk_row(rows: &[&[u8]], stride: usize, mut dots: impl FnMut(usize, [u32; 8])) {
-    let mut byte = 0;
-    while byte < stride {
-        let end = (byte + 8).min(stride);
-        // Most of a page is blank in most passes; eight bytes are passed over at once.
-        if rows.iter().any(|row| row[byte..end] != [0; 8][..end - byte]) {
-            for byte in byte..end {
-                let sets = sets(rows, byte);
-                if sets != [0; 8] {
-                    dots(byte, sets);
-                }
+impl Group<'_> {
+    /// Calls `dots(first column, for each of eight dots the passes that print it)` along row `y`, but where a first
+    /// group prints nothing.
+    fn walk_row(&self, y: usize, mut dots: impl FnMut(usize, [u8; 8])) {
+        let mut rows: [&[u8]; 8] = [&[]; 8];
+        for (row, pass) in rows.iter_mut().zip(self.passes) {
+            *row = &pass.plane.bits[y * self.stride..(y + 1) * self.stride];
+        }
+        let rows = &rows[..self.passes.len()];
+        for byte in 0..self.stride {
+            let mut sets = 0;
+            for (p, row) in rows.iter().enumerate() {
+                sets |= SPREAD[usize::from(row[byte])] << p;
+            }
+            if sets != 0 || !self.first {
+                dots(byte * 8, sets.to_le_bytes());
             }
         }
-        byte = end;
     }
-}
 
-/// The sets of passes that occur on the page, but not the empty one.
-fn occurring(passes: &[Pass], length: usize, stride: usize) -> BTreeSet<u32> {
-    let bands: Vec<BTreeSet<u32>> = (0..length.div_ceil(BAND))
-        .into_par_iter()
-        .map(|band| {
-            let mut seen = if passes.len() <= DIRECT { vec![false; 1 << passes.len()] } else { Vec::new() };
-            let mut found = BTreeSet::new();
-            let mut last = 0;
-            for y in band * BAND..((band + 1) * BAND).min(length) {
-                let rows = rows_at(passes, y, stride);
-                walk_row(&rows, stride, |_, sets| {
-                    for set in sets {
-                        if let Some(seen) = seen.get_mut(set as usize) {
-                            *seen = true;
-                        } else if set != last {
-                            last = set;
-                            found.insert(set);
+    /// Which pairs occur: `seen[number * 256 + set]`.
+    fn pairs(&self, index: &[u8]) -> Vec<bool> {
+        let none = || vec![false; NUMBERS * NUMBERS];
+        let mut seen = index
+            .par_chunks(self.width * BAND)
+            .enumerate()
+            .fold(none, |mut seen, (band, lines)| {
+                for (i, line) in lines.chunks(self.width).enumerate() {
+                    self.walk_row(band * BAND + i, |x, sets| {
+                        for (dot, set) in line[x..].iter().zip(sets) {
+                            let number = if self.first { 0 } else { usize::from(*dot) };
+                            seen[number * NUMBERS + usize::from(set)] = true;
                         }
+                    });
+                }
+                seen
+            })
+            .reduce(none, |mut all, some| {
+                all.iter_mut().zip(some).for_each(|(all, some)| *all |= some);
+                all
+            });
+        seen[0] |= self.first;
+        seen
+    }
+
+    /// Replaces the number of every dot by `numbers[number * 256 + set]`.
+    fn renumber(&self, index: &mut [u8], numbers: &[u8]) {
+        index.par_chunks_mut(self.width * BAND).enumerate().for_each(|(band, lines)| {
+            for (i, line) in lines.chunks_mut(self.width).enumerate() {
+                self.walk_row(band * BAND + i, |x, sets| {
+                    for (dot, set) in line[x..].iter_mut().zip(sets) {
+                        *dot = numbers[usize::from(*dot) * NUMBERS + usize::from(set)];
                     }
                 });
             }
-            found.extend((0..seen.len()).filter(|&set| seen[set]).map(|set| set as u32));
-            found.remove(&0);
-            found
-        })
-        .collect();
-    bands.into_iter().flatten().collect()
-}
+        });
+    }
 
-fn rows_at(passes: &[Pass], y: usize, stride: usize) -> Vec<&[u8]> {
-    passes.iter().map(|pass| &pass.plane.bits[y * stride..(y + 1) * stride]).collect()
-}
-
-/// The stack of a set of passes.
-fn stack(passes: &[Pass], set: u32) -> Stack {
-    let inks: Vec<Ink> =
-        passes.iter().enumerate().filter(|(p, _)| set >> p & 1 != 0).map(|(_, pass)| pass.ink).collect();
-    Stack::new(inks)
+    /// A stack with the inks of a set of these passes on top.
+    fn on(&self, below: &Stack, set: usize) -> Stack {
+        let above =
+            self.passes.iter().enumerate().filter(|(p, _)| set >> p & 1 != 0).map(|(_, pass)| pass.ink);
+        Stack::new(below.layers().iter().copied().chain(above).collect::<Vec<Ink>>())
+    }
 }
 
 /// The sheet these passes print on `paper`; all planes are the paper's size. Without a list the stacks that occur are
-/// numbered by their sets.
-pub(super) fn sheet(paper: Paper, passes: &[Pass], stacks: Option<&[Stack]>) -> Result<Sheet, PrintoutError> {
+/// numbered, the substrate first, by the passes that make them.
+pub(super) fn sheet(paper: Paper, passes: &[Pass], known: Option<&[Stack]>) -> Result<Sheet, PrintoutError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
-    let stride = width.div_ceil(8);
-    // Empty passes would only make the sets longer.
-    let passes: Vec<Pass> =
-        passes.iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).cloned().collect();
-    let passes = &passes[..];
-    let occurring = occurring(passes, length, stride);
-
-    let mut list = stacks.map_or_else(|| vec![Stack::SUBSTRATE], <[Stack]>::to_vec);
-    let mut numbers: HashMap<Stack, usize> = list.iter().cloned().zip(0..).collect();
-    let mut of_set = HashMap::with_capacity(occurring.len());
-    for set in occurring {
-        let stack = stack(passes, set);
-        let number = match numbers.get(&stack) {
-            Some(&number) => number,
-            None if stacks.is_some() => return Err(PrintoutError::UnknownStack(stack)),
-            None => {
-                numbers.insert(stack.clone(), list.len());
-                list.push(stack);
-                list.len() - 1
-            }
-        };
-        of_set.insert(set, number);
-    }
-    if list.len() > 256 {
-        return Err(PrintoutError::TooManyStacks(list.len()));
-    }
-    // The list has at most 256 entries, so the numbers fit a byte.
-    let of_set: HashMap<u32, u8> = of_set.into_iter().map(|(set, number)| (set, number as u8)).collect();
-    let mut direct = vec![0u8; if passes.len() <= DIRECT { 1 << passes.len() } else { 0 }];
-    for (&set, &number) in &of_set {
-        if let Some(place) = direct.get_mut(set as usize) {
-            *place = number;
-        }
-    }
-
+    let passes: Vec<&Pass> = passes.iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).collect();
     let mut index = vec![0u8; width * length];
-    index.par_chunks_mut(width * BAND).enumerate().for_each(|(band, chunk)| {
-        let mut last = (0, 0);
-        for (i, line) in chunk.chunks_mut(width).enumerate() {
-            let rows = rows_at(passes, band * BAND + i, stride);
-            walk_row(&rows, stride, |byte, sets| {
-                let start = byte * 8;
-                let end = (start + 8).min(width);
-                for (dot, set) in line[start..end].iter_mut().zip(sets) {
-                    *dot = match direct.get(set as usize) {
-                        Some(&number) => number,
-                        None if set == last.0 => last.1,
-                        None => {
-                            // Every set but the empty one has a number; the empty one is the substrate.
-                            last = (set, of_set.get(&set).copied().unwrap_or(0));
-                            last.1
-                        }
-                    };
+    let mut stacks = vec![Stack::SUBSTRATE];
+    let groups = passes.chunks(8).count();
+    for (g, passes) in passes.chunks(8).enumerate() {
+        let group = Group { passes, width, stride: width.div_ceil(8), first: g == 0 };
+        let seen = group.pairs(&index);
+        // In the last group the numbers are those of the list given, if any.
+        let given = known.filter(|_| g + 1 == groups);
+        let mut next = given.map_or_else(|| vec![Stack::SUBSTRATE], <[Stack]>::to_vec);
+        let mut numbers: HashMap<Stack, usize> = next.iter().cloned().zip(0..).collect();
+        let mut table = vec![0u8; NUMBERS * NUMBERS];
+        for pair in (0..seen.len()).filter(|&pair| seen[pair]) {
+            let stack = group.on(&stacks[pair / NUMBERS], pair % NUMBERS);
+            let number = match numbers.get(&stack) {
+                Some(&number) => number,
+                None if given.is_some() => return Err(PrintoutError::UnknownStack(stack)),
+                None => {
+                    numbers.insert(stack.clone(), next.len());
+                    next.push(stack);
+                    next.len() - 1
                 }
-            });
+            };
+            // Beyond a byte the sheet is refused below.
+            table[pair] = number as u8;
         }
-    });
-    Ok(Sheet::new(paper, list, index)?)
+        if next.len() > NUMBERS {
+            return Err(PrintoutError::TooManyStacks(next.len()));
+        }
+        group.renumber(&mut index, &table);
+        stacks = next;
+    }
+    if let Some(known) = known.filter(|_| groups == 0) {
+        stacks = known.to_vec();
+    }
+    Ok(Sheet::new(paper, stacks, index)?)
 }

@@ -16,6 +16,10 @@ mod printout;
 mod status;
 mod words;
 
+#[cfg(test)]
+mod tests;
+
+use protocol::rgl::command::MAX_CASSETTES;
 use protocol::rgl::{Command, Fault, Step, parse};
 
 use crate::observe::Observer;
@@ -62,7 +66,9 @@ pub enum SimulateError {
 /// Errors: the first byte that is not a legal job's, or the trouble that stops the printer.
 pub fn print(job: &[u8], setup: &Setup, observer: &dyn Observer) -> Result<Printout, SimulateError> {
     const CHUNK: usize = 1 << 18;
-    let cassettes = setup.cassettes.clone().unwrap_or_else(|| wanted(job));
+    // A job that wants more than go in is refused where it asks for the eighth.
+    let cassettes =
+        setup.cassettes.clone().unwrap_or_else(|| wanted(job).into_iter().take(MAX_CASSETTES).collect());
     let mut printer = Printer::new(Carousel::new(&cassettes)?, setup.lever);
     if let Some(stock) = setup.stock.or_else(|| declared_stock(job)) {
         printer.load(stock);

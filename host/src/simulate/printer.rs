@@ -61,6 +61,8 @@ struct Job {
     /// Dots per inch across and along.
     dpi: (u16, u16),
     printout: Printout,
+    /// The line of the sheet under the head, in 1/600 inch from its upper edge.
+    position: u32,
     pass: Option<(Ink, Canvas)>,
     /// An ink whose cassette is still waited for.
     wanted: Option<Ink>,
@@ -78,6 +80,8 @@ pub struct Printer {
     order: Order,
     /// The beginning of a command whose end has not come yet.
     carry: Vec<u8>,
+    /// A command that could not be done: it waits for the operator.
+    held: Vec<u8>,
     /// Offset of the command being read.
     offset: u64,
     refused: Option<Refused>,
@@ -105,6 +109,7 @@ impl Printer {
             stale: [0xff; PLACES + 1],
             order: Order::new(),
             carry: Vec::new(),
+            held: Vec::new(),
             offset: 0,
             refused: None,
             job: None,
@@ -121,80 +126,72 @@ impl Printer {
             if let Some(refused) = self.refused {
                 return Err(refused);
             }
+            if self.trouble.is_none() && !self.held.is_empty() {
+                let held = std::mem::take(&mut self.held);
+                self.offset -= held.len() as u64;
+                let next = self.next(&held)?;
+                self.act(next, &held)?;
+                continue;
+            }
+            let rest = &bytes[taken..];
             if self.carry.is_empty() {
-                match self.next(&bytes[taken..])? {
-                    Next::More(_) if self.trouble.is_some() && !self.is_question(&bytes[taken..]) => {
-                        return Ok(taken);
-                    }
+                if !self.hears(rest) {
+                    return Ok(taken);
+                }
+                match self.next(rest)? {
                     Next::More(_) => {
-                        self.carry.extend_from_slice(&bytes[taken..]);
+                        self.carry.extend_from_slice(rest);
                         return Ok(bytes.len());
                     }
-                    next => match self.act(next)? {
-                        0 => return Ok(taken),
-                        length => taken += length,
-                    },
+                    next => taken += self.act(next, rest)?,
                 }
-            } else {
-                // Rare: a command cut by the end of the piece before.
-                if self.trouble.is_some() && !self.is_question(&self.carry) {
-                    return Ok(taken);
-                }
-                let carry = std::mem::take(&mut self.carry);
-                let outcome = self.complete(carry, &bytes[taken..])?;
-                taken += outcome;
-                if !self.carry.is_empty() || taken == bytes.len() {
-                    return Ok(taken);
-                }
+                continue;
             }
-        }
-    }
-
-    /// Adds bytes to the beginning of a command until it is whole, and acts on it. Returns the bytes used.
-    fn complete(&mut self, mut carry: Vec<u8>, bytes: &[u8]) -> Result<usize, Refused> {
-        let mut used = 0;
-        loop {
+            // Rare: a command cut by the end of the piece before.
+            if !self.hears(&self.carry) {
+                return Ok(taken);
+            }
+            let mut carry = std::mem::take(&mut self.carry);
             match self.next(&carry)? {
                 Next::More(length) => {
-                    let piece = &bytes[used..bytes.len().min(used + length.saturating_sub(carry.len()))];
-                    if piece.is_empty() {
-                        self.carry = carry;
-                        return Ok(used);
-                    }
+                    let piece = &rest[..rest.len().min(length - carry.len())];
                     carry.extend_from_slice(piece);
-                    used += piece.len();
+                    taken += piece.len();
+                    self.carry = carry;
+                    if piece.is_empty() {
+                        return Ok(taken);
+                    }
                 }
                 next => {
-                    self.act(next)?;
-                    return Ok(used);
+                    self.act(next, &carry)?;
                 }
             }
         }
     }
 
-    /// Whether bytes at a command boundary are a question or the beginning of one.
-    fn is_question(&self, bytes: &[u8]) -> bool {
-        !bytes.is_empty() && (ASK.starts_with(bytes) || CLEAR.starts_with(bytes))
+    /// Whether the printer listens to what stands at a command boundary: when something is the matter, only to
+    /// questions. No command begins with the bytes those begin with.
+    fn hears(&self, bytes: &[u8]) -> bool {
+        self.trouble.is_none() || bytes.first().is_none_or(|&first| is_question(first))
     }
 
     fn next<'a>(&mut self, bytes: &'a [u8]) -> Result<Next<'a>, Refused> {
-        if bytes.first().is_some_and(|&first| first == ASK[0] || first == CLEAR[0]) {
+        let Some(&first) = bytes.first() else { return Ok(Next::More(1)) };
+        if is_question(first) {
             if self.trouble.is_none() && !self.order.is_idle() && !self.order.is_complete() {
                 return self.refuse(Fault::StatusInJob, 0);
             }
-            if bytes.starts_with(&ASK) {
-                return Ok(Next::Ask);
-            }
-            if bytes.starts_with(&CLEAR) {
-                return Ok(Next::Clear);
-            }
-            if self.is_question(bytes) {
-                return Ok(Next::More(if bytes[0] == ASK[0] { ASK.len() } else { CLEAR.len() }));
-            }
-            return self.refuse(Fault::UnknownCommand, 0);
-        }
-        if self.trouble.is_some() {
-            return Ok(Next::More(usize::MAX));
+            return if bytes.starts_with(&ASK) {
+                Ok(Next::Ask)
+            } else if bytes.starts_with(&CLEAR) {
+                Ok(Next::Clear)
+            } else if ASK.starts_with(bytes) {
+                Ok(Next::More(ASK.len()))
+            } else if CLEAR.starts_with(bytes) {
+                Ok(Next::More(CLEAR.len()))
+            } else {
+                self.refuse(Fault::UnknownCommand, 0)
+            };
         }
         match parse(bytes) {
             Ok(Step::Command(command, length)) => Ok(Next::Command(command, length)),
@@ -209,8 +206,9 @@ impl Printer {
         Err(refused)
     }
 
-    /// Acts on what stands at the boundary and returns its length; 0 when it has to wait for the operator.
-    fn act(&mut self, next: Next<'_>) -> Result<usize, Refused> {
+    /// Acts on what stands at the start of `bytes` and returns its length. A command that has to wait for the
+    /// operator is held.
+    fn act(&mut self, next: Next<'_>, bytes: &[u8]) -> Result<usize, Refused> {
         let length = match next {
             Next::Ask => {
                 let status = self.status();
@@ -227,10 +225,11 @@ impl Printer {
                 if let Err(refusal) = order.accept(&command) {
                     return self.refuse(refusal.fault, refusal.at);
                 }
-                if !self.perform(&command, &order) {
-                    return Ok(0);
+                if self.perform(&command, &order) {
+                    self.order = order;
+                } else {
+                    self.held.extend_from_slice(&bytes[..length]);
                 }
-                self.order = order;
                 length
             }
             Next::More(_) => 0,
@@ -240,7 +239,7 @@ impl Printer {
     }
 
     /// Does what a legal command says. `order` is the state after it. False when it could not be done: there is now
-    /// some trouble, and the command will come again.
+    /// some trouble.
     fn perform(&mut self, command: &Command<'_>, order: &Order) -> bool {
         match *command {
             Command::RasterStart => return self.begin(order),
@@ -253,8 +252,11 @@ impl Printer {
                 if !self.sheet_reaches(Some(row), order) {
                     return false;
                 }
-                if let Some((_, canvas)) = self.job.as_mut().and_then(|job| job.pass.as_mut()) {
-                    canvas.put(row, order.compression(), data);
+                if let Some(job) = &mut self.job {
+                    job.position = job.line_below(row + u32::from(order.declared().shift_y));
+                    if let Some((_, canvas)) = &mut job.pass {
+                        canvas.put(row, order.compression(), data);
+                    }
                 }
             }
             Command::BackFeed | Command::RasterEnd => {
@@ -262,6 +264,7 @@ impl Printer {
                     return false;
                 }
                 if let Some(job) = &mut self.job {
+                    job.position = job.top.into();
                     job.end_pass();
                 }
             }
@@ -282,6 +285,7 @@ impl Printer {
         let dpi = resolution.dpi();
         let code = declared.paper.unwrap_or(PaperCode::of(Paper::A4));
         let paper = code.paper(from_dots(declared.width, dpi.0), from_dots(declared.length, dpi.1));
+        let position = code.top().into();
         let printout = Printout {
             paper,
             resolution,
@@ -291,7 +295,7 @@ impl Printer {
             lost_dots: 0,
             complete: false,
         };
-        self.job = Some(Job { stock, top: code.top(), dpi, printout, pass: None, wanted: None });
+        self.job = Some(Job { stock, top: code.top(), dpi, printout, position, pass: None, wanted: None });
         if declared.mode == Some(Mode::BlackRaster) {
             self.begin_pass(Ink::Black, order);
         }
@@ -336,9 +340,8 @@ impl Printer {
     fn sheet_reaches(&mut self, row: Option<u32>, order: &Order) -> bool {
         let Some(job) = &self.job else { return true };
         let declared = order.declared();
-        let rows = row.map_or(u32::from(declared.length), |row| row + u32::from(declared.shift_y) + 1);
-        let end = rows * 600 / u32::from(job.dpi.1) + u32::from(job.top) + u32::from(BOTTOM);
-        let reaches = end <= u32::from(job.stock.length);
+        let last = row.map_or(u32::from(declared.length) - 1, |row| row + u32::from(declared.shift_y));
+        let reaches = job.line_below(last) + u32::from(BOTTOM) <= u32::from(job.stock.length);
         if !reaches {
             self.stop(Trouble::WrongSize);
         }
@@ -386,6 +389,11 @@ impl Printer {
     /// The cassettes.
     pub fn carousel(&self) -> &Carousel {
         &self.carousel
+    }
+
+    /// The line of the sheet under the head, in 1/600 inch from its upper edge; `None` while no sheet is in.
+    pub fn position(&self) -> Option<u32> {
+        self.job.as_ref().map(|job| job.position)
     }
 
     /// Offset of the command the printer is at.
@@ -449,6 +457,7 @@ impl Printer {
         self.eject(false);
         self.order = Order::new();
         self.carry.clear();
+        self.held.clear();
     }
 
     /// Takes the ejected sheet away; the printer is then ready for the next job. `None` while there is none.
@@ -464,7 +473,17 @@ impl Printer {
     }
 }
 
+/// Whether a byte begins a question: a status question or "@RCL3".
+fn is_question(first: u8) -> bool {
+    first == ASK[0] || first == CLEAR[0]
+}
+
 impl Job {
+    /// The line below a row of the page, in 1/600 inch from the sheet's upper edge.
+    fn line_below(&self, row: u32) -> u32 {
+        (row + 1) * 600 / u32::from(self.dpi.1) + u32::from(self.top)
+    }
+
     fn end_pass(&mut self) {
         if let Some((ink, canvas)) = self.pass.take() {
             self.printout.platen_dots += canvas.platen;
