@@ -191,4 +191,20 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_objective_never_rises_while_the_penalty_is_held() {
+        let sample = Sample::draw(&crate::factor::tests::noisy_mixtures(1500), 3).unwrap();
+        let mut bases = sample.x[..4 * sample.columns.padded].to_vec();
+        let mut held = Vec::new();
+        refine(&sample, &mut bases, 0.03, |strength, objective| {
+            if strength == 0.03 {
+                held.push(objective);
+            }
+        });
+        assert!(held.len() > 1);
+        for pair in held.windows(2) {
+            assert!(pair[1] <= pair[0] * (1.0 + 1e-6), "{held:?}");
+        }
+    }
 }
