@@ -30,19 +30,19 @@ pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: 
     let tangent2: Vec<f32> = sample.columns.omega.iter().map(|o| (o / 3.0).powi(2)).collect();
     let scale: f64 = (0..sample.len()).map(|i| sample.weight[i] * length2(sample.row(i), &tangent2)).sum();
     let mut weights = vec![1.0 / k as f64; sample.len() * k];
-    let mut last = f64::INFINITY;
+    let mut last = None;
     for iteration in 0..ITERATIONS {
         let held = iteration >= RAMP;
-        let strength = lambda * iteration.min(RAMP) as f64 / RAMP as f64;
+        let strength = lambda * (iteration.min(RAMP) as f64 / RAMP as f64);
         // The first round has no dominant weights to favour yet: plain least squares.
         let step = code(sample, bases, &tangent2, &mut weights, 0.5 * strength * scale);
         solve_bases(&step, bases, padded);
         let objective = objective(sample, bases, &tangent2, &weights, strength * scale);
         done(strength, objective);
-        if held && last - objective <= SETTLED * last {
+        if last.is_some_and(|last| last - objective <= SETTLED * last) {
             break;
         }
-        last = if held { objective } else { f64::INFINITY };
+        last = held.then_some(objective);
     }
 }
 
