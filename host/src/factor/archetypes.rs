@@ -13,7 +13,7 @@
 //! Source: Cutler & Breiman 1994 for the hull constraint; the metric, the slack and the descent are our own.
 
 use super::code::{Coder, Scratch};
-use super::columns::mix;
+use super::columns::{accumulate, mix};
 use super::hull::{Combination, Hull, Workspace};
 use super::parts;
 use super::sample::Sample;
@@ -323,13 +323,6 @@ impl<'a> Fit<'a> {
     }
 }
 
-#[inline]
-fn accumulate(sum: &mut [f32], s: f32, row: &[f32]) {
-    for (sum, &v) in sum.iter_mut().zip(row) {
-        *sum += s * v;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -367,7 +360,7 @@ mod tests {
         let pca = Pca::of(&sample, 10, 1);
         let hull = Hull::of_corners(&sample, &pca, 1);
         let padded = sample.columns.padded;
-        let mut fit = Fit::new(&sample, &hull, 0.0, &sample.x[..3 * padded].to_vec());
+        let mut fit = Fit::new(&sample, &hull, 0.0, &sample.x[..3 * padded]);
         let model = fit.improve_weights();
         let size = model.gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
         for place in (0..3 * padded).step_by(5) {

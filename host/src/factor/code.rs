@@ -40,7 +40,7 @@ pub(super) struct Scratch {
     /// The slope of the response.
     pub slope: Vec<f32>,
     weighted: Vec<f32>,
-    rows: Vec<f64>,
+    rows: Vec<f32>,
     gradient: Vec<f64>,
     next: Vec<f64>,
     trial: Vec<f64>,
@@ -164,10 +164,11 @@ impl<'a> Coder<'a> {
         let Scratch { rows, slope, gram, .. } = scratch;
         for (out, row) in rows.chunks_exact_mut(padded).zip(self.bases.chunks_exact(padded)) {
             for ((out, &row), &d) in out.iter_mut().zip(row).zip(slope.iter()) {
-                *out = f64::from(row * d);
+                *out = row * d;
             }
         }
-        gram.refill(self.k, |i| &rows[i * padded..][..padded]);
+        let row = |i: usize| &rows[i * padded..][..padded];
+        gram.refill_products(self.k, |i, j| f64::from(dot(row(i), row(j))));
     }
 }
 
