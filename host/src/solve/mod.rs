@@ -4,8 +4,11 @@
 //! sequence of such quadratics.
 
 pub mod gram;
+pub mod mixture;
+pub mod root;
 pub mod simplex;
 pub mod vector;
 
 pub use gram::{Gram, GramError};
+pub use mixture::{Best, Fit, Hull, Mixer, MixtureError, Target};
 pub use simplex::{Certificate, Simplex, SimplexError};

@@ -65,6 +65,8 @@ enum Place {
 pub struct Simplex {
     n: usize,
     support: Vec<usize>,
+    /// Points whose row of the factor is out of date, last first.
+    pending: Vec<usize>,
     place: Vec<Place>,
     /// Lower Cholesky factor of the shifted Gram matrix on the support, rows `n` apart, diagonal inverted.
     factor: Vec<f64>,
@@ -149,7 +151,10 @@ impl Simplex {
         if self.factor.len() < n * n {
             self.factor.resize(n * n, 0.0);
         }
+        self.support.clear();
         self.support.reserve(n);
+        self.pending.clear();
+        self.pending.reserve(n);
     }
 
     /// Walks from `a`, where the gradient is `g`, to the optimum; keeps both up to date. Returns the steps taken,
@@ -247,73 +252,79 @@ impl Simplex {
         }
         let Some(blocking) = blocking else { return (length, false) };
         a[blocking] = 0.0;
-        let mut first = p;
-        let mut kept = 0;
-        for i in 0..p {
+        while let Some(i) = self.support.iter().rposition(|&k| a[k] <= 0.0) {
             let k = self.support[i];
-            if a[k] > 0.0 {
-                self.support[kept] = k;
-                kept += 1;
-            } else {
-                a[k] = 0.0;
-                self.place[k] = Place::Out;
-                first = first.min(i);
-            }
+            a[k] = 0.0;
+            self.place[k] = Place::Out;
+            self.leave(i);
         }
-        self.support.truncate(kept);
-        self.refactor(gram, first);
+        self.join_pending(gram, g, a);
         (length, true)
     }
 
-    /// Takes point `k` into the support. While it depends on the points there, weight is exchanged along the flat
+    /// Takes point `k` into the support. If it depends on the points there, weight is exchanged along the flat
     /// direction, downhill if it slopes, until one of them is used up and leaves. False if `k` itself was.
     fn join(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64], k: usize) -> bool {
-        loop {
+        self.pending.push(k);
+        self.join_pending(gram, g, a);
+        self.place[k] == Place::In
+    }
+
+    /// Takes the pending points into the support, the last first. Every exchange removes a point from both lists
+    /// for good, so this ends.
+    fn join_pending(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) {
+        while let Some(k) = self.pending.pop() {
             let p = self.support.len();
             self.support.push(k);
             if self.factor_row(gram, p) {
                 self.place[k] = Place::In;
-                return true;
+                continue;
             }
-            // The affine combination of the support nearest to point k, exchanged for k: d_k = 1, sum d = 0.
-            let n = self.n;
-            let row = &self.factor[p * n..][..p];
-            let ones = &self.ones[..p];
-            let level = (dot(ones, row) - 1.0) / dot(ones, ones);
-            for ((d, one), l) in self.step.iter_mut().zip(ones).zip(row) {
-                *d = level * one - l;
-            }
-            self.solve_transposed(p);
-            self.step[p] = 1.0;
-            let slope: f64 = self.support.iter().zip(&self.step).map(|(&k, d)| g[k] * d).sum();
-            // From nothing, k can only gain.
-            let sign = if slope <= 0.0 || a[k] <= 0.0 { 1.0 } else { -1.0 };
-            let mut reach = f64::INFINITY;
-            let mut blocking = p;
-            for (i, (&k, d)) in self.support.iter().zip(&self.step).enumerate() {
-                if sign * d < 0.0 && a[k] / -(sign * d) < reach {
-                    (reach, blocking) = (a[k] / -(sign * d), i);
-                }
-            }
-            // The direction sums to zero, so something blocks, unless numbers have overflowed.
-            if reach.is_finite() {
-                for (&k, d) in self.support.iter().zip(&self.step) {
-                    let d = sign * reach * d;
-                    a[k] = (a[k] + d).max(0.0);
-                    add_scaled(g, d, gram.row(k));
-                }
-            }
-            self.support.pop();
-            if blocking == p {
-                a[k] = 0.0;
-                self.place[k] = Place::Out;
-                return false;
-            }
-            let gone = self.support.remove(blocking);
-            a[gone] = 0.0;
-            self.place[gone] = Place::Out;
-            self.refactor(gram, blocking);
+            let gone = self.exchange(gram, g, a);
+            a[self.support[gone]] = 0.0;
+            self.place[self.support[gone]] = Place::Out;
+            self.leave(gone);
         }
+    }
+
+    /// The last point of the support depends on the others: moves weight along the direction that changes
+    /// nothing else, and returns the position of the point that has none left.
+    fn exchange(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) -> usize {
+        let n = self.n;
+        let last = self.support.len() - 1;
+        // The affine combination of the others nearest to it, exchanged for it: d_last = 1, sum d = 0.
+        let row = &self.factor[last * n..][..last];
+        let ones = &self.ones[..last];
+        let level = (dot(ones, row) - 1.0) / dot(ones, ones);
+        for ((d, one), l) in self.step.iter_mut().zip(ones).zip(row) {
+            *d = level * one - l;
+        }
+        self.solve_transposed(last);
+        self.step[last] = 1.0;
+        let slope: f64 = self.support.iter().zip(&self.step).map(|(&k, d)| g[k] * d).sum();
+        // From nothing, the last can only gain.
+        let sign = if slope <= 0.0 || a[self.support[last]] <= 0.0 { 1.0 } else { -1.0 };
+        let (mut reach, mut blocking) = (f64::INFINITY, last);
+        for (i, (&k, d)) in self.support.iter().zip(&self.step).enumerate() {
+            if sign * d < 0.0 && a[k] / -(sign * d) < reach {
+                (reach, blocking) = (a[k] / -(sign * d), i);
+            }
+        }
+        // The direction sums to zero, so something blocks, unless numbers have overflowed.
+        if reach.is_finite() {
+            for (&k, d) in self.support.iter().zip(&self.step) {
+                let d = sign * reach * d;
+                a[k] = (a[k] + d).max(0.0);
+                add_scaled(g, d, gram.row(k));
+            }
+        }
+        blocking
+    }
+
+    /// Removes a position of the support; the points after it await their new rows of the factor.
+    fn leave(&mut self, position: usize) {
+        self.pending.extend(self.support[position + 1..].iter().rev());
+        self.support.truncate(position);
     }
 
     /// `step = factor^-T step` on the first `p` places.
@@ -323,14 +334,6 @@ impl Simplex {
             let value = self.step[i] * row[i];
             self.step[i] = value;
             add_scaled(&mut self.step[..i], -value, &row[..i]);
-        }
-    }
-
-    /// Brings the Cholesky factor up to date from row `first` of the support on. Points that were independent
-    /// stay so when others leave; the floor only guards the division.
-    fn refactor(&mut self, gram: &Gram, first: usize) {
-        for i in first..self.support.len() {
-            self.factor_row(gram, i);
         }
     }
 

@@ -91,9 +91,8 @@ fn eliminate(mut m: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
         b.swap(c, p);
         for r in c + 1..n {
             let f = m[r][c] / m[c][c];
-            for k in c..n {
-                m[r][k] -= f * m[c][k];
-            }
+            let upper = m[c].clone();
+            m[r].iter_mut().zip(&upper).for_each(|(m, u)| *m -= f * u);
             b[r] -= f * b[c];
         }
     }
