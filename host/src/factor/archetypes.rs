@@ -13,7 +13,7 @@
 //! Source: Cutler & Breiman 1994 for the hull constraint; the metric, the slack and the descent are our own.
 
 use super::code::{Coder, Scratch};
-use super::columns::mix;
+use super::columns::{accumulate, mix};
 use super::hull::{Combination, Hull, Workspace};
 use super::parts;
 use super::sample::Sample;
@@ -323,9 +323,62 @@ impl<'a> Fit<'a> {
     }
 }
 
-#[inline]
-fn accumulate(sum: &mut [f32], s: f32, row: &[f32]) {
-    for (sum, &v) in sum.iter_mut().zip(row) {
-        *sum += s * v;
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::factor::pca::Pca;
+    use crate::factor::tests::noisy_mixtures;
+
+    #[test]
+    fn the_total_never_rises_and_bases_stay_within_the_slack() {
+        let sample = Sample::draw(&noisy_mixtures(2500), 1).unwrap();
+        let pca = Pca::of(&sample, 10, 1);
+        let hull = Hull::of_corners(&sample, &pca, 1);
+        for delta in [0.0, 0.05, 0.5] {
+            // A bad start: five neighbours in one corner.
+            let start = sample.x[..5 * sample.columns.padded].to_vec();
+            let mut fit = Fit::new(&sample, &hull, delta * pca.spread, &start);
+            let first = fit.total();
+            let mut last = first;
+            for sweep in 0..25 {
+                let total = fit.sweep();
+                assert!(total <= last * (1.0 + 1e-6), "sweep {sweep}: {last} then {total}");
+                let moved = fit.total();
+                assert!(moved <= total * (1.0 + 1e-6), "sweep {sweep}: {total} then {moved}");
+                last = moved;
+            }
+            assert!(last < 0.5 * first, "{first} {last}");
+            let excursions = crate::factor::hull::excursions(&sample, &pca, &fit.bases);
+            assert!(excursions.iter().all(|&e| e < delta + 1e-3), "delta {delta}: {excursions:?}");
+        }
+    }
+
+    /// The model's gradient against differences of the total itself.
+    #[test]
+    fn the_gradient_is_that_of_the_total() {
+        let sample = Sample::draw(&noisy_mixtures(400), 2).unwrap();
+        let pca = Pca::of(&sample, 10, 1);
+        let hull = Hull::of_corners(&sample, &pca, 1);
+        let padded = sample.columns.padded;
+        let mut fit = Fit::new(&sample, &hull, 0.0, &sample.x[..3 * padded]);
+        let model = fit.improve_weights();
+        let size = model.gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
+        for place in (0..3 * padded).step_by(5) {
+            let at = fit.bases[place];
+            // Single precision: a coarse difference, and a tolerance to match.
+            let h = 0.02 * at.max(0.05);
+            let mut total = |v: f32| {
+                fit.bases[place] = v;
+                let total = fit.total();
+                fit.bases[place] = at;
+                total
+            };
+            let difference = (total(at + h) - total(at - h)) / (4.0 * f64::from(h));
+            assert!(
+                (difference - model.gradient[place]).abs() < 0.01 * size,
+                "{difference} {}",
+                model.gradient[place]
+            );
+        }
     }
 }

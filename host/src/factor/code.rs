@@ -40,7 +40,7 @@ pub(super) struct Scratch {
     /// The slope of the response.
     pub slope: Vec<f32>,
     weighted: Vec<f32>,
-    rows: Vec<f64>,
+    rows: Vec<f32>,
     gradient: Vec<f64>,
     next: Vec<f64>,
     trial: Vec<f64>,
@@ -164,9 +164,101 @@ impl<'a> Coder<'a> {
         let Scratch { rows, slope, gram, .. } = scratch;
         for (out, row) in rows.chunks_exact_mut(padded).zip(self.bases.chunks_exact(padded)) {
             for ((out, &row), &d) in out.iter_mut().zip(row).zip(slope.iter()) {
-                *out = f64::from(row * d);
+                *out = row * d;
             }
         }
-        gram.refill(self.k, |i| &rows[i * padded..][..padded]);
+        let row = |i: usize| &rows[i * padded..][..padded];
+        gram.refill_products(self.k, |i, j| f64::from(dot(row(i), row(j))));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Space;
+    use proptest::prelude::*;
+
+    const COLUMNS: usize = 12;
+
+    fn setting(values: &[f32]) -> (Space, Columns) {
+        let space = Space::half_angle(COLUMNS / 3);
+        let rows = values.len() / COLUMNS;
+        let mean: Vec<f64> = (0..COLUMNS)
+            .map(|j| (0..rows).map(|i| f64::from(values[i * COLUMNS + j])).sum::<f64>() / rows as f64)
+            .collect();
+        let columns = Columns::new(&space, &mean);
+        (space, columns)
+    }
+
+    fn scaled(columns: &Columns, values: &[f32]) -> Vec<f32> {
+        let mut rows = vec![0.0; values.len() / COLUMNS * columns.padded];
+        for (row, x) in values.chunks_exact(COLUMNS).zip(rows.chunks_exact_mut(columns.padded)) {
+            columns.scale(row, x);
+        }
+        rows
+    }
+
+    proptest! {
+        /// Against every mixture on a grid over the simplex, by the definition of the distance.
+        #[test]
+        fn no_mixture_on_a_grid_is_nearer(values in prop::collection::vec(0.01f32..3.0, 4 * COLUMNS)) {
+            let (space, columns) = setting(&values);
+            let rows = scaled(&columns, &values);
+            let (bases, x) = rows.split_at(3 * columns.padded);
+            let mut t = vec![0.0; columns.padded];
+            columns.respond(x, &mut t);
+            let coder = Coder::new(&columns, bases);
+            let mut a = [0.0; 3];
+            let d = coder.code(x, &t, &mut a, &mut coder.scratch()).sqrt();
+            prop_assert!((a.iter().sum::<f64>() - 1.0).abs() < 1e-9 && a.iter().all(|&a| a >= 0.0));
+            let double: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
+            let (bases, target) = double.split_at(3 * COLUMNS);
+            for i in 0..=20 {
+                for j in 0..=20 - i {
+                    let w = [f64::from(i) / 20.0, f64::from(j) / 20.0, f64::from(20 - i - j) / 20.0];
+                    let mixture: Vec<f64> = (0..COLUMNS)
+                        .map(|c| (0..3).map(|l| w[l] * bases[l * COLUMNS + c]).sum())
+                        .collect();
+                    let grid = space.distance(&mixture, target);
+                    prop_assert!(d <= grid * 1.002 + 1e-5, "{d} at {a:?}, but {grid} at {w:?}");
+                }
+            }
+        }
+
+        #[test]
+        fn a_mixture_of_the_bases_is_found_again(
+            values in prop::collection::vec(0.01f32..3.0, 5 * COLUMNS), w in prop::collection::vec(0.0f64..1.0, 5)
+        ) {
+            let (_, columns) = setting(&values);
+            let bases = scaled(&columns, &values);
+            let sum: f64 = w.iter().sum::<f64>() + 1e-3;
+            let w: Vec<f64> = w.iter().map(|w| (w + 2e-4) / sum).collect();
+            let (mut x, mut t) = (vec![0.0; columns.padded], vec![0.0; columns.padded]);
+            mix(&bases, &w, &mut x);
+            columns.respond(&x, &mut t);
+            let coder = Coder::new(&columns, &bases);
+            let mut a = [0.0; 5];
+            let d2 = coder.code(&x, &t, &mut a, &mut coder.scratch());
+            prop_assert!(d2.sqrt() < 2e-5, "{}", d2.sqrt());
+        }
+
+        #[test]
+        fn improving_never_makes_worse(values in prop::collection::vec(0.0f32..3.0, 4 * COLUMNS)) {
+            let (_, columns) = setting(&values);
+            let rows = scaled(&columns, &values);
+            let (bases, x) = rows.split_at(3 * columns.padded);
+            let mut t = vec![0.0; columns.padded];
+            columns.respond(x, &mut t);
+            let coder = Coder::new(&columns, bases);
+            let mut scratch = coder.scratch();
+            let mut a = [0.2, 0.3, 0.5];
+            let mut last = coder.evaluate(&t, &a, &mut scratch);
+            for _ in 0..6 {
+                let next = coder.improve(&t, &mut a, 1, &mut scratch);
+                prop_assert!(next <= last);
+                prop_assert_eq!(next, coder.evaluate(&t, &a, &mut scratch));
+                last = next;
+            }
+        }
     }
 }

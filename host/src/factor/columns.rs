@@ -132,6 +132,14 @@ pub(super) fn mix(rows: &[f32], a: &[f64], out: &mut [f32]) {
     }
 }
 
+/// `sum += s row`.
+#[inline]
+pub(super) fn accumulate(sum: &mut [f32], s: f32, row: &[f32]) {
+    for (sum, &v) in sum.iter_mut().zip(row) {
+        *sum += s * v;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

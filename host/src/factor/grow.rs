@@ -9,6 +9,8 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use crate::observe::Observer;
+
 use super::archetypes::Fit;
 use super::hull::Hull;
 use super::kmeans::draw;
@@ -25,12 +27,15 @@ const MATERIALS: usize = 4000;
 const TRIES: usize = 4;
 const SWEEPS: usize = 6;
 
-/// Bases as many as the document needs, at most `most`, fit to a part of the sample.
-pub(super) fn grow(sample: &Sample, hull: &Hull, slack: f64, most: usize, seed: u64) -> Vec<f32> {
+/// Bases as many as the document needs, fit to a part of the sample.
+pub(super) fn grow(sample: &Sample, hull: &Hull, slack: f64, seed: u64, observer: &dyn Observer) -> Vec<f32> {
+    let most = MOST.min(sample.len());
+    observer.begin("choosing how many bases", most as u64);
     let sample = sample.thinned(MATERIALS);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut fit = refined(&sample, hull, slack, &sample.mean());
     let mut error = fit.total().sqrt();
+    observer.advance(1);
     while error > ENOUGH && fit.bases.len() < most * sample.columns.padded {
         let chance: Vec<f64> = fit.distances2().iter().zip(&sample.weight).map(|(d, w)| d * w).collect();
         let mut best: Option<(f64, Fit)> = None;
@@ -46,12 +51,14 @@ pub(super) fn grow(sample: &Sample, hull: &Hull, slack: f64, most: usize, seed: 
         }
         let Some((_, mut next)) = best else { break };
         (1..SWEEPS).for_each(|_| _ = next.sweep());
+        observer.advance(1);
         let lower = next.total().sqrt();
         if lower > (1.0 - GAIN) * error {
             break;
         }
         (fit, error) = (next, lower);
     }
+    observer.end();
     fit.bases
 }
 

@@ -226,3 +226,55 @@ pub(super) fn excursions(sample: &Sample, pca: &Pca, bases: &[f32]) -> Vec<f64> 
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Table;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against one least-squares problem over all points at once.
+        #[test]
+        fn projecting_with_few_points_is_projecting_with_all(
+            points in prop::collection::vec(0.0f32..2.0, 40 * 8), target in prop::collection::vec(-0.5f64..2.5, 8),
+            weight in prop::collection::vec(0.1f64..3.0, 8)
+        ) {
+            let hull = Hull::new(points.clone(), 8);
+            let mut out = vec![0.0; 8];
+            let mut from = Combination::default();
+            let few = hull.project(&target, &weight, &mut from, &mut out, &mut Workspace::new());
+            let mut rows = Table::new(8);
+            for point in points.chunks_exact(8) {
+                let row: Vec<f64> =
+                    (0..8).map(|j| weight[j].sqrt() * (f64::from(point[j]) - target[j])).collect();
+                rows.push(&row);
+            }
+            let mut a = vec![0.0; 40];
+            Simplex::new().solve(&Gram::of_rows(&rows), &[0.0; 40], &mut a).unwrap();
+            let all: f64 = (0..8)
+                .map(|j| rows.rows().zip(&a).map(|(row, a)| row[j] * a).sum::<f64>().powi(2))
+                .sum();
+            prop_assert!(few >= all - 1e-9 && few <= all * 1.003 + 1e-6, "{few} {all}");
+            prop_assert!((from.weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            let mut again = vec![0.0; 8];
+            hull.combine(&from, &mut again);
+            prop_assert_eq!(again, out);
+        }
+    }
+
+    #[test]
+    fn a_combination_part_way_is_the_point_part_way() {
+        let hull = Hull::new((0..24).map(|i| (i * i % 7) as f32).collect(), 8);
+        let a = Combination { points: vec![0, 1], weights: vec![0.5, 0.5] };
+        let b = Combination { points: vec![1, 2], weights: vec![0.25, 0.75] };
+        let at = |c: &Combination| {
+            let mut out = vec![0.0; 8];
+            hull.combine(c, &mut out);
+            out
+        };
+        for ((a, b), m) in at(&a).iter().zip(at(&b)).zip(at(&a.towards(&b, 0.25))) {
+            assert!((m - (0.75 * a + 0.25 * b)).abs() < 1e-12);
+        }
+    }
+}

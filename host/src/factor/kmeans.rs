@@ -21,6 +21,8 @@ use super::sample::Sample;
 
 const STARTS: u64 = 4;
 const ITERATIONS: usize = 40;
+/// Iterations without a better hull after which nothing more is expected.
+const IDLE: usize = 5;
 /// Materials within this share of the document's spread of a mixture of the centres are represented.
 const TOLERANCE: f64 = 0.07;
 /// As many materials place centres well enough; all of them take part in lifting.
@@ -81,15 +83,20 @@ impl Cloud<'_> {
         let mut left = self.outside(&centres, k, &mut weights);
         let mut best = (self.sum(&left), centres.clone());
         let mut active = vec![true; n];
+        let mut idle = 0;
         for _ in 0..ITERATIONS {
             self.lloyd(&mut centres, k, &active, &left);
             left = self.outside(&centres, k, &mut weights);
             let sum = self.sum(&left);
+            idle += 1;
             if sum < best.0 {
                 best = (sum, centres.clone());
+                idle = 0;
             }
             let now: Vec<bool> = left.iter().map(|&left| left > represented).collect();
-            if now == active || now.iter().filter(|&&a| a).count() < few || d == 0 {
+            // Points that come back as others leave can go round in circles.
+            let stable = now == active || idle >= IDLE;
+            if stable || now.iter().filter(|&&a| a).count() < few || d == 0 {
                 break;
             }
             active = now;

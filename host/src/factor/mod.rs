@@ -254,18 +254,23 @@ fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca,
         }
         return (pca, sample.x.clone());
     }
-    observer.begin("learning bases", SWEEPS as u64);
     let corners = Hull::of_corners(sample, &pca, settings.seed);
     let slack = settings.delta * pca.spread;
     let grown = match settings.bases {
         Some(_) => None,
-        None => Some(grow::grow(sample, &corners, slack, most.min(grow::MOST), settings.seed)),
+        None => Some(grow::grow(sample, &corners, slack, settings.seed, observer)),
     };
     let k = settings.bases.or(grown.as_ref().map(|g| g.len() / sample.columns.padded)).unwrap_or(1);
     let mut bases = if k == 1 { sample.mean() } else { kmeans::bases(sample, &pca, k, settings.seed) };
+    let steps = match settings.method {
+        Method::Kmeans => 0,
+        Method::Sacls => sacls::ITERATIONS,
+        Method::Archetypes => SWEEPS,
+    };
+    observer.begin("learning bases", steps as u64);
     match settings.method {
         Method::Kmeans => {}
-        Method::Sacls => sacls::refine(sample, &mut bases, settings.lambda, |_, _| {}),
+        Method::Sacls => sacls::refine(sample, &mut bases, settings.lambda, |_| observer.advance(1)),
         Method::Archetypes => {
             let mut fit = Fit::new(sample, &corners, slack, &bases);
             for _ in 0..SWEEPS {

@@ -209,3 +209,54 @@ fn jacobi(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
     }
     ((0..n).map(|i| a[i * n + i]).collect(), v)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Space;
+    use crate::factor::columns::Columns;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn eigenvectors_are_turned_into_multiples(values in prop::collection::vec(-1.0f64..1.0, 25)) {
+            let matrix: Vec<f64> = (0..25).map(|i| values[i] + values[i % 5 * 5 + i / 5]).collect();
+            let (eigenvalues, vectors) = jacobi(matrix.clone(), 5);
+            for v in 0..5 {
+                for i in 0..5 {
+                    let image: f64 = (0..5).map(|j| matrix[i * 5 + j] * vectors[j * 5 + v]).sum();
+                    prop_assert!((image - eigenvalues[v] * vectors[i * 5 + v]).abs() < 1e-12);
+                }
+            }
+        }
+    }
+
+    /// Materials on a plane: two axes, and distances on them are those of the tangent.
+    #[test]
+    fn axes_of_a_plane_keep_its_distances() {
+        let columns = Columns::new(&Space::half_angle(8), &[1.0; 24]);
+        let n = 50;
+        let x: Vec<f32> = (0..n)
+            .flat_map(|i| {
+                let (a, b) = ((i * 7 % 50) as f32 / 50.0, (i * 31 % 50) as f32 / 50.0);
+                (0..24).map(move |j| 1.0 + a * (j % 3) as f32 + b * (j % 5) as f32)
+            })
+            .collect();
+        let sample = Sample { t: x.clone(), x, weight: vec![1.0 / n as f64; n], columns };
+        let pca = Pca::of(&sample, 6, 1);
+        assert_eq!(pca.dimensions, 2);
+        let variance: f64 = pca.variance.iter().sum();
+        assert!((variance.sqrt() / pca.spread - 1.0).abs() < 1e-6);
+        let c = pca.coordinates(&sample);
+        for (i, j) in [(0, 1), (3, 40), (17, 29)] {
+            let direct: f64 = (0..24)
+                .map(|l| {
+                    let d = f64::from(sample.row(i)[l] - sample.row(j)[l]);
+                    (d * f64::from(sample.columns.omega[l]) / 3.0).powi(2)
+                })
+                .sum();
+            let projected = (c[2 * i] - c[2 * j]).powi(2) + (c[2 * i + 1] - c[2 * j + 1]).powi(2);
+            assert!((projected / direct - 1.0).abs() < 1e-4, "{projected} {direct}");
+        }
+    }
+}

@@ -12,37 +12,39 @@
 
 use crate::solve::{Gram, Simplex};
 
-use super::columns::mix;
+use super::columns::{accumulate, dot, mix};
 use super::parts;
 use super::sample::Sample;
 
 /// Most iterations; the penalty is at its full strength after [`RAMP`] of them.
-const ITERATIONS: usize = 60;
+pub(super) const ITERATIONS: usize = 60;
 const RAMP: usize = 36;
 /// Relative fall of the objective that counts as settled.
 const SETTLED: f64 = 1e-4;
 
 /// Improves `bases` (rows of the sample's columns); `lambda` is the sparsity. `done` is called after each
-/// iteration with the penalty in force and the objective.
-pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: impl FnMut(f64, f64)) {
+/// iteration, with the objective once the penalty is held.
+pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: impl FnMut(Option<f64>)) {
     let padded = sample.columns.padded;
     let k = bases.len() / padded;
     let tangent2: Vec<f32> = sample.columns.omega.iter().map(|o| (o / 3.0).powi(2)).collect();
     let scale: f64 = (0..sample.len()).map(|i| sample.weight[i] * length2(sample.row(i), &tangent2)).sum();
     let mut weights = vec![1.0 / k as f64; sample.len() * k];
-    let mut last = f64::INFINITY;
+    let mut last: Option<f64> = None;
     for iteration in 0..ITERATIONS {
         let held = iteration >= RAMP;
-        let strength = lambda * iteration.min(RAMP) as f64 / RAMP as f64;
+        let strength = lambda * (iteration.min(RAMP) as f64 / RAMP as f64);
         // The first round has no dominant weights to favour yet: plain least squares.
         let step = code(sample, bases, &tangent2, &mut weights, 0.5 * strength * scale);
         solve_bases(&step, bases, padded);
-        let objective = objective(sample, bases, &tangent2, &weights, strength * scale);
-        done(strength, objective);
-        if held && last - objective <= SETTLED * last {
+        let objective = held.then(|| objective(sample, bases, &tangent2, &weights, strength * scale));
+        done(objective);
+        if let (Some(last), Some(now)) = (last, objective)
+            && last - now <= SETTLED * last
+        {
             break;
         }
-        last = if held { objective } else { f64::INFINITY };
+        last = objective;
     }
 }
 
@@ -56,25 +58,20 @@ struct Normal {
 fn code(sample: &Sample, bases: &[f32], tangent2: &[f32], weights: &mut [f64], bonus: f64) -> Normal {
     let padded = sample.columns.padded;
     let k = bases.len() / padded;
-    let rows: Vec<f64> = bases
-        .chunks_exact(padded)
-        .flat_map(|row| row.iter().zip(tangent2).map(|(&b, &t)| f64::from(b) * f64::from(t).sqrt()))
-        .collect();
+    let seen: Vec<f32> =
+        bases.chunks_exact(padded).flat_map(|row| row.iter().zip(tangent2).map(|(b, t)| b * t)).collect();
     let mut gram = Gram::empty();
-    gram.refill(k, |i| &rows[i * padded..][..padded]);
+    gram.refill_products(k, |i, j| f64::from(dot(&seen[i * padded..][..padded], &bases[j * padded..])));
     let gram = &gram;
     let partial = parts::each_mut(sample.len(), weights, k, |range, weights| {
         let mut simplex = Simplex::new();
         let mut matrix = vec![0.0f64; k * k];
-        let mut right = vec![0.0f64; k * padded];
-        let (mut h, mut z) = (vec![0.0; k], vec![0.0; padded]);
+        let mut right = vec![0.0f32; k * padded];
+        let mut h = vec![0.0; k];
         for (i, a) in range.zip(weights.chunks_exact_mut(k)) {
             let x = sample.row(i);
-            z.iter_mut()
-                .zip(x.iter().zip(tangent2))
-                .for_each(|(z, (&x, &t))| *z = f64::from(x) * f64::from(t).sqrt());
-            for (h, row) in h.iter_mut().zip(rows.chunks_exact(padded)) {
-                *h = crate::solve::vector::dot(row, &z);
+            for (h, row) in h.iter_mut().zip(seen.chunks_exact(padded)) {
+                *h = f64::from(dot(row, x));
             }
             h[dominant(a)] += bonus;
             // Sizes agree and numbers are finite, so there is a solution.
@@ -82,10 +79,7 @@ fn code(sample: &Sample, bases: &[f32], tangent2: &[f32], weights: &mut [f64], b
             let w = sample.weight[i];
             for (l, &al) in a.iter().enumerate().filter(|(_, a)| **a > 0.0) {
                 matrix[l * k..][..k].iter_mut().zip(a.iter()).for_each(|(m, &am)| *m += w * al * am);
-                right[l * padded..][..padded]
-                    .iter_mut()
-                    .zip(x)
-                    .for_each(|(r, &x)| *r += w * al * f64::from(x));
+                accumulate(&mut right[l * padded..][..padded], (w * al) as f32, x);
             }
         }
         (matrix, right)
@@ -189,6 +183,18 @@ mod tests {
                 let slope: f64 = (0..4).map(|m| matrix[l * 4 + m] * b[m]).sum::<f64>() - right[l];
                 prop_assert!(b[l] >= 0.0 && slope > -1e-6 && (b[l] == 0.0 || slope < 1e-6), "{b:?} {slope}");
             }
+        }
+    }
+
+    #[test]
+    fn the_objective_never_rises_while_the_penalty_is_held() {
+        let sample = Sample::draw(&crate::factor::tests::noisy_mixtures(1500), 3).unwrap();
+        let mut bases = sample.x[..4 * sample.columns.padded].to_vec();
+        let mut held = Vec::new();
+        refine(&sample, &mut bases, 0.03, |objective| held.extend(objective));
+        assert!(held.len() > 1);
+        for pair in held.windows(2) {
+            assert!(pair[1] <= pair[0] * (1.0 + 1e-6), "{held:?}");
         }
     }
 }

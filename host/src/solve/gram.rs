@@ -95,6 +95,22 @@ impl Gram {
         self.measure();
     }
 
+    /// Replaces the matrix by `n * n` inner products computed elsewhere, in single precision say: `product(i, j)`
+    /// is asked for `j <= i` only and must be finite. Allocates no more than [`Gram::refill`].
+    pub fn refill_products(&mut self, n: usize, product: impl Fn(usize, usize) -> f64) {
+        self.n = n;
+        self.values.clear();
+        self.values.resize(n * n, 0.0);
+        for i in 0..n {
+            for j in 0..=i {
+                let value = product(i, j);
+                self.values[i * n + j] = value;
+                self.values[j * n + i] = value;
+            }
+        }
+        self.measure();
+    }
+
     fn measure(&mut self) {
         self.largest = (0..self.n).map(|i| self.values[i * self.n + i]).fold(0.0, f64::max);
         self.shift = if self.largest > 0.0 { self.largest } else { 1.0 };
