@@ -159,10 +159,7 @@ pub fn job_of(
     inks: &InkSet,
     observer: &dyn Observer,
 ) -> Result<Vec<u8>, StreamError> {
-    let foil = inks
-        .iter()
-        .any(|ink| ink.kind() == Kind::Foil)
-        .then(FoilConsent::given_by_the_user);
+    let foil = inks.iter().any(|ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
     let mut job = Vec::new();
     stream::write_job(Page { media, ..Page::plain(paper) }, foil, passes, &mut job, observer)?;
     Ok(job)

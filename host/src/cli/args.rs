@@ -151,6 +151,7 @@ pub struct MediaArgs {
 }
 
 fn media(name: &str) -> Result<Media, String> {
-    Media::from_name(name)
-        .ok_or_else(|| format!("the media are {}", Media::all().map(Media::name).collect::<Vec<_>>().join(", ")))
+    Media::from_name(name).ok_or_else(|| {
+        format!("the media are {}", Media::all().map(Media::name).collect::<Vec<_>>().join(", "))
+    })
 }

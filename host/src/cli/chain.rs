@@ -46,7 +46,9 @@ impl Factor {
 
 /// Arguments of `map`.
 #[derive(ClapArgs, Debug)]
-#[command(after_help = "Example:\n  foilpress map my-material.foil --intent basis --inks process,MS -o my-material.mix")]
+#[command(
+    after_help = "Example:\n  foilpress map my-material.foil --intent basis --inks process,MS -o my-material.mix"
+)]
 pub struct Map {
     /// A folder made by `factor`
     #[arg(value_name = "DOC.foil")]
@@ -84,8 +86,7 @@ impl Map {
         let staged = Staged::new(&self.output)?;
         let printable = Printable::from_library(&library, &set, &factored.space);
         let materials = document.as_ref().map(|document| document.materials());
-        let mapped =
-            gamut::map(&factored, materials, &printable, &self.gamut.settings(self.seed), observer)?;
+        let mapped = gamut::map(&factored, materials, &printable, &self.gamut.settings(self.seed), observer)?;
         let provenance = Provenance {
             document: read.name.clone(),
             mapping: format!("intent {:?}, seed {}", mapped.report.intent, self.seed),
@@ -122,7 +123,8 @@ impl Halftone {
         let pixels = (mix.maps.width(), mix.maps.height());
         let placement = placement::place(pixels, provenance.size_mm, self.page.size, self.page.paper)?;
         let staged = Staged::new(&self.output)?;
-        pipeline::halftone_mix(&mix, &library, &placement, observer)?.save(staged.path())?;
+        let sheet = pipeline::halftone_mix(&mix, &library, &placement, observer)?;
+        sheet.save(staged.folder()?)?;
         staged.commit()
     }
 }
@@ -148,7 +150,7 @@ impl Separate {
         for check in &separation.checks {
             observer.note(&check.to_string());
         }
-        separate::files::write_passes(&separation, staged.path())?;
+        separate::files::save(&separation, staged.folder()?)?;
         staged.commit()
     }
 }
@@ -173,12 +175,11 @@ pub struct Encode {
 impl Encode {
     /// Passes → the printer's language.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let (paper, passes) = separate::files::read_passes(&self.passes)?;
+        let saved = separate::files::load(&self.passes)?;
         let staged = Staged::new(&self.output)?;
         let inks = if self.foil { inks::InkSet::ALL } else { inks::InkSet::default() };
-        let job = pipeline::job_of(&passes, paper, self.media.media, &inks, observer)?;
-        fs::write(staged.path(), job)
-            .with_context(|| format!("cannot write {}", self.output.display()))?;
+        let job = pipeline::job_of(&saved.passes, saved.paper, self.media.media, &inks, observer)?;
+        fs::write(staged.path(), job).with_context(|| format!("cannot write {}", self.output.display()))?;
         staged.commit()
     }
 }
@@ -202,7 +203,7 @@ impl Simulate {
         let staged = Staged::new(&self.output)?;
         let printout = simulate::print(&job, &simulate::Setup::default(), observer)
             .with_context(|| format!("{}", self.job.display()))?;
-        printout.sheet()?.save(staged.path())?;
+        printout.sheet()?.save(staged.folder()?)?;
         staged.commit()
     }
 }

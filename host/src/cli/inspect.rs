@@ -1,20 +1,21 @@
 //! `foilpress inspect`: what is in a stream.
 
-use std::fs;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use super::output::Staged;
 use crate::inspect::{Inspection, inspect};
 use crate::observe::Observer;
-use crate::separate::files::write_plane;
+use crate::separate::files::{self, save_plane};
 
 /// Arguments of `inspect`.
 #[derive(ClapArgs, Debug)]
-#[command(after_help = "Examples:\n  foilpress inspect job.rgl\n  foilpress inspect job.rgl --passes passes/ --json")]
+#[command(
+    after_help = "Examples:\n  foilpress inspect job.rgl\n  foilpress inspect job.rgl --passes passes/ --json"
+)]
 pub struct Args {
     /// A stream in the printer's language
     #[arg(value_name = "JOB.rgl")]
@@ -34,10 +35,10 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let summary = &inspected.inspection;
     if let Some(folder) = &args.passes {
         let staged = Staged::new(folder)?;
-        fs::create_dir(staged.path()).with_context(|| format!("cannot write {}", folder.display()))?;
+        let inside = staged.folder()?;
         for (report, pass) in summary.passes.iter().zip(&inspected.passes) {
-            let name = format!("{:02}-{}.png", report.number, report.ink);
-            write_plane(&pass.plane, &staged.path().join(name))?;
+            let name = files::name(report.number - 1, pass.ink);
+            save_plane(&pass.plane, &inside.join(name))?;
         }
         staged.commit()?;
     }
@@ -57,7 +58,12 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
     let setup = &summary.setup;
     let unknown = "not declared";
     let (across, along) = setup.resolution.unwrap_or_default();
-    writeln!(out, "{} bytes, {}", summary.bytes, if summary.complete { "one whole job" } else { "no whole job" })?;
+    writeln!(
+        out,
+        "{} bytes, {}",
+        summary.bytes,
+        if summary.complete { "one whole job" } else { "no whole job" }
+    )?;
     writeln!(
         out,
         "{across} x {along} dpi, {} paper ({} x {} dots), {} media, {} mode, curl correction {}",
@@ -93,7 +99,14 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
             Some(bounds) => writeln!(
                 out,
                 "\n    from ({}, {}), {} x {} dots; {:.1} x {:.1} mm at {:.1}, {:.1} mm of the printable area",
-                bounds.x, bounds.y, bounds.width, bounds.height, bounds.mm[2], bounds.mm[3], bounds.mm[0], bounds.mm[1]
+                bounds.x,
+                bounds.y,
+                bounds.width,
+                bounds.height,
+                bounds.mm[2],
+                bounds.mm[3],
+                bounds.mm[0],
+                bounds.mm[1]
             )?,
             None => writeln!(out, "; blank")?,
         }

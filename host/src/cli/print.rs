@@ -16,7 +16,7 @@ use crate::job::plan::Plan;
 use crate::observe::Observer;
 use crate::pipeline::{self, Print};
 use crate::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
-use crate::separate::files::write_passes;
+use crate::separate;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;
@@ -90,17 +90,16 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let print = pipeline::print(&document, &library, &settings, observer)?;
     let plan = Plan::new(&document.name, &print.sheet, &print.placement, &print.separation, &library);
 
-    let folder = staged.path();
-    fs::create_dir(folder).with_context(|| format!("cannot write {}", folder.display()))?;
+    let folder = staged.folder()?;
     write(&folder.join("job.rgl"), &print.job)?;
-    write_passes(&print.separation, &folder.join("passes"))?;
+    let passes = folder.join("passes");
+    fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
+    separate::files::save(&print.separation, &passes)?;
     let pictures = pictures(&document, &print, &library, &probe, observer)?;
     for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
         picture.save(folder.join(name)).with_context(|| format!("cannot write {name}"))?;
     }
-    preview::separation(&print.sheet, Area::of(&print.placement))?
-        .save(folder.join("separation.png"))
-        .context("cannot write separation.png")?;
+    print.sheet.save_colours(Area::of(&print.placement), &folder.join("separation.png"))?;
     let report = report(&document, &settings, &print, &plan, &pictures.fidelity);
     let report = serde_json::to_string_pretty(&report)?;
     write(&folder.join("report.json"), report.as_bytes())?;
@@ -154,21 +153,14 @@ fn pictures(
         None => Source::Document(document.materials()),
     };
     let printed = Source::Print { sheet: &print.printed, space, stacks: &stacks, area };
-    let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
+    let fidelity = preview::fidelity(&target, &printed, EYE, observer)?;
     let (width, height) = crate::job::placement::size_mm(&print.placement);
     let notes = [
         format!("{width:.0} x {height:.0} mm, {} passes", print.separation.passes.len()),
         format!("seen from {EYE} m: mean d {:.3}, 95 % below {:.3}", fidelity.mean, fidelity.p95),
     ];
-    let sheet = preview::sheet_picture(
-        &target,
-        &printed,
-        &STANDARD_LIGHTS,
-        PANEL,
-        &document.name,
-        &notes,
-        observer,
-    )?;
+    let sheet =
+        preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
     let swatches: Vec<Swatch> = (1..)
         .zip(&print.mapped.report.bases)
         .map(|(number, basis)| Swatch {

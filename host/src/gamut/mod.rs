@@ -20,8 +20,8 @@ mod mix;
 mod sample;
 
 use inks::Stack;
-use serde::Serialize;
 use protocol::ink::Ink;
+use serde::Serialize;
 
 use crate::brdf::Table;
 use crate::document::Materials;

@@ -9,6 +9,7 @@ use super::placement::size_mm;
 use crate::halftone::Placement;
 use crate::separate::{Check, Separation};
 use crate::sheet::Sheet;
+use crate::sheet::colours::colours;
 
 /// What will be printed, from what, and what to think of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -66,6 +67,8 @@ pub struct Share {
     pub stack: String,
     /// The same in the words of the boxes.
     pub words: String,
+    /// Its false colour in the separation picture, sRGB as `#rrggbb`.
+    pub colour: String,
     /// Dots.
     pub dots: u64,
     /// Dots as a share of the document's.
@@ -88,10 +91,17 @@ impl Plan {
             .stacks()
             .iter()
             .zip(sheet.census())
+            .zip(colours(sheet.stacks()))
             .enumerate()
-            .map(|(i, (stack, dots))| {
+            .map(|(i, ((stack, dots), [r, g, b]))| {
                 let dots = if i == 0 { dots.saturating_sub(outside) } else { dots };
-                Share { stack: stack.to_string(), words: library.words(stack), dots, share: share(dots) }
+                Share {
+                    stack: stack.to_string(),
+                    words: library.words(stack),
+                    colour: format!("#{r:02x}{g:02x}{b:02x}"),
+                    dots,
+                    share: share(dots),
+                }
             })
             .filter(|stack| stack.dots > 0)
             .collect();
@@ -134,13 +144,14 @@ impl fmt::Display for Plan {
         )?;
         writeln!(f, "\nLoad {} cartridge{}:", self.cartridges.len(), plural(self.cartridges.len()))?;
         for cartridge in &self.cartridges {
-            writeln!(
-                f,
-                "    {:<22} {}, barcode {}",
-                cartridge.sold_as, cartridge.part, cartridge.barcode
-            )?;
+            writeln!(f, "    {:<22} {}, barcode {}", cartridge.sold_as, cartridge.part, cartridge.barcode)?;
         }
-        writeln!(f, "\n{} pass{} over the sheet, in this order:", self.passes.len(), if self.passes.len() == 1 { "" } else { "es" })?;
+        writeln!(
+            f,
+            "\n{} pass{} over the sheet, in this order:",
+            self.passes.len(),
+            if self.passes.len() == 1 { "" } else { "es" }
+        )?;
         for pass in &self.passes {
             writeln!(
                 f,

@@ -101,7 +101,12 @@ pub fn draw() -> Painting {
     let mut gold = Shape::new(WIDTH, HEIGHT, 6.0);
     pen(&mut gold, &WORD, [268.0, 560.0], 142.0, 2.6, 13.0);
     for (inset, radius) in [(46.0, 3.4), (62.0, 1.4)] {
-        let corners = [[inset, inset], [width - inset, inset], [width - inset, height - inset], [inset, height - inset]];
+        let corners = [
+            [inset, inset],
+            [width - inset, inset],
+            [width - inset, height - inset],
+            [inset, height - inset],
+        ];
         for k in 0..4 {
             gold.stroke(corners[k], corners[(k + 1) % 4], radius, radius);
         }
@@ -114,9 +119,18 @@ pub fn draw() -> Painting {
 
     let mut silver = Shape::new(WIDTH, HEIGHT, 4.0);
     let stars = [
-        ([300.0, 330.0], 74.0), ([724.0, 290.0], 96.0), ([512.0, 206.0], 48.0), ([180.0, 500.0], 40.0),
-        ([862.0, 520.0], 52.0), ([196.0, 262.0], 28.0), ([852.0, 410.0], 24.0), ([424.0, 398.0], 26.0),
-        ([590.0, 420.0], 30.0), ([842.0, 210.0], 30.0), ([160.0, 700.0], 26.0), ([874.0, 760.0], 34.0),
+        ([300.0, 330.0], 74.0),
+        ([724.0, 290.0], 96.0),
+        ([512.0, 206.0], 48.0),
+        ([180.0, 500.0], 40.0),
+        ([862.0, 520.0], 52.0),
+        ([196.0, 262.0], 28.0),
+        ([852.0, 410.0], 24.0),
+        ([424.0, 398.0], 26.0),
+        ([590.0, 420.0], 30.0),
+        ([842.0, 210.0], 30.0),
+        ([160.0, 700.0], 26.0),
+        ([874.0, 760.0], 34.0),
     ];
     for (i, (centre, radius)) in stars.into_iter().enumerate() {
         star(&mut silver, centre, radius, hash(i as i32, 0, 9));
@@ -127,11 +141,17 @@ pub fn draw() -> Painting {
     }
 
     let (mut leaves, mut veins) = (Shape::new(WIDTH, HEIGHT, 26.0), Shape::new(WIDTH, HEIGHT, 4.0));
-    for (degrees, length) in [(-158.0, 300.0), (-22.0, 300.0), (168.0, 250.0), (12.0, 250.0), (-118.0, 170.0), (-62.0, 170.0)] {
+    for (degrees, length) in
+        [(-158.0, 300.0), (-22.0, 300.0), (168.0, 250.0), (12.0, 250.0), (-118.0, 170.0), (-62.0, 170.0)]
+    {
         holly(&mut leaves, &mut veins, [512.0, 1200.0], degrees, length);
     }
     let berries: [(Point, f32); 5] = [
-        ([470.0, 1196.0], 37.0), ([548.0, 1186.0], 40.0), ([508.0, 1246.0], 38.0), ([508.0, 1136.0], 30.0), ([590.0, 1240.0], 27.0),
+        ([470.0, 1196.0], 37.0),
+        ([548.0, 1186.0], 40.0),
+        ([508.0, 1246.0], 38.0),
+        ([508.0, 1136.0], 30.0),
+        ([590.0, 1240.0], 27.0),
     ];
     let berry = |p: Point| {
         berries.iter().fold((f32::MAX, 0), |best, (c, r)| {
@@ -155,7 +175,8 @@ pub fn draw() -> Painting {
         coat = coat.under(Coat { roughness: 0.16 + 0.16 * worn, ..gold_coat }, inside(gold.at(i)));
 
         let depth = -leaves.at(i);
-        let tone = 0.55 + 0.5 * smooth(0.0, 22.0, depth) + 0.35 * (clouds(p[0] / 40.0, p[1] / 40.0, 3, 31) - 0.5);
+        let tone =
+            0.55 + 0.5 * smooth(0.0, 22.0, depth) + 0.35 * (clouds(p[0] / 40.0, p[1] / 40.0, 3, 31) - 0.5);
         let mut green = leaf.shaded(tone).under(vein, 0.8 * inside(veins.at(i)));
         green.roughness += 0.12 * (clouds(p[0] / 25.0, p[1] / 25.0, 2, 32) - 0.5);
         // A fine gilt margin, as on embossed cards.

@@ -41,10 +41,20 @@ struct Wing {
     feathers: usize,
 }
 
-const NEAR: Wing =
-    Wing { shoulder: [600.0, 520.0], wrist: [640.0, 330.0], fan: (196.0, 276.0), lengths: (190.0, 400.0), feathers: 13 };
-const FAR: Wing =
-    Wing { shoulder: [730.0, 440.0], wrist: [800.0, 290.0], fan: (248.0, 322.0), lengths: (120.0, 300.0), feathers: 10 };
+const NEAR: Wing = Wing {
+    shoulder: [600.0, 520.0],
+    wrist: [640.0, 330.0],
+    fan: (196.0, 276.0),
+    lengths: (190.0, 400.0),
+    feathers: 13,
+};
+const FAR: Wing = Wing {
+    shoulder: [730.0, 440.0],
+    wrist: [800.0, 290.0],
+    fan: (248.0, 322.0),
+    lengths: (120.0, 300.0),
+    feathers: 10,
+};
 
 impl Wing {
     /// Draws the feathers into one shape and their shafts and gaps into another.
@@ -118,7 +128,11 @@ pub fn draw() -> Painting {
     let mut beak = shape(4.0);
     beak.fill(&closed(
         [898.0, 380.0],
-        &[[[915.0, 382.0], [930.0, 392.0], [942.0, 410.0]], [[925.0, 412.0], [912.0, 414.0], [898.0, 412.0]], [[896.0, 400.0], [896.0, 392.0], [898.0, 380.0]]],
+        &[
+            [[915.0, 382.0], [930.0, 392.0], [942.0, 410.0]],
+            [[925.0, 412.0], [912.0, 414.0], [898.0, 412.0]],
+            [[896.0, 400.0], [896.0, 392.0], [898.0, 380.0]],
+        ],
     ));
     let mut tail = shape(4.0);
     for (k, end) in [[300.0, 712.0], [282.0, 690.0], [262.0, 664.0]].into_iter().enumerate() {

@@ -5,8 +5,8 @@
 
 use super::Painting;
 use super::canvas::{
-    Coarse, Coat, Point, Shape, bezier, blend, capsule, cells, clouds, colour, hash, inside, mix, mix3, paint,
-    smooth,
+    Coarse, Coat, Point, Shape, bezier, blend, capsule, cells, clouds, colour, hash, inside, mix, mix3,
+    paint, smooth,
 };
 
 const WIDTH: usize = 1024;
@@ -84,7 +84,8 @@ fn lobe_veins() -> Vec<(Vec<Point>, f32)> {
             let (from, direction) = midrib(at);
             let length = lobe.length * (1.0 + 0.14 * jitter(1));
             let angle = side * (lobe.angle + 8.0 * jitter(2));
-            veins.push((vein(from, direction, angle, 16.0, length, 6), lobe.radius * (1.0 + 0.2 * jitter(3))));
+            veins
+                .push((vein(from, direction, angle, 16.0, length, 6), lobe.radius * (1.0 + 0.2 * jitter(3))));
         }
     }
     veins
@@ -112,7 +113,15 @@ fn outline(p: Point, veins: &[(Vec<Point>, f32)], body: &[(Point, f32)]) -> f32 
 }
 
 /// The finer veins of one vein: to both sides, shorter towards its end, each with finer ones of its own.
-fn branches(shape: &mut Shape, parent: &[Point], reach: f32, count: usize, radius: f32, depth: u32, seed: u32) {
+fn branches(
+    shape: &mut Shape,
+    parent: &[Point],
+    reach: f32,
+    count: usize,
+    radius: f32,
+    depth: u32,
+    seed: u32,
+) {
     for k in 0..count {
         let u = (k as f32 + 0.6) / (count as f32 + 0.4);
         let place = u * (parent.len() - 1) as f32;
@@ -128,7 +137,15 @@ fn branches(shape: &mut Shape, parent: &[Point], reach: f32, count: usize, radiu
             let points = vein(from, direction, angle, 24.0, length, 4);
             shape.line(&points, |u| mix(radius, 0.25, u));
             if depth > 0 {
-                branches(shape, &points, 0.42 * reach, 3, 0.6 * radius, depth - 1, seed * 31 + k as u32 * 7 + j);
+                branches(
+                    shape,
+                    &points,
+                    0.42 * reach,
+                    3,
+                    0.6 * radius,
+                    depth - 1,
+                    seed * 31 + k as u32 * 7 + j,
+                );
             }
         }
     }
@@ -161,7 +178,8 @@ pub fn draw() -> Painting {
 
     let paper = Coat::new(0xF2EBDC, 1.0, 0.0);
     let vein_coat = Coat::new(0xDCD9D2, 0.27, 1.0);
-    let (gold, orange, russet, olive) = (colour(0xE0A02C), colour(0xBE5718), colour(0x7C2210), colour(0x7D7A24));
+    let (gold, orange, russet, olive) =
+        (colour(0xE0A02C), colour(0xBE5718), colour(0x7C2210), colour(0x7D7A24));
     let (glow, dark) = (colour(0xEDC05A), colour(0x3A170A));
     paint(WIDTH, HEIGHT, (1900, 2687), |i, p| {
         let edge = blade.at(p);

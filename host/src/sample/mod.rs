@@ -35,7 +35,11 @@ pub struct Sample {
 /// All samples.
 pub const SAMPLES: [Sample; 5] = [
     Sample { name: "leaf", about: "an autumn oak leaf with silver veins on matte paper", draw: leaf::draw },
-    Sample { name: "card", about: "a greeting card: gold, silver and glossy holly on matte green", draw: card::draw },
+    Sample {
+        name: "card",
+        about: "a greeting card: gold, silver and glossy holly on matte green",
+        draw: card::draw,
+    },
     Sample { name: "dove", about: "a silver dove with a glossy olive twig on matte blue", draw: dove::draw },
     Sample { name: "flange", about: "a rusted steel ring, bare metal beside rust", draw: flange::draw },
     Sample {
