@@ -256,9 +256,9 @@ impl<'a> Lattice<'a> {
             let mut sum = [0i32; LANES];
             for (&channel, share) in self.channels.iter().zip(shares) {
                 let weight = weights[channel] as i32;
-                for l in 0..LANES {
+                for (sum, share) in sum.iter_mut().zip(share.0) {
                     // The whole sum is about 2^31, and kept as the bits of an unsigned number.
-                    sum[l] = sum[l].wrapping_add(weight.wrapping_mul(share.0[l]));
+                    *sum = sum.wrapping_add(weight.wrapping_mul(share));
                 }
             }
             for l in 0..LANES {

@@ -3,7 +3,7 @@
 //! Problem: a continuous mix of stacks becomes a [`Sheet`] whose local means are the mix, with no cluster
 //! smaller than a stack's minimum.
 //! Method: error diffusion along the band walk ([`protocol::walk`]) of the rectangle the document is printed
-//! on, by the rule in [`rule`] on the mix sampled by [`mix`]. The walk is cut into strips of [`STRIP`] bands, each
+//! on, by the rule in `rule` on the mix sampled by `mix`. The walk is cut into strips of 16 bands, each
 //! diffused by itself, so that both cores work and the result does not depend on how many there are; a strip
 //! forgets a few dots of debt at its end.
 //! Cost: under 10 ns a dot on one core for 8 stacks, 20 ns for 57. Memory: the sheet, one byte a dot, and a few

@@ -323,10 +323,7 @@ impl Rule {
             return Some(Candidate { stack, margin });
         }
         for ((look, seen), lane) in class.look.iter().zip(&class.seen).zip(&self.lane) {
-            let mut found = [false; LANES];
-            for l in 0..LANES {
-                found[l] = (seen.0[l] > now) & (look.0[l] == most);
-            }
+            let found: [bool; LANES] = std::array::from_fn(|l| (seen.0[l] > now) & (look.0[l] == most));
             if let Some(l) = found.iter().position(|&found| found) {
                 return Some(Candidate { stack: lane.0[l] as usize, margin: 0 });
             }
@@ -462,8 +459,8 @@ impl Class {
     fn cost(&self, k: usize, left: u32) -> u32 {
         let mut most = [0u32; LANES];
         for look in &self.look {
-            for l in 0..LANES {
-                most[l] = most[l].max(look.0[l].unsigned_abs());
+            for (most, look) in most.iter_mut().zip(look.0) {
+                *most = (*most).max(look.unsigned_abs());
             }
         }
         let all = most.into_iter().fold(0, u32::max);
@@ -655,7 +652,10 @@ mod tests {
         })
     }
 
-    fn document() -> impl Strategy<Value = (Vec<(u32, Vec<i32>)>, Vec<u16>, u32)> {
+    /// Stretches, minima, and after how many dots a stack is absent.
+    type Document = (Vec<(u32, Vec<i32>)>, Vec<u16>, u32);
+
+    fn document() -> impl Strategy<Value = Document> {
         (1usize..12).prop_flat_map(|stacks| {
             let minimum = prop_oneof![
                 (1u16..20).prop_map(move |c| vec![c; stacks]),
