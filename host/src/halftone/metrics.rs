@@ -307,6 +307,8 @@ mod tests {
             assert!(tone.shortest_run >= minimum && tone.smallest_cluster >= minimum, "{tone:?}");
             assert!(tone.mean_run >= f64::from(minimum) && tone.worst_window < 0.02, "{tone:?}");
         }
+        let other = Placement { paper: Paper::A4, ..place };
+        assert!(super::tones(&mix, &other, &sheet, &Silent).unwrap_err().to_string().contains("on a4"));
         let dots: f64 = tones.iter().map(|tone| tone.runs as f64 * tone.mean_run).sum();
         assert!((dots - 300_000.0).abs() < 1e-3);
     }
