@@ -345,7 +345,7 @@ mod tests {
     fn mix(width: usize, height: usize, seed: u64) -> InkMix {
         let mut data = vec![0; width * height * 3];
         for (pixel, out) in data.chunks_exact_mut(3).enumerate() {
-            let second = if pixel % width % 2 == 0 { random(seed, 3 * pixel + 1) } else { 0.0 };
+            let second = if (pixel % width).is_multiple_of(2) { random(seed, 3 * pixel + 1) } else { 0.0 };
             quantise(&[random(seed, 3 * pixel) + 0.01, second, random(seed, 3 * pixel + 2)], out);
         }
         let matrix = vec![
