@@ -42,8 +42,10 @@ impl Shape {
             .chunks(stretch)
             .map(|dots| {
                 let n = dots.len() as u32;
-                let middle =
-                    |side: fn(u16) -> u16| dots.iter().map(|&o| 2 * u32::from(side(o)) + 1).sum::<u32>() / n;
+                let middle = |side: fn(u16) -> u16| {
+                    let sum: u32 = dots.iter().map(|&o| 2 * u32::from(side(o)) + 1).sum();
+                    (sum + n / 2) / n
+                };
                 // At most 2 * 64 half dots, and 16 dots.
                 (middle(|o| o % EDGE) as u8, middle(|o| o / EDGE) as u8, n as u8)
             })
