@@ -160,6 +160,19 @@ fn runs<'s>(
     found
 }
 
+/// How many dots are like the first; `row` is not empty. Eight at a time, as most runs are about that long.
+fn run(row: &[u8]) -> usize {
+    let first = u64::from_ne_bytes([row[0]; 8]);
+    let (words, rest) = row.as_chunks::<8>();
+    for (i, &word) in words.iter().enumerate() {
+        let differ = u64::from_le_bytes(word) ^ first;
+        if differ != 0 {
+            return 8 * i + differ.trailing_zeros() as usize / 8;
+        }
+    }
+    8 * words.len() + rest.iter().take_while(|&&dot| dot == row[0]).count()
+}
+
 /// Dots of the smallest 4-connected cluster of each label, 0 for a label that does not occur. `label` groups stacks:
 /// equal numbers belong together. Rows of `width` dots.
 pub fn smallest_clusters(width: usize, index: &[u8], label: &[u8; 256]) -> [u32; 256] {
@@ -180,12 +193,16 @@ pub fn smallest_clusters(width: usize, index: &[u8], label: &[u8; 256]) -> [u32;
         i
     }
     let (mut above, mut here): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
-    for row in index.chunks_exact(width.max(1)) {
+    let mut row = vec![0; width];
+    for dots in index.chunks_exact(width.max(1)) {
+        for (own, &dot) in row.iter_mut().zip(dots) {
+            *own = label[usize::from(dot)];
+        }
         here.clear();
         let (mut start, mut over) = (0, 0);
         while start < row.len() {
-            let own = label[usize::from(row[start])];
-            let length = row[start..].iter().take_while(|&&dot| label[usize::from(dot)] == own).count();
+            let own = row[start];
+            let length = run(&row[start..]);
             let end = start + length;
             let mut cluster = None;
             // Runs above that end before this one starts cannot touch it or any later one.
@@ -307,6 +324,8 @@ mod tests {
             assert!(tone.shortest_run >= minimum && tone.smallest_cluster >= minimum, "{tone:?}");
             assert!(tone.mean_run >= f64::from(minimum) && tone.worst_window < 0.02, "{tone:?}");
         }
+        let other = Placement { paper: Paper::A4, ..place };
+        assert!(super::tones(&mix, &other, &sheet, &Silent).unwrap_err().to_string().contains("on a4"));
         let dots: f64 = tones.iter().map(|tone| tone.runs as f64 * tone.mean_run).sum();
         assert!((dots - 300_000.0).abs() < 1e-3);
     }

@@ -18,7 +18,7 @@ mod rule;
 
 use inks::Stack;
 use protocol::ink::Ink;
-use protocol::paper::Paper;
+use protocol::paper::{LARGEST as LARGEST_PAGE, Paper};
 use protocol::walk::{Band, MOST, Tile, Walk};
 use rayon::prelude::*;
 
@@ -92,6 +92,14 @@ pub enum HalftoneError {
         /// Printable rows.
         page_length: u16,
     },
+    /// The paper is larger than any the machine takes.
+    #[error("a page of {width} x {length} dots is larger than any sheet, {} x {} at most", LARGEST_PAGE.0, LARGEST_PAGE.1)]
+    Page {
+        /// Printable dots across.
+        width: u16,
+        /// Printable rows.
+        length: u16,
+    },
     /// The matrix has another number of rows than the maps have channels.
     #[error("the mix has {rows} rows of shares for {channels} weight maps; it needs one for each")]
     Rows {
@@ -149,6 +157,9 @@ pub enum HalftoneError {
 
 fn check(mix: &InkMix, place: &Placement, settings: &Settings) -> Result<(), HalftoneError> {
     let (page_width, page_length) = (place.paper.width(), place.paper.length());
+    if page_width > LARGEST_PAGE.0 || page_length > LARGEST_PAGE.1 {
+        return Err(HalftoneError::Page { width: page_width, length: page_length });
+    }
     let fits = |from: u16, length: u16, most: u16| length > 0 && from <= most && length <= most - from;
     if !(fits(place.x, place.width, page_width) && fits(place.y, place.height, page_length)) {
         let &Placement { x, y, width, height, paper } = place;
@@ -522,6 +533,7 @@ mod tests {
         {
             assert!(error(&mix, &place, &settings).contains("does not fit the 50 x 60"));
         }
+        assert!(error(&mix, &custom(u16::MAX, u16::MAX), &settings).contains("4940 x 7760 at most"));
         assert!(error(&mix, &page, &Settings::uniform(3, 9)).contains("3 minimum clusters"));
         assert!(error(&mix, &page, &Settings::uniform(2, 0)).contains("`substrate` is 0 dots"));
         let mut wrong = mix.clone();

@@ -526,6 +526,10 @@ mod tests {
         let dots = stretches.iter().map(|s| s.0).sum();
         let mut runs = Runs::default();
         Rule::new(minimum, dots, absent).walk(&mut Tape { stretches: stretches.iter() }, &mut runs);
+        // The same with whatever vectors this machine has.
+        let mut wide = Runs::default();
+        walk(&mut Rule::new(minimum, dots, absent), &mut Tape { stretches: stretches.iter() }, &mut wide);
+        assert_eq!(runs.0, wide.0);
         runs.0
     }
 

@@ -1,8 +1,8 @@
 //! A sheet as the fewest ordered one-bit passes, and what the printer thinks of them.
 //!
 //! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
-//! Method: the shortest list of inks in which every stack in use finds its layers in order ([`order`]), one plane for
-//! each ([`pack`]), the machine's order rules as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
+//! Method: the shortest list of inks in which every stack in use finds its layers in order (`order`), one plane for
+//! each (`pack`), the machine's order rules as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
 //! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_CARTRIDGES`] inks,
 //! [`MOST_LAYERS`] layers.
@@ -174,7 +174,7 @@ fn names(inks: &[Ink]) -> String {
 ///
 /// Errors: more than [`MOST_CARTRIDGES`] inks, [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
 pub fn separate(sheet: &Sheet, observer: &dyn Observer) -> Result<Separation, SeparateError> {
-    observer.begin("separate", 3);
+    observer.begin("separate", 2);
     let census = sheet.census();
     let used: Vec<(usize, &Stack)> =
         sheet.stacks().iter().enumerate().filter(|(q, _)| census[*q] > 0 || *q == 0).collect();
@@ -201,9 +201,6 @@ pub fn separate(sheet: &Sheet, observer: &dyn Observer) -> Result<Separation, Se
             dots[pass] += census[*q];
         }
     }
-    let planes = pack::pack(sheet.width(), sheet.index(), &passes_of, inks.len());
-    observer.advance(1);
-
     let planned = inks.iter().zip(dots).map(|(&ink, dots)| Planned { ink, dots }).collect();
     let mut cartridges: Vec<Ink> = Vec::new();
     for &ink in &inks {
@@ -212,7 +209,10 @@ pub fn separate(sheet: &Sheet, observer: &dyn Observer) -> Result<Separation, Se
         }
     }
     let plan = Plan { passes: planned, cartridges, fewest: shortest };
-    let checks = rules::check(sheet, &census, &plan);
+    let (planes, checks) = rayon::join(
+        || pack::pack(sheet.width(), sheet.index(), &passes_of, inks.len()),
+        || rules::check(sheet, &census, &plan),
+    );
     observer.advance(1);
     observer.end();
     Ok(Separation {
@@ -360,7 +360,7 @@ mod tests {
         assert!(error.contains("8 cartridges (black, cyan") && error.contains("holds 7"), "{error}");
         let high = format!("C{}", "+C".repeat(16));
         assert!(matches!(separate(&page(&["substrate", &high]), &Silent), Err(SeparateError::Layers { .. })));
-        let (cyan_first, black_first) = (vec!["C+K"; 8].join("+"), vec!["K+C"; 8].join("+"));
+        let (cyan_first, black_first) = (["C+K"; 8].join("+"), ["K+C"; 8].join("+"));
         let error = separate(&page(&["substrate", &cyan_first, &black_first]), &Silent).unwrap_err();
         assert!(matches!(error, SeparateError::Passes { passes: 17, .. }), "{error}");
     }

@@ -2,7 +2,7 @@
 //!
 //! Problem: the machine prints any order; some orders do not hold, do not show or jam the ribbon. Knowledge is
 //! uneven, so each rule says how it is known, and how much it matters.
-//! Method: [`RULES`] is a table of conditions on the stacks in use; [`check`] tries each. Nothing here changes the
+//! Method: `RULES` is a table of conditions on the stacks in use; `check` tries each. Nothing here changes the
 //! passes. Cost: negligible, except that rules on cluster size look at the whole page once for each ink concerned.
 //! Source: the notes on the machine, sections 9 and 14; the 2009 paper, section 4.2.
 
