@@ -82,7 +82,7 @@ fn a_measured_figure_of_an_ink_changes_every_stack_with_it() {
         BUILTIN.split("\n[[ink]]\n").find(|table| table.starts_with("ink = \"metallic-silver\"")).unwrap();
     let ink = ink.split("\n# ----").next().unwrap();
     let changed = ink.replace(
-        "alpha = { value = 0.27, source = \"literature\" }",
+        "alpha = { value = 0.27, source = \"guess\" }",
         "alpha = { value = 0.20, source = \"measured\" }",
     );
     assert_ne!(ink, changed);
