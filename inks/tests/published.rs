@@ -207,7 +207,8 @@ fn silver_flakes_peak_like_a_measured_silver_paint() {
     let Some(data) = data() else { return };
     let paint =
         inks::Curve::read_csv(&data.join("brdf/curves_colocated/merl_silver-metallic-paint.csv")).unwrap();
-    let flakes = &Library::builtin().entries()[8];
+    let library = Library::builtin();
+    let flakes = &library.entries()[8];
     assert_eq!(flakes.stack.to_string(), "MS");
     for (paint, flakes) in paint.at(0.0).into_iter().zip(flakes.curve.at(0.0)) {
         assert!((0.7..1.4).contains(&(flakes / paint)), "{flakes} {paint}");
