@@ -139,6 +139,18 @@ fn stacks_that_cannot_be_are_named() {
 }
 
 #[test]
+fn a_stack_of_an_ink_without_a_cartridge_is_named() {
+    let start = BUILTIN.find("[[ink]]\nink = \"yellow\"").unwrap();
+    let end = start + BUILTIN[start..].find("# ----").unwrap();
+    let text = format!("{}{}", &BUILTIN[..start], &BUILTIN[end..]);
+    let errors = errors(&check(&[("library.toml", &text)]));
+    assert!(errors.iter().all(|e| e.contains("holds yellow, of which there is no `[[ink]]`")), "{errors:#?}");
+    let stacks =
+        Library::builtin().entries().iter().filter(|e| e.stack.layers().contains(&Ink::Yellow)).count();
+    assert_eq!(errors.len(), stacks);
+}
+
+#[test]
 fn a_metal_seen_through_no_filter_is_named() {
     let text = BUILTIN.replacen("seen_through = \"cyan\"", "seen_through = \"finish\"", 1);
     let errors = errors(&check(&[("library.toml", &text)]));
