@@ -8,6 +8,7 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use protocol::ink::Ink;
+use toml::Spanned;
 
 use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::curve::{Curve, CurveError};
@@ -118,7 +119,7 @@ fn build(
         paper = paper.or(Some(base.optics.paper));
         model = model.or(Some(base.optics.model));
         name = name.or_else(|| Some(format!("{}, changed", base.name)));
-        about = about.or(Some(base.about));
+        about = about.or(Some("Modelled where it was not measured.".into()));
     }
     let mut seen = Vec::new();
     for table in file.ink {
@@ -127,32 +128,31 @@ fn build(
     }
     cartridges.sort_by_key(|cartridge| cartridge.ink);
     rules.extend(file.rule);
-    let stacks = match (file.stacks, stacks) {
-        (Some(texts), _) => texts
-            .into_iter()
-            .filter_map(|text| {
-                let (offset, field) = (text.span().start, format!("stacks: {}", text.get_ref()));
-                Some((wanted_stack(text.get_ref(), &field, offset, findings)?, Some(offset)))
-            })
-            .collect(),
-        (None, Some(stacks)) => stacks.into_iter().map(|stack| (stack, None)).collect(),
+    let mut wanted = match (file.stacks, stacks) {
+        (Some(texts), _) => listed_stacks(&texts, findings),
+        (None, Some(stacks)) => {
+            stacks.into_iter().map(|stack| Wanted { stack, offset: None, measured: None }).collect()
+        }
         (None, None) => {
             missing(findings, "stacks");
             Vec::new()
         }
     };
-    let mut wanted: Vec<Wanted> = Vec::with_capacity(stacks.len());
-    for (stack, offset) in stacks {
-        if wanted.iter().any(|other| other.stack == stack) {
-            findings.error(offset, format!("stacks: {stack}"), "is listed twice");
-        } else {
-            wanted.push(Wanted { stack, offset, measured: None });
-        }
-    }
     let named: Vec<String> =
         file.measured.iter().map(|table| table.get_ref().curve.get_ref().clone()).collect();
-    for table in file.measured {
+    if let Some(beyond) = file.measured.get(MOST_STACKS) {
+        findings.error(Some(beyond.span().start), "measured", format!("more than {MOST_STACKS}"));
+    }
+    for table in file.measured.iter().take(MOST_STACKS) {
         measured(table.get_ref(), folder, &mut wanted, findings);
+    }
+    for want in &wanted {
+        for ink in want.stack.layers() {
+            if !cartridges.iter().any(|cartridge| cartridge.ink == *ink) {
+                let problem = format!("holds {}, of which there is no `[[ink]]`", ink.name());
+                findings.error(want.offset, format!("stack {}", want.stack), problem);
+            }
+        }
     }
     if wanted.first().is_none_or(|first| first.stack != Stack::SUBSTRATE) || wanted.len() > MOST_STACKS {
         let problem =
@@ -188,6 +188,25 @@ fn build(
         rules,
         entries,
     })
+}
+
+/// The stacks of the file's own list, without those that are none or stand there twice.
+fn listed_stacks(texts: &[Spanned<String>], findings: &mut Findings) -> Vec<Wanted> {
+    let mut wanted: Vec<Wanted> = Vec::new();
+    for text in texts {
+        let (offset, field) = (text.span().start, format!("stacks: {}", text.get_ref()));
+        if wanted.len() == MOST_STACKS {
+            findings.error(Some(offset), "stacks", format!("more than {MOST_STACKS}"));
+            break;
+        }
+        let Some(stack) = wanted_stack(text.get_ref(), &field, offset, findings) else { continue };
+        if wanted.iter().any(|other| other.stack == stack) {
+            findings.error(Some(offset), field, "is listed twice");
+        } else {
+            wanted.push(Wanted { stack, offset: Some(offset), measured: None });
+        }
+    }
+    wanted
 }
 
 /// Reads a stack's text; says so if it is none.

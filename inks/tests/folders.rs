@@ -82,7 +82,7 @@ fn a_measured_figure_of_an_ink_changes_every_stack_with_it() {
         BUILTIN.split("\n[[ink]]\n").find(|table| table.starts_with("ink = \"metallic-silver\"")).unwrap();
     let ink = ink.split("\n# ----").next().unwrap();
     let changed = ink.replace(
-        "alpha = { value = 0.27, source = \"literature\" }",
+        "alpha = { value = 0.27, source = \"guess\" }",
         "alpha = { value = 0.20, source = \"measured\" }",
     );
     assert_ne!(ink, changed);
@@ -136,6 +136,18 @@ fn stacks_that_cannot_be_are_named() {
     one_error(&[("library.toml", &text)], &["stack W+Y", "white", "measure it"]);
     let text = BUILTIN.replacen("    \"substrate\",\n", "", 1);
     one_error(&[("library.toml", &text)], &["`substrate` must be the first"]);
+}
+
+#[test]
+fn a_stack_of_an_ink_without_a_cartridge_is_named() {
+    let start = BUILTIN.find("[[ink]]\nink = \"yellow\"").unwrap();
+    let end = start + BUILTIN[start..].find("# ----").unwrap();
+    let text = format!("{}{}", &BUILTIN[..start], &BUILTIN[end..]);
+    let errors = errors(&check(&[("library.toml", &text)]));
+    assert!(errors.iter().all(|e| e.contains("holds yellow, of which there is no `[[ink]]`")), "{errors:#?}");
+    let stacks =
+        Library::builtin().entries().iter().filter(|e| e.stack.layers().contains(&Ink::Yellow)).count();
+    assert_eq!(errors.len(), stacks);
 }
 
 #[test]

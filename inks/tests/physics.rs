@@ -30,11 +30,14 @@ fn no_stack_makes_light_and_plain_paper_sends_most_of_it_back() {
 fn finish_makes_flakes_glossier_and_foil_less_glossy() {
     let library = Library::builtin();
     let peak = |stack: &str| lobes(&library, stack).at(0.0)[1];
+    let gloss = |stack: &str| inks::gloss::units(&lobes(&library, stack));
     for flakes in ["MC", "MM", "MG", "MS"] {
-        assert!(peak(&format!("{flakes}+F")) > 2.0 * peak(flakes), "{flakes}");
+        let coated = format!("{flakes}+F");
+        assert!(peak(&coated) > 2.0 * peak(flakes) && gloss(&coated) > 2.0 * gloss(flakes), "{flakes}");
     }
     for foil in ["GF", "SF"] {
-        assert!(peak(&format!("{foil}+F")) < peak(foil), "{foil}");
+        let coated = format!("{foil}+F");
+        assert!(peak(&coated) < peak(foil) && gloss(&coated) < gloss(foil), "{foil}");
     }
 }
 

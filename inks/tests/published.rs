@@ -3,6 +3,8 @@
 //! Columns: stack, diffuse albedo, lobes (F0, alpha), green reflectance at half angles of 0, 10 and 30 degrees in 1/sr
 //! to three significant digits.
 
+use std::path::PathBuf;
+
 use inks::{Library, Stack};
 
 struct Row {
@@ -161,4 +163,80 @@ fn gloss_agrees_with_the_published_readings() {
         let reading = inks::gloss::units(&library.optics().lobes(&stack.parse().unwrap()).unwrap());
         assert!((reading - published).abs() < 0.6 + 0.03 * published, "{stack}: {reading} not {published}");
     }
+}
+
+/// Folder of outside data, if this machine has it.
+fn data() -> Option<PathBuf> {
+    let data = std::env::var_os("FOILPRESS_DATA").map(PathBuf::from);
+    if data.is_none() {
+        println!("skipped: FOILPRESS_DATA is not set");
+    }
+    data
+}
+
+/// R = ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2) at 630, 532 and 465 nm, from measured n and k of evaporated aluminium.
+#[test]
+fn the_metal_is_aluminium() {
+    let Some(data) = data() else { return };
+    let text = std::fs::read_to_string(data.join("metals/Al_Rakic.yml")).unwrap();
+    let rows: Vec<[f64; 3]> = text
+        .lines()
+        .filter_map(|line| {
+            let numbers =
+                line.split_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>()?;
+            numbers.try_into().ok()
+        })
+        .collect();
+    assert!(rows.len() > 100);
+    for (micrometres, figure) in
+        [0.630, 0.532, 0.465].into_iter().zip(Library::builtin().optics().model.aluminium.get())
+    {
+        let above = rows.partition_point(|row| row[0] <= micrometres);
+        let (a, b) = (rows[above - 1], rows[above]);
+        let s = (micrometres - a[0]) / (b[0] - a[0]);
+        let (n, k) = (a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]));
+        let reflectance = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
+        assert!((figure / reflectance - 1.0).abs() < 0.01, "{micrometres}: {figure} {reflectance}");
+    }
+}
+
+/// The flakes of the model beside a measured flake paint: the same height of peak. Away from the peak the paint falls far
+/// faster, which the library says.
+#[test]
+fn silver_flakes_peak_like_a_measured_silver_paint() {
+    let Some(data) = data() else { return };
+    let paint =
+        inks::Curve::read_csv(&data.join("brdf/curves_colocated/merl_silver-metallic-paint.csv")).unwrap();
+    let library = Library::builtin();
+    let flakes = &library.entries()[8];
+    assert_eq!(flakes.stack.to_string(), "MS");
+    for (paint, flakes) in paint.at(0.0).into_iter().zip(flakes.curve.at(0.0)) {
+        assert!((0.7..1.4).contains(&(flakes / paint)), "{flakes} {paint}");
+    }
+}
+
+/// Every real curve at hand, offered as a measurement of one of our prints: refused only for the reason that it makes light.
+#[test]
+fn real_measurements_are_read_and_judged_by_their_energy() {
+    let Some(data) = data() else { return };
+    let quadratures = inks::albedo::standard();
+    let mut count = 0;
+    for set in ["brdf/curves_avg", "brdf/curves_colocated"] {
+        for file in std::fs::read_dir(data.join(set)).unwrap() {
+            let path = file.unwrap().path();
+            if path.extension().is_none_or(|extension| extension != "csv") {
+                continue;
+            }
+            count += 1;
+            let curve = inks::Curve::read_csv(&path).unwrap();
+            let most = quadratures.iter().flat_map(|q| q.of(&curve)).fold(0.0, f64::max);
+            let folder = tempfile::tempdir().unwrap();
+            std::fs::copy(&path, folder.path().join("c.csv")).unwrap();
+            let text = "format = 1\nbased_on = \"built-in\"\n[[measured]]\nstack = \"C\"\ncurve = \"c.csv\"\n\
+                        by = \"x\"\nwhen = \"2010-01\"\nsetup = \"x\"\n";
+            std::fs::write(folder.path().join("library.toml"), text).unwrap();
+            assert_eq!(Library::from_dir(folder.path()).is_ok(), most <= 1.05, "{}: {most}", path.display());
+        }
+    }
+    assert!(count > 50, "{count}");
 }

@@ -168,9 +168,9 @@ mod tests {
         let theta: Vec<f64> = (0..64).map(|i| f64::from(i) * FRAC_PI_2 / 64.0).collect();
         let curve = curve(&terms, &theta);
         for (&t, value) in theta.iter().zip(curve.rgb()) {
-            for c in 0..3 {
+            for (c, v) in value.iter().enumerate() {
                 let sum: f64 = terms.iter().map(|term| term.at(t)[c]).sum();
-                assert!((value[c] - sum).abs() < 1e-12);
+                assert!((v - sum).abs() < 1e-12);
             }
         }
     }

@@ -244,14 +244,6 @@ mod tests {
         };
         let truth = root(20_000);
         let off = |d: f64| (d / truth - 1.0).abs();
-        println!(
-            "root 32: {:.2e}; even 32, 64, 128, 512: {:.2e} {:.2e} {:.2e} {:.2e}",
-            off(root(32)),
-            off(even(32)),
-            off(even(64)),
-            off(even(128)),
-            off(even(512))
-        );
         assert!(off(root(32)) < 3e-4 && off(even(512)) < 3e-4);
         assert!(off(even(32)) > 0.02 && off(even(64)) > 5e-3);
     }
@@ -285,7 +277,6 @@ mod tests {
         };
         for samples in [16, 32, 64] {
             let (point, mean) = (off(samples, 1), off(samples, 32));
-            println!("{samples} samples: middle {point:.2e}, mean {mean:.2e}");
             assert!(point < mean, "{samples}: {point} {mean}");
         }
     }
