@@ -57,14 +57,15 @@ pub fn cell_dots(metres: f64) -> usize {
     (spot_mm(metres) * DOTS_PER_MM * 6.0 / 16.0).round().max(1.0) as usize
 }
 
-/// Compares a print with its target as seen from `metres` (0.5 is arm's length). The print's own pixels are dots of
-/// 1/600 inch, and the target lies over all of it.
+/// Compares a print with its target as seen from `metres` (0.5 is arm's length). Both cover the same rectangle of
+/// paper, `size` dots of 1/600 inch across and down.
 ///
 /// # Errors
 /// When the two are not in the same tabulation, or a table does not fit its source.
 pub fn fidelity(
     target: &Source,
     print: &Source,
+    size: (usize, usize),
     metres: f64,
     observer: &dyn Observer,
 ) -> Result<Report, PreviewError> {
@@ -77,8 +78,7 @@ pub fn fidelity(
         });
     }
     let cell = cell_dots(metres);
-    let (across, down) = print.size();
-    let (width, height) = ((across / cell).max(1), (down / cell).max(1));
+    let (width, height) = ((size.0 / cell).max(1), (size.1 / cell).max(1));
     let target = target.lines(width, height, SAMPLES)?;
     let print = print.lines(width, height, SAMPLES)?;
     observer.begin("comparing print and document", height as u64);
@@ -194,7 +194,7 @@ mod tests {
     fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> Report {
         let target = Uniform(space.clone(), target);
         let print = Source::Print { sheet, space, stacks: rows, area: Area::whole(sheet) };
-        fidelity(&Source::Document(&target), &print, metres, &Silent).unwrap()
+        fidelity(&Source::Document(&target), &print, print.size(), metres, &Silent).unwrap()
     }
 
     #[test]
@@ -274,7 +274,7 @@ mod tests {
         let sheet = sheet(20, |_| false);
         let target = Uniform(space.clone(), vec![0.1; 12]);
         let print = Source::Print { sheet: &sheet, space: &other, stacks: &rows, area: Area::whole(&sheet) };
-        let result = fidelity(&Source::Document(&target), &print, 0.5, &Silent);
+        let result = fidelity(&Source::Document(&target), &print, (20, 20), 0.5, &Silent);
         assert!(matches!(result, Err(PreviewError::Shape { expected: 12, found: 15, .. })));
     }
 }
