@@ -136,7 +136,8 @@ impl Metric {
 /// The cube root of `x`, to a few units in the last place; nothing below 1e-30 counts, where it is 1e-10.
 ///
 /// A third of the exponent, read off the bits, is within 6 %; each of Halley's steps cubes that error. Unlike the
-/// library's function this is plain arithmetic, so the compiler does several columns at once (a quarter of the time).
+/// library's function this is plain arithmetic, so the compiler does several columns at once; comparing a page took
+/// six times as long without it.
 fn cube_root(x: f32) -> f32 {
     let x = x.max(1e-30);
     // (1 - 1/3) of the bias 127 in the exponent's place, moved so that errors above and below are alike.
