@@ -11,6 +11,7 @@
 
 use rayon::prelude::*;
 
+use crate::brdf::Space;
 use crate::observe::Observer;
 
 use super::PreviewError;
@@ -57,14 +58,15 @@ pub fn cell_dots(metres: f64) -> usize {
     (spot_mm(metres) * DOTS_PER_MM * 6.0 / 16.0).round().max(1.0) as usize
 }
 
-/// Compares a print with its target as seen from `metres` (0.5 is arm's length). The print's own pixels are dots of
-/// 1/600 inch, and the target lies over all of it.
+/// Compares a print with its target as seen from `metres` (0.5 is arm's length). Both cover the same rectangle of
+/// paper, `size` dots of 1/600 inch across and down.
 ///
 /// # Errors
 /// When the two are not in the same tabulation, or a table does not fit its source.
 pub fn fidelity(
     target: &Source,
     print: &Source,
+    size: (usize, usize),
     metres: f64,
     observer: &dyn Observer,
 ) -> Result<Report, PreviewError> {
@@ -77,11 +79,11 @@ pub fn fidelity(
         });
     }
     let cell = cell_dots(metres);
-    let (across, down) = print.size();
-    let (width, height) = ((across / cell).max(1), (down / cell).max(1));
+    let (width, height) = ((size.0 / cell).max(1), (size.1 / cell).max(1));
     let target = target.lines(width, height, SAMPLES)?;
     let print = print.lines(width, height, SAMPLES)?;
     observer.begin("comparing print and document", height as u64);
+    let metric = Metric::new(space);
     let mut map = vec![0.0f32; width * height];
     map.par_chunks_mut(width * CHUNK).enumerate().for_each(|(chunk, out)| {
         let first = chunk * CHUNK;
@@ -90,7 +92,7 @@ pub fn fidelity(
         let b = blurred(&print, first, count);
         let columns = space.columns();
         for ((out, a), b) in out.iter_mut().zip(a.chunks_exact(columns)).zip(b.chunks_exact(columns)) {
-            *out = distance(space.radiance(), space.weight(), a, b) as f32;
+            *out = metric.distance(a, b);
         }
         observer.advance(count as u64);
     });
@@ -104,14 +106,47 @@ pub fn fidelity(
     Ok(Report { mean, rmse, p95: at(0.95), max: at(1.0), width, height, map })
 }
 
-/// [`crate::brdf::Space::distance`] for rows of f32.
-fn distance(radiance: &[f64], weight: &[f64], a: &[f32], b: &[f32]) -> f64 {
-    let mut sum = 0.0;
-    for (((&a, &b), &c), &w) in a.iter().zip(b).zip(radiance).zip(weight) {
-        let seen = |f: f32| (f64::from(f).max(0.0) * c).cbrt();
-        sum += (w * (seen(a) - seen(b))).powi(2);
+/// [`crate::brdf::Space::distance`] for rows of f32, eight columns side by side; sums are taken in one fixed order.
+struct Metric {
+    /// Per column: the factor to reflected radiance and the root of the quadrature weight.
+    columns: Vec<(f32, f32)>,
+}
+
+const LANES: usize = 8;
+
+impl Metric {
+    fn new(space: &Space) -> Metric {
+        let both = space.radiance().iter().zip(space.weight());
+        Metric { columns: both.map(|(&c, &w)| (c as f32, w as f32)).collect() }
     }
-    sum.sqrt()
+
+    fn distance(&self, a: &[f32], b: &[f32]) -> f32 {
+        let mut sums = [0.0f32; LANES];
+        let rows = a.chunks(LANES).zip(b.chunks(LANES));
+        for ((a, b), columns) in rows.zip(self.columns.chunks(LANES)) {
+            for (((sum, &a), &b), &(c, w)) in sums.iter_mut().zip(a).zip(b).zip(columns) {
+                let d = w * (cube_root(a * c) - cube_root(b * c));
+                *sum += d * d;
+            }
+        }
+        sums.iter().sum::<f32>().sqrt()
+    }
+}
+
+/// The cube root of `x`, to a few units in the last place; nothing below 1e-30 counts, where it is 1e-10.
+///
+/// A third of the exponent, read off the bits, is within 6 %; each of Halley's steps cubes that error. Unlike the
+/// library's function this is plain arithmetic, so the compiler does several columns at once; comparing a page took
+/// six times as long without it.
+fn cube_root(x: f32) -> f32 {
+    let x = x.max(1e-30);
+    // (1 - 1/3) of the bias 127 in the exponent's place, moved so that errors above and below are alike.
+    let mut y = f32::from_bits(x.to_bits() / 3 + 0x2a51_19f2);
+    for _ in 0..2 {
+        let cube = y * y * y;
+        y *= (cube + 2.0 * x) / (2.0 * cube + x);
+    }
+    y
 }
 
 /// Lines `first..first + count` after the window [1 2 1] / 4 along both axes; edge cells are repeated outwards.
@@ -148,11 +183,12 @@ fn blurred(lines: &Lines, first: usize, count: usize) -> Vec<f32> {
 mod tests {
     use super::super::source::Area;
     use super::*;
-    use crate::brdf::{Space, Table};
+    use crate::brdf::Table;
     use crate::document::Materials;
     use crate::observe::Silent;
     use crate::sheet::Sheet;
     use inks::Stack;
+    use proptest::prelude::*;
     use protocol::paper::Paper;
 
     /// A document with one row everywhere.
@@ -194,7 +230,7 @@ mod tests {
     fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> Report {
         let target = Uniform(space.clone(), target);
         let print = Source::Print { sheet, space, stacks: rows, area: Area::whole(sheet) };
-        fidelity(&Source::Document(&target), &print, metres, &Silent).unwrap()
+        fidelity(&Source::Document(&target), &print, print.size(), metres, &Silent).unwrap()
     }
 
     #[test]
@@ -207,6 +243,25 @@ mod tests {
             assert!((value / expected - 1.0).abs() < 1e-5, "{value}, not {expected}");
         }
         assert_eq!((report.width, report.height), (200 / 12, 200 / 12));
+    }
+
+    proptest! {
+        #[test]
+        fn the_cube_root_is_one(exponent in -30.0f32..30.0) {
+            let x = 10f32.powf(exponent);
+            let relative = f64::from(cube_root(x)) / f64::from(x).cbrt() - 1.0;
+            prop_assert!(relative.abs() < 4e-7, "{x}: {relative}");
+        }
+
+        #[test]
+        fn the_distance_is_the_metrics(values in prop::collection::vec((0.0f32..30.0, 0.0f32..30.0), 15)) {
+            let space = Space::half_angle(5);
+            let (a, b): (Vec<f32>, Vec<f32>) = values.into_iter().unzip();
+            let wide = |v: &[f32]| v.iter().map(|&v| f64::from(v)).collect::<Vec<_>>();
+            let expected = space.distance(&wide(&a), &wide(&b));
+            let found = f64::from(Metric::new(&space).distance(&a, &b));
+            prop_assert!((found - expected).abs() < 1e-6 + 1e-5 * expected, "{found}, not {expected}");
+        }
     }
 
     #[test]
@@ -274,7 +329,7 @@ mod tests {
         let sheet = sheet(20, |_| false);
         let target = Uniform(space.clone(), vec![0.1; 12]);
         let print = Source::Print { sheet: &sheet, space: &other, stacks: &rows, area: Area::whole(&sheet) };
-        let result = fidelity(&Source::Document(&target), &print, 0.5, &Silent);
+        let result = fidelity(&Source::Document(&target), &print, (20, 20), 0.5, &Silent);
         assert!(matches!(result, Err(PreviewError::Shape { expected: 12, found: 15, .. })));
     }
 }

@@ -52,7 +52,7 @@ impl Light {
             Light::Far(_) => 1.0,
             Light::Point(p) => dot(p, p) / dot(to, to),
         };
-        let across = to[0].hypot(to[1]);
+        let across = (to[0] * to[0] + to[1] * to[1]).sqrt();
         (0.5 * across.atan2(to[2]), falloff * to[2] / dot(to, to).sqrt())
     }
 }

@@ -18,7 +18,7 @@ pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
     ("light at the eye", Light::Point([0.0, 0.0, 1.3])),
     ("light from the left", Light::Point([-0.3, 0.2, 1.1])),
     ("light from the right", Light::Point([0.3, -0.15, 1.1])),
-    ("raking light", Light::Point([0.0, 2.6, 1.3])),
+    ("raking light", Light::Point([0.0, 2.1, 1.4])),
 ];
 
 const GAP: usize = 16;

@@ -25,7 +25,10 @@ pub const SUBSAMPLES: usize = 4;
 
 /// A node is taken whole when its half vectors stay within this share of their angle to the normal. Tested to
 /// keep every pixel within 1 % of the sum over single texels, for the sharpest foil and for paper.
-const OPENING: f32 = 0.1;
+const OPENING: f32 = 0.12;
+
+/// Sine of the reach of the largest nodes that may straddle the horizon of a normal.
+const HORIZON: f32 = 0.1;
 
 /// Steps of the table from the chord between normal and half vector to a place among the curve's angles.
 const STEPS: usize = 8192;
@@ -289,7 +292,7 @@ impl Tree {
             let d = [n[0] - node.half[0], n[1] - node.half[1], n[2] - node.half[2]];
             let chord = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
             // Across the horizon the cosine has a kink, which only small nodes may straddle.
-            let horizon = cos_i > node.reach || node.reach < 0.05;
+            let horizon = cos_i > node.reach || node.reach < HORIZON;
             if node.spread > 0.0 && !(horizon && node.spread <= opening * chord) {
                 i += 1;
                 continue;

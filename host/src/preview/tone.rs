@@ -11,7 +11,11 @@ use palette::{LinSrgb, Srgb};
 use super::Radiance;
 
 /// Where the curve begins to bend, as a share of white.
-const KNEE: f32 = 0.7;
+const KNEE: f32 = 0.4;
+
+/// Where the exposure puts the brighter middle of a picture: light enough for paper to look white, with room left
+/// for what shines.
+const MIDDLE: f32 = 0.6;
 
 /// What radiance is multiplied by before it is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,8 +25,7 @@ impl Exposure {
     /// White paper facing a light of irradiance 1 reflects about 0.85 / pi; this lands it a little below white.
     pub const PAPER: Exposure = Exposure(3.0);
 
-    /// An exposure under which 70 % of the covered pixels of `pictures` lie below the bend of the curve, but never
-    /// so far from that of white paper that black would look white: a factor of 4 at most either way.
+    /// An exposure under which 70 % of the covered pixels of `pictures` stay below 0.6 of white, but never so far from that of white paper that black would look white: a factor of 4 at most either way.
     pub fn of(pictures: &[Radiance]) -> Exposure {
         let mut values: Vec<f32> = pictures
             .iter()
@@ -35,7 +38,7 @@ impl Exposure {
         }
         let at = (values.len() - 1) * 7 / 10;
         let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-        Exposure((KNEE / bright.max(1e-9)).clamp(Exposure::PAPER.0 / 4.0, Exposure::PAPER.0 * 4.0))
+        Exposure((MIDDLE / bright.max(1e-9)).clamp(Exposure::PAPER.0 / 4.0, Exposure::PAPER.0 * 4.0))
     }
 
     /// A colour (linear, before exposure) as it is shown: 0 to 1, linear.
@@ -90,7 +93,7 @@ mod tests {
 
     #[test]
     fn darks_and_middles_are_left_alone() {
-        assert_eq!(Exposure(2.0).shown([0.1, 0.2, 0.35]), [0.2, 0.4, 0.7]);
+        assert_eq!(Exposure(2.0).shown([0.05, 0.1, 0.2]), [0.1, 0.2, 0.4]);
     }
 
     #[test]
@@ -100,10 +103,10 @@ mod tests {
     }
 
     #[test]
-    fn most_of_a_picture_lies_below_the_bend() {
+    fn most_of_a_picture_leaves_room_for_what_shines() {
         let values: Vec<f32> = (1..=100).map(|i| i as f32 * 0.01).collect();
         let exposure = Exposure::of(&[picture(&values)]);
-        let below = values.iter().filter(|&&v| v * exposure.0 <= 0.7 + 1e-6).count();
+        let below = values.iter().filter(|&&v| v * exposure.0 <= 0.6 + 1e-6).count();
         assert!((69..=71).contains(&below), "{below} of 100");
         let black = Exposure::of(&[picture(&[0.0; 9])]);
         assert!(black.0.is_finite() && black.0 <= 12.0, "{black:?}");
