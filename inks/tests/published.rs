@@ -116,7 +116,11 @@ fn lobes_agree_with_the_published_figures_within_rounding() {
         for (lobe, (f0, alpha)) in lobes.lobes.iter().zip(row.lobes) {
             assert!((lobe.alpha - alpha).abs() <= 5e-4 + 1e-12, "{stack}: alpha {} {alpha}", lobe.alpha);
             for c in 0..3 {
-                assert!((lobe.f0[c] - f0[c]).abs() <= 5e-3 + 1e-3 * f0[c], "{stack}: F0 {:?} {f0:?}", lobe.f0);
+                assert!(
+                    (lobe.f0[c] - f0[c]).abs() <= 5e-3 + 1e-3 * f0[c],
+                    "{stack}: F0 {:?} {f0:?}",
+                    lobe.f0
+                );
             }
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! Problem: gamut mapping moves a handful of extreme materials and carries everything else along as mixtures of
 //! them (sections 3.1 and 4.1 of the paper); the document has to be taken apart into such materials first.
-//! Method: [`sample`] distinct materials; learn bases from them by one of three [`Method`]s; then weigh every
-//! pixel over the bases in the perceptual metric ([`code`]), whatever the bases were learnt with.
+//! Method: sample distinct materials; learn bases from them by one of three [`Method`]s; then weigh every pixel
+//! over the bases in the perceptual metric (equation 1), whatever the bases were learnt with.
 //! Cost: learning is bounded by the sample, weighing is a few microseconds a pixel on all cores. Curves are made
 //! pixel by pixel and thrown away. Results depend on the document and the settings, not on machine or threads.
 //! Limits: what covers less than a hundred-thousandth of the document may not be seen while learning; the report
