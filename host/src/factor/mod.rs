@@ -222,6 +222,8 @@ fn check(document: &dyn Materials, settings: &Settings) -> Result<(), FactorErro
 
 /// Sweeps of metric archetypes; most of the gain comes in the first ten.
 const SWEEPS: usize = 20;
+/// Relative fall of the mean squared distance in a sweep that counts as settled.
+const SETTLED: f64 = 1e-3;
 /// Axes in which corners are looked for.
 const CORNER_AXES: usize = 10;
 
@@ -257,9 +259,14 @@ fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca,
         Method::Sacls => sacls::refine(sample, &mut bases, settings.lambda, |_| observer.advance(1)),
         Method::Archetypes => {
             let mut fit = Fit::new(sample, &corners, slack, &bases);
+            let mut last = f64::INFINITY;
             for _ in 0..SWEEPS {
-                fit.sweep();
+                let total = fit.sweep();
                 observer.advance(1);
+                if total > (1.0 - SETTLED) * last {
+                    break;
+                }
+                last = total;
             }
             bases = fit.bases;
         }
