@@ -2,8 +2,8 @@
 //!
 //! Problem: gamut mapping moves a handful of extreme materials and carries everything else along as mixtures of
 //! them (sections 3.1 and 4.1 of the paper); the document has to be taken apart into such materials first.
-//! Method: [`sample`] distinct materials; learn bases from them by one of three [`Method`]s; then weigh every
-//! pixel over the bases in the perceptual metric ([`code`]), whatever the bases were learnt with.
+//! Method: sample distinct materials; learn bases from them by one of three [`Method`]s; then weigh every pixel
+//! over the bases in the perceptual metric (equation 1), whatever the bases were learnt with.
 //! Cost: learning is bounded by the sample, weighing is a few microseconds a pixel on all cores. Curves are made
 //! pixel by pixel and thrown away. Results depend on the document and the settings, not on machine or threads.
 //! Limits: what covers less than a hundred-thousandth of the document may not be seen while learning; the report
@@ -238,6 +238,8 @@ fn check(document: &dyn Materials, settings: &Settings) -> Result<(), FactorErro
 
 /// Sweeps of metric archetypes; most of the gain comes in the first ten.
 const SWEEPS: usize = 20;
+/// Relative fall of the mean squared distance in a sweep that counts as settled.
+const SETTLED: f64 = 1e-3;
 /// Axes in which corners are looked for.
 const CORNER_AXES: usize = 10;
 
@@ -273,9 +275,14 @@ fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca,
         Method::Sacls => sacls::refine(sample, &mut bases, settings.lambda, |_| observer.advance(1)),
         Method::Archetypes => {
             let mut fit = Fit::new(sample, &corners, slack, &bases);
+            let mut last = f64::INFINITY;
             for _ in 0..SWEEPS {
-                fit.sweep();
+                let total = fit.sweep();
                 observer.advance(1);
+                if total > (1.0 - SETTLED) * last {
+                    break;
+                }
+                last = total;
             }
             bases = fit.bases;
         }

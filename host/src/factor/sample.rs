@@ -2,8 +2,8 @@
 //!
 //! Problem: a document has millions of pixels, a basis is decided by thousands.
 //! Method: one pixel, at a random place, from every cell of a grid over the document, so small areas are not
-//! missed by chance; cells in random order. Pixels that nobody could tell apart, equal in every column of the
-//! metric's response after rounding so that merged ones differ by less than [`MERGED`], count as one material with the weight of all.
+//! missed by chance; cells in random order. Pixels that nobody could tell apart count as one material with the
+//! weight of all: those whose responses are equal after rounding, which keeps them within [`MERGED`].
 //! Cost: at most [`DRAWS`] rows are looked at and [`VALUES`] kept. Limits: a material on less than a cell of the
 //! document (a hundred-thousandth part of a large one) may go unseen.
 
@@ -228,5 +228,67 @@ impl Merge {
             columns.respond(&x[place.clone()], &mut t[place]);
         }
         Sample { columns, x, t, weight }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashSet;
+
+    proptest! {
+        #[test]
+        fn pixels_are_chosen_once_and_all_of_them_when_few(
+            width in 1usize..3000, height in 1usize..3000, seed in 0u64..9
+        ) {
+            let pixels = chosen_pixels(width, height, seed);
+            prop_assert!(pixels.len() <= DRAWS && pixels.iter().all(|&p| p < width * height));
+            let distinct: HashSet<_> = pixels.iter().collect();
+            prop_assert_eq!(distinct.len(), pixels.len());
+            if width * height <= DRAWS {
+                prop_assert_eq!(pixels.len(), width * height);
+            }
+        }
+    }
+
+    #[test]
+    fn even_a_line_of_pixels_is_covered_end_to_end() {
+        for (width, height) in [(1, 10_000_000), (10_000_000, 1)] {
+            let mut pixels = chosen_pixels(width, height, 1);
+            pixels.sort_unstable();
+            let widest = pixels.windows(2).map(|w| w[1] - w[0]).max().unwrap();
+            assert!(pixels.len() <= DRAWS && widest < 2 * 10_000_000 / pixels.len() + 2);
+            assert!(pixels[0] < 1000 && pixels[pixels.len() - 1] > 9_999_000);
+        }
+    }
+
+    /// Two materials side by side in every proportion: weights are areas.
+    #[test]
+    fn materials_weigh_as_much_as_they_cover() {
+        struct Two(Space);
+        impl Materials for Two {
+            fn width(&self) -> usize {
+                100
+            }
+            fn height(&self) -> usize {
+                40
+            }
+            fn space(&self) -> &Space {
+                &self.0
+            }
+            fn reflectance(&self, pixel: usize, out: &mut [f32]) {
+                // A hundred-thousandth more or less is the same material.
+                let same = 1.0 + 1e-5 * (pixel % 7) as f32;
+                out.fill(if pixel % 100 < 23 { 0.4 * same } else { 0.1 * same });
+            }
+        }
+        let sample = Sample::draw(&Two(Space::half_angle(8)), 1).unwrap();
+        let mut shares: Vec<(f32, f64)> =
+            (0..sample.len()).map(|i| (sample.row(i)[0], sample.weight[i])).collect();
+        shares.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let light: f64 = shares.iter().filter(|s| s.0 > 1.0).map(|s| s.1).sum();
+        assert!(sample.len() <= 4, "a rounding border may split a material: {shares:?}");
+        assert!((light - 0.23).abs() < 1e-12, "{shares:?}");
     }
 }
