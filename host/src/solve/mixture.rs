@@ -5,7 +5,7 @@
 //! that breaks ties toward fewer layers.
 //! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, its second
 //! derivative corrected to the exact one where that is positive; the model is minimised exactly by
-//! [`Simplex`](super::Simplex) over the stacks in use and those whose gradient says they would help; Armijo's rule
+//! [`Simplex`] over the stacks in use and those whose gradient says they would help; Armijo's rule
 //! halves the step. It ends when the gap is as small as asked or the
 //! objective drops by less than 1e-12 of itself. All stacks are priced in
 //! every step, only a dozen enter the quadratic.
