@@ -5,6 +5,7 @@ pub mod albedo;
 pub mod curve;
 pub mod format;
 pub mod ggx;
+pub mod gloss;
 pub mod lab;
 pub mod library;
 pub mod lobes;

@@ -38,7 +38,7 @@ pub struct Entry {
     pub number: usize,
     /// The layers.
     pub stack: Stack,
-    /// Reflectance in 1/sr over the half angle. A modelled one is sampled at 513 angles of the square-root grid;
+    /// Reflectance in 1/sr over the half angle. A modelled one is sampled at 512 angles of the square-root grid;
     /// [`Entry::curve_at`] gives it at any others without interpolation.
     pub curve: Curve,
     /// The modelled lobes; none when the curve was measured.
@@ -180,10 +180,8 @@ impl Library {
         if stack.layers().is_empty() {
             return self.optics.paper.name.clone();
         }
-        let name = |&ink: &Ink| {
-            let words = self.cartridge(ink).map_or_else(|| ink.name().into(), |c| c.okidata.to_lowercase());
-            words
-        };
+        let name =
+            |&ink: &Ink| self.cartridge(ink).map_or_else(|| ink.name().into(), |c| c.okidata.to_lowercase());
         stack.layers().iter().map(name).collect::<Vec<String>>().join(", ")
     }
 }

@@ -68,7 +68,7 @@ pub enum Layer {
     /// A transparent colour.
     Filter(Filter),
     /// Opaque flakes or film.
-    Metal(Metal),
+    Metal(Box<Metal>),
     /// A clear layer that levels what it covers.
     Undercoat(Undercoat),
     /// A clear coat that makes the surface.

@@ -3,10 +3,12 @@
 //! A finding is collected, not thrown, so that an owner sees all of them at once; only a file that is not TOML of
 //! the expected shape ends the reading early. A library with errors is not made.
 
+use std::f64::consts::FRAC_PI_2;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use protocol::ink::Ink;
+use toml::Spanned;
 
 use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::curve::{Curve, CurveError};
@@ -81,7 +83,7 @@ pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
         Some(name) => {
             let problem = format!("`{}`: a library can be based on `built-in` or on nothing", name.get_ref());
             findings.error(Some(name.span().start), "based_on", problem);
-            None
+            return (None, findings.found);
         }
     };
     let library = build(parsed, base, folder, &mut findings);
@@ -117,7 +119,7 @@ fn build(
         paper = paper.or(Some(base.optics.paper));
         model = model.or(Some(base.optics.model));
         name = name.or_else(|| Some(format!("{}, changed", base.name)));
-        about = about.or(Some(base.about));
+        about = about.or(Some("Modelled where it was not measured.".into()));
     }
     let mut seen = Vec::new();
     for table in file.ink {
@@ -126,32 +128,31 @@ fn build(
     }
     cartridges.sort_by_key(|cartridge| cartridge.ink);
     rules.extend(file.rule);
-    let stacks = match (file.stacks, stacks) {
-        (Some(texts), _) => texts
-            .into_iter()
-            .filter_map(|text| {
-                let (offset, field) = (text.span().start, format!("stacks: {}", text.get_ref()));
-                Some((wanted_stack(text.get_ref(), &field, offset, findings)?, Some(offset)))
-            })
-            .collect(),
-        (None, Some(stacks)) => stacks.into_iter().map(|stack| (stack, None)).collect(),
+    let mut wanted = match (file.stacks, stacks) {
+        (Some(texts), _) => listed_stacks(&texts, findings),
+        (None, Some(stacks)) => {
+            stacks.into_iter().map(|stack| Wanted { stack, offset: None, measured: None }).collect()
+        }
         (None, None) => {
             missing(findings, "stacks");
             Vec::new()
         }
     };
-    let mut wanted: Vec<Wanted> = Vec::with_capacity(stacks.len());
-    for (stack, offset) in stacks {
-        if wanted.iter().any(|other| other.stack == stack) {
-            findings.error(offset, format!("stacks: {stack}"), "is listed twice");
-        } else {
-            wanted.push(Wanted { stack, offset, measured: None });
-        }
-    }
     let named: Vec<String> =
         file.measured.iter().map(|table| table.get_ref().curve.get_ref().clone()).collect();
-    for table in file.measured {
+    if let Some(beyond) = file.measured.get(MOST_STACKS) {
+        findings.error(Some(beyond.span().start), "measured", format!("more than {MOST_STACKS}"));
+    }
+    for table in file.measured.iter().take(MOST_STACKS) {
         measured(table.get_ref(), folder, &mut wanted, findings);
+    }
+    for want in &wanted {
+        for ink in want.stack.layers() {
+            if !cartridges.iter().any(|cartridge| cartridge.ink == *ink) {
+                let problem = format!("holds {}, of which there is no `[[ink]]`", ink.name());
+                findings.error(want.offset, format!("stack {}", want.stack), problem);
+            }
+        }
     }
     if wanted.first().is_none_or(|first| first.stack != Stack::SUBSTRATE) || wanted.len() > MOST_STACKS {
         let problem =
@@ -187,6 +188,25 @@ fn build(
         rules,
         entries,
     })
+}
+
+/// The stacks of the file's own list, without those that are none or stand there twice.
+fn listed_stacks(texts: &[Spanned<String>], findings: &mut Findings) -> Vec<Wanted> {
+    let mut wanted: Vec<Wanted> = Vec::new();
+    for text in texts {
+        let (offset, field) = (text.span().start, format!("stacks: {}", text.get_ref()));
+        if wanted.len() == MOST_STACKS {
+            findings.error(Some(offset), "stacks", format!("more than {MOST_STACKS}"));
+            break;
+        }
+        let Some(stack) = wanted_stack(text.get_ref(), &field, offset, findings) else { continue };
+        if wanted.iter().any(|other| other.stack == stack) {
+            findings.error(Some(offset), field, "is listed twice");
+        } else {
+            wanted.push(Wanted { stack, offset: Some(offset), measured: None });
+        }
+    }
+    wanted
 }
 
 /// Reads a stack's text; says so if it is none.
@@ -305,6 +325,7 @@ fn measured(table: &MeasuredTable, folder: Option<&Path>, wanted: &mut Vec<Wante
     if wanted[place].measured.is_some() {
         findings.error(Some(offset), owner, "is measured twice");
     }
+    wanted[place].offset.get_or_insert(offset);
     wanted[place].measured = Some((curve, provenance));
 }
 
@@ -381,10 +402,11 @@ fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
     }
 }
 
-/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 90 degrees.
+/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. A lobe grows as
+/// 1 / cos towards 90 degrees, so the last value is held there rather than drawn towards a pole.
 fn grid() -> Vec<f64> {
-    const STEPS: usize = 512;
-    (0..=STEPS).map(|n| std::f64::consts::FRAC_PI_2 * (n as f64 / STEPS as f64).powi(2)).collect()
+    const STEPS: u32 = 512;
+    (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).powi(2)).collect()
 }
 
 /// The entry of a stack, after the checks that need its curve.
@@ -425,7 +447,8 @@ fn entry(
             break;
         }
     }
-    for rule in rules.iter().filter(|rule| rule.broken_by(&stack)) {
+    // Of a base's stacks the owner of this text has said nothing, so nothing is said to him.
+    for rule in rules.iter().filter(|rule| offset.is_some() && rule.broken_by(&stack)) {
         let problem = format!("{} ({}; {})", rule.says, rule.name, rule.certainty);
         findings.add(rule.severity, offset, field.clone(), problem);
     }

@@ -1,1 +1,2 @@
 //! The command line: one file for each subcommand.
+pub mod inks;
