@@ -284,7 +284,8 @@ pub fn map(
             importance.push(1.0 / few.len() as f64);
         }
     }
-    let (allowed, given_up) = cartridges::choose(&all, &targets, &importance, settings.most_cartridges)?;
+    let (allowed, given_up) =
+        cartridges::choose(&all, &targets, &importance, settings.most_cartridges, observer)?;
     for given_up in &given_up {
         observer.note(&format!(
             "{} is left out to keep to {} cartridges; the mean distance goes from {:.4} to {:.4}",
@@ -304,6 +305,13 @@ pub fn map(
     }
     let gloss = if intent == Intent::Clamp { Gloss::Keep } else { settings.gloss };
     let bases = basis::map(&document.space, &document.bases, &candidates, gloss)?;
+
+    if let Some(factor) = bases.gloss_scale {
+        observer.note(&format!(
+            "the gloss of all materials is printed at {:.0} %, so that the glossiest still differ",
+            100.0 * factor
+        ));
+    }
 
     let (shares, maps, mut pixels_report) = if intent == Intent::Basis {
         (bases.shares, document.maps.clone(), None)

@@ -142,8 +142,8 @@ pub fn inner_products(rows: &Table, x: &[f64], h: &mut [f64]) {
         let four = [rows.row(i), rows.row(i + 1), rows.row(i + 2), rows.row(i + 3)];
         h[i..i + 4].copy_from_slice(&dot4(four, x));
     }
-    for i in fours..n {
-        h[i] = dot(rows.row(i), x);
+    for (i, h) in h.iter_mut().enumerate().take(n).skip(fours) {
+        *h = dot(rows.row(i), x);
     }
 }
 
