@@ -122,3 +122,27 @@ pub(super) fn prune(weights: &mut [f64]) -> bool {
     }
     dropped
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_weights_are_dropped_and_the_rest_sum_to_one() {
+        let mut weights = [0.6, 0.004, 0.0, 0.396];
+        assert!(prune(&mut weights));
+        assert_eq!(weights[1], 0.0);
+        assert!(
+            (weights.iter().sum::<f64>() - 1.0).abs() < 1e-15 && (weights[0] - 0.6 / 0.996).abs() < 1e-15
+        );
+        assert!(!prune(&mut weights));
+    }
+
+    /// More than two hundred equal weights are all small: those that are the largest stay.
+    #[test]
+    fn the_largest_weight_stays_however_small() {
+        let mut weights = vec![1.0 / 250.0; 250];
+        prune(&mut weights);
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}

@@ -62,7 +62,7 @@ impl Candidates {
         keep.iter().for_each(|&k| curves.push(self.curves.row(k)));
         Candidates {
             stacks: keep.iter().map(|&k| self.stacks[k].clone()).collect(),
-            inks: keep.iter().map(|&k| self.inks[k].clone()).collect(),
+            inks: keep.iter().map(|&k| self.inks[k]).collect(),
             curves,
             priced: self.priced.subset(keep),
             free: self.free.subset(keep),

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::candidates::Candidates;
 use super::{GamutError, GivenUp};
+use crate::observe::Observer;
 use crate::solve::{Hull, Mixer, MixtureError, Target};
 
 /// Weights below this are pruned, so they load no cartridge.
@@ -23,6 +24,7 @@ pub(super) fn choose(
     targets: &[Target],
     importance: &[f64],
     most: usize,
+    observer: &dyn Observer,
 ) -> Result<(Vec<usize>, Vec<GivenUp>), GamutError> {
     let all: Vec<usize> = (0..candidates.len()).collect();
     let inks_of = |stacks: &[usize]| InkSet::of(stacks.iter().flat_map(|&k| candidates.inks[k].iter()));
@@ -31,6 +33,7 @@ pub(super) fn choose(
         return Ok((all, given_up));
     }
     let failed = |source| GamutError::Mixture { what: "choosing cartridges".into(), source };
+    observer.begin("choosing cartridges", (inks_of(&all).len() - most) as u64);
     let mut allowed = all;
     let mut state = solve_all(candidates, &allowed, targets, None).map_err(failed)?;
     loop {
@@ -38,6 +41,7 @@ pub(super) fn choose(
             allowed.iter().copied().filter(|&k| state.iter().any(|s| s.weights[k] >= PRUNED)).collect();
         let inks: Vec<Ink> = inks_of(&used).iter().collect();
         if inks.len() <= most {
+            observer.end();
             // Only inks in use: a pixel outside the sample must not load another.
             let inks = InkSet::of(inks);
             allowed.retain(|&k| candidates.inks[k].iter().all(|ink| inks.contains(ink)));
@@ -65,6 +69,7 @@ pub(super) fn choose(
         };
         given_up.push(GivenUp { ink, before: mean_square(&state, importance).sqrt(), after: after.sqrt() });
         (allowed, state) = (without, solved);
+        observer.advance(1);
     }
 }
 

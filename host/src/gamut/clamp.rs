@@ -2,8 +2,8 @@
 //!
 //! Problem: a million constrained fits of the perceptual metric, which the 2009 paper puts at hours or days.
 //! Method: along a serpentine through bands of 16 rows every pixel starts from its neighbour's mixture, which is
-//! nearly its own; two or three steps with a dozen stacks in the quadratic, all stacks priced, end with a gap
-//! below 1e-8 in squared distance. Weights below 0.5 % are pruned and the rest solved again. Bands go to the
+//! nearly its own; three or four steps with eight stacks in the quadratic, all stacks priced, end with a gap below
+//! 1e-7 in squared distance. Weights below 0.5 % are pruned and the rest solved again. Bands go to the
 //! threads whole, so the result does not depend on how many there are.
 //! Cost: about 10 microseconds a pixel and core. Limits: a neighbour is a start like any other: where E is not
 //! convex the certificate is a statement about the valley it led to.
@@ -22,8 +22,8 @@ use crate::weights::{ONE, quantise};
 
 /// Rows that are walked as one.
 const BAND: usize = 16;
-/// A gap in squared distance that no eye could tell from none: at d = 0.01, 5e-7 in d.
-const ENOUGH: f64 = 1e-8;
+/// A gap in squared distance that no eye could tell from none: at d = 0.01 it is 5e-6 in d.
+const ENOUGH: f64 = 1e-7;
 
 /// A factored document as materials: each pixel the weighted sum of the bases.
 pub(super) struct Rebuilt<'a>(pub &'a Factored);

@@ -22,8 +22,8 @@ pub const FILE_NAME: &str = "mix.toml";
 const FORMAT: &str = "foilpress-mix-1";
 /// The largest `mix.toml` read, in bytes.
 const LONGEST: u64 = 4 << 20;
-/// The most pixels times maps read: 4 GiB of weights.
-const MOST_WEIGHTS: usize = 1 << 31;
+/// The most pixels times maps read: a gigabyte of weights, 30 maps of 4096 x 4096.
+const MOST_WEIGHTS: usize = 1 << 29;
 
 /// Why a mapped document could not be read or written.
 #[derive(Debug, thiserror::Error)]

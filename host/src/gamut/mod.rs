@@ -35,9 +35,9 @@ pub use candidates::Printable;
 pub use mix::{InkMix, MixError};
 pub use sample::merged_share;
 
-/// Pixels that cartridges and intent are chosen by.
+/// Pixels that the intent is chosen by and pairs are drawn from.
 const SAMPLE: usize = 1024;
-/// Of these, the pixels that inks are given up by.
+/// Pixels that inks are given up by.
 const CARTRIDGE_SAMPLE: usize = 256;
 /// Share of merged pairs up to which clamping is the automatic choice.
 const FEW_MERGED: f64 = 0.01;
@@ -277,15 +277,17 @@ pub fn map(
         }
     }
     if settings.intent != Intent::Basis {
-        let step = sample.len().div_ceil(CARTRIDGE_SAMPLE);
-        for i in (0..sample.len()).step_by(step) {
-            let what = || format!("pixel {}", sampled[i]);
-            let target = all.free.target(sample.row(i));
-            targets.push(target.map_err(|source| GamutError::Mixture { what: what(), source })?);
-            importance.push(step as f64 / sample.len() as f64);
+        // Drawn anew: every so manieth of the sample above would favour some columns of the picture.
+        let few = sample::pixels(pixels.width() * pixels.height(), CARTRIDGE_SAMPLE, settings.seed ^ 1);
+        for (row, pixel) in sample::rows(pixels, &few).rows().zip(&few) {
+            let what = || format!("pixel {pixel}");
+            targets
+                .push(all.free.target(row).map_err(|source| GamutError::Mixture { what: what(), source })?);
+            importance.push(1.0 / few.len() as f64);
         }
     }
-    let (allowed, given_up) = cartridges::choose(&all, &targets, &importance, settings.most_cartridges)?;
+    let (allowed, given_up) =
+        cartridges::choose(&all, &targets, &importance, settings.most_cartridges, observer)?;
     for given_up in &given_up {
         observer.note(&format!(
             "{} is left out to keep to {} cartridges; the mean distance goes from {:.4} to {:.4}",
@@ -305,6 +307,13 @@ pub fn map(
     }
     let gloss = if intent == Intent::Clamp { Gloss::Keep } else { settings.gloss };
     let bases = basis::map(&document.space, &document.bases, &candidates, gloss)?;
+
+    if let Some(factor) = bases.gloss_scale {
+        observer.note(&format!(
+            "the gloss of all materials is printed at {:.0} %, so that the glossiest still differ",
+            100.0 * factor
+        ));
+    }
 
     let (shares, maps, mut pixels_report) = if intent == Intent::Basis {
         (bases.shares, document.maps.clone(), None)

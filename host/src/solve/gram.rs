@@ -4,7 +4,7 @@
 
 use crate::brdf::Table;
 
-use super::vector::dot;
+use super::vector::{dot, dot4};
 
 /// Inner products `G_ij = a_i . a_j` of `n` rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,10 +86,16 @@ impl Gram {
         self.values.resize(n * n, 0.0);
         for i in 0..n {
             let a = row(i);
-            for j in 0..=i {
-                let value = dot(a, row(j));
-                self.values[i * n + j] = value;
-                self.values[j * n + i] = value;
+            let fours = (i + 1) / 4 * 4;
+            for j in (0..fours).step_by(4) {
+                let four = dot4([row(j), row(j + 1), row(j + 2), row(j + 3)], a);
+                self.values[i * n + j..][..4].copy_from_slice(&four);
+            }
+            for j in fours..=i {
+                self.values[i * n + j] = dot(a, row(j));
+            }
+            for j in 0..i {
+                self.values[j * n + i] = self.values[i * n + j];
             }
         }
         self.measure();
@@ -144,10 +150,16 @@ impl Gram {
     }
 }
 
-/// `h_i = a_i . x` for the rows of a table.
+/// `h_i = a_i . x` for the rows of a table; `x` is as long as a row, `h` has a place for each row.
 pub fn inner_products(rows: &Table, x: &[f64], h: &mut [f64]) {
-    for (h, row) in h.iter_mut().zip(rows.rows()) {
-        *h = dot(row, x);
+    let n = rows.len().min(h.len());
+    let fours = n - n % 4;
+    for i in (0..fours).step_by(4) {
+        let four = [rows.row(i), rows.row(i + 1), rows.row(i + 2), rows.row(i + 3)];
+        h[i..i + 4].copy_from_slice(&dot4(four, x));
+    }
+    for (i, h) in h.iter_mut().enumerate().take(n).skip(fours) {
+        *h = dot(rows.row(i), x);
     }
 }
 

@@ -5,7 +5,7 @@
 //! that breaks ties toward fewer layers.
 //! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, its second
 //! derivative corrected to the exact one where that is positive; the model is minimised exactly by
-//! [`Simplex`](super::Simplex) over the stacks in use and those whose gradient says they would help; Armijo's rule
+//! [`Simplex`] over the stacks in use and those whose gradient says they would help; Armijo's rule
 //! halves the step. It ends when the gap is as small as asked or the
 //! objective drops by less than 1e-12 of itself. All stacks are priced in
 //! every step, only a dozen enter the quadratic.
@@ -16,7 +16,7 @@
 
 use crate::brdf::{Space, Table};
 
-use super::gram::Gram;
+use super::gram::{Gram, inner_products};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
 use super::vector::{add_scaled, dot};
@@ -27,6 +27,8 @@ pub const LAYER_PRICE: f64 = 1e-6;
 const DROP: f64 = 1e-12;
 /// Steps taken at most; ten times what the slowest of a thousand random problems needs.
 const MOST_STEPS: u32 = 100;
+/// Halvings of a step before it counts as none.
+const MOST_HALVINGS: u32 = 30;
 /// Stacks that may join the mixture in one step.
 const MOST_JOINING: usize = 12;
 /// Darkest radiance told apart from black, relative to the brightest of any stack.
@@ -256,9 +258,13 @@ impl Hull {
 pub struct Mixer {
     simplex: Simplex,
     gram: Gram,
-    /// Radiance of the mixture and its change over the full step.
+    /// Radiance of the mixture, its change over the full step, and the mixture looked at.
     mix: Vec<f64>,
     change: Vec<f64>,
+    trial: Vec<f64>,
+    /// Per column: inverse cube root of the radiance, and weighted difference of the cube roots.
+    inverse: Vec<f64>,
+    residual: Vec<f64>,
     /// Per column: residual times slope, and the root of the model's curvature.
     pull: Vec<f64>,
     stiffness: Vec<f64>,
@@ -287,6 +293,9 @@ impl Mixer {
             gram: Gram::empty(),
             mix: Vec::new(),
             change: Vec::new(),
+            trial: Vec::new(),
+            inverse: Vec::new(),
+            residual: Vec::new(),
             pull: Vec::new(),
             stiffness: Vec::new(),
             slope: Vec::new(),
@@ -300,7 +309,15 @@ impl Mixer {
 
     fn resize(&mut self, hull: &Hull) {
         let (k, m) = (hull.len(), hull.columns());
-        for columns in [&mut self.mix, &mut self.change, &mut self.pull, &mut self.stiffness] {
+        for columns in [
+            &mut self.mix,
+            &mut self.change,
+            &mut self.trial,
+            &mut self.inverse,
+            &mut self.residual,
+            &mut self.pull,
+            &mut self.stiffness,
+        ] {
             columns.resize(m, 0.0);
         }
         self.slope.resize(k, 0.0);
@@ -423,21 +440,25 @@ impl Mixer {
     ) -> Result<Fit, MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
-        let (k, m) = (hull.len(), hull.columns());
+        let m = hull.columns();
         self.closed.clear();
         self.closed.extend(a.iter().map(|&w| matches!(reach, Reach::Support) && w <= 0.0));
         hull.mix(a, &mut self.mix);
+        self.trial.copy_from_slice(&self.mix);
         let mut squared = self.linearise(hull, target);
         let mut steps = 0;
         let mut stalled = false;
+
         let gap = loop {
-            for i in 0..k {
-                // A closed stack is so dear that it never joins.
-                self.slope[i] = if self.closed[i] {
-                    f64::MAX
-                } else {
-                    dot(hull.rows.row(i), &self.pull) + 0.5 * hull.price[i]
-                };
+            inner_products(&hull.rows, &self.pull, &mut self.slope);
+            for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
+                *slope += 0.5 * price;
+            }
+            for (slope, &closed) in self.slope.iter_mut().zip(&self.closed) {
+                if closed {
+                    // So dear that it never joins.
+                    *slope = f64::MAX;
+                }
             }
             let gap = 2.0 * frank_wolfe_gap(&self.slope, a);
             if stalled || steps >= MOST_STEPS || gap <= enough || gap.is_nan() {
@@ -446,6 +467,7 @@ impl Mixer {
             steps += 1;
             self.choose(a);
             let w = self.working.len();
+
             for (i, &k) in self.working.iter().enumerate() {
                 let scaled = &mut self.scaled[i * m..][..m];
                 for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
@@ -474,12 +496,16 @@ impl Mixer {
                 working.iter().zip(step).map(|(&k, w)| w * hull.price[k]).sum()
             };
             let priced = price(&self.working, &self.working_weights);
-            let mut length = 1.0;
             let before = squared;
+            let mut length = 1.0;
             let mut accepted = false;
-            for _ in 0..30 {
-                let trial = self.squared(hull, target, length);
-                if trial + length * priced <= before + 1e-4 * length * promised.min(0.0) {
+            for _ in 0..MOST_HALVINGS {
+                for ((trial, mix), change) in self.trial.iter_mut().zip(&self.mix).zip(&self.change) {
+                    *trial = mix + length * change;
+                }
+                // The model of the next step comes with the value: a step that is taken is not looked at twice.
+                squared = self.linearise(hull, target);
+                if squared + length * priced <= before + 1e-4 * length * promised.min(0.0) {
                     accepted = true;
                     break;
                 }
@@ -487,13 +513,14 @@ impl Mixer {
             }
             if !accepted {
                 stalled = true;
+                self.trial.copy_from_slice(&self.mix);
+                squared = self.linearise(hull, target);
                 continue;
             }
+            std::mem::swap(&mut self.mix, &mut self.trial);
             for (&k, w) in self.working.iter().zip(&self.working_weights) {
                 a[k] = (a[k] + length * w).max(0.0);
             }
-            hull.mix(a, &mut self.mix);
-            squared = self.linearise(hull, target);
             let drop = before - squared - length * priced;
             stalled = drop <= DROP * before;
         };
@@ -524,40 +551,31 @@ impl Mixer {
         }
     }
 
-    /// The squared distance of the mixture, and the model of it: `pull` and `stiffness`.
+    /// The squared distance of the trial mixture, and the model of it: `pull` and `stiffness`.
     fn linearise(&mut self, hull: &Hull, target: &Target) -> f64 {
-        let mut sum = [0.0; 4];
-        let m = self.mix.len();
-        let (mix, root, weight) = (&self.mix[..m], &target.root[..m], &hull.weight[..m]);
+        let m = self.trial.len();
+        let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);
         let (pull, stiffness) = (&mut self.pull[..m], &mut self.stiffness[..m]);
+        // Passes without sums: the compiler puts neighbouring columns side by side.
+        let inverse = &mut self.inverse[..m];
+        for (r, f) in inverse.iter_mut().zip(mix) {
+            *r = inverse_cbrt(if *f > hull.darkest { *f } else { hull.darkest });
+        }
+        let residual = &mut self.residual[..m];
         for j in 0..m {
-            let f = mix[j].max(hull.darkest);
-            let r = inverse_cbrt(f);
+            let r = inverse[j];
             let r2 = r * r;
-            let residual = weight[j] * (f * r2 - root[j]);
+            let f = if mix[j] > hull.darkest { mix[j] } else { hull.darkest };
+            residual[j] = weight[j] * (f * r2 - t[j]);
             let tangent = weight[j] * r2 * (1.0 / 3.0);
             // Second derivative over Gauss-Newton's: (2 cbrt t - cbrt f) / cbrt f, kept within reason.
-            let exact = (2.0 * root[j] * r - 1.0).clamp(0.25, 9.0);
-            pull[j] = residual * tangent;
+            let exact = 2.0 * t[j] * r - 1.0;
+            let exact = if exact > 0.25 { exact } else { 0.25 };
+            let exact = if exact < 9.0 { exact } else { 9.0 };
+            pull[j] = residual[j] * tangent;
             stiffness[j] = tangent * exact.sqrt();
-            sum[j % 4] += residual * residual;
         }
-        (sum[0] + sum[1]) + (sum[2] + sum[3])
-    }
-
-    /// The squared distance after a share of the step.
-    fn squared(&self, hull: &Hull, target: &Target, length: f64) -> f64 {
-        let mut sum = [0.0; 4];
-        let m = self.mix.len();
-        let (mix, change) = (&self.mix[..m], &self.change[..m]);
-        let (root, weight) = (&target.root[..m], &hull.weight[..m]);
-        for j in 0..m {
-            let f = (mix[j] + length * change[j]).max(hull.darkest);
-            let r = inverse_cbrt(f);
-            let residual = weight[j] * (f * r * r - root[j]);
-            sum[j % 4] += residual * residual;
-        }
-        (sum[0] + sum[1]) + (sum[2] + sum[3])
+        dot(residual, residual)
     }
 }
 

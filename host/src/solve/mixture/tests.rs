@@ -94,7 +94,7 @@ fn slopes_are_the_gradient_of_the_squared_distance() {
     let a: Vec<f64> = (0..57).map(|i| f64::from((i * 37) % 57 + 1) / (57.0 * 29.0)).collect();
     let mut mixer = Mixer::new();
     mixer.resize(&hull);
-    hull.mix(&a, &mut mixer.mix);
+    hull.mix(&a, &mut mixer.trial);
     mixer.linearise(&hull, &target);
     for i in 0..57 {
         let slope = dot(hull.rows.row(i), &mixer.pull);
