@@ -17,7 +17,7 @@ use super::error::DocumentError;
 use super::folder::check_size_mm;
 use super::picture::Picture;
 use super::source::{MOST_BYTES, Source};
-use super::surfaces::MOST_PIXELS;
+use super::surfaces::{MOST_PIXELS, check_reflectance};
 use super::{Content, Document, stem};
 use crate::brdf::{Space, Table};
 use crate::factor::Factored;
@@ -273,7 +273,9 @@ fn read_bases(
         let curve =
             Curve::new(theta, rgb).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
         // Samples on the very grid are taken as they stand, so that writing and reading changes nothing.
-        bases.push(&if on_grid { row } else { space.row(&curve) });
+        let row = if on_grid { row } else { space.row(&curve) };
+        check_reflectance(&row).map_err(|problem| wrong(format!("basis {basis}"), problem))?;
+        bases.push(&row);
     }
     Ok(bases)
 }

@@ -501,3 +501,6 @@ pub(super) fn relief_note(name: &str) -> String {
         relief::WINDOW
     )
 }
+
+#[cfg(test)]
+mod tests;

@@ -64,11 +64,11 @@ pub fn draw() -> Painting {
 
         // Rust starts at rims, in holes and at the step of the face, and eats its way in.
         let step = (radius - FACE).abs();
-        let near = smooth(70.0, 0.0, -edge) * 0.22
-            + smooth(46.0, 0.0, hole) * 0.16
-            + smooth(26.0, 0.0, step) * 0.14
-            - 0.10 * smooth(FACE + 4.0, FACE - 14.0, radius);
-        let eaten = clouds(p[0] / 130.0, p[1] / 130.0, 6, 20) + 0.35 * (clouds(p[0] / 17.0, p[1] / 17.0, 3, 21) - 0.5);
+        let near =
+            smooth(70.0, 0.0, -edge) * 0.22 + smooth(46.0, 0.0, hole) * 0.16 + smooth(26.0, 0.0, step) * 0.14
+                - 0.10 * smooth(FACE + 4.0, FACE - 14.0, radius);
+        let eaten = clouds(p[0] / 130.0, p[1] / 130.0, 6, 20)
+            + 0.35 * (clouds(p[0] / 17.0, p[1] / 17.0, 3, 21) - 0.5);
         let rust = smooth(0.50, 0.60, eaten + near);
         let hue = clouds(p[0] / 38.0, p[1] / 38.0, 4, 22);
         let mut crust = bright.under(deep, smooth(0.35, 0.7, hue + 0.5 * (rust - 0.6)));

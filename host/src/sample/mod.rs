@@ -35,7 +35,11 @@ pub struct Sample {
 /// All samples.
 pub const SAMPLES: [Sample; 5] = [
     Sample { name: "leaf", about: "an autumn oak leaf with silver veins on matte paper", draw: leaf::draw },
-    Sample { name: "card", about: "a greeting card: gold, silver and glossy holly on matte green", draw: card::draw },
+    Sample {
+        name: "card",
+        about: "a greeting card: gold, silver and glossy holly on matte green",
+        draw: card::draw,
+    },
     Sample { name: "dove", about: "a silver dove with a glossy olive twig on matte blue", draw: dove::draw },
     Sample { name: "flange", about: "a rusted steel ring, bare metal beside rust", draw: flange::draw },
     Sample {
@@ -192,6 +196,7 @@ mod tests {
     use crate::document::{Materials, Options, open};
     use crate::observe::Silent;
 
+    /// It is drawn twice here: nothing but its own code decides what it looks like.
     #[test]
     fn every_sample_opens_the_same_from_memory_and_from_its_folder() {
         for sample in SAMPLES {
@@ -209,13 +214,6 @@ mod tests {
             for pixel in 0..file.width() * file.height() {
                 assert_eq!(file.surface(pixel), memory.surface(pixel), "{} pixel {pixel}", sample.name);
             }
-        }
-    }
-
-    #[test]
-    fn drawing_twice_gives_the_same_painting() {
-        for sample in SAMPLES {
-            assert!(sample.draw() == sample.draw(), "{}", sample.name);
         }
     }
 
