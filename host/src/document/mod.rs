@@ -128,7 +128,7 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
         return crate::sample::document(name, space, observer);
     }
     let path = Path::new(spec);
-    let mut source = Source::new(observer);
+    let source = Source::new(observer);
     if source.is_folder(path)? {
         if path.join(foil::INDEX).is_file() {
             return foil::open(path, source);

@@ -91,6 +91,7 @@ pub struct Surfaces {
 impl Surfaces {
     /// Surfaces made pixel by pixel, rows from the top, on all cores; values are clamped to their ranges, NaN to
     /// the lowest. `width` and `height` at least 1.
+    #[expect(clippy::manual_clamp, reason = "clamp would keep NaN, max drops it")]
     pub fn build(
         width: usize,
         height: usize,
