@@ -9,7 +9,7 @@ use super::output::Staged;
 use crate::sample::{SAMPLES, Sample};
 
 /// The samples, or one of them as a folder of texture maps.
-#[derive(clap::Args)]
+#[derive(clap::Args, Debug)]
 pub struct Args {
     /// `list`, or the name of a sample
     name: String,
