@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use inks::Curve;
@@ -17,7 +17,7 @@ use super::error::DocumentError;
 use super::folder::check_size_mm;
 use super::picture::Picture;
 use super::source::{MOST_BYTES, Source};
-use super::surfaces::MOST_PIXELS;
+use super::surfaces::{MOST_PIXELS, check_reflectance};
 use super::{Content, Document, stem};
 use crate::brdf::{Space, Table};
 use crate::factor::Factored;
@@ -103,6 +103,9 @@ pub fn write(
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let staging =
         tempfile::Builder::new().prefix(".foil.").tempdir_in(parent).map_err(io(parent, "write in"))?;
+    // A folder within, since a temporary folder is its owner's alone.
+    let inside = staging.path().join("document");
+    std::fs::create_dir(&inside).map_err(io(&inside, "write"))?;
     let (width, height) = (factored.maps.width(), factored.maps.height());
     let mut maps = Vec::new();
     let mut row = vec![0u8; 2 * width * height];
@@ -111,14 +114,14 @@ pub fn write(
         for (pixel, out) in row.chunks_exact_mut(2).enumerate() {
             out.copy_from_slice(&stored(factored.maps.at(pixel)[basis]).to_ne_bytes());
         }
-        let at = staging.path().join(&file);
+        let at = inside.join(&file);
         let output = BufWriter::new(std::fs::File::create_new(&at).map_err(io(&at, "write"))?);
         PngEncoder::new(output)
             .write_image(&row, width as u32, height as u32, ExtendedColorType::L16)
             .map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
         maps.push(file);
     }
-    let at = staging.path().join(BASES);
+    let at = inside.join(BASES);
     let mut csv = csv::Writer::from_path(&at).map_err(|error| io(&at, "write")(error.into()))?;
     for (basis, row) in factored.bases.rows().enumerate() {
         for (theta, value) in angles.iter().zip(row.chunks_exact(3)) {
@@ -143,14 +146,11 @@ pub fn write(
         bases: BASES.into(),
         maps,
     };
-    let at = staging.path().join(INDEX);
+    let at = inside.join(INDEX);
     let text = toml::to_string(&index).map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
     let mut file = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
     file.write_all(text.as_bytes()).map_err(io(&at, "write"))?;
-    std::fs::rename(staging.path(), path).map_err(io(path, "write"))?;
-    // It has its own name now; there is nothing left to remove.
-    let _moved: PathBuf = staging.keep();
-    Ok(())
+    std::fs::rename(&inside, path).map_err(io(path, "write"))
 }
 
 /// Reads a factored document, nobody watching.
@@ -273,7 +273,9 @@ fn read_bases(
         let curve =
             Curve::new(theta, rgb).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
         // Samples on the very grid are taken as they stand, so that writing and reading changes nothing.
-        bases.push(&if on_grid { row } else { space.row(&curve) });
+        let row = if on_grid { row } else { space.row(&curve) };
+        check_reflectance(&row).map_err(|problem| wrong(format!("basis {basis}"), problem))?;
+        bases.push(&row);
     }
     Ok(bases)
 }

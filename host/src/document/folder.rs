@@ -288,6 +288,9 @@ impl Reader<'_, '_> {
         picture: &Picture,
         space: ColourSpace,
     ) -> Result<[Field; 3], DocumentError> {
+        if picture.has_foreign_profile() {
+            self.source.note(format!("{name}: its colour profile is not applied"));
+        }
         let planes = picture.linear(space);
         let outside = planes.iter().any(|plane| plane.data().iter().any(|v| !(0.0..=1.0).contains(v)));
         if outside {
@@ -501,3 +504,6 @@ pub(super) fn relief_note(name: &str) -> String {
         relief::WINDOW
     )
 }
+
+#[cfg(test)]
+mod tests;

@@ -300,6 +300,9 @@ impl<'a> Loader<'a, '_> {
         let Loaded { name, picture } = self.load(info, field)?;
         let how = if space == ColourSpace::Srgb { "sRGB" } else { "linear" };
         self.source.note(format!("{name}: {field} read as {how}"));
+        if picture.has_foreign_profile() {
+            self.source.note(format!("{name}: its colour profile is not applied"));
+        }
         Ok(coloured(&picture, factor, space))
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<
     source.note(
         "one isotropic material, averaged over the difference angle to a curve of the half angle".into(),
     );
-    Ok(Uniform::new(space, &curve).document(path, source))
+    Ok(Uniform::new(space, &curve, path)?.document(path, source))
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.

@@ -10,6 +10,8 @@ pub mod error;
 pub mod foil;
 pub mod folder;
 pub mod gltf;
+#[cfg(test)]
+mod hostile;
 pub mod materials;
 pub mod merl;
 pub mod names;

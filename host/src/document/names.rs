@@ -221,6 +221,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::type_complexity, reason = "a table to read")]
     fn each_sites_own_names_are_understood() {
         use Role::*;
         let sites: [(&str, &[(&str, Option<Role>)]); 8] = [

@@ -43,6 +43,7 @@ pub struct Picture {
     pub height: usize,
     channels: usize,
     values: Values,
+    foreign_profile: bool,
 }
 
 impl Picture {
@@ -70,7 +71,7 @@ impl Picture {
             format => {
                 // The decoder knows only one of the two signatures of a Radiance file.
                 let renamed = bytes.strip_prefix(b"#?RGBE").map(|rest| [b"#?RADIANCE", rest].concat());
-                decode_image(renamed.as_deref().unwrap_or(bytes), format, path, source)?
+                decode_image(renamed.as_deref().unwrap_or(bytes), format, path)?
             }
         };
         if let Values::Float(values) = &picture.values
@@ -93,6 +94,11 @@ impl Picture {
     /// Whether the values are floating point, as in EXR and HDR files.
     pub fn is_float(&self) -> bool {
         matches!(self.values, Values::Float(_))
+    }
+
+    /// Whether it carries a colour profile other than sRGB. It is never applied; data has no use for one.
+    pub fn has_foreign_profile(&self) -> bool {
+        self.foreign_profile
     }
 
     /// The values of a 16-bit grey picture, 0 to 65535.
@@ -173,6 +179,11 @@ pub fn decode_srgb(v: f32) -> f32 {
     <Srgb as IntoLinear<f32, f32>>::into_linear(v.max(0.0))
 }
 
+/// Whether a colour profile calls itself sRGB, in either of the text encodings profiles use.
+fn is_srgb(profile: &[u8]) -> bool {
+    profile.windows(4).any(|w| w == b"sRGB") || profile.windows(8).any(|w| w == b"\0s\0R\0G\0B")
+}
+
 fn kind(format: ImageFormat) -> Option<&'static str> {
     match format {
         ImageFormat::Png => Some("PNG"),
@@ -205,12 +216,7 @@ fn check_size(path: &Path, width: u64, height: u64, channels: u64) -> Result<(),
     Ok(())
 }
 
-fn decode_image(
-    bytes: &[u8],
-    format: ImageFormat,
-    path: &Path,
-    source: &mut Source<'_>,
-) -> Result<Picture, DocumentError> {
+fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Picture, DocumentError> {
     let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
     let damaged = |error: image::ImageError| wrong(format!("cannot decode the picture: {error}"));
     let mut limits = image::Limits::default();
@@ -224,14 +230,11 @@ fn decode_image(
     let channels = u64::from(decoder.color_type().channel_count());
     check_size(path, u64::from(width), u64::from(height), channels)?;
     // Damage to a profile is no damage to the picture.
-    if let Ok(Some(profile)) = decoder.icc_profile()
-        && !profile.windows(4).any(|w| w == b"sRGB")
-    {
-        source.note(format!("{}: its colour profile is not applied", path.display()));
-    }
+    let foreign_profile =
+        decoder.icc_profile().is_ok_and(|profile| profile.is_some_and(|bytes| !is_srgb(&bytes)));
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-    let picture = |channels, values| Picture { width, height, channels, values };
+    let picture = |channels, values| Picture { width, height, channels, values, foreign_profile };
     Ok(match decoded {
         DynamicImage::ImageLuma8(p) => picture(1, Values::Eight(p.into_raw())),
         DynamicImage::ImageLumaA8(p) => picture(2, Values::Eight(p.into_raw())),
@@ -290,5 +293,5 @@ fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
             pixel[c] = value;
         }
     }
-    Ok(Picture { width, height, channels, values: Values::Float(values) })
+    Ok(Picture { width, height, channels, values: Values::Float(values), foreign_profile: false })
 }

@@ -32,7 +32,7 @@ pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<
     source.note(
         "one isotropic material, averaged over the difference angle to a curve of the half angle".into(),
     );
-    Ok(Uniform::new(space, &curve).document(path, source))
+    Ok(Uniform::new(space, &curve, path)?.document(path, source))
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.
@@ -392,9 +392,8 @@ pub(super) mod tests {
         let layers = if spectral { 24 } else { 3 };
         let mut colours = Vec::new();
         for _ in 0..n {
-            for layer in 0..layers {
-                let level = if spectral { 0.7 } else { F0[layer] as f32 };
-                colours.extend(table.iter().map(|v| v * level));
+            for level in if spectral { vec![0.7; layers] } else { F0.to_vec() } {
+                colours.extend(table.iter().map(|v| v * level as f32));
             }
         }
         let mut fields = vec![

@@ -24,6 +24,9 @@ pub const LEAST_ALPHA: f32 = 0.02;
 /// The most pixels of a document. The largest page has 38 million dots; more is never seen.
 pub const MOST_PIXELS: u64 = 1 << 26;
 
+/// The largest reflectance that is read, in 1/sr: a mirror's peak as a laser sees it; more is damage.
+pub const MOST_REFLECTANCE: f64 = 1e9;
+
 const LEVELS: usize = 256;
 
 /// Pixels handed to a thread at a time.
@@ -88,6 +91,7 @@ pub struct Surfaces {
 impl Surfaces {
     /// Surfaces made pixel by pixel, rows from the top, on all cores; values are clamped to their ranges, NaN to
     /// the lowest. `width` and `height` at least 1.
+    #[expect(clippy::manual_clamp, reason = "clamp would keep NaN, max drops it")]
     pub fn build(
         width: usize,
         height: usize,
@@ -155,10 +159,16 @@ pub struct Uniform {
 }
 
 impl Uniform {
-    /// A curve (1/sr), sampled at the angles of the space.
-    pub fn new(space: Space, curve: &Curve) -> Uniform {
-        let row = space.row(curve).iter().map(|&v| v as f32).collect();
-        Uniform { space, row }
+    /// A curve (1/sr), sampled at the angles of the space; `path` names it in the error when a value is beyond
+    /// [`MOST_REFLECTANCE`].
+    pub fn new(space: Space, curve: &Curve, path: &Path) -> Result<Uniform, DocumentError> {
+        let row = space.row(curve);
+        check_reflectance(&row).map_err(|problem| DocumentError::Field {
+            path: path.to_path_buf(),
+            field: "reflectance".into(),
+            problem,
+        })?;
+        Ok(Uniform { space, row: row.into_iter().map(|v| v as f32).collect() })
     }
 
     /// As a document `SWATCH_MM` on a side.
@@ -218,6 +228,14 @@ impl Materials for Factored {
     }
 }
 
+/// Whether all values can be reflectances.
+pub(super) fn check_reflectance(row: &[f64]) -> Result<(), String> {
+    match row.iter().find(|v| !(0.0..=MOST_REFLECTANCE).contains(*v)) {
+        Some(v) => Err(format!("{v:e} is no reflectance; expected 0 to {MOST_REFLECTANCE:e} per steradian")),
+        None => Ok(()),
+    }
+}
+
 /// Opens a curve file as a document of one material.
 pub(super) fn open_curve(
     path: &Path,
@@ -226,7 +244,7 @@ pub(super) fn open_curve(
 ) -> Result<Document, DocumentError> {
     let bytes = source.read(path, 16 << 20)?;
     let curve = Curve::from_csv(&bytes[..], path)?;
-    Ok(Uniform::new(space, &curve).document(path, source))
+    Ok(Uniform::new(space, &curve, path)?.document(path, source))
 }
 
 /// The surface of the metallic workflow: `f0 = mix(dielectric, base, metallic)`, `diffuse = base (1 - metallic)

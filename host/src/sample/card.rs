@@ -13,11 +13,12 @@ fn pen(shape: &mut Shape, strokes: &[[Point; 4]], at: Point, scale: f32, thin: f
     for stroke in strokes {
         let curve = stroke.map(|p| [at[0] + scale * p[0], at[1] + scale * p[1]]);
         let points: Vec<Point> = (0..=36).map(|k| bezier(curve, k as f32 / 36.0)).collect();
-        for pair in points.windows(2) {
-            let slant = (pair[1][1] - pair[0][1]).atan2(pair[1][0] - pair[0][0]) + 40f32.to_radians();
-            let radius = mix(thin, wide, slant.sin().abs());
-            shape.stroke(pair[0], pair[1], radius, radius);
-        }
+        let radius = |u: f32| {
+            let (a, b) = (bezier(curve, (u - 0.02).max(0.0)), bezier(curve, (u + 0.02).min(1.0)));
+            let slant = (b[1] - a[1]).atan2(b[0] - a[0]) + 40f32.to_radians();
+            mix(thin, wide, slant.sin().abs())
+        };
+        shape.line(&points, radius);
     }
 }
 
@@ -119,15 +120,15 @@ pub fn draw() -> Painting {
 
     let mut silver = Shape::new(WIDTH, HEIGHT, 4.0);
     let stars = [
-        ([300.0, 330.0], 74.0),
+        ([268.0, 300.0], 74.0),
         ([724.0, 290.0], 96.0),
         ([512.0, 206.0], 48.0),
         ([180.0, 500.0], 40.0),
         ([862.0, 520.0], 52.0),
-        ([196.0, 262.0], 28.0),
+        ([166.0, 398.0], 28.0),
         ([852.0, 410.0], 24.0),
-        ([424.0, 398.0], 26.0),
-        ([590.0, 420.0], 30.0),
+        ([664.0, 462.0], 26.0),
+        ([560.0, 380.0], 30.0),
         ([842.0, 210.0], 30.0),
         ([160.0, 700.0], 26.0),
         ([874.0, 760.0], 34.0),
@@ -140,12 +141,13 @@ pub fn draw() -> Painting {
         silver.disc([at(0, 90.0, width - 90.0), at(1, 110.0, 1010.0)], at(2, 0.9, 2.8));
     }
 
-    let (mut leaves, mut veins) = (Shape::new(WIDTH, HEIGHT, 26.0), Shape::new(WIDTH, HEIGHT, 4.0));
-    for (degrees, length) in
-        [(-158.0, 300.0), (-22.0, 300.0), (168.0, 250.0), (12.0, 250.0), (-118.0, 170.0), (-62.0, 170.0)]
-    {
-        holly(&mut leaves, &mut veins, [512.0, 1200.0], degrees, length);
-    }
+    // From the back: a pair of leaves to each layer.
+    let layers = [(-62.0, 190.0), (-20.0, 310.0), (14.0, 262.0)].map(|(degrees, length)| {
+        let (mut leaves, mut veins) = (Shape::new(WIDTH, HEIGHT, 26.0), Shape::new(WIDTH, HEIGHT, 4.0));
+        holly(&mut leaves, &mut veins, [530.0, 1200.0], degrees, length);
+        holly(&mut leaves, &mut veins, [494.0, 1200.0], 180.0 - degrees, length);
+        (leaves, veins)
+    });
     let berries: [(Point, f32); 5] = [
         ([470.0, 1196.0], 37.0),
         ([548.0, 1186.0], 40.0),
@@ -168,20 +170,24 @@ pub fn draw() -> Painting {
         let fibre = noise(p[0] / 2.0, p[1] / 5.0, 1) + noise(p[0] / 9.0, p[1] / 2.0, 2) - 1.0;
         let glow = smooth(760.0, 60.0, ((p[0] - 512.0).powi(2) + (0.8 * (p[1] - 640.0)).powi(2)).sqrt());
         let mut coat = paper.shaded((0.72 + 0.62 * glow) * (1.0 + 0.07 * fibre));
-        let shadow = 0.55 * smooth(22.0, -6.0, leaves.at(i)).max(smooth(16.0, -4.0, berry(p).0));
-        coat = coat.shaded(1.0 - shadow);
         coat = coat.under(silver_coat, inside(silver.at(i)));
         let worn = clouds(p[0] / 60.0, p[1] / 60.0, 3, 30);
         coat = coat.under(Coat { roughness: 0.16 + 0.16 * worn, ..gold_coat }, inside(gold.at(i)));
 
-        let depth = -leaves.at(i);
-        let tone =
-            0.55 + 0.5 * smooth(0.0, 22.0, depth) + 0.35 * (clouds(p[0] / 40.0, p[1] / 40.0, 3, 31) - 0.5);
-        let mut green = leaf.shaded(tone).under(vein, 0.8 * inside(veins.at(i)));
-        green.roughness += 0.12 * (clouds(p[0] / 25.0, p[1] / 25.0, 2, 32) - 0.5);
-        // A fine gilt margin, as on embossed cards.
-        green = green.under(gold_coat, smooth(3.6, 2.2, depth));
-        coat = coat.under(green, inside(leaves.at(i)));
+        for (leaves, veins) in &layers {
+            let depth = -leaves.at(i);
+            coat = coat.shaded(1.0 - 0.5 * smooth(20.0, -4.0, -depth));
+            if depth < -1.0 {
+                continue;
+            }
+            let tone =
+                0.5 + 0.5 * smooth(0.0, 22.0, depth) + 0.35 * (clouds(p[0] / 40.0, p[1] / 40.0, 3, 31) - 0.5);
+            let mut green = leaf.shaded(tone).under(vein, 0.8 * inside(veins.at(i)));
+            green.roughness += 0.12 * (clouds(p[0] / 25.0, p[1] / 25.0, 2, 32) - 0.5);
+            // A fine gilt margin, as on embossed cards.
+            green = green.under(gold_coat, smooth(3.6, 2.2, depth));
+            coat = coat.under(green, inside(-depth));
+        }
 
         let (distance, size) = berry(p);
         let round = smooth(0.0, size as f32 / 8.0, -distance);

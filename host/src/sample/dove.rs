@@ -6,12 +6,19 @@ use super::canvas::{Coat, Point, Shape, bezier, clouds, inside, mix, noise, pain
 const WIDTH: usize = 1280;
 const HEIGHT: usize = 960;
 
+/// How far below the coordinates everything is drawn.
+const DROP: f32 = 118.0;
+
+fn dropped(p: Point) -> Point {
+    [p[0], p[1] + DROP]
+}
+
 /// The outline of closed curves: each entry goes on from the end of the one before.
 fn closed(start: Point, curves: &[[Point; 3]]) -> Vec<Point> {
     let mut points = Vec::new();
     let mut from = start;
     for &[a, b, to] in curves {
-        points.extend((0..20).map(|k| bezier([from, a, b, to], k as f32 / 20.0)));
+        points.extend((0..20).map(|k| dropped(bezier([from, a, b, to], k as f32 / 20.0))));
         from = to;
     }
     points
@@ -45,26 +52,27 @@ const NEAR: Wing = Wing {
     shoulder: [600.0, 520.0],
     wrist: [640.0, 330.0],
     fan: (196.0, 276.0),
-    lengths: (190.0, 400.0),
+    lengths: (180.0, 352.0),
     feathers: 13,
 };
 const FAR: Wing = Wing {
     shoulder: [730.0, 440.0],
     wrist: [800.0, 290.0],
     fan: (248.0, 322.0),
-    lengths: (120.0, 300.0),
+    lengths: (120.0, 270.0),
     feathers: 10,
 };
 
 impl Wing {
     /// Draws the feathers into one shape and their shafts and gaps into another.
-    fn draw(&self, shape: &mut Shape, lines: &mut Shape) {
+    fn draw(&self, shape: &mut Shape, lines: &mut Shape, coverts: &mut Shape) {
         let arm = [
             self.shoulder,
             [mix(self.shoulder[0], self.wrist[0], 0.4), mix(self.shoulder[1], self.wrist[1], 0.4)],
             [mix(self.shoulder[0], self.wrist[0], 0.8), mix(self.shoulder[1], self.wrist[1], 0.8)],
             self.wrist,
-        ];
+        ]
+        .map(dropped);
         for k in 0..self.feathers {
             let u = k as f32 / (self.feathers - 1) as f32;
             let from = bezier(arm, u);
@@ -82,13 +90,14 @@ impl Wing {
             lines.line(&points, |s| mix(2.0, 0.5, s));
         }
         let arm: Vec<Point> = (0..=10).map(|k| bezier(arm, k as f32 / 10.0)).collect();
-        shape.line(&arm, |s| mix(52.0, 24.0, s));
+        shape.line(&arm, |s| mix(46.0, 22.0, s));
+        coverts.line(&arm, |s| mix(58.0, 30.0, s));
     }
 }
 
 /// A twig from the beak with its leaves.
 fn twig(stem: &mut Shape, leaves: &mut Shape, veins: &mut Shape) {
-    let curve = [[926.0, 402.0], [985.0, 430.0], [1030.0, 490.0], [1056.0, 580.0]];
+    let curve = [[926.0, 402.0], [985.0, 430.0], [1030.0, 490.0], [1056.0, 580.0]].map(dropped);
     let points: Vec<Point> = (0..=20).map(|k| bezier(curve, k as f32 / 20.0)).collect();
     stem.line(&points, |s| mix(4.2, 2.0, s));
     for k in 0..9 {
@@ -120,9 +129,10 @@ pub fn draw() -> Painting {
     let shape = |reach| Shape::new(WIDTH, HEIGHT, reach);
     let (mut body, mut near, mut far) = (shape(40.0), shape(40.0), shape(40.0));
     let (mut shafts, mut far_shafts) = (shape(14.0), shape(14.0));
+    let (mut coverts, mut far_coverts) = (shape(40.0), shape(40.0));
     body.fill(&closed([896.0, 372.0], &BODY));
-    NEAR.draw(&mut near, &mut shafts);
-    FAR.draw(&mut far, &mut far_shafts);
+    NEAR.draw(&mut near, &mut shafts, &mut coverts);
+    FAR.draw(&mut far, &mut far_shafts, &mut far_coverts);
     let (mut stem, mut leaves, mut veins) = (shape(4.0), shape(14.0), shape(4.0));
     twig(&mut stem, &mut leaves, &mut veins);
     let mut beak = shape(4.0);
@@ -136,7 +146,7 @@ pub fn draw() -> Painting {
     ));
     let mut tail = shape(4.0);
     for (k, end) in [[300.0, 712.0], [282.0, 690.0], [262.0, 664.0]].into_iter().enumerate() {
-        tail.stroke([470.0, 600.0 - 14.0 * k as f32], end, 0.8, 1.8);
+        tail.stroke(dropped([470.0, 600.0 - 14.0 * k as f32]), dropped(end), 0.8, 1.8);
     }
 
     let blue = Coat::new(0x2A5A93, 0.96, 0.0);
@@ -144,7 +154,7 @@ pub fn draw() -> Painting {
     let (leaf, pale) = (Coat::new(0x5E7F3A, 0.3, 0.0), Coat::new(0xB9C78E, 0.4, 0.0));
     paint(WIDTH, HEIGHT, (1600, 1200), |i, p| {
         let fibre = noise(p[0] / 2.5, p[1] / 6.0, 1) + noise(p[0] / 11.0, p[1] / 2.5, 2) - 1.0;
-        let glow = smooth(900.0, 120.0, ((p[0] - 640.0).powi(2) + (p[1] - 430.0).powi(2)).sqrt());
+        let glow = smooth(900.0, 120.0, ((p[0] - 640.0).powi(2) + (p[1] - 480.0).powi(2)).sqrt());
         let nearest = body.at(i).min(near.at(i)).min(far.at(i));
         let shadow = 0.4 * smooth(34.0, -10.0, nearest);
         let mut coat = blue.shaded((0.68 + 0.55 * glow) * (1.0 + 0.05 * fibre) * (1.0 - shadow));
@@ -159,15 +169,21 @@ pub fn draw() -> Painting {
             coat
         };
         let rim = |d: f32| mix(0.55, 1.0, smooth(0.0, 9.0, -d));
-        coat = coat.under(feather(far_shafts.at(i), 0.62 * rim(far.at(i))), inside(far.at(i)));
-        let mut plumage = silver.shaded((0.84 + 0.24 * down) * rim(body.at(i)));
+        let mut plumage = silver.shaded(0.84 + 0.24 * down);
         plumage.roughness = 0.34 + 0.22 * down;
-        plumage = plumage.shaded(1.0 - 0.5 * inside(tail.at(i)));
-        coat = coat.shaded(1.0 - 0.3 * smooth(12.0, 0.0, body.at(i))).under(plumage, inside(body.at(i)));
-        let edge = smooth(16.0, 0.0, near.at(i)) * 0.35;
-        coat = coat.shaded(1.0 - edge).under(feather(shafts.at(i), rim(near.at(i))), inside(near.at(i)));
+        // Small feathers lie over the roots of the large ones, the border between them frayed.
+        let fray = 26.0 * (clouds(p[0] / 16.0, p[1] / 16.0, 2, 21) - 0.5);
+        let soft = |d: f32| smooth(10.0, -10.0, d + fray);
+        let wing = feather(far_shafts.at(i), 1.0).under(plumage, soft(far_coverts.at(i)));
+        coat = coat.under(wing.shaded(0.62 * rim(far.at(i))), inside(far.at(i)));
+        let trunk = plumage.shaded(rim(body.at(i)) * (1.0 - 0.5 * inside(tail.at(i))));
+        coat = coat.shaded(1.0 - 0.3 * smooth(12.0, 0.0, body.at(i))).under(trunk, inside(body.at(i)));
+        let covert = soft(coverts.at(i));
+        coat = coat.shaded(1.0 - 0.35 * smooth(16.0, 0.0, near.at(i)) * (1.0 - covert));
+        let wing = feather(shafts.at(i), mix(rim(near.at(i)), 1.0, covert)).under(plumage, covert);
+        coat = coat.under(wing, inside(near.at(i)));
 
-        let eye = ((p[0] - 868.0).powi(2) + (p[1] - 388.0).powi(2)).sqrt() - 6.5;
+        let eye = ((p[0] - 868.0).powi(2) + (p[1] - 388.0 - DROP).powi(2)).sqrt() - 6.5;
         coat = coat.under(Coat::new(0x14100E, 0.1, 0.0), inside(eye));
         coat = coat.under(Coat::new(0xD98B3A, 0.3, 0.0), inside(beak.at(i)));
         coat = coat.under(Coat::new(0x6A4A26, 0.5, 0.0), inside(stem.at(i)));

@@ -64,9 +64,9 @@ mod tests {
         let at = |step: usize| surfaces.surface(HEIGHT / 2 * WIDTH + step * 256 + 128);
         for (step, share) in STEPS.into_iter().enumerate() {
             let surface = at(step);
-            for c in 0..3 {
-                assert!((surface.f0[c] / (FULL * share) - 1.0).abs() < 0.03, "{surface:?}");
-                assert!((surface.diffuse[c] / DIFFUSE[c] - 1.0).abs() < 0.04, "{surface:?}");
+            assert!(surface.f0.iter().all(|f0| (f0 / (FULL * share) - 1.0).abs() < 0.03), "{surface:?}");
+            for (found, wanted) in surface.diffuse.into_iter().zip(DIFFUSE) {
+                assert!((found / wanted - 1.0).abs() < 0.04, "{surface:?}");
             }
             assert_eq!(surface.alpha, at(0).alpha);
         }

@@ -33,12 +33,12 @@ const fn lobe(at: f32, length: f32, radius: f32, angle: f32) -> Lobe {
 
 /// The lobes of the left side; those of the right are shifted a little.
 const LOBES: [Lobe; 6] = [
-    lobe(0.07, 118.0, 34.0, 66.0),
-    lobe(0.19, 214.0, 48.0, 58.0),
-    lobe(0.34, 318.0, 60.0, 52.0),
-    lobe(0.51, 338.0, 66.0, 45.0),
-    lobe(0.68, 262.0, 60.0, 39.0),
-    lobe(0.84, 138.0, 46.0, 32.0),
+    lobe(0.06, 120.0, 30.0, 68.0),
+    lobe(0.17, 226.0, 45.0, 61.0),
+    lobe(0.32, 345.0, 58.0, 56.0),
+    lobe(0.50, 372.0, 62.0, 50.0),
+    lobe(0.68, 285.0, 54.0, 45.0),
+    lobe(0.83, 150.0, 40.0, 37.0),
 ];
 
 /// A place on the blade's midrib and the direction there.
@@ -102,14 +102,14 @@ fn outline(p: Point, veins: &[(Vec<Point>, f32)], body: &[(Point, f32)]) -> f32 
         let last = (points.len() - 1) as f32;
         let mut own = f32::MAX;
         for (i, pair) in points.windows(2).enumerate() {
-            let swell = |i: usize| radius * mix(0.55, 1.0, smooth(0.0, 0.75, i as f32 / last));
+            let swell = |i: usize| radius * mix(0.8, 1.0, smooth(0.0, 0.75, i as f32 / last));
             own = own.min(capsule(p, pair[0], pair[1], swell(i), swell(i + 1)));
         }
-        d = blend(d, own, 58.0);
+        d = blend(d, own, 70.0);
     }
     let wave = clouds(p[0] / 70.0, p[1] / 70.0, 2, 5) - 0.5;
     let ripple = clouds(p[0] / 19.0, p[1] / 19.0, 2, 6) - 0.5;
-    d + 26.0 * wave + 7.0 * ripple
+    d + 20.0 * wave + 5.0 * ripple
 }
 
 /// The finer veins of one vein: to both sides, shorter towards its end, each with finer ones of its own.
@@ -140,9 +140,9 @@ fn branches(
                 branches(
                     shape,
                     &points,
-                    0.42 * reach,
-                    3,
-                    0.6 * radius,
+                    0.4 * reach,
+                    2,
+                    0.55 * radius,
                     depth - 1,
                     seed * 31 + k as u32 * 7 + j,
                 );
@@ -157,7 +157,7 @@ pub fn draw() -> Painting {
     let body: Vec<(Point, f32)> = (0..=12)
         .map(|k| {
             let at = k as f32 / 12.0 * 0.97;
-            let radius = 12.0 + 52.0 * smooth(-0.05, 0.3, at) - 14.0 * smooth(0.75, 1.0, at);
+            let radius = 9.0 + 82.0 * smooth(-0.04, 0.42, at) - 40.0 * smooth(0.6, 1.0, at);
             (midrib(at).0, radius)
         })
         .collect();
@@ -171,10 +171,12 @@ pub fn draw() -> Painting {
     }
     let mut fine = Shape::new(WIDTH, HEIGHT, 5.0);
     for (i, (points, radius)) in veins.iter().enumerate() {
-        branches(&mut fine, points, 1.35 * radius, 6, 1.5, 1, 100 + i as u32);
+        let length: f32 = points.windows(2).map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1])).sum();
+        let count = (length / 46.0) as usize + 1;
+        branches(&mut fine, points, 1.5 * radius, count, 1.15, 1, 100 + i as u32);
     }
     let spine: Vec<Point> = (0..=24).map(|k| midrib(k as f32 / 24.0).0).collect();
-    branches(&mut fine, &spine, 74.0, 15, 1.4, 1, 77);
+    branches(&mut fine, &spine, 62.0, 15, 1.1, 1, 77);
 
     let paper = Coat::new(0xF2EBDC, 1.0, 0.0);
     let vein_coat = Coat::new(0xDCD9D2, 0.27, 1.0);
@@ -199,9 +201,9 @@ pub fn draw() -> Painting {
             base = mix3(base, russet, smooth(0.45, 1.0, out + 0.7 * (mottle - 0.45)));
             let green = smooth(0.54, 0.72, clouds(p[0] / 260.0, p[1] / 260.0, 3, 14));
             base = mix3(base, olive, 0.75 * green * smooth(14.0, 70.0, depth));
-            let (first, second) = cells(p[0] / 13.0, p[1] / 13.0, 21);
+            let (first, second) = cells(p[0] / 9.0, p[1] / 9.0, 21);
             let mesh = smooth(0.16, 0.02, second - first);
-            base = mix3(base, glow, 0.16 * mesh + 0.34 * smooth(14.0, 2.0, silver.at(i)));
+            base = mix3(base, glow, 0.07 * mesh + 0.34 * smooth(14.0, 2.0, silver.at(i)));
             let shade = 0.82 + 0.36 * clouds(p[0] / 24.0, p[1] / 24.0, 3, 15);
             base = base.map(|v| v * shade);
             // Waxy between the veins, dull where the leaf has dried.
@@ -216,7 +218,7 @@ pub fn draw() -> Painting {
             base = mix3(base, dark, 0.85 * speck);
             roughness = mix(roughness, 0.9, rim.max(speck));
             let mut leaf = Coat { base, roughness, metallic: 0.0 };
-            leaf = leaf.under(vein_coat, 0.8 * inside(fine.at(i)) * smooth(2.0, 10.0, depth));
+            leaf = leaf.under(vein_coat, 0.7 * inside(fine.at(i)) * smooth(2.0, 10.0, depth));
             coat = coat.under(leaf, share);
         }
         coat.under(vein_coat, inside(silver.at(i)) * if edge > 6.0 && p[1] < 1000.0 { 0.0 } else { 1.0 })
