@@ -110,14 +110,16 @@ fn lawson_hanson(bencher: Bencher, k: usize) {
     bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
         for t in targets.rows() {
             inner_products(&stacks, t, &mut h);
+            // Slopes are judged on the scale of the problem, not of the heavy row.
+            let tolerance = 1e-9 * h.iter().copied().fold(0.0, f64::max);
             h.iter_mut().for_each(|h| *h += heavy * heavy);
-            black_box(nnls(&gram, &h));
+            black_box(nnls(&gram, &h, tolerance));
         }
     });
 }
 
 /// Lawson and Hanson's algorithm on normal equations, Cholesky afresh for each support.
-fn nnls(gram: &Gram, h: &[f64]) -> Vec<f64> {
+fn nnls(gram: &Gram, h: &[f64], tolerance: f64) -> Vec<f64> {
     let k = h.len();
     let mut x = vec![0.0; k];
     let mut passive: Vec<usize> = Vec::new();
@@ -126,7 +128,7 @@ fn nnls(gram: &Gram, h: &[f64]) -> Vec<f64> {
         let best = (0..k)
             .filter(|i| !passive.contains(i))
             .map(|i| (slope(i), i))
-            .fold((1e-9 * h[0].abs(), None), |best, (s, i)| if s > best.0 { (s, Some(i)) } else { best });
+            .fold((tolerance, None), |best, (s, i)| if s > best.0 { (s, Some(i)) } else { best });
         let (_, Some(best)) = best else { break };
         passive.push(best);
         loop {

@@ -1,5 +1,4 @@
-//! Against finite differences, random descent, an interior-point-free second minimiser, exact mixtures and the
-//! measured materials.
+//! Against finite differences, a second minimiser, exact mixtures, random rivals and the measured materials.
 
 use std::path::PathBuf;
 
