@@ -27,6 +27,10 @@ pub mod job;
 
 pub mod simulate;
 
+pub mod inspect;
+
 pub mod preview;
+
+pub mod pipeline;
 
 pub mod cli;

@@ -1,7 +1,13 @@
 //! A sheet is the one printable thing: a page and one stack for every dot.
 
+pub mod colours;
+pub mod files;
+pub(crate) mod picture;
+
 use inks::Stack;
 use protocol::paper::Paper;
+
+pub use picture::FileError;
 
 /// One stack for every dot of the printable area at 600 dpi. Stack 0 is always the bare substrate.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,6 +52,19 @@ pub enum SheetError {
     },
 }
 
+/// Whether these can be the stacks of a sheet: the substrate first, at most 256, all different.
+pub(crate) fn check_stacks(stacks: &[Stack]) -> Result<(), SheetError> {
+    for (i, stack) in stacks.iter().enumerate() {
+        if (i == 0) != stack.layers().is_empty() || i > 255 || stacks[..i].contains(stack) {
+            return Err(SheetError::Stacks { index: i, stack: stack.clone() });
+        }
+    }
+    if stacks.is_empty() {
+        return Err(SheetError::Stacks { index: 0, stack: Stack::SUBSTRATE });
+    }
+    Ok(())
+}
+
 impl Sheet {
     /// A sheet from its dots, row by row from the top.
     pub fn new(paper: Paper, stacks: Vec<Stack>, index: Vec<u8>) -> Result<Sheet, SheetError> {
@@ -53,14 +72,7 @@ impl Sheet {
         if index.len() != width * length || index.is_empty() {
             return Err(SheetError::Size { width, length, found: index.len() });
         }
-        for (i, stack) in stacks.iter().enumerate() {
-            if (i == 0) != stack.layers().is_empty() || i > 255 || stacks[..i].contains(stack) {
-                return Err(SheetError::Stacks { index: i, stack: stack.clone() });
-            }
-        }
-        if stacks.is_empty() {
-            return Err(SheetError::Stacks { index: 0, stack: Stack::SUBSTRATE });
-        }
+        check_stacks(&stacks)?;
         // Branch-free over the page first; only a bad sheet is searched for its dot.
         if usize::from(index.iter().copied().max().unwrap_or(0)) >= stacks.len()
             && let Some(dot) = index.iter().position(|&s| usize::from(s) >= stacks.len())

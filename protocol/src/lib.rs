@@ -6,4 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod ink;
+pub mod packbits;
 pub mod paper;
+pub mod rgl;
+pub mod walk;

@@ -1,6 +1,6 @@
-//! `foilpress sample`: what can be printed before there is a document.
+//! `foilpress sample`: documents made by the program itself.
 
-use std::io::Write;
+use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
@@ -8,34 +8,32 @@ use anyhow::{Result, bail};
 use super::output::Staged;
 use crate::sample::{SAMPLES, Sample};
 
-/// The samples, or one of them as a folder of texture maps.
+/// Documents made by the program itself.
 #[derive(clap::Args, Debug)]
+#[command(after_help = "Examples:\n  foilpress sample list\n  foilpress sample leaf -o leaf/")]
 pub struct Args {
-    /// `list`, or the name of a sample
+    /// `list`, or the sample to write as a folder of texture maps
+    #[arg(value_name = "list|NAME")]
     name: String,
-    /// Where to write the sample's folder [default: the sample's name]
+    /// Folder to write [default: NAME in the current folder]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 }
 
-/// Lists the samples, or draws one and writes its maps.
+/// Runs `sample`.
 pub fn run(args: Args) -> Result<()> {
-    let mut out = std::io::stdout().lock();
     if args.name == "list" {
         if args.output.is_some() {
-            bail!("`sample list` writes no files; name a sample to go with -o");
+            bail!("`list` writes no folder; name a sample to write, such as `foilpress sample leaf -o DIR`");
         }
+        let mut out = std::io::stdout().lock();
         for sample in SAMPLES {
             writeln!(out, "{:<8} {}", sample.name, sample.about)?;
         }
         return Ok(());
     }
     let sample = Sample::named(&args.name)?;
-    let target = args.output.unwrap_or_else(|| PathBuf::from(sample.name));
-    let staged = Staged::new(&target)?;
-    std::fs::create_dir(staged.path())?;
-    sample.draw().write(sample.name, staged.path())?;
-    staged.commit()?;
-    writeln!(out, "{}", target.display())?;
-    Ok(())
+    let staged = Staged::new(&args.output.unwrap_or_else(|| sample.name.into()))?;
+    sample.draw().write(sample.name, staged.folder()?)?;
+    staged.commit()
 }
