@@ -153,7 +153,7 @@ fn pictures(
         None => Source::Document(document.materials()),
     };
     let printed = Source::Print { sheet: &print.printed, space, stacks: &stacks, area };
-    let fidelity = preview::fidelity(&target, &printed, EYE, observer)?;
+    let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
     let (width, height) = crate::job::placement::size_mm(&print.placement);
     let notes = [
         format!("{width:.0} x {height:.0} mm, {} passes", print.separation.passes.len()),
