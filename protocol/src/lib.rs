@@ -6,4 +6,5 @@
 #![forbid(unsafe_code)]
 
 pub mod ink;
+pub mod link;
 pub mod paper;

@@ -34,8 +34,7 @@ struct Args {
 }
 
 #[derive(Subcommand)]
-enum Command {
-}
+enum Command {}
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {

@@ -64,7 +64,11 @@ impl Staged {
                 // The old folder goes back; if even that fails it is still in the staging folder, which stays.
                 if fs::rename(&old, &self.target).is_err() {
                     let kept = self.folder.keep();
-                    bail!("cannot write {}: {error}; what was there is in {}", self.target.display(), kept.display());
+                    bail!(
+                        "cannot write {}: {error}; what was there is in {}",
+                        self.target.display(),
+                        kept.display()
+                    );
                 }
             }
             return Err(error).with_context(|| format!("cannot write {}", self.target.display()));

@@ -183,7 +183,10 @@ mod tests {
     fn what_does_not_fit_is_refused_with_both_sizes() {
         let wrong = Placement::new((10, 10), None, Some("300mm".parse().unwrap()), Paper::A4).unwrap_err();
         let text = wrong.to_string();
-        assert!(text.contains("300.0 x 300.0") && text.contains("203.2 x 269.7") && text.contains("a4"), "{text}");
+        assert!(
+            text.contains("300.0 x 300.0") && text.contains("203.2 x 269.7") && text.contains("a4"),
+            "{text}"
+        );
         assert!(matches!(
             Placement::new((10, 10), Some((0.01, 0.01)), None, Paper::A4),
             Err(PlacementError::TooSmall { .. })
