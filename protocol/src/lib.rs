@@ -7,4 +7,6 @@
 
 pub mod ink;
 pub mod link;
+pub mod packbits;
 pub mod paper;
+pub mod rgl;
