@@ -10,3 +10,4 @@ pub mod link;
 pub mod packbits;
 pub mod paper;
 pub mod rgl;
+pub mod walk;
