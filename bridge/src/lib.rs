@@ -6,7 +6,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "simulation"))]
 extern crate std;
 
 pub mod port;
+#[cfg(any(test, feature = "simulation"))]
+pub mod simulation;

@@ -162,11 +162,8 @@ impl Walk {
         let rest = position - band.start();
         // All tiles of a band are equally high, so a column of dots is `height` positions.
         let column = (rest / u32::from(band.height)) as u16;
-        let i = if band.back {
-            self.columns.find(self.width - 1 - column)
-        } else {
-            self.columns.find(column)
-        };
+        let i =
+            if band.back { self.columns.find(self.width - 1 - column) } else { self.columns.find(column) };
         let tile = band.tile(i);
         let (x, y) = tile.at((rest - band.before(i)) as u16);
         Some((tile.x + x, tile.y + y))
@@ -504,7 +501,8 @@ mod tests {
 
     #[test]
     fn whole_pages_are_walked_once_by_steps_to_neighbours() {
-        for (width, height) in [(4800, 6372), (4940, 7760), (4801, 6373), (2202, 3081), (1, 7761), (4939, 1)] {
+        for (width, height) in [(4800, 6372), (4940, 7760), (4801, 6373), (2202, 3081), (1, 7761), (4939, 1)]
+        {
             check(width, height).unwrap();
         }
     }

@@ -118,6 +118,9 @@ pub struct PortSettings {
     /// How long the printer may be busy without reporting an error before the host is told, in seconds. The
     /// byte is kept and goes out when Busy falls, however late.
     pub patience_s: u16,
+    /// The status lines that are wired and mean what they should, as in [`Lines`]; the others are taken for
+    /// idle.
+    pub heed: Lines,
 }
 
 /// Which of the printer's signals ends a byte.
@@ -314,12 +317,20 @@ impl Lines {
     /// +5 V of the printer. Always set by a bridge that has no wire for it.
     pub const POWER: u8 = 1 << 5;
 
+    /// All of them.
+    pub const ALL: Lines = Lines(0x3f);
+
     /// A printer that is switched on, on line and waiting for data.
     pub const IDLE: Lines = Lines(Self::ACK | Self::SELECT | Self::FAULT | Self::POWER);
 
     /// Whether all of these are high.
     pub fn high(self, lines: u8) -> bool {
         self.0 & lines == lines
+    }
+
+    /// These lines where they are to be heeded, and idle elsewhere.
+    pub fn heeding(self, heed: Lines) -> Lines {
+        Lines((self.0 & heed.0) | (Lines::IDLE.0 & !heed.0))
     }
 
     /// What the operator has to see to, by the lines alone. Busy is no fault.
@@ -353,6 +364,7 @@ mod tests {
         settle_ns: 500,
         handshake: Handshake::Busy,
         patience_s: 600,
+        heed: Lines(0x3f),
     };
     const PROGRESS: Progress = Progress {
         job: 7,
@@ -388,9 +400,9 @@ mod tests {
             (ask(Ask::Lines), &[4, 0xac, 0x02, 0]),
             (ask(Ask::Printer), &[4, 0xac, 0x02, 1]),
             (ask(Ask::DeviceId), &[4, 0xac, 0x02, 2]),
-            (settings(Handshake::Busy), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 0, 0xd8, 4]),
-            (settings(Handshake::BusyAck), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 1, 0xd8, 4]),
-            (settings(Handshake::Ack), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 2, 0xd8, 4]),
+            (settings(Handshake::Busy), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 0, 0xd8, 4, 0x3f]),
+            (settings(Handshake::BusyAck), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 1, 0xd8, 4, 0x3f]),
+            (settings(Handshake::Ack), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 2, 0xd8, 4, 0x3f]),
             (ToBridge::Initialise, &[6]),
             (ToBridge::Bootloader, &[7]),
             (ToBridge::Drive { data: 0xaa, control: 0b0111 }, &[8, 0xaa, 7]),
