@@ -46,6 +46,19 @@ pub enum SheetError {
     },
 }
 
+/// Whether these can be the stacks of a sheet: the substrate first, at most 256, all different.
+pub(crate) fn check_stacks(stacks: &[Stack]) -> Result<(), SheetError> {
+    for (i, stack) in stacks.iter().enumerate() {
+        if (i == 0) != stack.layers().is_empty() || i > 255 || stacks[..i].contains(stack) {
+            return Err(SheetError::Stacks { index: i, stack: stack.clone() });
+        }
+    }
+    if stacks.is_empty() {
+        return Err(SheetError::Stacks { index: 0, stack: Stack::SUBSTRATE });
+    }
+    Ok(())
+}
+
 impl Sheet {
     /// A sheet from its dots, row by row from the top.
     pub fn new(paper: Paper, stacks: Vec<Stack>, index: Vec<u8>) -> Result<Sheet, SheetError> {
@@ -53,14 +66,7 @@ impl Sheet {
         if index.len() != width * length || index.is_empty() {
             return Err(SheetError::Size { width, length, found: index.len() });
         }
-        for (i, stack) in stacks.iter().enumerate() {
-            if (i == 0) != stack.layers().is_empty() || i > 255 || stacks[..i].contains(stack) {
-                return Err(SheetError::Stacks { index: i, stack: stack.clone() });
-            }
-        }
-        if stacks.is_empty() {
-            return Err(SheetError::Stacks { index: 0, stack: Stack::SUBSTRATE });
-        }
+        check_stacks(&stacks)?;
         // Branch-free over the page first; only a bad sheet is searched for its dot.
         if usize::from(index.iter().copied().max().unwrap_or(0)) >= stacks.len()
             && let Some(dot) = index.iter().position(|&s| usize::from(s) >= stacks.len())

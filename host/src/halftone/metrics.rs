@@ -1,0 +1,1 @@
+//! How well a sheet keeps the mix and the minimum clusters.
