@@ -33,8 +33,9 @@ fn document(count: usize) -> InkMix {
     let mut data = vec![0; width * height * channels];
     for (pixel, out) in data.chunks_exact_mut(channels).enumerate() {
         let (x, y) = ((pixel % width) as f64 / 190.0, (pixel / width) as f64 / 230.0);
-        let weights: Vec<f64> =
-            (0..channels).map(|i| 1.05 + (x * (1.0 + i as f64 * 0.3) + y * (2.0 - i as f64 * 0.2)).sin()).collect();
+        let weights: Vec<f64> = (0..channels)
+            .map(|i| 1.05 + (x * (1.0 + i as f64 * 0.3) + y * (2.0 - i as f64 * 0.2)).sin())
+            .collect();
         quantise(&weights, out);
     }
     let matrix = (0..channels)

@@ -10,4 +10,5 @@ pub mod link;
 pub mod packbits;
 pub mod paper;
 pub mod rgl;
+pub mod runs;
 pub mod walk;

@@ -156,7 +156,8 @@ impl<'a> Lattice<'a> {
             })
             .collect();
         let finer = (maps.width() > width, maps.height() > height);
-        let axis = |finer, dots, pixels| if finer { Axis::over(dots, pixels) } else { Axis::between(dots, pixels) };
+        let axis =
+            |finer, dots, pixels| if finer { Axis::over(dots, pixels) } else { Axis::between(dots, pixels) };
         let stretch = if width >= 4 * maps.width() && height >= 4 * maps.height() {
             16
         } else if width >= 2 * maps.width() && height >= 2 * maps.height() {

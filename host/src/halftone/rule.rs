@@ -315,10 +315,7 @@ impl Rule {
         {
             let mut low = [i32::MAX; LANES];
             for l in 0..LANES {
-                let found = (seen.0[l] > now)
-                    & (member.0[l] != 0)
-                    & (lane.0[l] != own)
-                    & (look.0[l] == most);
+                let found = (seen.0[l] > now) & (member.0[l] != 0) & (lane.0[l] != own) & (look.0[l] == most);
                 low[l] = if found { lane.0[l] } else { i32::MAX };
             }
             first = first.min(low.into_iter().fold(i32::MAX, i32::min));
@@ -524,7 +521,8 @@ mod tests {
         let (n, stacks) = (weights.len(), minimum.len());
         let unit = i128::from(UNIT);
         let mut debt = vec![0i128; stacks];
-        let (mut live, mut parked, mut last) = (vec![false; stacks], vec![0i128; stacks], vec![0usize; stacks]);
+        let (mut live, mut parked, mut last) =
+            (vec![false; stacks], vec![0i128; stacks], vec![0usize; stacks]);
         let share = |debt: &mut [i128], live: &[bool], k: usize, amount: i128| {
             let others = live.iter().filter(|l| **l).count() as i128;
             if others == 0 {
@@ -619,7 +617,8 @@ mod tests {
 
     /// Shares with many zeros and some wholes, in the unit, summing to it exactly.
     fn shares(stacks: usize) -> impl Strategy<Value = Vec<i32>> {
-        let raw = prop::collection::vec(prop_oneof![3 => Just(0u32), 2 => 1u32..100, 1 => Just(50u32)], stacks);
+        let raw =
+            prop::collection::vec(prop_oneof![3 => Just(0u32), 2 => 1u32..100, 1 => Just(50u32)], stacks);
         (raw, 0..stacks).prop_map(move |(mut raw, some)| {
             raw[some] += 1;
             let sum: u32 = raw.iter().sum();
