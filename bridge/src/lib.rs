@@ -9,6 +9,10 @@
 #[cfg(any(test, feature = "simulation"))]
 extern crate std;
 
+pub mod engine;
 pub mod port;
+mod ring;
 #[cfg(any(test, feature = "simulation"))]
 pub mod simulation;
+mod streams;
+mod track;

@@ -68,7 +68,8 @@ pub enum ToBridge<'a> {
     },
     /// Sets how the port is driven, from the next byte on.
     Configure(PortSettings),
-    /// Resets the printer with a pulse on nInit. Refused while a job is open.
+    /// Resets the printer with a pulse on nInit. Refused while a job is open; a job that was open when the bridge
+    /// itself was reset, and whose data have not been sent again, is given up as [`JobState::Lost`].
     Initialise,
     /// Restarts the bridge in its boot loader, to be flashed. Refused while a job is open.
     Bootloader,
@@ -218,7 +219,8 @@ pub enum JobState {
     Cancelled,
     /// The data made no sense; ended as if cancelled.
     Broken(Defect),
-    /// The printer was switched off in the middle: the sheet is lost, and nothing more was sent.
+    /// Given up in the middle, nothing more was sent: the printer was switched off, or the bridge was reset and
+    /// nobody had the data any more. The sheet is lost.
     Lost,
 }
 

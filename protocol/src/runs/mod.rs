@@ -42,10 +42,12 @@
 
 mod decode;
 mod encode;
+mod header;
 mod rice;
 
 pub use decode::{Decoder, Defect, Step};
 pub use encode::{MAX_BAND, NoRoom, encode};
+pub use header::{Header, HeaderError, MAX_HEADER};
 
 /// Bytes of a row of so many dots.
 pub fn stride(width: u16) -> usize {
