@@ -257,8 +257,17 @@ pub struct Mischief {
 
 pub const NONE: Mischief =
     Mischief { drop: 0, duplicate: 0, swap: 0, flip: 0, cut: 0, stall: 0, kill: 0, reset: 0, fault: 0 };
-pub const ALL: Mischief =
-    Mischief { drop: 40, duplicate: 40, swap: 40, flip: 40, cut: 30, stall: 30, kill: 20, reset: 25, fault: 20 };
+pub const ALL: Mischief = Mischief {
+    drop: 40,
+    duplicate: 40,
+    swap: 40,
+    flip: 40,
+    cut: 30,
+    stall: 30,
+    kill: 20,
+    reset: 25,
+    fault: 20,
+};
 
 /// What a wire makes of frames.
 fn damage(frames: Vec<Vec<u8>>, mischief: &Mischief, random: &mut ChaCha8Rng) -> Vec<u8> {
