@@ -5,8 +5,10 @@
 
 use divan::Bencher;
 use foilpress::gamut::InkMix;
+use foilpress::halftone::metrics::tones;
 use foilpress::halftone::{Placement, Settings, halftone};
 use foilpress::observe::Silent;
+use foilpress::separate::{compose, separate};
 use foilpress::weights::{ONE, WeightMaps, quantise};
 use inks::Stack;
 use protocol::ink::Ink;
@@ -68,4 +70,36 @@ fn two_minima(bencher: Bencher, count: usize) {
     let mix = document(count);
     let settings = Settings::of(&mix.stacks, 9, |ink| if ink == Ink::MetallicSilver { 16 } else { 9 });
     bencher.bench(|| halftone(&mix, &page(), &settings, &Silent).expect("a valid mix"));
+}
+
+/// Stacks of the paper's oak leaf: metallic silver and three process inks, with finish on some; five passes.
+fn leaf() -> (InkMix, foilpress::sheet::Sheet) {
+    let mut mix = document(8);
+    let text = ["substrate", "C", "M", "Y", "MS", "MS+C", "MS+M+Y", "MS+Y+F"];
+    mix.stacks = text.map(|stack| stack.parse().expect("known inks")).to_vec();
+    let sheet = halftone(&mix, &page(), &Settings::uniform(8, 9), &Silent).expect("a valid mix");
+    (mix, sheet)
+}
+
+/// A full A4 page in five passes, planes and checks on cluster sizes included.
+#[divan::bench(sample_count = 5)]
+fn five_passes(bencher: Bencher) {
+    let (_, sheet) = leaf();
+    assert_eq!(separate(&sheet, &Silent).expect("five inks").passes.len(), 5);
+    bencher.bench(|| separate(&sheet, &Silent).expect("five inks"));
+}
+
+/// The same back to a sheet.
+#[divan::bench(sample_count = 5)]
+fn five_passes_back(bencher: Bencher) {
+    let (_, sheet) = leaf();
+    let separation = separate(&sheet, &Silent).expect("five inks");
+    bencher.bench(|| compose(sheet.paper(), &separation.passes, sheet.stacks()).expect("the same sheet"));
+}
+
+/// Tones and clusters of a full A4 page.
+#[divan::bench(sample_count = 3)]
+fn report(bencher: Bencher) {
+    let (mix, sheet) = leaf();
+    bencher.bench(|| tones(&mix, &page(), &sheet, &Silent).expect("the same sheet"));
 }

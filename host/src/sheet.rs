@@ -1,7 +1,13 @@
 //! A sheet is the one printable thing: a page and one stack for every dot.
 
+pub mod colours;
+pub mod files;
+pub(crate) mod picture;
+
 use inks::Stack;
 use protocol::paper::Paper;
+
+pub use picture::FileError;
 
 /// One stack for every dot of the printable area at 600 dpi. Stack 0 is always the bare substrate.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -219,7 +219,7 @@ impl Band {
     /// The tile of column `i`, counted from the left.
     fn tile(&self, i: u16) -> Tile {
         let (x, w) = self.columns.piece(i);
-        let orientation = if self.height % 2 == 0 && i + 1 == self.columns.count() {
+        let orientation = if self.height.is_multiple_of(2) && i + 1 == self.columns.count() {
             Orientation::Down
         } else if self.back {
             Orientation::Back

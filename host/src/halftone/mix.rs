@@ -42,8 +42,10 @@ impl Shape {
             .chunks(stretch)
             .map(|dots| {
                 let n = dots.len() as u32;
-                let middle =
-                    |side: fn(u16) -> u16| dots.iter().map(|&o| 2 * u32::from(side(o)) + 1).sum::<u32>() / n;
+                let middle = |side: fn(u16) -> u16| {
+                    let sum: u32 = dots.iter().map(|&o| 2 * u32::from(side(o)) + 1).sum();
+                    (sum + n / 2) / n
+                };
                 // At most 2 * 64 half dots, and 16 dots.
                 (middle(|o| o % EDGE) as u8, middle(|o| o / EDGE) as u8, n as u8)
             })
@@ -124,8 +126,10 @@ pub(super) struct Lattice<'a> {
     mix: &'a InkMix,
     /// Numbers in `mix.stacks` of the stacks with weight, ascending.
     pub(super) stacks: Vec<u8>,
-    /// Channels with weight, and their shares of the stacks above.
-    rows: Vec<(usize, Vec<Lanes>)>,
+    /// Channels with weight.
+    channels: Vec<usize>,
+    /// For each eight of the stacks above the shares of each of these channels.
+    shares: Vec<Lanes>,
     shapes: Vec<Shape>,
     across: Axis,
     down: Axis,
@@ -145,15 +149,15 @@ impl<'a> Lattice<'a> {
         let channels: Vec<usize> = (0..maps.channels()).filter(|&i| sums[i] > 0).collect();
         let used = |q: &usize| channels.iter().any(|&i| mix.matrix[i][*q] > 0);
         let stacks: Vec<u8> = (0..mix.stacks.len()).filter(used).map(|q| q as u8).collect();
-        let rows = channels
-            .iter()
-            .map(|&i| {
-                let mut row = vec![Lanes::default(); blocks(stacks.len())];
-                for (lane, &q) in stacks.iter().enumerate() {
-                    row[lane / LANES].0[lane % LANES] = i32::from(mix.matrix[i][usize::from(q)]);
-                }
-                (i, row)
-            })
+        let share = |block: usize, channel: usize| {
+            let stack = |l: usize| stacks.get(block * LANES + l);
+            Lanes(std::array::from_fn(|l| {
+                stack(l).map_or(0, |&q| i32::from(mix.matrix[channel][usize::from(q)]))
+            }))
+        };
+        let shares = (0..blocks(stacks.len()))
+            .flat_map(|block| channels.iter().map(move |&channel| (block, channel)))
+            .map(|(block, channel)| share(block, channel))
             .collect();
         let finer = (maps.width() > width, maps.height() > height);
         let axis =
@@ -174,7 +178,8 @@ impl<'a> Lattice<'a> {
         Lattice {
             mix,
             stacks,
-            rows,
+            channels,
+            shares,
             shapes,
             across: axis(finer.0, width, maps.width()),
             down: axis(finer.1, height, maps.height()),
@@ -247,25 +252,21 @@ impl<'a> Lattice<'a> {
     /// Shares in the rule's unit from basis weights.
     #[inline(always)]
     fn shares(&self, weights: &[u32], out: &mut [Lanes]) {
-        out.fill(Lanes::default());
-        for (channel, row) in &self.rows {
-            let weight = weights[*channel] as i32;
-            if weight == 0 {
-                continue;
-            }
-            for (sum, share) in out.iter_mut().zip(row) {
-                for l in 0..LANES {
+        let (mut total, mut most) = ([0i32; LANES], [0i32; LANES]);
+        let channels = self.channels.len();
+        for (out, shares) in out.iter_mut().zip(self.shares.chunks_exact(channels)) {
+            let mut sum = [0i32; LANES];
+            for (&channel, share) in self.channels.iter().zip(shares) {
+                let weight = weights[channel] as i32;
+                for (sum, share) in sum.iter_mut().zip(share.0) {
                     // The whole sum is about 2^31, and kept as the bits of an unsigned number.
-                    sum.0[l] = sum.0[l].wrapping_add(weight.wrapping_mul(share.0[l]));
+                    *sum = sum.wrapping_add(weight.wrapping_mul(share));
                 }
             }
-        }
-        let (mut total, mut most) = ([0i32; LANES], [0i32; LANES]);
-        for sum in out.iter_mut() {
             for l in 0..LANES {
                 // From 2^-31 to 2^-18.
-                let share = ((sum.0[l] as u32 + (1 << 12)) >> 13) as i32;
-                sum.0[l] = share;
+                let share = ((sum[l] as u32 + (1 << 12)) >> 13) as i32;
+                out.0[l] = share;
                 total[l] += share;
                 most[l] = most[l].max(share);
             }
@@ -326,5 +327,128 @@ impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
         }
         lattice.shares(&self.weights, out);
         u32::from(dots)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::weights::{WeightMaps, quantise};
+    use inks::Stack;
+    use proptest::prelude::*;
+    use protocol::ink::Ink;
+
+    fn random(seed: u64, i: usize) -> f64 {
+        let v = (seed ^ i as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        ((v ^ (v >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f64 / (1u64 << 24) as f64
+    }
+
+    /// Three channels over five stacks; stack 2 has no share, channel 1 only where `x` is even.
+    fn mix(width: usize, height: usize, seed: u64) -> InkMix {
+        let mut data = vec![0; width * height * 3];
+        for (pixel, out) in data.chunks_exact_mut(3).enumerate() {
+            let second = if (pixel % width).is_multiple_of(2) { random(seed, 3 * pixel + 1) } else { 0.0 };
+            quantise(&[random(seed, 3 * pixel) + 0.01, second, random(seed, 3 * pixel + 2)], out);
+        }
+        let matrix = vec![
+            vec![ONE, 0, 0, 0, 0],
+            vec![0, ONE / 4, 0, ONE / 2, ONE / 4],
+            vec![100, 10_000, 0, ONE - 10_100, 0],
+        ];
+        let stacks = std::iter::once(Stack::SUBSTRATE).chain(Ink::ALL.map(|ink| Stack::new([ink])));
+        InkMix {
+            stacks: stacks.take(5).collect(),
+            maps: WeightMaps::new(width, height, 3, data).unwrap(),
+            matrix,
+        }
+    }
+
+    /// The parts of the pixels along one side, in floating point, for the dots between `from` and `to`.
+    fn parts(dots: usize, pixels: usize, from: f64, to: f64) -> Vec<(usize, f64)> {
+        let scale = pixels as f64 / dots as f64;
+        if pixels > dots {
+            let (from, to) = (from * scale, to * scale);
+            let covered = |p: usize| ((p + 1) as f64).min(to) - (p as f64).max(from);
+            return (0..pixels)
+                .map(|p| (p, covered(p).max(0.0) / (to - from)))
+                .filter(|p| p.1 > 0.0)
+                .collect();
+        }
+        let at = ((from + to) / 2.0 * scale - 0.5).clamp(0.0, (pixels - 1) as f64);
+        let (pixel, part) = (at.floor() as usize, at.fract());
+        if part > 0.0 { vec![(pixel, 1.0 - part), (pixel + 1, part)] } else { vec![(pixel, 1.0)] }
+    }
+
+    proptest! {
+        #[test]
+        fn shares_are_the_bilinear_or_averaged_weights_times_the_matrix(
+            (pw, ph) in (1usize..40, 1usize..40), (width, height) in (1u16..140, 1u16..140), seed: u64,
+        ) {
+            let mix = mix(pw, ph, seed);
+            let walk = Walk::new(width, height);
+            let lattice = Lattice::new(&mix, &walk);
+            prop_assert!(!lattice.stacks.contains(&2) && lattice.stacks.is_sorted());
+            let tiles = || walk.bands().flat_map(|band| band.tiles());
+            let mut along = lattice.along(tiles());
+            let mut out = vec![Lanes::default(); blocks(lattice.stacks.len())];
+            for tile in tiles() {
+                let mut curve = [0; MOST];
+                let n = tile.fill(&mut curve);
+                let mut done = 0;
+                while done < n {
+                    let dots = along.stretch(&mut out) as usize;
+                    let offsets = &curve[done..done + dots];
+                    done += dots;
+                    let shares = out[0].0;
+                    prop_assert_eq!(shares.iter().sum::<i32>(), UNIT);
+                    let middle = |of: fn(u16) -> u16, corner: u16| {
+                        let sum: f64 = offsets.iter().map(|&o| f64::from(of(o)) + 0.5).sum();
+                        f64::from(corner) + sum / dots as f64
+                    };
+                    let (x, y) = (middle(|o| o % EDGE, tile.x), middle(|o| o / EDGE, tile.y));
+                    let across = parts(width.into(), pw, x - 0.5, x + 0.5);
+                    let down = parts(height.into(), ph, y - 0.5, y + 0.5);
+                    // Half a half dot of rounding, on either side, moves a weight by at most that part of a pixel.
+                    let slack = 0.01 + 0.25 * (pw as f64 / f64::from(width)).min(1.0) * f64::from(u8::from(dots > 1))
+                        + 0.25 * (ph as f64 / f64::from(height)).min(1.0) * f64::from(u8::from(dots > 1));
+                    for (lane, &q) in lattice.stacks.iter().enumerate() {
+                        let mut wanted = 0.0;
+                        for &(row, part_y) in &down {
+                            for &(column, part_x) in &across {
+                                let weights = mix.maps.at(row * pw + column).iter().zip(&mix.matrix);
+                                wanted += part_x * part_y * weights
+                                    .map(|(&a, shares)| f64::from(a) * f64::from(shares[usize::from(q)]))
+                                    .sum::<f64>() / f64::from(ONE).powi(2);
+                            }
+                        }
+                        let found = f64::from(shares[lane]) / f64::from(UNIT);
+                        prop_assert!((found - wanted).abs() < slack, "stack {} at ({}, {}): {} not {}", q, x, y, found, wanted);
+                    }
+                }
+            }
+        }
+
+        /// Where a pixel is a whole square of dots in every tile, its own weights come through unblended.
+        #[test]
+        fn the_middle_of_a_pixel_has_the_pixels_own_weights(seed: u64) {
+            let mix = mix(16, 16, seed);
+            let walk = Walk::new(64, 64);
+            let lattice = Lattice::new(&mix, &walk);
+            let tile = walk.bands().next().unwrap().tiles().next().unwrap();
+            let mut curve = [0; MOST];
+            tile.fill(&mut curve);
+            let mut along = lattice.along(std::iter::once(tile));
+            let mut out = vec![Lanes::default(); 1];
+            for dots in curve.chunks(16) {
+                prop_assert_eq!(along.stretch(&mut out), 16);
+                let pixel = usize::from(dots[0] / EDGE / 4) * 16 + usize::from(dots[0] % EDGE / 4);
+                for (lane, &q) in lattice.stacks.iter().enumerate() {
+                    let exact: u32 = mix.maps.at(pixel).iter().zip(&mix.matrix)
+                        .map(|(&a, shares)| u32::from(a) * u32::from(shares[usize::from(q)])).sum();
+                    // Exact to the unit, but for what the largest takes to make the sum whole.
+                    prop_assert!(out[0].0[lane].abs_diff((exact >> 12) as i32) <= 4);
+                }
+            }
+        }
     }
 }

@@ -93,7 +93,7 @@ struct Class {
     /// -1 for the stacks of this class.
     member: Vec<Lanes>,
     look: Vec<Lanes>,
-    /// End of the last stretch, up to `front`, where the stack had weight.
+    /// For the stacks of this class: end of the last stretch, up to `front`, with weight.
     seen: Vec<Lanes>,
     /// End of the window.
     front: u32,
@@ -109,8 +109,13 @@ pub(super) struct Rule {
     class_of: Vec<usize>,
     lane: Vec<Lanes>,
     ahead: Ahead,
-    /// -1 for stacks whose debts are in the looks.
+    /// -1 for stacks whose debts are in the looks, and how many are not.
     live: Vec<Lanes>,
+    away: usize,
+    /// End of the last stretch with weight.
+    last: Vec<Lanes>,
+    /// Dots asked for so far.
+    known: u32,
     parked: Vec<i32>,
     absent: u32,
     next_check: u32,
@@ -174,6 +179,9 @@ impl Rule {
             lane: (0..n).map(|b| Lanes(std::array::from_fn(|l| (b * LANES + l) as i32))).collect(),
             ahead: Ahead { first: 0, held: VecDeque::new(), spare: Vec::new() },
             live: vec![Lanes::default(); n],
+            away: minimum.len(),
+            last: vec![Lanes::default(); n],
+            known: 0,
             parked: vec![0; minimum.len()],
             absent,
             next_check: absent,
@@ -288,42 +296,39 @@ impl Rule {
         if left < class.minimum {
             return current.map(|stack| Candidate { stack, margin: i64::MAX });
         }
-        let (now, own) = (at as i32, current.map_or(-1, |k| k as i32));
+        let now = at as i32;
         let mut most = Lanes([NEVER; LANES]);
-        for (((look, seen), member), lane) in
-            class.look.iter().zip(&class.seen).zip(&class.member).zip(&self.lane)
-        {
+        for (look, seen) in class.look.iter().zip(&class.seen) {
             for l in 0..LANES {
-                let other = (seen.0[l] > now) & (member.0[l] != 0) & (lane.0[l] != own);
-                most.0[l] = most.0[l].max(if other { look.0[l] } else { NEVER });
+                most.0[l] = most.0[l].max(if seen.0[l] > now { look.0[l] } else { NEVER });
             }
         }
         let most = most.0.into_iter().fold(NEVER, i32::max);
-        if let Some(stack) = current
-            && get(&class.seen, stack) > now
-            && get(&class.look, stack) >= most
-        {
-            let margin = i64::from(get(&class.look, stack)) - i64::from(most);
-            return Some(Candidate { stack, margin: if most == NEVER { i64::MAX } else { margin } });
-        }
         if most == NEVER {
             return None;
         }
-        let mut first = i32::MAX;
-        for (((look, seen), member), lane) in
-            class.look.iter().zip(&class.seen).zip(&class.member).zip(&self.lane)
+        if let Some(stack) = current
+            && get(&class.seen, stack) > now
+            && get(&class.look, stack) == most
         {
-            let mut low = [i32::MAX; LANES];
-            for l in 0..LANES {
-                let found = (seen.0[l] > now) & (member.0[l] != 0) & (lane.0[l] != own) & (look.0[l] == most);
-                low[l] = if found { lane.0[l] } else { i32::MAX };
+            let (mut second, own) = (Lanes([NEVER; LANES]), stack as i32);
+            for ((look, seen), lane) in class.look.iter().zip(&class.seen).zip(&self.lane) {
+                for l in 0..LANES {
+                    let other = (seen.0[l] > now) & (lane.0[l] != own);
+                    second.0[l] = second.0[l].max(if other { look.0[l] } else { NEVER });
+                }
             }
-            first = first.min(low.into_iter().fold(i32::MAX, i32::min));
-            if first != i32::MAX {
-                break;
+            let second = second.0.into_iter().fold(NEVER, i32::max);
+            let margin = if second == NEVER { i64::MAX } else { i64::from(most) - i64::from(second) };
+            return Some(Candidate { stack, margin });
+        }
+        for ((look, seen), lane) in class.look.iter().zip(&class.seen).zip(&self.lane) {
+            let found: [bool; LANES] = std::array::from_fn(|l| (seen.0[l] > now) & (look.0[l] == most));
+            if let Some(l) = found.iter().position(|&found| found) {
+                return Some(Candidate { stack: lane.0[l] as usize, margin: 0 });
             }
         }
-        Some(Candidate { stack: first as usize, margin: 0 })
+        None
     }
 
     /// The largest look of all that have weight, whatever their minimum.
@@ -355,10 +360,11 @@ impl Rule {
             let step = dots.min(stretch.dots - class.used);
             (class.front, class.used, dots) = (class.front + step, class.used + step, dots - step);
             let (step, front) = (step as i32, class.front as i32);
-            for ((look, seen), weight) in class.look.iter_mut().zip(&mut class.seen).zip(&stretch.weights) {
+            let lanes = class.look.iter_mut().zip(&mut class.seen).zip(&class.member).zip(&stretch.weights);
+            for (((look, seen), member), weight) in lanes {
                 for l in 0..LANES {
                     look.0[l] = look.0[l].wrapping_add(weight.0[l].wrapping_mul(step));
-                    seen.0[l] = if weight.0[l] > 0 { front } else { seen.0[l] };
+                    seen.0[l] = if weight.0[l] & member.0[l] > 0 { front } else { seen.0[l] };
                 }
             }
         }
@@ -381,22 +387,30 @@ impl Rule {
         let mut stretch = self.ahead.spare.pop().unwrap_or_default();
         stretch.weights.resize(self.live.len(), Lanes::default());
         stretch.dots = source.stretch(&mut stretch.weights).max(1);
-        let mut back = Lanes::default();
-        for (weight, live) in stretch.weights.iter().zip(&self.live) {
+        self.known = self.known.saturating_add(stretch.dots);
+        let end = self.known.min(self.dots) as i32;
+        for (last, weight) in self.last.iter_mut().zip(&stretch.weights) {
             for l in 0..LANES {
-                back.0[l] |= i32::from((weight.0[l] > 0) & (live.0[l] == 0));
+                last.0[l] = if weight.0[l] > 0 { end } else { last.0[l] };
             }
         }
-        if back.0.into_iter().any(|b| b != 0) {
-            for k in 0..self.parked.len() {
-                if get(&stretch.weights, k) > 0 && get(&self.live, k) == 0 {
-                    let debt = std::mem::take(&mut self.parked[k]);
-                    self.share(k, debt.wrapping_neg());
-                    *get_mut(&mut self.live, k) = -1;
-                }
-            }
+        if self.away > 0 {
+            self.welcome(&stretch.weights);
         }
         self.ahead.held.push_back(stretch);
+    }
+
+    /// Gives stacks that come back their debts.
+    #[inline(never)]
+    fn welcome(&mut self, weights: &[Lanes]) {
+        for k in 0..self.parked.len() {
+            if get(weights, k) > 0 && get(&self.live, k) == 0 {
+                let debt = std::mem::take(&mut self.parked[k]);
+                self.share(k, debt.wrapping_neg());
+                *get_mut(&mut self.live, k) = -1;
+                self.away -= 1;
+            }
+        }
     }
 
     /// Sets the debts of the absent aside.
@@ -404,12 +418,13 @@ impl Rule {
     fn park(&mut self, at: u32) {
         self.next_check = at.saturating_add(self.absent);
         for k in 0..self.parked.len() {
-            let last = self.classes.iter().map(|class| get(&class.seen, k)).max().unwrap_or(0) as u32;
+            let last = get(&self.last, k) as u32;
             if get(&self.live, k) != 0 && at.saturating_sub(last) >= self.absent {
                 // Without weight in any window every class's look is the bare debt.
                 let debt = get(&self.classes[0].look, k);
                 self.parked[k] = debt;
                 *get_mut(&mut self.live, k) = 0;
+                self.away += 1;
                 self.share(k, debt);
             }
         }
@@ -444,8 +459,8 @@ impl Class {
     fn cost(&self, k: usize, left: u32) -> u32 {
         let mut most = [0u32; LANES];
         for look in &self.look {
-            for l in 0..LANES {
-                most[l] = most[l].max(look.0[l].unsigned_abs());
+            for (most, look) in most.iter_mut().zip(look.0) {
+                *most = (*most).max(look.unsigned_abs());
             }
         }
         let all = most.into_iter().fold(0, u32::max);
@@ -511,6 +526,10 @@ mod tests {
         let dots = stretches.iter().map(|s| s.0).sum();
         let mut runs = Runs::default();
         Rule::new(minimum, dots, absent).walk(&mut Tape { stretches: stretches.iter() }, &mut runs);
+        // The same with whatever vectors this machine has.
+        let mut wide = Runs::default();
+        walk(&mut Rule::new(minimum, dots, absent), &mut Tape { stretches: stretches.iter() }, &mut wide);
+        assert_eq!(runs.0, wide.0);
         runs.0
     }
 
@@ -518,6 +537,14 @@ mod tests {
     fn literal(stretches: &[(u32, Vec<i32>)], minimum: &[u16], absent: usize) -> Vec<usize> {
         let weights: Vec<&[i32]> =
             stretches.iter().flat_map(|(dots, row)| std::iter::repeat_n(&row[..], *dots as usize)).collect();
+        let ends: Vec<usize> = stretches
+            .iter()
+            .scan(0, |end, (dots, _)| {
+                *end += *dots as usize;
+                Some(std::iter::repeat_n(*end, *dots as usize))
+            })
+            .flatten()
+            .collect();
         let (n, stacks) = (weights.len(), minimum.len());
         let unit = i128::from(UNIT);
         let mut debt = vec![0i128; stacks];
@@ -541,7 +568,7 @@ mod tests {
             while entered < n.min(at + far) {
                 for q in 0..stacks {
                     if weights[entered][q] > 0 {
-                        last[q] = entered + 1;
+                        last[q] = ends[entered];
                         if !live[q] {
                             let back = std::mem::take(&mut parked[q]);
                             share(&mut debt, &live, q, -back);
@@ -590,7 +617,7 @@ mod tests {
             while entered < n.min(at + far) {
                 for q in 0..stacks {
                     if weights[entered][q] > 0 {
-                        last[q] = entered + 1;
+                        last[q] = ends[entered];
                         if !live[q] {
                             let back = std::mem::take(&mut parked[q]);
                             share(&mut debt, &live, q, -back);
@@ -629,7 +656,10 @@ mod tests {
         })
     }
 
-    fn document() -> impl Strategy<Value = (Vec<(u32, Vec<i32>)>, Vec<u16>, u32)> {
+    /// Stretches, minima, and after how many dots a stack is absent.
+    type Document = (Vec<(u32, Vec<i32>)>, Vec<u16>, u32);
+
+    fn document() -> impl Strategy<Value = Document> {
         (1usize..12).prop_flat_map(|stacks| {
             let minimum = prop_oneof![
                 (1u16..20).prop_map(move |c| vec![c; stacks]),

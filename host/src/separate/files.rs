@@ -1,0 +1,117 @@
+//! Passes on disk: `passes.toml` and one PNG a pass, one bit a dot, ink shown black.
+
+use std::path::Path;
+
+use inks::Stack;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{MOST_PASSES, Pass, Plane, Separation};
+use crate::sheet::files::{PaperText, check_format};
+use crate::sheet::picture::{FileError, Kind, read_png, read_toml, write_png, write_toml};
+
+/// The text beside the pictures.
+pub const TEXT: &str = "passes.toml";
+
+/// Number of the format, raised when old files can no longer be read.
+const FORMAT: u32 = 1;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Text {
+    format: u32,
+    stacks: Vec<Stack>,
+    paper: PaperText,
+    #[serde(default, rename = "pass")]
+    passes: Vec<PassText>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PassText {
+    ink: String,
+    file: String,
+    dots: u64,
+}
+
+/// Passes as read back, ready for [`super::compose`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Saved {
+    /// The paper.
+    pub paper: Paper,
+    /// The stacks the passes were made of, the substrate first.
+    pub stacks: Vec<Stack>,
+    /// The passes, first printed first.
+    pub passes: Vec<Pass>,
+}
+
+/// `01-cyan.png` for the first pass.
+pub fn name(pass: usize, ink: Ink) -> String {
+    format!("{:02}-{}.png", pass + 1, ink.name())
+}
+
+/// Writes [`TEXT`] and a picture of each pass into a folder that exists, the text last.
+pub fn save(separation: &Separation, folder: &Path) -> Result<(), FileError> {
+    separation.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
+        let plane = &pass.plane;
+        let bits: Vec<u8> = plane.bits.iter().map(|byte| !byte).collect();
+        write_png(&folder.join(name(i, pass.ink)), (plane.width, plane.length), Kind::Bits, &bits)
+    })?;
+    let pass = |(i, pass): (usize, &Pass)| PassText {
+        ink: pass.ink.name().to_string(),
+        file: name(i, pass.ink),
+        dots: pass.plane.dots(),
+    };
+    let text = Text {
+        format: FORMAT,
+        stacks: separation.stacks.clone(),
+        paper: PaperText::new(separation.paper),
+        passes: separation.passes.iter().enumerate().map(pass).collect(),
+    };
+    write_toml(&folder.join(TEXT), &text)
+}
+
+/// Reads what [`save`] wrote. Anything that does not fit is an error with the file and the field.
+pub fn load(folder: &Path) -> Result<Saved, FileError> {
+    let path = folder.join(TEXT);
+    let text: Text = read_toml(&path)?;
+    let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
+    check_format(text.format, FORMAT).map_err(wrong)?;
+    let paper = text.paper.paper().map_err(wrong)?;
+    crate::sheet::check_stacks(&text.stacks).map_err(|error| wrong(format!("stacks: {error}")))?;
+    if text.passes.len() > MOST_PASSES {
+        return Err(wrong(format!("pass: {} passes, at most {MOST_PASSES}", text.passes.len())));
+    }
+    let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
+    let stride = width.div_ceil(8);
+    let read = |(i, pass): (usize, &PassText)| -> Result<Pass, FileError> {
+        let number = i + 1;
+        let ink = Ink::from_name(&pass.ink)
+            .ok_or_else(|| wrong(format!("pass {number}, ink: `{}` is no ink", pass.ink)))?;
+        // The name is given by place and ink, so a file elsewhere is never opened.
+        if pass.file != name(i, ink) {
+            let problem = format!("pass {number}, file: `{}`, expected `{}`", pass.file, name(i, ink));
+            return Err(wrong(problem));
+        }
+        let mut bits = read_png(&folder.join(&pass.file), (width, length), Kind::Bits)?;
+        bits.iter_mut().for_each(|byte| *byte = !*byte);
+        if width % 8 != 0 {
+            let used = !(0xffu8 >> (width % 8));
+            bits.iter_mut().skip(stride - 1).step_by(stride).for_each(|byte| *byte &= used);
+        }
+        let plane = Plane { width, length, stride, bits };
+        let dots = plane.dots();
+        if dots != pass.dots {
+            return Err(wrong(format!(
+                "pass {number}, dots: {}, but {} has {dots}; the picture was changed",
+                pass.dots, pass.file
+            )));
+        }
+        Ok(Pass { ink, plane })
+    };
+    let passes: Vec<Result<Pass, FileError>> = text.passes.par_iter().enumerate().map(read).collect();
+    let passes = passes.into_iter().collect::<Result<_, _>>()?;
+    Ok(Saved { paper, stacks: text.stacks, passes })
+}
