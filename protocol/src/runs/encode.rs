@@ -81,6 +81,21 @@ impl Table {
     }
 }
 
+/// Puts a tile's rows into words, first column in the highest bit; false if there is no dot in them. What lies
+/// right of the tile may be in them too.
+fn gather(tile: &Tile, rows: &[u8], stride: usize, words: &mut [u64; EDGE as usize]) -> bool {
+    let (byte, shift) = (usize::from(tile.x) / 8, u32::from(tile.x % 8));
+    let mut any = 0;
+    for (word, row) in words.iter_mut().zip(rows.chunks_exact(stride)) {
+        let bytes = &row[byte..row.len().min(byte + 9)];
+        let mut wide = [0; 16];
+        wide[..bytes.len()].copy_from_slice(bytes);
+        *word = (u128::from_be_bytes(wide) << shift >> 64) as u64;
+        any |= *word;
+    }
+    any != 0
+}
+
 /// Calls `run` with the length of every run of the band, off first, possibly 0.
 fn for_each_run(
     band: &Band,
@@ -89,12 +104,10 @@ fn for_each_run(
     table: &mut Table,
     mut run: impl FnMut(u32) -> Option<()>,
 ) -> Option<()> {
-    let (mut on, mut length) = (0u8, 0);
+    let (mut on, mut length) = (0, 0);
+    let mut columns = [0; EDGE as usize];
     for tile in band.tiles() {
-        let left = usize::from(tile.x) / 8;
-        let right = usize::from(tile.x + tile.w).div_ceil(8);
-        let blank = rows.chunks_exact(stride).all(|row| row[left..right].iter().all(|&byte| byte == 0));
-        if blank {
+        if !gather(&tile, rows, stride, &mut columns) {
             if on == 1 {
                 run(length)?;
                 (on, length) = (0, 0);
@@ -103,8 +116,7 @@ fn for_each_run(
             continue;
         }
         for &dot in table.of(&tile) {
-            let x = usize::from(tile.x + dot % EDGE);
-            let bit = rows[usize::from(dot / EDGE) * stride + x / 8] >> (7 - x % 8) & 1;
+            let bit = columns[usize::from(dot / EDGE)] >> (EDGE - 1 - dot % EDGE) & 1;
             if bit != on {
                 run(length)?;
                 (on, length) = (bit, 0);
