@@ -27,6 +27,8 @@ pub mod job;
 
 pub mod simulate;
 
+pub mod inspect;
+
 pub mod preview;
 
 pub mod cli;

@@ -40,10 +40,39 @@ pub fn pack_into(row: &[u8], out: &mut [u8]) -> Option<usize> {
 fn segment(row: &[u8]) -> (usize, bool) {
     let row = &row[..row.len().min(LONGEST)];
     if row.len() >= 2 && row[1] == row[0] {
-        return (row.iter().position(|&byte| byte != row[0]).unwrap_or(row.len()), true);
+        return (row.len() - after_run(row), true);
     }
-    let end = row.windows(2).position(|pair| pair[0] == pair[1]);
-    (end.map_or(row.len(), |i| i + 1), false)
+    (literal(row), false)
+}
+
+/// Bytes left after the first run of equal bytes.
+fn after_run(row: &[u8]) -> usize {
+    let mut rest = row;
+    let same = u64::from_le_bytes([row[0]; 8]);
+    while let Some(chunk) = rest.first_chunk::<8>() {
+        let differing = u64::from_le_bytes(*chunk) ^ same;
+        if differing != 0 {
+            return rest.len() - differing.trailing_zeros() as usize / 8;
+        }
+        rest = &rest[8..];
+    }
+    rest.len() - rest.iter().take_while(|&&byte| byte == row[0]).count()
+}
+
+/// Bytes before the first that equals the one before it.
+fn literal(row: &[u8]) -> usize {
+    const ONES: u64 = u64::from_le_bytes([1; 8]);
+    let mut at = 0;
+    while let (Some(these), Some(next)) = (row[at..].first_chunk::<8>(), row[at + 1..].first_chunk::<8>()) {
+        let differing = u64::from_le_bytes(*these) ^ u64::from_le_bytes(*next);
+        // The high bit of each zero byte; those above the lowest may be wrong, the lowest is right.
+        let equal = differing.wrapping_sub(ONES) & !differing & (ONES << 7);
+        if equal != 0 {
+            return at + equal.trailing_zeros() as usize / 8 + 1;
+        }
+        at += 8;
+    }
+    row[at..].windows(2).position(|pair| pair[0] == pair[1]).map_or(row.len(), |i| at + i + 1)
 }
 
 fn put_literal(bytes: &[u8], out: &mut [u8], at: usize) -> Option<usize> {
@@ -216,6 +245,21 @@ mod tests {
             prop_assert_eq!(&back, &row);
             prop_assert_eq!(measure(packed), Ok((row.len(), row.last().copied().unwrap_or(0))));
             prop_assert!(!packed.is_empty() || row.is_empty());
+        }
+
+        #[test]
+        fn runs_found_eight_bytes_at_a_time_are_those_found_one_by_one(
+            row in proptest::collection::vec(prop_oneof![3 => Just(0xffu8), 1 => Just(0), 2 => 0..4u8, 1 => any::<u8>()], 1..300),
+        ) {
+            let one_by_one = |row: &[u8]| {
+                let row = &row[..row.len().min(128)];
+                let repeat = row.len() > 1 && row[0] == row[1];
+                let end = (1..row.len()).find(|&i| (row[i] == row[i - 1]) != repeat);
+                (end.unwrap_or(row.len()), repeat)
+            };
+            for start in 0..row.len() {
+                prop_assert_eq!(segment(&row[start..]), one_by_one(&row[start..]));
+            }
         }
 
         #[test]

@@ -1,3 +1,4 @@
 //! Placement on the page, the plan in words, and the bytes of a job.
 
 pub mod placement;
+pub mod stream;

@@ -8,11 +8,14 @@ pub(super) const SUB: u8 = 0x1a;
 pub(super) const FF: u8 = 0x0c;
 /// The flag of the last pass's ink-select.
 pub(super) const LAST: u8 = 0x80;
+/// The largest adjustment of the print head's drive, either way.
+pub(super) const MOST_DRIVE: u8 = 50;
 
 /// Writes a command to the start of `out` and returns its length.
 ///
-/// Errors: [`Fault::NoRoom`]; [`Fault::EmptyRow`] and [`Fault::BeyondWidth`] for a row of no bytes or more than
-/// 65535.
+/// Errors: [`Fault::NoRoom`]; what [`parse`](super::parse::parse) would not take back: [`Fault::Adjustment`],
+/// [`Fault::ZeroShift`], [`Fault::ZeroSkip`], [`Fault::EmptyRow`]; [`Fault::BeyondWidth`] for a row of more than 65535
+/// bytes.
 pub fn encode_into(command: &Command<'_>, out: &mut [u8]) -> Result<usize, Fault> {
     let value = |letters: [u8; 2], value: u16, end: u8| {
         let [low, high] = value.to_le_bytes();
@@ -28,6 +31,10 @@ pub fn encode_into(command: &Command<'_>, out: &mut [u8]) -> Result<usize, Fault
         Command::Paper(paper) => put(out, &value(*b"&l", paper.code().into(), b'A'), &[]),
         Command::Length(rows) => put(out, &value(*b"&l", rows, b'P'), &[]),
         Command::Width(dots) => put(out, &value(*b"&a", dots, b'M'), &[]),
+        Command::LineFeed(0) | Command::HeadDrive(0) => Err(Fault::Adjustment),
+        Command::HeadDrive(by) if by.unsigned_abs() > MOST_DRIVE => Err(Fault::Adjustment),
+        Command::ShiftX(0) | Command::ShiftY(0) => Err(Fault::ZeroShift),
+        Command::Skip(0) => Err(Fault::ZeroSkip),
         Command::LineFeed(by) => put(out, &adjust(by as u8, b'L'), &[]),
         Command::HeadDrive(by) => put(out, &adjust(by as u8, b'V'), &[]),
         Command::Cassettes(list) => {

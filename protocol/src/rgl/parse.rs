@@ -4,7 +4,7 @@
 //! state, so a stream may arrive in any pieces: a verdict once given does not change when more bytes follow.
 
 use super::command::{Cassettes, Command, Compression, MAX_CASSETTES, Media, Mode, PaperCode, Resolution};
-use super::encode::{ESC, FF, LAST, SUB};
+use super::encode::{ESC, FF, LAST, MOST_DRIVE, SUB};
 use super::fault::{Fault, Refusal};
 use crate::ink::Ink;
 
@@ -81,7 +81,7 @@ fn special<'a>(first: u8, second: u8, letter: u8) -> Result<Step<'a>, Refusal> {
         }
         b'L' | b'V' if first == 0 => return Err(Refusal::new(Fault::Adjustment, 2)),
         b'L' => Command::LineFeed(first as i8),
-        b'V' if (first as i8).unsigned_abs() > 50 => return Err(Refusal::new(Fault::Adjustment, 2)),
+        b'V' if (first as i8).unsigned_abs() > MOST_DRIVE => return Err(Refusal::new(Fault::Adjustment, 2)),
         b'V' => Command::HeadDrive(first as i8),
         b'C' if first > 1 => return Err(Refusal::new(Fault::CurlCode, 2)),
         b'C' => Command::CurlCorrection(first == 0),
@@ -226,6 +226,20 @@ mod tests {
             bytes(Command::Cassettes(list)),
             [0x1b, 0x26, 0x6c, 0x05, 0x00, 0x43, 0x03, 0x02, 0x01, 0x00, 0x13]
         );
+    }
+
+    #[test]
+    fn what_would_not_be_read_back_is_not_written() {
+        let fault = |command: Command<'_>| encode_into(&command, &mut [0; 16]).unwrap_err();
+        for wrong in
+            [Command::LineFeed(0), Command::HeadDrive(0), Command::HeadDrive(51), Command::HeadDrive(-128)]
+        {
+            assert_eq!(fault(wrong), Fault::Adjustment);
+        }
+        assert_eq!([fault(Command::ShiftX(0)), fault(Command::ShiftY(0))], [Fault::ZeroShift; 2]);
+        assert_eq!(fault(Command::Skip(0)), Fault::ZeroSkip);
+        assert_eq!(fault(Command::Row { last: true, data: &[] }), Fault::EmptyRow);
+        assert_eq!(fault(Command::Row { last: true, data: &[1; 65536] }), Fault::BeyondWidth);
     }
 
     #[test]
