@@ -197,7 +197,7 @@ fn what_cannot_be_followed_is_refused_with_the_reason() {
         rig.tell(ToBridge::Data { job: 9, offset: 0, bytes: b"x" }).text,
         refused(Refusal::NoSuchJob, 9)
     );
-    assert_eq!(rig.tell(begin(1, JobKind::Raw, 50)).text, [String::new(); 0]);
+    assert_eq!(rig.tell(begin(1, JobKind::Raw, 50)).text, Vec::<String>::new());
     assert_eq!(rig.tell(begin(1, JobKind::Raw, 51)).text, refused(Refusal::OtherJob, 1));
     assert_eq!(rig.tell(begin(2, JobKind::Raw, 50)).text, refused(Refusal::JobOpen, 2));
     assert_eq!(rig.tell(ToBridge::Initialise).text, refused(Refusal::JobOpen, 1));
