@@ -183,10 +183,9 @@ struct Due {
     not_now: Option<u16>,
 }
 
-/// The engine. About 12 KB beside the [`Memory`] it is given.
+/// The engine. Some 11 KB beside the [`Memory`] it is given.
 pub struct Engine<'m> {
     identity: Identity,
-    reader: Reader,
     data: Ring<'m>,
     output: Ring<'m>,
     streams: Streams<'m>,
@@ -227,7 +226,6 @@ impl<'m> Engine<'m> {
     pub fn new(memory: Memory<'m>, identity: Identity) -> Self {
         Engine {
             identity,
-            reader: Reader::new(),
             data: Ring::new(memory.data),
             output: Ring::new(memory.output),
             streams: Streams::new(memory.band),
@@ -310,20 +308,19 @@ impl<'m> Engine<'m> {
 
     // ---- link, inwards ----
 
-    /// The link was cut: a frame under way will not be completed. The job goes on.
+    /// The link was cut: answers that were due would meet another conversation. The job goes on. The link's reader
+    /// is to be [reset](Reader::reset) too.
     pub fn link_lost(&mut self) {
-        self.reader.reset();
         self.frame_length = 0;
         self.due = Due::default();
     }
 
-    /// Bytes from the link, in any portions.
-    pub fn receive(&mut self, mut bytes: &[u8]) {
-        // The reader is taken out so that its message can be followed while the rest of the engine changes.
-        let mut reader = core::mem::take(&mut self.reader);
+    /// Bytes from a link, in any portions. Every link has its own reader; a board with two of them (a serial
+    /// port and bulk endpoints, say) may serve both, the answers going to the one that spoke last.
+    pub fn receive(&mut self, reader: &mut Reader, mut bytes: &[u8]) {
         loop {
             match reader.read(bytes) {
-                Read::More => break,
+                Read::More => return,
                 // Damage needs no answer: what was lost is sent again.
                 Read::Damaged(_, rest) => bytes = rest,
                 Read::Message(message, rest) => {
@@ -335,7 +332,6 @@ impl<'m> Engine<'m> {
                 }
             }
         }
-        self.reader = reader;
     }
 
     fn refuse(&mut self, reason: Refusal, job: u32) {

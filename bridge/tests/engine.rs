@@ -13,6 +13,7 @@ use protocol::link::message::{
 
 struct Rig {
     engine: Engine<'static>,
+    reader: Reader,
     printed: Vec<u8>,
 }
 
@@ -25,11 +26,15 @@ struct Said {
 
 impl Rig {
     fn new() -> Rig {
-        Rig { engine: Engine::new(memory(2048, 4096, 40_000), IDENTITY), printed: Vec::new() }
+        Rig {
+            engine: Engine::new(memory(2048, 4096, 40_000), IDENTITY),
+            reader: Reader::new(),
+            printed: Vec::new(),
+        }
     }
 
     fn tell(&mut self, message: ToBridge<'_>) -> Said {
-        self.engine.receive(&framed(&message));
+        self.engine.receive(&mut self.reader, &framed(&message));
         self.said()
     }
 
@@ -204,7 +209,7 @@ fn what_cannot_be_followed_is_refused_with_the_reason() {
     assert_eq!(rig.tell(ToBridge::Bootloader).text, refused(Refusal::JobOpen, 1));
     let question = rig.tell(ToBridge::Ask { request: 8, what: Ask::Printer });
     assert_eq!(question.text, [format!("{:?}", ToHost::Answer { request: 8, answer: Answer::NotNow })]);
-    rig.engine.receive(&framed_bytes(&[99, 1, 2]));
+    rig.engine.receive(&mut rig.reader, &framed_bytes(&[99, 1, 2]));
     assert_eq!(rig.said().text, refused(Refusal::Unknown, 0));
 }
 
@@ -305,7 +310,7 @@ fn a_job_nobody_has_the_data_of_any_more_can_be_given_up() {
     while rig.engine.work() {}
     rig.engine.consumed(100);
     let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-    let mut rig = Rig { engine, printed: Vec::new() };
+    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
     let said = rig.tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
     let progress = said.progress.unwrap();
     assert_eq!((progress.job, progress.accepted, progress.limit, progress.printed), (1, 0, 0, 100));
@@ -319,7 +324,7 @@ fn a_finished_job_is_remembered_through_a_reset() {
     let mut rig = Rig::new();
     rig.send(1, JobKind::Raw, &stream);
     let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-    let mut rig = Rig { engine, printed: Vec::new() };
+    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
     // The host has not heard of the end and sends it again.
     assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
     assert!(rig.printed.is_empty(), "the sheet was printed twice");
@@ -389,11 +394,19 @@ fn pass_streams_with_a_defect_are_brought_to_an_end() {
 fn a_page_too_wide_for_the_memory_is_refused_before_the_first_byte() {
     let planes =
         Planes { width: 4800, rows: 10, inks: vec![protocol::ink::Ink::Black], bits: vec![vec![1; 6000]] };
-    let mut rig = Rig { engine: Engine::new(memory(2048, 2048, 38_399), IDENTITY), printed: Vec::new() };
+    let mut rig = Rig {
+        engine: Engine::new(memory(2048, 2048, 38_399), IDENTITY),
+        reader: Reader::new(),
+        printed: Vec::new(),
+    };
     let state = rig.send(1, JobKind::Streams, &planes.streams()).state;
     assert!(matches!(state, JobState::Broken(defect) if defect.what == DefectKind::TooLarge));
     assert!(rig.printed.is_empty());
-    let mut rig = Rig { engine: Engine::new(memory(2048, 2048, 38_400), IDENTITY), printed: Vec::new() };
+    let mut rig = Rig {
+        engine: Engine::new(memory(2048, 2048, 38_400), IDENTITY),
+        reader: Reader::new(),
+        printed: Vec::new(),
+    };
     assert_eq!(rig.send(1, JobKind::Streams, &planes.streams()).state, JobState::Done);
 }
 
@@ -420,7 +433,7 @@ proptest! {
             let mut left = &frames[..];
             while !left.is_empty() {
                 let (portion, rest) = left.split_at(sizes.next().unwrap().min(left.len()));
-                rig.engine.receive(portion);
+                rig.engine.receive(&mut rig.reader, portion);
                 left = rest;
             }
             rig.print();
@@ -467,4 +480,9 @@ fn an_undisturbed_run_of_the_model_is_the_job() {
         let job = Job::random(3, &mut random);
         assert!(run(&job, &NONE, None, &mut random).printed == job.expected);
     }
+}
+
+#[test]
+fn the_engine_fits_a_microcontroller() {
+    assert!(size_of::<Engine>() <= 12 * 1024, "{} bytes", size_of::<Engine>());
 }

@@ -324,6 +324,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
             Some(checkpoint) => Engine::resume(board.memory(), IDENTITY, checkpoint),
             None => Engine::new(board.memory(), IDENTITY),
         };
+        let mut reader = Reader::new();
         let mut faulty = 0u32;
         for tick in 0.. {
             assert!(tick < 200_000, "the job does not come to an end");
@@ -339,6 +340,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
                 host = Host::new(job);
                 host.cancel = cancel;
                 engine.link_lost();
+                reader.reset();
             }
             // To the bridge.
             let mut there = damage(host.speak(), mischief, random);
@@ -349,7 +351,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
             let mut left = &there[..];
             while !left.is_empty() {
                 let (portion, rest) = left.split_at(random.random_range(1..=64).min(left.len()));
-                engine.receive(portion);
+                engine.receive(&mut reader, portion);
                 left = rest;
             }
             // In the bridge.
@@ -406,6 +408,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
             if cut {
                 host.link_lost();
                 engine.link_lost();
+                reader.reset();
             }
         }
     }
