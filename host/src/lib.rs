@@ -31,4 +31,6 @@ pub mod inspect;
 
 pub mod preview;
 
+pub mod pipeline;
+
 pub mod cli;

@@ -182,6 +182,7 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     /// Two Lambertians differ by |cbrt a - cbrt b| times the root of three times the integral of
     /// cos^(2/3) sin cos = 3/8, channel by channel.
@@ -206,5 +207,168 @@ mod tests {
         };
         let (few, many) = (distance(32), distance(4096));
         assert!((few / many - 1.0).abs() < 2e-3, "{few} {many}");
+    }
+
+    /// A space of uniform angles from 0 to 90 degrees with trapezoid weights, as measurements often come.
+    fn uniform(samples: usize) -> (Space, Vec<f64>) {
+        let step = FRAC_PI_2 / (samples - 1) as f64;
+        let angles: Vec<f64> = (0..samples).map(|n| n as f64 * step).collect();
+        let cosine: Vec<f64> = angles.iter().map(|t| t.cos().max(0.0)).collect();
+        let half = |n| if n == 0 || n + 1 == samples { 0.5 } else { 1.0 };
+        let measure: Vec<f64> = (0..samples).map(|n| half(n) * step * angles[n].sin() * cosine[n]).collect();
+        (Space::tabulated(&cosine, &measure).unwrap(), angles)
+    }
+
+    /// The lobes of silver foil on primer and on paper, the sharpest pair of the ink library.
+    fn foils() -> [inks::Lobes; 2] {
+        let library = inks::Library::builtin();
+        ["P+SF", "SF"].map(|stack| library.optics().lobes(&stack.parse().unwrap()).unwrap())
+    }
+
+    fn flat(values: impl Iterator<Item = [f64; 3]>) -> Vec<f64> {
+        values.flatten().collect()
+    }
+
+    #[test]
+    fn the_square_root_grid_does_with_32_samples_what_uniform_angles_do_with_512() {
+        let [primed, plain] = foils();
+        let root = |samples| {
+            let space = Space::half_angle(samples);
+            let row = |lobes: &inks::Lobes| flat(space.angles().iter().map(|&t| lobes.at(t)));
+            space.distance(&row(&primed), &row(&plain))
+        };
+        let even = |samples| {
+            let (space, angles) = uniform(samples);
+            let row = |lobes: &inks::Lobes| flat(angles.iter().map(|&t| lobes.at(t)));
+            space.distance(&row(&primed), &row(&plain))
+        };
+        let truth = root(20_000);
+        let off = |d: f64| (d / truth - 1.0).abs();
+        assert!(off(root(32)) < 3e-4 && off(even(512)) < 3e-4);
+        assert!(off(even(32)) > 0.02 && off(even(64)) > 5e-3);
+    }
+
+    /// Averaging each cell instead of sampling its middle keeps its energy but bends the cube root: the mean of a
+    /// steep flank is not what is seen there.
+    #[test]
+    fn sampling_the_middle_of_a_cell_beats_averaging_the_cell() {
+        let [primed, plain] = foils();
+        let off = |samples: usize, fine: u32| {
+            let space = Space::half_angle(samples);
+            let row = |lobes: &inks::Lobes| {
+                flat((0..samples).map(|n| {
+                    let (mut sum, mut area) = ([0.0; 3], 0.0);
+                    for k in 0..fine {
+                        let u = (n as f64 + (f64::from(k) + 0.5) / f64::from(fine)) / samples as f64;
+                        let t = FRAC_PI_2 * u * u;
+                        let weight = u * t.sin() * t.cos();
+                        area += weight;
+                        for (sum, f) in sum.iter_mut().zip(lobes.at(t)) {
+                            *sum += weight * f;
+                        }
+                    }
+                    sum.map(|v| v / area)
+                }))
+            };
+            let (space_truth, angles) = (Space::half_angle(20_000), Space::half_angle(20_000).angles);
+            let truth = |lobes: &inks::Lobes| flat(angles.iter().map(|&t| lobes.at(t)));
+            let truth = space_truth.distance(&truth(&primed), &truth(&plain));
+            (space.distance(&row(&primed), &row(&plain)) / truth - 1.0).abs()
+        };
+        for samples in [16, 32, 64] {
+            let (point, mean) = (off(samples, 1), off(samples, 32));
+            assert!(point < mean, "{samples}: {point} {mean}");
+        }
+    }
+
+    fn row(columns: usize) -> impl Strategy<Value = Vec<f64>> {
+        // Values over six decades, and exact zeros.
+        prop::collection::vec(prop_oneof![Just(0.0), (-4.0f64..2.0).prop_map(|e| 10f64.powf(e))], columns)
+    }
+
+    proptest! {
+        #[test]
+        fn it_is_a_metric((a, b, c) in (row(24), row(24), row(24))) {
+            let space = Space::half_angle(8);
+            let d = |a: &[f64], b: &[f64]| space.distance(a, b);
+            prop_assert_eq!(d(&a, &b), d(&b, &a));
+            prop_assert_eq!(d(&a, &a), 0.0);
+            prop_assert!(d(&a, &c) <= d(&a, &b) + d(&b, &c) + 1e-12);
+            prop_assert!(a == b || d(&a, &b) > 0.0);
+        }
+
+        /// The cube root is the whole nonlinearity: light eight times as strong looks twice as strong.
+        #[test]
+        fn distances_grow_with_the_cube_root_of_the_light((a, b) in (row(24), row(24)), s in 1e-3f64..1e3) {
+            let space = Space::half_angle(8);
+            let scaled = |row: &[f64]| row.iter().map(|v| v * s).collect::<Vec<_>>();
+            let (d, far) = (space.distance(&a, &b), space.distance(&scaled(&a), &scaled(&b)));
+            prop_assert!((far - s.cbrt() * d).abs() <= 1e-9 * (far + 1e-9));
+        }
+
+        /// A picture of everything twice, each at half the weight, is the same picture.
+        #[test]
+        fn splitting_a_configuration_changes_nothing((a, b) in (row(24), row(24))) {
+            let space = Space::half_angle(8);
+            let (cosine, measure): (Vec<f64>, Vec<f64>) = space
+                .radiance
+                .chunks_exact(3)
+                .zip(space.weight.chunks_exact(3))
+                .flat_map(|(c, w)| [(c[0], w[0] * w[0] / 2.0); 2])
+                .unzip();
+            let split = Space::tabulated(&cosine, &measure).unwrap();
+            let twice = |row: &[f64]| flat(row.chunks_exact(3).flat_map(|v| [[v[0], v[1], v[2]]; 2]));
+            let (d, again) = (space.distance(&a, &b), split.distance(&twice(&a), &twice(&b)));
+            prop_assert!((d - again).abs() <= 1e-12 * (1.0 + d));
+        }
+    }
+
+    /// A tabulation over theta_h and theta_d, and the picture it is meant for: all pairs of directions, with
+    /// measure sin cos d theta for each angle, the second one normalised to 1.
+    struct Bivariate {
+        space: Space,
+        cells: Vec<[f64; 2]>,
+    }
+
+    fn bivariate(halves: usize, differences: usize) -> Bivariate {
+        let (mut cosine, mut measure, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+        for h in 0..halves {
+            let u = (h as f64 + 0.5) / halves as f64;
+            let theta_h = FRAC_PI_2 * u * u;
+            let dh = FRAC_PI_2 * 2.0 * u / halves as f64 * theta_h.sin() * theta_h.cos();
+            for d in 0..differences {
+                let theta_d = FRAC_PI_2 * (d as f64 + 0.5) / differences as f64;
+                let dd = 2.0 * FRAC_PI_2 / differences as f64 * theta_d.sin() * theta_d.cos();
+                cosine.push(theta_h.cos());
+                measure.push(dh * dd);
+                cells.push([theta_h, theta_d]);
+            }
+        }
+        Bivariate { space: Space::tabulated(&cosine, &measure).unwrap(), cells }
+    }
+
+    #[test]
+    fn a_table_over_two_angles_is_a_space_like_any_other() {
+        let table = bivariate(64, 48);
+        assert!(table.space.angles().is_empty());
+        let [primed, plain] = foils();
+        // Without dependence on theta_d it must say what the half-angle space says.
+        let lifted = |lobes: &inks::Lobes| flat(table.cells.iter().map(|cell| lobes.at(cell[0])));
+        let half = Space::half_angle(64);
+        let curve = |lobes: &inks::Lobes| flat(half.angles().iter().map(|&t| lobes.at(t)));
+        let (two, one) = (
+            table.space.distance(&lifted(&primed), &lifted(&plain)),
+            half.distance(&curve(&primed), &curve(&plain)),
+        );
+        assert!((two / one - 1.0).abs() < 1e-3, "{two} {one}");
+        // A surface and the same surface with s(theta_d) times the light: for f = a, f' = a s(theta_d) the distance
+        // separates into the integral of cos^(2/3) sin cos = 3/8 and that of (1 - cbrt s)^2 over theta_d.
+        // With s = cos^6 the latter is 2 * integral (1 - x^2)^2 x dx = 1/3.
+        let a = 0.25;
+        let level = vec![a; table.space.columns()];
+        let falling = flat(table.cells.iter().map(|cell| [a * cell[1].cos().powi(6); 3]));
+        let expected = a.cbrt() * (3.0f64 * 3.0 / 8.0 / 3.0).sqrt();
+        let d = table.space.distance(&level, &falling);
+        assert!((d / expected - 1.0).abs() < 1e-3, "{d} {expected}");
     }
 }

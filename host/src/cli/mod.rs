@@ -4,15 +4,27 @@
 //! 1 failed, 2 wrong usage, 130 interrupted. Results go to standard output, everything else to standard error; a
 //! closed pipe is success.
 
-pub mod output;
-pub mod progress;
+mod args;
+mod chain;
+mod inks;
+mod inspect;
+mod output;
+mod print;
+mod progress;
+mod sample;
 
-use std::io;
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
 use std::process::ExitCode;
 
+use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 
 use progress::Progress;
+
+/// The largest stream that is read: several times a page of noise in seven passes.
+const LARGEST_JOB: u64 = 256 << 20;
 
 /// Print materials instead of colours on the ALPS MD-5500 (Oki DP-5000).
 #[derive(Parser)]
@@ -23,7 +35,9 @@ use progress::Progress;
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
         foilpress inks show MS+C\n  \
-        foilpress inspect job.rgl --passes passes/"
+        foilpress inspect job.rgl --passes passes/\n\n\
+        The chain, step by step: factor, map, halftone, separate, encode, simulate.\n\
+        Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 )]
 struct Args {
     /// No progress on standard error, only notes and errors
@@ -34,14 +48,33 @@ struct Args {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    /// Print a document: the job, the simulated sheet, and everything to look at, in one folder
+    Print(Box<print::Args>),
+    /// Take a document apart into a few basis materials and their weight maps
+    Factor(chain::Factor),
+    /// Fit basis materials (or every pixel) to mixtures of printable stacks
+    Map(chain::Map),
+    /// Choose one stack for every dot of the page
+    Halftone(chain::Halftone),
+    /// Split a sheet into one-bit passes, one ink each
+    Separate(chain::Separate),
+    /// Write passes as a job in the printer's language
+    Encode(chain::Encode),
+    /// Feed a job to the simulated printer and keep its sheet
+    Simulate(chain::Simulate),
+    /// Tell what is in a job, with byte offsets where something is wrong
+    Inspect(inspect::Args),
+    /// The ink library: list, show, check
+    Inks(inks::Args),
+    /// Documents made by the program itself: list them or write one as a texture folder
+    Sample(sample::Args),
+}
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
     let args = Args::parse();
-    let progress = Progress::new(args.quiet);
-    let result = output::remove_on_interrupt().and_then(|()| match args.command {});
-    match result {
+    match output::remove_on_interrupt().and_then(|()| run(args)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
@@ -49,6 +82,34 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn run(args: Args) -> Result<()> {
+    let observer = &Progress::new(args.quiet);
+    match args.command {
+        Command::Print(args) => print::run(&args, observer),
+        Command::Factor(args) => args.run(observer),
+        Command::Map(args) => args.run(observer),
+        Command::Halftone(args) => args.run(observer),
+        Command::Separate(args) => args.run(observer),
+        Command::Encode(args) => args.run(observer),
+        Command::Simulate(args) => args.run(observer),
+        Command::Inspect(args) => inspect::run(&args, observer),
+        Command::Inks(args) => inks::run(args),
+        Command::Sample(args) => sample::run(args),
+    }
+}
+
+/// Reads a job whole.
+fn read_job(path: &Path) -> Result<Vec<u8>> {
+    let cannot = || format!("cannot read {}", path.display());
+    let file = File::open(path).with_context(cannot)?;
+    let mut job = Vec::new();
+    file.take(LARGEST_JOB + 1).read_to_end(&mut job).with_context(cannot)?;
+    if job.len() as u64 > LARGEST_JOB {
+        bail!("{} is larger than {} MB: no job for this printer", path.display(), LARGEST_JOB >> 20);
+    }
+    Ok(job)
 }
 
 /// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`.

@@ -52,6 +52,12 @@ impl Staged {
         &self.inside
     }
 
+    /// Where to write, as a folder that is there.
+    pub fn folder(&self) -> Result<&Path> {
+        fs::create_dir(&self.inside).with_context(|| format!("cannot write {}", self.target.display()))?;
+        Ok(&self.inside)
+    }
+
     /// Moves what was written to its own name, replacing what was there.
     pub fn commit(self) -> Result<()> {
         let old = self.folder.path().join("replaced");

@@ -8,23 +8,10 @@ use std::str::FromStr;
 
 use protocol::paper::Paper;
 
+use crate::halftone::Placement;
+
 /// Dots in a millimetre at 600 dpi.
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
-
-/// A rectangle of dots inside the printable area of a paper.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Placement {
-    /// The paper.
-    pub paper: Paper,
-    /// Dots from the left edge of the printable area.
-    pub x: usize,
-    /// Rows from its top.
-    pub y: usize,
-    /// Dots across, at least 1.
-    pub width: usize,
-    /// Rows, at least 1.
-    pub height: usize,
-}
 
 /// A size on paper as typed: `120x90mm`, `12x9cm`, `5x4in`, or only the width, `120mm`.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -98,55 +85,53 @@ impl fmt::Display for Size {
     }
 }
 
-impl Placement {
-    /// Places a document of `pixels` (width, height) on `paper`, centred.
-    ///
-    /// `asked` is the size wanted: the document fills it as far as its shape allows. Without it the document's own
-    /// size `own_mm` counts, and without that the largest size that fits the page.
-    pub fn new(
-        pixels: (usize, usize),
-        own_mm: Option<(f64, f64)>,
-        asked: Option<Size>,
-        paper: Paper,
-    ) -> Result<Placement, PlacementError> {
-        let most = (usize::from(paper.width()), usize::from(paper.length()));
-        let most_mm = (most.0 as f64 / DOTS_PER_MM, most.1 as f64 / DOTS_PER_MM);
-        let aspect = match own_mm {
-            Some((width, height)) => height / width,
-            None => pixels.1 as f64 / pixels.0 as f64,
-        };
-        let within = |width: f64, height: f64| {
-            let width = width.min(height / aspect);
-            (width, width * aspect)
-        };
-        let (width, height) = match (asked, own_mm) {
-            (Some(Size { width, height: Some(height) }), _) => within(width, height),
-            (Some(Size { width, height: None }), _) => (width, width * aspect),
-            (None, Some(own)) => own,
-            (None, None) => within(most_mm.0, most_mm.1),
-        };
-        // Half a dot of grace, so that a size computed from the page's own dots is not refused.
-        let dots = ((width * DOTS_PER_MM).round(), (height * DOTS_PER_MM).round());
-        if !(dots.0 >= 1.0 && dots.1 >= 1.0) {
-            return Err(PlacementError::TooSmall { width, height });
-        }
-        if dots.0 > most.0 as f64 || dots.1 > most.1 as f64 {
-            return Err(PlacementError::TooLarge {
-                width,
-                height,
-                paper: paper.name(),
-                most_width: most_mm.0,
-                most_height: most_mm.1,
-            });
-        }
-        let (width, height) = (dots.0 as usize, dots.1 as usize);
-        Ok(Placement { paper, x: (most.0 - width) / 2, y: (most.1 - height) / 2, width, height })
+/// Places a document of `pixels` (width, height) on `paper`, centred.
+///
+/// `asked` is the size wanted: the document fills it as far as its shape allows. Without it the document's own
+/// size `own_mm` counts, and without that the largest size that fits the page.
+pub fn place(
+    pixels: (usize, usize),
+    own_mm: Option<(f64, f64)>,
+    asked: Option<Size>,
+    paper: Paper,
+) -> Result<Placement, PlacementError> {
+    let most = (f64::from(paper.width()), f64::from(paper.length()));
+    let most_mm = (most.0 / DOTS_PER_MM, most.1 / DOTS_PER_MM);
+    let aspect = match own_mm {
+        Some((width, height)) => height / width,
+        None => pixels.1 as f64 / pixels.0 as f64,
+    };
+    let within = |width: f64, height: f64| {
+        let width = width.min(height / aspect);
+        (width, width * aspect)
+    };
+    let (width, height) = match (asked, own_mm) {
+        (Some(Size { width, height: Some(height) }), _) => within(width, height),
+        (Some(Size { width, height: None }), _) => (width, width * aspect),
+        (None, Some(own)) => own,
+        (None, None) => within(most_mm.0, most_mm.1),
+    };
+    // Rounding gives half a dot of grace, so that a size computed from the page's own dots is not refused.
+    let dots = ((width * DOTS_PER_MM).round(), (height * DOTS_PER_MM).round());
+    if !(dots.0 >= 1.0 && dots.1 >= 1.0) {
+        return Err(PlacementError::TooSmall { width, height });
     }
+    if dots.0 > most.0 || dots.1 > most.1 {
+        return Err(PlacementError::TooLarge {
+            width,
+            height,
+            paper: paper.name(),
+            most_width: most_mm.0,
+            most_height: most_mm.1,
+        });
+    }
+    let (width, height) = (dots.0 as u16, dots.1 as u16);
+    Ok(Placement { paper, x: (paper.width() - width) / 2, y: (paper.length() - height) / 2, width, height })
+}
 
-    /// Width and height on paper in millimetres.
-    pub fn size_mm(&self) -> (f64, f64) {
-        (self.width as f64 / DOTS_PER_MM, self.height as f64 / DOTS_PER_MM)
-    }
+/// Width and height of a placed document in millimetres.
+pub fn size_mm(placement: &Placement) -> (f64, f64) {
+    (f64::from(placement.width) / DOTS_PER_MM, f64::from(placement.height) / DOTS_PER_MM)
 }
 
 #[cfg(test)]
@@ -165,30 +150,30 @@ mod tests {
 
     #[test]
     fn a_document_without_a_size_fills_the_page_in_its_own_shape() {
-        let p = Placement::new((1000, 1000), None, None, Paper::A4).unwrap();
+        let p = place((1000, 1000), None, None, Paper::A4).unwrap();
         assert_eq!((p.width, p.height, p.x, p.y), (4800, 4800, 0, 786));
-        let p = Placement::new((480, 6372), None, None, Paper::A4).unwrap();
+        let p = place((480, 6372), None, None, Paper::A4).unwrap();
         assert_eq!((p.width, p.height), (480, 6372));
     }
 
     #[test]
     fn a_box_is_filled_as_far_as_the_shape_allows() {
-        let p = Placement::new((200, 100), None, Some("100x100mm".parse().unwrap()), Paper::A4).unwrap();
+        let p = place((200, 100), None, Some("100x100mm".parse().unwrap()), Paper::A4).unwrap();
         assert_eq!((p.width, p.height), (2362, 1181));
-        let p = Placement::new((200, 100), Some((50.0, 50.0)), Some("100mm".parse().unwrap()), Paper::A4);
+        let p = place((200, 100), Some((50.0, 50.0)), Some("100mm".parse().unwrap()), Paper::A4);
         assert_eq!(p.map(|p| (p.width, p.height)), Ok((2362, 2362)), "its own size gives the shape");
     }
 
     #[test]
     fn what_does_not_fit_is_refused_with_both_sizes() {
-        let wrong = Placement::new((10, 10), None, Some("300mm".parse().unwrap()), Paper::A4).unwrap_err();
+        let wrong = place((10, 10), None, Some("300mm".parse().unwrap()), Paper::A4).unwrap_err();
         let text = wrong.to_string();
         assert!(
             text.contains("300.0 x 300.0") && text.contains("203.2 x 269.7") && text.contains("a4"),
             "{text}"
         );
         assert!(matches!(
-            Placement::new((10, 10), Some((0.01, 0.01)), None, Paper::A4),
+            place((10, 10), Some((0.01, 0.01)), None, Paper::A4),
             Err(PlacementError::TooSmall { .. })
         ));
     }

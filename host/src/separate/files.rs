@@ -52,13 +52,19 @@ pub fn name(pass: usize, ink: Ink) -> String {
     format!("{:02}-{}.png", pass + 1, ink.name())
 }
 
+/// Writes a plane as a one-bit picture, ink black.
+pub fn save_plane(plane: &Plane, path: &Path) -> Result<(), FileError> {
+    let bits: Vec<u8> = plane.bits.iter().map(|byte| !byte).collect();
+    write_png(path, (plane.width, plane.length), Kind::Bits, &bits)
+}
+
 /// Writes [`TEXT`] and a picture of each pass into a folder that exists, the text last.
 pub fn save(separation: &Separation, folder: &Path) -> Result<(), FileError> {
-    separation.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
-        let plane = &pass.plane;
-        let bits: Vec<u8> = plane.bits.iter().map(|byte| !byte).collect();
-        write_png(&folder.join(name(i, pass.ink)), (plane.width, plane.length), Kind::Bits, &bits)
-    })?;
+    separation
+        .passes
+        .par_iter()
+        .enumerate()
+        .try_for_each(|(i, pass)| save_plane(&pass.plane, &folder.join(name(i, pass.ink))))?;
     let pass = |(i, pass): (usize, &Pass)| PassText {
         ink: pass.ink.name().to_string(),
         file: name(i, pass.ink),

@@ -6,6 +6,8 @@
 //! passes. Cost: negligible, except that rules on cluster size look at the whole page once for each ink concerned.
 //! Source: the notes on the machine, sections 9 and 14; the 2009 paper, section 4.2.
 
+use std::fmt;
+
 use inks::Stack;
 use protocol::ink::{Ink, Kind};
 use serde::Serialize;
@@ -57,6 +59,17 @@ pub struct Check {
     pub text: String,
     /// The stacks concerned; empty when the page as a whole is.
     pub stacks: Vec<Stack>,
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = match self.severity {
+            Severity::Refuse => "refused",
+            Severity::Warn => "careful",
+            Severity::Note => "note",
+        };
+        write!(f, "{word}: {}", self.text)
+    }
 }
 
 /// A condition on a stack, or on the page.

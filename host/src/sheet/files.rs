@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::colours::colours;
 use super::picture::{FileError, Kind, read_png, read_toml, write_png, write_toml};
 use super::{Sheet, check_stacks};
+use crate::preview::Area;
 
 /// The text beside the picture.
 pub const TEXT: &str = "sheet.toml";
@@ -92,6 +93,16 @@ impl Sheet {
             paper: PaperText::new(self.paper()),
         };
         write_toml(&folder.join(TEXT), &text)
+    }
+
+    /// Writes an area of the sheet in false colours, one for each stack ([`colours()`]), a pixel a dot.
+    ///
+    /// # Panics
+    /// When the area leaves the sheet: a bug of the caller, never a matter of input.
+    pub fn save_colours(&self, area: Area, path: &Path) -> Result<(), FileError> {
+        let rows = self.index().chunks_exact(self.width()).skip(area.top).take(area.length);
+        let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
+        write_png(path, (area.width, area.length), Kind::Indexed(&colours(self.stacks())), &dots)
     }
 
     /// Reads what [`Sheet::save`] wrote. Anything that does not fit is an error with the file and the field.

@@ -1,1 +1,14 @@
-//! Least squares on the simplex, and equation 1 in the perceptual metric.
+//! Constrained least squares: the one problem under factoring, gamut mapping and clamping.
+//!
+//! [`simplex`] solves the convex quadratic exactly, [`mixture`] the perceptual problem (eq. 1) by a short
+//! sequence of such quadratics.
+
+pub mod gram;
+pub mod mixture;
+pub mod root;
+pub mod simplex;
+pub mod vector;
+
+pub use gram::{Gram, GramError};
+pub use mixture::{Best, Fit, Hull, Mixer, MixtureError, Target};
+pub use simplex::{Certificate, Simplex, SimplexError};

@@ -1,0 +1,152 @@
+//! Half-angle curves as pictures: braille dots for a terminal, SVG for a document.
+//!
+//! Both have a linear angle from 0 to 90 degrees across and the logarithm of reflectance upwards, because foil
+//! and paper differ by a factor of a hundred. Values below a millionth of the largest are drawn at that floor.
+
+use inks::Curve;
+use plotters::prelude::*;
+use textplots::{Chart, ColorPlot, LabelBuilder, LabelFormat, Plot, Shape, TickDisplay, TickDisplayBuilder};
+
+/// Why a curve could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[error("the plot of {title} could not be drawn: {problem}")]
+pub struct PlotError {
+    /// The plot's title.
+    pub title: String,
+    /// What the drawing library said.
+    pub problem: String,
+}
+
+/// Characters across a terminal plot, and down a decade of it: the scale has a label every four rows.
+const TERMINAL: (u32, u32) = (72, 4);
+const INKS: [(u8, u8, u8); 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
+
+/// Decades that hold the curve: whole powers of ten, at least three and at most six.
+fn decades(curve: &Curve) -> (i32, i32) {
+    let values = || curve.rgb().iter().flatten().copied().filter(|v| *v > 0.0);
+    let most = values().fold(1e-12, f64::max).log10().ceil() as i32;
+    let least = values().fold(f64::MAX, f64::min).log10().floor() as i32;
+    (least.clamp(most - 6, most - 3), most)
+}
+
+/// Points in degrees and decades, close enough together for any plot.
+fn points(curve: &Curve, channel: usize, (least, most): (i32, i32)) -> Vec<(f64, f64)> {
+    (0..=720)
+        .map(|n| f64::from(n) / 8.0)
+        .map(|degrees| {
+            let value = curve.at(degrees.to_radians())[channel];
+            (degrees, value.max(1e-300).log10().clamp(f64::from(least), f64::from(most)))
+        })
+        .collect()
+}
+
+fn is_grey(curve: &Curve) -> bool {
+    curve.rgb().iter().all(|v| (v[0] - v[1]).abs().max((v[2] - v[1]).abs()) <= 0.01 * v[1])
+}
+
+/// The curve in braille dots with its scales, a line for each channel (one when they agree).
+pub fn terminal(curve: &Curve, colour: bool) -> String {
+    let range = decades(curve);
+    let channels = if is_grey(curve) { 1..2 } else { 0..3 };
+    let colour = colour && channels.len() > 1;
+    let shapes: Vec<Vec<(f32, f32)>> = channels
+        .clone()
+        .map(|c| points(curve, c, range).into_iter().map(|(x, y)| (x as f32, y as f32)).collect())
+        .collect();
+    let lines: Vec<Shape<'_>> = shapes.iter().map(|points| Shape::Lines(points)).collect();
+    // A character is two dots wide and four high.
+    let (width, height) = (TERMINAL.0 * 2, TERMINAL.1 * 4 * range.0.abs_diff(range.1));
+    let mut chart = Chart::new_with_y_range(width, height, 0.0, 90.0, range.0 as f32, range.1 as f32);
+    let mut chart: &mut Chart<'_> = chart
+        .x_label_format(LabelFormat::Custom(Box::new(|degrees| format!("{degrees:.0} deg"))))
+        .y_label_format(LabelFormat::Custom(Box::new(|decade| number(10f64.powf(f64::from(decade))))))
+        .y_tick_display(TickDisplay::Sparse);
+    for (line, channel) in lines.iter().zip(channels) {
+        let (r, g, b) = INKS[channel];
+        chart = if colour { chart.linecolorplot(line, (r, g, b).into()) } else { chart.lineplot(line) };
+    }
+    chart.axis();
+    chart.figures();
+    chart.to_string()
+}
+
+/// A reflectance with two significant digits, however small.
+fn number(value: f64) -> String {
+    let decimals = 1 - value.max(1e-300).log10().floor() as i32;
+    if decimals > 5 {
+        return format!("{value:.0e}");
+    }
+    let text = format!("{value:.0$}", decimals.max(0) as usize);
+    match text.split_once('.') {
+        Some(_) => text.trim_end_matches('0').trim_end_matches('.').into(),
+        None => text,
+    }
+}
+
+/// The curve as an SVG picture.
+pub fn svg(title: &str, curve: &Curve) -> Result<String, PlotError> {
+    let mut text = String::new();
+    draw(&mut text, title, curve)
+        .map_err(|error| PlotError { title: title.into(), problem: error.to_string() })?;
+    Ok(text)
+}
+
+fn draw(text: &mut String, title: &str, curve: &Curve) -> Result<(), Box<dyn std::error::Error>> {
+    let (least, most) = decades(curve);
+    let area = SVGBackend::with_string(text, (720, 480)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .caption(title, ("sans-serif", 18))
+        .margin(12)
+        .x_label_area_size(44)
+        .y_label_area_size(72)
+        .build_cartesian_2d(0.0..90.0, (10f64.powi(least)..10f64.powi(most)).log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc("half angle, degrees")
+        .y_desc("reflectance, 1/sr")
+        .x_label_formatter(&|degrees| format!("{degrees:.0}"))
+        .y_label_formatter(&|value| number(*value))
+        .x_labels(10)
+        .light_line_style(BLACK.mix(0.06))
+        .draw()?;
+    for (channel, (r, g, b)) in INKS.into_iter().enumerate() {
+        let line = points(curve, channel, (least, most)).into_iter().map(|(x, y)| (x, 10f64.powf(y)));
+        chart.draw_series(LineSeries::new(line, RGBColor(r, g, b).stroke_width(2)))?;
+    }
+    area.present()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_holds_the_curve_and_no_more_than_six_decades() {
+        let level = |v: f64| Curve::new(vec![0.0], vec![[v; 3]]).unwrap();
+        assert_eq!(decades(&level(0.25)), (-3, 0));
+        assert_eq!(decades(&level(0.0)), (-15, -12));
+        let steep = Curve::new(vec![0.0, 1.0], vec![[30.0; 3], [1e-9; 3]]).unwrap();
+        assert_eq!(decades(&steep), (-4, 2));
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let numbers = [100.0, 12.3, 1.0, 0.1, 0.034, 0.001, 1e-9].map(number);
+        assert_eq!(numbers, ["100", "12", "1", "0.1", "0.034", "0.001", "1e-9"]);
+    }
+
+    #[test]
+    fn any_curve_is_drawn_within_its_frame() {
+        for values in [[0.0; 3], [1e300; 3], [1e-300, 1.0, 30.0], [5.0, 0.0, 1e-5]] {
+            let curve = Curve::new(vec![0.0, 0.4], vec![values, [0.1; 3]]).unwrap();
+            let text = terminal(&curve, false);
+            let rows = TERMINAL.1 * decades(&curve).0.abs_diff(decades(&curve).1);
+            assert!(text.lines().count() > rows as usize, "{text}");
+            assert!(text.contains("90 deg"));
+            let picture = svg("a curve", &curve).unwrap();
+            assert!(picture.starts_with("<svg") && picture.contains("a curve") && !picture.contains("NaN"));
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! Arguments that several subcommands share, and the settings they mean.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args;
+use inks::{InkSet, Library};
+use protocol::paper::Paper;
+use protocol::rgl::Media;
+
+use crate::document::{self, ColourSpace, Document};
+use crate::factor::{self, Method};
+use crate::gamut::{self, Intent};
+use crate::job::placement::Size;
+use crate::observe::Observer;
+
+/// What to read.
+#[derive(Args, Debug)]
+pub struct DocumentArgs {
+    /// A folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .csv), a .foil folder, or
+    /// sample:NAME
+    #[arg(value_name = "DOC")]
+    pub document: String,
+    /// Which material of a glTF file, by number (from 0) or name
+    #[arg(long, value_name = "NUMBER|NAME")]
+    pub material: Option<String>,
+    /// Encoding of the colour maps, if it is not the usual one of their file format
+    #[arg(long, value_name = "SPACE")]
+    pub colour_space: Option<ColourSpace>,
+    /// Angles each reflectance curve is sampled at, 32 to 512; 32 is enough for everything printable
+    #[arg(long, default_value_t = document::SAMPLES, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(32..=512))]
+    pub samples: usize,
+}
+
+impl DocumentArgs {
+    /// Opens the document and passes on what the reader decided.
+    pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
+        let options = document::Options {
+            material: self.material.clone(),
+            colour_space: self.colour_space,
+            samples: self.samples,
+        };
+        let document = document::open(&self.document, &options, observer)?;
+        for note in &document.notes {
+            observer.note(note);
+        }
+        Ok(document)
+    }
+}
+
+/// How to take the document apart.
+#[derive(Args, Debug)]
+pub struct FactorArgs {
+    /// Number of bases [default: as many as the document needs]
+    #[arg(long, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=factor::MOST_BASES as u64))]
+    pub bases: Option<usize>,
+    /// How bases are learnt: archetypes, or the paper's kmeans (convex hull) and sacls
+    #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes")]
+    pub method: Method,
+    /// Seed of everything that is left to chance; equal seeds give equal prints
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+impl FactorArgs {
+    /// The settings meant.
+    pub fn settings(&self) -> factor::Settings {
+        factor::Settings {
+            method: self.method,
+            bases: self.bases,
+            seed: self.seed,
+            ..factor::Settings::default()
+        }
+    }
+}
+
+/// What to print with.
+#[derive(Args, Debug)]
+pub struct InkArgs {
+    /// Inks at hand: names and the groups process, metallic, clear, foil, default, all, joined by commas; a leading
+    /// - takes one away from the default [default: all but the foils]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub inks: Option<String>,
+    /// Folder of an ink library of your own, such as one you measured
+    #[arg(long, value_name = "DIR")]
+    pub library: Option<PathBuf>,
+}
+
+impl InkArgs {
+    /// The inks at hand.
+    pub fn set(&self) -> Result<InkSet> {
+        let set: InkSet = match &self.inks {
+            Some(text) => text.parse()?,
+            None => InkSet::default(),
+        };
+        if set.is_empty() {
+            bail!("--inks leaves no ink to print with");
+        }
+        Ok(set)
+    }
+
+    /// The library.
+    pub fn library(&self) -> Result<Library> {
+        Ok(match &self.library {
+            Some(folder) => Library::from_dir(folder)?,
+            None => Library::builtin(),
+        })
+    }
+}
+
+/// How to fit materials to the inks.
+#[derive(Args, Debug)]
+pub struct GamutArgs {
+    /// What to do with materials no ink can make: basis keeps differences (the paper), clamp keeps closest, blend is
+    /// between, auto clamps unless that would make different materials look alike
+    #[arg(long, value_name = "INTENT", default_value = "auto")]
+    pub intent: Intent,
+}
+
+impl GamutArgs {
+    /// The settings meant.
+    pub fn settings(&self, seed: u64) -> gamut::Settings {
+        gamut::Settings { intent: self.intent, seed, ..gamut::Settings::default() }
+    }
+}
+
+/// Where and how large.
+#[derive(Args, Debug)]
+pub struct PageArgs {
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape and is centred
+    /// [default: the document's own size, else as large as the page allows]
+    #[arg(long)]
+    pub size: Option<Size>,
+    /// Paper: a4, letter, legal, executive, b5 or postcard
+    #[arg(long, default_value = "a4", value_parser = paper)]
+    pub paper: Paper,
+}
+
+fn paper(name: &str) -> Result<Paper, String> {
+    Paper::from_name(name).ok_or_else(|| {
+        format!("the papers are {}", Paper::named().map(Paper::name).collect::<Vec<_>>().join(", "))
+    })
+}
+
+/// What the sheet is made of.
+#[derive(Args, Debug)]
+pub struct MediaArgs {
+    /// Media type, which sets the head's heat: plain, cardboard, glossy-paper, …
+    #[arg(long, default_value = "plain", value_parser = media)]
+    pub media: Media,
+}
+
+fn media(name: &str) -> Result<Media, String> {
+    Media::from_name(name).ok_or_else(|| {
+        format!("the media are {}", Media::all().map(Media::name).collect::<Vec<_>>().join(", "))
+    })
+}

@@ -1,0 +1,383 @@
+//! `foilpress inks`: what the library knows, and what is wrong with one.
+
+use std::fmt::Write as _;
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use inks::{Entry, InkSet, Library, Provenance, Severity, Source, Stack};
+use serde::Serialize;
+
+use crate::brdf::plot;
+
+/// The library of inks and stacks.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum What {
+    /// List the stacks: layers, peak reflectance and where the curve comes from.
+    List {
+        /// A folder with a `library.toml`; without it the built-in library, which is modelled, not measured.
+        #[arg(long, value_name = "DIR")]
+        library: Option<PathBuf>,
+        /// Only stacks that need no ink but these, such as `process,metallic-silver,finish`, `all` or
+        /// `-metallic`. Foils are left out unless they or `all` are named. Without it every stack is listed.
+        #[arg(long, value_name = "INKS", allow_hyphen_values = true)]
+        inks: Option<InkSet>,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Show one stack: cartridges, cautions, figures, and the curve as a plot.
+    Show {
+        /// Layers from the bottom up, such as `MS+C+F`, `metallic-silver+cyan` or `substrate`.
+        stack: String,
+        /// A folder with a `library.toml`; without it the built-in library.
+        #[arg(long, value_name = "DIR")]
+        library: Option<PathBuf>,
+        /// List every figure the curve rests on.
+        #[arg(long)]
+        figures: bool,
+        /// Also write the plot to this SVG file.
+        #[arg(long, value_name = "FILE.svg")]
+        plot: Option<PathBuf>,
+    },
+    /// Check a library's folder and list every problem with its file, line and field.
+    Check {
+        /// The folder with `library.toml`.
+        dir: PathBuf,
+    },
+}
+
+/// Runs the subcommand; what it has to say goes to the standard output.
+pub fn run(args: Args) -> anyhow::Result<()> {
+    let (text, verdict) = match args.what {
+        What::List { library, inks, json } => (list(&open(library.as_deref())?, inks, json)?, Ok(())),
+        What::Show { stack, library, figures, plot } => {
+            let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+            let library = open(library.as_deref())?;
+            let entry = find(&library, &stack)?;
+            let mut text = show(&library, entry, figures);
+            text.push_str(&plot::terminal(&entry.curve, colour));
+            if let Some(file) = &plot {
+                let title =
+                    format!("{}: {} ({})", entry.stack, library.words(&entry.stack), entry.provenance.word());
+                replace(file, &plot::svg(&title, &entry.curve)?)?;
+                writeln!(text, "\nplot written to {}", file.display())?;
+            }
+            (text, Ok(()))
+        }
+        What::Check { dir } => check(&dir),
+    };
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        // A reader that has seen enough, such as `head`, is no failure.
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => verdict,
+    }
+}
+
+fn open(folder: Option<&Path>) -> anyhow::Result<Library> {
+    match folder {
+        Some(folder) => Library::from_dir(folder)
+            .with_context(|| format!("{} is not a usable ink library", folder.display())),
+        None => Ok(Library::builtin()),
+    }
+}
+
+/// Writes a file beside its place and moves it there, so that nothing half-written is ever seen.
+fn replace(file: &Path, text: &str) -> anyhow::Result<()> {
+    let folder = match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut draft = tempfile::NamedTempFile::new_in(folder)
+        .with_context(|| format!("cannot write in {}", folder.display()))?;
+    draft.write_all(text.as_bytes())?;
+    draft.persist(file).with_context(|| format!("cannot write {}", file.display()))?;
+    Ok(())
+}
+
+/// The entry of a stack given in words; suggests one when there is none.
+fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
+    let stack: Stack = text.parse()?;
+    if let Some(entry) = library.entry(&stack) {
+        return Ok(entry);
+    }
+    let sorted = |stack: &Stack| {
+        let mut layers = stack.layers().to_vec();
+        layers.sort();
+        layers
+    };
+    if let Some(other) = library.entries().iter().find(|entry| sorted(&entry.stack) == sorted(&stack)) {
+        bail!(
+            "stack {stack} is not in the library, but {} is: the first layer lies at the bottom",
+            other.stack
+        );
+    }
+    let name = stack.to_string();
+    let near = library
+        .entries()
+        .iter()
+        .map(|entry| (strsim::normalized_levenshtein(&name, &entry.stack.to_string()), &entry.stack))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    match near {
+        Some((_, near)) => bail!(
+            "stack {stack} is not in the library; the nearest is {near}, `foilpress inks list` shows all of them"
+        ),
+        None => bail!("stack {stack} is not in the library"),
+    }
+}
+
+/// Relative luminance of a linear Rec. 709 colour.
+fn luminance(rgb: [f64; 3]) -> f64 {
+    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+}
+
+#[derive(Serialize)]
+struct Row<'a> {
+    number: usize,
+    stack: &'a Stack,
+    layers: Vec<&'static str>,
+    words: String,
+    /// Reflectance in 1/sr at half angles of 0, 10 and 30 degrees, linear RGB.
+    reflectance: [[f64; 3]; 3],
+    minimum_cluster: u16,
+    breaks: Vec<&'a str>,
+    provenance: &'a Provenance,
+}
+
+fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<String> {
+    let entries = library.at_hand(&inks.unwrap_or(InkSet::ALL));
+    if json {
+        let rows: Vec<Row<'_>> = entries
+            .into_iter()
+            .map(|entry| Row {
+                number: entry.number,
+                stack: &entry.stack,
+                layers: entry.stack.layers().iter().map(|ink| ink.name()).collect(),
+                words: library.words(&entry.stack),
+                reflectance: [0.0, 10.0, 30.0].map(|degrees: f64| entry.curve.at(degrees.to_radians())),
+                minimum_cluster: library.minimum_cluster(&entry.stack),
+                breaks: library.broken_rules(&entry.stack).iter().map(|rule| rule.name.as_str()).collect(),
+                provenance: &entry.provenance,
+            })
+            .collect();
+        return Ok(serde_json::to_string_pretty(&rows)? + "\n");
+    }
+    let mut text = String::new();
+    writeln!(text, "{}\n{}\n", library.name(), library.about())?;
+    writeln!(
+        text,
+        "{:>3}  {:<10} {:>9} {:>9}  {:<10} layers, bottom first",
+        "no.", "stack", "f(0)", "f(30)", "curve"
+    )?;
+    for entry in &entries {
+        let at = |degrees: f64| luminance(entry.curve.at(degrees.to_radians()));
+        writeln!(
+            text,
+            "{:>3}  {:<10} {:>9.4} {:>9.4}  {:<10} {}",
+            entry.number,
+            entry.stack,
+            at(0.0),
+            at(30.0),
+            entry.provenance.word(),
+            library.words(&entry.stack)
+        )?;
+    }
+    let measured = entries.iter().filter(|entry| entry.provenance.is_measured()).count();
+    writeln!(
+        text,
+        "\n{} stacks, {measured} measured, {} modelled. f is the luminance of the reflectance, in 1/sr.",
+        entries.len(),
+        entries.len() - measured
+    )?;
+    Ok(text)
+}
+
+fn show(library: &Library, entry: &Entry, figures: bool) -> String {
+    let stack = &entry.stack;
+    let mut lines = vec![format!("{stack}: {}", library.words(stack))];
+    match &entry.provenance {
+        Provenance::Modelled { model, parameters } => {
+            let count = |source| parameters.iter().filter(|p| p.source == source).count();
+            lines.push(format!("curve     modelled, not measured: {model}"));
+            lines.push(format!(
+                "rests on  {} figures: {} measured, {} from literature, {} from formulas, {} guesses",
+                parameters.len(),
+                count(Source::Measured),
+                count(Source::Literature),
+                count(Source::Formula),
+                count(Source::Guess)
+            ));
+        }
+        Provenance::Measured { by, when, setup } => {
+            lines.push(format!("curve     measured by {by}, {when}: {setup}"));
+        }
+    }
+    if let Some(lobes) = &entry.lobes {
+        let rgb = |v: [f64; 3]| format!("{:.3} {:.3} {:.3}", v[0], v[1], v[2]);
+        lines.push(format!("diffuse   albedo {}", rgb(lobes.kd)));
+        for lobe in &lobes.lobes {
+            lines.push(format!("lobe      F0 {}, alpha {:.3}", rgb(lobe.f0), lobe.alpha));
+        }
+    }
+    if let Some(lobes) = &entry.lobes {
+        lines.push(format!(
+            "gloss     {:.0} units at 60 degrees, as a gloss meter would read the model",
+            inks::gloss::units(lobes)
+        ));
+    }
+    lines.push(format!("cluster   {} dots of 1/600 inch or more", library.minimum_cluster(stack)));
+    for (place, &ink) in stack.layers().iter().enumerate() {
+        lines.push(String::new());
+        let at = if place == 0 { "first, lowest" } else { "above" };
+        match library.cartridge(ink) {
+            Some(cartridge) => {
+                lines.push(format!(
+                    "{at}: {} ({}), sold by ALPS as {}",
+                    cartridge.okidata,
+                    ink.short(),
+                    cartridge.alps
+                ));
+                lines.push(format!(
+                    "  cartridge {}, barcode {}, ink code {:02x}, clusters of {} dots",
+                    ink.part(),
+                    ink.barcode(),
+                    ink.code(),
+                    cartridge.minimum_cluster.get()
+                ));
+                lines.extend(
+                    cartridge
+                        .cautions
+                        .iter()
+                        .map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
+                );
+            }
+            None => lines.push(format!("{at}: {}, of which the library has no cartridge", ink.name())),
+        }
+    }
+    let broken = library.broken_rules(stack);
+    if !broken.is_empty() {
+        lines.push(String::new());
+        lines.extend(
+            broken.iter().map(|rule| format!("{}: {} ({})", rule.severity, rule.says, rule.certainty)),
+        );
+    }
+    if figures && let Provenance::Modelled { parameters, .. } = &entry.provenance {
+        lines.push(String::new());
+        for parameter in parameters {
+            let value = parameter.value.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+            lines.push(format!("  {:<32} {value:<22} {}", parameter.name, parameter.source));
+        }
+    }
+    lines.push(String::new());
+    lines.push("reflectance in 1/sr over the half angle:".into());
+    lines.join("\n") + "\n"
+}
+
+fn check(dir: &Path) -> (String, anyhow::Result<()>) {
+    let problems = Library::check(dir);
+    let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
+    let count = |severity| problems.iter().filter(|problem| problem.severity == severity).count();
+    let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
+    text.push_str(&format!("{}: {errors} errors, {warnings} warnings, {notes} notes\n", dir.display()));
+    let verdict = match errors {
+        0 => Ok(()),
+        _ => Err(anyhow::anyhow!("{} cannot be used as an ink library", dir.display())),
+    };
+    (text, verdict)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Program {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn parse(words: &str) -> Result<What, clap::Error> {
+        Program::try_parse_from(std::iter::once("inks").chain(words.split(' ')))
+            .map(|program| program.args.what)
+    }
+
+    #[test]
+    fn sets_of_inks_are_arguments() {
+        let What::List { inks: Some(inks), .. } = parse("list --inks -metallic").unwrap() else { panic!() };
+        assert!(
+            !inks.contains(protocol::ink::Ink::MetallicSilver) && inks.contains(protocol::ink::Ink::Finish)
+        );
+        let error = parse("list --inks finnish").err().unwrap();
+        assert!(error.to_string().contains("did you mean `finish`?"), "{error}");
+    }
+
+    #[test]
+    fn the_list_has_a_line_for_each_stack_and_says_modelled() {
+        let library = Library::builtin();
+        let text = list(&library, None, false).unwrap();
+        for entry in library.entries() {
+            assert!(text.lines().any(|line| line.contains(&format!(" {} ", entry.stack))), "{}", entry.stack);
+        }
+        assert!(text.contains("57 stacks, 0 measured, 57 modelled"));
+        let few = list(&library, Some("process".parse().unwrap()), false).unwrap();
+        assert!(few.contains("\n9 stacks"), "{few}");
+    }
+
+    #[test]
+    fn the_json_list_is_the_library() {
+        let text = list(&Library::builtin(), None, true).unwrap();
+        let rows: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(rows.as_array().unwrap().len(), 57);
+        assert_eq!(rows[52]["stack"], "MS+C+F");
+        assert_eq!(rows[52]["layers"], serde_json::json!(["metallic-silver", "cyan", "finish"]));
+        assert!(rows[52]["provenance"]["modelled"]["parameters"].as_array().unwrap().len() > 10);
+    }
+
+    #[test]
+    fn a_foil_stack_is_shown_with_its_cartridges_and_its_trouble() {
+        let library = Library::builtin();
+        let text = show(&library, find(&library, "SF+C").unwrap(), true);
+        for word in [
+            "Flash Silver",
+            "MDC-FMES",
+            "barcode 6",
+            "modelled, not measured",
+            "inferred",
+            "16 dots",
+            "warning: foil prints properly only on",
+            "silver-foil.reflectance",
+        ] {
+            assert!(text.contains(word), "`{word}` is not in:\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_stack_the_library_lacks_brings_the_nearest() {
+        let library = Library::builtin();
+        let error = |text: &str| find(&library, text).unwrap_err().to_string();
+        assert!(error("C+MS").contains("but MS+C is"), "{}", error("C+MS"));
+        assert!(error("MS+C+K").contains("nearest is"), "{}", error("MS+C+K"));
+        assert!(error("gold").contains("metallic-gold"), "{}", error("gold"));
+    }
+
+    #[test]
+    fn a_plot_file_appears_whole_and_check_fails_on_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("plot.svg");
+        replace(&file, "one").unwrap();
+        replace(&file, "two").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "two");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(check(folder.path()).1.is_err());
+        std::fs::write(folder.path().join("library.toml"), "format = 1\nbased_on = \"built-in\"\n").unwrap();
+        let (text, verdict) = check(folder.path());
+        assert!(verdict.is_ok() && text.contains("0 errors"), "{text}");
+    }
+}

@@ -1,0 +1,115 @@
+//! `foilpress inspect`: what is in a stream.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use clap::Args as ClapArgs;
+
+use super::output::Staged;
+use crate::inspect::{Inspection, inspect};
+use crate::observe::Observer;
+use crate::separate::files::{self, save_plane};
+
+/// Arguments of `inspect`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    after_help = "Examples:\n  foilpress inspect job.rgl\n  foilpress inspect job.rgl --passes passes/ --json"
+)]
+pub struct Args {
+    /// A stream in the printer's language
+    #[arg(value_name = "JOB.rgl")]
+    job: PathBuf,
+    /// The summary as JSON
+    #[arg(long)]
+    json: bool,
+    /// Also write the dots of each pass as a one-bit picture into this folder
+    #[arg(long, value_name = "DIR")]
+    passes: Option<PathBuf>,
+}
+
+/// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    let job = super::read_job(&args.job)?;
+    let inspected = inspect(&job, observer);
+    let summary = &inspected.inspection;
+    if let Some(folder) = &args.passes {
+        let staged = Staged::new(folder)?;
+        let inside = staged.folder()?;
+        for (report, pass) in summary.passes.iter().zip(&inspected.passes) {
+            let name = files::name(report.number - 1, pass.ink);
+            save_plane(&pass.plane, &inside.join(name))?;
+        }
+        staged.commit()?;
+    }
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        writeln!(out, "{}", serde_json::to_string_pretty(summary)?)?;
+    } else {
+        write_words(summary, &mut out)?;
+    }
+    match &summary.error {
+        Some(error) => bail!("{}: {error}", args.job.display()),
+        None => Ok(()),
+    }
+}
+
+fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()> {
+    let setup = &summary.setup;
+    let unknown = "not declared";
+    let (across, along) = setup.resolution.unwrap_or_default();
+    writeln!(
+        out,
+        "{} bytes, {}",
+        summary.bytes,
+        if summary.complete { "one whole job" } else { "no whole job" }
+    )?;
+    writeln!(
+        out,
+        "{across} x {along} dpi, {} paper ({} x {} dots), {} media, {} mode, curl correction {}",
+        setup.paper.unwrap_or(unknown),
+        setup.width,
+        setup.length,
+        setup.media.unwrap_or(unknown),
+        setup.mode.unwrap_or(unknown),
+        setup.curl_correction.map_or(unknown, |on| if on { "on" } else { "off" }),
+    )?;
+    if (setup.shift_x, setup.shift_y) != (0, 0) {
+        writeln!(out, "shifted by {} dots and {} rows", setup.shift_x, setup.shift_y)?;
+    }
+    if let Some(cassettes) = &setup.cassettes {
+        writeln!(out, "cassette list: {}", cassettes.join(", "))?;
+    }
+    for pass in &summary.passes {
+        write!(
+            out,
+            "pass {} at byte {}: {} (ink {:02x}, barcode {}, {}), {} dots, {} rows ({} packed), {} bytes",
+            pass.number,
+            pass.offset,
+            pass.ink,
+            pass.code,
+            pass.barcode,
+            pass.cartridge,
+            pass.dots,
+            pass.rows,
+            pass.packed_rows,
+            pass.bytes
+        )?;
+        match &pass.bounds {
+            Some(bounds) => writeln!(
+                out,
+                "\n    from ({}, {}), {} x {} dots; {:.1} x {:.1} mm at {:.1}, {:.1} mm of the printable area",
+                bounds.x,
+                bounds.y,
+                bounds.width,
+                bounds.height,
+                bounds.mm[2],
+                bounds.mm[3],
+                bounds.mm[0],
+                bounds.mm[1]
+            )?,
+            None => writeln!(out, "; blank")?,
+        }
+    }
+    Ok(())
+}

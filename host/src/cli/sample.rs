@@ -1,0 +1,41 @@
+//! `foilpress sample`: what can be printed before there is a document.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+
+use super::output::Staged;
+use crate::sample::{SAMPLES, Sample};
+
+/// The samples, or one of them as a folder of texture maps.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// `list`, or the name of a sample
+    name: String,
+    /// Where to write the sample's folder [default: the sample's name]
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
+/// Lists the samples, or draws one and writes its maps.
+pub fn run(args: Args) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    if args.name == "list" {
+        if args.output.is_some() {
+            bail!("`sample list` writes no files; name a sample to go with -o");
+        }
+        for sample in SAMPLES {
+            writeln!(out, "{:<8} {}", sample.name, sample.about)?;
+        }
+        return Ok(());
+    }
+    let sample = Sample::named(&args.name)?;
+    let target = args.output.unwrap_or_else(|| PathBuf::from(sample.name));
+    let staged = Staged::new(&target)?;
+    std::fs::create_dir(staged.path())?;
+    sample.draw().write(sample.name, staged.path())?;
+    staged.commit()?;
+    writeln!(out, "{}", target.display())?;
+    Ok(())
+}

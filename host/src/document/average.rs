@@ -1,0 +1,102 @@
+//! A half-angle curve from a measurement over all directions.
+//!
+//! Problem: a measured isotropic BRDF depends on theta_h, theta_d and phi_d; the document stage wants theta_h alone.
+//! Method: at each theta_h the mean over theta_d and phi_d, weighted by `cos_i cos_o sin(theta_d)`, of the cells
+//! that were measured (both directions above the horizon). theta_d runs from 2.5 to 57.5 degrees: nearer
+//! to 0 the instrument is in its own light and files hold extrapolations, beyond lie the grazing pairs.
+//! Limits: what depends on theta_d is lost (metals: factors up to two at the peak). Angles that no pair of
+//! directions reaches are left out; the curve holds its last value there.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use inks::Curve;
+
+/// Range of theta_d that is averaged, in degrees.
+pub const THETA_D: (f64, f64) = (2.5, 57.5);
+
+/// A direction, z along the normal.
+pub type Direction = [f64; 3];
+
+/// The two directions of half-angle coordinates (radians), by symmetry with phi_h = 0: `wi` is d turned by theta_h about
+/// the y axis, `wo = 2 (wi . h) h - wi`.
+pub fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (Direction, Direction) {
+    let (sh, ch) = theta_h.sin_cos();
+    let (sd, cd) = theta_d.sin_cos();
+    let (sp, cp) = phi_d.sin_cos();
+    let d = [sd * cp, sd * sp, cd];
+    let wi = [ch * d[0] + sh * d[2], d[1], ch * d[2] - sh * d[0]];
+    let h = [sh, 0.0, ch];
+    // The angle between wi and h is theta_d.
+    let wo = std::array::from_fn(|k| 2.0 * cd * h[k] - wi[k]);
+    (wi, wo)
+}
+
+/// Mean over theta_d and phi_d at each theta_h, given in `theta_h` (radians, ascending), on a grid of cell centres:
+/// `theta_d_cells` over 0 to 90 degrees and `phi_d_cells` over 0 to 180. `value` gets the indices of theta_h,
+/// theta_d and phi_d with the two directions and answers the reflectance in 1/sr, or `None` where nothing was
+/// measured. `None` if no cell at all was measured.
+pub fn curve(
+    theta_h: &[f64],
+    theta_d_cells: usize,
+    phi_d_cells: usize,
+    mut value: impl FnMut([usize; 3], Direction, Direction) -> Option<[f64; 3]>,
+) -> Option<Curve> {
+    let (mut angles, mut values) = (Vec::new(), Vec::new());
+    for (h, &th) in theta_h.iter().enumerate() {
+        let (mut sum, mut weights) = ([0.0; 3], 0.0);
+        for d in 0..theta_d_cells {
+            let td = (d as f64 + 0.5) / theta_d_cells as f64 * FRAC_PI_2;
+            if td < THETA_D.0.to_radians() || td > THETA_D.1.to_radians() {
+                continue;
+            }
+            for p in 0..phi_d_cells {
+                let (wi, wo) = directions(th, td, (p as f64 + 0.5) / phi_d_cells as f64 * PI);
+                let weight = wi[2] * wo[2] * td.sin();
+                if wi[2] <= 0.0 || wo[2] <= 0.0 {
+                    continue;
+                }
+                if let Some(f) = value([h, d, p], wi, wo) {
+                    (0..3).for_each(|c| sum[c] += weight * f[c]);
+                    weights += weight;
+                }
+            }
+        }
+        if weights > 0.0 {
+            angles.push(th);
+            values.push(sum.map(|s| (s / weights).max(0.0)));
+        }
+    }
+    Curve::new(angles, values).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn directions_have_the_half_angles_they_were_made_from(
+            th in 0.01f64..1.5, td in 0.01f64..1.5, pd in 0.01f64..3.1,
+        ) {
+            let (wi, wo) = directions(th, td, pd);
+            let dot = |a: Direction, b: Direction| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+            prop_assert!((dot(wi, wi) - 1.0).abs() < 1e-12 && (dot(wo, wo) - 1.0).abs() < 1e-12);
+            let sum: Direction = std::array::from_fn(|k| wi[k] + wo[k]);
+            let length = dot(sum, sum).sqrt();
+            prop_assert!(((sum[2] / length).acos() - th).abs() < 1e-7);
+            // Half the angle between the directions is theta_d.
+            prop_assert!((dot(wi, wo).clamp(-1.0, 1.0).acos() / 2.0 - td).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn what_depends_on_the_half_angle_alone_is_kept() {
+        let theta: Vec<f64> = (0..40).map(|i| f64::from(i) / 40.0 * 1.4).collect();
+        let f = |t: f64| [(-3.0 * t).exp(), 0.2, t * t];
+        let found = curve(&theta, 90, 90, |[h, ..], _, _| Some(f(theta[h]))).unwrap();
+        for (&t, v) in found.theta().iter().zip(found.rgb()) {
+            (0..3).for_each(|c| assert!((v[c] - f(t)[c]).abs() < 1e-12));
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! What a texture file is, by its name: the conventions of texture sites and painting programs.
+//!
+//! Problem: `Metal053C_1K-JPG_NormalGL.jpg`, `rusty_metal_02_arm_2k.png`, `T_Rock_BC.tga`, `albedo.jpg`.
+//! Method: a stem is cut into lower-case words at punctuation and at a capital after a small letter. Words all
+//! files of the folder begin with are the material's name and say nothing (so `rusty_metal_diff` is no metal map).
+//! Of the rest, words about size and format are dropped; then the longest run of words that names a role,
+//! furthest to the right, decides. Single letters count only as the last word, as in Unreal's suffixes.
+//! Limits: a name that follows no convention is no map; `material.toml` can name the files instead.
+
+/// What a map is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Base colour, albedo or diffuse colour.
+    BaseColor,
+    /// Roughness.
+    Roughness,
+    /// Metallic, metalness.
+    Metallic,
+    /// Occlusion, roughness and metallic in red, green and blue.
+    Packed,
+    /// Specular colour (f0) or level.
+    Specular,
+    /// Glossiness, one minus roughness.
+    Glossiness,
+    /// Surface normals, of either handedness.
+    Normal,
+    /// A map known to say nothing about reflectance: occlusion, height, previews and the like.
+    Ignored,
+}
+
+impl Role {
+    /// How errors call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::BaseColor => "base colour",
+            Role::Roughness => "roughness",
+            Role::Metallic => "metallic",
+            Role::Packed => "occlusion-roughness-metallic",
+            Role::Specular => "specular",
+            Role::Glossiness => "glossiness",
+            Role::Normal => "normal",
+            Role::Ignored => "other",
+        }
+    }
+}
+
+/// Words run together that name a role.
+const ALIASES: [(&str, Role); 87] = [
+    ("basecolor", Role::BaseColor),
+    ("basecolour", Role::BaseColor),
+    ("base", Role::BaseColor),
+    ("albedo", Role::BaseColor),
+    ("albedotransparency", Role::BaseColor),
+    ("alb", Role::BaseColor),
+    ("diffuse", Role::BaseColor),
+    ("diffusecolor", Role::BaseColor),
+    ("diff", Role::BaseColor),
+    ("dif", Role::BaseColor),
+    ("color", Role::BaseColor),
+    ("colour", Role::BaseColor),
+    ("col", Role::BaseColor),
+    ("bc", Role::BaseColor),
+    ("roughness", Role::Roughness),
+    ("rough", Role::Roughness),
+    ("rgh", Role::Roughness),
+    ("metallic", Role::Metallic),
+    ("metalness", Role::Metallic),
+    ("metallness", Role::Metallic),
+    ("metal", Role::Metallic),
+    ("mtl", Role::Metallic),
+    ("orm", Role::Packed),
+    ("arm", Role::Packed),
+    ("aorm", Role::Packed),
+    ("aormt", Role::Packed),
+    ("mr", Role::Packed),
+    ("metallicroughness", Role::Packed),
+    ("metalnessroughness", Role::Packed),
+    ("metalrough", Role::Packed),
+    ("metalroughness", Role::Packed),
+    ("roughnessmetallic", Role::Packed),
+    ("roughnessmetalness", Role::Packed),
+    ("roughmetal", Role::Packed),
+    ("occlusionroughnessmetallic", Role::Packed),
+    ("occlusionroughnessmetalness", Role::Packed),
+    ("aoroughnessmetallic", Role::Packed),
+    ("aoroughnessmetalness", Role::Packed),
+    ("ambientocclusionroughnessmetallic", Role::Packed),
+    ("specular", Role::Specular),
+    ("specularcolor", Role::Specular),
+    ("specularlevel", Role::Specular),
+    ("spec", Role::Specular),
+    ("spc", Role::Specular),
+    ("refl", Role::Specular),
+    ("reflection", Role::Specular),
+    ("glossiness", Role::Glossiness),
+    ("gloss", Role::Glossiness),
+    ("glossy", Role::Glossiness),
+    ("smoothness", Role::Glossiness),
+    ("normal", Role::Normal),
+    ("normals", Role::Normal),
+    ("normalmap", Role::Normal),
+    ("normalgl", Role::Normal),
+    ("normaldx", Role::Normal),
+    ("norm", Role::Normal),
+    ("nor", Role::Normal),
+    ("nrm", Role::Normal),
+    ("nrml", Role::Normal),
+    ("ao", Role::Ignored),
+    ("occlusion", Role::Ignored),
+    ("ambientocclusion", Role::Ignored),
+    ("occ", Role::Ignored),
+    ("cavity", Role::Ignored),
+    ("height", Role::Ignored),
+    ("heightmap", Role::Ignored),
+    ("displacement", Role::Ignored),
+    ("displace", Role::Ignored),
+    ("disp", Role::Ignored),
+    ("bump", Role::Ignored),
+    ("opacity", Role::Ignored),
+    ("alpha", Role::Ignored),
+    ("mask", Role::Ignored),
+    ("emissive", Role::Ignored),
+    ("emission", Role::Ignored),
+    ("emit", Role::Ignored),
+    ("anisotropy", Role::Ignored),
+    ("anisotropic", Role::Ignored),
+    ("curvature", Role::Ignored),
+    ("translucency", Role::Ignored),
+    ("subsurface", Role::Ignored),
+    ("fuzz", Role::Ignored),
+    ("sheen", Role::Ignored),
+    ("clearcoat", Role::Ignored),
+    ("preview", Role::Ignored),
+    ("thumbnail", Role::Ignored),
+    ("thumb", Role::Ignored),
+];
+
+const LETTERS: [(&str, Role); 7] = [
+    ("d", Role::BaseColor),
+    ("r", Role::Roughness),
+    ("m", Role::Metallic),
+    ("s", Role::Specular),
+    ("g", Role::Glossiness),
+    ("n", Role::Normal),
+    ("h", Role::Ignored),
+];
+
+/// The words of a stem, lower case.
+fn words(stem: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut small = false;
+    for c in stem.chars() {
+        if !c.is_alphanumeric() {
+            words.push(String::new());
+            small = false;
+            continue;
+        }
+        if c.is_uppercase() && small {
+            words.push(String::new());
+        }
+        small = c.is_lowercase();
+        if let Some(word) = words.last_mut() {
+            word.extend(c.to_lowercase());
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+/// Whether a word is about size, format or handedness.
+fn is_noise(word: &str) -> bool {
+    const NOISE: [&str; 19] = [
+        "jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr", "gl", "ogl", "opengl", "dx", "directx", "8bit",
+        "16bit", "32bit", "srgb", "linear", "raw", "map",
+    ];
+    let number = word.trim_end_matches('k');
+    let digits = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_ascii_digit());
+    NOISE.contains(&word)
+        || digits(number)
+        || word.strip_prefix("lod").is_some_and(digits)
+        || word.strip_prefix('v').is_some_and(digits)
+}
+
+/// The role some words name, furthest right, longest first.
+fn role(words: &[String]) -> Option<Role> {
+    let words: Vec<&str> = words.iter().map(String::as_str).filter(|word| !is_noise(word)).collect();
+    let last = *words.last()?;
+    if let Some(&(_, role)) = LETTERS.iter().find(|(letter, _)| *letter == last) {
+        return Some(role);
+    }
+    for end in (1..=words.len()).rev() {
+        for start in end.saturating_sub(4)..end {
+            let run = words[start..end].concat();
+            if let Some(&(_, role)) = ALIASES.iter().find(|(alias, _)| *alias == run) {
+                return Some(role);
+            }
+        }
+    }
+    None
+}
+
+/// The role of each file of a folder, by its stem; `None` where the name says nothing.
+pub fn roles(stems: &[&str]) -> Vec<Option<Role>> {
+    let all: Vec<Vec<String>> = stems.iter().map(|stem| words(stem)).collect();
+    let mut shared = 0;
+    if let [first, rest @ ..] = &all[..]
+        && !rest.is_empty()
+    {
+        shared =
+            (0..first.len()).take_while(|&i| rest.iter().all(|other| other.get(i) == first.get(i))).count();
+    }
+    all.iter().map(|words| role(&words[shared..])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all(stems: &[&str]) -> Vec<Option<Role>> {
+        roles(stems)
+    }
+
+    #[test]
+    #[expect(clippy::type_complexity, reason = "a table to read")]
+    fn each_sites_own_names_are_understood() {
+        use Role::*;
+        let sites: [(&str, &[(&str, Option<Role>)]); 8] = [
+            (
+                "ambientCG",
+                &[
+                    ("Metal053C", None),
+                    ("Metal053C_1K-JPG_Color", Some(BaseColor)),
+                    ("Metal053C_1K-JPG_NormalGL", Some(Normal)),
+                    ("Metal053C_1K-JPG_NormalDX", Some(Normal)),
+                    ("Metal053C_1K-JPG_Roughness", Some(Roughness)),
+                    ("Metal053C_1K-JPG_Metalness", Some(Metallic)),
+                    ("Metal053C_1K-JPG_Displacement", Some(Ignored)),
+                ],
+            ),
+            (
+                "Poly Haven",
+                &[
+                    ("rusty_metal_02_diff_2k", Some(BaseColor)),
+                    ("rusty_metal_02_arm_2k", Some(Packed)),
+                    ("rusty_metal_02_nor_gl_2k", Some(Normal)),
+                    ("rusty_metal_02_rough_2k", Some(Roughness)),
+                    ("rusty_metal_02_metal_2k", Some(Metallic)),
+                    ("rusty_metal_02_spec_2k", Some(Specular)),
+                    ("rusty_metal_02_disp_2k", Some(Ignored)),
+                ],
+            ),
+            (
+                "Substance",
+                &[
+                    ("mat_Base_Color", Some(BaseColor)),
+                    ("mat_OcclusionRoughnessMetallic", Some(Packed)),
+                    ("mat_Normal_OpenGL", Some(Normal)),
+                    ("mat_Glossiness", Some(Glossiness)),
+                    ("mat_Specular", Some(Specular)),
+                ],
+            ),
+            (
+                "Unreal",
+                &[
+                    ("T_Rock_BC", Some(BaseColor)),
+                    ("T_Rock_N", Some(Normal)),
+                    ("T_Rock_ORM", Some(Packed)),
+                    ("T_Rock_R", Some(Roughness)),
+                    ("T_Rock_M", Some(Metallic)),
+                    ("T_Rock_H", Some(Ignored)),
+                ],
+            ),
+            (
+                "three.js",
+                &[
+                    ("hardwood2_diffuse", Some(BaseColor)),
+                    ("hardwood2_roughness", Some(Roughness)),
+                    ("hardwood2_bump", Some(Ignored)),
+                ],
+            ),
+            (
+                "glTF",
+                &[
+                    ("Default_albedo", Some(BaseColor)),
+                    ("Default_metalRoughness", Some(Packed)),
+                    ("Default_AO", Some(Ignored)),
+                ],
+            ),
+            (
+                "Megascans",
+                &[
+                    ("xyz_2K_Albedo", Some(BaseColor)),
+                    ("xyz_2K_Normal_LOD0", Some(Normal)),
+                    ("xyz_2K_Gloss", Some(Glossiness)),
+                    ("xyz_2K_AO", Some(Ignored)),
+                ],
+            ),
+            (
+                "plain",
+                &[
+                    ("albedo", Some(BaseColor)),
+                    ("METALLIC", Some(Metallic)),
+                    ("occlusion_roughness_metallic", Some(Packed)),
+                    ("normal-ogl", Some(Normal)),
+                    ("holiday", None),
+                ],
+            ),
+        ];
+        for (site, files) in sites {
+            let stems: Vec<&str> = files.iter().map(|(stem, _)| *stem).collect();
+            for (found, (stem, expected)) in all(&stems).into_iter().zip(files) {
+                assert_eq!(found, *expected, "{site}: {stem}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_materials_own_name_is_no_role() {
+        assert_eq!(all(&["rusty_metal", "rusty_metal_color"]), [None, Some(Role::BaseColor)]);
+        assert_eq!(all(&["gloss_paint_diffuse", "gloss_paint_roughness"])[0], Some(Role::BaseColor));
+    }
+}

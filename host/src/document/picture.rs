@@ -1,0 +1,297 @@
+//! Decoding one picture: PNG, JPEG, TIFF, Radiance HDR and OpenEXR, by content and within limits.
+//!
+//! The file's name is only a hint; what it holds decides, and a mismatch is noted. Dimensions are checked before
+//! anything of their size is allocated. Floating-point pictures must be finite.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use exr::prelude::{ReadChannels, ReadLayers};
+use image::{DynamicImage, ImageDecoder, ImageFormat};
+use palette::encoding::{IntoLinear, Srgb};
+use rayon::prelude::*;
+
+use super::ColourSpace;
+use super::error::DocumentError;
+use super::source::Source;
+use super::surfaces::MOST_PIXELS;
+use super::texture::Plane;
+
+/// The most pixels along one side.
+pub const MOST_SIDE: u64 = 16_384;
+
+/// The most values (pixels times channels) of one picture.
+pub const MOST_VALUES: u64 = 1 << 28;
+
+/// The values of a picture, interleaved, rows from the top.
+#[derive(Clone, Debug)]
+enum Values {
+    /// 0..=255 for 0..=1.
+    Eight(Vec<u8>),
+    /// 0..=65535 for 0..=1.
+    Sixteen(Vec<u16>),
+    /// As they are; finite.
+    Float(Vec<f32>),
+}
+
+/// A decoded picture of 1 to 4 channels: grey, grey and alpha, RGB, RGB and alpha.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Pixels across, at least 1.
+    pub width: usize,
+    /// Pixels down, at least 1.
+    pub height: usize,
+    channels: usize,
+    values: Values,
+    foreign_profile: bool,
+}
+
+impl Picture {
+    /// Decodes the bytes of a file; `path` names it in errors and notes.
+    pub fn decode(bytes: &[u8], path: &Path, source: &mut Source<'_>) -> Result<Picture, DocumentError> {
+        let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
+        let format = if bytes.starts_with(b"#?RGBE") {
+            Some(ImageFormat::Hdr)
+        } else {
+            image::guess_format(bytes).ok()
+        };
+        let Some((format, kind)) = format.and_then(|format| Some((format, kind(format)?))) else {
+            let found = if bytes.is_empty() { "an empty file" } else { "something else" };
+            return Err(wrong(format!(
+                "expected a PNG, JPEG, TIFF, OpenEXR or Radiance HDR picture, found {found}"
+            )));
+        };
+        if let Ok(named) = ImageFormat::from_path(path)
+            && named != format
+        {
+            source.note(format!("{} is a {kind} picture under another name; read as {kind}", path.display()));
+        }
+        let picture = match format {
+            ImageFormat::OpenExr => decode_exr(bytes, path)?,
+            format => {
+                // The decoder knows only one of the two signatures of a Radiance file.
+                let renamed = bytes.strip_prefix(b"#?RGBE").map(|rest| [b"#?RADIANCE", rest].concat());
+                decode_image(renamed.as_deref().unwrap_or(bytes), format, path)?
+            }
+        };
+        if let Values::Float(values) = &picture.values
+            && let Some(at) = values.iter().position(|v| !v.is_finite())
+        {
+            let (pixel, channel) = (at / picture.channels, at % picture.channels);
+            return Err(wrong(format!(
+                "pixel ({}, {}) channel {channel} is {}, not a finite number",
+                pixel % picture.width,
+                pixel / picture.width,
+                values[at]
+            )));
+        }
+        if picture.has_alpha() && !picture.is_opaque() {
+            source.note(format!("{}: alpha is ignored; every pixel is printed", path.display()));
+        }
+        Ok(picture)
+    }
+
+    /// Whether the values are floating point, as in EXR and HDR files.
+    pub fn is_float(&self) -> bool {
+        matches!(self.values, Values::Float(_))
+    }
+
+    /// Whether it carries a colour profile other than sRGB. It is never applied; data has no use for one.
+    pub fn has_foreign_profile(&self) -> bool {
+        self.foreign_profile
+    }
+
+    /// The values of a 16-bit grey picture, 0 to 65535.
+    pub fn sixteen(&self) -> Option<&[u16]> {
+        match &self.values {
+            Values::Sixteen(values) if self.channels == 1 => Some(values),
+            _ => None,
+        }
+    }
+
+    /// Channels without alpha: 1 or 3.
+    pub fn colours(&self) -> usize {
+        if self.channels < 3 { 1 } else { 3 }
+    }
+
+    fn has_alpha(&self) -> bool {
+        self.channels == 2 || self.channels == 4
+    }
+
+    fn is_opaque(&self) -> bool {
+        let (channels, last) = (self.channels, self.channels - 1);
+        match &self.values {
+            Values::Eight(v) => v.chunks_exact(channels).all(|p| p[last] == u8::MAX),
+            Values::Sixteen(v) => v.chunks_exact(channels).all(|p| p[last] == u16::MAX),
+            Values::Float(v) => v.chunks_exact(channels).all(|p| p[last] >= 1.0),
+        }
+    }
+
+    /// One channel as data, 0 to 1 for whole numbers. Channel 3 is alpha (1 where there is none); of a grey
+    /// picture every other channel is the grey one.
+    pub fn channel(&self, channel: usize) -> Plane {
+        let at = match (channel, self.has_alpha()) {
+            (3, false) => {
+                return Plane::new(self.width, self.height, vec![1.0; self.width * self.height]);
+            }
+            (3, true) => self.channels - 1,
+            (channel, _) => channel.min(self.colours() - 1),
+        };
+        let data = match &self.values {
+            Values::Eight(v) => {
+                v.par_chunks_exact(self.channels).map(|p| f32::from(p[at]) / f32::from(u8::MAX)).collect()
+            }
+            Values::Sixteen(v) => {
+                v.par_chunks_exact(self.channels).map(|p| f32::from(p[at]) / f32::from(u16::MAX)).collect()
+            }
+            Values::Float(v) => v.par_chunks_exact(self.channels).map(|p| p[at]).collect(),
+        };
+        Plane::new(self.width, self.height, data)
+    }
+
+    /// Which encoding its colours have unless someone says otherwise: linear in floating point, sRGB in whole
+    /// numbers.
+    pub fn natural_space(&self) -> ColourSpace {
+        if self.is_float() { ColourSpace::Linear } else { ColourSpace::Srgb }
+    }
+
+    /// One colour channel as linear values.
+    pub fn linear_channel(&self, channel: usize, space: ColourSpace) -> Plane {
+        let plane = self.channel(channel);
+        match space {
+            ColourSpace::Linear => plane,
+            ColourSpace::Srgb => plane.map(decode_srgb),
+        }
+    }
+
+    /// The colours as linear values.
+    pub fn linear(&self, space: ColourSpace) -> [Plane; 3] {
+        if self.colours() == 1 {
+            let grey = self.linear_channel(0, space);
+            return [grey.clone(), grey.clone(), grey];
+        }
+        std::array::from_fn(|channel| self.linear_channel(channel, space))
+    }
+}
+
+/// Inverts the sRGB transfer curve.
+pub fn decode_srgb(v: f32) -> f32 {
+    <Srgb as IntoLinear<f32, f32>>::into_linear(v.max(0.0))
+}
+
+/// Whether a colour profile calls itself sRGB, in either of the text encodings profiles use.
+fn is_srgb(profile: &[u8]) -> bool {
+    profile.windows(4).any(|w| w == b"sRGB") || profile.windows(8).any(|w| w == b"\0s\0R\0G\0B")
+}
+
+fn kind(format: ImageFormat) -> Option<&'static str> {
+    match format {
+        ImageFormat::Png => Some("PNG"),
+        ImageFormat::Jpeg => Some("JPEG"),
+        ImageFormat::Tiff => Some("TIFF"),
+        ImageFormat::Hdr => Some("Radiance HDR"),
+        ImageFormat::OpenExr => Some("OpenEXR"),
+        _ => None,
+    }
+}
+
+/// Refuses sizes nobody can mean, before anything is allocated.
+fn check_size(path: &Path, width: u64, height: u64, channels: u64) -> Result<(), DocumentError> {
+    let large = |field: &str, found, most| {
+        Err(DocumentError::Large { path: path.to_path_buf(), field: field.into(), found, most })
+    };
+    if width == 0 || height == 0 {
+        let problem = format!("the picture is {width} x {height} pixels; expected at least one");
+        return Err(DocumentError::Picture { path: path.to_path_buf(), problem });
+    }
+    if width.max(height) > MOST_SIDE {
+        return large("longer side in pixels", width.max(height), MOST_SIDE);
+    }
+    if width * height > MOST_PIXELS {
+        return large("number of pixels", width * height, MOST_PIXELS);
+    }
+    if width * height * channels > MOST_VALUES {
+        return large("number of values", width * height * channels, MOST_VALUES);
+    }
+    Ok(())
+}
+
+fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Picture, DocumentError> {
+    let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
+    let damaged = |error: image::ImageError| wrong(format!("cannot decode the picture: {error}"));
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(MOST_SIDE as u32);
+    limits.max_image_height = Some(MOST_SIDE as u32);
+    limits.max_alloc = Some(4 * MOST_VALUES);
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(damaged)?;
+    let (width, height) = decoder.dimensions();
+    let channels = u64::from(decoder.color_type().channel_count());
+    check_size(path, u64::from(width), u64::from(height), channels)?;
+    // Damage to a profile is no damage to the picture.
+    let foreign_profile =
+        decoder.icc_profile().is_ok_and(|profile| profile.is_some_and(|bytes| !is_srgb(&bytes)));
+    let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    let picture = |channels, values| Picture { width, height, channels, values, foreign_profile };
+    Ok(match decoded {
+        DynamicImage::ImageLuma8(p) => picture(1, Values::Eight(p.into_raw())),
+        DynamicImage::ImageLumaA8(p) => picture(2, Values::Eight(p.into_raw())),
+        DynamicImage::ImageRgb8(p) => picture(3, Values::Eight(p.into_raw())),
+        DynamicImage::ImageRgba8(p) => picture(4, Values::Eight(p.into_raw())),
+        DynamicImage::ImageLuma16(p) => picture(1, Values::Sixteen(p.into_raw())),
+        DynamicImage::ImageLumaA16(p) => picture(2, Values::Sixteen(p.into_raw())),
+        DynamicImage::ImageRgb16(p) => picture(3, Values::Sixteen(p.into_raw())),
+        DynamicImage::ImageRgba16(p) => picture(4, Values::Sixteen(p.into_raw())),
+        DynamicImage::ImageRgb32F(p) => picture(3, Values::Float(p.into_raw())),
+        DynamicImage::ImageRgba32F(p) => picture(4, Values::Float(p.into_raw())),
+        other => {
+            return Err(wrong(format!("pixels of kind {:?} are not read; save it as RGB", other.color())));
+        }
+    })
+}
+
+/// OpenEXR files name their channels freely: `R G B`, `Y`, or a single channel of any name are read.
+fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
+    let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
+    let damaged = |error: exr::error::Error| wrong(format!("cannot decode the picture: {error}"));
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        check_size(path, size.width() as u64, size.height() as u64, header.channels.list.len() as u64)?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(damaged)?;
+    let layer = image.layer_data;
+    let (width, height) = (layer.size.width(), layer.size.height());
+    let list = &layer.channel_data.list;
+    let named = |name: &str| list.iter().find(|channel| channel.name.eq(name));
+    let chosen = match (named("R"), named("G"), named("B"), named("Y")) {
+        (Some(r), Some(g), Some(b), _) => vec![r, g, b],
+        (_, _, _, Some(y)) => vec![y],
+        _ if list.len() == 1 => vec![&list[0]],
+        _ => {
+            let names: Vec<String> = list.iter().map(|channel| channel.name.to_string()).collect();
+            return Err(wrong(format!("expected channels R, G, B or Y, found {}", names.join(", "))));
+        }
+    };
+    let channels = chosen.len();
+    let mut values = vec![0.0; width * height * channels];
+    for (c, channel) in chosen.into_iter().enumerate() {
+        if channel.sample_data.len() != width * height {
+            return Err(wrong(format!("channel {} is subsampled, which is not read", channel.name)));
+        }
+        for (pixel, value) in values.chunks_exact_mut(channels).zip(channel.sample_data.values_as_f32()) {
+            pixel[c] = value;
+        }
+    }
+    Ok(Picture { width, height, channels, values: Values::Float(values), foreign_profile: false })
+}

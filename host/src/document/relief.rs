@@ -1,0 +1,147 @@
+//! Relief as roughness: what is left of a normal map on flat paper.
+//!
+//! Problem: paper is flat. A bumpy surface scatters a highlight by its bumps as well as by its microfacets; the
+//! print can only do the latter.
+//! Method: within a window the slopes of the normal map are one more spread of facets. Widths add in squares:
+//! `alpha'^2 = alpha^2 + 2 var` with `var` the variance of the slope about its mean along one axis (the mean of both axes
+//! here), as for Gaussian slopes. The window is [`WINDOW`] pixels of the base colour: bumps smaller than that
+//! become gloss, larger shapes are lost. Sign conventions (+Y up or down) do not matter to a variance, and z
+//! is taken from x and y, so maps with two channels are read too.
+//! Cost: a few additions a pixel whatever the window (running sums). Limits: isotropic; the mean slope is dropped.
+//! Source: the widening rule of the input format notes; linear filtering of slope moments in rendering (LEAN).
+
+use rayon::prelude::*;
+
+use super::texture::Plane;
+
+/// Side of the window in pixels, about a millimetre of a document printed across a page.
+pub const WINDOW: usize = 7;
+
+/// The steepest slope counted: 84 degrees.
+const STEEPEST: f32 = 10.0;
+
+/// The slope variance (mean of both axes) about the local mean, in a square window of `2 radius + 1` pixels cut
+/// off at the borders. `x` and `y` are the stored components, 0 to 1, of one size; `scale` multiplies the
+/// decoded components as glTF's normal scale does.
+pub fn slope_variance(x: &Plane, y: &Plane, scale: f32, radius: usize) -> Plane {
+    let (width, height) = (x.width(), x.height());
+    let slopes: Vec<[f32; 2]> = x
+        .data()
+        .par_iter()
+        .zip(y.data())
+        .map(|(&x, &y)| {
+            let (x, y) = (2.0 * x - 1.0, 2.0 * y - 1.0);
+            let z = (1.0 - x * x - y * y).max(0.0).sqrt().max(1.0 / STEEPEST);
+            [x * scale / z, y * scale / z].map(|s| s.clamp(-STEEPEST, STEEPEST))
+        })
+        .collect();
+    // Per column: running sums of s_x, s_y and s_x^2 + s_y^2 over the rows of the window.
+    let mut data = vec![0.0f32; width * height];
+    const BAND: usize = 64;
+    data.par_chunks_mut(width * BAND).enumerate().for_each(|(band, out)| {
+        let mut columns = vec![[0.0f64; 3]; width];
+        let add = |columns: &mut [[f64; 3]], y: usize, sign: f64| {
+            for (sum, &[sx, sy]) in columns.iter_mut().zip(&slopes[y * width..][..width]) {
+                let (sx, sy) = (f64::from(sx), f64::from(sy));
+                sum[0] += sign * sx;
+                sum[1] += sign * sy;
+                sum[2] += sign * (sx * sx + sy * sy);
+            }
+        };
+        let top = band * BAND;
+        for y in top.saturating_sub(radius)..(top + radius).min(height) {
+            add(&mut columns, y, 1.0);
+        }
+        for (row, out) in out.chunks_exact_mut(width).enumerate() {
+            let y = top + row;
+            if y + radius < height {
+                add(&mut columns, y + radius, 1.0);
+            }
+            if row > 0 && y > radius {
+                add(&mut columns, y - radius - 1, -1.0);
+            }
+            let rows = (y + radius + 1).min(height) - y.saturating_sub(radius);
+            let mut sum = [0.0f64; 3];
+            for column in &columns[..radius.min(width)] {
+                (0..3).for_each(|k| sum[k] += column[k]);
+            }
+            for (x, out) in out.iter_mut().enumerate() {
+                if let Some(column) = columns.get(x + radius) {
+                    (0..3).for_each(|k| sum[k] += column[k]);
+                }
+                if let Some(column) = x.checked_sub(radius + 1).map(|x| &columns[x]) {
+                    (0..3).for_each(|k| sum[k] -= column[k]);
+                }
+                let across = (x + radius + 1).min(width) - x.saturating_sub(radius);
+                let n = (rows * across) as f64;
+                let both = sum[2] / n - (sum[0] / n).powi(2) - (sum[1] / n).powi(2);
+                *out = (0.5 * both).max(0.0) as f32;
+            }
+        }
+    });
+    Plane::new(width, height, data)
+}
+
+/// A microfacet width with the spread of slopes added: `sqrt(alpha^2 + 2 var)`.
+pub fn widened(alpha: f32, variance: f32) -> f32 {
+    (alpha * alpha + 2.0 * variance).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn encode(slope: f32) -> f32 {
+        // A slope along one axis only, as a stored component.
+        0.5 + 0.5 * slope / (1.0 + slope * slope).sqrt()
+    }
+
+    #[test]
+    fn a_tilted_plane_has_no_variance_and_a_ridge_has_its_own() {
+        let flat = Plane::new(40, 30, vec![0.5; 1200]);
+        let tilted = Plane::new(40, 30, vec![encode(0.4); 1200]);
+        assert!(slope_variance(&tilted, &flat, 1.0, 3).data().iter().all(|v| v.abs() < 1e-6));
+        // Slopes +0.3 and -0.3 in turn: within 7 columns 4 of one sign and 3 of the other.
+        let ridges =
+            Plane::new(40, 30, (0..1200).map(|i| encode(if i % 2 == 0 { 0.3 } else { -0.3 })).collect());
+        let var = slope_variance(&ridges, &flat, 1.0, 3);
+        let expected = 0.5 * 0.09 * (1.0 - (1.0f32 / 7.0).powi(2));
+        assert!((var.data()[15 * 40 + 20] - expected).abs() < 1e-5, "{} {expected}", var.data()[620]);
+    }
+
+    proptest! {
+        #[test]
+        fn running_sums_are_the_variance_of_the_window(
+            w in 1usize..20, h in 1usize..90, radius in 0usize..6, seed in any::<u32>(),
+        ) {
+            let noise = |i: usize, k: u32| {
+                let v = (i as u32 + 7).wrapping_mul(2_654_435_761 ^ k).wrapping_add(seed).wrapping_mul(747_796_405);
+                0.2 + 0.6 * (v >> 8) as f32 / (1u32 << 24) as f32
+            };
+            let x = Plane::new(w, h, (0..w * h).map(|i| noise(i, 1)).collect());
+            let y = Plane::new(w, h, (0..w * h).map(|i| noise(i, 2)).collect());
+            let found = slope_variance(&x, &y, 0.7, radius);
+            let slope = |i: usize| {
+                let (x, y) = (f64::from(2.0 * x.data()[i] - 1.0), f64::from(2.0 * y.data()[i] - 1.0));
+                let z = (1.0 - x * x - y * y).max(0.01).sqrt();
+                [0.7 * x / z, 0.7 * y / z]
+            };
+            for cy in 0..h {
+                for cx in 0..w {
+                    let mut all = Vec::new();
+                    for y in cy.saturating_sub(radius)..(cy + radius + 1).min(h) {
+                        for x in cx.saturating_sub(radius)..(cx + radius + 1).min(w) {
+                            all.push(slope(y * w + x));
+                        }
+                    }
+                    let n = all.len() as f64;
+                    let mean = [0, 1].map(|k| all.iter().map(|s| s[k]).sum::<f64>() / n);
+                    let var = all.iter().map(|s| (s[0] - mean[0]).powi(2) + (s[1] - mean[1]).powi(2)).sum::<f64>()
+                        / (2.0 * n);
+                    prop_assert!((f64::from(found.data()[cy * w + cx]) - var).abs() < 1e-5);
+                }
+            }
+        }
+    }
+}

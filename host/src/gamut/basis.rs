@@ -1,0 +1,148 @@
+//! Each basis by eq. 1, pruned, with its certificate.
+
+use rayon::prelude::*;
+
+use super::candidates::Candidates;
+use super::cartridges::PRUNED;
+use super::{BasisReport, GamutError, Gloss, gloss};
+use crate::brdf::{Space, Table};
+use crate::solve::{Best, Mixer, MixtureError};
+use crate::weights::{ONE, quantise};
+
+/// The bases' mixtures over the candidates.
+pub(super) struct Bases {
+    /// One row of shares for each basis, summing to [`ONE`].
+    pub shares: Vec<Vec<u16>>,
+    pub reports: Vec<BasisReport>,
+    pub gloss_scale: Option<f64>,
+}
+
+struct Mapping {
+    best: Best,
+    weights: Vec<f64>,
+    shares: Vec<u16>,
+    printed: Vec<f64>,
+    pruning_cost: f64,
+}
+
+pub(super) fn map(
+    space: &Space,
+    bases: &Table,
+    candidates: &Candidates,
+    gloss: Gloss,
+) -> Result<Bases, GamutError> {
+    let plain = map_rows(bases, candidates)?;
+    let rows = |m: &[Mapping]| m.iter().map(|m| m.printed.clone()).collect::<Vec<_>>();
+    let printed = rows(&plain);
+    let merged = gloss::merges(space, bases, &printed);
+    let (mut targets, mut mappings, mut gloss_scale) = (bases.clone(), plain, None);
+    if gloss == Gloss::Scale || gloss == Gloss::WhereMerged && merged > 0 {
+        let factor = gloss::factor(space, bases, &printed);
+        if factor < 1.0 {
+            let scaled = gloss::scaled(bases, factor);
+            let mapped = map_rows(&scaled, candidates)?;
+            if gloss == Gloss::Scale || gloss::merges(space, bases, &rows(&mapped)) < merged {
+                (targets, mappings, gloss_scale) = (scaled, mapped, Some(factor));
+            }
+        }
+    }
+    let reports = mappings
+        .iter()
+        .enumerate()
+        .map(|(i, m)| {
+            let mut weights: Vec<_> = candidates
+                .stacks
+                .iter()
+                .zip(&m.weights)
+                .filter(|(_, w)| **w > 0.0)
+                .map(|(stack, &w)| (stack.clone(), w))
+                .collect();
+            weights.sort_by(|a, b| b.1.total_cmp(&a.1));
+            BasisReport {
+                target: targets.row(i).to_vec(),
+                distance: space.distance(targets.row(i), &m.printed),
+                unscaled_distance: space.distance(bases.row(i), &m.printed),
+                printed: m.printed.clone(),
+                weights,
+                gap: m.best.fit.gap,
+                convex: m.best.fit.convex,
+                starts: m.best.starts,
+                agreeing: m.best.agreeing,
+                pruning_cost: m.pruning_cost,
+            }
+        })
+        .collect();
+    Ok(Bases { shares: mappings.into_iter().map(|m| m.shares).collect(), reports, gloss_scale })
+}
+
+fn map_rows(rows: &Table, candidates: &Candidates) -> Result<Vec<Mapping>, GamutError> {
+    (0..rows.len())
+        .into_par_iter()
+        .map_init(Mixer::new, |mixer, i| {
+            map_row(rows.row(i), candidates, mixer)
+                .map_err(|source| GamutError::Mixture { what: format!("basis {i}"), source })
+        })
+        .collect()
+}
+
+fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Mapping, MixtureError> {
+    let target = candidates.free.target(row)?;
+    let best = mixer.best(&candidates.priced, &target)?;
+    let mut weights = best.weights.clone();
+    // The price has decided which stacks; among them the distance alone counts.
+    let unpruned = mixer.polish(&candidates.free, &target, &mut weights)?.distance;
+    let mut distance = unpruned;
+    while prune(&mut weights) {
+        distance = mixer.polish(&candidates.free, &target, &mut weights)?.distance;
+    }
+    let mut shares = vec![0; weights.len()];
+    quantise(&weights, &mut shares);
+    let printed = candidates.reflectance(shares.iter().map(|&s| f64::from(s) / f64::from(ONE)));
+    Ok(Mapping { best, weights, shares, printed, pruning_cost: distance - unpruned })
+}
+
+/// Drops weights below 0.5 %; whether there were any. The largest always stays: it is at least one part in 256.
+pub(super) fn prune(weights: &mut [f64]) -> bool {
+    let small = |w: f64| w > 0.0 && w < PRUNED;
+    if !weights.iter().any(|&w| small(w)) {
+        return false;
+    }
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    let mut sum = 0.0;
+    let mut dropped = false;
+    for w in weights.iter_mut() {
+        if small(*w) && *w < largest {
+            *w = 0.0;
+            dropped = true;
+        }
+        sum += *w;
+    }
+    if sum > 0.0 {
+        weights.iter_mut().for_each(|w| *w /= sum);
+    }
+    dropped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_weights_are_dropped_and_the_rest_sum_to_one() {
+        let mut weights = [0.6, 0.004, 0.0, 0.396];
+        assert!(prune(&mut weights));
+        assert_eq!(weights[1], 0.0);
+        assert!(
+            (weights.iter().sum::<f64>() - 1.0).abs() < 1e-15 && (weights[0] - 0.6 / 0.996).abs() < 1e-15
+        );
+        assert!(!prune(&mut weights));
+    }
+
+    /// More than two hundred equal weights are all small: those that are the largest stay.
+    #[test]
+    fn the_largest_weight_stays_however_small() {
+        let mut weights = vec![1.0 / 250.0; 250];
+        prune(&mut weights);
+        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}

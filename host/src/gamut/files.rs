@@ -1,0 +1,343 @@
+//! A mapped document as a folder: `mix.toml` and one 16-bit grey PNG for each weight map.
+//!
+//! `mix.toml` names the stacks and the matrix; `weights-000.png` and so on hold weight `w` (of 32768) as
+//! `w * 65535 / 32768`, rounded, so that white is full weight in any viewer; reading gives back the same weights.
+//! Reading is strict: sizes, sums and unknown keys are errors that name file and field. Writing fills a folder
+//! file by file, each appearing whole; whoever wants the folder as a whole to appear at once renames it.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+use inks::Stack;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::mix::{InkMix, MixError};
+use crate::weights::{ONE, WeightError, WeightMaps};
+
+/// The name of the description in the folder.
+pub const FILE_NAME: &str = "mix.toml";
+/// What the description says it is.
+const FORMAT: &str = "foilpress-mix-1";
+/// The largest `mix.toml` read, in bytes.
+const LONGEST: u64 = 4 << 20;
+/// The most pixels times maps read: a gigabyte of weights, 30 maps of 4096 x 4096.
+const MOST_WEIGHTS: usize = 1 << 29;
+
+/// Why a mapped document could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum MixFileError {
+    /// Reading or writing failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The description is not what it should be.
+    #[error("{}: {problem}", path.display())]
+    Description {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the field.
+        problem: String,
+    },
+    /// A weight map is not a PNG of the right kind.
+    #[error("{}: {problem}; expected a 16-bit grey PNG of {width} x {height} pixels", path.display())]
+    Map {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+        /// Pixels across the description gives.
+        width: usize,
+        /// Pixels down the description gives.
+        height: usize,
+    },
+    /// The weight maps do not fit together.
+    #[error("weight maps in {}: {source}", path.display())]
+    Weights {
+        /// The folder.
+        path: PathBuf,
+        /// Which rule they break.
+        source: WeightError,
+    },
+    /// Stacks and matrix do not fit together.
+    #[error("{}: {source}", path.display())]
+    Mix {
+        /// The file.
+        path: PathBuf,
+        /// Which rule they break.
+        source: MixError,
+    },
+}
+
+/// Where a mix comes from, in words; kept with it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// The document it was made of.
+    #[serde(default)]
+    pub document: String,
+    /// How it was mapped.
+    #[serde(default)]
+    pub mapping: String,
+    /// The ink library it was made with.
+    #[serde(default)]
+    pub library: String,
+    /// The document's own width and height on paper in millimetres.
+    #[serde(default)]
+    pub size_mm: Option<(f64, f64)>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Description {
+    format: String,
+    width: usize,
+    height: usize,
+    /// Full weight; always 32768.
+    one: u16,
+    stacks: Vec<Stack>,
+    matrix: Vec<Vec<u16>>,
+    #[serde(default)]
+    provenance: Provenance,
+}
+
+/// Writes a mix to a folder, which is created if it is not there.
+pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), MixFileError> {
+    let described = folder.join(FILE_NAME);
+    mix.check().map_err(|source| MixFileError::Mix { path: described.clone(), source })?;
+    std::fs::create_dir_all(folder)
+        .map_err(|source| MixFileError::Io { path: folder.to_path_buf(), source })?;
+    let maps = &mix.maps;
+    (0..maps.channels()).into_par_iter().try_for_each(|channel| {
+        let mut bytes = Vec::with_capacity(maps.width() * maps.height() * 2);
+        for weights in maps.data().chunks_exact(maps.channels()) {
+            bytes.extend_from_slice(&to_grey(weights[channel]).to_be_bytes());
+        }
+        let path = folder.join(map_name(channel));
+        let (Ok(width), Ok(height)) = (u32::try_from(maps.width()), u32::try_from(maps.height())) else {
+            let problem = "a PNG cannot be that large".to_string();
+            return Err(MixFileError::Map { path, problem, width: maps.width(), height: maps.height() });
+        };
+        whole(&path, |file| {
+            let mut encoder = png::Encoder::new(file, width, height);
+            encoder.set_color(png::ColorType::Grayscale);
+            encoder.set_depth(png::BitDepth::Sixteen);
+            encoder.set_compression(png::Compression::Fast);
+            let mut writer = encoder.write_header().map_err(std::io::Error::other)?;
+            writer.write_image_data(&bytes).map_err(std::io::Error::other)?;
+            writer.finish().map_err(std::io::Error::other)
+        })
+    })?;
+    let description = Description {
+        format: FORMAT.into(),
+        width: maps.width(),
+        height: maps.height(),
+        one: ONE,
+        stacks: mix.stacks.clone(),
+        matrix: mix.matrix.clone(),
+        provenance: provenance.clone(),
+    };
+    let text = toml::to_string(&description)
+        .map_err(|e| MixFileError::Description { path: described.clone(), problem: e.to_string() })?;
+    // Last: a folder without a description is no mix.
+    whole(&described, |file| file.write_all(text.as_bytes()))
+}
+
+/// Writes a file beside its name and renames it.
+fn whole(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&File>) -> std::io::Result<()>,
+) -> Result<(), MixFileError> {
+    let io = |source| MixFileError::Io { path: path.to_path_buf(), source };
+    let file = tempfile::Builder::new()
+        .prefix(".")
+        .tempfile_in(path.parent().unwrap_or(Path::new(".")))
+        .map_err(io)?;
+    let mut buffered = BufWriter::new(file.as_file());
+    write(&mut buffered).and_then(|()| buffered.flush()).map_err(io)?;
+    drop(buffered);
+    file.persist(path).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+/// Reads a mix and where it comes from.
+pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
+    let path = folder.join(FILE_NAME);
+    let wrong = |problem: String| MixFileError::Description { path: path.clone(), problem };
+    let io = |source| MixFileError::Io { path: path.clone(), source };
+    let mut text = String::new();
+    File::open(&path).map_err(io)?.take(LONGEST + 1).read_to_string(&mut text).map_err(io)?;
+    if text.len() as u64 > LONGEST {
+        return Err(wrong(format!("longer than {LONGEST} bytes")));
+    }
+    let described: Description = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let Description { format, width, height, one, stacks, matrix, provenance } = described;
+    if format != FORMAT {
+        return Err(wrong(format!("`format` is `{format}`, expected `{FORMAT}`")));
+    }
+    if one != ONE {
+        return Err(wrong(format!("`one` is {one}, expected {ONE}")));
+    }
+    let channels = matrix.len();
+    if channels == 0 {
+        return Err(wrong("`matrix` has no row; one for each weight map is needed".into()));
+    }
+    let total = width.checked_mul(height).and_then(|n| n.checked_mul(channels));
+    if width == 0 || height == 0 || total.is_none_or(|n| n > MOST_WEIGHTS) {
+        return Err(wrong(format!(
+            "`width`, `height` and the rows of `matrix` give {width} x {height} pixels with {channels} weights; 1 \
+             to {MOST_WEIGHTS} weights can be read"
+        )));
+    }
+    // Maps are read one by one before room for all of them is taken: the description alone allocates nothing.
+    let mut data = Vec::new();
+    for channel in 0..channels {
+        let path = folder.join(map_name(channel));
+        let grey = read_map(&path, width, height)?;
+        if channel == 0 {
+            data.resize(width * height * channels, 0);
+        }
+        for (pixel, grey) in grey.chunks_exact(2).enumerate() {
+            data[pixel * channels + channel] = from_grey(u16::from_be_bytes([grey[0], grey[1]]));
+        }
+    }
+    let maps = WeightMaps::new(width, height, channels, data)
+        .map_err(|source| MixFileError::Weights { path: folder.to_path_buf(), source })?;
+    let mix = InkMix::new(stacks, maps, matrix)
+        .map_err(|source| MixFileError::Mix { path: path.clone(), source })?;
+    Ok((mix, provenance))
+}
+
+fn read_map(path: &Path, width: usize, height: usize) -> Result<Vec<u8>, MixFileError> {
+    let wrong = |problem: String| MixFileError::Map { path: path.to_path_buf(), problem, width, height };
+    let file = File::open(path).map_err(|source| MixFileError::Io { path: path.to_path_buf(), source })?;
+    let mut decoder = png::Decoder::new(BufReader::new(file));
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    let mut reader = decoder.read_info().map_err(|e| wrong(e.to_string()))?;
+    let info = reader.info();
+    let found = (info.width as usize, info.height as usize);
+    if found != (width, height) {
+        return Err(wrong(format!("{} x {} pixels", found.0, found.1)));
+    }
+    if (info.color_type, info.bit_depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
+        return Err(wrong(format!("{:?} with {:?} bits", info.color_type, info.bit_depth)));
+    }
+    let mut bytes = vec![0; width * height * 2];
+    reader.next_frame(&mut bytes).map_err(|e| wrong(e.to_string()))?;
+    // The checksum of the last chunk is only looked at here.
+    reader.finish().map_err(|e| wrong(e.to_string()))?;
+    Ok(bytes)
+}
+
+fn map_name(channel: usize) -> String {
+    format!("weights-{channel:03}.png")
+}
+
+fn to_grey(weight: u16) -> u16 {
+    // At most ONE, so at most 65535.
+    ((u32::from(weight) * 65535 + u32::from(ONE) / 2) / u32::from(ONE)) as u16
+}
+
+fn from_grey(grey: u16) -> u16 {
+    ((u32::from(grey) * u32::from(ONE) + 32767) / 65535) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mix() -> InkMix {
+        let maps = WeightMaps::new(3, 2, 2, [0, 1, 5, 16384, 32767, 32768].map(|w| [w, ONE - w]).concat());
+        let stacks = ["substrate", "MS+C", "P+SF"].map(|s| s.parse().unwrap()).to_vec();
+        InkMix::new(stacks, maps.unwrap(), vec![vec![0, 32768, 0], vec![16384, 1, 16383]]).unwrap()
+    }
+
+    fn saved() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        save(&mix(), &Provenance { document: "leaf".into(), ..Provenance::default() }, folder.path())
+            .unwrap();
+        folder
+    }
+
+    fn edited(from: &str, to: &str) -> String {
+        let folder = saved();
+        let path = folder.path().join(FILE_NAME);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{text}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+        load(folder.path()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_weight_survives_its_grey() {
+        for weight in 0..=ONE {
+            assert_eq!(from_grey(to_grey(weight)), weight);
+        }
+        assert_eq!(to_grey(ONE), u16::MAX);
+    }
+
+    #[test]
+    fn what_is_saved_is_loaded() {
+        let folder = saved();
+        let (loaded, provenance) = load(folder.path()).unwrap();
+        assert_eq!(loaded, mix());
+        assert_eq!(provenance.document, "leaf");
+        let files: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(files.len(), 3, "no temporary file is left: {files:?}");
+    }
+
+    #[test]
+    fn a_wrong_description_is_named_with_its_field() {
+        for (from, to, word) in [
+            ("foilpress-mix-1", "foilpress-mix-9", "format"),
+            ("width = 3", "width = 4", "weights-000.png"),
+            ("width = 3", "width = 99999999999", "width"),
+            ("height = 2", "height = 0", "height"),
+            ("height = 2", "hight = 2", "hight"),
+            ("one = 32768", "one = 32767", "one"),
+            ("16383", "16382", "row 1"),
+            ("\"MS+C\"", "\"MS+tin\"", "tin"),
+            ("\"MS+C\"", "\"P+SF\"", "P+SF"),
+            ("document", "dokument", "dokument"),
+        ] {
+            let error = edited(from, to);
+            assert!(error.contains(word), "{from} -> {to}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_map_is_named() {
+        let folder = saved();
+        let path = folder.path().join("weights-001.png");
+        let bytes = std::fs::read(&path).unwrap();
+        // Cut short at every length: an error that names the file, never a panic.
+        for length in 0..bytes.len() {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            match load(folder.path()) {
+                Err(error) => assert!(error.to_string().contains("weights-001.png"), "{length}: {error}"),
+                Ok((loaded, _)) => assert_eq!(loaded, mix(), "only the end mark may be missing"),
+            }
+        }
+        std::fs::copy(folder.path().join("weights-000.png"), &path).unwrap();
+        let error = load(folder.path()).unwrap_err();
+        assert!(error.to_string().contains("pixel (0, 0)"), "{error}");
+        std::fs::remove_file(&path).unwrap();
+        assert!(matches!(load(folder.path()), Err(MixFileError::Io { .. })));
+    }
+
+    #[test]
+    fn eight_bits_are_refused() {
+        let folder = saved();
+        let file = File::create(folder.path().join("weights-000.png")).unwrap();
+        let mut encoder = png::Encoder::new(file, 3, 2);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.write_header().unwrap().write_image_data(&[0; 6]).unwrap();
+        let error = load(folder.path()).unwrap_err().to_string();
+        assert!(error.contains("Eight") && error.contains("16-bit"), "{error}");
+    }
+}

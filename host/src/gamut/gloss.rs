@@ -1,0 +1,81 @@
+//! Common gloss scaling of the bases: figure 5's ladder when every rung is a basis.
+//!
+//! Problem: eq. 1 maps each basis by itself, so bases that lie beyond the gamut in the same direction are printed
+//! alike. Method: the gloss of a basis is what it reflects above its least value over all configurations, channel
+//! by channel; all gloss is multiplied by one factor, the least of the factors by which the printed bases follow
+//! their targets' gloss (least squares in the metric), so that the most extreme basis just reaches the gamut and
+//! ratios of gloss survive. Cost: a line search a basis. Limits: one factor cannot narrow a lobe, only lower it.
+
+use crate::brdf::{Space, Table};
+
+/// Two rows differ when they are farther apart than this...
+pub(super) const DIFFERENT: f64 = 0.03;
+/// ...and are merged when they are printed at less than this share of it.
+pub(super) const MERGED: f64 = 0.25;
+
+/// Whether some bases that differ are printed alike.
+pub(super) fn merges(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> usize {
+    let mut merged = 0;
+    for i in 0..targets.len() {
+        for j in 0..i {
+            let apart = space.distance(targets.row(i), targets.row(j));
+            let left = space.distance(&printed[i], &printed[j]);
+            merged += usize::from(apart > DIFFERENT && left < MERGED * apart);
+        }
+    }
+    merged
+}
+
+/// Rows with their gloss multiplied by `factor`.
+pub(super) fn scaled(rows: &Table, factor: f64) -> Table {
+    let mut out = Table::new(rows.columns());
+    for row in rows.rows() {
+        let base = base(row);
+        let scaled: Vec<f64> =
+            row.iter().enumerate().map(|(j, &f)| base[j % 3] + factor * (f - base[j % 3])).collect();
+        out.push(&scaled);
+    }
+    out
+}
+
+/// The least reflectance of each channel: what is not gloss.
+fn base(row: &[f64]) -> [f64; 3] {
+    let mut base = [f64::INFINITY; 3];
+    for (j, &f) in row.iter().enumerate() {
+        base[j % 3] = base[j % 3].min(f);
+    }
+    base.map(f64::abs)
+}
+
+/// The factor in 0.02..=1 on the gloss of all bases by which the most extreme of them is printed.
+pub(super) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f64 {
+    let mut least = 1.0f64;
+    for (i, printed) in printed.iter().enumerate() {
+        let mut one = Table::new(targets.columns());
+        one.push(targets.row(i));
+        let miss = |log: f64| space.distance(scaled(&one, log.exp()).row(0), printed);
+        // Golden section on the logarithm; the distance has one valley along the factor.
+        let golden = 0.618_033_988_749_895;
+        let (mut low, mut high) = (0.02f64.ln(), 0.0);
+        let (mut x, mut y) = (high - golden * (high - low), low + golden * (high - low));
+        let (mut at_x, mut at_y) = (miss(x), miss(y));
+        for _ in 0..40 {
+            if at_x <= at_y {
+                (high, y, at_y) = (y, x, at_x);
+                x = high - golden * (high - low);
+                at_x = miss(x);
+            } else {
+                (low, x, at_x) = (x, y, at_y);
+                y = low + golden * (high - low);
+                at_y = miss(y);
+            }
+        }
+        // At the end of the range the valley lies beyond it: the gloss is printed in full.
+        let found = 0.5 * (low + high);
+        let full = miss(0.0);
+        if miss(found) < full - 1e-9 {
+            least = least.min(found.exp());
+        }
+    }
+    least
+}

@@ -1,0 +1,158 @@
+//! A picture to lay radiance and words out on.
+
+use std::convert::Infallible;
+
+use embedded_graphics::mono_font::iso_8859_1::{FONT_7X13, FONT_9X15, FONT_10X20};
+use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
+use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
+use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, Size};
+use embedded_graphics::text::{Baseline, Text};
+use image::{Rgb, RgbImage};
+
+use super::tone::{Exposure, linear, srgb};
+use super::{PreviewError, Radiance, check_size};
+
+/// The neutral ground, sRGB.
+pub const GROUND: [u8; 3] = [52, 52, 52];
+/// Words that matter.
+pub const INK: [u8; 3] = [232, 232, 232];
+/// Words that explain.
+pub const FAINT: [u8; 3] = [168, 168, 168];
+
+/// The sizes of letters in use; every letter of a size is equally wide.
+#[derive(Clone, Copy)]
+pub enum Letters {
+    Title,
+    Plain,
+    Small,
+}
+
+impl Letters {
+    fn font(self) -> &'static MonoFont<'static> {
+        match self {
+            Letters::Title => &FONT_10X20,
+            Letters::Plain => &FONT_9X15,
+            Letters::Small => &FONT_7X13,
+        }
+    }
+
+    /// Pixels a letter is wide.
+    pub fn width(self) -> usize {
+        self.font().character_size.width as usize
+    }
+
+    /// Pixels a line is high.
+    pub fn height(self) -> usize {
+        self.font().character_size.height as usize
+    }
+}
+
+/// A picture on the neutral ground.
+pub struct Canvas {
+    image: RgbImage,
+}
+
+impl Canvas {
+    pub fn new(width: usize, height: usize) -> Result<Canvas, PreviewError> {
+        check_size(width, height)?;
+        Ok(Canvas { image: RgbImage::from_pixel(width as u32, height as u32, Rgb(GROUND)) })
+    }
+
+    pub fn finish(self) -> RgbImage {
+        self.image
+    }
+
+    /// Writes a line with its top left corner at (x, y); what does not fit is cut off. Letters outside Latin-1
+    /// appear as question marks.
+    pub fn text(&mut self, x: usize, y: usize, letters: Letters, colour: [u8; 3], text: &str) {
+        let (width, height) = (self.image.width() as usize, self.image.height() as usize);
+        if x >= width || y >= height {
+            return;
+        }
+        let style = MonoTextStyle::new(letters.font(), Rgb888::new(colour[0], colour[1], colour[2]));
+        // What lies outside is cut off here: the drawing library adds up widths without looking.
+        let visible: String = text.chars().take((width - x).div_ceil(letters.width())).collect();
+        let at = Point::new(x as i32, y as i32);
+        let Ok(_) = Text::with_baseline(&visible, at, style, Baseline::Top).draw(self);
+    }
+
+    /// Lays radiance over the ground with its top left corner at (x, y).
+    pub fn paste(&mut self, x: usize, y: usize, picture: &Radiance, exposure: Exposure) {
+        let ground = linear(GROUND);
+        for (j, row) in picture.pixels.chunks_exact(picture.width).enumerate() {
+            for (i, &[r, g, b, covered]) in row.iter().enumerate() {
+                let (px, py) = ((x + i) as u32, (y + j) as u32);
+                if covered <= 0.0 || px >= self.image.width() || py >= self.image.height() {
+                    continue;
+                }
+                // The curve is for what is covered; the edge then blends what is shown.
+                let shown = exposure.shown([r, g, b].map(|v| v / covered));
+                let blend = |c: usize| shown[c] * covered + ground[c] * (1.0 - covered);
+                self.image.put_pixel(px, py, Rgb(srgb([blend(0), blend(1), blend(2)])));
+            }
+        }
+    }
+}
+
+impl OriginDimensions for Canvas {
+    fn size(&self) -> Size {
+        Size::new(self.image.width(), self.image.height())
+    }
+}
+
+impl DrawTarget for Canvas {
+    type Color = Rgb888;
+    type Error = Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Infallible> {
+        for Pixel(at, colour) in pixels {
+            if let (Ok(x), Ok(y)) = (u32::try_from(at.x), u32::try_from(at.y))
+                && x < self.image.width()
+                && y < self.image.height()
+            {
+                self.image.put_pixel(x, y, Rgb([colour.r(), colour.g(), colour.b()]));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_stay_where_they_are_put_and_what_does_not_fit_is_cut_off() {
+        let mut canvas = Canvas::new(40, 30).unwrap();
+        canvas.text(9, 8, Letters::Small, INK, "MS+C · 62 % ñ");
+        canvas.text(1 << 40, 5, Letters::Title, INK, "far away");
+        canvas.text(5, 1 << 40, Letters::Title, INK, "far below");
+        let image = canvas.finish();
+        let lit = |x: u32, y: u32| image.get_pixel(x, y).0 != GROUND;
+        let all = || (0..30).flat_map(|y| (0..40).map(move |x| (x, y)));
+        assert!(all().filter(|&(x, y)| lit(x, y)).count() > 40);
+        assert!(all().filter(|&(x, y)| lit(x, y)).all(|(x, y)| x >= 9 && (8..21).contains(&y)));
+    }
+
+    #[test]
+    fn half_covered_pixels_are_half_ground() {
+        let mut canvas = Canvas::new(3, 1).unwrap();
+        let pixels = vec![[0.2, 0.2, 0.2, 1.0], [0.1, 0.1, 0.1, 0.5], [0.0; 4]];
+        canvas.paste(0, 0, &Radiance { width: 3, height: 1, pixels }, Exposure(1.0));
+        let image = canvas.finish();
+        let value = |x| linear(image.get_pixel(x, 0).0)[0];
+        assert!((value(0) - 0.2).abs() < 2e-3);
+        assert!((value(1) - 0.5 * (0.2 + linear(GROUND)[0])).abs() < 2e-3);
+        assert_eq!(image.get_pixel(2, 0).0, GROUND);
+    }
+
+    #[test]
+    fn pictures_beyond_the_edge_are_cut_off() {
+        let mut canvas = Canvas::new(2, 2).unwrap();
+        let picture = Radiance { width: 3, height: 3, pixels: vec![[9.0, 9.0, 9.0, 1.0]; 9] };
+        canvas.paste(1, 1, &picture, Exposure(1.0));
+        let image = canvas.finish();
+        assert_eq!(image.get_pixel(0, 1).0, GROUND);
+        assert!(image.get_pixel(1, 1).0[0] > 240);
+    }
+}

@@ -1,0 +1,339 @@
+//! Light from everywhere: a latitude-longitude panorama of radiance.
+//!
+//! Conventions: row 0 is up (+y); at column u and row v in 0..1 the direction is
+//! `(sin phi sin t, cos t, -cos phi sin t)`, phi = 2 pi u, t = pi v. The eye looks along -z, so the middle of the
+//! panorama is behind the eye and its left edge behind the ball. Texels count with their exact solid angle.
+//! Source of files: Radiance `.hdr` (RGBE), decoded within limits.
+
+use std::f64::consts::PI;
+use std::io::{BufRead, BufReader, Seek};
+use std::path::Path;
+
+use image::codecs::hdr::HdrDecoder;
+use image::{DynamicImage, ImageDecoder, Limits};
+
+use super::PreviewError;
+
+/// The widest panorama that is read.
+pub const WIDEST: usize = 8192;
+
+/// Radiance from every direction. See the module text for its layout.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Probe {
+    width: usize,
+    height: usize,
+    rgb: Vec<[f32; 3]>,
+}
+
+impl Probe {
+    /// A panorama of `height` rows and as many columns as fill it; radiance finite and not negative.
+    pub fn new(height: usize, rgb: Vec<[f32; 3]>) -> Result<Probe, PreviewError> {
+        let shape = |what, expected, found| PreviewError::Shape { what, expected, found };
+        let width = rgb.len() / height.max(1);
+        if width == 0 || width * height != rgb.len() {
+            return Err(shape("texels of a light probe", width.max(1) * height.max(1), rgb.len()));
+        }
+        let good = |t: &&[f32; 3]| t.iter().all(|v| v.is_finite() && *v >= 0.0);
+        let count = rgb.iter().filter(good).count();
+        if count != rgb.len() {
+            return Err(shape("texels of a light probe that are finite and not negative", rgb.len(), count));
+        }
+        Ok(Probe { width, height, rgb })
+    }
+
+    /// The same radiance from everywhere: a furnace.
+    pub fn constant(radiance: f32) -> Probe {
+        let (width, height) = (128, 64);
+        Probe { width, height, rgb: vec![[radiance.max(0.0); 3]; width * height] }
+    }
+
+    /// A photographer's studio of our own: a window with four panes at the upper left, a tall strip at the
+    /// right, a lamp behind and a soft ceiling, in a grey room that is darker below. `height` rows (1 or more).
+    pub fn studio(height: usize) -> Probe {
+        let height = height.max(1);
+        let width = 2 * height;
+        let texel = |i: usize| {
+            let d = direction(
+                ((i % width) as f64 + 0.5) / width as f64,
+                ((i / width) as f64 + 0.5) / height as f64,
+            );
+            studio_radiance(d).map(|v| v as f32)
+        };
+        Probe { width, height, rgb: (0..width * height).map(texel).collect() }
+    }
+
+    /// Reads a Radiance `.hdr` file.
+    pub fn read_hdr(path: &Path) -> Result<Probe, PreviewError> {
+        let file = std::fs::File::open(path)
+            .map_err(|e| PreviewError::Probe { path: path.to_path_buf(), problem: e.to_string() })?;
+        Probe::from_hdr(BufReader::new(file), path)
+    }
+
+    /// Reads a Radiance `.hdr` from anything; `path` is only named in errors.
+    pub fn from_hdr(input: impl BufRead + Seek, path: &Path) -> Result<Probe, PreviewError> {
+        let wrong = |problem: String| PreviewError::Probe { path: path.to_path_buf(), problem };
+        let mut decoder = HdrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
+        let (width, height) = decoder.dimensions();
+        let (width, height) = (width as usize, height as usize);
+        if width == 0 || height == 0 || width > WIDEST || width != 2 * height {
+            return Err(wrong(format!(
+                "{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide"
+            )));
+        }
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(WIDEST as u32);
+        limits.max_image_height = Some(WIDEST as u32);
+        decoder.set_limits(limits).map_err(|e| wrong(e.to_string()))?;
+        // What the header calls exposure was multiplied into the pixels by the program that wrote them.
+        let exposure = decoder.metadata().exposure.unwrap_or(1.0);
+        if !(exposure.is_finite() && exposure > 0.0) {
+            return Err(wrong(format!("EXPOSURE={exposure} must be above 0")));
+        }
+        let image = DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?.into_rgb32f();
+        let rgb = image.pixels().map(|p| p.0.map(|v| v / exposure)).collect();
+        Probe::new(height, rgb).map_err(|e| wrong(e.to_string()))
+    }
+
+    /// Texels across.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Texels down.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Radiance, row by row.
+    pub fn rgb(&self) -> &[[f32; 3]] {
+        &self.rgb
+    }
+
+    /// Direction of the middle of a texel.
+    pub fn direction(&self, x: usize, y: usize) -> [f64; 3] {
+        direction((x as f64 + 0.5) / self.width as f64, (y as f64 + 0.5) / self.height as f64)
+    }
+
+    /// Solid angle of each texel of row `y`; all of them sum to 4 pi.
+    pub fn solid_angle(&self, y: usize) -> f64 {
+        let edge = |y: usize| (PI * y as f64 / self.height as f64).cos();
+        (edge(y) - edge(y + 1)) * 2.0 * PI / self.width as f64
+    }
+
+    /// Averaged by solid angle to at most `height` rows, by a whole factor; the same where that factor is 1 or
+    /// does not divide both sides.
+    pub fn shrunk(&self, height: usize) -> Probe {
+        let k = (1..=self.height)
+            .find(|k| {
+                self.height / k <= height && self.height.is_multiple_of(*k) && self.width.is_multiple_of(*k)
+            })
+            .unwrap_or(1);
+        let (w, h) = (self.width / k, self.height / k);
+        let mut rgb = Vec::with_capacity(w * h);
+        for i in 0..w * h {
+            let mut sum = [0.0f64; 3];
+            let mut solid = 0.0;
+            for y in (i / w) * k..(i / w + 1) * k {
+                let omega = self.solid_angle(y);
+                for texel in &self.rgb[y * self.width + (i % w) * k..][..k] {
+                    solid += omega;
+                    (0..3).for_each(|c| sum[c] += omega * f64::from(texel[c]));
+                }
+            }
+            rgb.push(sum.map(|s| (s / solid) as f32));
+        }
+        Probe { width: w, height: h, rgb }
+    }
+}
+
+/// The direction at column `u` and row `v`, both 0 to 1.
+pub fn direction(u: f64, v: f64) -> [f64; 3] {
+    let (phi, t) = (2.0 * PI * u, PI * v);
+    [phi.sin() * t.sin(), t.cos(), -phi.cos() * t.sin()]
+}
+
+/// One rectangular lamp: where it is, half its size as tangents, panes across and down, radiance.
+struct Lamp {
+    towards: [f64; 3],
+    half: [f64; 2],
+    panes: [f64; 2],
+    radiance: [f64; 3],
+}
+
+const LAMPS: [Lamp; 4] = [
+    Lamp {
+        towards: [-0.62, 0.52, 0.59],
+        half: [0.34, 0.42],
+        panes: [2.0, 2.0],
+        radiance: [13.0, 13.4, 14.0],
+    },
+    Lamp { towards: [0.86, 0.10, 0.50], half: [0.10, 0.80], panes: [1.0, 1.0], radiance: [7.4, 7.0, 6.4] },
+    Lamp { towards: [0.35, 0.45, -0.82], half: [0.40, 0.25], panes: [1.0, 1.0], radiance: [9.0, 8.8, 8.4] },
+    Lamp { towards: [0.10, 0.99, 0.05], half: [0.60, 0.35], panes: [1.0, 1.0], radiance: [3.0, 3.0, 3.0] },
+];
+
+fn studio_radiance(d: [f64; 3]) -> [f64; 3] {
+    // A floor, a wall that brightens to the ceiling, and no hard line between them.
+    let up = smooth(-0.35, 0.25, d[1]);
+    let wall = 0.20 + 0.22 * d[1].max(0.0);
+    let mut sum: [f64; 3] = std::array::from_fn(|c| {
+        let floor = [0.075, 0.070, 0.064][c];
+        floor + (wall * [0.97, 1.0, 1.04][c] - floor) * up
+    });
+    for lamp in &LAMPS {
+        let lit = lamp.mask(d);
+        (0..3).for_each(|c| sum[c] += lit * lamp.radiance[c]);
+    }
+    sum
+}
+
+impl Lamp {
+    /// How much of the lamp's radiance comes from `d`: 1 within a pane, 0 outside, smooth at the edges.
+    fn mask(&self, d: [f64; 3]) -> f64 {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let unit = |a: [f64; 3]| a.map(|v| v / dot(a, a).sqrt());
+        let w = unit(self.towards);
+        // Lamps overhead have no upright; the tilt of every LAMP leaves this cross product well away from 0.
+        let across = unit([w[2], 0.0, -w[0]]);
+        let up = [
+            w[1] * across[2] - w[2] * across[1],
+            w[2] * across[0] - w[0] * across[2],
+            w[0] * across[1] - w[1] * across[0],
+        ];
+        let facing = dot(d, w);
+        if facing <= 0.05 {
+            return 0.0;
+        }
+        let place = [dot(d, across) / facing / self.half[0], dot(d, up) / facing / self.half[1]];
+        let mut lit = 1.0;
+        for (p, panes) in place.into_iter().zip(self.panes) {
+            lit *= 1.0 - smooth(0.93, 1.0, p.abs());
+            let within = ((p + 1.0) * 0.5 * panes).rem_euclid(1.0);
+            let bar = within.min(1.0 - within);
+            if panes > 1.0 {
+                lit *= smooth(0.03, 0.07, bar);
+            }
+        }
+        lit
+    }
+}
+
+/// 0 below `from`, 1 above `to`, smooth between.
+fn smooth(from: f64, to: f64, x: f64) -> f64 {
+    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::io::Cursor;
+
+    /// A flat (not run-length coded) file of RGBE pixels.
+    fn file(header: &str, width: usize, height: usize, pixels: &[[u8; 4]]) -> Vec<u8> {
+        let head = format!("#?RADIANCE\n{header}FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
+        head.into_bytes().into_iter().chain(pixels.iter().flatten().copied()).collect()
+    }
+
+    fn read(bytes: Vec<u8>) -> Result<Probe, PreviewError> {
+        Probe::from_hdr(Cursor::new(bytes), Path::new("env.hdr"))
+    }
+
+    #[test]
+    fn rgbe_is_mantissa_times_a_power_of_two() {
+        let pixels = [[128, 64, 32, 129], [0, 0, 0, 0], [200, 100, 50, 136], [1, 2, 3, 130]];
+        let bytes = file("", 4, 2, &pixels.repeat(2));
+        let probe = read(bytes).unwrap();
+        assert_eq!((probe.width(), probe.height()), (4, 2));
+        for (found, [r, g, b, e]) in probe.rgb().iter().zip(pixels.iter().cycle()) {
+            let scale = 2f32.powi(i32::from(*e) - 136) * f32::from(u8::from(*e > 0));
+            for (found, mantissa) in found.iter().zip([r, g, b]) {
+                // Some readers put half a step on the mantissa.
+                assert!(
+                    (found - f32::from(*mantissa) * scale).abs() <= 0.5 * scale,
+                    "{found} {mantissa} {e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn exposure_is_taken_out_again() {
+        let pixels = [[128, 64, 32, 129]; 2];
+        let plain = read(file("", 2, 1, &pixels)).unwrap();
+        let exposed = read(file("EXPOSURE=2.0\nEXPOSURE=4.0\n", 2, 1, &pixels)).unwrap();
+        for (a, b) in plain.rgb().iter().flatten().zip(exposed.rgb().iter().flatten()) {
+            assert!((a / 8.0 - b).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn huge_and_square_panoramas_are_refused_by_name() {
+        for (w, h) in [(1 << 20, 1 << 19), (64, 64), (0, 0), (16384, 8192)] {
+            let error = read(file("", w, h, &[])).unwrap_err().to_string();
+            assert!(error.contains("env.hdr"), "{error}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn damaged_files_are_errors_or_panoramas_but_never_worse(
+            at in 0usize..140, byte in any::<u8>(), cut in 0usize..140,
+        ) {
+            let mut bytes = file("EXPOSURE=1\n", 8, 4, &[[2, 2, 0, 8]; 32]);
+            let len = bytes.len();
+            bytes[at % len] = byte;
+            bytes.truncate(len - cut % len);
+            if let Ok(probe) = read(bytes) {
+                prop_assert!(probe.rgb().iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
+            }
+        }
+
+        #[test]
+        fn shrinking_keeps_all_light(height in 1usize..5, k in 1usize..4, seed in any::<u32>()) {
+            let (h, w) = (height * k, 2 * height * k);
+            let value = |i: usize| ((i as u32).wrapping_mul(2_654_435_761).wrapping_add(seed) >> 16) as f32;
+            let probe = Probe::new(h, (0..w * h).map(|i| [value(i), value(i + 7), 1.0]).collect()).unwrap();
+            let small = probe.shrunk(height);
+            prop_assert!(small.height() <= height);
+            let light = |p: &Probe, c: usize| -> f64 {
+                (0..p.rgb().len()).map(|i| f64::from(p.rgb()[i][c]) * p.solid_angle(i / p.width())).sum()
+            };
+            for c in 0..3 {
+                prop_assert!((light(&small, c) / light(&probe, c) - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn texels_cover_the_whole_sphere() {
+        let probe = Probe::constant(1.0);
+        let sum: f64 = (0..probe.height()).map(|y| probe.solid_angle(y) * probe.width() as f64).sum();
+        assert!((sum - 4.0 * PI).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_middle_is_behind_the_eye_and_the_top_is_up() {
+        let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
+        assert!(near(direction(0.5, 0.5), [0.0, 0.0, 1.0]));
+        assert!(near(direction(0.0, 0.5), [0.0, 0.0, -1.0]));
+        assert!(near(direction(0.25, 0.5), [1.0, 0.0, 0.0]));
+        assert!(near(direction(0.1, 0.0), [0.0, 1.0, 0.0]));
+    }
+
+    #[test]
+    fn real_panoramas_open() {
+        let Ok(data) = std::env::var("FOILPRESS_DATA") else {
+            println!("skipped: FOILPRESS_DATA is not set");
+            return;
+        };
+        for name in ["studio.hdr", "venice.hdr"] {
+            let probe = Probe::read_hdr(&Path::new(&data).join("env").join(name)).unwrap();
+            assert_eq!((probe.width(), probe.height()), (1024, 512));
+            let small = probe.shrunk(128);
+            assert_eq!((small.width(), small.height()), (256, 128));
+            assert!(small.rgb().iter().flatten().any(|v| *v > 1.0));
+        }
+    }
+}

@@ -1,0 +1,607 @@
+//! Equation 1: the mixture of printable stacks that looks most like a target.
+//!
+//! Problem: minimise `E(a) = sum_j W_j^2 (cbrt((Aa)_j) - cbrt(t_j))^2 + p'a` over the simplex, where the rows of A
+//! are the stacks' reflected radiances, t the target's, W the metric's weights and p a small price of each stack
+//! that breaks ties toward fewer layers.
+//! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, its second
+//! derivative corrected to the exact one where that is positive; the model is minimised exactly by
+//! [`Simplex`] over the stacks in use and those whose gradient says they would help; Armijo's rule
+//! halves the step. It ends when the gap is as small as asked or the
+//! objective drops by less than 1e-12 of itself. All stacks are priced in
+//! every step, only a dozen enter the quadratic.
+//! Cost: K m multiplications a step for the prices (K stacks, m columns), about 5 steps from the tangent start and
+//! 2 from a neighbour's answer; no allocation. Limits: E is convex where no sample of the mixture is more than 8
+//! times the target; there the gap bounds the error, elsewhere several starts are the only assurance.
+//! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
+
+use crate::brdf::{Space, Table};
+
+use super::gram::{Gram, inner_products};
+use super::root::inverse_cbrt;
+use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
+use super::vector::{add_scaled, dot};
+
+/// Price of one layer of ink, in units of squared distance: what a tie is decided by.
+pub const LAYER_PRICE: f64 = 1e-6;
+/// Relative drop of the objective below which the search ends.
+const DROP: f64 = 1e-12;
+/// Steps taken at most; ten times what the slowest of a thousand random problems needs.
+const MOST_STEPS: u32 = 100;
+/// Halvings of a step before it counts as none.
+const MOST_HALVINGS: u32 = 30;
+/// Stacks that may join the mixture in one step.
+const MOST_JOINING: usize = 12;
+/// Darkest radiance told apart from black, relative to the brightest of any stack.
+const DARKEST: f64 = 1e-12;
+/// Two starts agree when their distances differ by less than this.
+const AGREEMENT: f64 = 1e-6;
+
+/// Why there is no mixture.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MixtureError {
+    /// There is nothing to mix.
+    #[error("there is no stack to mix from")]
+    NoStacks,
+    /// The stacks or the target are in another tabulation.
+    #[error("{what} has {found} columns where the space has {expected}")]
+    Columns {
+        /// What was given.
+        what: &'static str,
+        /// Columns of the space.
+        expected: usize,
+        /// Columns found.
+        found: usize,
+    },
+    /// As many prices as stacks are needed.
+    #[error("{stacks} stacks need as many prices and weights, not {found}")]
+    Length {
+        /// Stacks.
+        stacks: usize,
+        /// Numbers given.
+        found: usize,
+    },
+    /// A reflectance is not a number, infinite or negative.
+    #[error("{what}, column {column}: a reflectance of {value} is not a finite number of 0 or more")]
+    Value {
+        /// What was given.
+        what: &'static str,
+        /// The column.
+        column: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The numbers are so large or small that products of them overflow.
+    #[error(transparent)]
+    Simplex(#[from] SimplexError),
+}
+
+/// The stacks as the metric sees them: reflected radiance, weights of the columns, prices.
+#[derive(Clone, Debug)]
+pub struct Hull {
+    radiance: Vec<f64>,
+    weight: Vec<f64>,
+    rows: Table,
+    price: Vec<f64>,
+    darkest: f64,
+}
+
+/// A target as the metric sees it.
+#[derive(Clone, Debug, Default)]
+pub struct Target {
+    radiance: Vec<f64>,
+    root: Vec<f64>,
+}
+
+/// What is known of a mixture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Distance d of mixture and target.
+    pub distance: f64,
+    /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has `d^2 + p'a` lower by more than this.
+    pub gap: f64,
+    /// Steps taken.
+    pub steps: u32,
+    /// No sample of the mixture is above 8 times the target, so E is convex around it and the gap is a bound.
+    pub convex: bool,
+}
+
+impl Target {
+    /// Integral of the cube root of the target's radiance over the metric's measure, all channels.
+    pub fn brightness(&self, hull: &Hull) -> f64 {
+        self.root.iter().zip(&hull.weight).map(|(root, w)| root * w * w).sum()
+    }
+}
+
+impl Fit {
+    /// A distance no mixture can be below, by the gap (a bound where [`Fit::convex`]).
+    pub fn at_least(&self) -> f64 {
+        (self.distance * self.distance - self.gap).max(0.0).sqrt()
+    }
+}
+
+/// The best mixture over several starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Best {
+    /// One weight for each stack, 0 or more, sum 1.
+    pub weights: Vec<f64>,
+    /// Its certificate.
+    pub fit: Fit,
+    /// Starts tried.
+    pub starts: usize,
+    /// How many of them reached the same distance, within 1e-6.
+    pub agreeing: usize,
+}
+
+impl Hull {
+    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared
+    /// distance: [`LAYER_PRICE`] times its layers, or 0.
+    pub fn new(space: &Space, curves: &Table, price: &[f64]) -> Result<Hull, MixtureError> {
+        let m = space.columns();
+        if curves.is_empty() {
+            return Err(MixtureError::NoStacks);
+        }
+        if curves.columns() != m {
+            return Err(MixtureError::Columns { what: "a stack", expected: m, found: curves.columns() });
+        }
+        if price.len() != curves.len() {
+            return Err(MixtureError::Length { stacks: curves.len(), found: price.len() });
+        }
+        let mut rows = Table::new(m);
+        let mut brightest = 0.0f64;
+        let mut radiance = vec![0.0; m];
+        for row in curves.rows() {
+            for (j, (&f, c)) in row.iter().zip(space.radiance()).enumerate() {
+                if !(f.is_finite() && f >= 0.0) {
+                    return Err(MixtureError::Value { what: "a stack", column: j, value: f });
+                }
+                radiance[j] = f * c;
+                brightest = brightest.max(radiance[j]);
+            }
+            rows.push(&radiance);
+        }
+        let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
+        Ok(Hull {
+            radiance: space.radiance().to_vec(),
+            weight: space.weight().to_vec(),
+            rows,
+            price: price.to_vec(),
+            darkest: darkest.max(f64::MIN_POSITIVE),
+        })
+    }
+
+    /// The hull of some of the stacks.
+    pub fn subset(&self, stacks: &[usize]) -> Hull {
+        let mut rows = Table::new(self.rows.columns());
+        stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
+        let price = stacks.iter().map(|&k| self.price[k]).collect();
+        Hull { radiance: self.radiance.clone(), weight: self.weight.clone(), rows, price, ..*self }
+    }
+
+    /// Number of stacks.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Never: a hull has at least one stack.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.rows.columns()
+    }
+
+    /// A target from a row of reflectance (1/sr). Values below 0 count as 0.
+    pub fn target(&self, reflectance: &[f64]) -> Result<Target, MixtureError> {
+        let mut target = Target::default();
+        self.aim(reflectance.iter().copied(), &mut target)?;
+        Ok(target)
+    }
+
+    /// The same into an existing target, without allocating when it has been used before.
+    pub fn aim(
+        &self,
+        reflectance: impl ExactSizeIterator<Item = f64>,
+        target: &mut Target,
+    ) -> Result<(), MixtureError> {
+        let m = self.columns();
+        if reflectance.len() != m {
+            return Err(MixtureError::Columns { what: "the target", expected: m, found: reflectance.len() });
+        }
+        target.radiance.clear();
+        target
+            .radiance
+            .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
+        target.root.clear();
+        target.root.resize(m, 0.0);
+        for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
+            // Zero and what is too small for the root are black.
+            let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));
+            *root = t * r * r;
+        }
+        match target.radiance.iter().position(|t| !t.is_finite()) {
+            Some(column) => {
+                Err(MixtureError::Value { what: "the target", column, value: target.radiance[column] })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The distance d of a mixture to a target.
+    pub fn distance(&self, weights: &[f64], target: &Target) -> f64 {
+        let mut mix = vec![0.0; self.columns()];
+        self.mix(weights, &mut mix);
+        let mut sum = 0.0;
+        for ((w, &f), root) in self.weight.iter().zip(&mix).zip(&target.root) {
+            let f = f.max(self.darkest);
+            let r = inverse_cbrt(f);
+            let d = w * (f * r * r - root);
+            sum += d * d;
+        }
+        sum.sqrt()
+    }
+
+    /// Reflected radiance of a mixture.
+    fn mix(&self, weights: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        for (k, &w) in weights.iter().enumerate() {
+            if w != 0.0 {
+                add_scaled(out, w, self.rows.row(k));
+            }
+        }
+    }
+}
+
+/// The solver of equation 1 and its workspace. One for each thread.
+#[derive(Clone, Debug)]
+pub struct Mixer {
+    simplex: Simplex,
+    gram: Gram,
+    /// Radiance of the mixture, its change over the full step, and the mixture looked at.
+    mix: Vec<f64>,
+    change: Vec<f64>,
+    trial: Vec<f64>,
+    /// Per column: inverse cube root of the radiance, and weighted difference of the cube roots.
+    inverse: Vec<f64>,
+    residual: Vec<f64>,
+    /// Per column: residual times slope, and the root of the model's curvature.
+    pull: Vec<f64>,
+    stiffness: Vec<f64>,
+    /// Half the gradient, one for each stack.
+    slope: Vec<f64>,
+    /// Which stacks may not be used.
+    closed: Vec<bool>,
+    /// The stacks of the quadratic, their stiffness-scaled rows, slopes and weights.
+    working: Vec<usize>,
+    scaled: Vec<f64>,
+    working_slope: Vec<f64>,
+    working_weights: Vec<f64>,
+}
+
+impl Default for Mixer {
+    fn default() -> Mixer {
+        Mixer::new()
+    }
+}
+
+impl Mixer {
+    /// A solver; it allocates when it first meets a problem of a size, and no more after that.
+    pub fn new() -> Mixer {
+        Mixer {
+            simplex: Simplex::new(),
+            gram: Gram::empty(),
+            mix: Vec::new(),
+            change: Vec::new(),
+            trial: Vec::new(),
+            inverse: Vec::new(),
+            residual: Vec::new(),
+            pull: Vec::new(),
+            stiffness: Vec::new(),
+            slope: Vec::new(),
+            closed: Vec::new(),
+            working: Vec::new(),
+            scaled: Vec::new(),
+            working_slope: Vec::new(),
+            working_weights: Vec::new(),
+        }
+    }
+
+    fn resize(&mut self, hull: &Hull) {
+        let (k, m) = (hull.len(), hull.columns());
+        for columns in [
+            &mut self.mix,
+            &mut self.change,
+            &mut self.trial,
+            &mut self.inverse,
+            &mut self.residual,
+            &mut self.pull,
+            &mut self.stiffness,
+        ] {
+            columns.resize(m, 0.0);
+        }
+        self.slope.resize(k, 0.0);
+        self.scaled.resize(k * m, 0.0);
+    }
+
+    /// The minimum over all sensible starts: the tangent start, the linear start (least squares without the cube
+    /// root), equal parts of everything, and the four nearest single stacks.
+    pub fn best(&mut self, hull: &Hull, target: &Target) -> Result<Best, MixtureError> {
+        let k = hull.len();
+        let mut starts = Vec::new();
+        for metric in [Linear::Tangent, Linear::Plain] {
+            let mut a = vec![0.0; k];
+            self.linear(hull, target, metric, &mut a)?;
+            starts.push(a);
+        }
+        starts.push(vec![1.0 / k as f64; k]);
+        let single = |i: usize| {
+            let mut a = vec![0.0; k];
+            a[i] = 1.0;
+            a
+        };
+        let mut nearest: Vec<(f64, usize)> = (0..k).map(|i| (hull.distance(&single(i), target), i)).collect();
+        nearest.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        starts.extend(nearest.iter().take(4).map(|&(_, i)| single(i)));
+
+        let mut results = Vec::with_capacity(starts.len());
+        for mut a in starts {
+            let fit = self.refine(hull, target, &mut a)?;
+            let value = fit.distance * fit.distance + dot(&hull.price, &a);
+            results.push((value, fit, a));
+        }
+        let starts = results.len();
+        let least = results.iter().map(|(_, fit, _)| fit.distance).fold(f64::INFINITY, f64::min);
+        let agreeing = results.iter().filter(|(_, fit, _)| fit.distance - least < AGREEMENT).count();
+        // Ties go to the earlier start. There is always one, so the fallback is never used.
+        let best = results.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best });
+        let Some((_, fit, weights)) = best else { return Err(MixtureError::NoStacks) };
+        Ok(Best { weights, fit, starts, agreeing })
+    }
+
+    /// The tangent start: least squares in the metric's tangent at the target.
+    pub fn tangent(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<(), MixtureError> {
+        self.linear(hull, target, Linear::Tangent, a)
+    }
+
+    fn linear(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        metric: Linear,
+        a: &mut [f64],
+    ) -> Result<(), MixtureError> {
+        check(hull, target, a)?;
+        self.resize(hull);
+        let (k, m) = (hull.len(), hull.columns());
+        // The tangent at black is vertical: darker targets share that of a millionth of the brightest stack.
+        let floor = hull.darkest / DARKEST * 1e-6;
+        for (j, s) in self.stiffness.iter_mut().enumerate() {
+            let root = inverse_cbrt(target.radiance[j].max(floor));
+            *s = match metric {
+                Linear::Tangent => hull.weight[j] * root * root / 3.0,
+                Linear::Plain => hull.weight[j],
+            };
+            self.pull[j] = target.radiance[j] * *s;
+        }
+        for i in 0..k {
+            let scaled = &mut self.scaled[i * m..][..m];
+            for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(i)).zip(&self.stiffness) {
+                *x = f * s;
+            }
+            self.slope[i] = dot(scaled, &self.pull);
+        }
+        let scaled = &self.scaled;
+        self.gram.refill(k, |i| &scaled[i * m..][..m]);
+        a.fill(0.0);
+        self.simplex.solve(&self.gram, &self.slope, a)?;
+        Ok(())
+    }
+
+    /// Refines a start to the minimum. `a` is the start, a point of the simplex, and receives the weights.
+    pub fn refine(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::All, 0.0)
+    }
+
+    /// The same, ending when the gap (in squared distance) is at most `gap`: for a picture's worth of targets.
+    pub fn refine_to(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        gap: f64,
+    ) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::All, gap)
+    }
+
+    /// The best mixture of the stacks that have weight in `a`. The gap is over these stacks alone.
+    pub fn polish(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::Support, 0.0)
+    }
+
+    /// The same, ending when the gap (in squared distance) is at most `gap`.
+    pub fn polish_to(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        gap: f64,
+    ) -> Result<Fit, MixtureError> {
+        self.descend(hull, target, a, Reach::Support, gap)
+    }
+
+    fn descend(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        reach: Reach,
+        enough: f64,
+    ) -> Result<Fit, MixtureError> {
+        check(hull, target, a)?;
+        self.resize(hull);
+        let m = hull.columns();
+        self.closed.clear();
+        self.closed.extend(a.iter().map(|&w| matches!(reach, Reach::Support) && w <= 0.0));
+        hull.mix(a, &mut self.mix);
+        self.trial.copy_from_slice(&self.mix);
+        let mut squared = self.linearise(hull, target);
+        let mut steps = 0;
+        let mut stalled = false;
+
+        let gap = loop {
+            inner_products(&hull.rows, &self.pull, &mut self.slope);
+            for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
+                *slope += 0.5 * price;
+            }
+            for (slope, &closed) in self.slope.iter_mut().zip(&self.closed) {
+                if closed {
+                    // So dear that it never joins.
+                    *slope = f64::MAX;
+                }
+            }
+            let gap = 2.0 * frank_wolfe_gap(&self.slope, a);
+            if stalled || steps >= MOST_STEPS || gap <= enough || gap.is_nan() {
+                break gap;
+            }
+            steps += 1;
+            self.choose(a);
+            let w = self.working.len();
+
+            for (i, &k) in self.working.iter().enumerate() {
+                let scaled = &mut self.scaled[i * m..][..m];
+                for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
+                    *x = f * s;
+                }
+            }
+            let scaled = &self.scaled;
+            self.gram.refill(w, |i| &scaled[i * m..][..m]);
+            self.working_slope.clear();
+            self.working_slope.extend(self.working.iter().map(|&k| self.slope[k]));
+            self.working_weights.clear();
+            self.working_weights.extend(self.working.iter().map(|&k| a[k]));
+            self.simplex.descend(&self.gram, &mut self.working_slope, &mut self.working_weights)?;
+
+            // Weights become the full step; the mixture moves along it as far as the objective agrees.
+            self.change.fill(0.0);
+            let mut promised = 0.0;
+            for (&k, w) in self.working.iter().zip(&mut self.working_weights) {
+                *w -= a[k];
+                promised += 2.0 * *w * self.slope[k];
+                if *w != 0.0 {
+                    add_scaled(&mut self.change, *w, hull.rows.row(k));
+                }
+            }
+            let price = |working: &[usize], step: &[f64]| -> f64 {
+                working.iter().zip(step).map(|(&k, w)| w * hull.price[k]).sum()
+            };
+            let priced = price(&self.working, &self.working_weights);
+            let before = squared;
+            let mut length = 1.0;
+            let mut accepted = false;
+            for _ in 0..MOST_HALVINGS {
+                for ((trial, mix), change) in self.trial.iter_mut().zip(&self.mix).zip(&self.change) {
+                    *trial = mix + length * change;
+                }
+                // The model of the next step comes with the value: a step that is taken is not looked at twice.
+                squared = self.linearise(hull, target);
+                if squared + length * priced <= before + 1e-4 * length * promised.min(0.0) {
+                    accepted = true;
+                    break;
+                }
+                length *= 0.5;
+            }
+            if !accepted {
+                stalled = true;
+                self.trial.copy_from_slice(&self.mix);
+                squared = self.linearise(hull, target);
+                continue;
+            }
+            std::mem::swap(&mut self.mix, &mut self.trial);
+            for (&k, w) in self.working.iter().zip(&self.working_weights) {
+                a[k] = (a[k] + length * w).max(0.0);
+            }
+            let drop = before - squared - length * priced;
+            stalled = drop <= DROP * before;
+        };
+        if !gap.is_finite() {
+            return Err(SimplexError::NotFinite.into());
+        }
+        let convex = self.mix.iter().zip(&target.radiance).all(|(f, t)| *f <= 8.0 * t);
+        Ok(Fit { distance: squared.sqrt(), gap: gap.max(0.0), steps, convex })
+    }
+
+    /// The stacks in use and those that would help most.
+    fn choose(&mut self, a: &[f64]) {
+        self.working.clear();
+        let level = dot(&self.slope, a);
+        for (k, &w) in a.iter().enumerate() {
+            if w > 0.0 || self.slope[k] < level {
+                self.working.push(k);
+            }
+        }
+        let joining = self.working.iter().filter(|&&k| a[k] <= 0.0).count();
+        if joining > MOST_JOINING {
+            let slope = &self.slope;
+            self.working.sort_unstable_by(|&i, &j| {
+                (a[j] > 0.0).cmp(&(a[i] > 0.0)).then(slope[i].total_cmp(&slope[j])).then(i.cmp(&j))
+            });
+            self.working.truncate(self.working.len() - joining + MOST_JOINING);
+            self.working.sort_unstable();
+        }
+    }
+
+    /// The squared distance of the trial mixture, and the model of it: `pull` and `stiffness`.
+    fn linearise(&mut self, hull: &Hull, target: &Target) -> f64 {
+        let m = self.trial.len();
+        let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);
+        let (pull, stiffness) = (&mut self.pull[..m], &mut self.stiffness[..m]);
+        // Passes without sums: the compiler puts neighbouring columns side by side.
+        let inverse = &mut self.inverse[..m];
+        for (r, f) in inverse.iter_mut().zip(mix) {
+            *r = inverse_cbrt(if *f > hull.darkest { *f } else { hull.darkest });
+        }
+        let residual = &mut self.residual[..m];
+        for j in 0..m {
+            let r = inverse[j];
+            let r2 = r * r;
+            let f = if mix[j] > hull.darkest { mix[j] } else { hull.darkest };
+            residual[j] = weight[j] * (f * r2 - t[j]);
+            let tangent = weight[j] * r2 * (1.0 / 3.0);
+            // Second derivative over Gauss-Newton's: (2 cbrt t - cbrt f) / cbrt f, kept within reason.
+            let exact = 2.0 * t[j] * r - 1.0;
+            let exact = if exact > 0.25 { exact } else { 0.25 };
+            let exact = if exact < 9.0 { exact } else { 9.0 };
+            pull[j] = residual[j] * tangent;
+            stiffness[j] = tangent * exact.sqrt();
+        }
+        dot(residual, residual)
+    }
+}
+
+/// Which stacks may get weight.
+#[derive(Clone, Copy)]
+enum Reach {
+    All,
+    Support,
+}
+
+#[derive(Clone, Copy)]
+enum Linear {
+    Tangent,
+    Plain,
+}
+
+fn check(hull: &Hull, target: &Target, a: &[f64]) -> Result<(), MixtureError> {
+    if target.root.len() != hull.columns() {
+        let (expected, found) = (hull.columns(), target.root.len());
+        return Err(MixtureError::Columns { what: "the target", expected, found });
+    }
+    if a.len() != hull.len() {
+        return Err(MixtureError::Length { stacks: hull.len(), found: a.len() });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

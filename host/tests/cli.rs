@@ -1,0 +1,191 @@
+//! The program as its users meet it: arguments in, files and exit codes out.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+/// A fresh folder to run the program in.
+struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        Bench { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn command(&self, args: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_foilpress"));
+        command.args(args.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
+        command
+    }
+
+    fn run(&self, args: &str) -> Output {
+        self.command(args).output().expect("the program starts")
+    }
+
+    /// Runs and returns standard output; fails the test unless the exit code is 0.
+    fn done(&self, args: &str) -> String {
+        let output = self.run(args);
+        assert_eq!(output.status.code(), Some(0), "{args}: {}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    /// Runs what must fail with this exit code; returns what was said.
+    fn refused(&self, code: i32, args: &str) -> String {
+        let output = self.run(args);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{args}: {said}");
+        assert!(!said.contains("panicked"), "{args}: {said}");
+        said
+    }
+
+    /// Everything in the folder, hidden entries too.
+    fn entries(&self) -> Vec<String> {
+        entries(self.folder.path())
+    }
+}
+
+fn entries(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A small PBR folder: a glossy red half beside a bare metal half.
+fn small_document(folder: &Path) {
+    fs::create_dir_all(folder).expect("a folder");
+    let half = |left: [u8; 3], right: [u8; 3]| {
+        image::RgbImage::from_fn(24, 16, |x, _| image::Rgb(if x < 12 { left } else { right }))
+    };
+    for (name, picture) in [
+        ("base_color.png", half([180, 30, 25], [200, 200, 205])),
+        ("roughness.png", half([90; 3], [130; 3])),
+        ("metallic.png", half([0; 3], [255; 3])),
+    ] {
+        picture.save(folder.join(name)).expect("a picture");
+    }
+}
+
+#[test]
+fn a_folder_becomes_a_print_with_everything_in_it() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let plan = bench.done("print tile --size 12x8mm --paper postcard");
+    for word in ["pass", "cartridge", "dots"] {
+        assert!(plan.contains(word), "{word} in the plan:\n{plan}");
+    }
+    assert_eq!(bench.entries(), ["tile", "tile.print"]);
+    let made = entries(&bench.path("tile.print"));
+    assert_eq!(made, ["job.rgl", "materials.png", "passes", "report.json", "separation.png", "sheet.png"]);
+    let report = fs::read_to_string(bench.path("tile.print/report.json")).expect("a report");
+    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    assert_eq!(report["simulated"]["equal"], true);
+    // The same command again replaces its own folder and gives the same job to the byte.
+    let job = fs::read(bench.path("tile.print/job.rgl")).expect("a job");
+    bench.done("print tile --size 12x8mm --paper postcard --to file:again.rgl");
+    assert_eq!(fs::read(bench.path("again.rgl")).expect("a job"), job);
+}
+
+#[test]
+fn every_arrow_by_itself_gives_the_job_of_print() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("print tile --size 12x8mm --paper postcard --to file:whole.rgl");
+    bench.done("factor tile -o tile.foil");
+    bench.done("map tile.foil -o tile.mix");
+    bench.done("halftone tile.mix --size 12x8mm --paper postcard -o tile.sheet");
+    bench.done("separate tile.sheet -o tile.passes");
+    bench.done("encode tile.passes -o steps.rgl");
+    assert!(fs::read(bench.path("whole.rgl")).unwrap() == fs::read(bench.path("steps.rgl")).unwrap());
+    bench.done("simulate steps.rgl -o printed.sheet");
+    let summary = bench.done("inspect steps.rgl --json --passes seen");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    assert_eq!(summary["passes"].as_array().map(Vec::len), Some(entries(&bench.path("seen")).len()));
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    let bench = Bench::new();
+    bench.refused(2, "");
+    bench.refused(2, "print");
+    bench.refused(2, "print sample:leaf --sise 3mm");
+    let said = bench.refused(2, "print sample:leaf --size big");
+    assert!(said.contains("120x90mm"), "{said}");
+    let said = bench.refused(2, "print sample:leaf --paper a3");
+    assert!(said.contains("a4"), "{said}");
+}
+
+#[test]
+fn bad_input_names_the_file_and_leaves_nothing_behind() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let whole = fs::read(bench.path("tile/roughness.png")).unwrap();
+    fs::write(bench.path("tile/roughness.png"), &whole[..whole.len() / 2]).unwrap();
+    let said = bench.refused(1, "print tile --size 12x8mm");
+    assert!(said.contains("roughness.png"), "{said}");
+    assert_eq!(bench.entries(), ["tile"]);
+
+    let said = bench.refused(1, "print nowhere");
+    assert!(said.contains("nowhere"), "{said}");
+    let said = bench.refused(1, "print sample:leef");
+    assert!(said.contains("leaf"), "{said}");
+    let said = bench.refused(1, "print sample:leaf --size 400x500mm");
+    assert!(said.contains("203.2"), "{said}");
+    let said = bench.refused(1, "inspect tile/base_color.png");
+    assert!(said.contains("base_color.png") && said.contains("byte"), "{said}");
+    assert_eq!(bench.entries(), ["tile"]);
+}
+
+#[test]
+fn a_misspelt_ink_is_answered_with_the_one_meant() {
+    let bench = Bench::new();
+    let said = bench.refused(1, "print sample:leaf --inks process,metalic-silver");
+    assert!(said.contains("metallic-silver"), "{said}");
+}
+
+#[test]
+fn a_folder_of_somebody_else_is_never_replaced() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    fs::create_dir(bench.path("thesis")).unwrap();
+    fs::write(bench.path("thesis/chapter1"), "words").unwrap();
+    let said = bench.refused(1, "print tile --size 12x8mm -o thesis");
+    assert!(said.contains("thesis"), "{said}");
+    assert_eq!(entries(&bench.path("thesis")), ["chapter1"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_print_leaves_nothing_behind() {
+    let bench = Bench::new();
+    let mut child = bench
+        .command("print sample:leaf")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let began = Instant::now();
+    while bench.entries().is_empty() && began.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    assert!(!bench.entries().is_empty(), "the staging folder appears early");
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(killed.is_ok_and(|status| status.success()));
+    assert_eq!(child.wait().expect("the program ends").code(), Some(130));
+    assert!(bench.entries().is_empty(), "{:?}", bench.entries());
+}

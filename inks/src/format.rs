@@ -1,0 +1,73 @@
+//! The library's file as it is written: `library.toml`.
+//!
+//! Every table refuses keys it does not know. Values that are checked later keep their place in the file.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::model::{Layer, Model, Paper};
+use crate::provenance::Figure;
+use crate::rule::{Certainty, Rule};
+use crate::set::InkName;
+
+/// The version of the format this program reads.
+pub(crate) const FORMAT: u32 = 1;
+
+/// The name of the file in a library's folder.
+pub const FILE_NAME: &str = "library.toml";
+
+/// A library's file is refused beyond this size.
+pub(crate) const MOST_BYTES: u64 = 1 << 20;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct File {
+    pub format: Spanned<u32>,
+    pub based_on: Option<Spanned<String>>,
+    pub name: Option<String>,
+    pub about: Option<String>,
+    pub stacks: Option<Vec<Spanned<String>>>,
+    pub paper: Option<Paper>,
+    pub model: Option<Model>,
+    #[serde(default)]
+    pub ink: Vec<Spanned<InkTable>>,
+    #[serde(default)]
+    pub rule: Vec<Rule>,
+    #[serde(default)]
+    pub measured: Vec<Spanned<MeasuredTable>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct InkTable {
+    pub ink: InkName,
+    pub okidata: String,
+    pub alps: String,
+    pub part: Spanned<String>,
+    pub code: Spanned<u8>,
+    pub barcode: Spanned<u8>,
+    pub minimum_cluster: Figure<u16>,
+    #[serde(default)]
+    pub cautions: Vec<Caution>,
+    pub layer: Option<Spanned<Layer>>,
+}
+
+/// Something an owner should know before using a cartridge.
+#[derive(Clone, Debug, PartialEq, Deserialize, serde::Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Caution {
+    /// The words.
+    pub text: String,
+    /// How sure it is.
+    pub certainty: Certainty,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct MeasuredTable {
+    pub stack: Spanned<String>,
+    pub curve: Spanned<String>,
+    pub by: Spanned<String>,
+    pub when: Spanned<String>,
+    pub setup: Spanned<String>,
+}

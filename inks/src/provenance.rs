@@ -1,0 +1,142 @@
+//! Where a number comes from, kept beside the number.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+/// How a single figure was obtained.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// Measured on the printed ink itself.
+    Measured,
+    /// Published for this ink, this machine, or the same class of print or metal.
+    Literature,
+    /// Follows from other figures.
+    Formula,
+    /// An informed guess. Nobody has published it.
+    Guess,
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Source::Measured => "measured",
+            Source::Literature => "literature",
+            Source::Formula => "formula",
+            Source::Guess => "guess",
+        })
+    }
+}
+
+/// A figure with its source, `{ value = 0.12, source = "guess", note = "..." }` in a file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figure<T> {
+    value: Spanned<T>,
+    source: Source,
+    note: Option<String>,
+}
+
+impl<T: Copy> Figure<T> {
+    /// The value.
+    pub fn get(&self) -> T {
+        *self.value.get_ref()
+    }
+
+    /// Where it comes from.
+    pub fn source(&self) -> Source {
+        self.source
+    }
+
+    /// A word on it, if the file has one.
+    pub fn note(&self) -> Option<&str> {
+        self.note.as_deref()
+    }
+
+    /// Byte offset of the value in its file.
+    pub fn offset(&self) -> usize {
+        self.value.span().start
+    }
+}
+
+/// A figure of either shape, to list and to check.
+#[derive(Clone, Copy, Debug)]
+pub enum Value<'a> {
+    /// One number.
+    Scalar(&'a Figure<f64>),
+    /// One number for each channel, or L*, a*, b*.
+    Triple(&'a Figure<[f64; 3]>),
+}
+
+impl Value<'_> {
+    /// The numbers.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Value::Scalar(figure) => vec![figure.get()],
+            Value::Triple(figure) => figure.get().to_vec(),
+        }
+    }
+
+    /// Where they come from.
+    pub fn source(&self) -> Source {
+        match self {
+            Value::Scalar(figure) => figure.source(),
+            Value::Triple(figure) => figure.source(),
+        }
+    }
+
+    /// Byte offset in the file.
+    pub fn offset(&self) -> usize {
+        match self {
+            Value::Scalar(figure) => figure.offset(),
+            Value::Triple(figure) => figure.offset(),
+        }
+    }
+}
+
+/// One figure a modelled curve rests on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Its place in the library, such as `cyan.lab`.
+    pub name: String,
+    /// Its number, or three.
+    pub value: Vec<f64>,
+    /// Where it comes from.
+    pub source: Source,
+}
+
+/// Where a curve comes from, so that nobody mistakes a model for a measurement.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Provenance {
+    /// Computed from figures of the library; nobody measured this print.
+    Modelled {
+        /// The model's name.
+        model: String,
+        /// The figures used, substrate first, then layer by layer.
+        parameters: Vec<Parameter>,
+    },
+    /// Measured on a print.
+    Measured {
+        /// Who measured.
+        by: String,
+        /// When, as `YYYY-MM-DD` or `YYYY-MM`.
+        when: String,
+        /// Instrument, geometry, paper and anything else needed to repeat it.
+        setup: String,
+    },
+}
+
+impl Provenance {
+    /// Whether the curve is a measurement.
+    pub fn is_measured(&self) -> bool {
+        matches!(self, Provenance::Measured { .. })
+    }
+
+    /// `modelled` or `measured`.
+    pub fn word(&self) -> &'static str {
+        if self.is_measured() { "measured" } else { "modelled" }
+    }
+}

@@ -1,0 +1,456 @@
+//! Reading and checking a library: the built-in text and an owner's folder take the same way.
+//!
+//! A finding is collected, not thrown, so that an owner sees all of them at once; only a file that is not TOML of
+//! the expected shape ends the reading early. A library with errors is not made.
+
+use std::f64::consts::FRAC_PI_2;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+use protocol::ink::Ink;
+use toml::Spanned;
+
+use crate::albedo::{self, Albedo, INCIDENCES};
+use crate::curve::{Curve, CurveError};
+use crate::format::{FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
+use crate::library::{Cartridge, Entry, Library};
+use crate::model::{Layer, Listed, Optics};
+use crate::problem::{Findings, Problem};
+use crate::provenance::{Figure, Provenance};
+use crate::rule::{Rule, Severity};
+use crate::stack::Stack;
+
+/// A sheet numbers its stacks with a byte.
+const MOST_STACKS: usize = 256;
+/// Far beyond what holds; a limit for hostile files only.
+const MOST_LAYERS: usize = 16;
+/// A curve file is refused beyond this size.
+const MOST_CURVE_BYTES: u64 = 16 << 20;
+/// A measured albedo up to here is a calibration error, beyond it is no reflectance.
+const CALIBRATION: f64 = 1.05;
+
+type Found = (Option<Library>, Vec<Problem>);
+
+/// Reads `folder/library.toml`.
+pub(crate) fn folder(folder: &Path) -> Found {
+    let file = folder.join(FILE_NAME);
+    match text(&file, MOST_BYTES) {
+        Ok(text) => parse(&text, &file, Some(folder)),
+        Err(problem) => {
+            let problem =
+                Problem { file, line: None, field: String::new(), severity: Severity::Error, text: problem };
+            (None, vec![problem])
+        }
+    }
+}
+
+/// A text file no longer than `most` bytes.
+fn text(path: &Path, most: u64) -> Result<String, String> {
+    let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
+    let mut text = String::new();
+    file.take(most + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
+    if text.len() as u64 > most {
+        return Err(format!("longer than {most} bytes"));
+    }
+    Ok(text)
+}
+
+/// A stack that is wanted, and the place in the text that wants it.
+struct Wanted {
+    stack: Stack,
+    offset: Option<usize>,
+    measured: Option<(Curve, Provenance)>,
+}
+
+/// Reads a library's text. `folder` holds its curves; without it there can be none.
+pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
+    let mut findings = Findings { text, file: file.to_path_buf(), found: Vec::new() };
+    let parsed = match toml::from_str::<File>(text) {
+        Ok(parsed) => parsed,
+        Err(error) => {
+            findings.error(error.span().map(|span| span.start), "", error.message());
+            return (None, findings.found);
+        }
+    };
+    if *parsed.format.get_ref() != FORMAT {
+        let problem = format!("version {}; this program reads version {FORMAT}", parsed.format.get_ref());
+        findings.error(Some(parsed.format.span().start), "format", problem);
+        return (None, findings.found);
+    }
+    let base = match &parsed.based_on {
+        None => None,
+        Some(name) if folder.is_some() && name.get_ref() == "built-in" => Some(Library::builtin()),
+        Some(name) => {
+            let problem = format!("`{}`: a library can be based on `built-in` or on nothing", name.get_ref());
+            findings.error(Some(name.span().start), "based_on", problem);
+            return (None, findings.found);
+        }
+    };
+    let library = build(parsed, base, folder, &mut findings);
+    let usable = library.filter(|_| !findings.fatal());
+    (usable, findings.found)
+}
+
+fn build(
+    file: File,
+    base: Option<Library>,
+    folder: Option<&Path>,
+    findings: &mut Findings,
+) -> Option<Library> {
+    let missing = |findings: &mut Findings, table: &str| {
+        findings.error(None, table, "missing; give it, or set `based_on = \"built-in\"`");
+    };
+    let (mut cartridges, mut rules, mut layers, mut stacks) =
+        (Vec::new(), Vec::new(), [const { None }; 13], None);
+    // Figures of a base were checked when it was read, and their places are in another text.
+    if let Some(paper) = &file.paper {
+        ranges("paper", &paper.figures(), findings);
+        cluster("paper", &paper.minimum_cluster, findings);
+    }
+    if let Some(model) = &file.model {
+        ranges("model", &model.figures(), findings);
+    }
+    let (mut paper, mut model, mut name, mut about) = (file.paper, file.model, file.name, file.about);
+    if let Some(base) = base {
+        cartridges = base.cartridges;
+        rules = base.rules;
+        layers = base.optics.layers;
+        stacks = Some(base.entries.into_iter().map(|entry| entry.stack).collect::<Vec<_>>());
+        paper = paper.or(Some(base.optics.paper));
+        model = model.or(Some(base.optics.model));
+        name = name.or_else(|| Some(format!("{}, changed", base.name)));
+        about = about.or(Some("Modelled where it was not measured.".into()));
+    }
+    let mut seen = Vec::new();
+    for table in file.ink {
+        let offset = table.span().start;
+        ink(table.into_inner(), offset, &mut seen, &mut cartridges, &mut layers, findings);
+    }
+    cartridges.sort_by_key(|cartridge| cartridge.ink);
+    rules.extend(file.rule);
+    let mut wanted = match (file.stacks, stacks) {
+        (Some(texts), _) => listed_stacks(&texts, findings),
+        (None, Some(stacks)) => {
+            stacks.into_iter().map(|stack| Wanted { stack, offset: None, measured: None }).collect()
+        }
+        (None, None) => {
+            missing(findings, "stacks");
+            Vec::new()
+        }
+    };
+    let named: Vec<String> =
+        file.measured.iter().map(|table| table.get_ref().curve.get_ref().clone()).collect();
+    if let Some(beyond) = file.measured.get(MOST_STACKS) {
+        findings.error(Some(beyond.span().start), "measured", format!("more than {MOST_STACKS}"));
+    }
+    for table in file.measured.iter().take(MOST_STACKS) {
+        measured(table.get_ref(), folder, &mut wanted, findings);
+    }
+    for want in &wanted {
+        for ink in want.stack.layers() {
+            if !cartridges.iter().any(|cartridge| cartridge.ink == *ink) {
+                let problem = format!("holds {}, of which there is no `[[ink]]`", ink.name());
+                findings.error(want.offset, format!("stack {}", want.stack), problem);
+            }
+        }
+    }
+    if wanted.first().is_none_or(|first| first.stack != Stack::SUBSTRATE) || wanted.len() > MOST_STACKS {
+        let problem =
+            format!("{} stacks; `substrate` must be the first of at most {MOST_STACKS}", wanted.len());
+        findings.error(None, "stacks", problem);
+    }
+    if let Some(folder) = folder {
+        unused_curves(folder, &named, findings);
+    }
+    let Some(paper) = paper else {
+        missing(findings, "paper");
+        return None;
+    };
+    let Some(model) = model else {
+        missing(findings, "model");
+        return None;
+    };
+    let optics = Optics { paper, model, layers };
+    if findings.fatal() {
+        return None;
+    }
+    let quadratures = albedo::standard();
+    let mut entries = Vec::with_capacity(wanted.len());
+    for want in wanted {
+        let number = entries.len();
+        entries.extend(entry(number, want, &optics, &quadratures, &rules, findings));
+    }
+    Some(Library {
+        name: name.unwrap_or_default(),
+        about: about.unwrap_or_default(),
+        optics,
+        cartridges,
+        rules,
+        entries,
+    })
+}
+
+/// The stacks of the file's own list, without those that are none or stand there twice.
+fn listed_stacks(texts: &[Spanned<String>], findings: &mut Findings) -> Vec<Wanted> {
+    let mut wanted: Vec<Wanted> = Vec::new();
+    for text in texts {
+        let (offset, field) = (text.span().start, format!("stacks: {}", text.get_ref()));
+        if wanted.len() == MOST_STACKS {
+            findings.error(Some(offset), "stacks", format!("more than {MOST_STACKS}"));
+            break;
+        }
+        let Some(stack) = wanted_stack(text.get_ref(), &field, offset, findings) else { continue };
+        if wanted.iter().any(|other| other.stack == stack) {
+            findings.error(Some(offset), field, "is listed twice");
+        } else {
+            wanted.push(Wanted { stack, offset: Some(offset), measured: None });
+        }
+    }
+    wanted
+}
+
+/// Reads a stack's text; says so if it is none.
+fn wanted_stack(text: &str, field: &str, offset: usize, findings: &mut Findings) -> Option<Stack> {
+    match text.parse::<Stack>() {
+        Ok(stack) if stack.layers().len() <= MOST_LAYERS => Some(stack),
+        Ok(stack) => {
+            let problem = format!("{} layers; at most {MOST_LAYERS}", stack.layers().len());
+            findings.error(Some(offset), field, problem);
+            None
+        }
+        Err(error) => {
+            findings.error(Some(offset), field, error.to_string());
+            None
+        }
+    }
+}
+
+fn ranges(owner: &str, figures: &[Listed<'_>], findings: &mut Findings) {
+    for (name, [least, most], value) in figures {
+        if let Some(number) = value.numbers().into_iter().find(|n| !(*least..=*most).contains(n)) {
+            let problem = format!("{number} is outside {least} to {most}");
+            findings.error(Some(value.offset()), format!("{owner}.{name}"), problem);
+        }
+    }
+}
+
+fn cluster(owner: &str, figure: &Figure<u16>, findings: &mut Findings) {
+    if !(1..=1024).contains(&figure.get()) {
+        let problem = format!("{} dots; 1 to 1024", figure.get());
+        findings.error(Some(figure.offset()), format!("{owner}.minimum_cluster"), problem);
+    }
+}
+
+/// Checks an ink's table and puts it in the place of the one known so far.
+fn ink(
+    table: InkTable,
+    offset: usize,
+    seen: &mut Vec<Ink>,
+    cartridges: &mut Vec<Cartridge>,
+    layers: &mut [Option<Layer>; 13],
+    findings: &mut Findings,
+) {
+    let ink = table.ink.0;
+    let owner = format!("ink {}", ink.name());
+    if seen.contains(&ink) {
+        findings.error(Some(offset), owner.clone(), "is given twice");
+    }
+    seen.push(ink);
+    // The machine knows an ink by these; a slip here would print with another ribbon.
+    let mut same = |field: &str, offset: usize, found: String, expected: String| {
+        if found != expected {
+            let problem = format!("{found}, but the machine's is {expected}");
+            findings.error(Some(offset), format!("{owner}.{field}"), problem);
+        }
+    };
+    let (code, barcode, part) = (&table.code, &table.barcode, &table.part);
+    same("code", code.span().start, format!("{:#04x}", code.get_ref()), format!("{:#04x}", ink.code()));
+    same("barcode", barcode.span().start, barcode.get_ref().to_string(), ink.barcode().to_string());
+    same("part", part.span().start, part.get_ref().clone(), ink.part().into());
+    cluster(&owner, &table.minimum_cluster, findings);
+    let layer = table.layer.map(|layer| {
+        ranges(&owner, &layer.get_ref().figures(), findings);
+        if let Layer::Metal(metal) = layer.get_ref()
+            && metal.binder_f0.is_some() != metal.binder_alpha.is_some()
+        {
+            let problem = "binder_f0 and binder_alpha come together or not at all";
+            findings.error(Some(layer.span().start), owner.clone(), problem);
+        }
+        layer.into_inner()
+    });
+    layers[ink as usize] = layer;
+    cartridges.retain(|cartridge| cartridge.ink != ink);
+    cartridges.push(Cartridge {
+        ink,
+        okidata: table.okidata,
+        alps: table.alps,
+        minimum_cluster: table.minimum_cluster,
+        cautions: table.cautions,
+    });
+}
+
+/// Reads a measured curve and gives it to its stack, which joins the list if it is new.
+fn measured(table: &MeasuredTable, folder: Option<&Path>, wanted: &mut Vec<Wanted>, findings: &mut Findings) {
+    let owner = format!("measured {}", table.stack.get_ref());
+    let offset = table.stack.span().start;
+    let stack = wanted_stack(table.stack.get_ref(), &owner, offset, findings);
+    for (name, value) in [("by", &table.by), ("when", &table.when), ("setup", &table.setup)] {
+        if value.get_ref().trim().is_empty() {
+            let problem = "is empty; a measurement says who, when and how";
+            findings.error(Some(value.span().start), format!("{owner}.{name}"), problem);
+        }
+    }
+    if !is_date(table.when.get_ref()) {
+        let problem = format!("`{}` is no date; write YYYY-MM-DD or YYYY-MM", table.when.get_ref());
+        findings.error(Some(table.when.span().start), format!("{owner}.when"), problem);
+    }
+    let field = format!("{owner}.curve");
+    let curve = match curve_path(folder, table.curve.get_ref()) {
+        Ok(path) => curve(&path, findings, table.curve.span().start, &field),
+        Err(problem) => {
+            findings.error(Some(table.curve.span().start), field, problem);
+            None
+        }
+    };
+    let (Some(stack), Some(curve)) = (stack, curve) else { return };
+    let provenance = Provenance::Measured {
+        by: table.by.get_ref().clone(),
+        when: table.when.get_ref().clone(),
+        setup: table.setup.get_ref().clone(),
+    };
+    let place = wanted.iter().position(|want| want.stack == stack).unwrap_or_else(|| {
+        wanted.push(Wanted { stack, offset: Some(offset), measured: None });
+        wanted.len() - 1
+    });
+    if wanted[place].measured.is_some() {
+        findings.error(Some(offset), owner, "is measured twice");
+    }
+    wanted[place].offset.get_or_insert(offset);
+    wanted[place].measured = Some((curve, provenance));
+}
+
+/// A file inside the folder, named without leaving it.
+fn curve_path(folder: Option<&Path>, name: &str) -> Result<PathBuf, String> {
+    let folder = folder.ok_or("a library without a folder has no curve files")?;
+    let plain = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    if name.is_empty() || !plain {
+        return Err(format!("`{name}` must name a file inside the library's folder"));
+    }
+    Ok(folder.join(name))
+}
+
+fn curve(path: &Path, findings: &mut Findings, offset: usize, field: &str) -> Option<Curve> {
+    let text = match text(path, MOST_CURVE_BYTES) {
+        Ok(text) => text,
+        Err(problem) => {
+            findings.error(Some(offset), field, format!("{}: {problem}", path.display()));
+            return None;
+        }
+    };
+    match Curve::from_csv(text.as_bytes(), path) {
+        Ok(curve) => Some(curve),
+        Err(CurveError::Csv { path, line, problem }) => {
+            findings.found.push(Problem {
+                file: path,
+                line: usize::try_from(line).ok().filter(|&line| line > 0),
+                field: field.into(),
+                severity: Severity::Error,
+                text: problem,
+            });
+            None
+        }
+        Err(error) => {
+            findings.error(Some(offset), field, error.to_string());
+            None
+        }
+    }
+}
+
+/// `YYYY-MM` or `YYYY-MM-DD`, with a month and a day that exist in some year.
+fn is_date(text: &str) -> bool {
+    let number = |part: &str, digits: usize| -> Option<u32> {
+        (part.len() == digits && part.bytes().all(|b| b.is_ascii_digit())).then(|| part.parse().ok())?
+    };
+    let parts: Vec<&str> = text.split('-').collect();
+    let (year, month, day) = match parts[..] {
+        [year, month] => (year, month, "01"),
+        [year, month, day] => (year, month, day),
+        _ => return false,
+    };
+    number(year, 4).is_some()
+        && number(month, 2).is_some_and(|month| (1..=12).contains(&month))
+        && number(day, 2).is_some_and(|day| (1..=31).contains(&day))
+}
+
+/// Curves that lie in the folder and are named by nothing are probably a slip.
+fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
+    let Ok(list) = std::fs::read_dir(folder) else { return };
+    let mut unused: Vec<PathBuf> = list
+        .filter_map(|file| Some(file.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")))
+        .filter(|path| !named.iter().any(|name| folder.join(name) == *path))
+        .collect();
+    unused.sort();
+    for file in unused.into_iter().take(100) {
+        findings.found.push(Problem {
+            file,
+            line: None,
+            field: String::new(),
+            severity: Severity::Warning,
+            text: "no `[[measured]]` names this curve".into(),
+        });
+    }
+}
+
+/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. A lobe grows as
+/// 1 / cos towards 90 degrees, so the last value is held there rather than drawn towards a pole.
+fn grid() -> Vec<f64> {
+    const STEPS: u32 = 512;
+    (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).powi(2)).collect()
+}
+
+/// The entry of a stack, after the checks that need its curve.
+fn entry(
+    number: usize,
+    want: Wanted,
+    optics: &Optics,
+    quadratures: &[Albedo],
+    rules: &[Rule],
+    findings: &mut Findings,
+) -> Option<Entry> {
+    let Wanted { stack, offset, measured } = want;
+    let field = format!("stack {stack}");
+    let (curve, lobes, provenance) = match measured {
+        Some((curve, provenance)) => (curve, None, provenance),
+        None => match optics.lobes(&stack) {
+            Ok(lobes) => {
+                let (model, parameters) = (optics.model.name.clone(), optics.parameters(&stack));
+                (lobes.curve(&grid()), Some(lobes), Provenance::Modelled { model, parameters })
+            }
+            Err(error) => {
+                findings.error(offset, field, error.to_string());
+                return None;
+            }
+        },
+    };
+    for (quadrature, degrees) in quadratures.iter().zip(INCIDENCES) {
+        let albedo = quadrature.of(&curve).into_iter().fold(0.0, f64::max);
+        if albedo > 1.0 {
+            // The quadrature itself is good to 2e-4, far inside what separates the two cases.
+            let severity =
+                if albedo <= CALIBRATION && lobes.is_none() { Severity::Warning } else { Severity::Error };
+            let problem = format!(
+                "sends back {:.1}% of the light that comes in {degrees} degrees off the normal",
+                100.0 * albedo
+            );
+            findings.add(severity, offset, field.clone(), problem);
+            break;
+        }
+    }
+    // Of a base's stacks the owner of this text has said nothing, so nothing is said to him.
+    for rule in rules.iter().filter(|rule| offset.is_some() && rule.broken_by(&stack)) {
+        let problem = format!("{} ({}; {})", rule.says, rule.name, rule.certainty);
+        findings.add(rule.severity, offset, field.clone(), problem);
+    }
+    Some(Entry { number, stack, curve, lobes, provenance })
+}

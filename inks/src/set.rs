@@ -1,0 +1,231 @@
+//! The inks at hand.
+//!
+//! Text form: words joined by commas, each an ink (`cyan`, `MS`) or a group (`process`, `metallic`, `clear`,
+//! `foil`, `default`, `all`), taken away with a leading `-`. A text that begins with `-` or `+` changes the default
+//! set. Foils are in no set that does not name them or `all`: their ink codes were never seen in a real stream,
+//! so using them takes an explicit choice.
+
+use std::fmt;
+use std::str::FromStr;
+
+use protocol::ink::{Ink, Kind};
+use serde::Deserialize;
+
+/// A set of inks. `Default` is every ink but the foils and white.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
+#[serde(try_from = "String")]
+pub struct InkSet(u16);
+
+/// Why a text is not a set of inks.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{word}` is no ink and no group of inks{}; {}", hint(suggestion), choices())]
+pub struct InkSetError {
+    /// The word that is not understood.
+    pub word: String,
+    /// What may have been meant.
+    pub suggestion: Option<&'static str>,
+}
+
+fn hint(suggestion: &Option<&'static str>) -> String {
+    suggestion.map_or(String::new(), |s| format!(", did you mean `{s}`?"))
+}
+
+fn choices() -> String {
+    let groups: Vec<_> = GROUPS.iter().map(|(name, _)| *name).collect();
+    format!("groups are {}; inks are {}", groups.join(", "), Ink::ALL.map(Ink::name).join(", "))
+}
+
+type Member = fn(Ink) -> bool;
+
+const GROUPS: [(&str, Member); 6] = [
+    ("process", |ink| ink.kind() == Kind::Process),
+    ("metallic", |ink| ink.kind() == Kind::Metallic),
+    ("clear", |ink| matches!(ink.kind(), Kind::Finish | Kind::Primer)),
+    ("foil", |ink| ink.kind() == Kind::Foil),
+    ("default", |ink| !matches!(ink.kind(), Kind::Foil | Kind::White)),
+    ("all", |_| true),
+];
+
+impl Default for InkSet {
+    fn default() -> InkSet {
+        InkSet::EMPTY.with_all(|ink| !matches!(ink.kind(), Kind::Foil | Kind::White))
+    }
+}
+
+impl InkSet {
+    /// No ink: only the bare substrate can be printed.
+    pub const EMPTY: InkSet = InkSet(0);
+
+    /// Every ink, the foils included.
+    pub const ALL: InkSet = InkSet((1 << Ink::ALL.len()) - 1);
+
+    /// The set of these inks.
+    pub fn of(inks: impl IntoIterator<Item = Ink>) -> InkSet {
+        inks.into_iter().fold(InkSet::EMPTY, InkSet::with)
+    }
+
+    /// The set and this ink.
+    #[must_use]
+    pub fn with(self, ink: Ink) -> InkSet {
+        InkSet(self.0 | 1 << ink as u16)
+    }
+
+    /// The set without this ink.
+    #[must_use]
+    pub fn without(self, ink: Ink) -> InkSet {
+        InkSet(self.0 & !(1 << ink as u16))
+    }
+
+    fn with_all(self, member: impl Fn(Ink) -> bool) -> InkSet {
+        Ink::ALL.into_iter().filter(|&ink| member(ink)).fold(self, InkSet::with)
+    }
+
+    /// Whether the ink is in the set.
+    pub fn contains(self, ink: Ink) -> bool {
+        self.0 & 1 << ink as u16 != 0
+    }
+
+    /// Whether every one of the inks is in the set.
+    pub fn contains_all(self, inks: &[Ink]) -> bool {
+        inks.iter().all(|&ink| self.contains(ink))
+    }
+
+    /// How many inks are in the set.
+    pub fn len(self) -> usize {
+        self.0.count_ones() as usize
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// The inks, in the order of their codes.
+    pub fn iter(self) -> impl Iterator<Item = Ink> {
+        Ink::ALL.into_iter().filter(move |&ink| self.contains(ink))
+    }
+}
+
+impl FromStr for InkSet {
+    type Err = InkSetError;
+
+    fn from_str(text: &str) -> Result<InkSet, InkSetError> {
+        let changes_default = text.trim_start().starts_with(['-', '+']);
+        let mut set = if changes_default { InkSet::default() } else { InkSet::EMPTY };
+        for word in text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty()) {
+            let (take, name) = match word.strip_prefix('-') {
+                Some(name) => (true, name),
+                None => (false, word.strip_prefix('+').unwrap_or(word)),
+            };
+            let named = match GROUPS.iter().find(|(group, _)| group.eq_ignore_ascii_case(name)) {
+                Some((_, member)) => InkSet::EMPTY.with_all(member),
+                None => InkSet::EMPTY.with(
+                    Ink::from_name(name)
+                        .ok_or_else(|| InkSetError { word: name.into(), suggestion: closest(name) })?,
+                ),
+            };
+            set = if take { InkSet(set.0 & !named.0) } else { InkSet(set.0 | named.0) };
+        }
+        Ok(set)
+    }
+}
+
+impl TryFrom<String> for InkSet {
+    type Error = InkSetError;
+
+    fn try_from(text: String) -> Result<InkSet, InkSetError> {
+        text.parse()
+    }
+}
+
+/// One ink, named in a file by its long or short name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct InkName(pub Ink);
+
+impl TryFrom<String> for InkName {
+    type Error = InkSetError;
+
+    fn try_from(word: String) -> Result<InkName, InkSetError> {
+        match Ink::from_name(&word) {
+            Some(ink) => Ok(InkName(ink)),
+            None => Err(InkSetError { suggestion: closest(&word), word }),
+        }
+    }
+}
+
+/// The known name most like this one, if any is like it at all.
+fn closest(word: &str) -> Option<&'static str> {
+    let word = word.to_ascii_lowercase();
+    let names = Ink::ALL.into_iter().map(Ink::name).chain(GROUPS.iter().map(|(name, _)| *name));
+    names
+        .map(|name| (strsim::normalized_damerau_levenshtein(&word, name), name))
+        .filter(|(likeness, _)| *likeness >= 0.5)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
+}
+
+impl fmt::Display for InkSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.iter().map(Ink::name).collect::<Vec<_>>().join(","))
+    }
+}
+
+impl fmt::Debug for InkSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_set().entries(self.iter()).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn set(text: &str) -> InkSet {
+        text.parse().unwrap()
+    }
+
+    #[test]
+    fn foils_need_to_be_named() {
+        for text in ["default", "process,metallic,clear", "-white", "+white"] {
+            assert!(!set(text).contains(Ink::SilverFoil) && !set(text).contains(Ink::GoldFoil), "{text}");
+        }
+        for text in ["all", "foil", "+silver-foil", "C,SF"] {
+            assert!(set(text).contains(Ink::SilverFoil), "{text}");
+        }
+    }
+
+    #[test]
+    fn words_add_and_take_away_in_order() {
+        let inks = [Ink::Black, Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::MetallicSilver, Ink::Finish];
+        assert_eq!(set("process,metallic-silver,finish"), InkSet::of(inks));
+        assert_eq!(set("all,-white"), InkSet::ALL.without(Ink::White));
+        assert_eq!(set("-metallic"), set("process clear"));
+        assert_eq!(set("process,-K,k"), set("process"));
+        assert_eq!(set(""), InkSet::EMPTY);
+    }
+
+    #[test]
+    fn a_slip_of_the_pen_is_understood() {
+        let error = "process,metalic-silver".parse::<InkSet>().unwrap_err();
+        assert_eq!(error.suggestion, Some("metallic-silver"));
+        assert!(error.to_string().contains("did you mean `metallic-silver`?"), "{error}");
+        let error = "chartreuse".parse::<InkSet>().unwrap_err();
+        assert!(error.suggestion.is_none() && error.to_string().contains("gold-foil"), "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn the_text_of_a_set_is_the_set(bits in 0u16..1 << 13) {
+            let some = InkSet(bits);
+            prop_assert_eq!(set(&some.to_string()), some);
+            prop_assert_eq!(InkSet::of(some.iter()), some);
+        }
+
+        #[test]
+        fn no_text_panics(text in "\\PC{0,40}") {
+            let _ = text.parse::<InkSet>();
+        }
+    }
+}

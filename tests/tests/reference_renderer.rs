@@ -1,0 +1,147 @@
+//! Balls against an independent renderer, where there is one: `FOILPRESS_REFERENCE` names the script, which needs
+//! `python3` with NumPy. It takes a curve as CSV and a panorama as `.npy`, and writes radiance as `.npy`.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use foilpress::brdf::{Space, Table};
+use foilpress::observe::Silent;
+use foilpress::preview::{Probe, Radiance, sphere};
+use inks::Curve;
+
+/// Where the reference is, if it can run here.
+fn reference() -> Option<PathBuf> {
+    let Ok(script) = std::env::var("FOILPRESS_REFERENCE") else {
+        println!("skipped: FOILPRESS_REFERENCE is not set");
+        return None;
+    };
+    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
+    if !numpy.is_ok_and(|out| out.status.success()) {
+        println!("skipped: no python3 with NumPy");
+        return None;
+    }
+    Some(PathBuf::from(script))
+}
+
+/// Diffuse reflectance, F0 and width as a curve of the working grid, so that both sides interpolate the same samples.
+fn curve(space: &Space, (diffuse, f0, alpha): (f64, f64, f64)) -> Curve {
+    Curve::sampled(space.angles(), |t| {
+        let lobe = f0 * inks::ggx::lobe(t, alpha);
+        [diffuse + lobe, 0.7 * diffuse + lobe, 0.2 * diffuse + 0.5 * lobe]
+    })
+}
+
+fn write_curve(path: &Path, curve: &Curve) {
+    curve.to_csv(std::fs::File::create(path).unwrap()).unwrap();
+}
+
+/// NumPy's format, version 1: magic, length of the header, a Python dictionary padded to 64 bytes, then the data.
+fn write_npy(path: &Path, probe: &Probe) {
+    let shape = format!("({}, {}, 3)", probe.height(), probe.width());
+    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    while (10 + header.len() + 1) % 64 != 0 {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.bytes());
+    bytes.extend(probe.rgb().iter().flatten().flat_map(|v| v.to_le_bytes()));
+    std::fs::write(path, bytes).unwrap();
+}
+
+fn read_npy(path: &Path, values: usize) -> Vec<[f32; 4]> {
+    let bytes = std::fs::read(path).unwrap();
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = String::from_utf8_lossy(&bytes[10..start]);
+    assert!(header.contains("'<f4'") && header.contains("False"), "{header}");
+    let numbers: Vec<f32> =
+        bytes[start..].chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    assert_eq!(numbers.len(), 4 * values);
+    numbers.chunks_exact(4).map(|p| p.try_into().unwrap()).collect()
+}
+
+fn run(script: &Path, mode: &str, args: &[&str], curve: &Path, out: &Path, size: usize) -> Vec<[f32; 4]> {
+    let status = Command::new("python3")
+        .arg(script)
+        .arg(mode)
+        .args(["--size", &size.to_string(), "--curve"])
+        .arg(curve)
+        .arg("--out")
+        .arg(out)
+        .args(args)
+        .output()
+        .unwrap();
+    assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
+    read_npy(out, size * size)
+}
+
+/// Greatest and root-mean-square difference over wholly covered pixels, as shares of the reference's mean.
+fn difference(ours: &Radiance, theirs: &[[f32; 4]]) -> (f64, f64) {
+    let (mut most, mut squares, mut mean, mut n) = (0.0f64, 0.0, 0.0, 0.0);
+    for (a, b) in ours.pixels.iter().zip(theirs).filter(|(_, b)| b[3] > 0.999) {
+        assert_eq!(a[3], 1.0, "both cover the same pixels");
+        for c in 0..3 {
+            let d = f64::from(a[c] - b[c]);
+            most = most.max(d.abs());
+            squares += d * d;
+            mean += f64::from(b[c]);
+            n += 1.0;
+        }
+    }
+    assert!(n > 0.0);
+    (most / (mean / n), (squares / n).sqrt() / (mean / n))
+}
+
+/// White paper and silver foil: the dullest and nearly the sharpest thing that can be printed.
+const PAPER: (f64, f64, f64) = (0.27, 0.04, 0.28);
+const FOIL: (f64, f64, f64) = (0.005, 0.85, 0.06);
+
+#[test]
+fn a_ball_lit_from_the_eye_is_the_references_ball() {
+    let Some(script) = reference() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let space = Space::half_angle(64);
+    for material in [PAPER, FOIL] {
+        let curve = curve(&space, material);
+        let (csv, out) = (dir.path().join("curve.csv"), dir.path().join("ball.npy"));
+        write_curve(&csv, &curve);
+        let theirs = run(&script, "sphere-dir", &[], &csv, &out, 96);
+        let (most, rms) = difference(&sphere::under_light(&curve, [0.0, 0.0, 1.0], 96).unwrap(), &theirs);
+        println!("{material:?}: greatest difference {most:.2e}, rms {rms:.2e} of the mean");
+        assert!(most < 1e-4, "{material:?}: {most}");
+    }
+}
+
+#[test]
+fn balls_under_a_probe_are_the_references_balls() {
+    let Some(script) = reference() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let space = Space::half_angle(64);
+    let mut cases = vec![(Probe::studio(64), PAPER)];
+    match std::env::var("FOILPRESS_DATA") {
+        Ok(data) => {
+            let path = Path::new(&data).join("env/studio.hdr");
+            cases.push((Probe::read_hdr(&path).unwrap().shrunk(64), FOIL));
+        }
+        Err(_) => cases.push((Probe::studio(64), FOIL)),
+    }
+    for (probe, material) in &cases {
+        let curve = curve(&space, *material);
+        let at = |name: &str| dir.path().join(name);
+        let (csv, env, out) = (at("curve.csv"), at("env.npy"), at("ball.npy"));
+        write_curve(&csv, &curve);
+        write_npy(&env, probe);
+        let args = ["--env", env.to_str().unwrap(), "--env-height", "64"];
+        let theirs = run(&script, "sphere-env", &args, &csv, &out, 40);
+        let mut rows = Table::new(space.columns());
+        rows.push(&space.row(&curve));
+        let ours = &sphere::under_probe(&space, &rows, probe, 40, &Silent).unwrap()[0];
+        // The reference takes one sample a pixel and counts as covered what that sample hits.
+        let inner: Vec<[f32; 4]> =
+            theirs.iter().zip(&ours.pixels).map(|(t, o)| if o[3] == 1.0 { *t } else { [0.0; 4] }).collect();
+        let (most, rms) = difference(ours, &inner);
+        println!("{material:?}: greatest difference {most:.2e}, rms {rms:.2e} of the mean");
+        assert!(rms < 3e-3 && most < 2e-2, "{material:?}: greatest {most}, rms {rms}");
+    }
+}
