@@ -75,7 +75,7 @@ pub(super) fn map(
     let mut shares = vec![0u16; count * k];
     let mut distance = vec![0f32; count];
     let mut brightness = vec![0f32; count];
-    observer.begin("clamp", count as u64);
+    observer.begin("fitting pixels to inks", count as u64);
     let gaps: Vec<Result<f64, GamutError>> = shares
         .par_chunks_mut(RUN * k)
         .zip(distance.par_chunks_mut(RUN))
