@@ -254,8 +254,7 @@ pub fn map(
     check(document, materials, printable)?;
     let failed = |source| GamutError::Mixture { what: "the stacks".into(), source };
     let all = Candidates::new(&document.space, printable).map_err(failed)?;
-    let rebuilt = clamp::Rebuilt(document);
-    let pixels: &dyn Materials = materials.unwrap_or(&rebuilt);
+    let pixels: &dyn Materials = materials.unwrap_or(document);
     let sampled = sample::pixels(pixels.width() * pixels.height(), SAMPLE, settings.seed);
     let sample = sample::rows(pixels, &sampled);
 
