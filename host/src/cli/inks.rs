@@ -364,4 +364,14 @@ mod tests {
         assert!(error("MS+C+K").contains("nearest is"), "{}", error("MS+C+K"));
         assert!(error("gold").contains("metallic-gold"), "{}", error("gold"));
     }
+
+    #[test]
+    fn check_fails_on_errors_and_counts_what_it_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let (text, verdict) = check(folder.path());
+        assert!(verdict.is_err() && text.contains("1 error,"), "{text}");
+        std::fs::write(folder.path().join("library.toml"), "format = 1\nbased_on = \"built-in\"\n").unwrap();
+        let (text, verdict) = check(folder.path());
+        assert!(verdict.is_ok() && text.contains("0 errors"), "{text}");
+    }
 }

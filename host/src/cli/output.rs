@@ -282,7 +282,9 @@ mod tests {
             let inside = staged.create().unwrap();
             fs::write(inside.join("report.json"), round).unwrap();
             fs::create_dir(inside.join("passes")).unwrap();
-            fs::write(inside.join("passes/01-cyan.png"), round).unwrap();
+            for file in ["passes/passes.toml", "passes/01-cyan.png"] {
+                fs::write(inside.join(file), round).unwrap();
+            }
             staged.commit().unwrap();
             assert_eq!(fs::read_to_string(target.join("report.json")).unwrap(), round);
             assert_eq!(entries(folder.path()), ["out.print"]);

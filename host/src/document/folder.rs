@@ -523,7 +523,7 @@ fn normal_variance(reader: &mut Reader<'_, '_>, name: &str) -> Result<Field, Doc
 /// What the user is told about a normal map.
 pub(super) fn relief_note(name: &str) -> String {
     format!(
-        "{name}: paper is flat; bumps within {} pixels become roughness (alpha^2 + 2 var), larger relief is lost",
+        "{name}: paper is flat; bumps within {} pixels are printed as roughness, larger relief is lost",
         relief::WINDOW
     )
 }
