@@ -146,6 +146,9 @@ pub struct Separate {
     /// A folder made by `halftone` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
+    /// Folder of an ink library of your own: its order rules count
+    #[arg(long, value_name = "DIR")]
+    library: Option<PathBuf>,
     /// Folder to write: a one-bit picture for each pass, passes.toml
     #[arg(short, long, value_name = "DOC.passes")]
     output: PathBuf,
@@ -154,13 +157,14 @@ pub struct Separate {
 impl Separate {
     /// Sheet → one-bit passes.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
+        let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
         let sheet = Sheet::load(&self.sheet)?;
         let staged = Staged::folder(&self.output, Kind::Passes)?;
-        let separation = separate::separate(&sheet, observer)?;
+        let separation = separate::separate(&sheet, library.rules(), observer)?;
         for check in &separation.checks {
             match check.severity {
-                Severity::Refuse => bail!("this must not be printed: {}", check.text),
-                Severity::Warn => observer.note(&check.to_string()),
+                Severity::Error => bail!("this must not be printed: {}", check.with_stacks()),
+                Severity::Warning => observer.note(&check.to_string()),
                 Severity::Note => observer.note(&check.text),
             }
         }
