@@ -6,7 +6,9 @@
 #![forbid(unsafe_code)]
 
 pub mod ink;
+pub mod link;
 pub mod packbits;
 pub mod paper;
 pub mod rgl;
+pub mod runs;
 pub mod walk;

@@ -1,0 +1,204 @@
+//! The other end of the cable: a printer's port in virtual time.
+//!
+//! [`SimulatedPort`] holds all lines and a clock. Its pins implement the `embedded-hal` traits; looking at a pin
+//! and waiting are what makes time pass, so a test sees every edge with its time to the nanosecond and minutes
+//! of an operator's absence cost nothing. The printer's side reacts as IEEE 1284 describes, with times of its own;
+//! bytes it has taken, what it would send back and every edge on the way can be looked at afterwards.
+//!
+//! Limits: edges are ideal, no analogue behaviour of a cable is modelled.
+
+mod check;
+mod peripheral;
+mod pins;
+
+pub use check::{Violation, check};
+pub use peripheral::{Pause, Peripheral};
+pub use pins::{AckLine, DataLines, DelayLine, InLine, OutLine};
+
+use crate::port::Pins;
+use peripheral::Phase;
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::rc::Rc;
+use std::vec::Vec;
+
+/// A line of the port.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Line {
+    /// Data1..Data8 together; the level is the byte.
+    Data,
+    /// nStrobe.
+    Strobe,
+    /// nAutoFd.
+    AutoFeed,
+    /// nInit.
+    Init,
+    /// nSelectIn.
+    SelectIn,
+    /// nAck.
+    Ack,
+    /// Busy.
+    Busy,
+    /// PError.
+    PaperOut,
+    /// Select.
+    Select,
+    /// nFault.
+    Fault,
+    /// +5 V.
+    Power,
+}
+
+/// A change of a line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Edge {
+    /// When, in ns from the start.
+    pub at: u64,
+    /// Which.
+    pub line: Line,
+    /// 0 or 1; for [`Line::Data`] the byte.
+    pub level: u8,
+}
+
+pub(crate) struct World {
+    pub(crate) now: u64,
+    /// What the printer will do, by time and order of planning.
+    plan: BTreeMap<(u64, u64), (Line, u8)>,
+    planned: u64,
+    levels: [u8; 11],
+    ack_latch: bool,
+    pub(crate) edges: Vec<Edge>,
+    pub(crate) taken: Vec<u8>,
+    peripheral: Peripheral,
+    phase: Phase,
+    sent_back: usize,
+    resets: usize,
+}
+
+/// The cable and what hangs at its end. Clones are the same cable.
+#[derive(Clone)]
+pub struct SimulatedPort(Rc<RefCell<World>>);
+
+/// The pins of a simulated port.
+pub type SimulatedPins = Pins<DataLines, OutLine, InLine, AckLine>;
+
+impl SimulatedPort {
+    /// A cable to this printer, which is switched on and on line.
+    pub fn new(peripheral: Peripheral) -> Self {
+        let mut levels = [0; 11];
+        for line in
+            [Line::Strobe, Line::AutoFeed, Line::Init, Line::Ack, Line::Select, Line::Fault, Line::Power]
+        {
+            levels[line as usize] = 1;
+        }
+        SimulatedPort(Rc::new(RefCell::new(World {
+            now: 0,
+            plan: BTreeMap::new(),
+            planned: 0,
+            levels,
+            ack_latch: false,
+            edges: Vec::new(),
+            taken: Vec::new(),
+            peripheral,
+            phase: Phase::Forward,
+            sent_back: 0,
+            resets: 0,
+        })))
+    }
+
+    /// The host's end, and the clock to wait by.
+    pub fn pins(&self) -> (SimulatedPins, DelayLine) {
+        let output = |line| OutLine(self.0.clone(), line);
+        let input = |line| InLine(self.0.clone(), line);
+        let pins = Pins {
+            data: DataLines(self.0.clone()),
+            strobe: output(Line::Strobe),
+            auto_feed: output(Line::AutoFeed),
+            init: output(Line::Init),
+            select_in: output(Line::SelectIn),
+            ack: AckLine(self.0.clone()),
+            busy: input(Line::Busy),
+            paper_out: input(Line::PaperOut),
+            select: input(Line::Select),
+            fault: input(Line::Fault),
+            power: Some(input(Line::Power)),
+        };
+        (pins, DelayLine(self.0.clone()))
+    }
+
+    /// Lets time pass, in ns.
+    pub fn pass(&self, ns: u64) {
+        self.0.borrow_mut().pass(ns);
+    }
+
+    /// The time, in ns.
+    pub fn now(&self) -> u64 {
+        self.0.borrow().now
+    }
+
+    /// Changes a line of the printer in `after` ns, whatever its model says.
+    pub fn plan(&self, after: u64, line: Line, level: u8) {
+        self.0.borrow_mut().plan(after, line, level);
+    }
+
+    /// The bytes the printer has taken.
+    pub fn taken(&self) -> Vec<u8> {
+        self.0.borrow().taken.clone()
+    }
+
+    /// Every change of every line.
+    pub fn edges(&self) -> Vec<Edge> {
+        self.0.borrow().edges.clone()
+    }
+
+    /// How often nInit has reset the printer.
+    pub fn resets(&self) -> usize {
+        self.0.borrow().resets
+    }
+}
+
+impl World {
+    pub(crate) fn level(&self, line: Line) -> u8 {
+        self.levels[line as usize]
+    }
+
+    fn plan(&mut self, after: u64, line: Line, level: u8) {
+        self.planned += 1;
+        self.plan.insert((self.now + after, self.planned), (line, level));
+    }
+
+    pub(crate) fn pass(&mut self, ns: u64) {
+        let until = self.now + ns;
+        while let Some(entry) = self.plan.first_entry() {
+            if entry.key().0 > until {
+                break;
+            }
+            let ((at, _), (line, level)) = entry.remove_entry();
+            self.now = at;
+            self.change(line, level);
+        }
+        self.now = until;
+    }
+
+    /// Sets a line; true if that changed it.
+    fn change(&mut self, line: Line, level: u8) -> bool {
+        if self.level(line) == level {
+            return false;
+        }
+        self.levels[line as usize] = level;
+        self.edges.push(Edge { at: self.now, line, level });
+        if line == Line::Ack && level == 0 {
+            self.ack_latch = true;
+        }
+        true
+    }
+
+    /// The host sets a line.
+    pub(crate) fn host(&mut self, line: Line, level: u8) {
+        if self.change(line, level) {
+            self.react(line, level);
+        }
+        // An instruction or two.
+        self.pass(16);
+    }
+}

@@ -1,0 +1,488 @@
+//! The engine on a good link: what it answers, what it refuses, how it ends a job.
+
+mod model;
+
+use bridge::engine::{Engine, Outcome, Task};
+use model::{IDENTITY, Job, NONE, Planes, framed, is_a_whole_job, memory, run, seeded};
+use proptest::prelude::*;
+use protocol::link::frame::{self, MAX, Read, Reader};
+use protocol::link::message::{
+    Answer, Ask, DATA_MAX, DefectKind, Fault, Handshake, JobKind, JobState, Lines, PortSettings, Progress,
+    Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+};
+
+struct Rig {
+    engine: Engine<'static>,
+    reader: Reader,
+    printed: Vec<u8>,
+}
+
+/// What the engine said, as owned text, and the last progress.
+#[derive(Debug, PartialEq)]
+struct Said {
+    text: Vec<String>,
+    progress: Option<Progress>,
+}
+
+impl Rig {
+    fn new() -> Rig {
+        Rig {
+            engine: Engine::new(memory(2048, 4096, 40_000), IDENTITY),
+            reader: Reader::new(),
+            printed: Vec::new(),
+        }
+    }
+
+    fn tell(&mut self, message: ToBridge<'_>) -> Said {
+        self.engine.receive(&mut self.reader, &framed(&message));
+        self.said()
+    }
+
+    fn said(&mut self) -> Said {
+        let (mut reader, mut buffer) = (Reader::new(), [0; MAX]);
+        let mut said = Said { text: Vec::new(), progress: None };
+        loop {
+            let length = self.engine.transmit(&mut buffer);
+            if length == 0 {
+                return said;
+            }
+            let Read::Message(bytes, []) = reader.read(&buffer[..length]) else { panic!("not a frame") };
+            let message = frame::decode::<ToHost>(bytes).unwrap();
+            if let ToHost::Progress(progress) = message {
+                said.progress = Some(progress);
+            } else {
+                said.text.push(format!("{message:?}"));
+            }
+        }
+    }
+
+    /// Works and prints until nothing moves.
+    fn print(&mut self) {
+        loop {
+            while self.engine.work() {}
+            let bytes = self.engine.output();
+            if bytes.is_empty() {
+                return;
+            }
+            self.printed.extend_from_slice(bytes);
+            let count = bytes.len();
+            self.engine.consumed(count);
+        }
+    }
+
+    /// Sends a whole job as fast as the credit allows.
+    fn send(&mut self, id: u32, kind: JobKind, data: &[u8]) -> Progress {
+        self.tell(ToBridge::Begin { job: id, kind, length: data.len() as u32 });
+        for _ in 0..10_000 {
+            let progress = self.engine.progress();
+            if progress.job != id || !matches!(progress.state, JobState::Printing) {
+                break;
+            }
+            let (from, to) = (progress.accepted, progress.limit.min(progress.accepted + DATA_MAX as u32));
+            if from < to {
+                let bytes = &data[from as usize..to as usize];
+                self.tell(ToBridge::Data { job: id, offset: from, bytes });
+            }
+            self.print();
+        }
+        self.engine.progress()
+    }
+}
+
+fn refused(reason: Refusal, job: u32) -> Vec<String> {
+    vec![format!("{:?}", ToHost::Refused { reason, job })]
+}
+
+fn a_raw_job() -> Vec<u8> {
+    Planes::random(&mut seeded(3)).printed()
+}
+
+#[test]
+fn a_greeting_is_answered_with_who_and_where() {
+    let said = Rig::new().tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
+    let hello = ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 2, firmware: "test" };
+    assert_eq!(said.text, [format!("{hello:?}")]);
+    assert_eq!(said.progress.unwrap().state, JobState::None);
+}
+
+#[test]
+fn streams_come_out_as_the_encoder_that_writes_files_would_have_it() {
+    for seed in 0..100 {
+        let planes = Planes::random(&mut seeded(seed));
+        let mut rig = Rig::new();
+        let progress = rig.send(1, JobKind::Streams, &planes.streams());
+        assert_eq!(progress.state, JobState::Done);
+        assert!(rig.printed == planes.printed(), "seed {seed}");
+        assert_eq!(progress.printed as usize, rig.printed.len());
+    }
+}
+
+#[test]
+fn real_streams_pass_through_unchanged() {
+    let Some(folder) = std::env::var_os("FOILPRESS_GOLDEN") else {
+        println!("skipped: FOILPRESS_GOLDEN names no folder of streams");
+        return;
+    };
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|name| name == "bin") {
+            let stream = std::fs::read(&path).unwrap();
+            let mut rig = Rig::new();
+            assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+            assert!(rig.printed == stream, "{path:?}");
+        }
+    }
+}
+
+#[test]
+fn several_jobs_follow_each_other() {
+    let (mut rig, mut random) = (Rig::new(), seeded(9));
+    let mut expected = Vec::new();
+    for id in 1..20 {
+        let job = Job::random(id, &mut random);
+        assert_eq!(rig.send(id, job.kind, &job.data).state, JobState::Done);
+        expected.extend(job.expected);
+        // A late repetition of the one before changes nothing.
+        rig.tell(ToBridge::Begin { job: id, kind: job.kind, length: job.data.len() as u32 });
+        rig.tell(ToBridge::Data { job: id, offset: 0, bytes: &job.data[..1] });
+        assert_eq!(rig.engine.progress().state, JobState::Done);
+    }
+    assert!(rig.printed == expected);
+}
+
+#[test]
+fn a_question_is_answered_at_once_though_the_printer_takes_nothing() {
+    let mut rig = Rig::new();
+    let data = vec![b'x'; 20_000];
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 20_000 });
+    // As much as there is credit for, and the printer is out of paper.
+    rig.engine.port(Lines(Lines::IDLE.0 | Lines::PAPER_OUT), Some(Fault::PaperOut));
+    loop {
+        let progress = rig.engine.progress();
+        let count = (progress.limit - progress.accepted).min(DATA_MAX as u32);
+        if count == 0 && !rig.engine.work() {
+            break;
+        }
+        rig.tell(ToBridge::Data { job: 1, offset: progress.accepted, bytes: &data[..count as usize] });
+    }
+    let lines = Lines(Lines::IDLE.0 | Lines::PAPER_OUT);
+    let said = rig.tell(ToBridge::Ask { request: 5, what: Ask::Lines });
+    let answer = ToHost::Lines { request: 5, lines, fault: Some(Fault::PaperOut) };
+    assert_eq!(said.text, [format!("{answer:?}")]);
+    let said = rig.tell(ToBridge::Cancel { job: 1 });
+    assert_eq!(said.progress.unwrap().state, JobState::Cancelling);
+}
+
+#[test]
+fn data_beyond_the_credit_are_refused_and_harm_nothing() {
+    let mut rig = Rig::new();
+    let stream = a_raw_job();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    let limit = rig.engine.progress().limit;
+    for offset in (0..limit).step_by(DATA_MAX) {
+        let end = (offset as usize + DATA_MAX).min(stream.len());
+        rig.tell(ToBridge::Data { job: 1, offset, bytes: &stream[offset as usize..end] });
+    }
+    // The last piece overlapped the limit and was dropped whole.
+    let said =
+        rig.tell(ToBridge::Data { job: 1, offset: 1920, bytes: &stream[1920..2880.min(stream.len())] });
+    assert_eq!(said.text, refused(Refusal::BeyondLimit, 1));
+    assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    assert!(rig.printed == stream);
+}
+
+#[test]
+fn what_cannot_be_followed_is_refused_with_the_reason() {
+    let mut rig = Rig::new();
+    let begin = |job, kind, length| ToBridge::Begin { job, kind, length };
+    assert_eq!(rig.tell(begin(0, JobKind::Raw, 5)).text, refused(Refusal::Empty, 0));
+    assert_eq!(rig.tell(begin(4, JobKind::Raw, 0)).text, refused(Refusal::Empty, 4));
+    assert_eq!(rig.tell(ToBridge::Cancel { job: 9 }).text, refused(Refusal::NoSuchJob, 9));
+    assert_eq!(
+        rig.tell(ToBridge::Data { job: 9, offset: 0, bytes: b"x" }).text,
+        refused(Refusal::NoSuchJob, 9)
+    );
+    assert_eq!(rig.tell(begin(1, JobKind::Raw, 50)).text, Vec::<String>::new());
+    assert_eq!(rig.tell(begin(1, JobKind::Raw, 51)).text, refused(Refusal::OtherJob, 1));
+    assert_eq!(rig.tell(begin(2, JobKind::Raw, 50)).text, refused(Refusal::JobOpen, 2));
+    assert_eq!(rig.tell(ToBridge::Initialise).text, refused(Refusal::JobOpen, 1));
+    assert_eq!(rig.tell(ToBridge::Bootloader).text, refused(Refusal::JobOpen, 1));
+    let question = rig.tell(ToBridge::Ask { request: 8, what: Ask::Printer });
+    assert_eq!(question.text, [format!("{:?}", ToHost::Answer { request: 8, answer: Answer::NotNow })]);
+    rig.engine.receive(&mut rig.reader, &framed_bytes(&[99, 1, 2]));
+    assert_eq!(rig.said().text, refused(Refusal::Unknown, 0));
+}
+
+/// A frame around bytes that are no message of this version.
+fn framed_bytes(body: &[u8]) -> Vec<u8> {
+    let mut with_sum = body.to_vec();
+    with_sum.extend(frame::checksum(body).to_le_bytes());
+    let mut coded = vec![0; 64];
+    let length = cobs(&with_sum, &mut coded);
+    coded.truncate(length);
+    coded.push(0);
+    coded
+}
+
+fn cobs(bytes: &[u8], out: &mut [u8]) -> usize {
+    let (mut code, mut at) = (0, 1);
+    for &byte in bytes {
+        if byte == 0 {
+            out[code] = (at - code) as u8;
+            code = at;
+        } else {
+            out[at] = byte;
+        }
+        at += 1;
+    }
+    out[code] = (at - code) as u8;
+    at
+}
+
+#[test]
+fn questions_to_the_printer_are_the_boards_to_put_and_have_the_port_to_themselves() {
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Ask { request: 8, what: Ask::DeviceId });
+    assert_eq!(rig.engine.task(), Some(Task::DeviceId));
+    assert_eq!(rig.engine.task(), None, "a task is given once");
+    // A job that comes meanwhile waits.
+    let stream = a_raw_job();
+    rig.send(1, JobKind::Raw, &stream);
+    assert!(rig.printed.is_empty());
+    rig.engine.done(Outcome::Answer(Answer::Bytes(b"MFG:ALPS;")));
+    let answer = ToHost::Answer { request: 8, answer: Answer::Bytes(b"MFG:ALPS;") };
+    assert_eq!(rig.said().text, [format!("{answer:?}")]);
+    assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    assert!(rig.printed == stream);
+}
+
+#[test]
+fn settings_reach_the_board_in_the_middle_of_a_job() {
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 50 });
+    let settings = PortSettings {
+        setup_ns: 1,
+        strobe_ns: 2,
+        hold_ns: 3,
+        settle_ns: 4,
+        handshake: Handshake::Busy,
+        patience_s: 5,
+        heed: Lines::ALL,
+    };
+    rig.tell(ToBridge::Configure(settings));
+    assert_eq!(rig.engine.task(), Some(Task::Configure(settings)));
+    rig.engine.done(Outcome::BadSettings);
+    assert_eq!(rig.said().text, refused(Refusal::Settings, 0));
+}
+
+#[test]
+fn a_fault_stops_the_job_and_its_end_lets_it_go_on() {
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 50 });
+    rig.engine.port(Lines(0), Some(Fault::OffLine));
+    assert_eq!(rig.said().progress.unwrap().state, JobState::Stopped(Fault::OffLine));
+    rig.engine.port(Lines::IDLE, None);
+    assert_eq!(rig.said().progress.unwrap().state, JobState::Printing);
+}
+
+#[test]
+fn a_printer_switched_off_in_the_middle_gets_nothing_more() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    // Off before the first byte is no harm: it may be switched on yet.
+    rig.engine.port(Lines(0), Some(Fault::PowerOff));
+    assert_eq!(rig.engine.progress().state, JobState::Stopped(Fault::PowerOff));
+    while rig.engine.work() {}
+    rig.engine.consumed(1);
+    rig.engine.port(Lines(0), Some(Fault::PowerOff));
+    assert_eq!(rig.engine.progress().state, JobState::Lost);
+    assert!(rig.engine.output().is_empty());
+}
+
+#[test]
+fn a_job_nobody_has_the_data_of_any_more_can_be_given_up() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    while rig.engine.work() {}
+    rig.engine.consumed(100);
+    let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+    let said = rig.tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
+    let progress = said.progress.unwrap();
+    assert_eq!((progress.job, progress.accepted, progress.limit, progress.printed), (1, 0, 0, 100));
+    rig.tell(ToBridge::Initialise);
+    assert_eq!((rig.engine.progress().state, rig.engine.task()), (JobState::Lost, Some(Task::Initialise)));
+}
+
+#[test]
+fn a_finished_job_is_remembered_through_a_reset() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.send(1, JobKind::Raw, &stream);
+    let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+    // The host has not heard of the end and sends it again.
+    assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    assert!(rig.printed.is_empty(), "the sheet was printed twice");
+}
+
+#[test]
+fn text_passes_through_and_cancelling_it_resets_the_printer() {
+    let text = vec![b'a'; 3000];
+    let mut rig = Rig::new();
+    assert_eq!(rig.send(1, JobKind::Raw, &text).state, JobState::Done);
+    assert!(rig.printed == text);
+    rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: 3000 });
+    rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &text[..500] });
+    rig.print();
+    rig.tell(ToBridge::Cancel { job: 2 });
+    rig.print();
+    assert_eq!(
+        (rig.engine.progress().state, rig.engine.task()),
+        (JobState::Cancelled, Some(Task::Initialise))
+    );
+    rig.engine.done(Outcome::Done);
+    assert_eq!(rig.engine.task(), None);
+}
+
+#[test]
+fn a_stream_that_ends_too_early_is_brought_to_an_end() {
+    let stream = a_raw_job();
+    for cut in (100..stream.len() - 2).step_by(97) {
+        let mut rig = Rig::new();
+        let state = rig.send(1, JobKind::Raw, &stream[..cut]).state;
+        assert!(
+            matches!(state, JobState::Broken(defect) if defect.what == DefectKind::Truncated),
+            "{state:?}"
+        );
+        assert!(rig.printed.is_empty() || is_a_whole_job(&rig.printed), "cut at {cut}");
+    }
+}
+
+#[test]
+fn pass_streams_with_a_defect_are_brought_to_an_end() {
+    let mut outcomes = std::collections::BTreeSet::new();
+    for seed in 0..300u64 {
+        let mut data = Planes::random(&mut seeded(seed)).streams();
+        match seed % 3 {
+            0 => data.truncate(data.len() - 1),
+            1 => data.push(0),
+            _ => {
+                let at = (seed as usize * 7919) % data.len();
+                data[at] ^= 1 << (seed / 3 % 8);
+            }
+        }
+        let mut rig = Rig::new();
+        let state = rig.send(1, JobKind::Streams, &data).state;
+        outcomes.insert(match state {
+            JobState::Broken(defect) => format!("{:?}", defect.what),
+            state => format!("{state:?}"),
+        });
+        assert!(rig.printed.is_empty() || is_a_whole_job(&rig.printed), "seed {seed}: {state:?}");
+        assert!(seed % 3 == 2 || matches!(state, JobState::Broken(_)), "seed {seed}: {state:?}");
+    }
+    for kind in ["Excess", "Truncated", "Stream", "Header"] {
+        assert!(outcomes.contains(kind), "never {kind}: {outcomes:?}");
+    }
+}
+
+#[test]
+fn a_page_too_wide_for_the_memory_is_refused_before_the_first_byte() {
+    let planes =
+        Planes { width: 4800, rows: 10, inks: vec![protocol::ink::Ink::Black], bits: vec![vec![1; 6000]] };
+    let mut rig = Rig {
+        engine: Engine::new(memory(2048, 2048, 38_399), IDENTITY),
+        reader: Reader::new(),
+        printed: Vec::new(),
+    };
+    let state = rig.send(1, JobKind::Streams, &planes.streams()).state;
+    assert!(matches!(state, JobState::Broken(defect) if defect.what == DefectKind::TooLarge));
+    assert!(rig.printed.is_empty());
+    let mut rig = Rig {
+        engine: Engine::new(memory(2048, 2048, 38_400), IDENTITY),
+        reader: Reader::new(),
+        printed: Vec::new(),
+    };
+    assert_eq!(rig.send(1, JobKind::Streams, &planes.streams()).state, JobState::Done);
+}
+
+#[test]
+fn positions_on_the_sheet_rise_to_the_last_pass() {
+    let planes = Planes::random(&mut seeded(5));
+    let mut rig = Rig::new();
+    let progress = rig.send(1, JobKind::Streams, &planes.streams());
+    assert_eq!(usize::from(progress.pass) + 1, planes.inks.len());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
+
+    #[test]
+    fn byte_by_byte_is_the_same_as_whole(seed in any::<u64>(), sizes in prop::collection::vec(1usize..200, 1..20)) {
+        let job = Job::random(1, &mut seeded(seed));
+        let mut frames = framed(&ToBridge::Begin { job: 1, kind: job.kind, length: job.data.len() as u32 });
+        for (i, bytes) in job.data.chunks(500).enumerate().take(4) {
+            frames.extend(framed(&ToBridge::Data { job: 1, offset: i as u32 * 500, bytes }));
+        }
+        let outcome = |mut sizes: Box<dyn Iterator<Item = usize>>| {
+            let mut rig = Rig::new();
+            let mut left = &frames[..];
+            while !left.is_empty() {
+                let (portion, rest) = left.split_at(sizes.next().unwrap().min(left.len()));
+                rig.engine.receive(&mut rig.reader, portion);
+                left = rest;
+            }
+            rig.print();
+            (rig.said(), rig.printed, rig.engine.checkpoint())
+        };
+        let whole = outcome(Box::new(std::iter::repeat(usize::MAX)));
+        prop_assert_eq!(&outcome(Box::new(std::iter::repeat(1))), &whole);
+        prop_assert_eq!(&outcome(Box::new(sizes.into_iter().cycle())), &whole);
+    }
+
+    #[test]
+    fn no_conversation_makes_it_fail(
+        messages in prop::collection::vec((0u8..10, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
+    ) {
+        let mut rig = Rig::new();
+        for (kind, job, number, bytes, small) in messages {
+            rig.tell(match kind {
+                0 => ToBridge::Hello { version: small, schema: number },
+                1 | 2 => ToBridge::Begin { job, kind: if small & 1 == 0 { JobKind::Raw } else { JobKind::Streams }, length: number },
+                3 | 4 => ToBridge::Data { job, offset: rig.engine.progress().accepted, bytes: &bytes },
+                5 => ToBridge::Data { job, offset: number.wrapping_sub(100), bytes: &bytes },
+                6 => ToBridge::Cancel { job },
+                7 => ToBridge::Ask { request: 1, what: Ask::Printer },
+                8 => ToBridge::Initialise,
+                _ => ToBridge::Drive { data: small, control: small },
+            });
+            match small % 5 {
+                0 => while rig.engine.work() {},
+                1 => rig.print(),
+                2 => { rig.engine.task(); rig.engine.done(Outcome::Answer(Answer::Silent)); }
+                3 => rig.engine = Engine::resume(memory(2048, 2048, 500), IDENTITY, rig.engine.checkpoint()),
+                _ => rig.engine.port(Lines(small), Lines(small).fault()),
+            }
+            let progress = rig.engine.progress();
+            prop_assert!(progress.accepted <= progress.limit);
+        }
+    }
+}
+
+#[test]
+fn an_undisturbed_run_of_the_model_is_the_job() {
+    for seed in 0..50 {
+        let mut random = seeded(seed);
+        let job = Job::random(3, &mut random);
+        assert!(run(&job, &NONE, None, &mut random).printed == job.expected);
+    }
+}
+
+#[test]
+fn the_engine_fits_a_microcontroller() {
+    assert!(size_of::<Engine>() <= 12 * 1024, "{} bytes", size_of::<Engine>());
+}

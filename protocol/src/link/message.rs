@@ -1,0 +1,539 @@
+//! Messages: what workstation and bridge say to each other.
+//!
+//! The bytes are postcard's: a variant is its number, integers are varints (seven bits to a byte, low bits
+//! first), a slice is its length and its bytes. **The numbers and the order of fields are the wire format.**
+//! Variants are only ever appended; a field is never added, moved or widened - a new variant takes its place.
+//! A reader that meets a number it does not know gets [`frame::Unknown`](super::frame::Unknown) and says so
+//! with [`Refusal::Unknown`].
+//!
+//! Nothing here answers by position: every message of the bridge tells a state, so it may be lost, repeated or
+//! late without harm, and a host that has missed one asks again.
+
+use serde::{Deserialize, Serialize};
+
+/// Version of the message set. Changes only if an old message changes its meaning; appended messages do not
+/// change it.
+pub const VERSION: u8 = 1;
+
+/// Fingerprint of the message set: the CRC-32 over one example of every variant. Two sides with the same
+/// fingerprint know the same messages; with different ones, the same version still understands all that the
+/// older of them knows.
+pub const SCHEMA: u32 = 0xc12c_ebc8;
+
+/// The most data bytes to put in one [`ToBridge::Data`]; fits a frame whatever the other fields are.
+pub const DATA_MAX: usize = 960;
+
+/// From the workstation to the bridge.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum ToBridge<'a> {
+    /// A host is there. Answered by [`ToHost::Hello`] and [`ToHost::Progress`]. Changes nothing: a job under
+    /// way goes on.
+    Hello {
+        /// [`VERSION`] of the host.
+        version: u8,
+        /// [`SCHEMA`] of the host.
+        schema: u32,
+    },
+    /// Opens a job. Repeating it for the same job changes nothing. Answered by [`ToHost::Progress`].
+    Begin {
+        /// The host's number for the job, never 0 and never used for another job.
+        job: u32,
+        /// What its data are.
+        kind: JobKind,
+        /// How many bytes of data it has.
+        length: u32,
+    },
+    /// A piece of a job's data. Bytes that were accepted before are passed over; a piece that begins beyond
+    /// the accepted position is dropped whole. Answered by [`ToHost::Progress`], not necessarily one by one.
+    Data {
+        /// The job.
+        job: u32,
+        /// Place of the first byte in the job's data.
+        offset: u32,
+        /// At most [`DATA_MAX`] bytes.
+        #[serde(borrow)]
+        bytes: &'a [u8],
+    },
+    /// Ends a job early, leaving the printer ready for the next one. Answered by [`ToHost::Progress`].
+    Cancel {
+        /// The job.
+        job: u32,
+    },
+    /// Asks for something; answered by [`ToHost::Lines`] or [`ToHost::Answer`] with the same number.
+    Ask {
+        /// Returned with the answer.
+        request: u16,
+        /// What is asked for.
+        what: Ask,
+    },
+    /// Sets how the port is driven, from the next byte on.
+    Configure(PortSettings),
+    /// Resets the printer with a pulse on nInit. Refused while a job is open; a job that was open when the bridge
+    /// itself was reset, and whose data have not been sent again, is given up as [`JobState::Lost`].
+    Initialise,
+    /// Restarts the bridge in its boot loader, to be flashed. Refused while a job is open.
+    Bootloader,
+    /// Sets the port's outputs by hand, for the wiring test; [`Ask::Lines`] reads the inputs. The next job
+    /// begins from the idle levels again. Refused while a job is open.
+    Drive {
+        /// Levels of Data1..Data8, Data1 in bit 0.
+        data: u8,
+        /// Levels of nStrobe, nAutoFd, nInit, nSelectIn in bits 0..3.
+        control: u8,
+    },
+}
+
+/// What the data of a job are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum JobKind {
+    /// The printer's language, made elsewhere; passed through.
+    Raw,
+    /// A job header and one pass stream per ink; the bridge makes the printer's language of them.
+    Streams,
+}
+
+/// What can be asked for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Ask {
+    /// The port's status lines as they are.
+    Lines,
+    /// The printer's own status answer of 38 bytes. Not while a job is open: the question would be row data.
+    Printer,
+    /// The printer's IEEE 1284 device ID. Not while a job is open.
+    DeviceId,
+}
+
+/// How the port is driven.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct PortSettings {
+    /// Data valid before nStrobe falls, in ns.
+    pub setup_ns: u16,
+    /// nStrobe low, in ns.
+    pub strobe_ns: u16,
+    /// Data kept after nStrobe rises, in ns.
+    pub hold_ns: u16,
+    /// From nStrobe falling until Busy is believed, in ns.
+    pub settle_ns: u16,
+    /// Which of the printer's signals ends a byte.
+    pub handshake: Handshake,
+    /// How long the printer may be busy without reporting an error before the host is told, in seconds. The
+    /// byte is kept and goes out when Busy falls, however late.
+    pub patience_s: u16,
+    /// The status lines that are wired and mean what they should, as in [`Lines`]; the others are taken for
+    /// idle.
+    pub heed: Lines,
+}
+
+/// Which of the printer's signals ends a byte.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Handshake {
+    /// Busy is low again.
+    Busy,
+    /// nAck has pulsed and Busy is low again.
+    BusyAck,
+    /// nAck has pulsed; Busy is not wired or not to be trusted.
+    Ack,
+}
+
+/// From the bridge to the workstation.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum ToHost<'a> {
+    /// The bridge is there.
+    Hello {
+        /// [`VERSION`] of the bridge.
+        version: u8,
+        /// [`SCHEMA`] of the bridge.
+        schema: u32,
+        /// Differs after every restart of the bridge.
+        boot: u32,
+        /// The board's own number, to tell two bridges apart.
+        serial: u64,
+        /// Version of the firmware, for people.
+        firmware: &'a str,
+    },
+    /// How far the job is. Sent after everything that could change it, now and then while printing, and when
+    /// the host repeats itself.
+    Progress(Progress),
+    /// The port's status lines.
+    Lines {
+        /// The number of the question.
+        request: u16,
+        /// The levels.
+        lines: Lines,
+        /// What they mean.
+        fault: Option<Fault>,
+    },
+    /// The answer to a question that went to the printer.
+    Answer {
+        /// The number of the question.
+        request: u16,
+        /// What came of it.
+        #[serde(borrow)]
+        answer: Answer<'a>,
+    },
+    /// A message that could not be followed. A damaged frame is not refused but ignored.
+    Refused {
+        /// Why.
+        reason: Refusal,
+        /// The job the message named, or 0.
+        job: u32,
+    },
+    /// A piece of the firmware's log, encoded by defmt.
+    Log(&'a [u8]),
+}
+
+/// How far a job is. All positions count from the job's beginning and never go back, except that `accepted`
+/// starts again from 0 when the bridge itself has restarted in the middle of a job.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Progress {
+    /// The job, or 0 if there was none since the bridge started.
+    pub job: u32,
+    /// Where it stands.
+    pub state: JobState,
+    /// Data taken: the next piece should begin here.
+    pub accepted: u32,
+    /// The bridge has memory for data up to here; never less than `accepted`.
+    pub limit: u32,
+    /// Bytes that have crossed the port.
+    pub printed: u32,
+    /// The pass those belong to, from 0.
+    pub pass: u8,
+    /// The next row of that pass.
+    pub row: u16,
+}
+
+/// Where a job stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum JobState {
+    /// There is no job.
+    None,
+    /// Data are awaited or on their way to the printer.
+    Printing,
+    /// The printer does not take bytes; the job goes on when the fault is gone.
+    Stopped(Fault),
+    /// Being brought to an end early.
+    Cancelling,
+    /// Every byte has crossed the port.
+    Done,
+    /// Ended early; the printer is ready for the next job.
+    Cancelled,
+    /// The data made no sense; ended as if cancelled.
+    Broken(Defect),
+    /// Given up in the middle, nothing more was sent: the printer was switched off, or the bridge was reset and
+    /// nobody had the data any more. The sheet is lost.
+    Lost,
+}
+
+/// Why the printer does not take bytes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Fault {
+    /// PError is high.
+    PaperOut,
+    /// Select is low.
+    OffLine,
+    /// nFault is low, with paper and on line.
+    Error,
+    /// The +5 V of the port are absent.
+    PowerOff,
+    /// Busy for longer than [`PortSettings::patience_s`], with no error line set.
+    BusyTooLong,
+    /// Busy is low but nAck never came, although the handshake asks for it.
+    NoAck,
+}
+
+/// What is wrong with a job's data.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Defect {
+    /// Offset in the job's data of the byte where it was noticed.
+    pub at: u32,
+    /// What it is.
+    pub what: DefectKind,
+}
+
+/// Kinds of defect.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum DefectKind {
+    /// Not a job header this bridge knows.
+    Header,
+    /// The header asks for something the printer must not be sent.
+    Forbidden,
+    /// The page needs more memory than the bridge has.
+    TooLarge,
+    /// Not a pass stream.
+    Stream,
+    /// Data after the end of the job.
+    Excess,
+    /// The data end before the job does.
+    Truncated,
+}
+
+/// An answer that came, or did not come, from the printer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Answer<'a> {
+    /// What the printer sent.
+    Bytes(&'a [u8]),
+    /// A job is open.
+    NotNow,
+    /// The printer does not negotiate: its port is one-way.
+    OneWay,
+    /// The printer negotiated but did not answer in time.
+    Silent,
+    /// The printer does not take bytes at the moment, so the question could not be put.
+    Stopped(Fault),
+}
+
+/// Why a message was not followed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Refusal {
+    /// Not a message of this version.
+    Unknown,
+    /// Another job is open; its number is that of the last progress.
+    JobOpen,
+    /// No such job.
+    NoSuchJob,
+    /// The same number was used for a job of another kind or length.
+    OtherJob,
+    /// Job number 0, or a length of 0.
+    Empty,
+    /// Data beyond the limit the bridge gave.
+    BeyondLimit,
+    /// Settings the port cannot work with.
+    Settings,
+}
+
+/// Levels of the port's status lines.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct Lines(pub u8);
+
+impl Lines {
+    /// nAck; high when idle.
+    pub const ACK: u8 = 1 << 0;
+    /// Busy.
+    pub const BUSY: u8 = 1 << 1;
+    /// PError: no paper.
+    pub const PAPER_OUT: u8 = 1 << 2;
+    /// Select: on line.
+    pub const SELECT: u8 = 1 << 3;
+    /// nFault; high when all is well.
+    pub const FAULT: u8 = 1 << 4;
+    /// +5 V of the printer. Always set by a bridge that has no wire for it.
+    pub const POWER: u8 = 1 << 5;
+
+    /// All of them.
+    pub const ALL: Lines = Lines(0x3f);
+
+    /// A printer that is switched on, on line and waiting for data.
+    pub const IDLE: Lines = Lines(Self::ACK | Self::SELECT | Self::FAULT | Self::POWER);
+
+    /// Whether all of these are high.
+    pub fn high(self, lines: u8) -> bool {
+        self.0 & lines == lines
+    }
+
+    /// These lines where they are to be heeded, and idle elsewhere.
+    pub fn heeding(self, heed: Lines) -> Lines {
+        Lines((self.0 & heed.0) | (Lines::IDLE.0 & !heed.0))
+    }
+
+    /// What the operator has to see to, by the lines alone. Busy is no fault.
+    pub fn fault(self) -> Option<Fault> {
+        if !self.high(Self::POWER) {
+            Some(Fault::PowerOff)
+        } else if self.high(Self::PAPER_OUT) {
+            Some(Fault::PaperOut)
+        } else if !self.high(Self::SELECT) {
+            Some(Fault::OffLine)
+        } else if !self.high(Self::FAULT) {
+            Some(Fault::Error)
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::super::frame;
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const SETTINGS: PortSettings = PortSettings {
+        setup_ns: 800,
+        strobe_ns: 800,
+        hold_ns: 800,
+        settle_ns: 500,
+        handshake: Handshake::Busy,
+        patience_s: 600,
+        heed: Lines(0x3f),
+    };
+    const PROGRESS: Progress = Progress {
+        job: 7,
+        state: JobState::Printing,
+        accepted: 1200,
+        limit: 9392,
+        printed: 300,
+        pass: 1,
+        row: 40,
+    };
+
+    fn with_state(state: JobState) -> ToHost<'static> {
+        ToHost::Progress(Progress { job: 1, state, accepted: 2, limit: 3, printed: 4, pass: 5, row: 6 })
+    }
+
+    fn broken(what: DefectKind) -> ToHost<'static> {
+        with_state(JobState::Broken(Defect { at: 9, what }))
+    }
+
+    /// One example of every variant and the bytes it has had since it was introduced.
+    fn to_bridge() -> Vec<(ToBridge<'static>, &'static [u8])> {
+        let settings = |handshake| ToBridge::Configure(PortSettings { handshake, ..SETTINGS });
+        let ask = |what| ToBridge::Ask { request: 300, what };
+        std::vec![
+            (ToBridge::Hello { version: 1, schema: 0x0102_0304 }, &[0, 1, 0x84, 0x86, 0x88, 0x08]),
+            (ToBridge::Begin { job: 7, kind: JobKind::Raw, length: 1061 }, &[1, 7, 0, 0xa5, 0x08]),
+            (ToBridge::Begin { job: 7, kind: JobKind::Streams, length: 1061 }, &[1, 7, 1, 0xa5, 0x08]),
+            (
+                ToBridge::Data { job: 7, offset: 960, bytes: &[0x1b, 0x65, 0] },
+                &[2, 7, 0xc0, 0x07, 3, 0x1b, 0x65, 0]
+            ),
+            (ToBridge::Cancel { job: 7 }, &[3, 7]),
+            (ask(Ask::Lines), &[4, 0xac, 0x02, 0]),
+            (ask(Ask::Printer), &[4, 0xac, 0x02, 1]),
+            (ask(Ask::DeviceId), &[4, 0xac, 0x02, 2]),
+            (settings(Handshake::Busy), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 0, 0xd8, 4, 0x3f]),
+            (settings(Handshake::BusyAck), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 1, 0xd8, 4, 0x3f]),
+            (settings(Handshake::Ack), &[5, 0xa0, 6, 0xa0, 6, 0xa0, 6, 0xf4, 3, 2, 0xd8, 4, 0x3f]),
+            (ToBridge::Initialise, &[6]),
+            (ToBridge::Bootloader, &[7]),
+            (ToBridge::Drive { data: 0xaa, control: 0b0111 }, &[8, 0xaa, 7]),
+        ]
+    }
+
+    fn to_host() -> Vec<(ToHost<'static>, &'static [u8])> {
+        let lines = |fault| ToHost::Lines { request: 3, lines: Lines(0x39), fault };
+        let answer = |answer| ToHost::Answer { request: 3, answer };
+        let refused = |reason| ToHost::Refused { reason, job: 7 };
+        std::vec![
+            (
+                ToHost::Hello { version: 1, schema: 0x80, boot: 5, serial: 0xe660, firmware: "0.1" },
+                &[0, 1, 0x80, 1, 5, 0xe0, 0xcc, 3, 3, b'0', b'.', b'1'],
+            ),
+            (ToHost::Progress(PROGRESS), &[1, 7, 1, 0xb0, 9, 0xb0, 0x49, 0xac, 2, 1, 40]),
+            (with_state(JobState::None), &[1, 1, 0, 2, 3, 4, 5, 6]),
+            (with_state(JobState::Stopped(Fault::PaperOut)), &[1, 1, 2, 0, 2, 3, 4, 5, 6]),
+            (with_state(JobState::Cancelling), &[1, 1, 3, 2, 3, 4, 5, 6]),
+            (with_state(JobState::Done), &[1, 1, 4, 2, 3, 4, 5, 6]),
+            (with_state(JobState::Cancelled), &[1, 1, 5, 2, 3, 4, 5, 6]),
+            (broken(DefectKind::Header), &[1, 1, 6, 9, 0, 2, 3, 4, 5, 6]),
+            (broken(DefectKind::Forbidden), &[1, 1, 6, 9, 1, 2, 3, 4, 5, 6]),
+            (broken(DefectKind::TooLarge), &[1, 1, 6, 9, 2, 2, 3, 4, 5, 6]),
+            (broken(DefectKind::Stream), &[1, 1, 6, 9, 3, 2, 3, 4, 5, 6]),
+            (broken(DefectKind::Excess), &[1, 1, 6, 9, 4, 2, 3, 4, 5, 6]),
+            (broken(DefectKind::Truncated), &[1, 1, 6, 9, 5, 2, 3, 4, 5, 6]),
+            (with_state(JobState::Lost), &[1, 1, 7, 2, 3, 4, 5, 6]),
+            (lines(None), &[2, 3, 0x39, 0]),
+            (lines(Some(Fault::PaperOut)), &[2, 3, 0x39, 1, 0]),
+            (lines(Some(Fault::OffLine)), &[2, 3, 0x39, 1, 1]),
+            (lines(Some(Fault::Error)), &[2, 3, 0x39, 1, 2]),
+            (lines(Some(Fault::PowerOff)), &[2, 3, 0x39, 1, 3]),
+            (lines(Some(Fault::BusyTooLong)), &[2, 3, 0x39, 1, 4]),
+            (lines(Some(Fault::NoAck)), &[2, 3, 0x39, 1, 5]),
+            (answer(Answer::Bytes(&[2, 0x80])), &[3, 3, 0, 2, 2, 0x80]),
+            (answer(Answer::NotNow), &[3, 3, 1]),
+            (answer(Answer::OneWay), &[3, 3, 2]),
+            (answer(Answer::Silent), &[3, 3, 3]),
+            (answer(Answer::Stopped(Fault::OffLine)), &[3, 3, 4, 1]),
+            (refused(Refusal::Unknown), &[4, 0, 7]),
+            (refused(Refusal::JobOpen), &[4, 1, 7]),
+            (refused(Refusal::NoSuchJob), &[4, 2, 7]),
+            (refused(Refusal::OtherJob), &[4, 3, 7]),
+            (refused(Refusal::Empty), &[4, 4, 7]),
+            (refused(Refusal::BeyondLimit), &[4, 5, 7]),
+            (refused(Refusal::Settings), &[4, 6, 7]),
+            (ToHost::Log(&[1, 2]), &[5, 2, 1, 2]),
+        ]
+    }
+
+    #[test]
+    fn bytes_never_change() {
+        let mut buffer = [0; frame::MAX];
+        for (message, bytes) in to_bridge() {
+            assert_eq!(postcard::to_slice(&message, &mut buffer).unwrap(), bytes, "{message:?}");
+            assert_eq!(frame::decode::<ToBridge>(bytes), Ok(message));
+        }
+        for (message, bytes) in to_host() {
+            assert_eq!(postcard::to_slice(&message, &mut buffer).unwrap(), bytes, "{message:?}");
+            assert_eq!(frame::decode::<ToHost>(bytes), Ok(message));
+        }
+    }
+
+    #[test]
+    fn the_fingerprint_is_that_of_every_example() {
+        let all: Vec<u8> = to_bridge()
+            .iter()
+            .map(|(_, bytes)| *bytes)
+            .chain(to_host().iter().map(|(_, bytes)| *bytes))
+            .flatten()
+            .copied()
+            .collect();
+        let sum = frame::checksum(&all);
+        assert_eq!(SCHEMA, sum, "the message set has changed: SCHEMA should be {sum:#010x}");
+    }
+
+    #[test]
+    fn numbers_of_the_future_are_unknown_and_not_misread() {
+        assert_eq!(frame::decode::<ToBridge>(&[99, 1, 2]), Err(frame::Unknown));
+        assert_eq!(frame::decode::<ToHost>(&[1, 1, 99, 2, 3, 4, 5, 6]), Err(frame::Unknown));
+        // A longer form of a known message is not that message.
+        assert_eq!(frame::decode::<ToBridge>(&[3, 7, 0]), Err(frame::Unknown));
+    }
+
+    #[test]
+    fn the_longest_data_message_fits_a_frame() {
+        let message = ToBridge::Data { job: u32::MAX, offset: u32::MAX, bytes: &[0xff; DATA_MAX] };
+        assert!(frame::write(&message, &mut [0; frame::MAX]).is_ok());
+    }
+
+    #[test]
+    fn the_worked_examples_of_the_document_are_these_bytes() {
+        let text = include_str!("../../../docs/wire-format.md");
+        let mut buffer = [0; frame::MAX];
+        let check = |frame: &[u8]| {
+            let hex: Vec<std::string::String> = frame.iter().map(|byte| std::format!("{byte:02x}")).collect();
+            let hex = hex.join(" ");
+            assert!(text.contains(&std::format!("`{hex}`")), "docs/wire-format.md does not show `{hex}`");
+        };
+        let examples = [
+            ToBridge::Hello { version: 1, schema: SCHEMA },
+            ToBridge::Begin { job: 7, kind: JobKind::Raw, length: 1061 },
+            ToBridge::Data { job: 7, offset: 960, bytes: &[0x1b, 0x65, 0] },
+            ToBridge::Cancel { job: 7 },
+        ];
+        for message in &examples {
+            let length = frame::write(message, &mut buffer).unwrap();
+            check(&buffer[..length]);
+        }
+        let length = frame::write(&ToHost::Progress(PROGRESS), &mut buffer).unwrap();
+        check(&buffer[..length]);
+    }
+
+    #[test]
+    fn a_printer_that_is_off_is_not_called_out_of_paper() {
+        assert_eq!(Lines::IDLE.fault(), None);
+        assert_eq!(Lines(Lines::IDLE.0 | Lines::BUSY).fault(), None);
+        assert_eq!(Lines(Lines::PAPER_OUT).fault(), Some(Fault::PowerOff));
+        assert_eq!(Lines(Lines::POWER | Lines::PAPER_OUT).fault(), Some(Fault::PaperOut));
+        assert_eq!(Lines(Lines::POWER | Lines::FAULT).fault(), Some(Fault::OffLine));
+        assert_eq!(Lines(Lines::POWER | Lines::SELECT).fault(), Some(Fault::Error));
+    }
+
+    proptest! {
+        #[test]
+        fn no_bytes_make_decoding_fail_other_than_by_unknown(bytes in prop::collection::vec(any::<u8>(), 0..64)) {
+            let _ = frame::decode::<ToBridge>(&bytes);
+            let _ = frame::decode::<ToHost>(&bytes);
+        }
+    }
+}

@@ -1,0 +1,437 @@
+//! A pass stream as bands of rows, in bounded memory and from input in any portions.
+
+use super::rice::{ESCAPE, Mean};
+use super::{PLAIN_BITS, band_bytes, form, stride};
+use crate::walk::{Band, EDGE, MOST, Tile, Walk};
+
+/// What is wrong with a stream.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Defect {
+    /// A band begins with a byte that is no form.
+    Form,
+    /// No band, or no row, or more of them than there are.
+    Count,
+    /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
+    Row,
+    /// The memory for a band is smaller than [`band_bytes`].
+    Memory,
+}
+
+/// What [`Decoder::step`] has come to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Step {
+    /// All input is used up and the band is not complete.
+    More,
+    /// So many rows without a dot come next, from row `y` of the page.
+    Blank {
+        /// First row.
+        y: u16,
+        /// How many.
+        rows: u16,
+    },
+    /// The next band is complete in the memory: rows of [`stride`] bytes each.
+    Band {
+        /// First row.
+        y: u16,
+        /// How many.
+        rows: u16,
+    },
+    /// The page is complete; input behind it is not read.
+    End,
+}
+
+enum State {
+    Form,
+    Blank,
+    Minimum,
+    Runs(Runs),
+    Row(Row),
+    End,
+}
+
+/// Where in a runs band the decoder is.
+struct Runs {
+    minimum: u32,
+    means: [Mean; 2],
+    /// Number of the run, even ones are off.
+    index: u32,
+    /// Bits read and not used, from the top, and how many.
+    bits: u32,
+    held: u32,
+    /// Ones of the code under way.
+    ones: u32,
+    /// Parameter of the code under way, once the ones are over; [`PLAIN_BITS`] if the value stands plain.
+    remainder: Option<u32>,
+    /// Dots of the band done.
+    done: u32,
+    /// Number of the tile, and dots done before it.
+    tile: Option<Tile>,
+    before: u32,
+    tiles: usize,
+}
+
+/// Where in a rows band the decoder is.
+struct Row {
+    /// Row of the band.
+    y: u16,
+    part: RowPart,
+}
+
+enum RowPart {
+    Head,
+    /// Second byte of the varint, the first having been this.
+    Tail(u8),
+    Same,
+    Data {
+        packed: bool,
+        left: u16,
+        x: u16,
+        run: Run,
+    },
+}
+
+#[derive(Clone, Copy)]
+enum Run {
+    Head,
+    Literal(u8),
+    Repeat(u8),
+}
+
+/// Decodes one pass of a page.
+pub struct Decoder {
+    walk: Walk,
+    next: usize,
+    band: Option<Band>,
+    state: State,
+    shape: Option<Tile>,
+    table: [u16; MOST],
+}
+
+impl Decoder {
+    /// A decoder for a plane of `width` by `height` dots.
+    pub fn new(width: u16, height: u16) -> Decoder {
+        let mut decoder = Decoder {
+            walk: Walk::new(width, height),
+            next: 0,
+            band: None,
+            state: State::End,
+            shape: None,
+            table: [0; MOST],
+        };
+        decoder.restart();
+        decoder
+    }
+
+    /// Begins the stream of another pass of the same page.
+    pub fn restart(&mut self) {
+        self.next = 0;
+        self.follow();
+    }
+
+    /// Begins the stream of another page.
+    pub fn resize(&mut self, width: u16, height: u16) {
+        self.walk = Walk::new(width, height);
+        self.restart();
+    }
+
+    /// Whether the page is complete.
+    pub fn ended(&self) -> bool {
+        matches!(self.state, State::End)
+    }
+
+    /// The band to come, or the end.
+    fn follow(&mut self) {
+        self.band = self.walk.bands().nth(self.next);
+        self.state = if self.band.is_some() { State::Form } else { State::End };
+    }
+
+    /// Reads until a band is complete, and says how many bytes of `input` it has read. `memory` needs
+    /// [`band_bytes`] bytes and must be the same, unchanged, until the band is complete.
+    ///
+    /// After a defect the decoder stays where it was; only [`Decoder::restart`] and [`Decoder::resize`] help.
+    pub fn step(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Step), Defect> {
+        let width = self.walk.width();
+        let memory = memory.get_mut(..band_bytes(width)).ok_or(Defect::Memory)?;
+        let stride = stride(width);
+        let mut read = 0;
+        loop {
+            let Some(band) = self.band else {
+                return Ok((read, Step::End));
+            };
+            match &mut self.state {
+                State::End => return Ok((read, Step::End)),
+                State::Form => {
+                    let Some(&byte) = input.get(read) else { return Ok((read, Step::More)) };
+                    read += 1;
+                    self.state = match byte {
+                        form::BLANK => State::Blank,
+                        form::RUNS => State::Minimum,
+                        form::ROWS => State::Row(Row { y: 0, part: RowPart::Head }),
+                        _ => return Err(Defect::Form),
+                    };
+                    if byte != form::BLANK {
+                        memory[..usize::from(band.height) * stride].fill(0);
+                    }
+                }
+                State::Blank => {
+                    let Some(&count) = input.get(read) else { return Ok((read, Step::More)) };
+                    let end = self.next + usize::from(count);
+                    let last = end.checked_sub(1).filter(|&last| last >= self.next).ok_or(Defect::Count)?;
+                    let last = self.walk.bands().nth(last).ok_or(Defect::Count)?;
+                    read += 1;
+                    self.next = end;
+                    self.follow();
+                    return Ok((read, Step::Blank { y: band.y, rows: last.y + last.height - band.y }));
+                }
+                State::Minimum => {
+                    let Some(&minimum) = input.get(read) else { return Ok((read, Step::More)) };
+                    read += 1;
+                    self.state = State::Runs(Runs::new(minimum));
+                }
+                State::Runs(runs) => {
+                    let mut place =
+                        Place { band, stride, memory, shape: &mut self.shape, table: &mut self.table };
+                    let (used, complete) = runs.read(&input[read..], &mut place);
+                    read += used;
+                    if !complete {
+                        return Ok((read, Step::More));
+                    }
+                    self.next += 1;
+                    self.follow();
+                    return Ok((read, Step::Band { y: band.y, rows: band.height }));
+                }
+                State::Row(row) => {
+                    let (used, complete) = row.read(&input[read..], memory, stride, band.height, width)?;
+                    read += used;
+                    if !complete {
+                        return Ok((read, Step::More));
+                    }
+                    self.next += 1;
+                    self.follow();
+                    return Ok((read, Step::Band { y: band.y, rows: band.height }));
+                }
+            }
+        }
+    }
+}
+
+/// Where the dots of a runs band go.
+struct Place<'d> {
+    band: Band,
+    stride: usize,
+    memory: &'d mut [u8],
+    shape: &'d mut Option<Tile>,
+    table: &'d mut [u16; MOST],
+}
+
+impl Place<'_> {
+    /// Inks dots `from..to` of a tile.
+    fn ink(&mut self, tile: &Tile, from: u32, to: u32) {
+        let shape = Tile { x: 0, y: 0, ..*tile };
+        if *self.shape != Some(shape) {
+            tile.fill(self.table);
+            *self.shape = Some(shape);
+        }
+        for &dot in &self.table[from as usize..to as usize] {
+            let x = usize::from(tile.x + dot % EDGE);
+            self.memory[usize::from(dot / EDGE) * self.stride + x / 8] |= 0x80 >> (x % 8);
+        }
+    }
+}
+
+impl Runs {
+    fn new(minimum: u8) -> Runs {
+        Runs {
+            minimum: u32::from(minimum),
+            means: [Mean::START; 2],
+            index: 0,
+            bits: 0,
+            held: 0,
+            ones: 0,
+            // The first run is plain.
+            remainder: Some(PLAIN_BITS),
+            done: 0,
+            tile: None,
+            before: 0,
+            tiles: 0,
+        }
+    }
+
+    /// Reads runs until the band is full; says how much was read and whether it is.
+    fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
+        let mut read = 0;
+        while self.done < place.band.len() {
+            // Bits are needed: at least one for the ones, all of the remainder.
+            let needed = self.remainder.unwrap_or(1);
+            while self.held < needed {
+                // Never a byte more than needed: what follows the last code belongs to the next band. There is
+                // room for it, since at most 20 bits are needed.
+                let Some(&byte) = input.get(read) else { return (read, false) };
+                self.bits |= u32::from(byte) << (24 - self.held);
+                self.held += 8;
+                read += 1;
+            }
+            let Some(count) = self.remainder else {
+                self.count_ones();
+                continue;
+            };
+            let value = if count == 0 { 0 } else { self.bits >> (32 - count) };
+            self.drop(count);
+            self.take(value, count, place);
+        }
+        (read, true)
+    }
+
+    fn drop(&mut self, count: u32) {
+        self.bits <<= count;
+        self.held -= count;
+    }
+
+    fn count_ones(&mut self) {
+        let ones = (!self.bits).leading_zeros().min(self.held).min(ESCAPE - self.ones);
+        self.drop(ones);
+        self.ones += ones;
+        if self.ones == ESCAPE {
+            self.remainder = Some(PLAIN_BITS);
+        } else if self.held > 0 {
+            self.drop(1);
+            self.remainder = Some(self.means[self.index as usize % 2].parameter());
+        }
+    }
+
+    /// A value is complete: `bits` of it stood as they are.
+    fn take(&mut self, bits: u32, count: u32, place: &mut Place<'_>) {
+        let length = if self.index == 0 {
+            bits
+        } else {
+            let mean = &mut self.means[self.index as usize % 2];
+            let k = mean.parameter();
+            let value = if self.ones == ESCAPE { bits } else { self.ones << count | bits };
+            mean.add(value, k);
+            value + self.minimum
+        };
+        let end = self.done.saturating_add(length).min(place.band.len());
+        if self.index % 2 == 1 {
+            self.ink(end, place);
+        }
+        self.done = end;
+        self.index += 1;
+        self.ones = 0;
+        self.remainder = None;
+    }
+
+    /// Inks the dots from `done` to `end`.
+    fn ink(&mut self, end: u32, place: &mut Place<'_>) {
+        let mut from = self.done;
+        while from < end {
+            let tile = match self.tile {
+                Some(tile) if from < self.before + u32::from(tile.area()) => tile,
+                tile => {
+                    self.before += tile.map_or(0, |tile| u32::from(tile.area()));
+                    // There is a next tile: `end` lies within the band.
+                    self.tile = place.band.tiles().nth(self.tiles);
+                    self.tiles += 1;
+                    if self.tile.is_none() {
+                        return;
+                    }
+                    continue;
+                }
+            };
+            let to = end.min(self.before + u32::from(tile.area()));
+            place.ink(&tile, from - self.before, to - self.before);
+            from = to;
+        }
+    }
+}
+
+impl Row {
+    /// Reads rows until the band is full; says how much was read and whether it is.
+    fn read(
+        &mut self,
+        input: &[u8],
+        memory: &mut [u8],
+        stride: usize,
+        height: u16,
+        width: u16,
+    ) -> Result<(usize, bool), Defect> {
+        let mut read = 0;
+        while self.y < height {
+            let row = usize::from(self.y) * stride;
+            if let RowPart::Data { left: 0, run, .. } = self.part {
+                // A packed row that announces more than it has.
+                if !matches!(run, Run::Head) {
+                    return Err(Defect::Row);
+                }
+                let spare = (stride * 8 - usize::from(width)) as u32;
+                if u32::from(memory[row + stride - 1]) & ((1 << spare) - 1) != 0 {
+                    return Err(Defect::Row);
+                }
+                self.y += 1;
+                self.part = RowPart::Head;
+                continue;
+            }
+            let Some(&byte) = input.get(read) else { return Ok((read, false)) };
+            read += 1;
+            match &mut self.part {
+                RowPart::Head if byte == 0 => self.part = RowPart::Same,
+                RowPart::Head if byte >= 0x80 => self.part = RowPart::Tail(byte & 0x7f),
+                RowPart::Head => self.part = RowPart::data(u16::from(byte)),
+                RowPart::Tail(low) if byte < 0x80 => {
+                    self.part = RowPart::data(u16::from(byte) << 7 | u16::from(*low));
+                }
+                RowPart::Tail(_) => return Err(Defect::Row),
+                RowPart::Same => {
+                    if byte == 0 || u16::from(byte) > height - self.y {
+                        return Err(Defect::Count);
+                    }
+                    for _ in 0..byte {
+                        if let Some(above) = (usize::from(self.y) * stride).checked_sub(stride) {
+                            memory.copy_within(above..above + stride, above + stride);
+                        }
+                        self.y += 1;
+                    }
+                    self.part = RowPart::Head;
+                }
+                RowPart::Data { packed, left, x, run } => {
+                    *left -= 1;
+                    let mut put = |value: u8, times: u8| -> Result<(), Defect> {
+                        let from = row + usize::from(*x);
+                        *x += u16::from(times);
+                        if usize::from(*x) > stride {
+                            return Err(Defect::Row);
+                        }
+                        memory[from..from + usize::from(times)].fill(value);
+                        Ok(())
+                    };
+                    *run = match *run {
+                        _ if !*packed => {
+                            put(byte, 1)?;
+                            Run::Head
+                        }
+                        Run::Head => match byte {
+                            0x80 => return Err(Defect::Row),
+                            0..0x80 => Run::Literal(byte + 1),
+                            // 257 - byte, which is 2..=128.
+                            _ => Run::Repeat((!byte) + 2),
+                        },
+                        Run::Literal(count) => {
+                            put(byte, 1)?;
+                            if count == 1 { Run::Head } else { Run::Literal(count - 1) }
+                        }
+                        Run::Repeat(count) => {
+                            put(byte, count)?;
+                            Run::Head
+                        }
+                    };
+                }
+            }
+        }
+        Ok((read, true))
+    }
+}
+
+impl RowPart {
+    fn data(head: u16) -> RowPart {
+        RowPart::Data { packed: head % 2 == 1, left: head / 2, x: 0, run: Run::Head }
+    }
+}

@@ -1,0 +1,273 @@
+//! A plane as a pass stream.
+
+use super::rice::{ESCAPE, Mean};
+use super::{PLAIN_BITS, band_bytes, form, stride};
+use crate::packbits;
+use crate::walk::{Band, EDGE, MOST, Tile, Walk};
+
+/// The most bytes one band can take, whatever is in it, on the widest page (9880 dots at 1200 dpi): the size of
+/// the buffer for [`encode`].
+pub const MAX_BAND: usize = 1 + EDGE as usize * (2 + MAX_STRIDE);
+
+const MAX_STRIDE: usize = 1235;
+
+/// A buffer is too small, a page wider than 9880 dots, or `bits` shorter than the plane.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct NoRoom;
+
+/// Codes a plane of `width` by `height` dots, 8 dots to a byte, most significant bit left, 1 = ink, rows padded
+/// to whole bytes with zeros. `put` gets the stream band by band; `buffer` needs [`MAX_BAND`] bytes.
+pub fn encode(
+    width: u16,
+    height: u16,
+    bits: &[u8],
+    buffer: &mut [u8],
+    mut put: impl FnMut(&[u8]),
+) -> Result<(), NoRoom> {
+    let stride = stride(width);
+    if stride > MAX_STRIDE || buffer.len() < MAX_BAND || bits.len() < stride * usize::from(height) {
+        return Err(NoRoom);
+    }
+    let mut blank = 0u8;
+    let mut table = Table::new();
+    for band in Walk::new(width, height).bands() {
+        let from = usize::from(band.y) * stride;
+        let rows = &bits[from..from + usize::from(band.height) * stride];
+        if rows.iter().all(|&byte| byte == 0) {
+            blank += 1;
+            if blank == u8::MAX {
+                put(&[form::BLANK, blank]);
+                blank = 0;
+            }
+            continue;
+        }
+        if blank > 0 {
+            put(&[form::BLANK, blank]);
+            blank = 0;
+        }
+        // Runs are written if they are shorter than rows would be.
+        let limit = rows_length(rows, stride);
+        let length = match put_runs(&band, rows, stride, &mut table, &mut buffer[..limit - 1]) {
+            Some(length) => length,
+            None => put_rows(rows, stride, &mut buffer[..limit]).ok_or(NoRoom)?,
+        };
+        put(&buffer[..length]);
+    }
+    if blank > 0 {
+        put(&[form::BLANK, blank]);
+    }
+    debug_assert!(band_bytes(width) < MAX_BAND);
+    Ok(())
+}
+
+/// The dots of the last tile's shape.
+struct Table {
+    shape: Option<Tile>,
+    dots: [u16; MOST],
+}
+
+impl Table {
+    fn new() -> Self {
+        Table { shape: None, dots: [0; MOST] }
+    }
+
+    fn of(&mut self, tile: &Tile) -> &[u16] {
+        let shape = Tile { x: 0, y: 0, ..*tile };
+        if self.shape != Some(shape) {
+            tile.fill(&mut self.dots);
+            self.shape = Some(shape);
+        }
+        &self.dots[..usize::from(tile.area())]
+    }
+}
+
+/// Puts a tile's rows into words, first column in the highest bit; false if there is no dot in them. What lies
+/// right of the tile may be in them too.
+fn gather(tile: &Tile, rows: &[u8], stride: usize, words: &mut [u64; EDGE as usize]) -> bool {
+    let (byte, shift) = (usize::from(tile.x) / 8, u32::from(tile.x % 8));
+    let mut any = 0;
+    for (word, row) in words.iter_mut().zip(rows.chunks_exact(stride)) {
+        let bytes = &row[byte..row.len().min(byte + 9)];
+        let mut wide = [0; 16];
+        wide[..bytes.len()].copy_from_slice(bytes);
+        *word = (u128::from_be_bytes(wide) << shift >> 64) as u64;
+        any |= *word;
+    }
+    any != 0
+}
+
+/// Calls `run` with the length of every run of the band, off first, possibly 0.
+fn for_each_run(
+    band: &Band,
+    rows: &[u8],
+    stride: usize,
+    table: &mut Table,
+    mut run: impl FnMut(u32) -> Option<()>,
+) -> Option<()> {
+    let (mut on, mut length) = (0, 0);
+    let mut columns = [0; EDGE as usize];
+    for tile in band.tiles() {
+        if !gather(&tile, rows, stride, &mut columns) {
+            if on == 1 {
+                run(length)?;
+                (on, length) = (0, 0);
+            }
+            length += u32::from(tile.area());
+            continue;
+        }
+        for &dot in table.of(&tile) {
+            let bit = columns[usize::from(dot / EDGE)] >> (EDGE - 1 - dot % EDGE) & 1;
+            if bit != on {
+                run(length)?;
+                (on, length) = (bit, 0);
+            }
+            length += 1;
+        }
+    }
+    run(length)
+}
+
+fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mut [u8]) -> Option<usize> {
+    // The first and the last run are cut by the band, so they say nothing about the clusters.
+    let (mut minimum, mut last, mut count) = (u32::from(u8::MAX), 0, 0u32);
+    for_each_run(band, rows, stride, table, |length| {
+        if count > 1 {
+            minimum = minimum.min(last);
+        }
+        (last, count) = (length, count + 1);
+        Some(())
+    })?;
+    let [head, codes @ ..] = out else { return None };
+    let [least, codes @ ..] = codes else { return None };
+    (*head, *least) = (form::RUNS, minimum as u8);
+    let mut bits = Bits { out: codes, at: 0, pending: 0, held: 0 };
+    let mut means = [Mean::START; 2];
+    let mut index = 0;
+    for_each_run(band, rows, stride, table, |length| {
+        if index == 0 {
+            bits.put(length, PLAIN_BITS)?;
+        } else {
+            let mean = &mut means[index % 2];
+            let (value, k) = (length.saturating_sub(minimum), mean.parameter());
+            let quotient = value >> k;
+            if quotient < ESCAPE {
+                bits.put((1 << (quotient + 1)) - 2, quotient + 1)?;
+                bits.put(value & ((1 << k) - 1), k)?;
+            } else {
+                bits.put((1 << ESCAPE) - 1, ESCAPE)?;
+                bits.put(value, PLAIN_BITS)?;
+            }
+            mean.add(value, k);
+        }
+        index += 1;
+        Some(())
+    })?;
+    bits.end().map(|length| 2 + length)
+}
+
+/// Writes bits from the top of each byte.
+struct Bits<'o> {
+    out: &'o mut [u8],
+    at: usize,
+    pending: u32,
+    held: u32,
+}
+
+impl Bits<'_> {
+    /// The low `count` (at most 21) bits of `value`, which has no others.
+    fn put(&mut self, value: u32, count: u32) -> Option<()> {
+        self.pending = self.pending << count | value;
+        self.held += count;
+        while self.held >= 8 {
+            self.held -= 8;
+            *self.out.get_mut(self.at)? = (self.pending >> self.held) as u8;
+            self.at += 1;
+        }
+        Some(())
+    }
+
+    fn end(mut self) -> Option<usize> {
+        let rest = (8 - self.held % 8) % 8;
+        self.put(0, rest)?;
+        Some(self.at)
+    }
+}
+
+/// What a row is to be written as.
+enum Row {
+    Same,
+    Packed(usize),
+    Plain(usize),
+}
+
+/// How the rows of a band are written, one after the other, with their packed bytes; rows alike are counted by
+/// the caller.
+fn for_each_row(rows: &[u8], stride: usize, mut row: impl FnMut(Row, &[u8]) -> Option<()>) -> Option<()> {
+    let mut packed = [0; MAX_STRIDE];
+    let mut above: &[u8] = &[];
+    for bits in rows.chunks_exact(stride) {
+        let trimmed = &bits[..bits.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1)];
+        if trimmed == above {
+            row(Row::Same, &[])?;
+        } else if trimmed.is_empty() {
+            row(Row::Packed(0), &[])?;
+        } else {
+            match packbits::pack_into(trimmed, &mut packed[..trimmed.len() - 1]) {
+                Some(length) => row(Row::Packed(length), &packed[..length])?,
+                None => row(Row::Plain(trimmed.len()), trimmed)?,
+            }
+        }
+        above = trimmed;
+    }
+    Some(())
+}
+
+fn rows_length(rows: &[u8], stride: usize) -> usize {
+    let (mut length, mut same) = (1, false);
+    for_each_row(rows, stride, |row, _| {
+        length += match row {
+            Row::Same if same => 0,
+            Row::Same => 2,
+            Row::Packed(bytes) => varint(2 * bytes + 1).1 + bytes,
+            Row::Plain(bytes) => varint(2 * bytes).1 + bytes,
+        };
+        same = matches!(row, Row::Same);
+        Some(())
+    });
+    length
+}
+
+fn put_rows(rows: &[u8], stride: usize, out: &mut [u8]) -> Option<usize> {
+    *out.first_mut()? = form::ROWS;
+    let mut at = 1;
+    let mut same = 0u8;
+    for_each_row(rows, stride, |row, data| {
+        let head = match row {
+            Row::Same => {
+                // At most 64 rows, so the count never overflows.
+                if same == 0 {
+                    *out.get_mut(at)? = 0;
+                    at += 2;
+                }
+                same += 1;
+                *out.get_mut(at - 1)? = same;
+                return Some(());
+            }
+            Row::Packed(length) => varint(2 * length + 1),
+            Row::Plain(length) => varint(2 * length),
+        };
+        same = 0;
+        let end = at + head.1 + data.len();
+        let place = out.get_mut(at..end)?;
+        place[..head.1].copy_from_slice(&head.0[..head.1]);
+        place[head.1..].copy_from_slice(data);
+        at = end;
+        Some(())
+    })?;
+    Some(at)
+}
+
+/// A number below 2^14 and how many bytes it takes.
+fn varint(number: usize) -> ([u8; 2], usize) {
+    if number < 0x80 { ([number as u8, 0], 1) } else { ([number as u8 | 0x80, (number >> 7) as u8], 2) }
+}

@@ -1,0 +1,74 @@
+//! Pass streams: one pass as on/off runs along the band walk.
+//!
+//! Problem: a halftoned plane is as good as noise to a raster coder, because its clusters follow the walk and
+//! not the rows; sent as packed rows, eight planes of an A4 page are some 25 MB. Along the walk the same plane
+//! is runs that are never shorter than the minimum cluster.
+//!
+//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in whichever of three forms is the
+//! shortest: nothing (blank bands), runs with adaptive Rice codes, or rows packed as the printer packs them. The
+//! last keeps type, line art and solids from ever costing more than they do in the printer's own language.
+//! The decoder holds one band (38 KB for 4800 dots), one tile's table (8 KB) and some counters, takes its input
+//! in any portions, and never looks back.
+//!
+//! Cost: encoding and decoding walk each inked dot once; blank dots are skipped by the run. On eight clustered
+//! planes of a full page the streams are a sixth to a seventh of the packed rows
+//! (`docs/decisions/pass-streams.md` has the figures, and the codecs that were not taken).
+//!
+//! Limits: a band is rebuilt from its own bytes alone, so what is alike from band to band is paid for again.
+//!
+//! # Format
+//!
+//! ```text
+//! stream  = { band }, until the bands of the walk are complete
+//! band    = 00 count                     count (1..=255) blank bands
+//!         | 01 minimum codes             runs
+//!         | 02 { row }                   rows, as many as the band is high
+//! row     = 00 count                     count (1..=64) rows like the one above (blank above the first)
+//!         | varint(2 * length + 1) data  length bytes of PackBits; length 0: a blank row
+//!         | varint(2 * length) data      length (> 0) plain bytes
+//! ```
+//!
+//! Row data end with the last byte that is not zero; what follows is blank. Varints are those of the messages:
+//! seven bits to a byte, low bits first, at most two bytes here.
+//!
+//! *Runs* alternate, off first, from the first dot of the band along the walk to the last. The first run stands as
+//! 20 plain bits and may be 0. Every other run is its length less `minimum` as a Rice code with parameter k: the
+//! quotient by 2^k as that many ones and a zero, then k bits of remainder; a quotient of 20 or more is 20 ones
+//! and 20 plain bits of the whole value instead. Off and on runs each keep a count and a sum (4 and 32 at the
+//! start of a band): k is the smallest with count * 2^k >= sum; afterwards the value, at most 8 * 2^k and at most 2^20 of it, is
+//! added to the sum and 1 to the count, and at a count of 64 both are halved. A run may be said to be longer than
+//! what is left of the band, and is then cut. Bits are filled from the top of each byte; the rest of the last byte
+//! is zero.
+
+mod decode;
+mod encode;
+mod header;
+mod rice;
+
+pub use decode::{Decoder, Defect, Step};
+pub use encode::{MAX_BAND, NoRoom, encode};
+pub use header::{Header, HeaderError, MAX_HEADER};
+
+/// Bytes of a row of so many dots.
+pub fn stride(width: u16) -> usize {
+    usize::from(width).div_ceil(8)
+}
+
+/// Bytes of memory for one band of so many dots across: what [`Decoder::step`] is given.
+pub fn band_bytes(width: u16) -> usize {
+    stride(width) * usize::from(crate::walk::EDGE)
+}
+
+/// First byte of a band.
+mod form {
+    pub const BLANK: u8 = 0;
+    pub const RUNS: u8 = 1;
+    pub const ROWS: u8 = 2;
+}
+
+/// Bits of the first run and of an escaped one: the largest band has 65535 x 64 dots at most in theory, and
+/// 9880 x 64 on this printer.
+const PLAIN_BITS: u32 = 20;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,35 @@
+//! The adaptive parameter of the Rice codes, the same on both sides.
+
+/// Ones that announce a plain value.
+pub(super) const ESCAPE: u32 = 20;
+
+/// Running mean of one colour's runs.
+#[derive(Clone, Copy)]
+pub(super) struct Mean {
+    sum: u32,
+    count: u32,
+}
+
+impl Mean {
+    pub(super) const START: Mean = Mean { sum: 32, count: 4 };
+
+    /// The parameter for the next value: at most 20, because no value counts for more than 2^20.
+    pub(super) fn parameter(self) -> u32 {
+        let mut k = 0;
+        while self.count << k < self.sum {
+            k += 1;
+        }
+        k
+    }
+
+    /// Takes note of a value that was coded with parameter `k`. A single long gap must not make the following
+    /// short ones dear, so it counts only eightfold.
+    pub(super) fn add(&mut self, value: u32, k: u32) {
+        self.sum += value.min(8 << k).min(1 << 20);
+        self.count += 1;
+        if self.count == 64 {
+            self.sum /= 2;
+            self.count /= 2;
+        }
+    }
+}
