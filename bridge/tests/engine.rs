@@ -350,6 +350,33 @@ fn text_passes_through_and_cancelling_it_resets_the_printer() {
 }
 
 #[test]
+fn a_raw_job_cancelled_before_its_first_row_has_not_touched_the_printer() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..60] });
+    rig.print();
+    rig.tell(ToBridge::Cancel { job: 1 });
+    rig.print();
+    assert_eq!((rig.engine.progress().state, rig.printed.len()), (JobState::Cancelled, 0));
+    assert_eq!(rig.engine.task(), None);
+}
+
+#[test]
+fn a_cancel_that_comes_too_late_changes_nothing() {
+    let stream =
+        Planes { width: 8, rows: 1, inks: vec![protocol::ink::Ink::Black], bits: vec![vec![1]] }.printed();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream });
+    while rig.engine.work() {}
+    assert_eq!(rig.tell(ToBridge::Cancel { job: 1 }).progress.unwrap().state, JobState::Printing);
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Done);
+    assert!(rig.printed == stream);
+}
+
+#[test]
 fn a_stream_that_ends_too_early_is_brought_to_an_end() {
     let stream = a_raw_job();
     for cut in (100..stream.len() - 2).step_by(97) {

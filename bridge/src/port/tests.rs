@@ -195,10 +195,10 @@ fn a_printer_that_goes_busy_between_two_looks_is_not_strobed() {
             cable.edges().iter().filter(|edge| edge.line == Line::Strobe && edge.level == 0).count();
         assert_eq!((cable.taken().as_slice(), strobes), (&b"ab"[..], 2));
         let edges = cable.edges();
-        // What falls within the last look at the lines and the strobe itself, 64 ns here, no host can see.
+        // What falls within the last look at the lines and the strobe itself, 32 ns here, no host can see.
         let raced = check(&edges, &Timing::DEFAULT).iter().any(|violation| {
-            !matches!(violation, crate::simulation::Violation::NotReady { at: strobe } if strobe - at <= 64)
-                && !matches!(violation, crate::simulation::Violation::ChangedWhileBusy { at: change } if change - at <= 64)
+            !matches!(violation, crate::simulation::Violation::NotReady { at: strobe } if strobe - at <= 32)
+                && !matches!(violation, crate::simulation::Violation::ChangedWhileBusy { at: change } if change - at <= 32)
         });
         assert!(!raced, "busy at {at}: {:?}", check(&edges, &Timing::DEFAULT));
     }
