@@ -4,7 +4,7 @@
 // instructions. Here they are stepped by the same clock as the processor, so an edge at a pin happens at the
 // nanosecond it would happen on silicon, give or take the fraction of a divided clock.
 
-import { RP2040, SimulationClock } from 'rp2040js';
+import { BasePeripheral, RP2040 } from 'rp2040js';
 
 const NS_PER_CYCLE = 8; // 125 MHz
 const FLASH = 0x10000000;
@@ -33,6 +33,12 @@ function bootRom(rom) {
   half(0x50, 0x3a04, 0x588b, 0x5083, 0xd1fb, 0x4770); // subs r2, #4; ldr r3, [r1, r2]; str r3, [r0, r2]; bne; bx lr
 }
 
+/// A peripheral whose registers are all zero.
+class Quiet extends BasePeripheral {
+  readUint32() { return 0; }
+  writeUint32() {}
+}
+
 /// Puts a UF2 image into the flash.
 function load(chip, image) {
   const view = new DataView(image.buffer, image.byteOffset, image.byteLength);
@@ -46,12 +52,14 @@ function load(chip, image) {
 
 export class Board {
   constructor(image) {
-    this.clock = new SimulationClock();
-    this.chip = new RP2040(this.clock);
+    this.chip = new RP2040();
+    this.clock = this.chip.clock;
     this.chip.logger = { debug() {}, info() {}, warn() {}, error: (part, text) => this.complaints.push(`${part}: ${text}`) };
     this.complaints = [];
     bootRom(this.chip.bootrom);
     load(this.chip, image);
+    // The cache's controller is not modelled; its stream of nothing is at its end.
+    this.chip.peripherals[0x14000] = new Quiet(this.chip, 'XIP_CTRL');
     // As the boot ROM leaves it.
     this.chip.core.SP = 0x20041f00;
     this.chip.core.LR = 0;

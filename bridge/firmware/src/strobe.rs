@@ -35,7 +35,7 @@ use embassy_rp::pac;
 use embassy_rp::pac::dma::vals::{DataSize, TreqSel};
 use embassy_rp::peripherals::{DMA_CH0, DMA_CH1, PIO0};
 use embassy_rp::pio::program::{Instruction, InstructionOperands, JmpCondition};
-use embassy_rp::pio::{Common, Config, Direction, Pin, StateMachine};
+use embassy_rp::pio::{Common, Config, Direction, Pin, ShiftDirection, StateMachine};
 use embassy_rp::{Peri, clocks};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -157,6 +157,8 @@ impl Strobe {
         config.use_program(&loaded, &[&strobe]);
         config.set_out_pins(&data.each_ref());
         config.set_in_pins(&[&busy]);
+        // To the left: the four levels then are a number from 0 to 15 in the register.
+        config.shift_in.direction = ShiftDirection::Left;
         machine.set_config(&config);
         machine.set_pins(embassy_rp::gpio::Level::High, &[&strobe]);
         machine.set_pin_dirs(Direction::Out, &[&strobe]);
