@@ -54,7 +54,13 @@ export class Board {
   constructor(image) {
     this.chip = new RP2040();
     this.clock = this.chip.clock;
-    this.chip.logger = { debug() {}, info() {}, warn() {}, error: (part, text) => this.complaints.push(`${part}: ${text}`) };
+    this.chip.logger = {
+      debug() {},
+      // rp2040js only reports this instruction. Without its effect a task that wakes itself sleeps on.
+      info: (part, text) => { if (text === 'SEV') this.chip.core.eventRegistered = true; },
+      warn() {},
+      error: (part, text) => this.complaints.push(`${part}: ${text}`),
+    };
     this.complaints = [];
     bootRom(this.chip.bootrom);
     load(this.chip, image);

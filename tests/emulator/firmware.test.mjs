@@ -130,7 +130,7 @@ test('the handshake by nAck, worked by the processor, delivers the same', { skip
   assert.equal((await bench.print(3, RAW, bytes)).state, 'done');
   same(bench.printer.taken, bytes);
   legal(bench.printer, 800);
-  t.diagnostic(`${(bytes.length / ((bench.board.now - start) / 1e6)).toFixed(0)} kB/s`);
+  t.diagnostic(`${((bytes.length / (bench.board.now - start)) * 1e6).toFixed(0)} kB/s`);
 });
 
 test('a status question is answered at once while data are under way', { skip }, async (t) => {

@@ -12,6 +12,7 @@ use crate::watch::HEARTBEAT;
 use bridge::engine::{Outcome, Task};
 use bridge::port::{BadSettings, Port, ReverseError, Stop, Timing};
 use embassy_futures::select::select3;
+use embassy_futures::yield_now;
 use embassy_rp::pac;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal::delay::DelayNs;
@@ -116,7 +117,11 @@ pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
         };
         shared.wake(Side::Work);
         shared.wake(Side::Link);
-        select3(Timer::after(pause), shared.wait(Side::Port), SENT.wait()).await;
+        if pause.as_ticks() == 0 {
+            yield_now().await;
+        } else {
+            select3(Timer::after(pause), shared.wait(Side::Port), SENT.wait()).await;
+        }
     }
 }
 
@@ -154,7 +159,7 @@ impl Desk {
         TICK
     }
 
-    /// Sends some bytes; says how long to leave the printer alone.
+    /// Sends some bytes; says how long to leave the printer alone, or zero if it is ready for more.
     fn send_by_hand(&mut self) -> Duration {
         let now = Instant::now().as_millis() as u32;
         let hand = &mut self.hand;
@@ -174,7 +179,7 @@ impl Desk {
             None => None,
         };
         match stop {
-            None if more => Duration::from_micros(1),
+            None if more => Duration::from_ticks(0),
             Some(Stop::Busy) => Duration::from_micros(100),
             _ => TICK,
         }

@@ -179,7 +179,8 @@ impl Strobe {
         let longest = timing.setup.max(timing.strobe).max(timing.hold).max(timing.settle);
         // Whole clock cycles; one more, because a divider with a fraction may give eight ticks one cycle less than
         // eight times its value. At most 65.5 µs, so far below the divider's range.
-        let cycles = (u64::from(longest) * u64::from(clocks::clk_sys_freq())).div_ceil(1_000_000_000) as u32 + 1;
+        let cycles =
+            (u64::from(longest) * u64::from(clocks::clk_sys_freq())).div_ceil(1_000_000_000) as u32 + 1;
         let divider = (cycles * 256).div_ceil(8);
         self.machine.set_clock_divider(FixedU32::<U8>::from_bits(divider.max(256)));
     }
