@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn what_was_encoded_is_decoded_and_the_rest_of_the_sector_is_blank() {
-        let long: Vec<u8> = (0..9000u32).map(|i| (i * 7 >> 3) as u8).collect();
+        let long: Vec<u8> = (0..9000u32).map(|i| ((i * 7) >> 3) as u8).collect();
         let file = encode(&[(0x1000_0100, &long), (0x1000_0000, &[1, 2, 3])]).unwrap();
         let mut flash = vec![0u8; 3 * 4096];
         for (address, page) in decode(&file).unwrap() {
