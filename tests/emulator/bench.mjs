@@ -46,8 +46,9 @@ export class Bench {
   async connect(way) {
     this.device = await this.until(this.host.enumerate());
     await this.open(way);
+    this.greeted = this.board.now;
     await this.say(hello());
-    await this.hear(({ kind }) => kind === 'hello');
+    await this.hear(({ kind, at }) => kind === 'hello' && at > this.greeted);
   }
 
   async open(way) {
@@ -55,6 +56,19 @@ export class Bench {
     this.end = this.device.interfaces.find((one) => one.class === kind);
     if (way === 'serial') await this.until(this.host.openSerial(this.end.number - 1, true));
     this.host.read(this.end.in, (packet) => this.listen(packet));
+  }
+
+  /// The cable is pulled and plugged in again: nothing of what was under way arrives. Then hello, and where a job stands.
+  async replug(way) {
+    const { host } = this;
+    host.attached = new Promise((resolve) => { host.onReset = resolve; });
+    host.read(this.end.in, null);
+    host.queues.clear();
+    host.armed.clear();
+    host.usb.resetDevice();
+    this.frames = new Frames();
+    await this.connect(way);
+    return (await this.hear(({ kind, at }) => kind === 'progress' && at > this.greeted)).accepted;
   }
 
   listen(packet) {
