@@ -1,8 +1,8 @@
 //! The project's own chores, so that a person and the gate type the same words.
 //!
 //! `cargo xtask test` is the whole gate: formatting, lints, documents, every test and the bare-metal build
-//! of `protocol`. It runs every step, then says which failed. The firmware and its emulator are chores of their
-//! own, because they need more than a Rust compiler.
+//! of `protocol` and `bridge`. It runs every step, then says which failed. The firmware and its emulator are
+//! chores of their own, because they need more than a Rust compiler.
 
 mod elf;
 mod emulator;
@@ -53,7 +53,16 @@ fn main() -> ExitCode {
             }),
             (
                 "bare-metal build",
-                cargo(&["build", "--package", "foilpress-protocol", "--target", BARE_METAL, "--locked"]),
+                cargo(&[
+                    "build",
+                    "--package",
+                    "foilpress-protocol",
+                    "--package",
+                    "foilpress-bridge",
+                    "--target",
+                    BARE_METAL,
+                    "--locked",
+                ]),
             ),
             ("tests", cargo(&["test", "--workspace", "--locked"])),
         ],

@@ -14,7 +14,7 @@ mod progress;
 mod sample;
 
 use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -78,7 +78,8 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("foilpress: {error:#}");
+            output::yield_to_interrupt();
+            let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
             ExitCode::FAILURE
         }
     }
@@ -98,6 +99,25 @@ fn run(args: Args) -> Result<()> {
         Command::Inks(args) => inks::run(args),
         Command::Sample(args) => sample::run(args),
     }
+}
+
+/// An error with its causes. Many name their cause in their own words; it is not said again.
+fn chain(error: &anyhow::Error) -> String {
+    let mut said = String::new();
+    for cause in error.chain() {
+        let cause = cause.to_string();
+        if said.is_empty() {
+            said = cause;
+        } else if !said.contains(cause.trim_end()) {
+            said = format!("{said}: {cause}");
+        }
+    }
+    said.trim_end().to_owned()
+}
+
+/// Writes to standard output, where results go.
+fn show(text: &str) -> Result<()> {
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot write to standard output")
 }
 
 /// Reads a job whole.
