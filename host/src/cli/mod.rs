@@ -48,7 +48,6 @@ struct Args {
 }
 
 #[derive(Subcommand)]
-<<<<<<< HEAD
 enum Command {
     /// Print a document: the job, the simulated sheet, and everything to look at, in one folder
     Print(Box<print::Args>),
@@ -71,9 +70,6 @@ enum Command {
     /// Documents made by the program itself: list them or write one as a texture folder
     Sample(sample::Args),
 }
-=======
-enum Command {}
->>>>>>> link
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
