@@ -3,7 +3,8 @@
 //!
 //! The board's loop is:
 //!
-//! * bytes of the link to [`Engine::receive`], [`Engine::link_lost`] when it goes;
+//! * bytes of the link to [`Engine::receive`], [`Engine::link_lost`] when it goes; bytes of a plain printer interface
+//!   to [`Engine::local`];
 //! * [`Engine::work`] while it returns true, a slice at a time, between other things;
 //! * [`Engine::output`] to the port, [`Engine::consumed`] for what has crossed it, [`Engine::port`] for what the
 //!   lines say;
@@ -42,6 +43,9 @@ pub struct Memory<'m> {
 
 /// Least size of [`Memory::data`] and [`Memory::output`]; with less, no job is taken.
 pub const LEAST_MEMORY: usize = 2048;
+
+/// Number of a job that came through [`Engine::local`] and not through the link.
+pub const LOCAL: u32 = u32::MAX;
 
 /// What the bridge says about itself.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -258,6 +262,13 @@ impl<'m> Engine<'m> {
             engine.last = progress;
             return engine;
         }
+        if progress.job == LOCAL {
+            // What an operating system has sent to a plain printer it does not send again.
+            engine.last = Progress { state: JobState::Lost, ..progress };
+            engine.needs_reset = true;
+            engine.assign(Task::Initialise);
+            return engine;
+        }
         engine.job = Some(Job {
             id: progress.job,
             kind: JobKind::Raw,
@@ -366,7 +377,7 @@ impl<'m> Engine<'m> {
     }
 
     fn begin(&mut self, id: u32, kind: JobKind, length: u32) {
-        if id == 0 || length == 0 {
+        if id == 0 || id == LOCAL || length == 0 {
             return self.refuse(Refusal::Empty, id);
         }
         self.due.progress = true;
@@ -389,10 +400,17 @@ impl<'m> Engine<'m> {
         if self.older.contains(&id) {
             return self.refuse(Refusal::OtherJob, id);
         }
-        if self.data.capacity() < LEAST_MEMORY || self.output.capacity() < LEAST_MEMORY {
-            return self.refuse(Refusal::Empty, id);
+        if !self.open(id, kind, length) {
+            self.refuse(Refusal::Empty, id);
         }
-        if self.last.job != 0 {
+    }
+
+    /// Opens a job, if there is memory to speak of.
+    fn open(&mut self, id: u32, kind: JobKind, length: u32) -> bool {
+        if self.data.capacity() < LEAST_MEMORY || self.output.capacity() < LEAST_MEMORY {
+            return false;
+        }
+        if self.last.job != 0 && self.last.job != LOCAL {
             self.older.rotate_right(1);
             self.older[0] = self.last.job;
         }
@@ -413,6 +431,46 @@ impl<'m> Engine<'m> {
             row: 0,
         });
         self.clear();
+        true
+    }
+
+    /// Bytes from an interface that knows nothing of jobs: the printer class, for whatever an operating system
+    /// sends. Gives the number of bytes taken; the rest is to be offered again, which on USB is a NAK. Nothing is
+    /// taken while a job of the link is open or the end of the last one has not crossed the port.
+    ///
+    /// A job ends with the reset behind its rows, and otherwise with [`Engine::local_end`].
+    pub fn local(&mut self, bytes: &[u8]) -> usize {
+        if bytes.is_empty() || self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX) {
+            return 0;
+        }
+        let Some(job) = &mut self.job else { return 0 };
+        if job.id != LOCAL || job.phase != Phase::Running || job.length != u32::MAX {
+            return 0;
+        }
+        // A job of 4 GB is over when it is that long.
+        let room = self.data.free().min((u32::MAX - 1 - job.accepted) as usize);
+        let mut taken = &bytes[..bytes.len().min(room)];
+        let settled = self.ahead.follow(taken);
+        if let Some(over) = self.ahead.over() {
+            // The track has looked beyond the end, but that is where it is thrown away.
+            taken = &taken[..over];
+            job.length = job.accepted + over as u32;
+        }
+        self.data.push(taken);
+        let before = job.accepted;
+        job.accepted += taken.len() as u32;
+        if let Some(count) = settled {
+            job.settled = (before + count as u32).min(job.accepted);
+        }
+        taken.len()
+    }
+
+    /// No more bytes of a job come through [`Engine::local`]: the interface was reset, or has been silent for
+    /// longer than anything that prints is.
+    pub fn local_end(&mut self) {
+        if let Some(job) = self.job.as_mut().filter(|job| job.id == LOCAL && job.phase == Phase::Running) {
+            job.length = job.accepted;
+        }
     }
 
     /// Empties everything that belongs to a job.

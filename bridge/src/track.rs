@@ -46,6 +46,8 @@ pub(crate) struct Track {
     facts: Facts,
     /// The facts at the last place where the job could be ended.
     settled: Facts,
+    /// Where in the last portion a job with rows was over, its final reset included.
+    over: Option<usize>,
 }
 
 enum Head {
@@ -68,7 +70,7 @@ impl Track {
             pass: 0,
             row: 0,
         };
-        Track { place: Place::Ground, head: [0; 8], facts: NOTHING, settled: NOTHING }
+        Track { place: Place::Ground, head: [0; 8], facts: NOTHING, settled: NOTHING, over: None }
     }
 
     /// Follows some bytes. Gives the number of them up to and with the last one after which the job could be
@@ -76,6 +78,7 @@ impl Track {
     pub(crate) fn follow(&mut self, bytes: &[u8]) -> Option<usize> {
         let mut settled = None;
         let mut at = 0;
+        self.over = None;
         while at < bytes.len() {
             let used = match self.place {
                 Place::Foreign => return Some(bytes.len()),
@@ -109,6 +112,9 @@ impl Track {
             match self.place {
                 Place::Data(0) => {
                     self.place = Place::Ground;
+                    if self.facts.any_row && self.head[..2] == [ESC, b'e'] {
+                        self.over.get_or_insert(at);
+                    }
                     if self.finish_command() {
                         self.settled = self.facts;
                         settled = Some(at);
@@ -119,6 +125,11 @@ impl Track {
             }
         }
         settled
+    }
+
+    /// How many bytes of the portion last followed belong to the job, if it was over in it.
+    pub(crate) fn over(&self) -> Option<usize> {
+        self.over
     }
 
     /// Whether the stream is not the printer's language.

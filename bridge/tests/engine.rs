@@ -2,7 +2,7 @@
 
 mod model;
 
-use bridge::engine::{Engine, Outcome, Task};
+use bridge::engine::{Engine, LOCAL, Outcome, Task};
 use model::{IDENTITY, Job, NONE, Planes, framed, is_a_whole_job, memory, run, seeded};
 use proptest::prelude::*;
 use protocol::link::frame::{self, MAX, Read, Reader};
@@ -347,6 +347,93 @@ fn text_passes_through_and_cancelling_it_resets_the_printer() {
     );
     rig.engine.done(Outcome::Done);
     assert_eq!(rig.engine.task(), None);
+}
+
+/// Offers bytes as a printer interface does, again and again.
+fn offer(rig: &mut Rig, mut bytes: &[u8], size: usize) {
+    while !bytes.is_empty() {
+        let taken = rig.engine.local(&bytes[..size.min(bytes.len())]);
+        bytes = &bytes[taken..];
+        rig.print();
+        assert!(taken > 0 || !rig.engine.work(), "nothing moves");
+    }
+}
+
+#[test]
+fn jobs_through_a_plain_printer_interface_end_by_themselves() {
+    for size in [1, 64, 5000] {
+        let (mut rig, mut expected) = (Rig::new(), Vec::new());
+        for seed in 0..6 {
+            expected.extend(Planes::random(&mut seeded(seed)).printed());
+        }
+        offer(&mut rig, &expected, size);
+        rig.print();
+        assert_eq!((rig.engine.progress().job, rig.engine.progress().state), (LOCAL, JobState::Done));
+        assert!(rig.printed == expected, "in portions of {size}");
+        // The link has its turn afterwards.
+        let stream = a_raw_job();
+        assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    }
+}
+
+#[test]
+fn a_plain_printer_interface_that_falls_silent_leaves_a_whole_job_and_text_as_it_is() {
+    let mut rig = Rig::new();
+    let stream = a_raw_job();
+    offer(&mut rig, &stream[..stream.len() / 2], 64);
+    rig.engine.local_end();
+    rig.print();
+    assert!(matches!(rig.engine.progress().state, JobState::Broken(_)));
+    assert!(is_a_whole_job(&rig.printed));
+    let mut rig = Rig::new();
+    offer(&mut rig, b"plain text\r\n", 3);
+    rig.engine.local_end();
+    rig.print();
+    assert_eq!((rig.engine.progress().state, &rig.printed[..]), (JobState::Done, &b"plain text\r\n"[..]));
+}
+
+#[test]
+fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    assert!(rig.engine.local(&stream[..200]) > 0);
+    let said = rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 9 });
+    assert_eq!(said.text, refused(Refusal::JobOpen, 1));
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 9 });
+    assert_eq!(rig.engine.local(&stream[..200]), 0);
+    // Half a sheet at a reset of the bridge: nobody sends the rest, so the printer is reset.
+    let mut rig = Rig::new();
+    offer(&mut rig, &stream[..1500], 64);
+    let mut engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+    assert_eq!((engine.progress().state, engine.task()), (JobState::Lost, Some(Task::Initialise)));
+}
+
+#[test]
+fn a_raw_job_cancelled_before_its_first_row_has_not_touched_the_printer() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..60] });
+    rig.print();
+    rig.tell(ToBridge::Cancel { job: 1 });
+    rig.print();
+    assert_eq!((rig.engine.progress().state, rig.printed.len()), (JobState::Cancelled, 0));
+    assert_eq!(rig.engine.task(), None);
+}
+
+#[test]
+fn a_cancel_that_comes_too_late_changes_nothing() {
+    let stream =
+        Planes { width: 8, rows: 1, inks: vec![protocol::ink::Ink::Black], bits: vec![vec![1]] }.printed();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream });
+    while rig.engine.work() {}
+    assert_eq!(rig.tell(ToBridge::Cancel { job: 1 }).progress.unwrap().state, JobState::Printing);
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Done);
+    assert!(rig.printed == stream);
 }
 
 #[test]

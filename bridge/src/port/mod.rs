@@ -25,7 +25,7 @@ pub use timing::{BadSettings, Timing};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
 use embedded_hal::digital::{InputPin, PinState};
-use protocol::link::message::{Handshake, Lines, PortSettings};
+use protocol::link::message::{Fault, Handshake, Lines, PortSettings};
 
 /// The port. Owns its pins; [`Port::new`] puts them to the idle levels.
 pub struct Port<D, O, I, A, T> {
@@ -87,6 +87,11 @@ where
     /// The status lines as they are on the wire.
     pub fn lines(&mut self) -> Lines {
         self.pins.lines()
+    }
+
+    /// What keeps the printer from taking bytes by its lines, as far as they are heeded.
+    pub fn fault(&mut self) -> Option<Fault> {
+        self.pins.lines().heeding(self.heed).fault()
     }
 
     /// Resets the printer: nInit low for at least 50 µs. The printer may then be busy for seconds.

@@ -72,6 +72,8 @@ pub(crate) struct World {
     peripheral: Peripheral,
     phase: Phase,
     sent_back: usize,
+    /// A strobe before this is not seen: the last byte is still being worked on.
+    ready_at: u64,
     resets: usize,
 }
 
@@ -102,6 +104,7 @@ impl SimulatedPort {
             peripheral,
             phase: Phase::Forward,
             sent_back: 0,
+            ready_at: 0,
             resets: 0,
         })))
     }
@@ -198,7 +201,7 @@ impl World {
         if self.change(line, level) {
             self.react(line, level);
         }
-        // An instruction or two.
-        self.pass(16);
+        // An instruction of a microcontroller at 125 MHz.
+        self.pass(8);
     }
 }

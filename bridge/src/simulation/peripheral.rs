@@ -148,6 +148,9 @@ impl World {
     }
 
     fn take(&mut self) {
+        if self.now < self.ready_at {
+            return;
+        }
         self.taken.push(self.level(Line::Data));
         let Peripheral { busy_after, work, ack, has_busy, .. } = self.peripheral;
         let mut busy = work;
@@ -166,6 +169,7 @@ impl World {
                 self.plan(busy_after + pause.ns, pause.line, good);
             }
         }
+        self.ready_at = self.now + busy_after + busy;
         if has_busy {
             self.plan(busy_after, Line::Busy, 1);
             self.plan(busy_after + busy + ack, Line::Busy, 0);

@@ -46,7 +46,7 @@ impl ErrorType for InLine {
 impl InputPin for InLine {
     fn is_high(&mut self) -> Result<bool, Infallible> {
         let mut world = self.0.borrow_mut();
-        world.pass(16);
+        world.pass(8);
         Ok(world.level(self.1) == 1)
     }
 
@@ -61,7 +61,7 @@ pub struct AckLine(pub(super) Rc<RefCell<World>>);
 impl AckPin for AckLine {
     fn is_high(&mut self) -> bool {
         let mut world = self.0.borrow_mut();
-        world.pass(16);
+        world.pass(8);
         world.level(Line::Ack) == 1
     }
 
@@ -71,7 +71,7 @@ impl AckPin for AckLine {
 
     fn fell(&mut self) -> bool {
         let mut world = self.0.borrow_mut();
-        world.pass(16);
+        world.pass(8);
         world.ack_latch
     }
 }
