@@ -29,7 +29,7 @@ fn disturbed(seeds: core::ops::Range<u64>) {
 
 #[test]
 fn the_paper_does_not_notice_a_bad_link() {
-    disturbed(0..300);
+    disturbed(0..1_000);
 }
 
 #[test]

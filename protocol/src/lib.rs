@@ -11,4 +11,5 @@ pub mod packbits;
 pub mod paper;
 pub mod rgl;
 pub mod runs;
+pub mod status;
 pub mod walk;

@@ -1,7 +1,7 @@
 //! The project's own chores, so that a person and the gate type the same words.
 //!
 //! `cargo xtask test` is the whole gate: formatting, lints, documents, every test and the bare-metal build
-//! of `protocol`. It runs every step, then says which failed.
+//! of `protocol` and `bridge`. It runs every step, then says which failed.
 
 use std::process::{Command, ExitCode};
 
@@ -38,7 +38,16 @@ fn main() -> ExitCode {
             }),
             (
                 "bare-metal build",
-                cargo(&["build", "--package", "foilpress-protocol", "--target", BARE_METAL, "--locked"]),
+                cargo(&[
+                    "build",
+                    "--package",
+                    "foilpress-protocol",
+                    "--package",
+                    "foilpress-bridge",
+                    "--target",
+                    BARE_METAL,
+                    "--locked",
+                ]),
             ),
             ("tests", cargo(&["test", "--workspace", "--locked"])),
         ],

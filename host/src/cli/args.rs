@@ -33,18 +33,14 @@ pub struct DocumentArgs {
 }
 
 impl DocumentArgs {
-    /// Opens the document and passes on what the reader decided.
+    /// Opens the document; what the reader decides goes to the observer.
     pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
         let options = document::Options {
             material: self.material.clone(),
             colour_space: self.colour_space,
             samples: self.samples,
         };
-        let document = document::open(&self.document, &options, observer)?;
-        for note in &document.notes {
-            observer.note(note);
-        }
-        Ok(document)
+        Ok(document::open(&self.document, &options, observer)?)
     }
 }
 

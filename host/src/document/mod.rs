@@ -6,6 +6,7 @@
 //! a map, a channel it left out, relief it turned into roughness) is one of [`Document::notes`].
 
 pub mod average;
+pub mod distinct;
 pub mod error;
 pub mod foil;
 pub mod folder;
@@ -31,6 +32,7 @@ use crate::brdf::Space;
 use crate::factor::Factored;
 use crate::observe::Observer;
 
+pub use distinct::Distinct;
 pub use error::DocumentError;
 pub use materials::{Materials, Surface};
 pub use surfaces::{Surfaces, Uniform};

@@ -1,12 +1,12 @@
 //! Every pixel of a document as weights over given bases, and how far off that is.
 //!
-//! Method: pixels are read, coded in the metric and rounded to fixed point in runs of fixed length, in parallel;
-//! no pixel knows another, except that one equal to its left neighbour is not solved again. Errors are those of
-//! the rounded weights. Cost: a few microseconds a pixel; memory is the maps and one number a pixel.
+//! Method: each distinct material is coded in the metric and rounded to fixed point, in runs of fixed length, in
+//! parallel; none knows another. Errors are those of the rounded weights. Cost: a few microseconds a distinct
+//! material; memory is the maps and a few numbers a pixel.
 
 use rayon::prelude::*;
 
-use crate::document::Materials;
+use crate::document::{Distinct, Materials};
 use crate::observe::Observer;
 use crate::weights::{ONE, WeightMaps, quantise};
 
@@ -42,15 +42,16 @@ pub(super) fn weigh(
 ) -> Result<(WeightMaps, Errors), FactorError> {
     let (width, height) = (document.width(), document.height());
     let k = bases.len() / columns.padded;
-    let mut data = vec![0u16; width * height * k];
-    let mut distance = vec![0.0f32; width * height];
-    observer.begin("weighing pixels", (width * height) as u64);
+    let distinct = Distinct::of(document);
+    let mut data = vec![0u16; distinct.first().len() * k];
+    let mut distance = vec![0.0f32; distinct.first().len()];
+    observer.begin("weighing pixels", distance.len() as u64);
     let runs: Vec<Result<(), FactorError>> = data
         .par_chunks_mut(RUN * k)
         .zip(distance.par_chunks_mut(RUN))
-        .enumerate()
-        .map(|(run, (data, distance))| {
-            weigh_run(document, columns, bases, run * RUN, data, distance)?;
+        .zip(distinct.first().par_chunks(RUN))
+        .map(|((data, distance), pixels)| {
+            weigh_run(document, columns, bases, pixels, data, distance)?;
             observer.advance(distance.len() as u64);
             Ok(())
         })
@@ -58,38 +59,32 @@ pub(super) fn weigh(
     observer.end();
     // The first in reading order, whichever thread met one first.
     runs.into_iter().collect::<Result<(), _>>()?;
-    Ok((WeightMaps::new(width, height, k, data)?, measure(&mut distance)))
+    let maps = WeightMaps::new(width, height, k, distinct.spread(&data, k))?;
+    Ok((maps, measure(&mut distinct.spread(&distance, 1))))
 }
 
 fn weigh_run(
     document: &dyn Materials,
     columns: &Columns,
     bases: &[f32],
-    from: usize,
+    pixels: &[u32],
     data: &mut [u16],
     distance: &mut [f32],
 ) -> Result<(), FactorError> {
     let coder = Coder::new(columns, bases);
     let mut scratch = coder.scratch();
     let k = bases.len() / columns.padded;
-    let (mut row, mut last) = (vec![0.0; columns.real], vec![f32::NAN; columns.real]);
+    let mut row = vec![0.0; columns.real];
     let (mut x, mut t) = (vec![0.0; columns.padded], vec![0.0; columns.padded]);
     let mut a = vec![0.0; k];
-    for i in 0..distance.len() {
-        read(document, from + i, &mut row)?;
-        if row == last {
-            data.copy_within((i - 1) * k..i * k, i * k);
-            distance[i] = distance[i - 1];
-            continue;
-        }
+    for ((&pixel, rounded), distance) in pixels.iter().zip(data.chunks_exact_mut(k)).zip(distance) {
+        read(document, pixel as usize, &mut row)?;
         columns.scale(&row, &mut x);
         columns.respond(&x, &mut t);
         coder.code(&x, &t, &mut a, &mut scratch);
-        let rounded = &mut data[i * k..][..k];
         quantise(&a, rounded);
         a.iter_mut().zip(rounded.iter()).for_each(|(a, &r)| *a = f64::from(r) / f64::from(ONE));
-        distance[i] = coder.evaluate(&t, &a, &mut scratch).sqrt() as f32;
-        std::mem::swap(&mut row, &mut last);
+        *distance = coder.evaluate(&t, &a, &mut scratch).sqrt() as f32;
     }
     Ok(())
 }

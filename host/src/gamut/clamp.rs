@@ -1,12 +1,12 @@
 //! Eq. 1 at every pixel.
 //!
 //! Problem: a million constrained fits of the perceptual metric, which the 2009 paper puts at hours or days.
-//! Method: along a serpentine through bands of 16 rows every pixel starts from its neighbour's mixture, which is
-//! nearly its own; three or four steps with eight stacks in the quadratic, all stacks priced, end with a gap below
-//! 1e-7 in squared distance. Weights below 0.5 % are pruned and the rest solved again. Bands go to the
-//! threads whole, so the result does not depend on how many there are.
-//! Cost: about 10 microseconds a pixel and core. Limits: a neighbour is a start like any other: where E is not
-//! convex the certificate is a statement about the valley it led to.
+//! Method: each distinct material, in reading order, starts from the one before, whose mixture is nearly its own;
+//! three or four steps with eight stacks in the quadratic, all stacks priced, end with a gap below 1e-7 in squared
+//! distance. Weights below 0.5 % are pruned and the rest solved again. Runs of fixed length go to the threads
+//! whole, so the result does not depend on how many there are.
+//! Cost: about 10 microseconds a distinct material and core. Limits: the one before is a start like any other:
+//! where E is not convex the certificate is a statement about the valley it led to.
 
 use rayon::prelude::*;
 
@@ -14,14 +14,14 @@ use super::GamutError;
 use super::basis::prune;
 use super::candidates::Candidates;
 use crate::brdf::{Space, Table};
-use crate::document::Materials;
+use crate::document::{Distinct, Materials};
 use crate::factor::Factored;
 use crate::observe::Observer;
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::{ONE, quantise};
 
-/// Rows that are walked as one.
-const BAND: usize = 16;
+/// Materials that are walked as one.
+const RUN: usize = 4096;
 /// A gap in squared distance that no eye could tell from none: at d = 0.01 it is 5e-6 in d.
 const ENOUGH: f64 = 1e-7;
 
@@ -69,45 +69,49 @@ pub(super) fn map(
     pixels: &dyn Materials,
     observer: &dyn Observer,
 ) -> Result<Clamped, GamutError> {
-    let (width, height, k) = (pixels.width(), pixels.height(), candidates.len());
-    let mut shares = vec![0u16; width * height * k];
-    let mut distance = vec![0f32; width * height];
-    let mut brightness = vec![0f32; width * height];
-    observer.begin("clamp", height as u64);
-    let band = BAND * width;
+    let (width, k) = (pixels.width(), candidates.len());
+    let distinct = Distinct::of(pixels);
+    let count = distinct.first().len();
+    let mut shares = vec![0u16; count * k];
+    let mut distance = vec![0f32; count];
+    let mut brightness = vec![0f32; count];
+    observer.begin("clamp", count as u64);
     let gaps: Vec<Result<f64, GamutError>> = shares
-        .par_chunks_mut(band * k)
-        .zip(distance.par_chunks_mut(band))
-        .zip(brightness.par_chunks_mut(band))
-        .enumerate()
-        .map(|(number, ((shares, distance), brightness))| {
-            let rows = distance.len() / width;
+        .par_chunks_mut(RUN * k)
+        .zip(distance.par_chunks_mut(RUN))
+        .zip(brightness.par_chunks_mut(RUN))
+        .zip(distinct.first().par_chunks(RUN))
+        .map(|(((shares, distance), brightness), first)| {
             let mut walker = Walker::new(candidates, pixels.space());
             let mut gap = 0.0f64;
-            for row in 0..rows {
-                for step in 0..width {
-                    let x = if row % 2 == 0 { step } else { width - 1 - step };
-                    let at = row * width + x;
-                    let pixel = number * band + at;
-                    let out = &mut shares[at * k..][..k];
-                    let met = walker.pixel(candidates, pixels, pixel, out).map_err(|source| {
-                        GamutError::Mixture { what: format!("pixel ({x}, {})", number * BAND + row), source }
+            for (i, &pixel) in first.iter().enumerate() {
+                let pixel = pixel as usize;
+                let met =
+                    walker.pixel(candidates, pixels, pixel, &mut shares[i * k..][..k]).map_err(|source| {
+                        GamutError::Mixture {
+                            what: format!("pixel ({}, {})", pixel % width, pixel / width),
+                            source,
+                        }
                     })?;
-                    gap = gap.max(met.gap);
-                    distance[at] = met.distance as f32;
-                    brightness[at] = met.brightness as f32;
-                }
+                gap = gap.max(met.gap);
+                distance[i] = met.distance as f32;
+                brightness[i] = met.brightness as f32;
             }
-            observer.advance(rows as u64);
+            observer.advance(first.len() as u64);
             Ok(gap)
         })
         .collect();
     observer.end();
     let mut gap = 0.0f64;
-    for band in gaps {
-        gap = gap.max(band?);
+    for run in gaps {
+        gap = gap.max(run?);
     }
-    Ok(Clamped { shares, distance, brightness, gap })
+    Ok(Clamped {
+        shares: distinct.spread(&shares, k),
+        distance: distinct.spread(&distance, 1),
+        brightness: distinct.spread(&brightness, 1),
+        gap,
+    })
 }
 
 /// What clamping prints (1/sr) for targets given as rows.
@@ -129,7 +133,7 @@ pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, Ga
 }
 
 /// One pixel's outcome.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Met {
     pub distance: f64,
     pub gap: f64,
@@ -141,11 +145,10 @@ pub(super) struct Walker {
     mixer: Mixer,
     target: Target,
     row: Vec<f32>,
-    last_row: Vec<f32>,
     /// The last pixel's mixture before pruning, and after it.
     start: Vec<f64>,
     weights: Vec<f64>,
-    met: Option<Met>,
+    started: bool,
     measure: f64,
 }
 
@@ -156,10 +159,9 @@ impl Walker {
             mixer: Mixer::new(),
             target: Target::default(),
             row: vec![0.0; space.columns()],
-            last_row: vec![0.0; space.columns()],
             start: vec![0.0; k],
             weights: vec![0.0; k],
-            met: None,
+            started: false,
             measure: space.weight().iter().map(|w| w * w).sum(),
         }
     }
@@ -173,15 +175,9 @@ impl Walker {
         out: &mut [u16],
     ) -> Result<Met, MixtureError> {
         pixels.reflectance(pixel, &mut self.row);
-        if let Some(met) = self.met
-            && self.row == self.last_row
-        {
-            quantise(&self.weights, out);
-            return Ok(met);
-        }
         let hull = &candidates.priced;
         hull.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
-        if self.met.is_none() {
+        if !self.started {
             self.mixer.tangent(hull, &self.target, &mut self.start)?;
         }
         let fit = self.mixer.refine_to(hull, &self.target, &mut self.start, ENOUGH)?;
@@ -193,9 +189,7 @@ impl Walker {
             prune(&mut self.weights);
         }
         quantise(&self.weights, out);
-        std::mem::swap(&mut self.row, &mut self.last_row);
-        let met = Met { distance, gap: fit.gap, brightness: self.target.brightness(hull) / self.measure };
-        self.met = Some(met);
-        Ok(met)
+        self.started = true;
+        Ok(Met { distance, gap: fit.gap, brightness: self.target.brightness(hull) / self.measure })
     }
 }

@@ -1,15 +1,10 @@
-//! The printer's status answer of 38 bytes, read.
-//!
-//! Source: answers recorded from the hardware. The second and third byte of a cassette entry are not the remaining ribbon
-//! and are not shown. Places are not slots, since the carousel turns: cassettes are known by their barcode. While the
-//! printer reports an error it does not renew the entries.
+//! The printer's own answer to how it is, in words and as figures for programs.
 
 use std::fmt;
 
 use protocol::ink::Ink;
+use protocol::status::{self, Complaint, Place};
 use serde::Serialize;
-
-use crate::simulate::STATUS_LENGTH;
 
 /// How the printer is, by its own answer.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -51,96 +46,70 @@ pub struct NoStatus(usize);
 impl Status {
     /// Reads an answer.
     pub fn read(bytes: &[u8]) -> Result<Status, NoStatus> {
-        let wrong = NoStatus(bytes.len());
-        let answer: &[u8; STATUS_LENGTH] = bytes.try_into().map_err(|_| wrong)?;
-        if answer[..4] != [0x02, 0x80, (STATUS_LENGTH - 5) as u8, 0] || answer[STATUS_LENGTH - 1] != 0x03 {
-            return Err(wrong);
-        }
-        let status = answer[4];
-        let error: [u8; 5] = std::array::from_fn(|i| answer[32 + i]);
-        let cassettes = answer[5..32]
-            .chunks_exact(3)
+        let answer = status::Status::parse(bytes).map_err(|status::NotAStatus| NoStatus(bytes.len()))?;
+        let cassettes = answer
+            .places()
+            .into_iter()
             .enumerate()
-            .filter(|(_, entry)| entry[0] >> 6 != 3)
-            .map(|(place, entry)| {
-                let barcode = entry[0] & 0x3f;
-                Cassette {
-                    barcode,
-                    ink: Ink::from_barcode(barcode).map(Ink::name),
-                    on_carriage: place == 8,
-                    condition: match entry[0] >> 6 {
-                        0 => "loaded",
-                        1 => "backwards",
-                        _ => "end of ribbon",
-                    },
-                }
+            .filter_map(|(place, content)| {
+                let (barcode, condition) = match content {
+                    Place::Empty => return None,
+                    Place::Loaded(barcode) => (barcode, "loaded"),
+                    Place::Backwards(barcode) => (barcode, "backwards"),
+                    Place::AtEnd(barcode) => (barcode, "end of ribbon"),
+                };
+                let ink = Ink::from_barcode(barcode).map(Ink::name);
+                Some(Cassette { barcode, ink, on_carriage: place == status::PLACES - 1, condition })
             })
             .collect();
         Ok(Status {
-            printing: status & 0x08 != 0,
-            holds_data: status & 0x01 != 0,
-            off_line: status & 0x80 != 0,
-            tray: status & 0x10 != 0,
-            stale: status & 0xc0 == 0xc0,
-            errors: errors(error),
+            printing: answer.printing(),
+            holds_data: answer.has_data(),
+            off_line: answer.off_line(),
+            tray: answer.automatic_feed(),
+            stale: answer.in_error(),
+            errors: answer.complaints().map(words).collect(),
             cassettes,
         })
     }
 }
 
-/// The error bytes in words.
-fn errors([e0, e1, e2, e3, e4]: [u8; 5]) -> Vec<String> {
-    let mut words = Vec::new();
-    let mut say = |is: bool, what: String| {
-        if is {
-            words.push(what);
+/// A complaint in the words of somebody who stands before the printer.
+fn words(complaint: Complaint) -> String {
+    let source = |manual: bool| if manual { "manual slot" } else { "tray" };
+    match complaint {
+        Complaint::Motor { units } => {
+            let parts = [
+                (0x80, "cassette changer"),
+                (0x40, "carriage"),
+                (0x20, "bail arm"),
+                (0x10, "line feed"),
+                (0x08, "feeder"),
+                (0x04, "anti-curl"),
+            ];
+            let named: Vec<&str> =
+                parts.iter().filter(|(bit, _)| units & bit != 0).map(|(_, name)| *name).collect();
+            format!("a motor has stopped ({}); that names what stopped, not why", named.join(", "))
         }
-    };
-    let units = [
-        (0x80, "cassette changer"),
-        (0x40, "carriage"),
-        (0x20, "bail arm"),
-        (0x10, "line feed"),
-        (0x08, "feeder"),
-        (0x04, "anti-curl"),
-    ];
-    let unit = units.iter().find(|(bit, _)| e4 & bit != 0).map_or("motor", |(_, name)| name);
-    say(
-        e0 & 0x80 != 0,
-        format!("it reports a fault of the {unit} motor; that names what stopped, not why"),
-    );
-    say(e0 & 0x40 != 0, "the cover is open; close it".into());
-    say(e0 & 0x01 != 0, "it reports a fault of its memory (EEPROM)".into());
-    let source = if e2 & 0x40 != 0 { "manual slot" } else { "tray" };
-    say(e1 & 0x80 != 0 && e2 & 0x80 != 0, format!("wrong paper size in the {source}; load the paper the job declares"));
-    say(e1 & 0x80 != 0 && e2 & 0x80 == 0, format!("no paper in the {source}; load a sheet"));
-    say(
-        e1 & 0x40 != 0,
-        format!(
-            "paper jam {}; take the sheet out",
-            match (e2 & 0x08 != 0, e2 & 0x04 != 0) {
-                (true, _) => "at the exit",
-                (false, true) => "at the manual slot",
-                (false, false) => "at the tray",
-            }
-        ),
-    );
-    say(e1 & 0x20 != 0, "a ribbon is at its end; put in a fresh cassette".into());
-    say(e1 & 0x02 != 0, "a ribbon is torn; take the cassette out and look".into());
-    let cassette = (e3 & 7) >> 1;
-    let barcode = e3 >> 3;
-    say(
-        e1 & 0x10 != 0 && cassette == 3,
-        match Ink::from_barcode(barcode) {
+        Complaint::CoverOpen => "the cover is open; close it".into(),
+        Complaint::Memory => "it reports a fault of its settings memory".into(),
+        Complaint::NoPaper { manual } => format!("no paper in the {}; load a sheet", source(manual)),
+        Complaint::WrongSize { manual } => {
+            format!("wrong paper size in the {}; load the paper the job declares", source(manual))
+        }
+        Complaint::Jam { at_exit: true } => "paper jam at the exit; take the sheet out".into(),
+        Complaint::Jam { at_exit: false } => "paper jam: the sheet was not fed; take it out".into(),
+        Complaint::RibbonEnd => "a ribbon is at its end; put in a fresh cassette".into(),
+        Complaint::RibbonBreak => "a ribbon is torn; take the cassette out and look".into(),
+        Complaint::PlaceOccupied => "a cassette holder is occupied; take a cassette out".into(),
+        Complaint::WrongCassette { wanted } => match Ink::from_barcode(wanted) {
             Some(ink) => {
-                format!("it wants the {} cassette ({}, barcode {barcode}); put it in", ink.name(), ink.part())
+                format!("it wants the {} cassette ({}, barcode {wanted}); put it in", ink.name(), ink.part())
             }
-            None => format!("it wants a cassette with barcode {barcode}"),
+            None => format!("it wants a cassette with barcode {wanted}"),
         },
-    );
-    say(e1 & 0x10 != 0 && cassette == 2, "a cassette holder is occupied; take a cassette out".into());
-    say(e1 & 0x10 != 0 && cassette < 2, "it reports a fault of a cassette".into());
-    words
+        Complaint::Cassette => "it reports a fault of a cassette".into(),
+    }
 }
 
 impl fmt::Display for Status {
@@ -179,43 +148,7 @@ mod tests {
     use super::*;
     use crate::simulate::{Carousel, Lever, Printer, Trouble};
 
-    fn bytes(hex: &str) -> Vec<u8> {
-        let digits: Vec<u8> = hex.bytes().filter(u8::is_ascii_hexdigit).collect();
-        digits
-            .chunks(2)
-            .map(|two| u8::from_str_radix(std::str::from_utf8(two).unwrap(), 16).unwrap())
-            .collect()
-    }
-
-    #[test]
-    fn answers_recorded_from_the_machine_are_understood() {
-        let idle = Status::read(&bytes(
-            "02802100 00 ff0000 030000 010000 000000 ff0000 020000 ff0000 ff0000 ff0000 0000000000 03",
-        ))
-        .unwrap();
-        assert!(!idle.printing && !idle.off_line && !idle.tray && idle.errors.is_empty());
-        let names: Vec<_> = idle.cassettes.iter().map(|c| c.ink.unwrap()).collect();
-        assert_eq!(names, ["cyan", "yellow", "black", "magenta"]);
-
-        let mismatch = Status::read(&bytes(
-            "02802100 c9 ff0000 033100 018d02 008d02 ff0000 023f00 ff0000 ff0000 ff0000 0010008600 03",
-        ))
-        .unwrap();
-        assert!(mismatch.printing && mismatch.off_line && mismatch.stale);
-        assert_eq!(mismatch.errors.len(), 1);
-        assert!(mismatch.errors[0].contains("white cassette (MDC-SCWH, barcode 16)"), "{:?}", mismatch.errors);
-    }
-
-    #[test]
-    fn error_bytes_seen_on_the_machine_have_their_words() {
-        let words = |e| errors(e).join(" | ");
-        assert!(words([0, 0x80, 0x80, 0, 0]).contains("wrong paper size in the tray"));
-        let both = words([0, 0xc0, 0x08, 0, 0]);
-        assert!(both.contains("no paper in the tray") && both.contains("jam at the exit"), "{both}");
-        assert!(words([0x80, 0, 0, 0, 0x80]).contains("cassette changer"));
-        assert_eq!(words([0; 5]), "");
-    }
-
+    /// The simulated printer makes its answers by other code, from the layout recorded from the hardware.
     #[test]
     fn the_simulated_printers_answers_say_what_it_is_told() {
         let mut printer = Printer::new(Carousel::new(&[Ink::White.into()]).unwrap(), Lever::Auto);

@@ -1,0 +1,288 @@
+//! The conversation with the host, and with a plain printer interface.
+
+use super::job::{Job, Marks, Phase};
+use super::{Engine, LEAST_MEMORY, LOCAL};
+use crate::engine::{Due, Identity, Task};
+use crate::track::Track;
+use protocol::link::frame::{self, MAX, Read, Reader};
+use protocol::link::message::{
+    Answer, Ask, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+};
+
+impl Engine<'_> {
+    /// The link was cut: answers that were due would meet another conversation. The job goes on. The link's reader
+    /// is to be [reset](Reader::reset) too.
+    pub fn link_lost(&mut self) {
+        self.frame_length = 0;
+        self.due = Due::default();
+    }
+
+    /// Bytes from a link, in any portions. Every link has its own reader; a board with two of them (a serial
+    /// port and bulk endpoints, say) may serve both, the answers going to the one that spoke last.
+    pub fn receive(&mut self, reader: &mut Reader, mut bytes: &[u8]) {
+        loop {
+            match reader.read(bytes) {
+                Read::More => return,
+                // Damage needs no answer: what was lost is sent again.
+                Read::Damaged(_, rest) => bytes = rest,
+                Read::Message(message, rest) => {
+                    bytes = rest;
+                    match frame::decode(message) {
+                        Ok(message) => self.follow(message),
+                        Err(frame::Unknown) => self.refuse(Refusal::Unknown, 0),
+                    }
+                }
+            }
+        }
+    }
+
+    pub(super) fn refuse(&mut self, reason: Refusal, job: u32) {
+        self.due.refused = Some((reason, job));
+    }
+
+    fn follow(&mut self, message: ToBridge<'_>) {
+        match message {
+            ToBridge::Hello { .. } => (self.due.hello, self.due.progress) = (true, true),
+            ToBridge::Begin { job, kind, length } => self.begin(job, kind, length),
+            ToBridge::Data { job, offset, bytes } => self.take(job, offset, bytes),
+            ToBridge::Cancel { job } => self.cancel(job),
+            ToBridge::Ask { request, what: Ask::Lines } => self.due.lines = Some(request),
+            ToBridge::Ask { request, what: Ask::Printer } => self.ask(request, Task::PrinterStatus),
+            ToBridge::Ask { request, what: Ask::DeviceId } => self.ask(request, Task::DeviceId),
+            ToBridge::Configure(settings) => {
+                // Harmless at any time, and wanted most when a job is stuck.
+                if !self.assign(Task::Configure(settings)) {
+                    self.refuse(Refusal::Settings, 0);
+                }
+            }
+            ToBridge::Initialise => {
+                // A job from before a reset whose data nobody has any more can only be given up.
+                if self.job.as_ref().is_some_and(|job| job.phase == Phase::Unknown) {
+                    self.end(JobState::Lost);
+                }
+                self.between_jobs(Task::Initialise);
+            }
+            ToBridge::Bootloader => self.between_jobs(Task::Bootloader),
+            ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),
+        }
+    }
+
+    fn begin(&mut self, id: u32, kind: JobKind, length: u32) {
+        if id == 0 || id == LOCAL || length == 0 {
+            return self.refuse(Refusal::Empty, id);
+        }
+        self.due.progress = true;
+        if let Some(job) = &mut self.job {
+            if job.id != id {
+                self.refuse(Refusal::JobOpen, id);
+            } else if job.phase == Phase::Unknown {
+                (job.kind, job.length, job.phase) = (kind, length, Phase::Running);
+            } else if (job.kind, job.length) != (kind, length) {
+                self.refuse(Refusal::OtherJob, id);
+            }
+            return;
+        }
+        if self.last.job == id {
+            if self.last_shape.is_some_and(|shape| shape != (kind, length)) {
+                self.refuse(Refusal::OtherJob, id);
+            }
+            return;
+        }
+        if self.older.contains(&id) {
+            return self.refuse(Refusal::OtherJob, id);
+        }
+        if !self.open(id, kind, length) {
+            self.refuse(Refusal::Empty, id);
+        }
+    }
+
+    /// Opens a job, if there is memory to speak of.
+    fn open(&mut self, id: u32, kind: JobKind, length: u32) -> bool {
+        if self.data.capacity() < LEAST_MEMORY || self.output.capacity() < LEAST_MEMORY {
+            return false;
+        }
+        if self.last.job != 0 && self.last.job != LOCAL {
+            self.older.rotate_right(1);
+            self.older[0] = self.last.job;
+        }
+        self.job = Some(Job {
+            id,
+            kind,
+            length,
+            accepted: 0,
+            used: 0,
+            made: 0,
+            printed: 0,
+            phase: Phase::Running,
+            cancelled: false,
+            ends_at: None,
+            settled: 0,
+            closed: 0,
+            pass: 0,
+            row: 0,
+        });
+        self.clear();
+        true
+    }
+
+    /// Bytes from an interface that knows nothing of jobs: the printer class, for whatever an operating system
+    /// sends. Gives the number of bytes taken; the rest is to be offered again, which on USB is a NAK. Nothing is
+    /// taken while a job of the link is open or the end of the last one has not crossed the port.
+    ///
+    /// A job ends with the reset behind its rows, and otherwise with [`Engine::local_end`].
+    pub fn local(&mut self, bytes: &[u8]) -> usize {
+        if bytes.is_empty() || self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX) {
+            return 0;
+        }
+        let Some(job) = &mut self.job else { return 0 };
+        if job.id != LOCAL || job.phase != Phase::Running || job.length != u32::MAX {
+            return 0;
+        }
+        // A job of 4 GB is over when it is that long.
+        let room = self.data.free().min((u32::MAX - 1 - job.accepted) as usize);
+        let mut taken = &bytes[..bytes.len().min(room)];
+        let settled = self.ahead.follow(taken);
+        if let Some(over) = self.ahead.over() {
+            // The track has looked beyond the end, but that is where it is thrown away.
+            taken = &taken[..over];
+            job.length = job.accepted + over as u32;
+        }
+        self.data.push(taken);
+        let before = job.accepted;
+        job.accepted += taken.len() as u32;
+        if let Some(count) = settled {
+            job.settled = (before + count as u32).min(job.accepted);
+        }
+        taken.len()
+    }
+
+    /// No more bytes of a job come through [`Engine::local`]: the interface was reset, or has been silent for
+    /// longer than anything that prints is.
+    pub fn local_end(&mut self) {
+        if let Some(job) = self.job.as_mut().filter(|job| job.id == LOCAL && job.phase == Phase::Running) {
+            job.length = job.accepted;
+        }
+    }
+
+    /// Empties everything that belongs to a job.
+    pub(super) fn clear(&mut self) {
+        self.data.clear();
+        self.output.clear();
+        self.streams.restart();
+        (self.ahead, self.sent) = (Track::new(), Track::new());
+        self.marks = Marks::new();
+    }
+
+    fn take(&mut self, id: u32, offset: u32, bytes: &[u8]) {
+        let Some(job) = self.job.as_mut().filter(|job| job.id == id) else {
+            if self.last.job == id {
+                // It has ended; the host has not heard of it.
+                self.due.progress = true;
+            } else {
+                self.refuse(Refusal::NoSuchJob, id);
+            }
+            return;
+        };
+        let end = u64::from(offset) + bytes.len() as u64;
+        if job.phase != Phase::Running || offset > job.accepted || end <= u64::from(job.accepted) {
+            self.due.progress = true;
+            return;
+        }
+        // Below the accepted position, and so below `bytes.len()`.
+        let fresh = &bytes[(job.accepted - offset) as usize..];
+        if end > u64::from(job.length) || fresh.len() > self.data.free() {
+            self.due.progress = true;
+            return self.refuse(Refusal::BeyondLimit, id);
+        }
+        self.data.push(fresh);
+        job.accepted += fresh.len() as u32;
+        if job.kind == JobKind::Raw
+            && let Some(count) = self.ahead.follow(fresh)
+        {
+            job.settled = job.accepted - (fresh.len() - count) as u32;
+        }
+        if job.accepted == job.length || end > u64::from(job.accepted) {
+            self.due.progress = true;
+        }
+    }
+
+    fn cancel(&mut self, id: u32) {
+        self.due.progress = true;
+        match &mut self.job {
+            Some(job) if job.id == id => {
+                if !matches!(job.phase, Phase::Ending(_)) {
+                    // After a reset the data are needed even for this: only they tell what the printer waits for.
+                    job.cancelled = true;
+                }
+            }
+            _ if self.last.job == id => {}
+            _ => self.refuse(Refusal::NoSuchJob, id),
+        }
+    }
+
+    fn ask(&mut self, request: u16, task: Task) {
+        if self.job.is_some() || !self.assign(task) {
+            self.due.not_now = Some(request);
+        } else {
+            self.request = request;
+        }
+    }
+
+    fn between_jobs(&mut self, task: Task) {
+        if self.job.is_some() || !self.assign(task) {
+            self.refuse(Refusal::JobOpen, self.job.as_ref().map_or(0, |job| job.id));
+        }
+    }
+
+    pub(super) fn assign(&mut self, task: Task) -> bool {
+        if self.task.is_some() {
+            return false;
+        }
+        (self.task, self.task_given) = (Some(task), false);
+        true
+    }
+
+    /// The next frame for the link, or 0 if there is nothing to say.
+    pub fn transmit(&mut self, out: &mut [u8; MAX]) -> usize {
+        let wrote = |message: ToHost<'_>, out: &mut [u8; MAX]| frame::write(&message, out).unwrap_or(0);
+        if core::mem::take(&mut self.due.hello) {
+            let Identity { boot, serial, firmware } = self.identity;
+            return wrote(ToHost::Hello { version: VERSION, schema: SCHEMA, boot, serial, firmware }, out);
+        }
+        if let Some((reason, job)) = self.due.refused.take() {
+            return wrote(ToHost::Refused { reason, job }, out);
+        }
+        let now = self.progress();
+        if self.due.progress || self.worth_telling(&now) {
+            self.due.progress = false;
+            self.told = now;
+            return wrote(ToHost::Progress(now), out);
+        }
+        if let Some(request) = self.due.lines.take() {
+            return wrote(ToHost::Lines { request, lines: self.lines, fault: self.fault }, out);
+        }
+        if let Some(request) = self.due.not_now.take() {
+            return wrote(ToHost::Answer { request, answer: Answer::NotNow }, out);
+        }
+        let length = core::mem::take(&mut self.frame_length);
+        out[..length].copy_from_slice(&self.frame[..length]);
+        length
+    }
+
+    fn worth_telling(&self, now: &Progress) -> bool {
+        let eighth = (self.data.capacity() / 8).max(1) as u32;
+        now.job != self.told.job
+            || now.state != self.told.state
+            || now.limit.wrapping_sub(self.told.limit) >= eighth && now.limit != self.told.limit
+            || now.accepted.wrapping_sub(self.told.accepted) >= eighth
+            || now.printed.wrapping_sub(self.told.printed) >= 4096
+    }
+
+    /// A piece of the firmware's log for the host; false if the last one has not gone yet.
+    pub fn log(&mut self, bytes: &[u8]) -> bool {
+        self.frame_length == 0 && {
+            self.frame_length = frame::write(&ToHost::Log(bytes), &mut self.frame).unwrap_or(0);
+            true
+        }
+    }
+}
