@@ -5,13 +5,17 @@
 //! closed pipe is success.
 
 mod args;
+mod bridge;
 mod chain;
+mod doctor;
 mod inks;
 mod inspect;
 mod output;
 mod print;
 mod progress;
+mod resume;
 mod sample;
+mod send;
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -35,7 +39,8 @@ const LARGEST_JOB: u64 = 256 << 20;
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
         foilpress inks show MS+C\n  \
-        foilpress inspect job.rgl --passes passes/\n\n\
+        foilpress inspect job.rgl --passes passes/\n  \
+        foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
         The chain, step by step: factor, map, halftone, separate, encode, simulate.\n\
         Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 )]
@@ -65,6 +70,16 @@ enum Command {
     Simulate(chain::Simulate),
     /// Tell what is in a job, with byte offsets where something is wrong
     Inspect(inspect::Args),
+    /// Send a job to a printer, through a bridge or as it is
+    Send(send::Args),
+    /// Go on with a job that was interrupted
+    Resume(resume::Resume),
+    /// End a job early, leaving the printer ready for the next one
+    Cancel(resume::Cancel),
+    /// The bridges there are, and how one of them and its printer are
+    Bridge(bridge::Args),
+    /// Find out what stands in the way of printing
+    Doctor(doctor::Args),
     /// The ink library: list, show, check
     Inks(inks::Args),
     /// Documents made by the program itself: list them or write one as a texture folder
@@ -95,6 +110,11 @@ fn run(args: Args) -> Result<()> {
         Command::Encode(args) => args.run(observer),
         Command::Simulate(args) => args.run(observer),
         Command::Inspect(args) => inspect::run(&args, observer),
+        Command::Send(args) => send::run(&args, observer),
+        Command::Resume(args) => resume::resume(&args, observer),
+        Command::Cancel(args) => resume::cancel(&args, observer),
+        Command::Bridge(args) => bridge::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
         Command::Sample(args) => sample::run(args),
     }

@@ -13,6 +13,14 @@ use tempfile::TempDir;
 
 static STAGED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// What the user is told when the program is interrupted.
+static FAREWELL: Mutex<String> = Mutex::new(String::new());
+
+/// From now on an interruption is not without consequences: says which.
+pub fn say_on_interrupt(text: &str) {
+    text.clone_into(&mut FAREWELL.lock().unwrap_or_else(PoisonError::into_inner));
+}
+
 /// What a folder of ours holds: only such a folder, or an empty one, is ever replaced.
 const MARKERS: [&str; 5] = ["report.json", "document.toml", "mix.toml", "sheet.toml", "passes.toml"];
 
@@ -106,7 +114,9 @@ pub fn remove_on_interrupt() -> Result<()> {
                 }
             }
         }
-        eprintln!("\ninterrupted; nothing was written");
+        let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = if farewell.is_empty() { "\ninterrupted; nothing was written" } else { &farewell };
+        eprintln!("{text}");
         std::process::exit(130);
     })
     .context("cannot watch for Ctrl-C")

@@ -11,11 +11,13 @@ use serde_json::json;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
 use super::output::Staged;
+use super::send::deliver;
 use crate::document::Document;
 use crate::job::plan::Plan;
 use crate::observe::Observer;
 use crate::pipeline::{self, Print};
 use crate::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
+use crate::send::Destination;
 use crate::separate;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
@@ -48,22 +50,15 @@ pub struct Args {
     /// Light probe (.hdr) for the balls in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// Also write the job there: file:PATH
-    #[arg(long, value_name = "WHERE", value_parser = destination)]
-    to: Option<PathBuf>,
+    /// Also send the job there: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Destination>,
     /// Folder to write [default: NAME.print in the current folder]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Print the report instead of the plan in words
     #[arg(long)]
     json: bool,
-}
-
-fn destination(text: &str) -> Result<PathBuf, String> {
-    match text.strip_prefix("file:") {
-        Some(path) if !path.is_empty() => Ok(path.into()),
-        _ => Err("write file:PATH, such as file:job.rgl".into()),
-    }
 }
 
 /// Runs `print`.
@@ -77,7 +72,10 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let document = args.document.open(observer)?;
     let target = args.output.clone().unwrap_or_else(|| format!("{}.print", document.name).into());
     let staged = Staged::new(&target)?;
-    let also = args.to.as_deref().map(Staged::new).transpose()?;
+    let also = match &args.to {
+        Some(Destination::File(path)) => Some(Staged::new(path)?),
+        _ => None,
+    };
 
     let settings = pipeline::Settings {
         factor: args.factor.settings(),
@@ -124,7 +122,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             target.join("sheet.png").display()
         )?;
     }
-    Ok(())
+    drop(out);
+    match &args.to {
+        Some(to @ (Destination::Raw(_) | Destination::Bridge(_))) => {
+            deliver(&document.name, &print.job, to, observer)
+        }
+        _ => Ok(()),
+    }
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {

@@ -4,6 +4,9 @@
 #[path = "../../../bridge/tests/model/mod.rs"]
 mod model;
 
+mod paper;
+#[cfg(unix)]
+mod process;
 mod wire;
 
 use foilpress::send::session::{Outcome, Record, Session, SessionError};
