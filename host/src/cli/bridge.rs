@@ -101,7 +101,13 @@ fn list() -> Result<()> {
         match port.candidate.then(|| greet(&port.address)) {
             None => writeln!(out, ": another device, not asked")?,
             Some(Ok((bridge, progress))) => {
-                writeln!(out, ": bridge {:016x}, firmware {}, {}", bridge.serial, bridge.firmware, doing(&progress))?;
+                writeln!(
+                    out,
+                    ": bridge {:016x}, firmware {}, {}",
+                    bridge.serial,
+                    bridge.firmware,
+                    doing(&progress)
+                )?;
             }
             Some(Err(error)) => writeln!(out, ": {error:#}")?,
         }

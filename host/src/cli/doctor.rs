@@ -69,7 +69,8 @@ pub fn run(args: &Args) -> Result<()> {
             Err(error) => {
                 troubles += 1;
                 writeln!(out, "{error:#}")?;
-                if matches!(error.downcast_ref(), Some(OpenError::Forbidden(_))) && cfg!(target_os = "linux") {
+                if matches!(error.downcast_ref(), Some(OpenError::Forbidden(_))) && cfg!(target_os = "linux")
+                {
                     writeln!(out, "allow it once, as root, and plug the bridge in again:\n\n{UDEV_RULE}\n")?;
                 }
             }

@@ -46,7 +46,8 @@ pub struct Cancel {
 }
 
 fn number(text: &str) -> Result<u32, String> {
-    u32::from_str_radix(text, 16).map_err(|_| "a job's number has eight digits 0-9 and a-f, as `resume --list` shows".into())
+    u32::from_str_radix(text, 16)
+        .map_err(|_| "a job's number has eight digits 0-9 and a-f, as `resume --list` shows".into())
 }
 
 /// Runs `resume`.
@@ -85,8 +86,11 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
     if let Some(number) = asked {
         return Ok(number);
     }
-    let open: Vec<Entry> =
-        journal.entries()?.into_iter().filter(|entry| !matches!(entry.record.phase, Phase::Ended(_))).collect();
+    let open: Vec<Entry> = journal
+        .entries()?
+        .into_iter()
+        .filter(|entry| !matches!(entry.record.phase, Phase::Ended(_)))
+        .collect();
     match &open[..] {
         [] => bail!("no job waits; every one that was sent is over (`foilpress resume --list`)"),
         [one] => Ok(one.record.job),

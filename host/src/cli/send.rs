@@ -58,7 +58,10 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer
                 passes: checked.passes,
             })?;
             observer.note(&load(&checked.inks));
-            observer.note(&format!("{name} is queued as job {:08x}; nothing is printed yet", queued.entry.record.job));
+            observer.note(&format!(
+                "{name} is queued as job {:08x}; nothing is printed yet",
+                queued.entry.record.job
+            ));
             go(queued, address, false, observer)
         }
     }
@@ -100,15 +103,17 @@ pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Obse
     let mut reporter = Reporter::new(&job, observer);
     let outcome = match session.outcome() {
         Some(outcome) => outcome,
-        None => send::run(
-            &mut session,
-            &mut || address.open(),
-            &mut |record| job.save(record),
-            &mut |event| reporter.tell(&event),
-        )
-        .with_context(|| {
-            format!("job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it", job.entry.name)
-        })?,
+        None => {
+            send::run(&mut session, &mut || address.open(), &mut |record| job.save(record), &mut |event| {
+                reporter.tell(&event)
+            })
+            .with_context(|| {
+                format!(
+                    "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
+                    job.entry.name
+                )
+            })?
+        }
     };
     observer.end();
     let text = words::outcome(outcome, &job.entry, session.progress());
@@ -152,10 +157,8 @@ impl<'o> Reporter<'o> {
                 if self.away {
                     self.observer.note("the bridge is back; going on where the printer is");
                 } else {
-                    self.observer.note(&format!(
-                        "bridge {:016x}, firmware {}",
-                        bridge.serial, bridge.firmware
-                    ));
+                    self.observer
+                        .note(&format!("bridge {:016x}, firmware {}", bridge.serial, bridge.firmware));
                 }
                 self.away = false;
             }

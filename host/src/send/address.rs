@@ -49,7 +49,9 @@ impl FromStr for Destination {
             Some(("raw", path)) => Ok(Destination::Raw(path.into())),
             Some(("serial", path)) => Ok(Destination::Bridge(Address::Serial(path.into()))),
             Some(("unix", path)) => Ok(Destination::Bridge(Address::Unix(path.into()))),
-            Some(("tcp", place)) if place.contains(':') => Ok(Destination::Bridge(Address::Tcp(place.into()))),
+            Some(("tcp", place)) if place.contains(':') => {
+                Ok(Destination::Bridge(Address::Tcp(place.into())))
+            }
             // The kernel's printer device needs no prefix: it can be nothing else.
             _ if text.starts_with("/dev/usb/lp") => Ok(Destination::Raw(text.into())),
             Some(_) => Err(NoDestination(text.into())),
@@ -156,7 +158,9 @@ mod tests {
 
     #[test]
     fn what_is_no_destination_is_answered_with_examples() {
-        for text in ["", "job.rgl", "file:", "tcp:localhost", "usb:", "parallel:/dev/parport0", "/dev/ttyACM0"] {
+        for text in
+            ["", "job.rgl", "file:", "tcp:localhost", "usb:", "parallel:/dev/parport0", "/dev/ttyACM0"]
+        {
             let error = text.parse::<Destination>().unwrap_err();
             assert!(error.to_string().contains("serial:/dev/ttyACM0"), "{text}");
         }

@@ -224,11 +224,8 @@ impl Journal {
 
     /// All jobs that can be read, oldest first. Folders that are none of ours are passed over.
     pub fn entries(&self) -> Result<Vec<Entry>, JournalError> {
-        let mut entries: Vec<Entry> = self
-            .folders()?
-            .iter()
-            .filter_map(|folder| read_entry(folder).ok())
-            .collect();
+        let mut entries: Vec<Entry> =
+            self.folders()?.iter().filter_map(|folder| read_entry(folder).ok()).collect();
         entries.sort_by_key(|entry| (entry.queued, entry.record.job));
         Ok(entries)
     }

@@ -381,10 +381,7 @@ impl<'d> Session<'d> {
 
     /// The bridge tells of another job.
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
-        let open = matches!(
-            progress.state,
-            JobState::Printing | JobState::Stopped(_) | JobState::Cancelling
-        );
+        let open = matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling);
         match self.record.phase {
             Phase::Queued | Phase::Begun if open => {
                 if self.convinced(now) {
@@ -483,11 +480,7 @@ impl<'d> Session<'d> {
     }
 
     /// Greets; opens the job where that is safe; asks for its end where that is wanted.
-    fn ask<E>(
-        &mut self,
-        out: &mut Vec<u8>,
-        save: &mut dyn FnMut(&Record) -> Result<(), E>,
-    ) -> Result<(), E> {
+    fn ask<E>(&mut self, out: &mut Vec<u8>, save: &mut dyn FnMut(&Record) -> Result<(), E>) -> Result<(), E> {
         let Record { job, kind, length, .. } = self.record;
         // A zero ends whatever stands in the bridge's reader.
         out.push(0);

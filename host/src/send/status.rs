@@ -40,7 +40,9 @@ pub struct Cassette {
 
 /// Bytes that are no status answer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("the printer answered {0} bytes that are not its status answer; switch it off and on if that stays so")]
+#[error(
+    "the printer answered {0} bytes that are not its status answer; switch it off and on if that stays so"
+)]
 pub struct NoStatus(usize);
 
 impl Status {
@@ -160,7 +162,11 @@ mod tests {
         ] {
             printer.strike(trouble);
             let status = Status::read(&printer.status()).unwrap();
-            assert!(status.errors.iter().any(|error| error.contains(word)), "{trouble:?}: {:?}", status.errors);
+            assert!(
+                status.errors.iter().any(|error| error.contains(word)),
+                "{trouble:?}: {:?}",
+                status.errors
+            );
         }
     }
 

@@ -20,12 +20,16 @@ pub fn fault(fault: Fault, ink: Option<Ink>) -> String {
             cassette(ink)
         ),
         (Fault::OffLine, None) => {
-            "the printer is off line: close its cover and press its ready button; the job goes on by itself".into()
+            "the printer is off line: close its cover and press its ready button; the job goes on by itself"
+                .into()
         }
         (Fault::Error, None) => {
-            "the printer reports an error: look at its lamps, cover and paper; the job goes on by itself".into()
+            "the printer reports an error: look at its lamps, cover and paper; the job goes on by itself"
+                .into()
         }
-        (Fault::PowerOff, _) => "the printer is switched off or its cable is loose (+5 V absent): switch it on".into(),
+        (Fault::PowerOff, _) => {
+            "the printer is switched off or its cable is loose (+5 V absent): switch it on".into()
+        }
         (Fault::BusyTooLong, Some(ink)) => format!(
             "the printer has been busy for very long without an error: if it does not move, it may want the {}; \
              nothing is lost by waiting",
@@ -58,14 +62,20 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             format!("{}: cancelled; the printer had not taken a byte of it", entry.name)
         }
         Outcome::Cancelled => {
-            format!("{}: cancelled; the sheet comes out unfinished and the printer is ready for the next job", entry.name)
+            format!(
+                "{}: cancelled; the sheet comes out unfinished and the printer is ready for the next job",
+                entry.name
+            )
         }
         Outcome::Broken => {
             let why = match progress.map(|progress| progress.state) {
                 Some(JobState::Broken(what)) => format!(" ({})", defect(what)),
                 _ => String::new(),
             };
-            format!("{}: the bridge could not read the job{why}; the printer is ready for the next one", entry.name)
+            format!(
+                "{}: the bridge could not read the job{why}; the printer is ready for the next one",
+                entry.name
+            )
         }
         Outcome::Lost => format!(
             "{}: the sheet is lost after {printed} bytes: printer or bridge lost power in the middle. \

@@ -184,7 +184,8 @@ fn rubbish_on_the_link_is_neither_believed_nor_fatal() {
         let mut session = Session::new(Record::new(4, JobKind::Raw, 3), b"abc");
         session.connected(Duration::ZERO);
         for i in 0..200 {
-            let rubbish: Vec<u8> = (0..random.random_range(0..300)).map(|_| random.random_range(0..=255)).collect();
+            let rubbish: Vec<u8> =
+                (0..random.random_range(0..300)).map(|_| random.random_range(0..=255)).collect();
             session.hear(Duration::from_millis(i * 10), &rubbish).unwrap();
         }
         assert!(!session.greeted() && session.outcome().is_none());

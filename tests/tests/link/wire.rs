@@ -54,7 +54,8 @@ impl Accidents {
     }
 
     pub fn add(&mut self, other: &Accidents) {
-        let Accidents { cuts, kills, resets, drops, duplicates, swaps, flips, delays, stalls, faults } = *other;
+        let Accidents { cuts, kills, resets, drops, duplicates, swaps, flips, delays, stalls, faults } =
+            *other;
         let others = [cuts, kills, resets, drops, duplicates, swaps, flips, delays, stalls, faults];
         self.counts().into_iter().zip(others).for_each(|(sum, count)| *sum += count);
     }
@@ -238,7 +239,9 @@ impl<'j> World<'j> {
             }
         }
         self.bridge(random);
-        if self.boards.len() > 0 && (chance(self.mischief.reset, random) || chance(self.extra.amnesia, random)) {
+        if self.boards.len() > 0
+            && (chance(self.mischief.reset, random) || chance(self.extra.amnesia, random))
+        {
             self.accidents.resets += 1;
             if chance(self.extra.amnesia * 20, random) {
                 self.checkpoint = None;
