@@ -44,6 +44,8 @@ impl FromStr for Destination {
 
     fn from_str(text: &str) -> Result<Destination, NoDestination> {
         match text.split_once(':') {
+            // The kernel's printer device needs no prefix: it can be nothing else.
+            _ if text.starts_with("/dev/usb/lp") => Ok(Destination::Raw(text.into())),
             Some((_, "")) | None => Err(NoDestination(text.into())),
             Some(("file", path)) => Ok(Destination::File(path.into())),
             Some(("raw", path)) => Ok(Destination::Raw(path.into())),
@@ -52,8 +54,6 @@ impl FromStr for Destination {
             Some(("tcp", place)) if place.contains(':') => {
                 Ok(Destination::Bridge(Address::Tcp(place.into())))
             }
-            // The kernel's printer device needs no prefix: it can be nothing else.
-            _ if text.starts_with("/dev/usb/lp") => Ok(Destination::Raw(text.into())),
             Some(_) => Err(NoDestination(text.into())),
         }
     }

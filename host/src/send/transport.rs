@@ -232,10 +232,10 @@ mod tests {
         use serialport::SerialPort as _;
         let (a, b) = serialport::TTYPort::pair().unwrap();
         let name = b.name().unwrap();
-        // Opened by its name, as a user would: not while somebody else has it.
-        assert!(Serial::open(&name).is_err());
         drop(b);
+        // Opened by its name, as a user would; not while somebody else has it.
         let mut b = Serial::open(&name).unwrap();
+        assert!(Serial::open(&name).is_err());
         let mut a = Serial(Box::new(a));
         let bytes: Vec<u8> = (0..=255).collect();
         assert_eq!(a.send(&bytes).unwrap(), 256);
