@@ -10,7 +10,7 @@ use foilpress::halftone::{Placement, Settings, halftone};
 use foilpress::observe::Silent;
 use foilpress::separate::{compose, separate};
 use foilpress::weights::{ONE, WeightMaps, quantise};
-use inks::Stack;
+use inks::{Library, Stack};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
@@ -84,16 +84,17 @@ fn leaf() -> (InkMix, foilpress::sheet::Sheet) {
 /// A full A4 page in five passes, planes and checks on cluster sizes included.
 #[divan::bench(sample_count = 5)]
 fn five_passes(bencher: Bencher) {
-    let (_, sheet) = leaf();
-    assert_eq!(separate(&sheet, &Silent).expect("five inks").passes.len(), 5);
-    bencher.bench(|| separate(&sheet, &Silent).expect("five inks"));
+    let ((_, sheet), library) = (leaf(), Library::builtin());
+    let separate = || separate(&sheet, library.rules(), &Silent).expect("five inks");
+    assert_eq!(separate().passes.len(), 5);
+    bencher.bench(separate);
 }
 
 /// The same back to a sheet.
 #[divan::bench(sample_count = 5)]
 fn five_passes_back(bencher: Bencher) {
     let (_, sheet) = leaf();
-    let separation = separate(&sheet, &Silent).expect("five inks");
+    let separation = separate(&sheet, &[], &Silent).expect("five inks");
     bencher.bench(|| compose(sheet.paper(), &separation.passes, sheet.stacks()).expect("the same sheet"));
 }
 

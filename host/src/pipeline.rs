@@ -78,7 +78,7 @@ pub enum PrintError {
     /// Writing the job.
     #[error(transparent)]
     Stream(#[from] StreamError),
-    /// The machine's rules forbid the job.
+    /// The rules on stacks and pages forbid the job.
     #[error("this must not be printed: {0}")]
     Refused(String),
     /// The simulated printer.
@@ -114,9 +114,9 @@ pub fn print(
     let printable = Printable::from_library(library, &settings.inks, &factored.space);
     let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
     let sheet = halftone_mix(&mapped.mix, library, &placement, observer)?;
-    let separation = separate::separate(&sheet, observer)?;
-    if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Refuse) {
-        return Err(PrintError::Refused(check.text.clone()));
+    let separation = separate::separate(&sheet, library.rules(), observer)?;
+    if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
+        return Err(PrintError::Refused(check.with_stacks()));
     }
     let job = job_of(&separation.passes, settings.paper, settings.media, &settings.inks, observer)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)?;

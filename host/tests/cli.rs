@@ -1,85 +1,12 @@
 //! The program as its users meet it: arguments in, files and exit codes out.
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
+mod common;
 
-/// A fresh folder to run the program in.
-struct Bench {
-    folder: TempDir,
-}
-
-impl Bench {
-    fn new() -> Bench {
-        Bench { folder: tempfile::tempdir().expect("a temporary folder") }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn command(&self, args: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_foilpress"));
-        command.args(args.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
-        command
-    }
-
-    fn run(&self, args: &str) -> Output {
-        self.command(args).output().expect("the program starts")
-    }
-
-    /// Runs and returns standard output; fails the test unless the exit code is 0.
-    fn done(&self, args: &str) -> String {
-        let output = self.run(args);
-        assert_eq!(output.status.code(), Some(0), "{args}: {}", text(&output.stderr));
-        text(&output.stdout)
-    }
-
-    /// Runs what must fail with this exit code; returns what was said.
-    fn refused(&self, code: i32, args: &str) -> String {
-        let output = self.run(args);
-        let said = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{args}: {said}");
-        assert!(!said.contains("panicked"), "{args}: {said}");
-        said
-    }
-
-    /// Everything in the folder, hidden entries too.
-    fn entries(&self) -> Vec<String> {
-        entries(self.folder.path())
-    }
-}
-
-fn entries(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .expect("a folder")
-        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// A small PBR folder: a glossy red half beside a bare metal half.
-fn small_document(folder: &Path) {
-    fs::create_dir_all(folder).expect("a folder");
-    let half = |left: [u8; 3], right: [u8; 3]| {
-        image::RgbImage::from_fn(24, 16, |x, _| image::Rgb(if x < 12 { left } else { right }))
-    };
-    for (name, picture) in [
-        ("base_color.png", half([180, 30, 25], [200, 200, 205])),
-        ("roughness.png", half([90; 3], [130; 3])),
-        ("metallic.png", half([0; 3], [255; 3])),
-    ] {
-        picture.save(folder.join(name)).expect("a picture");
-    }
-}
+use common::{Bench, entries, small_document};
 
 #[test]
 fn a_folder_becomes_a_print_with_everything_in_it() {
@@ -116,6 +43,27 @@ fn every_arrow_by_itself_gives_the_job_of_print() {
     let summary = bench.done("inspect steps.rgl --json --passes seen");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["passes"].as_array().map(Vec::len), Some(entries(&bench.path("seen")).len()));
+}
+
+#[test]
+fn an_owners_rule_keeps_a_stack_from_being_printed() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    fs::create_dir(bench.path("mine")).unwrap();
+    let rule = "format = 1\nbased_on = \"built-in\"\n[[rule]]\nname = \"bare\"\nsays = \"finish peels\"\n\
+                severity = \"error\"\ncertainty = \"measured\"\nover = \"finish\"\nunder = \"all\"\n";
+    fs::write(bench.path("mine/library.toml"), rule).unwrap();
+    bench.done("factor tile -o tile.foil");
+    bench.done("map tile.foil --inks process,finish -o tile.mix");
+    bench.done("halftone tile.mix --size 12x8mm --paper postcard -o tile.sheet");
+    bench.done("separate tile.sheet -o tile.passes");
+    let said = bench.refused(1, "separate tile.sheet --library mine -o other.passes");
+    assert!(said.contains("must not be printed: finish peels; it is about") && said.contains("+F"), "{said}");
+    assert!(!bench.entries().contains(&"other.passes".to_string()));
+    // With the rule known from the start, no such stack is chosen.
+    bench.done("map tile.foil --inks process,finish --library mine -o kept.mix");
+    bench.done("halftone kept.mix --size 12x8mm --paper postcard -o kept.sheet");
+    bench.done("separate kept.sheet --library mine -o kept.passes");
 }
 
 #[test]

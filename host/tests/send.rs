@@ -73,7 +73,10 @@ fn a_file_and_a_raw_device_get_the_job_byte_for_byte() {
     fs::write(bench.folder.path().join("port"), "").unwrap();
     let said = bench.says(0, "send job.rgl --to raw:port");
     assert!(said.contains("white (MDC-SCWH)"), "the cassette is named: {said}");
-    assert!(said.contains("whether they are printed only the printer shows"), "queued is not printed: {said}");
+    assert!(
+        said.contains("whether they are printed only the printer shows"),
+        "queued is not printed: {said}"
+    );
     for name in ["copy.rgl", "port"] {
         assert!(fs::read(bench.folder.path().join(name)).unwrap() == bench.job, "{name}");
     }

@@ -32,7 +32,7 @@ pub(crate) struct File {
     #[serde(default)]
     pub ink: Vec<Spanned<InkTable>>,
     #[serde(default)]
-    pub rule: Vec<Rule>,
+    pub rule: Vec<Spanned<Rule>>,
     #[serde(default)]
     pub measured: Vec<Spanned<MeasuredTable>>,
 }

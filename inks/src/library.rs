@@ -138,9 +138,13 @@ impl Library {
         self.entries.iter().find(|entry| entry.stack == *stack)
     }
 
-    /// The stacks that need no ink but these, in the library's order; the substrate is always among them.
+    /// The stacks that need no ink but these and break no rule of severity [`Severity::Error`], in the library's order;
+    /// the substrate is always among them.
     pub fn at_hand(&self, inks: &InkSet) -> Vec<&Entry> {
-        self.entries.iter().filter(|entry| inks.contains_all(entry.stack.layers())).collect()
+        let forbidden =
+            |stack: &Stack| self.broken_rules(stack).iter().any(|rule| rule.severity == Severity::Error);
+        let usable = |entry: &&Entry| inks.contains_all(entry.stack.layers()) && !forbidden(&entry.stack);
+        self.entries.iter().filter(usable).collect()
     }
 
     /// The cartridges, in the order of the ink codes.

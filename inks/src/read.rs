@@ -127,7 +127,7 @@ fn build(
         ink(table.into_inner(), offset, &mut seen, &mut cartridges, &mut layers, findings);
     }
     cartridges.sort_by_key(|cartridge| cartridge.ink);
-    rules.extend(file.rule);
+    merge_rules(file.rule, &mut rules, findings);
     let mut wanted = match (file.stacks, stacks) {
         (Some(texts), _) => listed_stacks(&texts, findings),
         (None, Some(stacks)) => {
@@ -287,6 +287,22 @@ fn ink(
         minimum_cluster: table.minimum_cluster,
         cautions: table.cautions,
     });
+}
+
+/// Puts each rule in the place of the one of its name, or behind all others.
+fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut Findings) {
+    let mut seen: Vec<String> = Vec::new();
+    for rule in given {
+        let (offset, rule) = (rule.span().start, rule.into_inner());
+        if seen.contains(&rule.name) {
+            findings.error(Some(offset), format!("rule {}", rule.name), "is given twice");
+        }
+        seen.push(rule.name.clone());
+        match rules.iter_mut().find(|known| known.name == rule.name) {
+            Some(known) => *known = rule,
+            None => rules.push(rule),
+        }
+    }
 }
 
 /// Reads a measured curve and gives it to its stack, which joins the list if it is new.

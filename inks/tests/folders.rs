@@ -253,13 +253,26 @@ fn blocks(language: &str) -> Vec<&'static str> {
 fn the_examples_of_the_guide_are_libraries() {
     let curve = blocks("csv")[0];
     let examples = blocks("toml");
-    assert_eq!(examples.len(), 2);
-    for (example, changed) in examples.into_iter().zip(["MS+C", "K+F"]) {
+    assert_eq!(examples.len(), 3);
+    let library = |example: &str| {
         let folder = folder(&[("library.toml", example), ("ms-c.csv", curve)]);
-        let library = Library::from_dir(folder.path()).unwrap();
+        Library::from_dir(folder.path()).unwrap()
+    };
+    for (example, changed) in examples.iter().zip(["MS+C", "K+F"]) {
         let stack: Stack = changed.parse().unwrap();
-        assert_ne!(library.entry(&stack).unwrap().curve, Library::builtin().entry(&stack).unwrap().curve);
+        assert_ne!(
+            library(example).entry(&stack).unwrap().curve,
+            Library::builtin().entry(&stack).unwrap().curve
+        );
     }
+    let forbidding = library(examples[2]);
+    let names = |library: &Library| {
+        let entries = library.at_hand(&inks::InkSet::ALL);
+        entries.iter().map(|entry| entry.stack.to_string()).collect::<Vec<_>>()
+    };
+    let kept: Vec<_> = names(&Library::builtin()).into_iter().filter(|name| !name.ends_with("F+F")).collect();
+    assert_eq!(names(&forbidding), kept);
+    assert_eq!(kept.len(), 55, "all but SF+F and GF+F");
 }
 
 proptest! {

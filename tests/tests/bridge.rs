@@ -96,7 +96,7 @@ fn bridged(data: &[u8], cancel_at: Option<usize>) -> (Vec<u8>, JobState) {
 #[test]
 fn the_paper_shows_the_sheet_that_went_through_the_bridge() {
     let sheet = sheet();
-    let passes = separate(&sheet, &Silent).unwrap().passes;
+    let passes = separate(&sheet, &[], &Silent).unwrap().passes;
     let (printed, state) = bridged(&streams(&passes), None);
     assert_eq!(state, JobState::Done);
     let mut file = Vec::new();
@@ -109,7 +109,7 @@ fn the_paper_shows_the_sheet_that_went_through_the_bridge() {
 #[test]
 fn the_job_after_a_cancelled_one_prints_on_the_same_printer() {
     let sheet = sheet();
-    let passes = separate(&sheet, &Silent).unwrap().passes;
+    let passes = separate(&sheet, &[], &Silent).unwrap().passes;
     let data = streams(&passes);
     let whole = bridged(&data, None).0;
     let cassettes = INKS.map(Cassette::from);

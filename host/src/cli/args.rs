@@ -33,14 +33,20 @@ pub struct DocumentArgs {
 }
 
 impl DocumentArgs {
-    /// Opens the document; what the reader decides goes to the observer.
+    /// Opens the document; what the reader decided it tells the observer itself.
     pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
         let options = document::Options {
             material: self.material.clone(),
             colour_space: self.colour_space,
             samples: self.samples,
         };
-        Ok(document::open(&self.document, &options, observer)?)
+        let mut document = document::open(&self.document, &options, observer)?;
+        // A name may come from anybody's file, and is shown on the terminal.
+        document.name.retain(|c| !c.is_control());
+        if document.name.trim().is_empty() {
+            document.name = "document".into();
+        }
+        Ok(document)
     }
 }
 
@@ -83,8 +89,16 @@ pub struct InkArgs {
 }
 
 impl InkArgs {
-    /// The inks at hand.
-    pub fn set(&self) -> Result<InkSet> {
+    /// The inks at hand and the library, which has a stack of them.
+    pub fn at_hand(&self) -> Result<(InkSet, Library)> {
+        let (set, library) = (self.set()?, self.library()?);
+        if library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty()) {
+            bail!("--inks: there is no stack of {set} alone; `foilpress inks list` shows what goes together");
+        }
+        Ok((set, library))
+    }
+
+    fn set(&self) -> Result<InkSet> {
         let set: InkSet = match &self.inks {
             Some(text) => text.parse()?,
             None => InkSet::default(),

@@ -3,17 +3,17 @@
 use std::fs;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
-use super::output::Staged;
-use crate::document::{self, foil};
+use super::output::{Kind, Staged};
+use crate::document::{self, ColourSpace, foil};
 use crate::gamut::files::Provenance;
 use crate::gamut::{self, Printable};
 use crate::job::placement;
 use crate::observe::Observer;
-use crate::separate;
+use crate::separate::{self, Severity};
 use crate::sheet::Sheet;
 use crate::{pipeline, simulate};
 
@@ -34,7 +34,7 @@ impl Factor {
     /// Document → bases and weight maps.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let document = self.document.open(observer)?;
-        let staged = Staged::new(&self.output)?;
+        let staged = Staged::folder(&self.output, Kind::Foil)?;
         let (factored, report) = pipeline::factor_document(&document, &self.factor.settings(), observer)?;
         if let Some(report) = report {
             observer.note(&report.to_string());
@@ -56,6 +56,12 @@ pub struct Map {
     /// The document it was made from, so that clamp and blend see its own pixels instead of the bases' mixtures
     #[arg(long, value_name = "DOC")]
     document: Option<String>,
+    /// Which material of that document, as it was given to `factor`
+    #[arg(long, value_name = "NUMBER|NAME", requires = "document")]
+    material: Option<String>,
+    /// Encoding of that document's colour maps, as it was given to `factor`
+    #[arg(long, value_name = "SPACE", requires = "document")]
+    colour_space: Option<ColourSpace>,
     #[command(flatten)]
     gamut: GamutArgs,
     #[command(flatten)]
@@ -71,8 +77,7 @@ pub struct Map {
 impl Map {
     /// Bases → mixtures of stacks.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let set = self.inks.set()?;
-        let library = self.inks.library()?;
+        let (set, library) = self.inks.at_hand()?;
         let read = foil::read_watched(&self.factored, observer)?;
         let (factored, _) = pipeline::factor_document(&read, &Default::default(), observer)?;
         let document = self
@@ -80,10 +85,15 @@ impl Map {
             .as_ref()
             .map(|spec| {
                 let samples = factored.space.angles().len();
-                document::open(spec, &document::Options { samples, ..Default::default() }, observer)
+                let options = document::Options {
+                    material: self.material.clone(),
+                    colour_space: self.colour_space,
+                    samples,
+                };
+                document::open(spec, &options, observer)
             })
             .transpose()?;
-        let staged = Staged::new(&self.output)?;
+        let staged = Staged::folder(&self.output, Kind::Mix)?;
         let printable = Printable::from_library(&library, &set, &factored.space);
         let materials = document.as_ref().map(|document| document.materials());
         let mapped = gamut::map(&factored, materials, &printable, &self.gamut.settings(self.seed), observer)?;
@@ -122,9 +132,9 @@ impl Halftone {
         let (mix, provenance) = gamut::files::load(&self.mix)?;
         let pixels = (mix.maps.width(), mix.maps.height());
         let placement = placement::place(pixels, provenance.size_mm, self.page.size, self.page.paper)?;
-        let staged = Staged::new(&self.output)?;
+        let staged = Staged::folder(&self.output, Kind::Sheet)?;
         let sheet = pipeline::halftone_mix(&mix, &library, &placement, observer)?;
-        sheet.save(staged.folder()?)?;
+        sheet.save(staged.create()?)?;
         staged.commit()
     }
 }
@@ -136,6 +146,9 @@ pub struct Separate {
     /// A folder made by `halftone` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
+    /// Folder of an ink library of your own: its order rules count
+    #[arg(long, value_name = "DIR")]
+    library: Option<PathBuf>,
     /// Folder to write: a one-bit picture for each pass, passes.toml
     #[arg(short, long, value_name = "DOC.passes")]
     output: PathBuf,
@@ -144,13 +157,18 @@ pub struct Separate {
 impl Separate {
     /// Sheet → one-bit passes.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
+        let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
         let sheet = Sheet::load(&self.sheet)?;
-        let staged = Staged::new(&self.output)?;
-        let separation = separate::separate(&sheet, observer)?;
+        let staged = Staged::folder(&self.output, Kind::Passes)?;
+        let separation = separate::separate(&sheet, library.rules(), observer)?;
         for check in &separation.checks {
-            observer.note(&check.to_string());
+            match check.severity {
+                Severity::Error => bail!("this must not be printed: {}", check.with_stacks()),
+                Severity::Warning => observer.note(&check.to_string()),
+                Severity::Note => observer.note(&check.text),
+            }
         }
-        separate::files::save(&separation, staged.folder()?)?;
+        separate::files::save(&separation, staged.create()?)?;
         staged.commit()
     }
 }
@@ -176,7 +194,7 @@ impl Encode {
     /// Passes → the printer's language.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let saved = separate::files::load(&self.passes)?;
-        let staged = Staged::new(&self.output)?;
+        let staged = Staged::file(&self.output)?;
         let inks = if self.foil { inks::InkSet::ALL } else { inks::InkSet::default() };
         let job = pipeline::job_of(&saved.passes, saved.paper, self.media.media, &inks, observer)?;
         fs::write(staged.path(), job).with_context(|| format!("cannot write {}", self.output.display()))?;
@@ -200,10 +218,10 @@ impl Simulate {
     /// The printer's language → the sheet that comes out.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let job = super::read_job(&self.job)?;
-        let staged = Staged::new(&self.output)?;
+        let staged = Staged::folder(&self.output, Kind::Sheet)?;
         let printout = simulate::print(&job, &simulate::Setup::default(), observer)
             .with_context(|| format!("{}", self.job.display()))?;
-        printout.sheet()?.save(staged.folder()?)?;
+        printout.sheet()?.save(staged.create()?)?;
         staged.commit()
     }
 }

@@ -1,13 +1,14 @@
 //! `foilpress inks`: what the library knows, and what is wrong with one.
 
 use std::fmt::Write as _;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use inks::{Entry, InkSet, Library, Provenance, Severity, Source, Stack};
 use serde::Serialize;
 
+use super::output::Staged;
 use crate::brdf::plot;
 
 /// The library of inks and stacks.
@@ -66,16 +67,19 @@ pub fn run(args: Args) -> anyhow::Result<()> {
             if let Some(file) = &plot {
                 let title =
                     format!("{}: {} ({})", entry.stack, library.words(&entry.stack), entry.provenance.word());
-                replace(file, &plot::svg(&title, &entry.curve)?)?;
+                let staged = Staged::file(file)?;
+                std::fs::write(staged.path(), plot::svg(&title, &entry.curve)?)
+                    .with_context(|| format!("cannot write {}", file.display()))?;
+                staged.commit()?;
                 writeln!(text, "\nplot written to {}", file.display())?;
             }
             (text, Ok(()))
         }
         What::Check { dir } => check(&dir),
     };
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match super::show(&text) {
         // A reader that has seen enough, such as `head`, is no failure.
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        Err(error) if !super::closed_pipe(&error) => Err(error),
         _ => verdict,
     }
 }
@@ -86,19 +90,6 @@ fn open(folder: Option<&Path>) -> anyhow::Result<Library> {
             .with_context(|| format!("{} is not a usable ink library", folder.display())),
         None => Ok(Library::builtin()),
     }
-}
-
-/// Writes a file beside its place and moves it there, so that nothing half-written is ever seen.
-fn replace(file: &Path, text: &str) -> anyhow::Result<()> {
-    let folder = match file.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut draft = tempfile::NamedTempFile::new_in(folder)
-        .with_context(|| format!("cannot write in {}", folder.display()))?;
-    draft.write_all(text.as_bytes())?;
-    draft.persist(file).with_context(|| format!("cannot write {}", file.display()))?;
-    Ok(())
 }
 
 /// The entry of a stack given in words; suggests one when there is none.
@@ -284,7 +275,14 @@ fn check(dir: &Path) -> (String, anyhow::Result<()>) {
     let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
     let count = |severity| problems.iter().filter(|problem| problem.severity == severity).count();
     let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
-    text.push_str(&format!("{}: {errors} errors, {warnings} warnings, {notes} notes\n", dir.display()));
+    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    text.push_str(&format!(
+        "{}: {}, {}, {}\n",
+        dir.display(),
+        counted(errors, "error"),
+        counted(warnings, "warning"),
+        counted(notes, "note")
+    ));
     let verdict = match errors {
         0 => Ok(()),
         _ => Err(anyhow::anyhow!("{} cannot be used as an ink library", dir.display())),
@@ -368,14 +366,10 @@ mod tests {
     }
 
     #[test]
-    fn a_plot_file_appears_whole_and_check_fails_on_errors() {
+    fn check_fails_on_errors_and_counts_what_it_found() {
         let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("plot.svg");
-        replace(&file, "one").unwrap();
-        replace(&file, "two").unwrap();
-        assert_eq!(std::fs::read_to_string(&file).unwrap(), "two");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(check(folder.path()).1.is_err());
+        let (text, verdict) = check(folder.path());
+        assert!(verdict.is_err() && text.contains("1 error,"), "{text}");
         std::fs::write(folder.path().join("library.toml"), "format = 1\nbased_on = \"built-in\"\n").unwrap();
         let (text, verdict) = check(folder.path());
         assert!(verdict.is_ok() && text.contains("0 errors"), "{text}");

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
-use super::output::Staged;
+use super::output::{Kind, Staged};
 use crate::inspect::{Inspection, inspect};
 use crate::observe::Observer;
 use crate::separate::files::{self, save_plane};
@@ -34,8 +34,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let inspected = inspect(&job, observer);
     let summary = &inspected.inspection;
     if let Some(folder) = &args.passes {
-        let staged = Staged::new(folder)?;
-        let inside = staged.folder()?;
+        let staged = Staged::folder(folder, Kind::Pictures)?;
+        let inside = staged.create()?;
         for (report, pass) in summary.passes.iter().zip(&inspected.passes) {
             let name = files::name(report.number - 1, pass.ink);
             save_plane(&pass.plane, &inside.join(name))?;
@@ -64,6 +64,9 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
         summary.bytes,
         if summary.complete { "one whole job" } else { "no whole job" }
     )?;
+    if setup.resolution.is_none() {
+        return Ok(writeln!(out, "no page is set up")?);
+    }
     writeln!(
         out,
         "{across} x {along} dpi, {} paper ({} x {} dots), {} media, {} mode, curl correction {}",
@@ -71,7 +74,11 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
         setup.width,
         setup.length,
         setup.media.unwrap_or(unknown),
-        setup.mode.unwrap_or(unknown),
+        setup.mode.map_or(unknown, |mode| match mode {
+            "blackRaster" => "black raster",
+            "colourPlane" => "colour plane",
+            _ => "multi-plane",
+        }),
         setup.curl_correction.map_or(unknown, |on| if on { "on" } else { "off" }),
     )?;
     if (setup.shift_x, setup.shift_y) != (0, 0) {

@@ -18,13 +18,17 @@ mod sample;
 mod send;
 
 use std::fs::File;
-use std::io::{self, Read as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 
+use crate::send::journal::JournalError;
+use crate::send::query::QueryError;
+use crate::send::raw::RawError;
+use crate::send::{OpenError, RunError};
 use progress::Progress;
 
 /// The largest stream that is read: several times a page of noise in seven passes.
@@ -93,7 +97,8 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("foilpress: {error:#}");
+            output::yield_to_interrupt();
+            let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
             ExitCode::FAILURE
         }
     }
@@ -120,6 +125,25 @@ fn run(args: Args) -> Result<()> {
     }
 }
 
+/// An error with its causes. Many name their cause in their own words; it is not said again.
+fn chain(error: &anyhow::Error) -> String {
+    let mut said = String::new();
+    for cause in error.chain() {
+        let cause = cause.to_string();
+        if said.is_empty() {
+            said = cause;
+        } else if !said.contains(cause.trim_end()) {
+            said = format!("{said}: {cause}");
+        }
+    }
+    said.trim_end().to_owned()
+}
+
+/// Writes to standard output, where results go.
+fn show(text: &str) -> Result<()> {
+    io::stdout().lock().write_all(text.as_bytes()).context("cannot write to standard output")
+}
+
 /// Reads a job whole.
 fn read_job(path: &Path) -> Result<Vec<u8>> {
     let cannot = || format!("cannot read {}", path.display());
@@ -132,9 +156,17 @@ fn read_job(path: &Path) -> Result<Vec<u8>> {
     Ok(job)
 }
 
-/// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`.
+/// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`. A printer or a bridge that went
+/// away is something else.
 fn closed_pipe(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
-    })
+    let device = error.chain().any(|cause| {
+        cause.is::<RawError>()
+            || cause.is::<QueryError>()
+            || cause.is::<OpenError>()
+            || cause.is::<RunError<JournalError>>()
+    });
+    !device
+        && error.chain().any(|cause| {
+            cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+        })
 }

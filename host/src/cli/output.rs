@@ -1,10 +1,12 @@
 //! Outputs appear whole or not at all.
 //!
 //! Everything is written to a hidden staging folder beside its destination and moved there at the end. If the
-//! program fails the folder goes with it; if it is interrupted, [`remove_on_interrupt`] sees to that.
+//! program fails the folder goes with it; if it is stopped, [`remove_on_interrupt`] sees to that. What stood at the
+//! destination is replaced only if this program wrote all of it: a file by a file, a folder by a folder of the same
+//! [`Kind`], nothing else.
 
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -14,15 +16,85 @@ use tempfile::TempDir;
 static STAGED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// What the user is told when the program is interrupted.
-static FAREWELL: Mutex<String> = Mutex::new(String::new());
+static FAREWELL: Mutex<Option<String>> = Mutex::new(None);
 
 /// From now on an interruption is not without consequences: says which.
 pub fn say_on_interrupt(text: &str) {
-    text.clone_into(&mut FAREWELL.lock().unwrap_or_else(PoisonError::into_inner));
+    *FAREWELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_owned());
 }
 
-/// What a folder of ours holds: only such a folder, or an empty one, is ever replaced.
-const MARKERS: [&str; 5] = ["report.json", "document.toml", "mix.toml", "sheet.toml", "passes.toml"];
+/// What a folder of ours is, which says what may be in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The result of `print`.
+    Print,
+    /// Bases and weight maps.
+    Foil,
+    /// Mixtures of stacks.
+    Mix,
+    /// One stack for every dot.
+    Sheet,
+    /// One-bit passes.
+    Passes,
+    /// Pictures of passes without their description.
+    Pictures,
+    /// A sample's maps, which the user may have painted in since: never replaced.
+    Maps,
+}
+
+impl Kind {
+    /// The file that every folder of this kind has.
+    fn marker(self) -> Option<&'static str> {
+        match self {
+            Kind::Print => Some("report.json"),
+            Kind::Foil => Some("document.toml"),
+            Kind::Mix => Some("mix.toml"),
+            Kind::Sheet => Some("sheet.toml"),
+            Kind::Passes => Some("passes.toml"),
+            Kind::Pictures | Kind::Maps => None,
+        }
+    }
+
+    /// Whether a file of that name can be one this program wrote.
+    fn writes(self, name: &str) -> bool {
+        let picture = |name: &str| name.ends_with(".png");
+        self.marker() == Some(name)
+            || match self {
+                Kind::Print => {
+                    ["job.rgl", "sheet.png", "materials.png", "separation.png", "passes"].contains(&name)
+                }
+                Kind::Foil => name == "bases.csv" || (name.starts_with("weights-") && picture(name)),
+                Kind::Mix => name.starts_with("weights-") && picture(name),
+                Kind::Sheet => name == "separation.png",
+                Kind::Passes | Kind::Pictures => {
+                    name.starts_with(|c: char| c.is_ascii_digit()) && name.contains('-') && picture(name)
+                }
+                Kind::Maps => false,
+            }
+            // What file browsers leave in every folder they show.
+            || [".DS_Store", "Thumbs.db", "desktop.ini"].contains(&name)
+    }
+
+    /// The first entry of a folder that this program did not write, if there is one.
+    fn stranger(self, folder: &Path) -> io::Result<Option<PathBuf>> {
+        let (mut entries, mut marked) = (0, self.marker().is_none());
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let name = entry.file_name();
+            let known = name.to_str().is_some_and(|name| self.writes(name));
+            let passes = self == Kind::Print && name == "passes";
+            if !known || entry.file_type()?.is_dir() != passes {
+                return Ok(Some(entry.path()));
+            }
+            if passes && let Some(stranger) = Kind::Passes.stranger(&entry.path())? {
+                return Ok(Some(stranger));
+            }
+            marked |= self.marker().is_some_and(|marker| name == marker);
+            entries += 1;
+        }
+        Ok((entries > 0 && !marked).then(|| folder.to_path_buf()))
+    }
+}
 
 /// A place to write a file or a folder before it appears under its own name.
 pub struct Staged {
@@ -32,27 +104,74 @@ pub struct Staged {
 }
 
 impl Staged {
-    /// Prepares to write `target`. Fails early if it cannot be written or is a folder that is not ours.
-    pub fn new(target: &Path) -> Result<Staged> {
+    /// Prepares to write the file `target`. Fails early if it cannot be written.
+    pub fn file(target: &Path) -> Result<Staged> {
+        Staged::new(target, |target, found| {
+            if found.is_dir() {
+                bail!("{} is a folder; name a file to write", target.display());
+            }
+            if !found.is_file() {
+                bail!("{} is a device, not a file; name a file to write", target.display());
+            }
+            Ok(())
+        })
+    }
+
+    /// Prepares to write the folder `target`. Fails early if it cannot be written or holds what is not ours.
+    pub fn folder(target: &Path, kind: Kind) -> Result<Staged> {
+        Staged::new(target, |target, found| {
+            if !found.is_dir() {
+                bail!("{} is a file; name a folder to write", target.display());
+            }
+            let stranger =
+                kind.stranger(target).with_context(|| format!("cannot look into {}", target.display()))?;
+            match stranger {
+                None => Ok(()),
+                Some(stranger) if stranger == target => bail!(
+                    "{} exists and is no result of this command; choose another place with -o",
+                    target.display()
+                ),
+                Some(stranger) => bail!(
+                    "{} exists and holds {}, which this command did not write; choose another place with -o",
+                    target.display(),
+                    stranger.strip_prefix(target).unwrap_or(&stranger).display()
+                ),
+            }
+        })
+    }
+
+    fn new(target: &Path, check: impl FnOnce(&Path, &fs::Metadata) -> Result<()>) -> Result<Staged> {
+        // Behind a link stands what is meant; the link itself stays.
+        let linked = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());
+        let target = if linked {
+            fs::canonicalize(target)
+                .with_context(|| format!("{} is a link that leads nowhere", target.display()))?
+        } else {
+            target.to_path_buf()
+        };
         let name = target
             .file_name()
-            .with_context(|| format!("{} names no file or folder to write", target.display()))?;
-        if target.is_dir() && !replaceable(target)? {
-            bail!(
-                "{} exists and was not made by this program; choose another place with -o",
-                target.display()
-            );
+            .with_context(|| format!("{} names no file or folder to write", target.display()))?
+            .to_owned();
+        if let Ok(found) = fs::metadata(&target) {
+            check(&target, &found)?;
         }
         let parent = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        let folder = tempfile::Builder::new()
-            .prefix(&format!(".{}.", name.to_string_lossy()))
-            .tempdir_in(parent)
-            .with_context(|| format!("cannot write in {}", parent.display()))?;
-        staged().push(folder.path().to_path_buf());
-        Ok(Staged { target: target.to_path_buf(), inside: folder.path().join(name), folder })
+        if !parent.is_dir() {
+            bail!("cannot write {}: there is no folder {}", target.display(), parent.display());
+        }
+        // Under one lock, so that an interruption finds either nothing or a folder it knows of.
+        let mut list = staged();
+        let folder = tempfile::Builder::new().prefix(".foilpress-").tempdir_in(parent).map_err(|error| {
+            // Its own words name the staging folder, which says nothing to the user.
+            let reason = error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
+            anyhow::anyhow!("cannot write in {}: {reason}", parent.display())
+        })?;
+        list.push(folder.path().to_path_buf());
+        Ok(Staged { inside: folder.path().join(name), target, folder })
     }
 
     /// Where to write; nothing is there yet.
@@ -61,33 +180,36 @@ impl Staged {
     }
 
     /// Where to write, as a folder that is there.
-    pub fn folder(&self) -> Result<&Path> {
+    pub fn create(&self) -> Result<&Path> {
         fs::create_dir(&self.inside).with_context(|| format!("cannot write {}", self.target.display()))?;
         Ok(&self.inside)
     }
 
     /// Moves what was written to its own name, replacing what was there.
     pub fn commit(self) -> Result<()> {
-        let old = self.folder.path().join("replaced");
+        // Held to the end: an interruption waits until old and new have changed places.
+        let mut list = staged();
+        let mut old = self.inside.clone().into_os_string();
+        old.push(".replaced");
+        let old = PathBuf::from(old);
         if self.target.is_dir() {
             fs::rename(&self.target, &old)
                 .with_context(|| format!("cannot replace {}", self.target.display()))?;
         }
         if let Err(error) = fs::rename(&self.inside, &self.target) {
-            if old.exists() {
-                // The old folder goes back; if even that fails it is still in the staging folder, which stays.
-                if fs::rename(&old, &self.target).is_err() {
-                    let kept = self.folder.keep();
-                    bail!(
-                        "cannot write {}: {error}; what was there is in {}",
-                        self.target.display(),
-                        kept.display()
-                    );
-                }
+            // The old folder goes back; if even that fails it is still in the staging folder, which stays.
+            if old.exists() && fs::rename(&old, &self.target).is_err() {
+                list.retain(|path| path != self.folder.path());
+                let kept = self.folder.keep();
+                bail!(
+                    "cannot write {}: {error}; what was there is in {}",
+                    self.target.display(),
+                    kept.display()
+                );
             }
             return Err(error).with_context(|| format!("cannot write {}", self.target.display()));
         }
-        staged().retain(|path| path != self.folder.path());
+        list.retain(|path| path != self.folder.path());
         Ok(())
     }
 }
@@ -96,14 +218,31 @@ fn staged() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
     STAGED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn replaceable(folder: &Path) -> Result<bool> {
-    let mut entries = fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))?;
-    Ok(MARKERS.iter().any(|marker| folder.join(marker).is_file()) || entries.next().is_none())
+/// A document's name as the name of a file: names come from documents, which are not to choose where we write.
+pub fn file_name(name: &str) -> String {
+    const LONGEST: usize = 80;
+    let plain: String = name
+        .trim()
+        .chars()
+        .map(|c| if c.is_control() || "/\\:*?\"<>|".contains(c) { '-' } else { c })
+        .take(LONGEST)
+        .collect();
+    let plain = plain.trim_start_matches(['.', '-']).trim_end_matches(['.', ' ']);
+    // File systems count bytes.
+    let cut = (0..=plain.len().min(2 * LONGEST)).rev().find(|&at| plain.is_char_boundary(at)).unwrap_or(0);
+    if cut == 0 { "document".into() } else { plain[..cut].to_owned() }
 }
 
-/// Removes what is staged when the user interrupts the program, which then ends with exit code 130.
+/// Waits for ever if the program is being stopped. Called before it ends by itself with a failure, which may be no
+/// more than the staging folder that is taken away under its hands.
+pub fn yield_to_interrupt() {
+    drop(staged());
+}
+
+/// Removes what is staged when the program is told to stop, which then ends with exit code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
+        // Never released: nothing new is staged, and nothing is moved to its place, from here on.
         let paths = staged();
         for path in paths.iter() {
             // A stage may still be writing into the folder; a second try catches what it added meanwhile.
@@ -115,8 +254,8 @@ pub fn remove_on_interrupt() -> Result<()> {
             }
         }
         let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
-        let text = if farewell.is_empty() { "\ninterrupted; nothing was written" } else { &farewell };
-        eprintln!("{text}");
+        let text = farewell.as_deref().unwrap_or("nothing half-written is left");
+        let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; {text}");
         std::process::exit(130);
     })
     .context("cannot watch for Ctrl-C")
@@ -138,30 +277,40 @@ mod tests {
     #[test]
     fn nothing_is_left_when_the_work_is_dropped() {
         let folder = tempfile::tempdir().unwrap();
-        let staged = Staged::new(&folder.path().join("out.print")).unwrap();
-        fs::create_dir(staged.path()).unwrap();
-        fs::write(staged.path().join("half"), "x").unwrap();
+        let staged = Staged::folder(&folder.path().join("out.print"), Kind::Print).unwrap();
+        fs::write(staged.create().unwrap().join("half"), "x").unwrap();
         drop(staged);
         assert!(entries(folder.path()).is_empty());
     }
 
     #[test]
-    fn our_own_folder_is_replaced_and_a_stranger_is_not() {
+    fn our_own_folder_is_replaced_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("out.print");
         for round in ["one", "two"] {
-            let staged = Staged::new(&target).unwrap();
-            fs::create_dir(staged.path()).unwrap();
-            fs::write(staged.path().join("report.json"), round).unwrap();
+            let staged = Staged::folder(&target, Kind::Print).unwrap();
+            let inside = staged.create().unwrap();
+            fs::write(inside.join("report.json"), round).unwrap();
+            fs::create_dir(inside.join("passes")).unwrap();
+            for file in ["passes/passes.toml", "passes/01-cyan.png"] {
+                fs::write(inside.join(file), round).unwrap();
+            }
             staged.commit().unwrap();
             assert_eq!(fs::read_to_string(target.join("report.json")).unwrap(), round);
             assert_eq!(entries(folder.path()), ["out.print"]);
         }
-        let stranger = folder.path().join("thesis");
-        fs::create_dir(&stranger).unwrap();
-        fs::write(stranger.join("chapter1"), "x").unwrap();
-        assert!(Staged::new(&stranger).is_err());
-        assert_eq!(entries(&stranger), ["chapter1"]);
+        // Of another kind, and with something of the user's at any depth.
+        assert!(Staged::folder(&target, Kind::Foil).is_err());
+        for mine in ["passes/thesis", "passes/thesis.png", "thesis"] {
+            fs::write(target.join(mine), "x").unwrap();
+            let said = Staged::folder(&target, Kind::Print).err().unwrap().to_string();
+            assert!(said.contains(mine), "{said}");
+            fs::remove_file(target.join(mine)).unwrap();
+        }
+        assert!(Staged::folder(&target, Kind::Print).is_ok());
+        // A report alone does not make a folder ours.
+        fs::write(folder.path().join("report.json"), "{}").unwrap();
+        assert!(Staged::folder(folder.path(), Kind::Print).is_err());
     }
 
     #[test]
@@ -169,10 +318,52 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("job.rgl");
         fs::write(&target, "old").unwrap();
-        let staged = Staged::new(&target).unwrap();
+        let staged = Staged::file(&target).unwrap();
         fs::write(staged.path(), "new").unwrap();
         assert_eq!(fs::read_to_string(&target).unwrap(), "old");
         staged.commit().unwrap();
         assert_eq!(fs::read_to_string(&target).unwrap(), "new");
+    }
+
+    #[test]
+    fn a_file_never_takes_the_place_of_a_folder_nor_a_folder_that_of_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(Staged::file(folder.path()).is_err());
+        let file = folder.path().join("notes");
+        fs::write(&file, "x").unwrap();
+        assert!(Staged::folder(&file, Kind::Print).is_err());
+        #[cfg(unix)]
+        assert!(Staged::file(Path::new("/dev/null")).is_err());
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn what_a_link_leads_to_is_replaced_and_the_link_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("job.rgl"), folder.path().join("latest"));
+        fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        let staged = Staged::file(&link).unwrap();
+        fs::write(staged.path(), "new").unwrap();
+        staged.commit().unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read_to_string(&file).unwrap(), "new");
+    }
+
+    #[test]
+    fn a_documents_name_leads_nowhere() {
+        for (name, expected) in [
+            ("leaf", "leaf"),
+            ("../../evil", "evil"),
+            ("metal/gold", "metal-gold"),
+            ("", "document"),
+            ("..", "document"),
+            (" \n ", "document"),
+            ("-o", "o"),
+            ("Gold \u{5370}", "Gold \u{5370}"),
+        ] {
+            assert_eq!(file_name(name), expected, "{name}");
+        }
+        assert!(file_name(&"\u{5370}".repeat(500)).len() < 200);
     }
 }

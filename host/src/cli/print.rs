@@ -1,16 +1,15 @@
 //! `foilpress print`: a document in, a folder with the job and everything to look at out.
 
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 use image::RgbImage;
 use serde_json::json;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
-use super::output::Staged;
+use super::output::{self, Kind, Staged};
 use super::send::deliver;
 use crate::document::Document;
 use crate::job::plan::Plan;
@@ -63,19 +62,29 @@ pub struct Args {
 
 /// Runs `print`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let inks = args.inks.set()?;
-    let library = args.inks.library()?;
+    let (inks, library) = args.inks.at_hand()?;
     let probe = match &args.probe {
         Some(path) => Probe::read_hdr(path)?,
         None => Probe::studio(128),
     };
     let document = args.document.open(observer)?;
-    let target = args.output.clone().unwrap_or_else(|| format!("{}.print", document.name).into());
-    let staged = Staged::new(&target)?;
-    let also = match &args.to {
-        Some(Destination::File(path)) => Some(Staged::new(path)?),
+    let target =
+        args.output.clone().unwrap_or_else(|| format!("{}.print", output::file_name(&document.name)).into());
+    let to_file = match &args.to {
+        Some(Destination::File(path)) => Some(path),
         _ => None,
     };
+    if let Some(to) = to_file
+        && absolute(to)?.starts_with(absolute(&target)?)
+    {
+        bail!(
+            "--to {} lies in {}, which is written whole; choose another place",
+            to.display(),
+            target.display()
+        );
+    }
+    let staged = Staged::folder(&target, Kind::Print)?;
+    let also = to_file.map(|path| Staged::file(path)).transpose()?;
 
     let settings = pipeline::Settings {
         factor: args.factor.settings(),
@@ -88,7 +97,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let print = pipeline::print(&document, &library, &settings, observer)?;
     let plan = Plan::new(&document.name, &print.sheet, &print.placement, &print.separation, &library);
 
-    let folder = staged.folder()?;
+    let folder = staged.create()?;
     write(&folder.join("job.rgl"), &print.job)?;
     let passes = folder.join("passes");
     fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
@@ -109,26 +118,26 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         also.commit()?;
     }
 
-    let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{report}")?;
+        super::show(&format!("{report}\n"))?;
     } else {
-        write!(out, "{plan}")?;
-        writeln!(
-            out,
-            "\nSeen from {EYE} m the print differs from the document by d = {:.3} on average (0.01 is hard to see, \
-             0.05 plain).\nThe simulated printer made exactly this sheet. Look at {}",
+        super::show(&format!(
+            "{plan}\nSeen from {EYE} m the print differs from the document by d = {:.3} on average (0.01 is hard to see, \
+             0.05 plain).\nThe simulated printer made exactly this sheet. Look at {}\n",
             pictures.fidelity.mean,
             target.join("sheet.png").display()
-        )?;
+        ))?;
     }
-    drop(out);
     match &args.to {
         Some(to @ (Destination::Raw(_) | Destination::Bridge(_))) => {
             deliver(&document.name, &print.job, to, observer)
         }
         _ => Ok(()),
     }
+}
+
+fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()))
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {

@@ -1,11 +1,20 @@
 //! Progress bars on the terminal: one at a time, with the time left, and a line for what is done.
 
+use std::io::{self, Write as _};
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::observe::Observer;
+
+/// Stages shorter than this leave no line behind.
+const WORTH_A_LINE: Duration = Duration::from_millis(50);
+
+/// A line on standard error. Nobody may be listening there, which is no reason to stop working.
+fn say(line: std::fmt::Arguments<'_>) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
 
 /// Draws on standard error. Where that is no terminal only notes and finished stages are written, one a line.
 pub struct Progress {
@@ -31,7 +40,7 @@ impl Observer for Progress {
         }
         self.end();
         let bar = ProgressBar::new(total);
-        if let Ok(style) = ProgressStyle::with_template("{msg:>24} {wide_bar} {percent:>3} %  {eta} left") {
+        if let Ok(style) = ProgressStyle::with_template("{msg:>30} {wide_bar} {percent:>3} %  {eta} left") {
             bar.set_style(style);
         }
         bar.set_message(stage.to_owned());
@@ -49,14 +58,17 @@ impl Observer for Progress {
     fn end(&self) {
         if let Some((bar, stage, start)) = self.with(Option::take) {
             bar.finish_and_clear();
-            eprintln!("{stage:>24}  {:.1} s", start.elapsed().as_secs_f64());
+            let took = start.elapsed();
+            if took >= WORTH_A_LINE {
+                say(format_args!("{stage:>30}  {:.1} s", took.as_secs_f64()));
+            }
         }
     }
 
     fn note(&self, text: &str) {
         self.with(|current| match current {
-            Some((bar, ..)) => bar.suspend(|| eprintln!("note: {text}")),
-            None => eprintln!("note: {text}"),
+            Some((bar, ..)) => bar.suspend(|| say(format_args!("note: {text}"))),
+            None => say(format_args!("note: {text}")),
         });
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 
-use super::output::Staged;
+use super::output::{Kind, Staged};
 use crate::sample::{SAMPLES, Sample};
 
 /// The samples, or one of them as a folder of texture maps.
@@ -32,9 +32,8 @@ pub fn run(args: Args) -> Result<()> {
     }
     let sample = Sample::named(&args.name)?;
     let target = args.output.unwrap_or_else(|| PathBuf::from(sample.name));
-    let staged = Staged::new(&target)?;
-    std::fs::create_dir(staged.path())?;
-    sample.draw().write(sample.name, staged.path())?;
+    let staged = Staged::folder(&target, Kind::Maps)?;
+    sample.draw().write(sample.name, staged.create()?)?;
     staged.commit()?;
     writeln!(out, "{}", target.display())?;
     Ok(())

@@ -41,7 +41,7 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer
     let checked = send::check(job, observer)?;
     match to {
         Destination::File(path) => {
-            let staged = Staged::new(path)?;
+            let staged = Staged::file(path)?;
             std::fs::write(staged.path(), job).with_context(|| format!("cannot write {}", path.display()))?;
             staged.commit()
         }
@@ -70,7 +70,7 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer
 fn to_device(name: &str, job: &[u8], checked: &Checked, path: &Path, observer: &dyn Observer) -> Result<()> {
     observer.note(&load(&checked.inks));
     output::say_on_interrupt(
-        "\ninterrupted: the printer may have a part of the job. Switch it off and on before the next one",
+        "the printer may have a part of the job. Switch it off and on before the next one",
     );
     send::raw::send(job, path, observer)?;
     observer.note(&format!(
@@ -90,7 +90,7 @@ fn load(inks: &[Ink]) -> String {
 pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Observer) -> Result<()> {
     let number = job.entry.record.job;
     output::say_on_interrupt(&format!(
-        "\ninterrupted; the bridge goes on printing what it holds. `foilpress resume {number:08x}` goes on, \
+        "the bridge goes on printing what it holds. `foilpress resume {number:08x}` goes on, \
          `foilpress cancel {number:08x}` ends the sheet"
     ));
     let data = std::mem::take(&mut job.data);

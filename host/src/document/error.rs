@@ -114,7 +114,8 @@ pub enum DocumentError {
     },
 }
 
-fn list(names: &[String]) -> String {
+/// Names in a row, not endlessly many.
+pub(super) fn list(names: &[String]) -> String {
     const SHOWN: usize = 24;
     match names.len() {
         0 => "none".into(),

@@ -3,7 +3,7 @@
 //! `NAME.foil/` holds `document.toml` (what is there), `bases.csv` (`basis,theta_h_deg,r,g,b`, reflectance in 1/sr)
 //! and one 16-bit grey PNG of weights for each basis. Weights are stored as `round(w 65535 / 32768)` with `w` in
 //! units of 1/32768; since that scale is above one, rounding back gives every weight exactly. What is read must
-//! sum to one at every pixel, exactly. Writing goes to a temporary folder that is renamed at the end.
+//! sum to one at every pixel, but for what rounding to 16 bits explains. Writing goes to a temporary folder that is renamed at the end.
 
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -22,7 +22,7 @@ use super::{Content, Document, stem};
 use crate::brdf::{Space, Table};
 use crate::factor::Factored;
 use crate::observe::{Observer, Silent};
-use crate::weights::{ONE, WeightMaps};
+use crate::weights::{ONE, WeightMaps, quantise};
 
 /// The file that makes a folder a factored document.
 pub const INDEX: &str = "document.toml";
@@ -153,6 +153,20 @@ pub fn write(
     std::fs::rename(&inside, path).map_err(io(path, "write"))
 }
 
+/// The weights of a pixel from its greys: those that were written, or by largest remainder those that were
+/// painted, whose greys sum to white but for a rounding of each. Otherwise the sum stays wrong, to be named.
+fn from_greys(grey: &[u16], weights: &mut [u16]) {
+    weights.iter_mut().zip(grey).for_each(|(w, &g)| *w = weight(g));
+    if weights.iter().map(|&w| u32::from(w)).sum::<u32>() == u32::from(ONE) {
+        return;
+    }
+    let sum: u32 = grey.iter().map(|&g| u32::from(g)).sum();
+    if sum.abs_diff(u32::from(u16::MAX)) as usize <= grey.len() {
+        let exact: Vec<f64> = grey.iter().map(|&g| f64::from(g)).collect();
+        quantise(&exact, weights);
+    }
+}
+
 /// Reads a factored document, nobody watching.
 pub fn read(path: &Path) -> Result<Document, DocumentError> {
     read_watched(path, &Silent)
@@ -187,7 +201,7 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
             None => "expected weights as 16-bit grey".into(),
             Some(weights) => {
                 for (out, &w) in data.chunks_exact_mut(channels).zip(weights) {
-                    out[channel] = weight(w);
+                    out[channel] = w;
                 }
                 source.observer.advance(1);
                 continue;
@@ -196,6 +210,11 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
         return Err(DocumentError::Picture { path: at, problem });
     }
     source.observer.end();
+    let mut grey = vec![0; channels];
+    for weights in data.chunks_exact_mut(channels) {
+        grey.copy_from_slice(weights);
+        from_greys(&grey, weights);
+    }
     let maps = WeightMaps::new(index.width, index.height, channels, data)
         .map_err(|source| DocumentError::Weights { path: path.to_path_buf(), source })?;
     let (notes, digest) = source.finish();
@@ -341,6 +360,31 @@ mod tests {
         std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
         let error = read(&path).unwrap_err().to_string();
         assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
+    }
+
+    proptest! {
+        /// Whoever paints in the maps keeps the sum of greys, not of our units.
+        #[test]
+        fn painted_greys_that_sum_to_white_are_weights(
+            mut cuts in prop::collection::vec(0u16..=u16::MAX, 1..8), off in -1i32..=1,
+        ) {
+            cuts.extend([0, u16::MAX]);
+            cuts.sort_unstable();
+            let mut grey: Vec<u16> = cuts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            grey[0] = (i32::from(grey[0]) + off).clamp(0, 65535) as u16;
+            let mut weights = vec![0; grey.len()];
+            from_greys(&grey, &mut weights);
+            prop_assert_eq!(weights.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
+            for (&w, &g) in weights.iter().zip(&grey) {
+                prop_assert!((f64::from(w) - f64::from(g) * 32768.0 / 65535.0).abs() <= 2.0);
+            }
+            // A step of 8 bits is no rounding.
+            if grey[0] < 65000 {
+                grey[0] += 257;
+                from_greys(&grey, &mut weights);
+                prop_assert!(weights.iter().map(|&w| u32::from(w)).sum::<u32>() != u32::from(ONE));
+            }
+        }
     }
 
     #[test]

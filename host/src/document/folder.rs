@@ -113,14 +113,26 @@ struct Files {
 impl Files {
     fn find(folder: &Path, settings: &Settings, source: &mut Source<'_>) -> Result<Files, DocumentError> {
         let io = |source| DocumentError::Io { path: folder.to_path_buf(), attempt: "list", source };
-        let mut seen = Vec::new();
+        let (mut seen, mut foreign) = (Vec::new(), Vec::new());
         for entry in std::fs::read_dir(folder).map_err(io)?.take(MOST_FILES) {
             let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
-            if is_picture(&name) && !name.starts_with('.') {
+            if name.starts_with('.') {
+                continue;
+            }
+            if is_picture(&name) {
                 seen.push(name);
+            } else if is_foreign_picture(&name) {
+                foreign.push(name);
             }
         }
         seen.sort();
+        if !foreign.is_empty() {
+            foreign.sort();
+            source.note(format!(
+                "not read: {}; save maps as PNG, JPEG, TIFF, OpenEXR or Radiance HDR",
+                super::error::list(&foreign)
+            ));
+        }
         let stems: Vec<&str> =
             seen.iter().map(|name| name.rsplit_once('.').map_or(&name[..], |(s, _)| s)).collect();
         let roles = names::roles(&stems);
@@ -186,8 +198,19 @@ impl Files {
 }
 
 fn is_picture(name: &str) -> bool {
-    const KINDS: [&str; 8] = ["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe"];
-    name.rsplit_once('.').is_some_and(|(_, kind)| KINDS.contains(&kind.to_ascii_lowercase().as_str()))
+    has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe"])
+}
+
+/// Pictures by their name that no decoder here reads.
+fn is_foreign_picture(name: &str) -> bool {
+    has_extension(
+        name,
+        &["tga", "webp", "bmp", "gif", "dds", "psd", "ktx2", "avif", "heic", "jxl", "jp2", "svg", "tx"],
+    )
+}
+
+fn has_extension(name: &str, kinds: &[&str]) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, kind)| kinds.contains(&kind.to_ascii_lowercase().as_str()))
 }
 
 /// Reads `material.toml`, if the folder has one.
@@ -500,7 +523,7 @@ fn normal_variance(reader: &mut Reader<'_, '_>, name: &str) -> Result<Field, Doc
 /// What the user is told about a normal map.
 pub(super) fn relief_note(name: &str) -> String {
     format!(
-        "{name}: paper is flat; bumps within {} pixels become roughness (alpha^2 + 2 var), larger relief is lost",
+        "{name}: paper is flat; bumps within {} pixels are printed as roughness, larger relief is lost",
         relief::WINDOW
     )
 }

@@ -102,6 +102,13 @@ fn choose<'r>(
         problem,
         materials: (0..root.materials.len()).map(|i| format!("{i} ({})", name(i))).collect(),
     };
+    if root.materials.is_empty() {
+        return Err(DocumentError::Field {
+            path: path.to_path_buf(),
+            field: "materials".into(),
+            problem: "the file has no material to print".into(),
+        });
+    }
     let found = match asked {
         None if root.materials.len() == 1 => 0,
         None => return Err(fail(format!("the file has {} materials", root.materials.len()))),
@@ -654,7 +661,7 @@ mod tests {
             (image(r#"{"bufferView":7,"mimeType":"image/png"}"#), "bufferView 7 does not exist"),
             (image("{}"), "neither uri nor bufferView"),
             (image("").replace(r#""index":0"#, r#""index":4"#), "texture 4 does not exist"),
-            (r#"{"asset":{"version":"2.0"}}"#.into(), "0 materials"),
+            (r#"{"asset":{"version":"2.0"}}"#.into(), "no material to print"),
             ("{".into(), "glTF"),
         ] {
             std::fs::write(&path, &json).unwrap();

@@ -130,11 +130,12 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
         return crate::sample::document(name, space, observer);
     }
     let path = Path::new(spec);
-    let source = Source::new(observer);
+    let mut source = Source::new(observer);
     if source.is_folder(path)? {
         if path.join(foil::INDEX).is_file() {
             return foil::open(path, source);
         }
+        unasked(options, &mut source);
         return folder::open(path, options, space, source);
     }
     let head = source.head(path)?;
@@ -145,10 +146,18 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     if head.starts_with(b"glTF") || extension == "gltf" || extension == "glb" {
         return gltf::open(path, options, space, source);
     }
+    unasked(options, &mut source);
     match extension.as_str() {
         "binary" => merl::open(path, space, source),
         "csv" => surfaces::open_curve(path, space, source),
         _ => Err(DocumentError::Kind { path: path.to_path_buf() }),
+    }
+}
+
+/// Says that a choice of material was not needed.
+fn unasked(options: &Options, source: &mut Source<'_>) {
+    if options.material.is_some() {
+        source.note("there is only one material in this document; --material is for glTF files".into());
     }
 }
 

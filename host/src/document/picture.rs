@@ -218,7 +218,20 @@ fn check_size(path: &Path, width: u64, height: u64, channels: u64) -> Result<(),
 
 fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Picture, DocumentError> {
     let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    let damaged = |error: image::ImageError| wrong(format!("cannot decode the picture: {error}"));
+    let damaged = |error: image::ImageError| {
+        wrong(match &error {
+            image::ImageError::Limits(_) => {
+                format!(
+                    "the picture has more than {MOST_SIDE} pixels along a side, or fills too much memory; \
+                     make it smaller"
+                )
+            }
+            image::ImageError::Unsupported(_) => {
+                format!("cannot decode the picture: {error}; save it as a PNG of 8 or 16 bits, or as OpenEXR")
+            }
+            _ => format!("cannot decode the picture: {error}"),
+        })
+    };
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(MOST_SIDE as u32);
     limits.max_image_height = Some(MOST_SIDE as u32);

@@ -122,14 +122,19 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} basis materials; pixels are d = {:.4} from their mixture (95 % below {:.4}, worst {:.4}), {:.1} % of \
-             them more than 0.01 outside the bases' hull",
+            "{} basis material{}; pixels are d = {:.4} from their mixture on average (95 % below {:.4}, worst {:.4})",
             self.bases,
+            if self.bases == 1 { "" } else { "s" },
             self.rmse,
             self.p95,
-            self.max,
-            100.0 * self.uncovered
-        )
+            self.max
+        )?;
+        match 100.0 * self.uncovered {
+            few if few < 0.05 => Ok(()),
+            share => {
+                write!(f, "; {share:.1} % of them lie more than 0.01 outside all that the bases can mix")
+            }
+        }
     }
 }
 
@@ -251,7 +256,8 @@ fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca,
     if most == 1 || settings.bases.is_some_and(|k| k >= most) {
         if let Some(k) = settings.bases.filter(|&k| k > most) {
             observer.note(&format!(
-                "{k} bases were asked for, but the document has only {most} distinct materials"
+                "{k} bases were asked for, but the document has only {most} distinct material{}",
+                if most == 1 { "" } else { "s" }
             ));
         }
         return (pca, sample.x.clone());

@@ -15,42 +15,14 @@ use super::basis::prune;
 use super::candidates::Candidates;
 use crate::brdf::{Space, Table};
 use crate::document::{Distinct, Materials};
-use crate::factor::Factored;
 use crate::observe::Observer;
 use crate::solve::{Mixer, MixtureError, Target};
-use crate::weights::{ONE, quantise};
+use crate::weights::quantise;
 
 /// Materials that are walked as one.
 const RUN: usize = 4096;
 /// A gap in squared distance that no eye could tell from none: at d = 0.01 it is 5e-6 in d.
 const ENOUGH: f64 = 1e-7;
-
-/// A factored document as materials: each pixel the weighted sum of the bases.
-pub(super) struct Rebuilt<'a>(pub &'a Factored);
-
-impl Materials for Rebuilt<'_> {
-    fn width(&self) -> usize {
-        self.0.maps.width()
-    }
-
-    fn height(&self) -> usize {
-        self.0.maps.height()
-    }
-
-    fn space(&self) -> &Space {
-        &self.0.space
-    }
-
-    fn reflectance(&self, pixel: usize, out: &mut [f32]) {
-        out.fill(0.0);
-        for (&weight, basis) in self.0.maps.at(pixel).iter().zip(self.0.bases.rows()) {
-            if weight > 0 {
-                let w = f32::from(weight) / f32::from(ONE);
-                out.iter_mut().zip(basis).for_each(|(out, &f)| *out += w * f as f32);
-            }
-        }
-    }
-}
 
 /// Every pixel's mixture over the candidates.
 pub(super) struct Clamped {
@@ -75,7 +47,7 @@ pub(super) fn map(
     let mut shares = vec![0u16; count * k];
     let mut distance = vec![0f32; count];
     let mut brightness = vec![0f32; count];
-    observer.begin("clamp", count as u64);
+    observer.begin("fitting pixels to inks", count as u64);
     let gaps: Vec<Result<f64, GamutError>> = shares
         .par_chunks_mut(RUN * k)
         .zip(distance.par_chunks_mut(RUN))

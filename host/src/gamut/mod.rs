@@ -254,8 +254,7 @@ pub fn map(
     check(document, materials, printable)?;
     let failed = |source| GamutError::Mixture { what: "the stacks".into(), source };
     let all = Candidates::new(&document.space, printable).map_err(failed)?;
-    let rebuilt = clamp::Rebuilt(document);
-    let pixels: &dyn Materials = materials.unwrap_or(&rebuilt);
+    let pixels: &dyn Materials = materials.unwrap_or(document);
     let sampled = sample::pixels(pixels.width() * pixels.height(), SAMPLE, settings.seed);
     let sample = sample::rows(pixels, &sampled);
 
@@ -288,14 +287,8 @@ pub fn map(
     }
     let (allowed, given_up) =
         cartridges::choose(&all, &targets, &importance, settings.most_cartridges, observer)?;
-    for given_up in &given_up {
-        observer.note(&format!(
-            "{} is left out to keep to {} cartridges; the mean distance goes from {:.4} to {:.4}",
-            given_up.ink.name(),
-            settings.most_cartridges,
-            given_up.before,
-            given_up.after
-        ));
+    if let Some(words) = in_words(&given_up, settings.most_cartridges) {
+        observer.note(&words);
     }
     let candidates = all.subset(&allowed);
 
@@ -304,6 +297,13 @@ pub fn map(
         let clamped = clamp::rows(&candidates, &sample)?;
         let merged = merged_share(&document.space, &sample, &clamped, settings.seed);
         intent = if merged > FEW_MERGED { Intent::Blend } else { Intent::Clamp };
+        if intent == Intent::Blend {
+            observer.note(&format!(
+                "{:.0} % of pairs of different materials would print alike if each were printed as near as the inks \
+                 come, so nearness is blended with keeping differences; --intent clamp or basis takes one of them",
+                100.0 * merged
+            ));
+        }
     }
     let gloss = if intent == Intent::Clamp { Gloss::Keep } else { settings.gloss };
     let bases = basis::map(&document.space, &document.bases, &candidates, gloss)?;
@@ -343,6 +343,24 @@ pub fn map(
         pixels: pixels_report,
     };
     Ok(Mapped { mix, report })
+}
+
+/// Which inks were given up and what that costs, in a sentence.
+fn in_words(given_up: &[GivenUp], most: usize) -> Option<String> {
+    let (first, last) = (given_up.first()?, given_up.last()?);
+    let names: Vec<&str> = given_up.iter().map(|given_up| given_up.ink.name()).collect();
+    let listed = match names.split_last() {
+        Some((last, [])) => format!("{last} is"),
+        Some((last, others)) => format!("{} and {last} are", others.join(", ")),
+        None => return None,
+    };
+    let (before, after) = (format!("{:.4}", first.before), format!("{:.4}", last.after));
+    let cost = if before == after {
+        format!("the mean distance stays at {before}")
+    } else {
+        format!("the mean distance goes from {before} to {after}")
+    };
+    Some(format!("{listed} left out to keep to {most} cartridges; {cost}"))
 }
 
 fn distances(mut distance: Vec<f32>, gap: f64, clamped: f64) -> PixelReport {

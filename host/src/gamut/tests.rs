@@ -150,10 +150,9 @@ proptest! {
         let settings = Settings { most_cartridges: 13, ..basis_settings() };
         let mapped = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mapped.mix, 13);
-        let rebuilt = clamp::Rebuilt(&document);
         let mut target = vec![0f32; space.columns()];
         for pixel in 0..30 {
-            rebuilt.reflectance(pixel, &mut target);
+            document.reflectance(pixel, &mut target);
             let target: Vec<f64> = target.iter().map(|&f| f64::from(f)).collect();
             let d = space.distance(&target, &printed_row(&mapped.mix, &printable, pixel));
             // Shares are rounded to 1/32768.

@@ -2,7 +2,7 @@
 //!
 //! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
 //! Method: the shortest list of inks in which every stack in use finds its layers in order (`order`), one plane for
-//! each (`pack`), the machine's order rules as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
+//! each (`pack`), the rules on stacks and pages as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
 //! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_CARTRIDGES`] inks,
 //! [`MOST_LAYERS`] layers.
@@ -14,14 +14,15 @@ pub mod rules;
 
 use std::collections::HashMap;
 
-use inks::Stack;
+use inks::{Rule, Stack};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
 use crate::observe::Observer;
 use crate::sheet::{Sheet, SheetError};
 
-pub use rules::{Certainty, Check, Severity};
+pub use inks::{Certainty, Severity};
+pub use rules::Check;
 
 /// Places for cartridges in the machine.
 pub const MOST_CARTRIDGES: usize = 7;
@@ -92,7 +93,7 @@ pub struct Separation {
     pub passes: Vec<Pass>,
     /// The same in numbers.
     pub plan: Plan,
-    /// What the order rules of the machine say, most severe first.
+    /// What the rules on stacks and pages say, most severe first.
     pub checks: Vec<Check>,
 }
 
@@ -170,10 +171,11 @@ fn names(inks: &[Ink]) -> String {
     inks.iter().map(|ink| ink.name()).collect::<Vec<_>>().join(", ")
 }
 
-/// Separates a sheet into passes. Only stacks that occur on a dot count.
+/// Separates a sheet into passes. Only stacks that occur on a dot count. `order` are the ink library's rules on the
+/// order of layers ([`inks::Library::rules`]).
 ///
 /// Errors: more than [`MOST_CARTRIDGES`] inks, [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
-pub fn separate(sheet: &Sheet, observer: &dyn Observer) -> Result<Separation, SeparateError> {
+pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
     let used: Vec<(usize, &Stack)> =
@@ -211,7 +213,7 @@ pub fn separate(sheet: &Sheet, observer: &dyn Observer) -> Result<Separation, Se
     let plan = Plan { passes: planned, cartridges, fewest: shortest };
     let (planes, checks) = rayon::join(
         || pack::pack(sheet.width(), sheet.index(), &passes_of, inks.len()),
-        || rules::check(sheet, &census, &plan),
+        || rules::check(sheet, &census, &plan, order),
     );
     observer.advance(1);
     observer.end();
@@ -301,14 +303,14 @@ mod tests {
     proptest! {
         #[test]
         fn passes_rebuild_the_sheet_dot_for_dot(sheet in sheets()) {
-            let separation = separate(&sheet, &Silent).unwrap();
+            let separation = separate(&sheet, &[], &Silent).unwrap();
             let again = compose(sheet.paper(), &separation.passes, sheet.stacks()).unwrap();
             prop_assert_eq!(again, sheet);
         }
 
         #[test]
         fn the_plan_counts_the_dots_of_the_planes(sheet in sheets()) {
-            let separation = separate(&sheet, &Silent).unwrap();
+            let separation = separate(&sheet, &[], &Silent).unwrap();
             prop_assert_eq!(separation.plan.passes.len(), separation.passes.len());
             for (planned, pass) in separation.plan.passes.iter().zip(&separation.passes) {
                 prop_assert_eq!((planned.ink, planned.dots), (pass.ink, pass.plane.dots()));
@@ -318,7 +320,7 @@ mod tests {
 
         #[test]
         fn saved_passes_come_back_bit_by_bit(sheet in sheets()) {
-            let separation = separate(&sheet, &Silent).unwrap();
+            let separation = separate(&sheet, &[], &Silent).unwrap();
             let folder = tempfile::tempdir().unwrap();
             files::save(&separation, folder.path()).unwrap();
             let saved = files::load(folder.path()).unwrap();
@@ -337,17 +339,17 @@ mod tests {
     fn stacks_without_a_dot_cost_no_pass() {
         let stacks = ["substrate", "C", "MS+K"].map(|text| text.parse().unwrap()).to_vec();
         let sheet = Sheet::new(Paper::Custom { width: 2, length: 1 }, stacks, vec![0, 1]).unwrap();
-        let separation = separate(&sheet, &Silent).unwrap();
+        let separation = separate(&sheet, &[], &Silent).unwrap();
         assert_eq!(separation.plan.cartridges, [Ink::Cyan]);
         assert_eq!(separation.stacks.len(), 2);
         let bare = Sheet::new(sheet.paper(), sheet.stacks().to_vec(), vec![0, 0]).unwrap();
-        assert!(separate(&bare, &Silent).unwrap().passes.is_empty());
+        assert!(separate(&bare, &[], &Silent).unwrap().passes.is_empty());
         assert_eq!(compose(bare.paper(), &[], bare.stacks()).unwrap(), bare);
     }
 
     #[test]
     fn an_ink_at_two_depths_takes_two_passes_of_one_cartridge() {
-        let plan = separate(&page(&["substrate", "K+P+F+P+W"]), &Silent).unwrap().plan;
+        let plan = separate(&page(&["substrate", "K+P+F+P+W"]), &[], &Silent).unwrap().plan;
         assert_eq!(plan.passes.len(), 5);
         assert_eq!(plan.cartridges, [Ink::Black, Ink::Primer, Ink::Finish, Ink::White]);
     }
@@ -355,20 +357,23 @@ mod tests {
     #[test]
     fn more_than_the_machine_holds_is_refused() {
         let inks = ["substrate", "K", "C", "M", "Y", "MG", "MM", "MC", "MS"];
-        assert!(separate(&page(&inks[..8]), &Silent).is_ok());
-        let error = separate(&page(&inks), &Silent).unwrap_err().to_string();
+        assert!(separate(&page(&inks[..8]), &[], &Silent).is_ok());
+        let error = separate(&page(&inks), &[], &Silent).unwrap_err().to_string();
         assert!(error.contains("8 cartridges (black, cyan") && error.contains("holds 7"), "{error}");
         let high = format!("C{}", "+C".repeat(16));
-        assert!(matches!(separate(&page(&["substrate", &high]), &Silent), Err(SeparateError::Layers { .. })));
+        assert!(matches!(
+            separate(&page(&["substrate", &high]), &[], &Silent),
+            Err(SeparateError::Layers { .. })
+        ));
         let (cyan_first, black_first) = (["C+K"; 8].join("+"), ["K+C"; 8].join("+"));
-        let error = separate(&page(&["substrate", &cyan_first, &black_first]), &Silent).unwrap_err();
+        let error = separate(&page(&["substrate", &cyan_first, &black_first]), &[], &Silent).unwrap_err();
         assert!(matches!(error, SeparateError::Passes { passes: 17, .. }), "{error}");
     }
 
     #[test]
     fn passes_that_make_no_sheet_are_refused_where_it_happens() {
         let sheet = page(&["substrate", "C", "MS+C"]);
-        let separation = separate(&sheet, &Silent).unwrap();
+        let separation = separate(&sheet, &[], &Silent).unwrap();
         let paper = sheet.paper();
         let mut passes = separation.passes.clone();
         passes[0].plane.bits[3] |= 0x80;
@@ -390,7 +395,7 @@ mod tests {
     #[test]
     fn a_changed_folder_is_refused_with_file_and_field() {
         let folder = tempfile::tempdir().unwrap();
-        let separation = separate(&page(&["substrate", "C", "MS+C"]), &Silent).unwrap();
+        let separation = separate(&page(&["substrate", "C", "MS+C"]), &[], &Silent).unwrap();
         files::save(&separation, folder.path()).unwrap();
         let path = folder.path().join(files::TEXT);
         let good = std::fs::read_to_string(&path).unwrap();

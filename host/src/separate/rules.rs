@@ -1,57 +1,30 @@
-//! What is known about the order of inks and what sticks to what, as data.
+//! What is known about pages that hold, show and do not jam the ribbon, as data.
 //!
-//! Problem: the machine prints any order; some orders do not hold, do not show or jam the ribbon. Knowledge is
-//! uneven, so each rule says how it is known, and how much it matters.
-//! Method: `RULES` is a table of conditions on the stacks in use; `check` tries each. Nothing here changes the
-//! passes. Cost: negligible, except that rules on cluster size look at the whole page once for each ink concerned.
+//! Problem: the machine prints anything; some pages disappoint. Knowledge is uneven, so each rule says how it is
+//! known, and how much it matters.
+//! Method: the rules on the order of layers in a stack are the ink library's ([`inks::Rule`]); `PAGE_RULES` is a
+//! table of conditions on what only the page knows: how small the dots are, how much an ink covers, what is used.
+//! `check` tries each. Nothing here changes the passes. Cost: negligible, except that rules on cluster size look at
+//! the whole page once for each ink concerned.
 //! Source: the notes on the machine, sections 9 and 14; the 2009 paper, section 4.2.
 
+use std::cmp::Reverse;
 use std::fmt;
 
-use inks::Stack;
-use protocol::ink::{Ink, Kind};
+use inks::{Certainty, Rule, Severity, Stack};
+use protocol::ink::Kind;
 use serde::Serialize;
 
 use super::Plan;
 use crate::halftone::metrics::smallest_clusters;
 use crate::sheet::Sheet;
 
-/// How much it matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Severity {
-    /// Must not be printed.
-    Refuse,
-    /// Likely to disappoint.
-    Warn,
-    /// Good to know.
-    Note,
-}
-
-/// How it is known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Certainty {
-    /// Measured on hardware.
-    Measured,
-    /// From the source or the streams of the established open driver.
-    Driver,
-    /// From the vendor's manuals and data.
-    Vendor,
-    /// Reported by users or sellers of the machine.
-    User,
-    /// From the 2009 paper's experiments.
-    Paper,
-    /// Concluded from several of the above.
-    Inferred,
-}
-
 /// A rule that a sheet touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Check {
     /// Name of the rule.
-    pub rule: &'static str,
-    /// How much it matters.
+    pub rule: String,
+    /// How much it matters; a sheet with an [`Severity::Error`] must not be printed.
     pub severity: Severity,
     /// How it is known.
     pub certainty: Certainty,
@@ -63,31 +36,31 @@ pub struct Check {
 
 impl fmt::Display for Check {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = match self.severity {
-            Severity::Refuse => "refused",
-            Severity::Warn => "careful",
-            Severity::Note => "note",
-        };
-        write!(f, "{word}: {}", self.text)
+        write!(f, "{}: {}", self.severity, self.text)
     }
 }
 
-/// A condition on a stack, or on the page.
+impl Check {
+    /// The text and the names of the stacks, the first few of many.
+    pub fn with_stacks(&self) -> String {
+        const NAMED: usize = 8;
+        let mut names: Vec<String> = self.stacks.iter().take(NAMED).map(Stack::to_string).collect();
+        if self.stacks.len() > NAMED {
+            names.push(format!("{} more", self.stacks.len() - NAMED));
+        }
+        match names.as_slice() {
+            [] => self.text.clone(),
+            names => format!("{}; it is about {}", self.text, names.join(", ")),
+        }
+    }
+}
+
+/// A condition on the page.
 enum When {
-    /// A layer of the first kinds anywhere above one of the second, but for a foil whose undercoat is whole.
-    Over(&'static [Kind], &'static [Kind]),
-    /// A layer of this kind directly above one of those.
-    OnTopOf(Kind, &'static [Kind]),
-    /// A layer of this kind without all of these inks somewhere beneath.
-    Without(Kind, &'static [Ink]),
-    /// A layer of this kind that is neither the first nor on a layer of these kinds.
-    NotFirst(Kind, &'static [Kind]),
     /// Exactly one layer of this kind.
     Single(Kind),
     /// A layer of this kind.
     Uses(Kind),
-    /// More layers than this.
-    Higher(usize),
     /// Dots of this kind in clusters smaller than this.
     Finer(Kind, u32),
     /// This kind covers a part of the page only.
@@ -96,16 +69,13 @@ enum When {
     NotLast(Kind),
 }
 
-struct Rule {
+struct PageRule {
     name: &'static str,
     severity: Severity,
     certainty: Certainty,
     when: When,
     text: &'static str,
 }
-
-/// The undercoat that gives foil its grip.
-const UNDERCOAT: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];
 
 const fn rule(
     name: &'static str,
@@ -113,86 +83,37 @@ const fn rule(
     certainty: Certainty,
     when: When,
     text: &'static str,
-) -> Rule {
-    Rule { name, severity, certainty, when, text }
+) -> PageRule {
+    PageRule { name, severity, certainty, when, text }
 }
 
-const RULES: [Rule; 17] = [
+const PAGE_RULES: [PageRule; 9] = [
     rule(
         "foil-speckle",
-        Severity::Refuse,
-        Certainty::Paper,
+        Severity::Error,
+        Certainty::Published,
         When::Finer(Kind::Foil, 9),
         "foil in clusters of fewer than 3 x 3 dots does not stick, or takes more foil with it; \
          set the minimum cluster of foil stacks to 16",
     ),
     rule(
         "foil-fine",
-        Severity::Warn,
+        Severity::Warning,
         Certainty::Vendor,
         When::Finer(Kind::Foil, 16),
         "foil does not take fine dots: clusters under 4 x 4 dots are uncertain; raise the minimum cluster of foil",
     ),
     rule(
-        "foil-undercoat",
-        Severity::Warn,
-        Certainty::Vendor,
-        When::Without(Kind::Foil, &UNDERCOAT),
-        "foil needs cyan, magenta, yellow and black, all four solid beneath it, for grip and gloss",
-    ),
-    rule(
         "foil-code",
-        Severity::Warn,
+        Severity::Warning,
         Certainty::Inferred,
         When::Uses(Kind::Foil),
         "the ink codes of the foils are inferred, no captured stream confirms them; try a small patch first",
     ),
     rule(
-        "ink-on-foil",
-        Severity::Warn,
-        Certainty::Vendor,
-        When::Over(&[Kind::Process, Kind::White, Kind::Metallic, Kind::Primer], &[Kind::Foil]),
-        "the vendor prints foil last; ink on foil may not hold (the 2009 paper printed process colours on it)",
-    ),
-    rule(
-        "opaque-over-transparent",
-        Severity::Warn,
-        Certainty::Vendor,
-        When::Over(&[Kind::White, Kind::Metallic, Kind::Foil], &[Kind::Process]),
-        "an opaque ink hides the transparent colour beneath it; put white, metallics and foil first",
-    ),
-    rule(
-        "white-on-colour",
-        Severity::Warn,
-        Certainty::Measured,
-        When::OnTopOf(Kind::White, &[Kind::Process]),
-        "white sticks badly on colours and is full of missing points on black; put it under them",
-    ),
-    rule(
-        "finish-last",
-        Severity::Warn,
-        Certainty::Driver,
-        When::Over(&[Kind::Process, Kind::Metallic, Kind::Foil], &[Kind::Finish]),
-        "finish is the clear top coat; an ink above it loses its gloss and may not stick",
-    ),
-    rule(
-        "finish-under-white",
-        Severity::Note,
-        Certainty::Measured,
-        When::Over(&[Kind::White, Kind::Primer], &[Kind::Finish]),
-        "finish between primer and white evens the white (seen once, on plain paper: black, primer, finish, primer, white)",
-    ),
-    rule(
-        "primer-first",
-        Severity::Note,
-        Certainty::Driver,
-        When::NotFirst(Kind::Primer, &[Kind::Finish, Kind::Primer]),
-        "primer is an undercoat for bare paper; above other inks it only repairs missing points",
-    ),
-    rule(
         "primer-ribbon",
         Severity::Note,
-        Certainty::User,
+        Certainty::Reported,
         When::Uses(Kind::Primer),
         "primer can tear its ribbon on plain paper settings; the cardboard setting cured it",
     ),
@@ -205,8 +126,8 @@ const RULES: [Rule; 17] = [
     ),
     rule(
         "metallic-fine",
-        Severity::Warn,
-        Certainty::Paper,
+        Severity::Warning,
+        Certainty::Published,
         When::Finer(Kind::Metallic, 8),
         "metallic flakes need clusters of 8 to 16 dots; raise their minimum cluster",
     ),
@@ -225,13 +146,6 @@ const RULES: [Rule; 17] = [
         "the driver prints primer solid or not at all; here it covers a part of the page, dot by dot",
     ),
     rule(
-        "layers",
-        Severity::Warn,
-        Certainty::User,
-        When::Higher(3),
-        "resin does not always hold on resin; more than three layers are rarely reported to work",
-    ),
-    rule(
         "finish-pass-last",
         Severity::Note,
         Certainty::Driver,
@@ -240,84 +154,72 @@ const RULES: [Rule; 17] = [
     ),
 ];
 
-/// The rules a sheet touches, most severe first. `census` counts the dots of each stack.
-pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan) -> Vec<Check> {
+/// The rules a sheet touches, most severe first, those on layers before those on the page. `census` counts the dots
+/// of each stack.
+pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, order: &[Rule]) -> Vec<Check> {
     let used: Vec<(usize, &Stack)> =
         sheet.stacks().iter().enumerate().filter(|(q, _)| census[*q] > 0).collect();
-    let has = |kind: Kind| move |stack: &Stack| stack.layers().iter().any(|ink| ink.kind() == kind);
+    let layers = |stack: &Stack, kind: Kind| stack.layers().iter().filter(|ink| ink.kind() == kind).count();
+    let concerned = |touches: &dyn Fn(&Stack) -> bool| -> Vec<Stack> {
+        used.iter().filter(|(_, stack)| touches(stack)).map(|(_, stack)| (*stack).clone()).collect()
+    };
+    let mut checks = Vec::new();
+    for rule in order {
+        let stacks = concerned(&|stack| rule.broken_by(stack));
+        if !stacks.is_empty() {
+            let Rule { name, says, severity, certainty, .. } = rule.clone();
+            checks.push(Check { rule: name, severity, certainty, text: says, stacks });
+        }
+    }
     let finest: Vec<(Kind, u32)> = [Kind::Foil, Kind::Metallic]
         .into_iter()
-        .filter(|&kind| used.iter().any(|(_, stack)| has(kind)(stack)))
+        .filter(|&kind| used.iter().any(|(_, stack)| layers(stack, kind) > 0))
         .map(|kind| {
             let mut label = [0; 256];
-            for (q, _) in used.iter().filter(|(_, stack)| has(kind)(stack)) {
+            for (q, _) in used.iter().filter(|(_, stack)| layers(stack, kind) > 0) {
                 label[*q] = 1;
             }
             (kind, smallest_clusters(sheet.width(), sheet.index(), &label)[1])
         })
         .collect();
-    let mut checks = Vec::new();
-    for rule in &RULES {
-        let stacks = |touches: &dyn Fn(&Stack) -> bool| -> Vec<Stack> {
-            used.iter().filter(|(_, stack)| touches(stack)).map(|(_, stack)| (*stack).clone()).collect()
-        };
+    for rule in &PAGE_RULES {
+        let having = |kind: Kind| concerned(&|stack| layers(stack, kind) > 0);
         let mut text = rule.text.to_string();
-        let (touched, stacks) = match &rule.when {
+        let (touched, stacks) = match rule.when {
+            When::Single(kind) => {
+                let stacks = concerned(&|stack| layers(stack, kind) == 1);
+                (!stacks.is_empty(), stacks)
+            }
+            When::Uses(kind) => {
+                let stacks = having(kind);
+                (!stacks.is_empty(), stacks)
+            }
             When::Finer(kind, dots) => {
-                let least = finest.iter().find(|(of, _)| of == kind).map_or(u32::MAX, |(_, least)| *least);
+                let least = finest.iter().find(|(of, _)| *of == kind).map_or(u32::MAX, |(_, least)| *least);
                 text = format!("{text} (smallest cluster: {least} dots)");
-                (least < *dots, stacks(&has(*kind)))
+                (least < dots, having(kind))
             }
             When::Partial(kind) => {
-                let covered: u64 =
-                    used.iter().filter(|(_, stack)| has(*kind)(stack)).map(|(q, _)| census[*q]).sum();
-                (covered > 0 && covered < sheet.index().len() as u64, stacks(&has(*kind)))
+                let with_kind = used.iter().filter(|(_, stack)| layers(stack, kind) > 0);
+                let covered: u64 = with_kind.map(|(q, _)| census[*q]).sum();
+                (covered > 0 && covered < sheet.index().len() as u64, having(kind))
             }
             When::NotLast(kind) => {
                 let kinds: Vec<Kind> = plan.passes.iter().map(|pass| pass.ink.kind()).collect();
-                let first = kinds.iter().position(|k| k == kind);
-                (first.is_some_and(|first| kinds[first..].iter().any(|k| k != kind)), Vec::new())
-            }
-            other => {
-                let stacks = stacks(&|stack| other.touches(stack.layers()));
-                (!stacks.is_empty(), stacks)
+                let first = kinds.iter().position(|&k| k == kind);
+                (first.is_some_and(|first| kinds[first..].iter().any(|&k| k != kind)), Vec::new())
             }
         };
         // The sharper of two rules on the same size is enough.
         let said =
             rule.name == "foil-fine" && checks.iter().any(|check: &Check| check.rule == "foil-speckle");
         if touched && !said {
-            let Rule { name, severity, certainty, .. } = *rule;
-            checks.push(Check { rule: name, severity, certainty, text, stacks });
+            let PageRule { severity, certainty, .. } = *rule;
+            checks.push(Check { rule: rule.name.into(), severity, certainty, text, stacks });
         }
     }
-    checks.sort_by_key(|check| check.severity);
+    checks.sort_by_key(|check| Reverse(check.severity));
     checks
-}
-
-impl When {
-    fn touches(&self, layers: &[Ink]) -> bool {
-        let beneath = |i: usize, inks: &[Ink]| inks.iter().all(|ink| layers[..i].contains(ink));
-        layers.iter().enumerate().any(|(i, layer)| match self {
-            When::Over(upper, lower) => {
-                upper.contains(&layer.kind())
-                    && layers[..i].iter().any(|below| lower.contains(&below.kind()))
-                    && !(layer.kind() == Kind::Foil && beneath(i, &UNDERCOAT))
-            }
-            When::OnTopOf(kind, below) => {
-                layer.kind() == *kind && i > 0 && below.contains(&layers[i - 1].kind())
-            }
-            When::Without(kind, inks) => layer.kind() == *kind && !beneath(i, inks),
-            When::NotFirst(kind, on) => layer.kind() == *kind && i > 0 && !on.contains(&layers[i - 1].kind()),
-            When::Single(kind) => {
-                layer.kind() == *kind && layers.iter().filter(|ink| ink.kind() == *kind).count() == 1
-            }
-            When::Uses(kind) => layer.kind() == *kind,
-            When::Higher(most) => layers.len() > *most,
-            // These look at the page, not at a stack.
-            When::Finer(..) | When::Partial(_) | When::NotLast(_) => false,
-        })
-    }
 }
 
 #[cfg(test)]
@@ -325,21 +227,30 @@ mod tests {
     use super::*;
     use crate::observe::Silent;
     use crate::separate::separate;
+    use inks::Library;
     use protocol::paper::Paper;
 
-    /// A page of 32 x 32 dots, bare but for a square of the stack with this side.
-    fn touched(stack: &str, side: usize) -> Vec<(&'static str, Severity)> {
+    /// A sheet of 32 x 32 dots, bare but for a square of the stack with this side.
+    fn sheet(stack: &str, side: usize) -> Sheet {
         let stacks = vec![Stack::SUBSTRATE, stack.parse().unwrap()];
         let index = (0..1024).map(|dot| u8::from(dot % 32 < side && dot / 32 < side)).collect();
-        let sheet = Sheet::new(Paper::Custom { width: 32, length: 32 }, stacks, index).unwrap();
-        let checks = separate(&sheet, &Silent).unwrap().checks;
-        checks.iter().map(|check| (check.rule, check.severity)).collect()
+        Sheet::new(Paper::Custom { width: 32, length: 32 }, stacks, index).unwrap()
+    }
+
+    fn checks(sheet: &Sheet, order: &[Rule]) -> Vec<Check> {
+        separate(sheet, order, &Silent).unwrap().checks
+    }
+
+    /// The built-in rules that a page touches.
+    fn touched(stack: &str, side: usize) -> Vec<(String, Severity)> {
+        let checks = checks(&sheet(stack, side), Library::builtin().rules());
+        checks.into_iter().map(|check| (check.rule, check.severity)).collect()
     }
 
     #[test]
     fn ordinary_stacks_touch_no_rule() {
         for stack in ["C", "C+M+Y", "MS+C", "MG+Y", "MS+M+F"] {
-            let rules: Vec<_> = touched(stack, 32).iter().map(|(rule, _)| *rule).collect();
+            let rules = touched(stack, 32);
             assert!(rules.is_empty(), "{stack}: {rules:?}");
         }
     }
@@ -347,22 +258,11 @@ mod tests {
     #[test]
     fn each_rule_is_touched_by_what_it_describes_and_not_by_what_it_allows() {
         let has =
-            |stack: &str, side: usize, rule: &str| touched(stack, side).iter().any(|(name, _)| *name == rule);
+            |stack: &str, side: usize, rule: &str| touched(stack, side).iter().any(|(name, _)| name == rule);
         for (rule, wrong, right) in [
-            ("foil-undercoat", "SF", "C+M+Y+K+SF"),
-            ("foil-undercoat", "C+M+Y+SF", "K+Y+M+C+GF"),
             ("foil-code", "GF", "MG"),
-            ("ink-on-foil", "SF+C", "SF+F"),
-            ("opaque-over-transparent", "C+MS", "C+M+Y+K+SF"),
-            ("opaque-over-transparent", "K+F+W", "W+K"),
-            ("white-on-colour", "K+W", "K+P+W"),
-            ("finish-last", "F+C", "C+F"),
-            ("finish-under-white", "F+P+W", "W+F"),
-            ("primer-first", "C+P", "P+C"),
-            ("primer-first", "W+P", "P+F+P"),
             ("primer-ribbon", "P", "F"),
             ("white-thin", "W+C", "W+W+W"),
-            ("layers", "MS+C+M+F", "MS+C+F"),
             ("finish-pass-last", "F+P", "P+F"),
         ] {
             assert!(has(wrong, 20, rule), "{rule}: {wrong}");
@@ -383,8 +283,63 @@ mod tests {
     #[test]
     fn foil_in_specks_is_refused_first_and_once() {
         let checks = touched("SF", 2);
-        assert_eq!(checks[0], ("foil-speckle", Severity::Refuse));
-        assert!(checks.iter().all(|(rule, _)| *rule != "foil-fine"));
-        assert!(checks.is_sorted_by_key(|(_, severity)| *severity));
+        assert_eq!(checks[0], ("foil-speckle".into(), Severity::Error));
+        assert!(checks.iter().all(|(rule, _)| rule != "foil-fine"));
+        assert!(checks.is_sorted_by_key(|(_, severity)| Reverse(*severity)));
+    }
+
+    #[test]
+    fn an_owners_rules_take_the_place_of_the_built_in_ones() {
+        let rule = |name: &str, severity, over: &str, under: &str| Rule {
+            name: name.into(),
+            says: format!("{over} should not lie over {under}"),
+            severity,
+            certainty: Certainty::Measured,
+            over: Some(over.parse().unwrap()),
+            under: Some(under.parse().unwrap()),
+            directly_on: None,
+            needs: None,
+            most_layers: None,
+        };
+        let order = [
+            rule("mine", Severity::Note, "finish", "black"),
+            rule("apart", Severity::Warning, "finish", "yellow"),
+            rule("never", Severity::Error, "all", "magenta"),
+        ];
+        let stacks = ["substrate", "K+F", "M+F", "K+C+F", "F+C", "Y+F"].map(|text| text.parse().unwrap());
+        // The last two stacks have no dot.
+        let index = (0..1024).map(|dot| (dot % 4) as u8).collect();
+        let sheet = Sheet::new(Paper::Custom { width: 32, length: 32 }, stacks.to_vec(), index).unwrap();
+        let checks = checks(&sheet, &order);
+        let said = |name: &str| checks.iter().filter(|check| check.rule == name).collect::<Vec<_>>();
+        let [mine] = said("mine")[..] else { panic!("{checks:?}") };
+        assert_eq!(mine.stacks, [stacks[1].clone(), stacks[3].clone()]);
+        assert_eq!((mine.severity, mine.certainty), (Severity::Note, Certainty::Measured));
+        assert_eq!(mine.text, "finish should not lie over black");
+        assert!(said("apart").is_empty(), "no dot has it");
+        assert_eq!(checks[0].rule, "never");
+        assert_eq!(checks[0].with_stacks(), "all should not lie over magenta; it is about M+F");
+        assert!(said("finish-partial").len() == 1 && checks.len() == 3, "{checks:?}");
+    }
+
+    #[test]
+    fn the_librarys_rules_name_every_stack_that_breaks_them_once() {
+        let library = Library::builtin();
+        let stacks: Vec<Stack> = library.entries().iter().map(|entry| entry.stack.clone()).collect();
+        // Seven cartridges at a time.
+        for inks in ["foil,process,finish", "metallic,cyan,magenta,finish", "primer,foil,metallic"] {
+            let set: inks::InkSet = inks.parse().unwrap();
+            let stacks: Vec<Stack> =
+                stacks.iter().filter(|s| set.contains_all(s.layers())).cloned().collect();
+            let index = (0..1024).map(|dot| (dot % stacks.len()) as u8).collect();
+            let sheet = Sheet::new(Paper::Custom { width: 32, length: 32 }, stacks.clone(), index).unwrap();
+            let checks = checks(&sheet, library.rules());
+            for rule in library.rules() {
+                let expected: Vec<&Stack> = stacks.iter().filter(|stack| rule.broken_by(stack)).collect();
+                let found: Vec<&Check> = checks.iter().filter(|check| check.rule == rule.name).collect();
+                assert_eq!(found.len(), usize::from(!expected.is_empty()), "{}", rule.name);
+                assert!(found.iter().all(|check| check.stacks.iter().eq(expected.iter().copied())));
+            }
+        }
     }
 }

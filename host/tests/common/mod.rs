@@ -1,0 +1,88 @@
+//! The program in a folder of its own, and a small document for it.
+#![allow(dead_code, reason = "each file of tests uses its own part")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use tempfile::TempDir;
+
+/// A fresh folder to run the program in.
+pub struct Bench {
+    folder: TempDir,
+}
+
+impl Bench {
+    #[allow(clippy::new_without_default, reason = "a test's helper")]
+    pub fn new() -> Bench {
+        Bench { folder: tempfile::tempdir().expect("a temporary folder") }
+    }
+
+    /// A name in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The program with these arguments, split at spaces.
+    pub fn command(&self, args: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_foilpress"));
+        command.args(args.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
+        command
+    }
+
+    /// Runs to the end.
+    pub fn run(&self, args: &str) -> Output {
+        self.command(args).output().expect("the program starts")
+    }
+
+    /// Runs and returns standard output; fails the test unless the exit code is 0.
+    pub fn done(&self, args: &str) -> String {
+        let output = self.run(args);
+        assert_eq!(output.status.code(), Some(0), "{args}: {}", text(&output.stderr));
+        text(&output.stdout)
+    }
+
+    /// Runs what must fail with this exit code; returns what was said.
+    pub fn refused(&self, code: i32, args: &str) -> String {
+        let output = self.run(args);
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{args}: {said}");
+        assert!(!said.contains("panicked"), "{args}: {said}");
+        said
+    }
+
+    /// Everything in the folder, hidden entries too.
+    pub fn entries(&self) -> Vec<String> {
+        entries(self.folder.path())
+    }
+}
+
+/// Names in a folder, sorted.
+pub fn entries(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Bytes as text.
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A small PBR folder: a glossy red half beside a bare metal half.
+pub fn small_document(folder: &Path) {
+    fs::create_dir_all(folder).expect("a folder");
+    let half = |left: [u8; 3], right: [u8; 3]| {
+        image::RgbImage::from_fn(24, 16, |x, _| image::Rgb(if x < 12 { left } else { right }))
+    };
+    for (name, picture) in [
+        ("base_color.png", half([180, 30, 25], [200, 200, 205])),
+        ("roughness.png", half([90; 3], [130; 3])),
+        ("metallic.png", half([0; 3], [255; 3])),
+    ] {
+        picture.save(folder.join(name)).expect("a picture");
+    }
+}
