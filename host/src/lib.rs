@@ -27,6 +27,8 @@ pub mod job;
 
 pub mod simulate;
 
+pub mod send;
+
 pub mod inspect;
 
 pub mod preview;

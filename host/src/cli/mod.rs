@@ -5,13 +5,17 @@
 //! closed pipe is success.
 
 mod args;
+mod bridge;
 mod chain;
+mod doctor;
 mod inks;
 mod inspect;
 mod output;
 mod print;
 mod progress;
+mod resume;
 mod sample;
+mod send;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -21,6 +25,10 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 
+use crate::send::journal::JournalError;
+use crate::send::query::QueryError;
+use crate::send::raw::RawError;
+use crate::send::{OpenError, RunError};
 use progress::Progress;
 
 /// The largest stream that is read: several times a page of noise in seven passes.
@@ -35,7 +43,8 @@ const LARGEST_JOB: u64 = 256 << 20;
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
         foilpress inks show MS+C\n  \
-        foilpress inspect job.rgl --passes passes/\n\n\
+        foilpress inspect job.rgl --passes passes/\n  \
+        foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
         The chain, step by step: factor, map, halftone, separate, encode, simulate.\n\
         Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 )]
@@ -65,6 +74,16 @@ enum Command {
     Simulate(chain::Simulate),
     /// Tell what is in a job, with byte offsets where something is wrong
     Inspect(inspect::Args),
+    /// Send a job to a printer, through a bridge or as it is
+    Send(send::Args),
+    /// Go on with a job that was interrupted
+    Resume(resume::Resume),
+    /// End a job early, leaving the printer ready for the next one
+    Cancel(resume::Cancel),
+    /// The bridges there are, and how one of them and its printer are
+    Bridge(bridge::Args),
+    /// Find out what stands in the way of printing
+    Doctor(doctor::Args),
     /// The ink library: list, show, check
     Inks(inks::Args),
     /// Documents made by the program itself: list them or write one as a texture folder
@@ -96,6 +115,11 @@ fn run(args: Args) -> Result<()> {
         Command::Encode(args) => args.run(observer),
         Command::Simulate(args) => args.run(observer),
         Command::Inspect(args) => inspect::run(&args, observer),
+        Command::Send(args) => send::run(&args, observer),
+        Command::Resume(args) => resume::resume(&args, observer),
+        Command::Cancel(args) => resume::cancel(&args, observer),
+        Command::Bridge(args) => bridge::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
         Command::Sample(args) => sample::run(args),
     }
@@ -132,9 +156,17 @@ fn read_job(path: &Path) -> Result<Vec<u8>> {
     Ok(job)
 }
 
-/// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`.
+/// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`. A printer or a bridge that went
+/// away is something else.
 fn closed_pipe(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
-    })
+    let device = error.chain().any(|cause| {
+        cause.is::<RawError>()
+            || cause.is::<QueryError>()
+            || cause.is::<OpenError>()
+            || cause.is::<RunError<JournalError>>()
+    });
+    !device
+        && error.chain().any(|cause| {
+            cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+        })
 }

@@ -15,6 +15,14 @@ use tempfile::TempDir;
 
 static STAGED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// What the user is told when the program is interrupted.
+static FAREWELL: Mutex<Option<String>> = Mutex::new(None);
+
+/// From now on an interruption is not without consequences: says which.
+pub fn say_on_interrupt(text: &str) {
+    *FAREWELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_owned());
+}
+
 /// What a folder of ours is, which says what may be in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -245,7 +253,9 @@ pub fn remove_on_interrupt() -> Result<()> {
                 }
             }
         }
-        let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; nothing half-written is left");
+        let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = farewell.as_deref().unwrap_or("nothing half-written is left");
+        let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; {text}");
         std::process::exit(130);
     })
     .context("cannot watch for Ctrl-C")

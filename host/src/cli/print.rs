@@ -10,11 +10,13 @@ use serde_json::json;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
 use super::output::{self, Kind, Staged};
+use super::send::deliver;
 use crate::document::Document;
 use crate::job::plan::Plan;
 use crate::observe::Observer;
 use crate::pipeline::{self, Print};
 use crate::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
+use crate::send::Destination;
 use crate::separate;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
@@ -47,22 +49,15 @@ pub struct Args {
     /// Light probe (.hdr) for the balls in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// Also write the job there: file:PATH
-    #[arg(long, value_name = "WHERE", value_parser = destination)]
-    to: Option<PathBuf>,
+    /// Also send the job there: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Destination>,
     /// Folder to write [default: NAME.print in the current folder]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Print the report instead of the plan in words
     #[arg(long)]
     json: bool,
-}
-
-fn destination(text: &str) -> Result<PathBuf, String> {
-    match text.strip_prefix("file:") {
-        Some(path) if !path.is_empty() => Ok(path.into()),
-        _ => Err("write file:PATH, such as file:job.rgl".into()),
-    }
 }
 
 /// Runs `print`.
@@ -75,7 +70,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let document = args.document.open(observer)?;
     let target =
         args.output.clone().unwrap_or_else(|| format!("{}.print", output::file_name(&document.name)).into());
-    if let Some(to) = &args.to
+    let to_file = match &args.to {
+        Some(Destination::File(path)) => Some(path),
+        _ => None,
+    };
+    if let Some(to) = to_file
         && absolute(to)?.starts_with(absolute(&target)?)
     {
         bail!(
@@ -85,7 +84,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         );
     }
     let staged = Staged::folder(&target, Kind::Print)?;
-    let also = args.to.as_deref().map(Staged::file).transpose()?;
+    let also = to_file.map(|path| Staged::file(path)).transpose()?;
 
     let settings = pipeline::Settings {
         factor: args.factor.settings(),
@@ -120,14 +119,20 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
 
     if args.json {
-        super::show(&format!("{report}\n"))
+        super::show(&format!("{report}\n"))?;
     } else {
         super::show(&format!(
             "{plan}\nSeen from {EYE} m the print differs from the document by d = {:.3} on average (0.01 is hard to see, \
              0.05 plain).\nThe simulated printer made exactly this sheet. Look at {}\n",
             pictures.fidelity.mean,
             target.join("sheet.png").display()
-        ))
+        ))?;
+    }
+    match &args.to {
+        Some(to @ (Destination::Raw(_) | Destination::Bridge(_))) => {
+            deliver(&document.name, &print.job, to, observer)
+        }
+        _ => Ok(()),
     }
 }
 

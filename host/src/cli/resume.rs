@@ -1,0 +1,107 @@
+//! `foilpress resume` and `foilpress cancel`: jobs that are not over.
+
+use std::io::Write as _;
+
+use anyhow::{Context, Result, bail};
+use clap::Args as ClapArgs;
+
+use super::send::go;
+use crate::observe::Observer;
+use crate::send::journal::{Entry, Journal};
+use crate::send::session::Phase;
+use crate::send::{Address, words};
+
+/// Arguments of `resume`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress resume                                     (the one job that is not over)\n  \
+    foilpress resume 5f3a9c01 --to serial:/dev/ttyACM1   (the port has another name today)\n  \
+    foilpress resume --list")]
+pub struct Resume {
+    /// Number of the job [default: the only one that is not over]
+    #[arg(value_parser = number)]
+    job: Option<u32>,
+    /// Where the bridge is now [default: where the job was sent to]
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Address>,
+    /// Only list the jobs and where they stand
+    #[arg(long, conflicts_with_all = ["job", "to"])]
+    list: bool,
+}
+
+/// Arguments of `cancel`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress cancel                                     (the one job that is not over)\n  \
+    foilpress cancel 5f3a9c01\n\n\
+    A sheet that has begun is brought to an end and put out; the printer is ready for the next job. Stop a `send` that is \
+    still running first (Ctrl-C).")]
+pub struct Cancel {
+    /// Number of the job [default: the only one that is not over]
+    #[arg(value_parser = number)]
+    job: Option<u32>,
+    /// Where the bridge is now [default: where the job was sent to]
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Address>,
+}
+
+fn number(text: &str) -> Result<u32, String> {
+    u32::from_str_radix(text, 16)
+        .map_err(|_| "a job's number has eight digits 0-9 and a-f, as `resume --list` shows".into())
+}
+
+/// Runs `resume`.
+pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
+    let journal = Journal::of_user()?;
+    if args.list {
+        let mut out = std::io::stdout().lock();
+        for entry in journal.entries()? {
+            writeln!(out, "{}", line(&entry))?;
+        }
+        return Ok(());
+    }
+    let job = journal.open(choose(&journal, args.job)?)?;
+    let address = address(&job.entry, args.to.as_ref())?;
+    let cancel = job.entry.record.cancel;
+    go(job, &address, cancel, observer)
+}
+
+/// Runs `cancel`.
+pub fn cancel(args: &Cancel, observer: &dyn Observer) -> Result<()> {
+    let journal = Journal::of_user()?;
+    let job = journal.open(choose(&journal, args.job)?)?;
+    let address = address(&job.entry, args.to.as_ref())?;
+    go(job, &address, true, observer)
+}
+
+fn address(entry: &Entry, asked: Option<&Address>) -> Result<Address> {
+    match asked {
+        Some(address) => Ok(address.clone()),
+        None => entry.to.parse().with_context(|| "the journal names no bridge; say where it is with --to"),
+    }
+}
+
+/// The job meant.
+fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
+    if let Some(number) = asked {
+        return Ok(number);
+    }
+    let open: Vec<Entry> = journal
+        .entries()?
+        .into_iter()
+        .filter(|entry| !matches!(entry.record.phase, Phase::Ended(_)))
+        .collect();
+    match &open[..] {
+        [] => bail!("no job waits; every one that was sent is over (`foilpress resume --list`)"),
+        [one] => Ok(one.record.job),
+        several => {
+            let lines: Vec<String> = several.iter().map(line).collect();
+            bail!("several jobs are not over; say which:\n{}", lines.join("\n"))
+        }
+    }
+}
+
+/// A job in a line.
+pub fn line(entry: &Entry) -> String {
+    format!("{:08x}  {}  {}: {}", entry.record.job, entry.to, entry.name, words::phase(entry))
+}

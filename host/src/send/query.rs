@@ -1,0 +1,178 @@
+//! Questions to a bridge, outside of any job: who it is, what it does, how the printer is.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use protocol::link::frame::{self, MAX, Read, Reader};
+use protocol::link::message::{Answer, Ask, Fault, Lines, Progress, SCHEMA, ToBridge, ToHost, VERSION};
+
+use super::session::{Bridge, printable};
+use super::transport::Transport;
+
+/// A question is repeated after this long: frames may be lost.
+const REPEAT: Duration = Duration::from_millis(400);
+
+/// What came of a question to the printer.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Reply {
+    /// The printer's bytes.
+    Bytes(Vec<u8>),
+    /// A job is open, and the question would be row data.
+    NotNow,
+    /// The printer's port does not talk back.
+    OneWay,
+    /// It does, but did not answer in time.
+    Silent,
+    /// It takes no bytes at the moment.
+    Stopped(Fault),
+}
+
+/// Why a question got no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum QueryError {
+    /// The link went.
+    #[error("the link to the bridge was lost")]
+    Link(#[from] io::Error),
+    /// Nothing that can be understood came in time.
+    #[error(
+        "no bridge answers there; is it the right port (`foilpress bridge list`), and does it run this program's firmware?"
+    )]
+    NoAnswer,
+}
+
+/// A conversation of questions.
+pub struct Query<'t> {
+    link: &'t mut dyn Transport,
+    reader: Reader,
+    request: u16,
+    bridge: Bridge,
+    progress: Progress,
+}
+
+/// A message of the bridge that answers something.
+enum Heard {
+    Hello(Bridge),
+    Progress(Progress),
+    Lines(u16, Lines, Option<Fault>),
+    Answer(u16, Reply),
+}
+
+impl<'t> Query<'t> {
+    /// Greets the bridge. Changes nothing: a job under way goes on.
+    pub fn new(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
+        let mut reader = Reader::new();
+        let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
+        let mut bridge = None;
+        let (bridge, progress) = exchange(link, &mut reader, &hello, patience, &mut |heard| {
+            match heard {
+                Heard::Hello(found) => bridge = Some(found),
+                Heard::Progress(progress) => return Some((bridge.clone()?, progress)),
+                _ => {}
+            }
+            None
+        })?;
+        Ok(Query { link, reader, request: 0, bridge, progress })
+    }
+
+    /// Who answers.
+    pub fn bridge(&self) -> &Bridge {
+        &self.bridge
+    }
+
+    /// What it does.
+    pub fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    /// The port's lines, and the fault they mean.
+    pub fn lines(&mut self, patience: Duration) -> Result<(Lines, Option<Fault>), QueryError> {
+        let number = self.next();
+        let question = ToBridge::Ask { request: number, what: Ask::Lines };
+        exchange(self.link, &mut self.reader, &question, patience, &mut |heard| match heard {
+            Heard::Lines(request, lines, fault) if request == number => Some((lines, fault)),
+            _ => None,
+        })
+    }
+
+    /// Asks the printer for its status answer or its device ID.
+    pub fn printer(&mut self, what: Ask, patience: Duration) -> Result<Reply, QueryError> {
+        let number = self.next();
+        // Asked once only: the bridge may be waiting for the printer, and a second question would wait behind.
+        let question = ToBridge::Ask { request: number, what };
+        exchange(self.link, &mut self.reader, &question, patience, &mut |heard| match heard {
+            Heard::Answer(request, reply) if request == number => Some(reply),
+            _ => None,
+        })
+    }
+
+    fn next(&mut self) -> u16 {
+        self.request = self.request.wrapping_add(1);
+        self.request
+    }
+}
+
+/// Says `message`, again and again, until `judge` is content with what is heard.
+fn exchange<T>(
+    link: &mut dyn Transport,
+    reader: &mut Reader,
+    message: &ToBridge<'_>,
+    patience: Duration,
+    judge: &mut dyn FnMut(Heard) -> Option<T>,
+) -> Result<T, QueryError> {
+    let mut framed = [0; MAX + 1];
+    let mut room = [0; MAX];
+    // A zero ends whatever stands in the bridge's reader; questions are far shorter than a frame.
+    let length = frame::write(message, &mut room).unwrap_or(0);
+    framed[1..=length].copy_from_slice(&room[..length]);
+    let out = &framed[..=length];
+    let start = Instant::now();
+    let (mut said, mut sent) = (None::<Duration>, out.len());
+    let mut buffer = [0; 1024];
+    loop {
+        let now = start.elapsed();
+        if now >= patience {
+            return Err(QueryError::NoAnswer);
+        }
+        if sent == out.len() && said.is_none_or(|at| now - at >= REPEAT) {
+            (said, sent) = (Some(now), 0);
+        }
+        if sent < out.len() {
+            sent += link.send(&out[sent..])?;
+        }
+        let count = link.receive(&mut buffer, Duration::from_millis(20))?;
+        let mut bytes = &buffer[..count];
+        loop {
+            match reader.read(bytes) {
+                Read::More => break,
+                Read::Damaged(_, rest) => bytes = rest,
+                Read::Message(message, rest) => {
+                    bytes = rest;
+                    if let Some(found) = heard(message).and_then(&mut *judge) {
+                        return Ok(found);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn heard(message: &[u8]) -> Option<Heard> {
+    Some(match frame::decode(message).ok()? {
+        ToHost::Hello { version, boot, serial, firmware, .. } => {
+            Heard::Hello(Bridge { version, boot, serial, firmware: printable(firmware) })
+        }
+        ToHost::Progress(progress) => Heard::Progress(progress),
+        ToHost::Lines { request, lines, fault } => Heard::Lines(request, lines, fault),
+        ToHost::Answer { request, answer } => Heard::Answer(
+            request,
+            match answer {
+                Answer::Bytes(bytes) => Reply::Bytes(bytes.to_vec()),
+                Answer::NotNow => Reply::NotNow,
+                Answer::OneWay => Reply::OneWay,
+                Answer::Silent => Reply::Silent,
+                Answer::Stopped(fault) => Reply::Stopped(fault),
+            },
+        ),
+        _ => return None,
+    })
+}

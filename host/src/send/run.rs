@@ -1,0 +1,189 @@
+//! A session on real links: opens, reads, writes, waits, and opens again when the link goes.
+//!
+//! The first link has to come at once, so that a wrong name is told; after that the bridge may be away for as long as it
+//! likes: it prints what it holds, and the job goes on where it stands when the cable is back.
+
+use std::time::{Duration, Instant};
+
+use protocol::link::message::{Fault, Progress};
+
+use super::address::OpenError;
+use super::session::{Bridge, Outcome, Record, Session, SessionError};
+use super::transport::Transport;
+
+/// How long to wait for bytes when there is nothing to send.
+const IDLE: Duration = Duration::from_millis(20);
+/// A link that has been opened but on which no bridge introduces itself is given up after this.
+const INTRODUCTION: Duration = Duration::from_secs(5);
+/// Between two attempts to open a link that was lost.
+const REOPEN: Duration = Duration::from_millis(500);
+/// The record is saved at least this often while its figures change.
+const SAVE: Duration = Duration::from_secs(1);
+
+/// What happens while a job is sent.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// The bridge has introduced itself.
+    Connected(&'a Bridge),
+    /// The link went, or cannot be opened again yet. Told once for each loss.
+    Away(&'a str),
+    /// The job has come on, or its state has changed.
+    Moved(&'a Progress),
+    /// The printer takes no bytes, or takes them again.
+    Fault(Option<Fault>),
+}
+
+/// Why sending stopped. The job is in the journal, and can be resumed unless its outcome says otherwise.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError<E: std::error::Error + 'static> {
+    /// The link could not be opened in the first place.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// What answers is no bridge, or nothing answers.
+    #[error(
+        "no bridge answers there{}; is it the right port (`foilpress bridge list`), and does it run this program's \
+         firmware?",
+        rubbish(*.0)
+    )]
+    NoAnswer(usize),
+    /// The conversation cannot go on.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The record could not be saved, so nothing more was sent.
+    #[error("cannot keep the job's record")]
+    Save(#[source] E),
+}
+
+fn rubbish(bytes: usize) -> String {
+    if bytes > 0 { format!(" ({bytes} bytes came that are not its messages)") } else { String::new() }
+}
+
+/// Sends a job, or brings it to its end, until the bridge says how it ended.
+///
+/// `open` opens the link anew each time; `save` makes the record durable. Only the time between two calls of the
+/// system decides what happens when; which bytes reach the printer does not depend on it.
+pub fn run<E: std::error::Error>(
+    session: &mut Session<'_>,
+    open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
+    save: &mut dyn FnMut(&Record) -> Result<(), E>,
+    watch: &mut dyn FnMut(Event<'_>),
+) -> Result<Outcome, RunError<E>> {
+    let start = Instant::now();
+    let mut met = false;
+    loop {
+        let link = if met { reopen(open, watch) } else { open()? };
+        session.connected(start.elapsed());
+        match converse(session, link, start, save, watch, &mut met)? {
+            Some(outcome) => return Ok(outcome),
+            None if met => std::thread::sleep(REOPEN),
+            None => return Err(RunError::NoAnswer(0)),
+        }
+    }
+}
+
+fn reopen(
+    open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
+    watch: &mut dyn FnMut(Event<'_>),
+) -> Box<dyn Transport> {
+    let mut told = String::new();
+    loop {
+        match open() {
+            Ok(link) => return link,
+            Err(error) => {
+                let text = error.to_string();
+                if text != told {
+                    watch(Event::Away(&text));
+                    told = text;
+                }
+                std::thread::sleep(REOPEN);
+            }
+        }
+    }
+}
+
+/// One link from its opening to its loss: `None` when it is lost.
+fn converse<E: std::error::Error>(
+    session: &mut Session<'_>,
+    mut link: Box<dyn Transport>,
+    start: Instant,
+    save: &mut dyn FnMut(&Record) -> Result<(), E>,
+    watch: &mut dyn FnMut(Event<'_>),
+    met: &mut bool,
+) -> Result<Option<Outcome>, RunError<E>> {
+    let opened = start.elapsed();
+    let mut out = Vec::new();
+    let mut sent = 0;
+    let mut buffer = [0; 4096];
+    let mut received = 0usize;
+    let mut introduced = false;
+    let mut last = session.progress().copied();
+    let (mut saved, mut saved_at) = (session.record().printed, opened);
+    loop {
+        let now = start.elapsed();
+        if sent == out.len() {
+            out.clear();
+            sent = 0;
+            session.speak(now, &mut out, save).map_err(RunError::Save)?;
+        }
+        if let Some(outcome) = session.outcome() {
+            // What was decided on the last message heard has to be on disk too.
+            session.speak(now, &mut out, save).map_err(RunError::Save)?;
+            return Ok(Some(outcome));
+        }
+        if sent < out.len() {
+            match link.send(&out[sent..]) {
+                Ok(count) => sent += count,
+                Err(error) => {
+                    watch(Event::Away(&error.to_string()));
+                    return Ok(None);
+                }
+            }
+        }
+        let patience = if sent < out.len() || session.has_more() { Duration::ZERO } else { IDLE };
+        let count = match link.receive(&mut buffer, patience) {
+            Ok(count) => count,
+            Err(error) => {
+                watch(Event::Away(&error.to_string()));
+                return Ok(None);
+            }
+        };
+        let now = start.elapsed();
+        received += count;
+        session.hear(now, &buffer[..count])?;
+        if !introduced
+            && session.greeted()
+            && let Some(bridge) = session.bridge()
+        {
+            (introduced, *met) = (true, true);
+            watch(Event::Connected(bridge));
+        }
+        if let Some(progress) = session.progress()
+            && last.as_ref() != Some(progress)
+        {
+            let fault = session.fault();
+            if last.is_some_and(|last| fault_of(&last) != fault) || (last.is_none() && fault.is_some()) {
+                watch(Event::Fault(fault));
+            }
+            watch(Event::Moved(progress));
+            last = Some(*progress);
+        }
+        if session.record().printed != saved && now.saturating_sub(saved_at) >= SAVE {
+            save(session.record()).map_err(RunError::Save)?;
+            (saved, saved_at) = (session.record().printed, now);
+        }
+        if !session.greeted() && !*met && now.saturating_sub(opened) >= INTRODUCTION {
+            return Err(RunError::NoAnswer(received));
+        }
+        if session.is_dead(now) {
+            watch(Event::Away("the bridge does not answer"));
+            return Ok(None);
+        }
+    }
+}
+
+fn fault_of(progress: &Progress) -> Option<Fault> {
+    match progress.state {
+        protocol::link::message::JobState::Stopped(fault) => Some(fault),
+        _ => None,
+    }
+}

@@ -1,0 +1,150 @@
+//! What the bridge reports, in the words of somebody who stands before the printer.
+
+use protocol::ink::Ink;
+use protocol::link::message::{Defect, DefectKind, Fault, JobState, Progress};
+
+use super::journal::{Entry, PassPlace};
+use super::session::{Outcome, Phase};
+
+/// What to do about a fault, with `ink` in the pass that was being printed.
+///
+/// The lines of the port do not tell a missing cassette from an open cover, and the printer must not be asked in the
+/// middle of a job; so the cassette the pass needs is named wherever it may be the reason.
+pub fn fault(fault: Fault, ink: Option<Ink>) -> String {
+    let cassette = |ink: Ink| format!("{} cassette ({}, barcode {})", ink.name(), ink.part(), ink.barcode());
+    match (fault, ink) {
+        (Fault::PaperOut, _) => "the printer is out of paper: load a sheet, the job goes on by itself".into(),
+        (Fault::OffLine | Fault::Error, Some(ink)) => format!(
+            "the printer has stopped: it may want the {}. Open the cover, put it in, close the cover; \
+             the job goes on by itself",
+            cassette(ink)
+        ),
+        (Fault::OffLine, None) => {
+            "the printer is off line: close its cover and press its ready button; the job goes on by itself"
+                .into()
+        }
+        (Fault::Error, None) => {
+            "the printer reports an error: look at its lamps, cover and paper; the job goes on by itself"
+                .into()
+        }
+        (Fault::PowerOff, _) => {
+            "the printer is switched off or its cable is loose (+5 V absent): switch it on".into()
+        }
+        (Fault::BusyTooLong, Some(ink)) => format!(
+            "the printer has been busy for very long without an error: if it does not move, it may want the {}; \
+             nothing is lost by waiting",
+            cassette(ink)
+        ),
+        (Fault::BusyTooLong, None) => {
+            "the printer has been busy for very long without an error; nothing is lost by waiting".into()
+        }
+        (Fault::NoAck, _) => {
+            "the printer does not acknowledge bytes (nAck never came): the nAck wire may be loose".into()
+        }
+    }
+}
+
+/// The number (from 1) of the pass that byte `printed` of the port belongs to, and its ink. `None` before the first.
+pub fn pass_at(passes: &[PassPlace], printed: u64) -> Option<(usize, Ink)> {
+    let number = passes.partition_point(|pass| pass.offset <= printed);
+    Some((number, Ink::from_code(passes.get(number.checked_sub(1)?)?.ink)?))
+}
+
+/// How a job ended, in a sentence that says what to do next.
+pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> String {
+    let printed = entry.record.printed;
+    match outcome {
+        Outcome::Printed => format!(
+            "{}: the printer has taken all {} bytes; the sheet is done when the printer has put it out",
+            entry.name, printed
+        ),
+        Outcome::Cancelled if printed == 0 => {
+            format!("{}: cancelled; the printer had not taken a byte of it", entry.name)
+        }
+        Outcome::Cancelled => {
+            format!(
+                "{}: cancelled; the sheet comes out unfinished and the printer is ready for the next job",
+                entry.name
+            )
+        }
+        Outcome::Broken => {
+            let why = match progress.map(|progress| progress.state) {
+                Some(JobState::Broken(what)) => format!(" ({})", defect(what)),
+                _ => String::new(),
+            };
+            format!(
+                "{}: the bridge could not read the job{why}; the printer is ready for the next one",
+                entry.name
+            )
+        }
+        Outcome::Lost => format!(
+            "{}: the sheet is lost after {printed} bytes: printer or bridge lost power in the middle. \
+             Switch the printer off and on, then send the job again",
+            entry.name
+        ),
+        Outcome::Forgotten => format!(
+            "{}: the bridge no longer knows this job; the printer had taken at least {printed} of {} bytes. \
+             If the sheet is complete all is well; otherwise switch the printer off and on, and send the job again. \
+             It was not sent again by itself, so that nothing is printed twice",
+            entry.name, entry.port_bytes
+        ),
+    }
+}
+
+fn defect(defect: Defect) -> String {
+    let what = match defect.what {
+        DefectKind::Header => "an unknown header",
+        DefectKind::Forbidden => "something that must not be printed",
+        DefectKind::TooLarge => "a page too wide for its memory",
+        DefectKind::Stream => "no pass stream",
+        DefectKind::Excess => "bytes after the end",
+        DefectKind::Truncated => "the end is missing",
+    };
+    format!("byte {}: {what}", defect.at)
+}
+
+/// Where a job in the journal stands.
+pub fn phase(entry: &Entry) -> String {
+    match entry.record.phase {
+        _ if entry.record.cancel && !matches!(entry.record.phase, Phase::Ended(_)) => {
+            "to be cancelled; the bridge has not confirmed it".into()
+        }
+        Phase::Queued => "queued, nothing printed".into(),
+        Phase::Begun => "announced to the bridge, nothing printed".into(),
+        Phase::Sending => {
+            format!("at least {} of {} bytes printed", entry.record.printed, entry.port_bytes)
+        }
+        Phase::Ended(outcome) => match outcome {
+            Outcome::Printed => "printed",
+            Outcome::Cancelled => "cancelled",
+            Outcome::Broken => "refused by the bridge",
+            Outcome::Lost => "sheet lost",
+            Outcome::Forgotten => "not known to the bridge any more",
+        }
+        .into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stop_in_a_pass_names_the_cassette_as_it_is_sold() {
+        let text = fault(Fault::OffLine, Some(Ink::White));
+        assert!(text.contains("white cassette (MDC-SCWH, barcode 16)"), "{text}");
+        assert!(!fault(Fault::PaperOut, Some(Ink::White)).contains("cassette"), "paper is no matter of ink");
+    }
+
+    #[test]
+    fn the_pass_is_the_one_whose_bytes_are_being_printed() {
+        let passes = [
+            PassPlace { ink: Ink::White.code(), offset: 50 },
+            PassPlace { ink: Ink::Cyan.code(), offset: 900 },
+        ];
+        let at = |printed| pass_at(&passes, printed);
+        assert_eq!(at(49), None);
+        assert_eq!((at(50), at(899)), (Some((1, Ink::White)), Some((1, Ink::White))));
+        assert_eq!(at(5000), Some((2, Ink::Cyan)));
+    }
+}

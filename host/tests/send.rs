@@ -1,0 +1,109 @@
+//! Sending as its users meet it, as far as it goes without a bridge.
+
+use std::fs;
+use std::process::{Command, Output, Stdio};
+
+use foilpress::job::stream::write_job;
+use foilpress::observe::Silent;
+use foilpress::separate::{Pass, Plane};
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+use protocol::rgl::Page;
+use tempfile::TempDir;
+
+/// A folder with a small job, and a journal of its own.
+struct Bench {
+    folder: TempDir,
+    job: Vec<u8>,
+}
+
+impl Bench {
+    fn new() -> Bench {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let paper = Paper::Custom { width: 64, length: 20 };
+        let plane = Plane { width: 64, length: 20, stride: 8, bits: vec![0x5a; 160] };
+        let mut job = Vec::new();
+        write_job(Page::plain(paper), None, &[Pass { ink: Ink::White, plane }], &mut job, &Silent)
+            .expect("a legal job");
+        fs::write(folder.path().join("job.rgl"), &job).expect("the job is written");
+        Bench { folder, job }
+    }
+
+    fn run(&self, args: &str) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_foilpress"))
+            .args(args.split_whitespace())
+            .current_dir(self.folder.path())
+            .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
+            .stdin(Stdio::null())
+            .output()
+            .expect("the program starts")
+    }
+
+    fn says(&self, code: i32, args: &str) -> String {
+        let output = self.run(args);
+        let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{args}: {said}");
+        said
+    }
+}
+
+#[test]
+fn what_is_not_one_whole_job_is_refused_before_the_first_byte() {
+    let bench = Bench::new();
+    let path = bench.folder.path().join("port");
+    fs::write(&path, "").unwrap();
+    let mut twice = bench.job.clone();
+    twice.extend_from_slice(&bench.job);
+    for wrong in [&bench.job[..bench.job.len() - 1], &twice, b"hello, printer\n", b""] {
+        fs::write(bench.folder.path().join("wrong.rgl"), wrong).unwrap();
+        for to in ["raw:port", "file:out.rgl", "serial:/dev/no-such-port"] {
+            let said = bench.says(1, &format!("send wrong.rgl --to {to}"));
+            assert!(said.contains("not sent") && said.contains("byte"), "{said}");
+        }
+    }
+    assert!(fs::read(&path).unwrap().is_empty(), "something was sent");
+    assert!(!bench.folder.path().join("out.rgl").exists());
+    assert!(!bench.folder.path().join("jobs").exists(), "something was queued");
+}
+
+#[test]
+fn a_file_and_a_raw_device_get_the_job_byte_for_byte() {
+    let bench = Bench::new();
+    bench.says(0, "send job.rgl --to file:copy.rgl");
+    fs::write(bench.folder.path().join("port"), "").unwrap();
+    let said = bench.says(0, "send job.rgl --to raw:port");
+    assert!(said.contains("white (MDC-SCWH)"), "the cassette is named: {said}");
+    assert!(
+        said.contains("whether they are printed only the printer shows"),
+        "queued is not printed: {said}"
+    );
+    for name in ["copy.rgl", "port"] {
+        assert!(fs::read(bench.folder.path().join(name)).unwrap() == bench.job, "{name}");
+    }
+}
+
+#[test]
+fn a_job_whose_bridge_is_not_there_waits_and_can_be_cancelled_without_it() {
+    let bench = Bench::new();
+    let said = bench.says(1, "send job.rgl --to serial:/dev/no-such-port");
+    assert!(said.contains("nothing is printed yet") && said.contains("nothing is there"), "{said}");
+    let listed = bench.says(0, "resume --list");
+    assert!(listed.contains("job.rgl: queued, nothing printed"), "{listed}");
+    let number = listed.split_whitespace().next().unwrap();
+    assert!(said.contains(&format!("foilpress resume {number}")), "{said}");
+    bench.says(1, "resume");
+    let said = bench.says(0, &format!("cancel {number}"));
+    assert!(said.contains("had not taken a byte"), "{said}");
+    assert!(bench.says(1, "resume").contains("no job waits"));
+    assert!(bench.says(1, &format!("resume {number}")).contains("is over"));
+    assert!(bench.says(1, "cancel 12345678").contains("no job 12345678"));
+}
+
+#[test]
+fn a_wrong_destination_is_wrong_usage_and_the_right_ones_are_shown() {
+    let bench = Bench::new();
+    for args in ["send job.rgl", "send job.rgl --to usb:", "cancel 123456789", "bridge status --to file:x"] {
+        bench.says(2, args);
+    }
+    assert!(bench.says(2, "send job.rgl --to paper").contains("serial:/dev/ttyACM0"));
+}

@@ -1,0 +1,71 @@
+//! From a document to the paper, over a bad link, to a printer with an absent-minded operator.
+
+use crate::EVERYTHING;
+use crate::model::{ALL, Job, seeded};
+use crate::wire::{self, World};
+use foilpress::document::{self, Options};
+use foilpress::observe::Silent;
+use foilpress::send::session::Outcome;
+use foilpress::simulate::{Carousel, Lever, Printer, Stock, Trouble, difference, wanted};
+use foilpress::{factor, gamut, pipeline};
+use protocol::link::message::{Fault, JobKind};
+use protocol::paper::Paper;
+use protocol::rgl::Media;
+use rand::RngExt;
+use std::cell::RefCell;
+
+#[test]
+fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
+    let document = document::open("sample:leaf", &Options::default(), &Silent).unwrap();
+    let settings = pipeline::Settings {
+        factor: factor::Settings::default(),
+        gamut: gamut::Settings::default(),
+        inks: inks::InkSet::default(),
+        paper: Paper::Postcard,
+        media: Media::default(),
+        size: Some("12x9mm".parse().unwrap()),
+    };
+    let print = pipeline::print(&document, &inks::Library::builtin(), &settings, &Silent).unwrap();
+    for seed in 0..3 {
+        let mut random = seeded(seed);
+        let cassettes = wanted(&print.job);
+        let printer = RefCell::new(Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto));
+        printer.borrow_mut().load(Stock::of(Paper::Postcard));
+        let troubles = RefCell::new(0);
+        let job = Job { id: 77, kind: JobKind::Raw, data: print.job.clone(), expected: print.job.clone() };
+        let mut boards = wire::boards(&mut random);
+        let mut world =
+            World::new(&job, &mut boards, ALL, EVERYTHING).with_port(Box::new(|bytes, random| {
+                let mut printer = printer.borrow_mut();
+                if let Some(trouble) = printer.trouble() {
+                    // The operator comes by now and then and does what the printer wants.
+                    if random.random_range(0..20) == 0 {
+                        match trouble {
+                            Trouble::CoverOpen => printer.close_cover(),
+                            _ => printer.clear(),
+                        }
+                    }
+                    return (0, Some(Fault::OffLine));
+                }
+                if random.random_range(0..60) == 0 {
+                    *troubles.borrow_mut() += 1;
+                    printer.strike(Trouble::CoverOpen);
+                    return (0, Some(Fault::OffLine));
+                }
+                let count = bytes.len().min(random.random_range(0..3000));
+                (printer.feed(&bytes[..count]).unwrap(), None)
+            }));
+        assert_eq!(world.run(None, &mut random), Outcome::Printed, "seed {seed}");
+        assert!(world.printed == print.job, "seed {seed}");
+        println!(
+            "seed {seed}: {} bytes, {:?}, {} troubles",
+            print.job.len(),
+            world.accidents,
+            troubles.borrow()
+        );
+        drop(world);
+        let printout = printer.borrow_mut().take_printout().expect("the sheet has come out");
+        let sheet = printout.sheet_with(print.sheet.stacks()).unwrap();
+        assert_eq!(difference(&sheet, &print.printed), None, "seed {seed}");
+    }
+}
