@@ -434,8 +434,8 @@ impl<'d> Session<'d> {
         self.contradictions >= CONVINCED
     }
 
-    /// Appends what is to be said now to `out`: at most [`BURST`] bytes and a few. Calls `save` before anything leaves that
-    /// the record has to know of; if that fails nothing leaves.
+    /// Appends what is to be said now to `out`: some kilobytes at most. Calls `save` before anything leaves that the
+    /// record has to know of; if that fails nothing leaves.
     pub fn speak<E>(
         &mut self,
         now: Duration,

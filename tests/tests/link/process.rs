@@ -163,7 +163,7 @@ impl Drop for Bench {
 
 #[test]
 fn a_sender_that_is_killed_again_and_again_costs_nothing() {
-    let bench = Bench::new(5, 8);
+    let bench = Bench::new(5, 24);
     let mut random = seeded(6);
     let mut kills = 0;
     while bench.printed().len() < bench.job.len() && kills < 12 {
@@ -186,7 +186,7 @@ fn a_sender_that_is_killed_again_and_again_costs_nothing() {
 
 #[test]
 fn another_process_cancels_what_a_killed_one_has_begun() {
-    let bench = Bench::new(8, 2);
+    let bench = Bench::new(8, 8);
     let mut child = spawn(&bench.jobs());
     while bench.printed().is_empty() {
         std::thread::sleep(Duration::from_millis(5));
