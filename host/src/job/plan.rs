@@ -163,8 +163,15 @@ impl fmt::Display for Plan {
             )?;
         }
         writeln!(f, "\nThe document's dots are:")?;
-        for stack in &self.stacks {
+        // Sorted, so that what would read 0.0 % stands together at the end.
+        let shown = self.stacks.partition_point(|stack| stack.share >= 0.0005);
+        for stack in &self.stacks[..shown] {
             writeln!(f, "    {:>5.1} %  {:<12} {}", 100.0 * stack.share, stack.stack, stack.words)?;
+        }
+        let rest = &self.stacks[shown..];
+        if !rest.is_empty() {
+            let share: f64 = rest.iter().map(|stack| stack.share).sum();
+            writeln!(f, "    {:>5.1} %  {} other{}", 100.0 * share, rest.len(), plural(rest.len()))?;
         }
         if !self.checks.is_empty() {
             writeln!(f, "\nBefore you print:")?;
