@@ -1,8 +1,15 @@
 //! The project's own chores, so that a person and the gate type the same words.
 //!
 //! `cargo xtask test` is the whole gate: formatting, lints, documents, every test and the bare-metal build
-//! of `protocol` and `bridge`. It runs every step, then says which failed.
+//! of `protocol` and `bridge`. It runs every step, then says which failed. The firmware and its emulator are
+//! chores of their own, because they need more than a Rust compiler.
 
+mod elf;
+mod emulator;
+mod firmware;
+mod uf2;
+
+use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use clap::{Parser, Subcommand};
@@ -23,10 +30,18 @@ enum Task {
     Test,
     /// The benchmarks (results are ratios to read, not tests that pass)
     Bench,
+    /// The bridge's image as UF2, its size against bridge/firmware/budget.toml
+    Firmware,
+    /// The bridge's image on an emulated board with a model printer at its pins (needs Node and npm)
+    Emulator,
 }
 
 fn main() -> ExitCode {
+    // The workspace, wherever this was started from: it is the folder above this package.
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
     let steps: Vec<(&str, Command)> = match Args::parse().task {
+        Task::Firmware => return finish(firmware::build(root).map(drop)),
+        Task::Emulator => return finish(emulator::run(root)),
         Task::Test => vec![
             ("bare-metal target", command("rustup", &["target", "add", BARE_METAL])),
             ("formatting", cargo(&["fmt", "--all", "--check"])),
@@ -69,6 +84,16 @@ fn main() -> ExitCode {
     } else {
         eprintln!("failed: {}", failed.join(", "));
         ExitCode::FAILURE
+    }
+}
+
+fn finish(result: anyhow::Result<()>) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("failed: {error:#}");
+            ExitCode::FAILURE
+        }
     }
 }
 

@@ -1,0 +1,155 @@
+//! The bridge on a Raspberry Pi Pico.
+//!
+//! Everything that can be tested without a board is in the library `bridge`; here is what the board adds: pins, a
+//! strobe engine of PIO and DMA, a USB device, a lamp and a watchdog. Six tasks on one core:
+//!
+//! | task | waits for | does |
+//! |---|---|---|
+//! | `usb::run` | the bus | the device itself |
+//! | `usb::serial`, `usb::bulk` | packets | give them to the engine |
+//! | `usb::answer` | something to say | takes frames from the engine |
+//! | `work` | data, room | lets the engine make printer bytes, a slice at a time |
+//! | `port::serve` | 1 ms, a sent buffer | feeds the strobe engine, looks at the lines, does the engine's errands |
+//! | `watch::run` | 50 ms | lamp, watchdog |
+//!
+//! Memory: 79,040 bytes for a band of the widest page at 1200 dpi, 40 KiB of printer bytes so that the printer has work
+//! while a band is decoded, 12 KiB of window for the link.
+#![no_std]
+#![no_main]
+
+mod pins;
+mod port;
+mod shared;
+mod strobe;
+mod usb;
+mod watch;
+
+use bridge::engine::{Engine, Identity, Memory};
+use embassy_executor::Spawner;
+use embassy_futures::yield_now;
+use embassy_rp::clocks::RoscRng;
+use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::peripherals::{PIO0, USB};
+use embassy_rp::pio::Pio;
+use embassy_rp::watchdog::Watchdog;
+use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
+use shared::{Shared, Side};
+use static_cell::{ConstStaticCell, StaticCell};
+use strobe::{CHUNK, Strobe};
+
+bind_interrupts!(struct Interrupts {
+    USBCTRL_IRQ => usb_driver::InterruptHandler<USB>;
+    PIO0_IRQ_0 => pio::InterruptHandler<PIO0>;
+});
+
+const FLASH_BYTES: usize = 2 * 1024 * 1024;
+
+/// 64 rows of 9880 dots, as `protocol::runs::band_bytes` counts them.
+const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
+
+/// Slices of the engine's work between two looks at who else wants to run.
+const SLICES: usize = 4;
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    // Before anything else: the lines at rest.
+    let board = embassy_rp::init(Default::default());
+    pins::bring_up();
+
+    let number = {
+        let mut flash = Flash::<_, Blocking, FLASH_BYTES>::new_blocking(board.FLASH);
+        let mut number = [0; 8];
+        // A board whose flash does not tell has number 0, which is as good as any if it is the only one.
+        let _ = flash.blocking_unique_id(&mut number);
+        number
+    };
+    let identity = Identity {
+        boot: RoscRng.next_u32(),
+        serial: u64::from_be_bytes(number),
+        firmware: env!("CARGO_PKG_VERSION"),
+    };
+
+    static DATA: ConstStaticCell<[u8; 12 * 1024]> = ConstStaticCell::new([0; 12 * 1024]);
+    static OUTPUT: ConstStaticCell<[u8; 40 * 1024]> = ConstStaticCell::new([0; 40 * 1024]);
+    static BAND: ConstStaticCell<[u8; WIDEST_BAND]> = ConstStaticCell::new([0; WIDEST_BAND]);
+    static SHARED: StaticCell<Shared> = StaticCell::new();
+    let memory = Memory { data: DATA.take(), output: OUTPUT.take(), band: BAND.take() };
+    let shared: &'static Shared = SHARED.init_with(|| Shared::new(Engine::new(memory, identity)));
+
+    let Pio { mut common, sm0, .. } = Pio::new(board.PIO0, Interrupts);
+    let data = [
+        common.make_pio_pin(board.PIN_2),
+        common.make_pio_pin(board.PIN_3),
+        common.make_pio_pin(board.PIN_4),
+        common.make_pio_pin(board.PIN_5),
+        common.make_pio_pin(board.PIN_6),
+        common.make_pio_pin(board.PIN_7),
+        common.make_pio_pin(board.PIN_8),
+        common.make_pio_pin(board.PIN_9),
+    ];
+    let strobe_pin = common.make_pio_pin(board.PIN_10);
+    let busy = common.make_pio_pin(board.PIN_15);
+    static BUFFERS: ConstStaticCell<[[u8; CHUNK]; 2]> = ConstStaticCell::new([[0; CHUNK]; 2]);
+    let [first, second] = BUFFERS.take();
+    let strobe = Strobe::new(
+        &mut common,
+        sm0,
+        data,
+        strobe_pin,
+        busy,
+        [first, second],
+        (board.DMA_CH0, board.DMA_CH1),
+    );
+    pins::bring_up();
+
+    static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
+    static FLOOR: StaticCell<usb::Floor> = StaticCell::new();
+    let floor: &'static usb::Floor = FLOOR.init(usb::Floor::new());
+    let link = usb::build(usb_driver::Driver::new(board.USB, Interrupts), hex(&number, SERIAL.init([0; 16])));
+    // The pools hold one of each task, and each is spawned once.
+    spawner.spawn(usb::run(link.device).unwrap());
+    spawner.spawn(usb::serial(shared, floor, link.serial_in, link.serial_lines).unwrap());
+    spawner.spawn(usb::bulk(shared, floor, link.bulk_in).unwrap());
+    spawner.spawn(usb::answer(shared, floor, link.serial_out, link.bulk_out).unwrap());
+    spawner.spawn(port::serve(shared, strobe).unwrap());
+    spawner.spawn(watch::run(shared, Watchdog::new(board.WATCHDOG)).unwrap());
+    work(shared).await
+}
+
+/// Lets the engine work, a few slices at a time.
+async fn work(shared: &'static Shared) {
+    loop {
+        let more = shared.engine(|engine| {
+            let empty = engine.output().is_empty();
+            let more = (0..SLICES).all(|_| engine.work());
+            (more, empty && !engine.output().is_empty())
+        });
+        if more.1 {
+            shared.wake(Side::Port);
+        }
+        if more.0 {
+            yield_now().await;
+        } else {
+            shared.wake(Side::Link);
+            shared.wait(Side::Work).await;
+        }
+    }
+}
+
+fn hex<'a>(bytes: &[u8; 8], text: &'a mut [u8; 16]) -> &'a str {
+    const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
+    for (pair, &byte) in text.chunks_exact_mut(2).zip(bytes) {
+        pair[0] = DIGITS[usize::from(byte >> 4)];
+        pair[1] = DIGITS[usize::from(byte & 15)];
+    }
+    core::str::from_utf8(text).unwrap_or("0")
+}
+
+/// The buffers off, so that nothing the pins may still do reaches the printer; the watchdog does the rest.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    pins::enable(false);
+    loop {
+        cortex_m::asm::nop();
+    }
+}

@@ -1,0 +1,321 @@
+//! Bytes to the printer without the processor: a PIO program works the strobe, DMA feeds it and counts.
+//!
+//! Problem: a byte every 2.42 µs, each with setup, strobe and hold times that are never too short, no strobe while the
+//! printer is busy or in trouble, and an exact count of what has crossed the port whenever it stops.
+//!
+//! Method: thirteen instructions, one byte each round. The program looks at Busy, PError, Select and nFault together:
+//! before it changes the data (which stand until Busy has fallen) and again, three ticks before the strobe. Behind
+//! every strobe it pushes a word; a DMA channel takes these words away, and its counter *is* the number of bytes that
+//! have crossed. A byte in a FIFO or half way through its setup is not counted and can be taken back.
+//!
+//! One tick is an eighth of the longest time asked for and of one clock cycle more:
+//!
+//! | | ticks | asked for |
+//! |---|---|---|
+//! | data before nStrobe falls | 8 | setup: 8 ticks |
+//! | nStrobe low | 8 | strobe: 8 ticks |
+//! | data after nStrobe rises | 8 at least | hold: 8 ticks |
+//! | nStrobe falling until Busy is looked at | 13 at least | settle: 8 ticks |
+//!
+//! A byte takes 24 ticks when the printer is quick enough: 2.42 µs with the default timing.
+//!
+//! Two buffers take turns, the interrupt of the DMA channel starting the second when the first is through, so the
+//! printer never waits for a task to be scheduled.
+//!
+//! Limits: the handshake is Busy, and all four status lines are heeded. For others, and for everything else the
+//! port can do, there is [`bridge::port::Port`] on the same pins.
+
+use crate::pins;
+use bridge::port::Timing;
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
+use critical_section::{CriticalSection, Mutex};
+use embassy_rp::interrupt;
+use embassy_rp::pac;
+use embassy_rp::pac::dma::vals::{DataSize, TreqSel};
+use embassy_rp::peripherals::{DMA_CH0, DMA_CH1, PIO0};
+use embassy_rp::pio::program::{Instruction, InstructionOperands, JmpCondition};
+use embassy_rp::pio::{Common, Config, Direction, Pin, ShiftDirection, StateMachine};
+use embassy_rp::{Peri, clocks};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use fixed::FixedU32;
+use fixed::types::extra::U8;
+
+/// Bytes in each of the two buffers: at 2.4 µs, 2.4 ms of work for the printer.
+pub const CHUNK: usize = 1024;
+
+/// Busy low, PError low, Select high, nFault high, as the program reads them from Busy upwards.
+const READY: u8 = 0b1100;
+
+/// The instructions during which a byte crosses: from the strobe to the push that counts it.
+const CROSSING: core::ops::RangeInclusive<u8> = 10..=12;
+
+/// Words of the DMA counter between two starts of it.
+const COUNTER: u32 = u32::MAX;
+
+const FEED: usize = 0;
+const TALLY: usize = 1;
+
+/// A buffer has been sent.
+pub static SENT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
+/// What the interrupt starts when the present buffer is through: address and length. Its other half belongs to the
+/// task; both look only inside a critical section.
+static NEXT: Mutex<RefCell<Option<(u32, u32)>>> = Mutex::new(RefCell::new(None));
+
+/// Where the counter's words go.
+static NOWHERE: AtomicU32 = AtomicU32::new(0);
+
+fn start(address: u32, length: u32) {
+    let channel = pac::DMA.ch(FEED);
+    channel.read_addr().write_value(address);
+    channel.write_addr().write_value(pac::PIO0.txf(0).as_ptr() as u32);
+    channel.trans_count().write_value(length);
+    compiler_fence(Ordering::SeqCst);
+    channel.ctrl_trig().write(|w| {
+        w.set_treq_sel(TreqSel::PIO0_TX0);
+        w.set_data_size(DataSize::SIZE_BYTE);
+        w.set_incr_read(true);
+        w.set_chain_to(FEED as u8);
+        w.set_en(true);
+    });
+}
+
+fn feeding() -> bool {
+    pac::DMA.ch(FEED).ctrl_trig().read().busy()
+}
+
+/// Starts the buffer that waits, if the one before is through.
+fn advance(token: CriticalSection<'_>) {
+    if !feeding()
+        && let Some((address, length)) = NEXT.borrow_ref_mut(token).take()
+    {
+        start(address, length);
+    }
+}
+
+#[interrupt]
+fn DMA_IRQ_1() {
+    pac::DMA.ints(1).write_value(1 << FEED);
+    critical_section::with(advance);
+    SENT.signal(());
+}
+
+/// The strobe engine.
+pub struct Strobe {
+    machine: StateMachine<'static, PIO0, 0>,
+    origin: u8,
+    buffers: [&'static mut [u8; CHUNK]; 2],
+    /// The buffer that is filled next.
+    turn: usize,
+    /// Bytes handed over in either buffer that may still be read by DMA, oldest first.
+    given: [u32; 2],
+    /// The counter when it was last asked.
+    tally: u32,
+    /// Handed over and not crossed.
+    in_flight: u32,
+    last: u8,
+}
+
+impl Strobe {
+    /// Loads the program. nStrobe is high by the program's own level afterwards; the pins are still the processor's.
+    pub fn new(
+        common: &mut Common<'static, PIO0>,
+        mut machine: StateMachine<'static, PIO0, 0>,
+        data: [Pin<'static, PIO0>; 8],
+        strobe: Pin<'static, PIO0>,
+        busy: Pin<'static, PIO0>,
+        buffers: [&'static mut [u8; CHUNK]; 2],
+        _channels: (Peri<'static, DMA_CH0>, Peri<'static, DMA_CH1>),
+    ) -> Self {
+        let program = embassy_rp::pio::program::pio_asm!(
+            ".side_set 1",
+            ".wrap_target",
+            "    pull block      side 1",
+            // The byte before must be done with before its data go: they stand until Busy has fallen.
+            "before:",
+            "    mov isr, null   side 1",
+            "    in pins, 4      side 1",
+            "    mov x, isr      side 1",
+            "    jmp x!=y before side 1",
+            // Setup: 4 + 4 ticks. `mov` and not `out`, so that the byte is still there if it has to wait.
+            "    mov pins, osr   side 1 [3]",
+            "    mov isr, null   side 1",
+            "    in pins, 4      side 1",
+            "    mov x, isr      side 1",
+            "    jmp x!=y before side 1",
+            "    nop             side 0 [7]",
+            // Hold: 2 ticks here, 2 for push and pull, 4 for the look at the lines before the data can change.
+            "    nop             side 1 [1]",
+            "    push block      side 1",
+            ".wrap",
+        );
+        let loaded = common.load_program(&program.program);
+        let origin = loaded.origin;
+        let mut config = Config::default();
+        config.use_program(&loaded, &[&strobe]);
+        config.set_out_pins(&data.each_ref());
+        config.set_in_pins(&[&busy]);
+        // To the left: the four levels then are a number from 0 to 15 in the register.
+        config.shift_in.direction = ShiftDirection::Left;
+        machine.set_config(&config);
+        machine.set_pins(embassy_rp::gpio::Level::High, &[&strobe]);
+        machine.set_pin_dirs(Direction::Out, &[&strobe]);
+        machine.set_pin_dirs(Direction::Out, &data.each_ref());
+        let mut engine =
+            Strobe { machine, origin, buffers, turn: 0, given: [0; 2], tally: 0, in_flight: 0, last: 0 };
+        engine.set_timing(&Timing::DEFAULT);
+        engine.rewind();
+        engine.start_tally();
+        pac::DMA.inte(1).modify(|w| *w |= 1 << FEED);
+        // SAFETY: the handler above shares nothing with tasks that is not behind a critical section.
+        unsafe { cortex_m::peripheral::NVIC::unmask(pac::Interrupt::DMA_IRQ_1) };
+        engine
+    }
+
+    /// Sets the times, from the next byte on. Only with nothing in flight.
+    pub fn set_timing(&mut self, timing: &Timing) {
+        let longest = timing.setup.max(timing.strobe).max(timing.hold).max(timing.settle);
+        // Whole clock cycles; one more, because a divider with a fraction may give eight ticks one cycle less than
+        // eight times its value. At most 65.5 µs, so far below the divider's range.
+        let cycles =
+            (u64::from(longest) * u64::from(clocks::clk_sys_freq())).div_ceil(1_000_000_000) as u32 + 1;
+        let divider = (cycles * 256).div_ceil(8);
+        self.machine.set_clock_divider(FixedU32::<U8>::from_bits(divider.max(256)));
+    }
+
+    /// Whether there is a buffer to fill.
+    pub fn has_room(&self) -> bool {
+        self.given[self.turn] == 0
+    }
+
+    /// Bytes handed over that have not crossed the port.
+    pub fn in_flight(&self) -> usize {
+        self.in_flight as usize
+    }
+
+    /// Hands over bytes; says how many were taken.
+    pub fn give(&mut self, bytes: &[u8]) -> usize {
+        if !self.has_room() || bytes.is_empty() {
+            return 0;
+        }
+        let count = bytes.len().min(CHUNK);
+        let buffer = &mut self.buffers[self.turn];
+        buffer[..count].copy_from_slice(&bytes[..count]);
+        self.last = bytes[count - 1];
+        let address = buffer.as_ptr() as u32;
+        self.given[self.turn] = count as u32;
+        self.turn ^= 1;
+        self.in_flight += count as u32;
+        critical_section::with(|token| {
+            advance(token);
+            if feeding() {
+                NEXT.borrow_ref_mut(token).replace((address, count as u32));
+            } else {
+                start(address, count as u32);
+            }
+        });
+        count
+    }
+
+    /// How many bytes have crossed the port since this was last asked.
+    pub fn crossed(&mut self) -> usize {
+        let tally = COUNTER - pac::DMA.ch(TALLY).trans_count().read();
+        let fresh = tally - self.tally;
+        self.tally = tally;
+        self.in_flight -= fresh;
+        // Buffers are emptied in turn; `turn` is the older one if both are in use.
+        let mut left = fresh;
+        for which in [self.turn, self.turn ^ 1] {
+            let part = left.min(self.given[which]);
+            self.given[which] -= part;
+            left -= part;
+        }
+        if self.in_flight == 0 && self.tally > COUNTER / 2 {
+            self.start_tally();
+        }
+        fresh as usize
+    }
+
+    /// Stops and forgets what has not crossed the port; says how much has since it was last asked. No byte is cut
+    /// in two: if nStrobe is low, its time is waited for, ten microseconds at most with the slowest timing.
+    pub fn stop(&mut self) -> usize {
+        critical_section::with(|token| NEXT.borrow_ref_mut(token).take());
+        pac::DMA.inte(1).modify(|w| *w &= !(1 << FEED));
+        pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << FEED));
+        while feeding() {}
+        // An aborted channel may raise its interrupt.
+        pac::DMA.ints(1).write_value(1 << FEED);
+        pac::DMA.inte(1).modify(|w| *w |= 1 << FEED);
+        loop {
+            self.machine.set_enable(false);
+            let at = self.machine.get_addr() - self.origin;
+            if !CROSSING.contains(&at) {
+                break;
+            }
+            self.machine.set_enable(true);
+            cortex_m::asm::delay(20);
+        }
+        while !self.machine.rx().empty() {}
+        // The last word may be on its way through the DMA.
+        cortex_m::asm::delay(20);
+        let crossed = self.crossed();
+        self.given = [0; 2];
+        self.in_flight = 0;
+        self.rewind();
+        crossed
+    }
+
+    /// The last byte that was handed over: what the data lines show, or would show.
+    pub fn last(&self) -> u8 {
+        self.last
+    }
+
+    /// To the beginning of the program, with empty FIFOs.
+    fn rewind(&mut self) {
+        self.machine.set_enable(false);
+        self.machine.clear_fifos();
+        self.machine.restart();
+        self.machine.clkdiv_restart();
+        let jump = Instruction {
+            operands: InstructionOperands::JMP { condition: JmpCondition::Always, address: self.origin },
+            delay: 0,
+            side_set: Some(1),
+        };
+        let ready = Instruction {
+            operands: InstructionOperands::SET {
+                destination: embassy_rp::pio::program::SetDestination::Y,
+                data: READY,
+            },
+            delay: 0,
+            side_set: Some(1),
+        };
+        let side_set = embassy_rp::pio::program::SideSet::new(false, 1, false);
+        // SAFETY: the machine stands still; both are instructions of its own kind with nStrobe high, and the program
+        // is where it was loaded.
+        unsafe {
+            self.machine.exec_instr(ready.encode(side_set));
+            self.machine.exec_instr(jump.encode(side_set));
+        }
+        self.machine.set_enable(true);
+    }
+
+    fn start_tally(&mut self) {
+        let channel = pac::DMA.ch(TALLY);
+        pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << TALLY));
+        while channel.ctrl_trig().read().busy() {}
+        channel.read_addr().write_value(pac::PIO0.rxf(0).as_ptr() as u32);
+        channel.write_addr().write_value(NOWHERE.as_ptr() as u32);
+        channel.trans_count().write_value(COUNTER);
+        channel.ctrl_trig().write(|w| {
+            w.set_treq_sel(TreqSel::PIO0_RX0);
+            w.set_data_size(DataSize::SIZE_WORD);
+            w.set_chain_to(TALLY as u8);
+            w.set_en(true);
+        });
+        self.tally = 0;
+    }
+}
+
+const _: () = assert!(pins::BUSY == pins::ACK + 1 && pins::STROBE == pins::DATA + 8);

@@ -1,0 +1,130 @@
+// A board, a printer and a program on the workstation, put together.
+
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { Board } from './board.mjs';
+import { Frames, ask, begin, data, hello, parse } from './frames.mjs';
+import { Printer } from './printer.mjs';
+import { Host } from './usb.mjs';
+
+export const MS = 1_000_000;
+export const RAW = 0;
+export const STREAMS = 1;
+
+const { FOILPRESS_IMAGE: image, FOILPRESS_JOBS: jobs } = process.env;
+
+/// Why the tests cannot run, or false.
+export const skip = image && jobs ? false : 'run by `cargo xtask emulator`, which builds the image';
+
+export const job = (name) => new Uint8Array(readFileSync(join(jobs, name)));
+
+export class Bench {
+  constructor(settings) {
+    this.board = new Board(new Uint8Array(readFileSync(image)));
+    this.printer = new Printer(this.board, settings);
+    this.host = new Host(this.board);
+    this.frames = new Frames();
+    this.heard = [];
+    this.progress = null;
+    this.requests = 0;
+  }
+
+  /// Runs the board until a promise is kept.
+  async until(promise, limitMs = 2000) {
+    let [settled, result, failure] = [false, undefined, undefined];
+    promise.then((value) => { [settled, result] = [true, value]; }, (error) => { [settled, failure] = [true, error]; });
+    if (!(await this.board.run(() => settled, limitMs * MS))) throw new Error(`nothing after ${limitMs} ms of the board's time`);
+    if (failure) throw failure;
+    return result;
+  }
+
+  pass(ms) {
+    return this.board.run(() => false, ms * MS);
+  }
+
+  /// Plugs the board in and opens `way`: 'serial' or 'bulk'.
+  async connect(way) {
+    this.device = await this.until(this.host.enumerate());
+    await this.open(way);
+    this.greeted = this.board.now;
+    await this.say(hello());
+    await this.hear(({ kind, at }) => kind === 'hello' && at > this.greeted);
+  }
+
+  async open(way) {
+    const kind = way === 'serial' ? 0x0a : 0xff;
+    this.end = this.device.interfaces.find((one) => one.class === kind);
+    if (way === 'serial') await this.until(this.host.openSerial(this.end.number - 1, true));
+    this.host.read(this.end.in, (packet) => this.listen(packet));
+  }
+
+  /// The cable is pulled and plugged in again: nothing of what was under way arrives. Then hello, and where a job stands.
+  async replug(way) {
+    const { host } = this;
+    host.attached = new Promise((resolve) => { host.onReset = resolve; });
+    host.read(this.end.in, null);
+    host.queues.clear();
+    host.armed.clear();
+    host.usb.resetDevice();
+    this.frames = new Frames();
+    await this.connect(way);
+    return (await this.hear(({ kind, at }) => kind === 'progress' && at > this.greeted)).accepted;
+  }
+
+  listen(packet) {
+    for (const message of this.frames.feed(packet)) {
+      const heard = { at: this.board.now, ...parse(message) };
+      this.heard.push(heard);
+      if (heard.kind === 'progress') this.progress = heard;
+    }
+  }
+
+  say(bytes) {
+    return this.until(this.host.write(this.end.out, bytes));
+  }
+
+  /// The first message from now on, or of those not looked at yet, that fits.
+  async hear(fits, limitMs = 2000) {
+    let found;
+    const look = () => {
+      const at = this.heard.findIndex(fits);
+      if (at >= 0) [found] = this.heard.splice(at, 1);
+      return found !== undefined;
+    };
+    if (!(await this.board.run(look, limitMs * MS))) {
+      throw new Error(`not heard in ${limitMs} ms; last progress ${JSON.stringify(this.progress)}, printed ${this.printer.taken.length}`);
+    }
+    return found;
+  }
+
+  /// Sends a job and waits for its end, keeping to the credits; `piece` bytes in a frame.
+  async print(number, kind, bytes, { piece = 900, limitMs = 20_000, from = 0, until = () => false } = {}) {
+    await this.say(begin(number, kind, bytes.length));
+    await this.hear((heard) => heard.kind === 'progress' && heard.job === number);
+    let [next, sending, stop] = [from, false, false];
+    const ended = () => ['done', 'cancelled', 'broken', 'lost'].includes(this.progress.state) && this.progress.job === number;
+    const step = () => {
+      stop ||= until(next);
+      // Never in the middle of a frame.
+      if (ended() || (stop && !sending)) return true;
+      if (!sending && !stop && next < Math.min(this.progress.limit, bytes.length)) {
+        const end = Math.min(next + piece, this.progress.limit, bytes.length);
+        sending = true;
+        this.host.write(this.end.out, data(number, next, bytes.subarray(next, end))).then(() => { sending = false; });
+        next = end;
+      }
+      return false;
+    };
+    if (!(await this.board.run(step, limitMs * MS))) {
+      throw new Error(`the job does not end: sent ${next} of ${bytes.length}, ${JSON.stringify(this.progress)}, taken ${this.printer.taken.length}`);
+    }
+    return this.progress;
+  }
+
+  /// Asks, and gives the answer.
+  async ask(what, limitMs = 3000) {
+    const request = ++this.requests;
+    await this.say(ask(request, what));
+    return this.hear((heard) => heard.request === request, limitMs);
+  }
+}

@@ -1,0 +1,154 @@
+// The board: an RP2040 that runs the real image, with a clock that its PIO block keeps too.
+//
+// rp2040js runs state machines in bursts of its own and knows neither their clock divider nor the delays in their
+// instructions. Here they are stepped by the same clock as the processor, so an edge at a pin happens at the
+// nanosecond it would happen on silicon, give or take the fraction of a divided clock.
+
+import { BasePeripheral, RP2040 } from 'rp2040js';
+
+const NS_PER_CYCLE = 8; // 125 MHz
+const FLASH = 0x10000000;
+
+// While the processor sleeps, time goes on in steps of at most this, so that what the test does is not late.
+const MOST_NS = 20_000;
+
+/// A boot ROM of a few instructions: the two functions the image calls, and a table look-up that finds them. The
+/// real one cannot be kept here, and nothing else of it is needed.
+function bootRom(rom) {
+  const half = (address, ...values) => {
+    for (const [i, value] of values.entries()) {
+      const at = address + 2 * i;
+      const shift = (at & 2) * 8;
+      rom[at >> 2] = ((rom[at >> 2] & ~(0xffff << shift)) | (value << shift)) >>> 0;
+    }
+  };
+  half(0x14, 0x0001); // the table: never looked into
+  half(0x18, 0x0031); // the look-up
+  // r1 is the function's name. "C4" (memcpy44) is at 0x50, everything else does nothing, at 0x48.
+  half(0x30, 0x4a03, 0x4291, 0xd001); //     ldr r2, [pc, #12]; cmp r1, r2; beq 0x3a
+  half(0x36, 0x2049, 0x4770); //             movs r0, #0x49; bx lr
+  half(0x3a, 0x2051, 0x4770); //             movs r0, #0x51; bx lr
+  half(0x40, 0x3443, 0x0000); //             "C4"
+  half(0x48, 0x4770); //                     bx lr
+  half(0x50, 0x3a04, 0x588b, 0x5083, 0xd1fb, 0x4770); // subs r2, #4; ldr r3, [r1, r2]; str r3, [r0, r2]; bne; bx lr
+}
+
+/// A peripheral whose registers are all zero.
+class Quiet extends BasePeripheral {
+  readUint32() { return 0; }
+  writeUint32() {}
+}
+
+/// Puts a UF2 image into the flash.
+function load(chip, image) {
+  const view = new DataView(image.buffer, image.byteOffset, image.byteLength);
+  for (let at = 0; at < image.length; at += 512) {
+    if (view.getUint32(at, true) !== 0x0a324655) throw new Error(`block ${at / 512} is no UF2`);
+    const address = view.getUint32(at + 12, true);
+    const length = view.getUint32(at + 16, true);
+    chip.flash.set(image.subarray(at + 32, at + 32 + length), address - FLASH);
+  }
+}
+
+export class Board {
+  constructor(image) {
+    this.chip = new RP2040();
+    this.clock = this.chip.clock;
+    this.chip.logger = {
+      debug() {},
+      // rp2040js only reports this instruction. Without its effect a task that wakes itself sleeps on.
+      info: (part, text) => { if (text === 'SEV') this.chip.core.eventRegistered = true; },
+      warn() {},
+      error: (part, text) => this.complaints.push(`${part}: ${text}`),
+    };
+    this.complaints = [];
+    bootRom(this.chip.bootrom);
+    load(this.chip, image);
+    // The cache's controller is not modelled; its stream of nothing is at its end.
+    this.chip.peripherals[0x14000] = new Quiet(this.chip, 'XIP_CTRL');
+    // As the boot ROM leaves it.
+    this.chip.core.SP = 0x20041f00;
+    this.chip.core.LR = 0;
+    this.chip.core.PC = FLASH;
+    this.instructions = 0;
+    // A pin that was never told reads low; the lines of a printer are told by the printer.
+    this.machines = [];
+    for (const pio of this.chip.pio) {
+      pio.run = () => {};
+      for (const machine of pio.machines) {
+        // A fresh machine has an empty output register (rp2040js begins with a full one).
+        machine.outputShiftCount = 32;
+        this.machines.push({ pio, machine, due: 0, idle: 0 });
+      }
+    }
+    this.watchdogBites = 0;
+    this.chip.peripherals[0x40058].onWatchdogTrigger = () => { this.watchdogBites += 1; };
+  }
+
+  get now() {
+    return this.clock.nanos;
+  }
+
+  pin(number) {
+    return this.chip.gpio[number];
+  }
+
+  /// Runs until `done()` or, at the latest, for `limitNs` of the board's time. Promises go on in between.
+  async run(done, limitNs) {
+    const end = this.now + limitNs;
+    while (!done()) {
+      if (this.now >= end) return false;
+      for (let i = 0; i < 400 && this.now < end; i++) this.step();
+      // Not only promises but timers and sockets of the test, now and then.
+      await ((this.turns = (this.turns + 1) | 0) % 64 === 0 ? new Promise(setImmediate) : null);
+    }
+    return true;
+  }
+
+  turns = 0;
+
+  step() {
+    const { chip, clock } = this;
+    if (chip.core.waiting) {
+      const alarm = clock.nextAlarm ? clock.nanosToNextAlarm : MOST_NS;
+      this.pass(Math.min(Math.max(alarm, NS_PER_CYCLE), MOST_NS));
+    } else {
+      this.instructions += 1;
+      this.pass(chip.core.executeInstruction() * NS_PER_CYCLE);
+    }
+  }
+
+  /// Time passes for everything but the processor.
+  pass(ns) {
+    const end = this.now + ns;
+    for (;;) {
+      let next = null;
+      for (const one of this.machines) {
+        const { machine } = one;
+        if (!machine.enabled) {
+          one.due = 0;
+          continue;
+        }
+        if (one.due === 0) one.due = this.now;
+        if (one.due < end && (next === null || one.due < next.due)) next = one;
+      }
+      if (next === null) break;
+      if (next.due > this.now) this.clock.tick(next.due - this.now);
+      // An alarm may have switched it off.
+      if (next.machine.enabled) this.stepMachine(next);
+    }
+    if (end > this.now) this.clock.tick(end - this.now);
+    // The processor may wake by what happened before its time is up; it then is at most 20 µs late.
+  }
+
+  stepMachine(one) {
+    const { pio, machine } = one;
+    const before = machine.cycles;
+    machine.step();
+    pio.checkChangedPins();
+    // `cycles` grows by one for an instruction and by its delay; by nothing while it waits.
+    const ticks = Math.max(1, machine.cycles - before);
+    const divider = (machine.clockDivInt || 65536) + machine.clockDivFrac / 256;
+    one.due += ticks * divider * NS_PER_CYCLE;
+  }
+}

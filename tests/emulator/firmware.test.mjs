@@ -1,0 +1,323 @@
+// The real image, from power-on to the last byte at the printer.
+
+import assert from 'node:assert/strict';
+import { test } from 'node:test';
+import { Bench, MS, RAW, STREAMS, job, skip } from './bench.mjs';
+import { cancel, configure, data, drive, hello, initialise } from './frames.mjs';
+import { waveform } from './printer.mjs';
+
+const LINES = 0, STATUS = 1, DEVICE_ID = 2;
+// 800 ns each, and a clock cycle of what an edge may be late.
+const STANDARD = 792;
+
+const same = (taken, expected) => {
+  assert.equal(taken.length, expected.length, 'number of bytes');
+  const at = taken.findIndex((byte, i) => byte !== expected[i]);
+  assert.equal(at, -1, `first difference at byte ${at}`);
+};
+
+/// Every time kept, no strobe while the printer was not ready.
+const legal = (printer, least = STANDARD) => {
+  const { shortest, wrong } = waveform(printer.edges);
+  assert.deepEqual(wrong.slice(0, 3), []);
+  for (const time of ['setup', 'strobe', 'hold']) assert.ok(shortest[time] >= least, `${time} ${shortest[time]} ns`);
+  return shortest;
+};
+
+test('a composite device appears, with a serial port and bulk endpoints', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const { device, names, interfaces } = bench.device;
+  assert.deepEqual([...device.subarray(4, 7)], [0xef, 2, 1]);
+  assert.deepEqual(names.slice(0, 2), ['Foilpress', 'Foilpress bridge']);
+  assert.match(names[2], /^[0-9A-F]{16}$/);
+  assert.deepEqual(interfaces.map((one) => one.class), [2, 10, 0xff]);
+  assert.deepEqual(bench.board.complaints, []);
+});
+
+test('nothing is strobed before the host asks for it, and nOE goes low only with the lines at rest', { skip }, async () => {
+  const bench = new Bench();
+  const seen = [];
+  const strobe = bench.board.pin(10), enable = bench.board.pin(20);
+  enable.addListener(() => seen.push([enable.value, strobe.value, bench.board.pin(12).value, bench.board.pin(13).value]));
+  await bench.connect('serial');
+  await bench.pass(50);
+  assert.deepEqual(seen.at(-1), [0, 1, 1, 0], 'nOE low, nStrobe and nInit high, nSelectIn low');
+  assert.deepEqual(bench.printer.taken, []);
+  assert.equal(bench.printer.edges.filter(({ line }) => line === 'strobe' || line === 'init').length, 0);
+});
+
+for (const way of ['serial', 'bulk']) {
+  test(`a raw job over ${way} arrives byte for byte, within the timing`, { skip }, async (t) => {
+    const bench = new Bench();
+    await bench.connect(way);
+    const bytes = job('page.rgl');
+    const start = bench.board.now;
+    const progress = await bench.print(7, RAW, bytes);
+    assert.equal(progress.state, 'done');
+    assert.equal(progress.printed, bytes.length);
+    same(bench.printer.taken, bytes);
+    const shortest = legal(bench.printer);
+    const seconds = (bench.board.now - start) / 1e9;
+    t.diagnostic(`${bytes.length} bytes, ${(bytes.length / seconds / 1000).toFixed(0)} kB/s, ${JSON.stringify(shortest)} ns`);
+    assert.equal(bench.frames.damaged, 0);
+  });
+}
+
+test('pass streams become the bytes that the workstation writes into a file', { skip }, async (t) => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  for (const [number, name] of [[1, 'small'], [2, 'page']]) {
+    const expected = job(`${name}.rgl`), streams = job(`${name}.streams`);
+    bench.printer.taken = [];
+    const start = bench.board.now, before = bench.board.instructions;
+    const progress = await bench.print(number, STREAMS, streams);
+    assert.equal(progress.state, 'done');
+    same(bench.printer.taken, expected);
+    const seconds = (bench.board.now - start) / 1e9;
+    t.diagnostic(`${name}: ${streams.length} bytes become ${expected.length}, ${(expected.length / seconds / 1000).toFixed(0)} kB/s at the port, ${bench.board.instructions - before} instructions`);
+  }
+  legal(bench.printer);
+});
+
+for (const [line, level, state] of [['paperOut', 1, 'paper out'], ['select', 0, 'off line'], ['fault', 0, 'error']]) {
+  test(`a printer that says "${state}" stops the job, and it goes on without a byte lost or doubled`, { skip }, async () => {
+    const bench = new Bench();
+    await bench.connect('bulk');
+    const bytes = job('small.rgl');
+    bench.printer.pauses = [{ after: 700, line, level, ns: 30 * MS }];
+    const { printer } = bench;
+    let stopped;
+    const progress = await bench.print(3, RAW, bytes, {
+      until: () => {
+        if (bench.progress.state === 'stopped') stopped ??= [bench.progress.detail, printer.taken.length];
+        return false;
+      },
+    });
+    assert.equal(progress.state, 'done');
+    assert.deepEqual(stopped, [state, 700]);
+    same(printer.taken, bytes);
+    legal(printer);
+  });
+}
+
+test('a slow printer sets the pace', { skip }, async () => {
+  const bench = new Bench({ busyAfter: 500, work: 40_000, ack: 5_000 });
+  await bench.connect('bulk');
+  const bytes = job('small.rgl').subarray(0, 3000);
+  await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length >= 1200 });
+  same(bench.printer.taken.slice(0, 1200), bytes.subarray(0, 1200));
+  legal(bench.printer);
+});
+
+test('slower timing is kept to', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  await bench.say(configure({ setup: 5000, strobe: 3000, hold: 2000, settle: 1000 }));
+  const bytes = job('small.rgl');
+  await bench.print(3, RAW, bytes);
+  same(bench.printer.taken, bytes);
+  const { setup, strobe, hold } = legal(bench.printer);
+  assert.ok(setup >= 5000 && strobe >= 3000 && hold >= 2000);
+});
+
+test('the handshake by nAck, worked by the processor, delivers the same', { skip }, async (t) => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  await bench.say(configure({ setup: 800, strobe: 800, hold: 800, settle: 500, handshake: 1 }));
+  const bytes = job('small.rgl');
+  const start = bench.board.now;
+  assert.equal((await bench.print(3, RAW, bytes)).state, 'done');
+  same(bench.printer.taken, bytes);
+  legal(bench.printer, 800);
+  t.diagnostic(`${((bytes.length / (bench.board.now - start)) * 1e6).toFixed(0)} kB/s`);
+});
+
+test('a status question is answered at once while data are under way', { skip }, async (t) => {
+  const bench = new Bench({ work: 20_000 });
+  await bench.connect('bulk');
+  const bytes = job('page.rgl');
+  await bench.print(3, RAW, bytes, { until: (sent) => sent > 9000 });
+  const waits = [];
+  for (let i = 0; i < 5; i++) {
+    const asked = bench.board.now;
+    const answer = await bench.ask(LINES);
+    waits.push((answer.at - asked) / MS);
+    await bench.pass(7);
+  }
+  t.diagnostic(`ms: ${waits.map((ms) => ms.toFixed(2)).join(' ')}`);
+  assert.ok(Math.max(...waits) <= 5);
+});
+
+test('a cancelled job is brought to a legal end', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('page.rgl');
+  await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length > 5000 });
+  await bench.say(cancel(3));
+  await bench.hear(({ kind, state }) => kind === 'progress' && state === 'cancelled');
+  const taken = bench.printer.taken;
+  assert.ok(taken.length < bytes.length);
+  // End of raster, one form feed, end of RGL, reset.
+  assert.deepEqual(taken.slice(-11), [0x1b, 0x2a, 0x72, 0x43, 0x0c, 0x1b, 0x25, 0x00, 0x58, 0x1b, 0x65]);
+  legal(bench.printer);
+  bench.printer.taken = [];
+  const next = job('small.rgl');
+  assert.equal((await bench.print(4, RAW, next)).state, 'done');
+  same(bench.printer.taken, next);
+});
+
+test('the serial port is closed in the middle, and the job goes on over the other way', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('serial');
+  const bytes = job('page.rgl');
+  await bench.print(3, RAW, bytes, { until: (sent) => sent > 6000 });
+  const serial = bench.end;
+  await bench.pass(2);
+  bench.host.read(serial.in, null);
+  await bench.until(bench.host.openSerial(serial.number - 1, false));
+  await bench.pass(5);
+  await bench.open('bulk');
+  await bench.say(hello());
+  await bench.hear(({ kind }) => kind === 'hello');
+  const { accepted } = await bench.hear(({ kind, job: number }) => kind === 'progress' && number === 3);
+  assert.equal((await bench.print(3, RAW, bytes, { from: accepted })).state, 'done');
+  same(bench.printer.taken, bytes);
+});
+
+test('a bus reset in the middle of a job costs nothing', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('page.rgl');
+  await bench.print(3, RAW, bytes, { until: (sent) => sent > 6000 });
+  await bench.pass(2);
+  const accepted = await bench.replug('bulk');
+  assert.equal((await bench.print(3, RAW, bytes, { from: accepted })).state, 'done');
+  same(bench.printer.taken, bytes);
+});
+
+test('garbage and repeated data change nothing', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('small.rgl');
+  await bench.say(Uint8Array.from({ length: 3000 }, (_, i) => (i * 131 + (i >> 3)) & 255));
+  // As every host does that opens the link: ends whatever stands in the reader.
+  await bench.say(Uint8Array.of(0));
+  await bench.print(3, RAW, bytes, { until: (sent) => sent > 1000 });
+  await bench.say(data(3, 0, bytes.subarray(0, 800)));
+  await bench.say(data(3, 5, bytes.subarray(5, 300)));
+  await bench.pass(2);
+  assert.equal((await bench.print(3, RAW, bytes, { from: bench.progress.accepted })).state, 'done');
+  same(bench.printer.taken, bytes);
+});
+
+test('the device ID and the status answer are read in nibble mode, and forward printing goes on', { skip }, async () => {
+  const text = 'MFG:ALPS;MDL:MD-5500;CLS:PRINTER;';
+  const id = [0, text.length + 2, ...new TextEncoder().encode(text)];
+  const status = [2, 0x80, 33, 0, 0x10, ...Array.from({ length: 32 }, (_, i) => (i * 37) & 255), 3];
+  const bench = new Bench({ id, status });
+  await bench.connect('bulk');
+  assert.deepEqual([...(await bench.ask(DEVICE_ID)).answer], id);
+  assert.deepEqual([...(await bench.ask(STATUS)).answer], status);
+  assert.deepEqual(bench.printer.taken, [5, 1]);
+  bench.printer.taken = [];
+  const bytes = job('small.rgl');
+  assert.equal((await bench.print(3, RAW, bytes)).state, 'done');
+  same(bench.printer.taken, bytes);
+  legal(bench.printer);
+});
+
+test('a printer that knows no IEEE 1284 is told apart and printed on', { skip }, async () => {
+  const bench = new Bench({ negotiates: false });
+  await bench.connect('bulk');
+  assert.equal((await bench.ask(DEVICE_ID)).answer, 'one-way');
+  const bytes = job('small.rgl');
+  assert.equal((await bench.print(3, RAW, bytes)).state, 'done');
+  same(bench.printer.taken, bytes);
+});
+
+test('a wiring test sets every line, and the next job begins from rest', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  for (let bit = 0; bit < 8; bit++) {
+    await bench.say(drive(1 << bit, 0b0111));
+    await bench.pass(3);
+    assert.equal(bench.printer.out.data, 1 << bit);
+  }
+  await bench.say(drive(0, 0b1010));
+  await bench.pass(3);
+  const { strobe, autoFeed, init, selectIn } = bench.printer.out;
+  assert.deepEqual([strobe, autoFeed, init, selectIn], [0, 1, 0, 1]);
+  bench.printer.taken = [];
+  bench.printer.edges = [];
+  await bench.say(initialise());
+  await bench.pass(3);
+  const bytes = job('small.rgl');
+  assert.equal((await bench.print(3, RAW, bytes)).state, 'done');
+  same(bench.printer.taken, bytes);
+});
+
+test('a printer that is switched off in the middle loses the job, and nothing more is sent', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('page.rgl');
+  await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length > 3000 });
+  for (const [line, level] of [['busy', 1], ['power', 0]]) bench.printer.set(line, level);
+  bench.printer.readyAt = Infinity;
+  const { taken } = bench.printer;
+  const had = taken.length;
+  await bench.hear(({ kind, state }) => kind === 'progress' && state === 'lost');
+  bench.printer.readyAt = 0;
+  for (const [line, level] of [['power', 1], ['busy', 0], ['ack', 1]]) bench.printer.set(line, level);
+  await bench.pass(50);
+  assert.equal(taken.length, had);
+});
+
+/// Numbers from 0 to `below` - 1, the same for the same seed (mulberry32).
+const random = (seed) => (below) => {
+  seed = (seed + 0x6d2b79f5) | 0;
+  let value = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+  value = (value + Math.imul(value ^ (value >>> 7), 61 | value)) ^ value;
+  return ((value ^ (value >>> 14)) >>> 0) % below;
+};
+
+test('whatever happens on the cables, the printer gets the same bytes', { skip }, async (t) => {
+  const runs = Number(process.env.FOILPRESS_RUNS ?? 8);
+  const happened = {};
+  for (let seed = 1; seed <= runs; seed++) {
+    const pick = random(seed);
+    const bench = new Bench({ busyAfter: pick(500), work: 200 + pick(4000), ack: 500 + pick(2000) });
+    const [kind, name] = pick(2) ? [RAW, 'small.rgl'] : [STREAMS, 'small.streams'];
+    const [bytes, expected] = [job(name), job('small.rgl')];
+    for (let i = pick(3); i > 0; i--) {
+      const [line, level] = [[null, 1], ['paperOut', 1], ['select', 0], ['fault', 0]][pick(4)];
+      bench.printer.pauses.push({ after: 1 + pick(expected.length - 1), line, level, ns: pick(10 * MS) });
+    }
+    await bench.connect(pick(2) ? 'bulk' : 'serial');
+    let from = 0;
+    for (let i = 1 + pick(4); i > 0; i--) {
+      const at = from + pick(3000);
+      await bench.print(3, kind, bytes, { from, piece: 1 + pick(900), until: (sent) => sent >= at });
+      const what = ['replug', 'garbage', 'repeat', 'damage', 'gap'][pick(5)];
+      happened[what] = (happened[what] ?? 0) + 1;
+      const broken = data(3, bench.progress.accepted, bytes.subarray(0, 300));
+      broken[1 + pick(broken.length - 2)] ^= 1 << pick(8);
+      if (what === 'replug') await bench.replug(pick(2) ? 'bulk' : 'serial');
+      if (what === 'garbage') await bench.say(Uint8Array.from({ length: 1 + pick(2500) }, () => pick(256)));
+      const again = pick(bench.progress.accepted + 1);
+      if (what === 'repeat') await bench.say(data(3, again, bytes.subarray(again, again + 300)));
+      if (what === 'damage') await bench.say(broken);
+      if (what === 'gap') await bench.say(data(3, bench.progress.accepted + 5000, bytes.subarray(0, 100)));
+      await bench.pass(pick(10));
+      await bench.say(Uint8Array.of(0));
+      await bench.say(hello());
+      const asked = bench.board.now;
+      from = (await bench.hear(({ kind: heard, job: number, at: when }) => heard === 'progress' && number === 3 && when > asked)).accepted;
+      if (bench.progress.state === 'done') break;
+    }
+    assert.equal((await bench.print(3, kind, bytes, { from })).state, 'done', `seed ${seed}`);
+    same(bench.printer.taken, expected);
+    legal(bench.printer);
+  }
+  t.diagnostic(`${runs} runs, ${JSON.stringify(happened)}`);
+});

@@ -1,0 +1,153 @@
+// The printer at the end of the cable: its side of the handshake, and a record of every edge.
+//
+// Compatibility mode as in IEEE 1284: Busy rises some time after the strobe falls, then comes the work on the byte,
+// then a pulse on nAck, and Busy falls with its end. Nibble mode answers a negotiation with the device ID or with
+// what the printer has to say. A byte strobed before the printer is ready is lost, as on a real one.
+
+const [DATA, STROBE, AUTO_FEED, INIT, SELECT_IN] = [2, 10, 11, 12, 13];
+const LINES = { ack: 14, busy: 15, paperOut: 16, select: 17, fault: 18, power: 21 };
+const ENABLE = 20;
+const LOW = 0;
+
+export class Printer {
+  constructor(board, { busyAfter = 300, work = 1000, ack = 500, id = null, negotiates = true, status = null } = {}) {
+    Object.assign(this, { board, busyAfter, work, ack, id, negotiates, status });
+    this.taken = [];
+    this.edges = [];
+    this.resets = 0;
+    this.pauses = []; // { after, line, level, ns }
+    this.phase = 'forward';
+    this.readyAt = 0;
+    this.level = {};
+    for (const [line, level] of Object.entries({ ack: 1, busy: 0, paperOut: 0, select: 1, fault: 1, power: 1 })) this.set(line, level);
+    // What the cable shows before the buffers are enabled: pull-ups.
+    this.out = { strobe: 1, autoFeed: 1, init: 1, selectIn: 1, data: 0xff };
+    const outputs = [STROBE, AUTO_FEED, INIT, SELECT_IN, ENABLE, ...Array.from({ length: 8 }, (_, i) => DATA + i)];
+    for (const pin of outputs) board.pin(pin).addListener(() => this.look());
+  }
+
+  /// Drives one of the printer's own lines.
+  set(line, level) {
+    if (this.level[line] === level) return;
+    this.level[line] = level;
+    this.edges.push({ at: this.board.now, line, level });
+    this.board.pin(LINES[line]).setInputValue(level === 1);
+  }
+
+  later(ns, act) {
+    this.board.clock.createAlarm(act).schedule(ns);
+  }
+
+  /// The host's end of the cable has changed somewhere.
+  look() {
+    const high = (pin) => (this.enabled && this.board.pin(pin).value === LOW ? 0 : 1);
+    this.enabled = this.board.pin(ENABLE).value === LOW;
+    const before = this.out;
+    let data = 0;
+    for (let bit = 0; bit < 8; bit++) data |= high(DATA + bit) << bit;
+    this.out = { strobe: high(STROBE), autoFeed: high(AUTO_FEED), init: high(INIT), selectIn: high(SELECT_IN), data };
+    for (const line of ['data', 'selectIn', 'autoFeed', 'init', 'strobe']) {
+      if (before[line] === this.out[line]) continue;
+      this.edges.push({ at: this.board.now, line, level: this.out[line] });
+      this.react(line, this.out[line]);
+    }
+  }
+
+  react(line, level) {
+    if (line === 'init' && level === 0) this.resets += 1;
+    if (line === 'strobe' && level === 0 && this.phase === 'forward') this.take();
+    if (this.negotiates) this.converse(line, level);
+  }
+
+  take() {
+    if (this.board.now < this.readyAt) return;
+    this.taken.push(this.out.data);
+    const pauses = this.pauses.filter(({ after }) => after === this.taken.length);
+    let busy = this.work;
+    for (const { line, level, ns } of pauses) {
+      busy = Math.max(busy, ns);
+      if (line) {
+        this.later(this.busyAfter, () => this.set(line, level));
+        this.later(this.busyAfter + ns, () => this.set(line, 1 - level));
+      }
+    }
+    this.readyAt = this.board.now + this.busyAfter + busy;
+    this.later(this.busyAfter, () => this.set('busy', 1));
+    this.later(this.busyAfter + busy, () => this.set('ack', 0));
+    this.later(this.busyAfter + busy + this.ack, () => { this.set('ack', 1); this.set('busy', 0); });
+    // The status question, and its answer when it is worked on.
+    if (this.status && this.taken.length >= 2 && this.taken.at(-2) === 5 && this.taken.at(-1) === 1) {
+      this.later(3_000_000, () => { this.say = [...this.status]; });
+    }
+  }
+
+  say = [];
+
+  converse(line, level) {
+    const answer = (lines, ack) => {
+      this.later(2_000, () => Object.entries(lines).forEach(([name, value]) => this.set(name, value)));
+      if (ack !== undefined) this.later(2_500, () => this.set('ack', ack));
+    };
+    const offer = () => {
+      const none = this.reply.length ? 0 : 1;
+      return { fault: none, paperOut: none, select: this.flag, busy: 0 };
+    };
+    if (this.phase === 'forward' && line === 'autoFeed' && level === 0 && this.out.selectIn === 1) {
+      this.phase = 'negotiating';
+      answer({ paperOut: 1, select: 1, fault: 1 }, 0);
+    } else if (this.phase === 'negotiating' && line === 'strobe' && level === 0) {
+      this.mode = this.out.data;
+    } else if (this.phase === 'negotiating' && line === 'autoFeed' && level === 1 && this.mode !== undefined) {
+      const known = this.mode === 0 || (this.mode === 4 && this.id !== null);
+      this.reply = this.mode === 4 && known ? [...this.id] : this.mode === 0 ? this.say.splice(0) : [];
+      this.flag = known && this.mode !== 0 ? 1 : 0;
+      this.half = null;
+      this.mode = undefined;
+      this.phase = 'reverse';
+      answer(offer(), 1);
+    } else if (this.phase === 'reverse' && line === 'autoFeed' && level === 0) {
+      if (this.half === null && this.reply.length === 0) return;
+      const nibble = this.half ?? this.reply[0] & 15;
+      this.half = this.half === null ? this.reply.shift() >> 4 : null;
+      answer({ fault: nibble & 1, select: (nibble >> 1) & 1, paperOut: (nibble >> 2) & 1, busy: nibble >> 3 }, 0);
+    } else if (this.phase === 'reverse' && line === 'autoFeed' && level === 1 && this.out.selectIn === 1) {
+      answer(this.half === null ? offer() : {}, 1);
+    } else if ((this.phase === 'reverse' || this.phase === 'negotiating') && line === 'selectIn' && level === 0) {
+      this.phase = 'leaving';
+      answer({ fault: 1, busy: 0 }, 0);
+    } else if (this.phase === 'leaving' && line === 'autoFeed' && level === 0) {
+      answer({ paperOut: 0, select: 1, fault: 1 }, 1);
+    } else if (this.phase === 'leaving' && line === 'autoFeed' && level === 1 && this.level.ack === 1) {
+      this.phase = 'forward';
+    }
+  }
+}
+
+/// The shortest of every time around the strobes, and every strobe or change of data that came when it must not.
+export function waveform(edges) {
+  const shortest = { setup: Infinity, strobe: Infinity, hold: Infinity, between: Infinity };
+  const wrong = [];
+  let [dataAt, fallAt, riseAt, lastFall] = [-Infinity, null, null, null];
+  const level = { busy: 0, paperOut: 0, select: 1, fault: 1, selectIn: 0, data: 0 };
+  const least = (name, ns) => { shortest[name] = Math.min(shortest[name], ns); };
+  for (const { at, line, level: now } of edges) {
+    level[line] = now;
+    if (line === 'selectIn' && now === 1) [riseAt, lastFall] = [null, null];
+    if (level.selectIn === 1) continue;
+    if (line === 'data') {
+      if (fallAt !== null) wrong.push({ at, what: 'data changed under the strobe' });
+      if (level.busy) wrong.push({ at, what: 'data changed while busy' });
+      if (riseAt !== null) least('hold', at - riseAt);
+      dataAt = at;
+    } else if (line === 'strobe' && now === 0) {
+      least('setup', at - dataAt);
+      if (lastFall !== null) least('between', at - lastFall);
+      if (level.busy || level.paperOut || !level.select || !level.fault) wrong.push({ at, what: 'strobe while not ready', ...level });
+      [fallAt, lastFall] = [at, at];
+    } else if (line === 'strobe') {
+      if (fallAt !== null) least('strobe', at - fallAt);
+      [fallAt, riseAt] = [null, at];
+    }
+  }
+  return { shortest, wrong };
+}

@@ -1,0 +1,172 @@
+// The USB host: enumerates the board and moves packets over a bus with a clock.
+//
+// rp2040js takes a buffer away the moment the firmware arms it. Firmware that watches the AVAILABLE bit (embassy
+// does) then reads 64 bytes of rubbish. Here the controller's two entry points are replaced: a buffer stays available
+// until its packet has crossed the bus, which takes as long as it takes at full speed, one packet at a time.
+
+const AVAILABLE = 1 << 10;
+const STALL = 1 << 11;
+const FULL = 1 << 15;
+const LENGTH = 0x3ff;
+
+/// At 12 Mbit/s: the bytes, and 21 more for tokens, checksum, handshake and the gaps between.
+const packetNs = (bytes) => Math.ceil(((bytes + 21) * 8 * 1000) / 12);
+
+const key = (endpoint, out) => endpoint * 2 + (out ? 1 : 0);
+const control = (endpoint, out) => 0x80 + endpoint * 8 + (out ? 4 : 0);
+
+export class Host {
+  constructor(board) {
+    this.board = board;
+    this.usb = board.chip.usbCtrl;
+    this.memory = board.chip.usbDPRAM;
+    this.view = board.chip.usbDPRAMView;
+    this.armed = new Set();
+    this.queues = new Map(); // packets that wait for an OUT buffer: { bytes, sent }
+    this.reading = new Map(); // who wants packets of an IN endpoint
+    this.busFreeAt = 0;
+    this.packets = 0;
+    this.resets = 0;
+    this.attached = new Promise((resolve) => { this.onReset = resolve; });
+    this.usb.DPRAMUpdated = (offset, value) => this.written(offset, value);
+    this.usb.onUSBEnabled = () => this.usb.resetDevice();
+    this.usb.onResetReceived = () => { this.resets += 1; this.onReset(); };
+  }
+
+  written(offset, value) {
+    if (offset < 0x80 || offset > 0xfc) return;
+    const [endpoint, out] = [(offset - 0x80) >> 3, (offset & 4) !== 0];
+    if (endpoint === 0 && value & STALL) {
+      this.stalled?.();
+      return;
+    }
+    if (value & AVAILABLE) {
+      this.armed.add(key(endpoint, out));
+      this.go(endpoint, out);
+    } else {
+      this.armed.delete(key(endpoint, out));
+    }
+  }
+
+  /// Moves a packet if both sides are ready.
+  go(endpoint, out) {
+    const id = key(endpoint, out);
+    if (!this.armed.has(id)) return;
+    const queue = this.queues.get(id);
+    if (out ? !queue?.length : !this.reading.get(id)) return;
+    this.armed.delete(id);
+    const register = control(endpoint, out);
+    const length = out ? queue[0].bytes.length : this.view.getUint32(register, true) & LENGTH;
+    this.onBus(packetNs(length), () => {
+      const now = this.view.getUint32(register, true);
+      // Taken back by a bus reset meanwhile.
+      if (!(now & AVAILABLE)) return;
+      const at = this.usb.getEndpointBufferOffset(endpoint, out);
+      this.packets += 1;
+      if (out) {
+        const { bytes, sent } = queue.shift();
+        this.memory.set(bytes, at);
+        this.view.setUint32(register, (now & ~(AVAILABLE | LENGTH)) | FULL | bytes.length, true);
+        this.usb.indicateBufferReady(endpoint, true);
+        sent();
+      } else {
+        const bytes = this.memory.slice(at, at + length);
+        this.view.setUint32(register, now & ~(AVAILABLE | FULL), true);
+        this.usb.indicateBufferReady(endpoint, false);
+        this.reading.get(id)?.(bytes);
+      }
+    });
+  }
+
+  /// One packet after the other.
+  onBus(ns, done) {
+    this.busFreeAt = Math.max(this.busFreeAt, this.board.now) + ns;
+    this.board.clock.createAlarm(done).schedule(this.busFreeAt - this.board.now);
+  }
+
+  /// Sends a packet; the promise is kept when it has crossed the bus.
+  send(endpoint, bytes) {
+    const id = key(endpoint, true);
+    const queue = this.queues.get(id) ?? [];
+    this.queues.set(id, queue);
+    const sent = new Promise((resolve) => queue.push({ bytes, sent: resolve }));
+    this.go(endpoint, true);
+    return sent;
+  }
+
+  /// Sends bytes in packets of 64.
+  async write(endpoint, bytes) {
+    for (let at = 0; at < bytes.length; at += 64) await this.send(endpoint, bytes.subarray(at, at + 64));
+  }
+
+  /// Gives every packet of an endpoint to `take`, or, with nothing, no longer asks for any.
+  read(endpoint, take) {
+    this.reading.set(key(endpoint, false), take);
+    if (take) this.go(endpoint, false);
+  }
+
+  /// A control transfer; `data` is what is sent, or how many bytes are wanted. `null` if it was refused.
+  async transfer([requestType, request, value, index], data) {
+    const wanted = typeof data === 'number' ? data : data.length;
+    const setup = new Uint8Array([requestType, request, value & 255, value >> 8, index & 255, index >> 8, wanted & 255, wanted >> 8]);
+    const refused = new Promise((resolve) => { this.stalled = () => resolve(null); });
+    await new Promise((resolve) => this.onBus(packetNs(8), () => { this.usb.sendSetupPacket(setup); resolve(); }));
+    const whole = async () => {
+      const received = [];
+      if (requestType & 0x80) {
+        for (;;) {
+          const packet = await this.one(0);
+          received.push(...packet);
+          if (packet.length < 64 || received.length >= wanted) break;
+        }
+        await this.send(0, new Uint8Array(0));
+      } else {
+        if (wanted > 0) await this.write(0, data);
+        await this.one(0);
+      }
+      return Uint8Array.from(received);
+    };
+    const result = await Promise.race([whole(), refused]);
+    this.stalled = null;
+    this.reading.delete(key(0, false));
+    return result;
+  }
+
+  /// The next packet of an endpoint.
+  one(endpoint) {
+    return new Promise((resolve) => this.read(endpoint, (packet) => { this.read(endpoint, null); resolve(packet); }));
+  }
+
+  /// What an operating system does with a new device. Gives its descriptors and where to talk to it.
+  async enumerate() {
+    await this.attached;
+    const device = await this.transfer([0x80, 6, 0x0100, 0], 18);
+    await this.transfer([0x00, 5, 9, 0], new Uint8Array(0));
+    const head = await this.transfer([0x80, 6, 0x0200, 0], 9);
+    const configuration = await this.transfer([0x80, 6, 0x0200, 0], head[2] | (head[3] << 8));
+    const string = async (index) => {
+      const bytes = await this.transfer([0x80, 6, 0x0300 | index, 0x0409], 255);
+      return new TextDecoder('utf-16le').decode(bytes.subarray(2));
+    };
+    const names = [await string(device[14]), await string(device[15]), await string(device[16])];
+    await this.transfer([0x00, 9, configuration[5], 0], new Uint8Array(0));
+    return { device, configuration, names, interfaces: interfaces(configuration) };
+  }
+
+  /// What a program does that opens the serial port, or closes it.
+  async openSerial(number, open) {
+    const rate = new Uint8Array([0x00, 0xc2, 0x01, 0x00, 0, 0, 8]); // 115200 8N1
+    if (open) await this.transfer([0x21, 0x20, 0, number], rate);
+    await this.transfer([0x21, 0x22, open ? 3 : 0, number], new Uint8Array(0));
+  }
+}
+
+/// The interfaces in a configuration descriptor, with their endpoints.
+function interfaces(bytes) {
+  const found = [];
+  for (let at = 0; at < bytes.length; at += bytes[at]) {
+    if (bytes[at + 1] === 4) found.push({ number: bytes[at + 2], class: bytes[at + 5], in: 0, out: 0 });
+    if (bytes[at + 1] === 5) found.at(-1)[bytes[at + 2] & 0x80 ? 'in' : 'out'] = bytes[at + 2] & 15;
+  }
+  return found;
+}

@@ -1,0 +1,91 @@
+//! `cargo xtask emulator`: the real image on an emulated board, a model printer at its pins.
+//!
+//! Needs Node 20 and npm, which fetches the one pinned package. The jobs it prints are made here, by the encoders
+//! the workstation uses, so that what arrives at the emulated port is compared with what a file would have held.
+
+use crate::{command, firmware};
+use anyhow::{Context, Result, bail};
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
+use protocol::rgl::{JobSetup, JobWriter, Page};
+use protocol::runs::{self, Header, MAX_BAND, MAX_HEADER};
+use std::fs;
+use std::path::Path;
+
+/// Builds image and jobs and runs the tests.
+pub fn run(root: &Path) -> Result<()> {
+    if !command("node", &["--version"]).output().is_ok_and(|output| output.status.success()) {
+        println!("skipped: Node is not installed, and the emulator runs in it");
+        return Ok(());
+    }
+    let image = firmware::build(root)?;
+    let folder = root.join("tests/emulator");
+    let jobs = firmware::target(root).join("jobs");
+    fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
+    for (name, width, rows) in [("small", 500, 150), ("page", 4800, 130)] {
+        let (printed, streams) = job(width, rows).context("a test job cannot be made")?;
+        fs::write(jobs.join(format!("{name}.rgl")), printed)?;
+        fs::write(jobs.join(format!("{name}.streams")), streams)?;
+    }
+    let mut install = command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts"]);
+    let mut test = command("node", &["--test", "--test-reporter=spec"]);
+    test.env("FOILPRESS_IMAGE", image).env("FOILPRESS_JOBS", jobs);
+    for (what, step) in [("npm ci", &mut install), ("the emulator's tests", &mut test)] {
+        let status =
+            step.current_dir(&folder).status().with_context(|| format!("{what}: cannot be started"))?;
+        if !status.success() {
+            bail!("{what}: {status}");
+        }
+    }
+    Ok(())
+}
+
+/// A job of two inks as the printer's language and as pass streams: discs of two sizes, denser towards the bottom.
+fn job(width: u16, rows: u16) -> Option<(Vec<u8>, Vec<u8>)> {
+    let inks = [Ink::White, Ink::Black];
+    let stride = runs::stride(width);
+    let planes: Vec<Vec<u8>> = [12u32, 40]
+        .iter()
+        .map(|&pitch| {
+            let mut plane = vec![0u8; stride * usize::from(rows)];
+            for y in 0..u32::from(rows) {
+                let radius = pitch / 6 + pitch * y / (3 * u32::from(rows));
+                for x in 0..u32::from(width) {
+                    let (dx, dy) = (x % pitch, y % pitch);
+                    let square = dx.abs_diff(pitch / 2).pow(2) + dy.abs_diff(pitch / 2).pow(2);
+                    if square < radius * radius {
+                        plane[y as usize * stride + x as usize / 8] |= 0x80 >> (x % 8);
+                    }
+                }
+            }
+            plane
+        })
+        .collect();
+
+    let page = Page::plain(Paper::A4);
+    let mut writer = JobWriter::new(JobSetup::new(page, &inks, None).ok()?, rows).ok()?;
+    let mut out = vec![0; COMMAND_ROOM + ROW_ROOM + stride];
+    let mut printed = Vec::new();
+    let length = writer.begin(&mut out).ok()?;
+    printed.extend_from_slice(&out[..length]);
+    for plane in &planes {
+        let length = writer.next_pass(&mut out).ok()?;
+        printed.extend_from_slice(&out[..length]);
+        for row in plane.chunks_exact(stride) {
+            let length = writer.row(row, &mut out).ok()?;
+            printed.extend_from_slice(&out[..length]);
+        }
+    }
+    let length = writer.end(&mut out).ok()?;
+    printed.extend_from_slice(&out[..length]);
+
+    let mut head = [0; MAX_HEADER];
+    let length = Header::new(page, &inks, None, width, rows).ok()?.write(&mut head);
+    let mut streams = head[..length].to_vec();
+    let mut buffer = vec![0; MAX_BAND];
+    for plane in &planes {
+        runs::encode(width, rows, plane, &mut buffer, |band| streams.extend_from_slice(band)).ok()?;
+    }
+    Some((printed, streams))
+}
