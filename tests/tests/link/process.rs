@@ -1,14 +1,18 @@
 //! Real processes, a real socket, a real journal: the sender is killed with SIGKILL again and again.
 
 use crate::model::{Board, Planes, is_a_whole_job, seeded};
-use bridge::engine::{Engine, Identity};
+use bridge::engine::{Engine, Identity, Outcome as Done, Task};
 use foilpress::observe::Silent;
 use foilpress::send::journal::{Journal, NewJob};
+use foilpress::send::query::{Query, QueryError, Reply};
 use foilpress::send::session::{Outcome, Phase, Session};
-use foilpress::send::transport::{Socket, Transport};
+use foilpress::send::status::Status;
+use foilpress::send::transport::{Socket, Transport, pair};
 use foilpress::send::{self, Address};
+use foilpress::simulate::{Carousel, Lever, Printer, STATUS_LENGTH, Trouble};
+use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
-use protocol::link::message::{JobKind, Lines};
+use protocol::link::message::{Answer, Ask, JobKind, JobState, Lines};
 use rand::RngExt;
 use std::os::unix::net::UnixListener;
 use std::path::Path;
@@ -47,6 +51,15 @@ fn bridge_at(path: &Path, rate: usize, printed: Arc<Mutex<Vec<u8>>>, stop: Arc<A
             Ok(count) => engine.receive(&mut reader, &buffer[..count]),
             Err(_) => link = None,
         }
+        if let Some(task) = engine.task() {
+            // What the board would do at the port.
+            let status = status();
+            engine.done(match task {
+                Task::PrinterStatus => Done::Answer(Answer::Bytes(&status)),
+                Task::DeviceId => Done::Answer(Answer::OneWay),
+                _ => Done::Done,
+            });
+        }
         for _ in 0..50 {
             engine.work();
         }
@@ -72,6 +85,13 @@ fn bridge_at(path: &Path, rate: usize, printed: Arc<Mutex<Vec<u8>>>, stop: Arc<A
             }
         }
     }
+}
+
+/// The answer of a printer with white in it and its cover open.
+fn status() -> [u8; STATUS_LENGTH] {
+    let mut printer = Printer::new(Carousel::new(&[Ink::White.into()]).unwrap(), Lever::Manual);
+    printer.strike(Trouble::CoverOpen);
+    printer.status()
 }
 
 /// Goes on with the only job in the journal.
@@ -163,7 +183,7 @@ impl Drop for Bench {
 
 #[test]
 fn a_sender_that_is_killed_again_and_again_costs_nothing() {
-    let bench = Bench::new(5, 24);
+    let bench = Bench::new(5, 60);
     let mut random = seeded(6);
     let mut kills = 0;
     while bench.printed().len() < bench.job.len() && kills < 12 {
@@ -186,7 +206,7 @@ fn a_sender_that_is_killed_again_and_again_costs_nothing() {
 
 #[test]
 fn another_process_cancels_what_a_killed_one_has_begun() {
-    let bench = Bench::new(8, 8);
+    let bench = Bench::new(8, 40);
     let mut child = spawn(&bench.jobs());
     while bench.printed().is_empty() {
         std::thread::sleep(Duration::from_millis(5));
@@ -196,4 +216,55 @@ fn another_process_cancels_what_a_killed_one_has_begun() {
     assert_eq!(resume(&bench.jobs(), true), Outcome::Cancelled);
     let printed = bench.printed();
     assert!(printed.len() < bench.job.len() && is_a_whole_job(&printed));
+}
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn address(bench: &Bench) -> Address {
+    Journal::at(&bench.jobs()).unwrap().entries().unwrap()[0].to.parse().unwrap()
+}
+
+#[test]
+fn between_jobs_the_printer_itself_is_asked() {
+    let bench = Bench::new(1, 100);
+    let mut link = address(&bench).open().unwrap();
+    let mut query = Query::new(&mut *link, PATIENCE).unwrap();
+    assert_eq!((query.bridge().serial, query.bridge().firmware.as_str()), (7, "test"));
+    assert_eq!(query.progress().state, JobState::None);
+    assert_eq!(query.lines(PATIENCE).unwrap(), (Lines::IDLE, None));
+    assert_eq!(query.printer(Ask::DeviceId, PATIENCE).unwrap(), Reply::OneWay);
+    let Reply::Bytes(bytes) = query.printer(Ask::Printer, PATIENCE).unwrap() else { panic!("no answer") };
+    let status = Status::read(&bytes).unwrap();
+    assert_eq!(status.errors, ["the cover is open; close it"]);
+    assert_eq!(status.cassettes[0].ink, Some("white"));
+}
+
+#[test]
+fn while_a_job_is_open_the_lines_are_told_and_the_printer_is_left_alone() {
+    let bench = Bench::new(8, 40);
+    let mut child = spawn(&bench.jobs());
+    while bench.printed().is_empty() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let before = bench.printed();
+    let mut link = address(&bench).open().unwrap();
+    let mut query = Query::new(&mut *link, PATIENCE).unwrap();
+    assert_eq!(query.printer(Ask::Printer, PATIENCE).unwrap(), Reply::NotNow);
+    assert_eq!(query.lines(PATIENCE).unwrap(), (Lines::IDLE, None));
+    drop(link);
+    assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
+    assert!(bench.job.starts_with(&before) && bench.printed() == bench.job);
+}
+
+#[test]
+fn silence_and_rubbish_are_no_bridge() {
+    let (mut here, mut there) = pair();
+    there.send(b"login: \0\x03abc\0").unwrap();
+    let answer = Query::new(&mut here, Duration::from_millis(300)).map(|_| ());
+    assert!(matches!(answer, Err(QueryError::NoAnswer)));
+    drop(there);
+    let answer = Query::new(&mut here, Duration::from_millis(300)).map(|_| ());
+    assert!(matches!(answer, Err(QueryError::Link(_))));
 }
