@@ -3,11 +3,13 @@
 pub mod colours;
 pub mod files;
 pub(crate) mod picture;
+pub mod piece;
 
 use inks::Stack;
 use protocol::paper::Paper;
 
 pub use picture::FileError;
+pub use piece::Piece;
 
 /// One stack for every dot of the printable area at 600 dpi. Stack 0 is always the bare substrate.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,7 +23,7 @@ pub struct Sheet {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SheetError {
     /// The page has no dots, or the index does not fill it.
-    #[error("a sheet of {width} x {length} dots needs {} values, not {found}", width * length)]
+    #[error("a sheet of {width} x {length} dots needs {} values, not {found}", width.saturating_mul(*length))]
     Size {
         /// Dots across.
         width: usize,
