@@ -2,17 +2,21 @@
 //!
 //! Cost: `n^2 / 2` inner products to form. Limits: dense and symmetric; meant for up to a few hundred rows.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use crate::brdf::Table;
 
-use super::vector::{dot, dot4};
+use super::vector::dot;
 
 /// Inner products `G_ij = a_i . a_j` of `n` rows.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Gram {
     n: usize,
     values: Vec<f64>,
     largest: f64,
     shift: f64,
+    /// Another one whenever the values change, in all the program.
+    edition: u64,
 }
 
 /// Why numbers are not a Gram matrix.
@@ -46,7 +50,7 @@ pub enum GramError {
 impl Gram {
     /// An empty matrix to be filled with [`Gram::refill`].
     pub fn empty() -> Gram {
-        Gram { n: 0, values: Vec::new(), largest: 0.0, shift: 1.0 }
+        Gram { n: 0, values: Vec::new(), largest: 0.0, shift: 1.0, edition: 0 }
     }
 
     /// The inner products of the rows of a table.
@@ -62,7 +66,7 @@ impl Gram {
         if n.checked_mul(n) != Some(values.len()) || n == 0 {
             return Err(GramError::Size { n, found: values.len() });
         }
-        let mut gram = Gram { n, values, largest: 0.0, shift: 1.0 };
+        let mut gram = Gram { n, values, largest: 0.0, shift: 1.0, edition: 0 };
         for row in 0..n {
             for column in 0..=row {
                 let (value, mirror) = (gram.values[row * n + column], gram.values[column * n + row]);
@@ -86,16 +90,10 @@ impl Gram {
         self.values.resize(n * n, 0.0);
         for i in 0..n {
             let a = row(i);
-            let fours = (i + 1) / 4 * 4;
-            for j in (0..fours).step_by(4) {
-                let four = dot4([row(j), row(j + 1), row(j + 2), row(j + 3)], a);
-                self.values[i * n + j..][..4].copy_from_slice(&four);
-            }
-            for j in fours..=i {
-                self.values[i * n + j] = dot(a, row(j));
-            }
-            for j in 0..i {
-                self.values[j * n + i] = self.values[i * n + j];
+            for j in 0..=i {
+                let product = dot(a, row(j));
+                self.values[i * n + j] = product;
+                self.values[j * n + i] = product;
             }
         }
         self.measure();
@@ -120,6 +118,8 @@ impl Gram {
     fn measure(&mut self) {
         self.largest = (0..self.n).map(|i| self.values[i * self.n + i]).fold(0.0, f64::max);
         self.shift = if self.largest > 0.0 { self.largest } else { 1.0 };
+        static EDITIONS: AtomicU64 = AtomicU64::new(1);
+        self.edition = EDITIONS.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Number of rows.
@@ -143,6 +143,11 @@ impl Gram {
         self.largest
     }
 
+    /// A number that no matrix of other values has, so that a solver knows one it has met; 0 if there are no rows.
+    pub(super) fn edition(&self) -> u64 {
+        self.edition
+    }
+
     /// What may be added to every entry without changing the problem on the simplex, where the weights sum to
     /// one. It turns affinely independent rows into linearly independent ones.
     pub(super) fn shift(&self) -> f64 {
@@ -150,22 +155,61 @@ impl Gram {
     }
 }
 
-/// `h_i = a_i . x` for the rows of a table; `x` is as long as a row, `h` has a place for each row.
+/// `h_i = a_i . x` for the rows of a table; `x` is as long as a row, `h` has at most a place for each row.
+///
+/// Uses the widest vectors the machine has; the order of additions is the same with any, so the result is too.
 pub fn inner_products(rows: &Table, x: &[f64], h: &mut [f64]) {
-    let n = rows.len().min(h.len());
-    let fours = n - n % 4;
-    for i in (0..fours).step_by(4) {
-        let four = [rows.row(i), rows.row(i + 1), rows.row(i + 2), rows.row(i + 3)];
-        h[i..i + 4].copy_from_slice(&dot4(four, x));
+    #[cfg(target_arch = "x86_64")]
+    {
+        /// The same code, compiled for AVX: it multiplies and adds one after the other, so equal bit for bit.
+        #[target_feature(enable = "avx")]
+        fn wide(rows: &Table, x: &[f64], h: &mut [f64]) {
+            products(rows, x, h);
+        }
+        if is_x86_feature_detected!("avx") {
+            // SAFETY: the only requirement of `wide` is that the processor has AVX, just detected.
+            unsafe { wide(rows, x, h) };
+            return;
+        }
     }
-    for (i, h) in h.iter_mut().enumerate().take(n).skip(fours) {
-        *h = dot(rows.row(i), x);
+    products(rows, x, h);
+}
+
+#[inline(always)]
+fn products(rows: &Table, x: &[f64], h: &mut [f64]) {
+    for (h, row) in h.iter_mut().zip(rows.rows()) {
+        *h = dot(row, x);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn vectors_of_any_width_give_the_same_products_bit_for_bit(
+            columns in 1usize..130,
+            rows in 1usize..23,
+            seed in any::<u64>(),
+        ) {
+            let mut state = seed;
+            let mut number = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            };
+            let mut table = Table::new(columns);
+            for _ in 0..rows {
+                table.push(&(0..columns).map(|_| number()).collect::<Vec<_>>());
+            }
+            let x: Vec<f64> = (0..columns).map(|_| number()).collect();
+            let (mut plain, mut widest) = (vec![0.0; rows], vec![0.0; rows]);
+            products(&table, &x, &mut plain);
+            inner_products(&table, &x, &mut widest);
+            prop_assert_eq!(plain, widest);
+        }
+    }
 
     #[test]
     fn what_is_no_gram_matrix_is_named() {

@@ -14,7 +14,7 @@
 //! Source: Lawson & Hanson 1974, chapter 23, with the equality kept exactly instead of by a heavy row.
 
 use super::gram::Gram;
-use super::vector::{add_scaled, dot};
+use super::vector::{add_scaled, dot, dot_short};
 
 /// Reduced gradients within this share of the problem's scale count as zero: some hundred roundings.
 const TOLERANCE: f64 = 4e-14;
@@ -68,12 +68,15 @@ pub struct Simplex {
     /// Points whose row of the factor is out of date, last first.
     pending: Vec<usize>,
     place: Vec<Place>,
+    refused: Vec<usize>,
     /// Lower Cholesky factor of the shifted Gram matrix on the support, rows `n` apart, diagonal inverted.
     factor: Vec<f64>,
     /// `factor^-1` times the vector of ones.
     ones: Vec<f64>,
     step: Vec<f64>,
     gradient: Vec<f64>,
+    /// The matrix that the factor on the support belongs to.
+    edition: u64,
 }
 
 impl Simplex {
@@ -85,7 +88,31 @@ impl Simplex {
     /// Minimises `1/2 a'Ga - h'a` over the simplex. `a` is the warm start, ideally the solution of a similar
     /// problem, and receives the solution; a start that is no point of the simplex (all zero, say) is a cold
     /// start. `h` and `a` have as many places as the Gram matrix has rows.
+    ///
+    /// Uses the widest vectors the machine has; the order of additions is the same with any, so the result is too.
     pub fn solve(&mut self, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
+        #[cfg(target_arch = "x86_64")]
+        {
+            /// The same code, compiled for AVX: it multiplies and adds one after the other, so equal bit for bit.
+            #[target_feature(enable = "avx")]
+            fn wide(
+                it: &mut Simplex,
+                gram: &Gram,
+                h: &[f64],
+                a: &mut [f64],
+            ) -> Result<Certificate, SimplexError> {
+                it.solve_plainly(gram, h, a)
+            }
+            if is_x86_feature_detected!("avx") {
+                // SAFETY: the only requirement of `wide` is that the processor has AVX, just detected.
+                return unsafe { wide(self, gram, h, a) };
+            }
+        }
+        self.solve_plainly(gram, h, a)
+    }
+
+    #[inline(always)]
+    fn solve_plainly(&mut self, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
         let n = gram.len();
         if h.len() != n || a.len() != n || n == 0 {
             return Err(SimplexError::Size { points: n, products: h.len(), weights: a.len() });
@@ -143,7 +170,10 @@ impl Simplex {
     }
 
     fn reset(&mut self, n: usize) {
-        self.n = n;
+        if self.n != n {
+            (self.n, self.edition) = (n, 0);
+            self.support.clear();
+        }
         self.place.resize(n, Place::Out);
         self.gradient.resize(n, 0.0);
         self.ones.resize(n, 0.0);
@@ -151,22 +181,16 @@ impl Simplex {
         if self.factor.len() < n * n {
             self.factor.resize(n * n, 0.0);
         }
-        self.support.clear();
         self.support.reserve(n);
-        self.pending.clear();
         self.pending.reserve(n);
+        self.refused.reserve(n);
     }
 
     /// Walks from `a`, where the gradient is `g`, to the optimum; keeps both up to date. Returns the steps taken,
     /// at least 1.
+    #[inline(always)]
     fn search(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64], tolerance: f64, most: u32) -> u32 {
-        self.place.fill(Place::Out);
-        self.support.clear();
-        for k in 0..self.n {
-            if a[k] > 0.0 {
-                self.join(gram, g, a, k);
-            }
-        }
+        self.take_support(gram, g, a);
         let mut steps = 0;
         let mut entered = None;
         let mut repeats = 0;
@@ -175,17 +199,15 @@ impl Simplex {
             if self.support.len() > 1 {
                 let (length, blocked) = self.step_on_support(gram, g, a);
                 if length > 0.0 {
-                    for place in &mut self.place {
-                        if *place == Place::Refused {
-                            *place = Place::Out;
-                        }
+                    while let Some(k) = self.refused.pop() {
+                        self.place[k] = Place::Out;
                     }
                 }
                 if blocked {
                     if let Some(k) = entered
                         && a[k] <= 0.0
                     {
-                        self.place[k] = Place::Refused;
+                        self.refuse(k);
                     }
                     entered = None;
                     continue;
@@ -209,7 +231,7 @@ impl Simplex {
             if self.join(gram, g, a, k) {
                 entered = joining;
             } else {
-                self.place[k] = Place::Refused;
+                self.refuse(k);
             }
         }
         // What rounding has taken from or added to the sum.
@@ -217,8 +239,36 @@ impl Simplex {
         steps
     }
 
+    /// Point `k` may not join before the weights have moved.
+    fn refuse(&mut self, k: usize) {
+        self.place[k] = Place::Refused;
+        self.refused.push(k);
+    }
+
+    /// Makes the points with weight the support. Neighbours in a picture mostly have the same, with its factor.
+    #[inline(always)]
+    fn take_support(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) {
+        self.place.fill(Place::Out);
+        self.refused.clear();
+        let same = self.edition == gram.edition()
+            && self.support.iter().all(|&k| a[k] > 0.0)
+            && a.iter().filter(|&&a| a > 0.0).count() == self.support.len();
+        if same {
+            self.support.iter().for_each(|&k| self.place[k] = Place::In);
+            return;
+        }
+        (self.edition, self.n) = (gram.edition(), gram.len());
+        self.support.clear();
+        for k in 0..self.n {
+            if a[k] > 0.0 {
+                self.join(gram, g, a, k);
+            }
+        }
+    }
+
     /// Moves to the optimum on the support, or along the way until the first weight is used up: that one leaves.
     /// Returns the share of the way gone and whether a weight left.
+    #[inline(always)]
     fn step_on_support(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) -> (f64, bool) {
         let p = self.support.len();
         let n = self.n;
@@ -226,10 +276,10 @@ impl Simplex {
         let common = g[self.support[0]];
         for i in 0..p {
             let row = &self.factor[i * n..][..=i];
-            let sum = dot(&row[..i], &self.step[..i]);
+            let sum = dot_short(&row[..i], &self.step[..i]);
             self.step[i] = (common - g[self.support[i]] - sum) * row[i];
         }
-        let level = dot(&self.ones[..p], &self.step[..p]) / dot(&self.ones[..p], &self.ones[..p]);
+        let level = dot_short(&self.ones[..p], &self.step[..p]) / dot_short(&self.ones[..p], &self.ones[..p]);
         add_scaled(&mut self.step[..p], -level, &self.ones[..p]);
         self.solve_transposed(p);
         let mut length = 1.0;
@@ -264,6 +314,7 @@ impl Simplex {
 
     /// Takes point `k` into the support. If it depends on the points there, weight is exchanged along the flat
     /// direction, downhill if it slopes, until one of them is used up and leaves. False if `k` itself was.
+    #[inline(always)]
     fn join(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64], k: usize) -> bool {
         self.pending.push(k);
         self.join_pending(gram, g, a);
@@ -272,6 +323,7 @@ impl Simplex {
 
     /// Takes the pending points into the support, the last first. Every exchange removes a point from both lists
     /// for good, so this ends.
+    #[inline(always)]
     fn join_pending(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) {
         while let Some(k) = self.pending.pop() {
             let p = self.support.len();
@@ -295,7 +347,7 @@ impl Simplex {
         // The affine combination of the others nearest to it, exchanged for it: d_last = 1, sum d = 0.
         let row = &self.factor[last * n..][..last];
         let ones = &self.ones[..last];
-        let level = (dot(ones, row) - 1.0) / dot(ones, ones);
+        let level = (dot_short(ones, row) - 1.0) / dot_short(ones, ones);
         for ((d, one), l) in self.step.iter_mut().zip(ones).zip(row) {
             *d = level * one - l;
         }
@@ -328,6 +380,7 @@ impl Simplex {
     }
 
     /// `step = factor^-T step` on the first `p` places.
+    #[inline(always)]
     fn solve_transposed(&mut self, p: usize) {
         for i in (0..p).rev() {
             let row = &self.factor[i * self.n..][..=i];
@@ -338,6 +391,7 @@ impl Simplex {
     }
 
     /// Computes row `i` of the Cholesky factor; false if the point depends on those before it.
+    #[inline(always)]
     fn factor_row(&mut self, gram: &Gram, i: usize) -> bool {
         let n = self.n;
         let (above, rest) = self.factor.split_at_mut(i * n);
@@ -346,18 +400,19 @@ impl Simplex {
         let products = gram.row(k);
         for j in 0..i {
             let other = &above[j * n..][..=j];
-            let sum = dot(&other[..j], &row[..j]);
+            let sum = dot_short(&other[..j], &row[..j]);
             row[j] = (products[self.support[j]] + gram.shift() - sum) * other[j];
         }
         let length = products[k] + gram.shift();
-        let pivot = length - dot(&row[..i], &row[..i]);
+        let pivot = length - dot_short(&row[..i], &row[..i]);
         let floor = PIVOT_FLOOR * length;
         row[i] = 1.0 / pivot.max(floor).sqrt();
-        self.ones[i] = (1.0 - dot(&row[..i], &self.ones[..i])) * row[i];
+        self.ones[i] = (1.0 - dot_short(&row[..i], &self.ones[..i])) * row[i];
         pivot > floor
     }
 
     /// How far the gradient differs over the support; 0 at its optimum.
+    #[inline(always)]
     fn unevenness(&self, g: &[f64]) -> f64 {
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
         for &k in &self.support {
@@ -377,6 +432,7 @@ fn finish(gap: f64, steps: u32) -> Result<Certificate, SimplexError> {
 }
 
 /// The gradient `Ga - h`.
+#[inline(always)]
 fn evaluate(gram: &Gram, h: &[f64], a: &[f64], g: &mut [f64]) {
     for (g, h) in g.iter_mut().zip(h) {
         *g = -h;
@@ -389,12 +445,14 @@ fn evaluate(gram: &Gram, h: &[f64], a: &[f64], g: &mut [f64]) {
 }
 
 /// `max_k g.(a - e_k)` for a point of the simplex; not a number if any part is not.
+#[inline(always)]
 pub(super) fn frank_wolfe_gap(g: &[f64], a: &[f64]) -> f64 {
     // A gradient that is not finite makes the inner product NaN, even where the weight is zero.
     dot(g, a) - g.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 /// Scales weights to sum 1; false if they are no point of the simplex to begin with.
+#[inline(always)]
 fn normalise(a: &mut [f64]) -> bool {
     let sum: f64 = a.iter().sum();
     let least = a.iter().copied().fold(f64::INFINITY, f64::min);
