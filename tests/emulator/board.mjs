@@ -70,8 +70,9 @@ export class Board {
     this.chip.core.SP = 0x20041f00;
     this.chip.core.LR = 0;
     this.chip.core.PC = FLASH;
+    // While awake.
     this.instructions = 0;
-    this.cycles = 0; // those the processor did not sleep through
+    this.cycles = 0;
     // A pin that was never told reads low; the lines of a printer are told by the printer.
     this.machines = [];
     for (const pio of this.chip.pio) {

@@ -319,3 +319,23 @@ test('whatever happens on the cables, the printer gets the same bytes', { skip }
   }
   t.diagnostic(`${runs} runs, ${JSON.stringify(happened)}`);
 });
+
+test('decoding keeps the port at work', { skip }, async (t) => {
+  const expected = job('clusters.rgl'), streams = job('clusters.streams');
+  for (const [what, settings] of [['as quick as the timing allows', { busyAfter: 200, work: 400, ack: 400 }], ['usual', {}]]) {
+    const bench = new Bench(settings);
+    await bench.connect('bulk');
+    const before = bench.board.cycles;
+    assert.equal((await bench.print(1, STREAMS, streams)).state, 'done');
+    same(bench.printer.taken, expected);
+    legal(bench.printer);
+    const at = bench.printer.edges.filter(({ line, level }) => line === 'strobe' && level === 0).map((edge) => edge.at);
+    // The port's own pace: what most bytes take. The rest of the time it had nothing to send.
+    const paces = at.slice(1).map((time, i) => time - at[i]).sort((a, b) => a - b);
+    const pace = paces[paces.length >> 1];
+    const busy = (paces.length * pace) / (at.at(-1) - at[0]);
+    const perDot = (bench.board.cycles - before) / (2 * 4800 * 256);
+    t.diagnostic(`${what}: ${pace} ns a byte, ${(100 * busy).toFixed(1)} % of the time; ${perDot.toFixed(1)} cycles a dot, all included`);
+    assert.ok(busy >= 0.9);
+  }
+});

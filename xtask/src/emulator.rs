@@ -10,6 +10,7 @@ use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{JobSetup, JobWriter, Page};
 use protocol::runs::{self, Header, MAX_BAND, MAX_HEADER};
+use protocol::walk::{EDGE, Walk};
 use std::fs;
 use std::path::Path;
 
@@ -23,8 +24,13 @@ pub fn run(root: &Path) -> Result<()> {
     let folder = root.join("tests/emulator");
     let jobs = firmware::target(root).join("jobs");
     fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
-    for (name, width, rows) in [("small", 500, 150), ("page", 4800, 130)] {
-        let (printed, streams) = job(width, rows).context("a test job cannot be made")?;
+    let made = [
+        ("small", 500, 150, discs(500, 150)),
+        ("page", 4800, 130, discs(4800, 130)),
+        ("clusters", 4800, 256, clusters(4800, 256)),
+    ];
+    for (name, width, rows, planes) in made {
+        let (printed, streams) = job(width, rows, &planes).context("a test job cannot be made")?;
         fs::write(jobs.join(format!("{name}.rgl")), printed)?;
         fs::write(jobs.join(format!("{name}.streams")), streams)?;
     }
@@ -41,35 +47,63 @@ pub fn run(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A job of two inks as the printer's language and as pass streams: discs of two sizes, denser towards the bottom.
-fn job(width: u16, rows: u16) -> Option<(Vec<u8>, Vec<u8>)> {
-    let inks = [Ink::White, Ink::Black];
+/// The planes of two inks: discs of two sizes, denser towards the bottom.
+fn discs(width: u16, rows: u16) -> [Vec<u8>; 2] {
     let stride = runs::stride(width);
-    let planes: Vec<Vec<u8>> = [12u32, 40]
-        .iter()
-        .map(|&pitch| {
-            let mut plane = vec![0u8; stride * usize::from(rows)];
-            for y in 0..u32::from(rows) {
-                let radius = pitch / 6 + pitch * y / (3 * u32::from(rows));
-                for x in 0..u32::from(width) {
-                    let (dx, dy) = (x % pitch, y % pitch);
-                    let square = dx.abs_diff(pitch / 2).pow(2) + dy.abs_diff(pitch / 2).pow(2);
-                    if square < radius * radius {
-                        plane[y as usize * stride + x as usize / 8] |= 0x80 >> (x % 8);
-                    }
+    [12u32, 40].map(|pitch| {
+        let mut plane = vec![0u8; stride * usize::from(rows)];
+        for y in 0..u32::from(rows) {
+            let radius = pitch / 6 + pitch * y / (3 * u32::from(rows));
+            for x in 0..u32::from(width) {
+                let (dx, dy) = (x % pitch, y % pitch);
+                let square = dx.abs_diff(pitch / 2).pow(2) + dy.abs_diff(pitch / 2).pow(2);
+                if square < radius * radius {
+                    plane[y as usize * stride + x as usize / 8] |= 0x80 >> (x % 8);
                 }
             }
-            plane
-        })
-        .collect();
+        }
+        plane
+    })
+}
 
+/// Two of eight planes as the halftone makes them: clusters of eight dots or somewhat more along the walk, each of one
+/// of eight inks or of bare paper.
+fn clusters(width: u16, rows: u16) -> [Vec<u8>; 2] {
+    let stride = runs::stride(width);
+    let mut planes = [(); 2].map(|()| vec![0u8; stride * usize::from(rows)]);
+    let (mut random, mut left, mut ink) = (1u64, 0, 0);
+    for tile in Walk::new(width, rows).bands().flat_map(|band| band.tiles()) {
+        let mut dots = vec![0; usize::from(tile.area())];
+        tile.fill(&mut dots);
+        for dot in dots {
+            if left == 0 {
+                random =
+                    random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                ink = (random >> 40) as usize % 9;
+                // Eight, and one more with a chance of a half each time.
+                left = 8 + (random >> 50).trailing_ones();
+            }
+            left -= 1;
+            if let Some(plane) = planes.get_mut(ink) {
+                let (x, y) = (usize::from(tile.x + dot % EDGE), usize::from(tile.y + dot / EDGE));
+                plane[y * stride + x / 8] |= 0x80 >> (x % 8);
+            }
+        }
+    }
+    planes
+}
+
+/// A job of two inks as the printer's language and as pass streams.
+fn job(width: u16, rows: u16, planes: &[Vec<u8>; 2]) -> Option<(Vec<u8>, Vec<u8>)> {
+    let inks = [Ink::White, Ink::Black];
+    let stride = runs::stride(width);
     let page = Page::plain(Paper::A4);
     let mut writer = JobWriter::new(JobSetup::new(page, &inks, None).ok()?, rows).ok()?;
     let mut out = vec![0; COMMAND_ROOM + ROW_ROOM + stride];
     let mut printed = Vec::new();
     let length = writer.begin(&mut out).ok()?;
     printed.extend_from_slice(&out[..length]);
-    for plane in &planes {
+    for plane in planes {
         let length = writer.next_pass(&mut out).ok()?;
         printed.extend_from_slice(&out[..length]);
         for row in plane.chunks_exact(stride) {
@@ -84,7 +118,7 @@ fn job(width: u16, rows: u16) -> Option<(Vec<u8>, Vec<u8>)> {
     let length = Header::new(page, &inks, None, width, rows).ok()?.write(&mut head);
     let mut streams = head[..length].to_vec();
     let mut buffer = vec![0; MAX_BAND];
-    for plane in &planes {
+    for plane in planes {
         runs::encode(width, rows, plane, &mut buffer, |band| streams.extend_from_slice(band)).ok()?;
     }
     Some((printed, streams))

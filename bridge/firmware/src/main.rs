@@ -33,6 +33,7 @@ use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
 use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
+use embassy_time::{Duration, Instant};
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
 use strobe::{CHUNK, Strobe};
@@ -47,8 +48,9 @@ const FLASH_BYTES: usize = 2 * 1024 * 1024;
 /// 64 rows of 9880 dots, as `protocol::runs::band_bytes` counts them.
 const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
 
-/// Slices of the engine's work between two looks at who else wants to run.
-const SLICES: usize = 4;
+/// The engine works for so long, and for the slice under way, before others may run: a slice takes up to 0.4 ms, and the
+/// strobe engine has work for three or more.
+const TURN: Duration = Duration::from_micros(500);
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -116,12 +118,15 @@ async fn main(spawner: Spawner) {
     work(shared).await
 }
 
-/// Lets the engine work, a few slices at a time.
+/// Lets the engine work, a turn at a time.
 async fn work(shared: &'static Shared) {
     loop {
         let more = shared.engine(|engine| {
-            let empty = engine.output().is_empty();
-            let more = (0..SLICES).all(|_| engine.work());
+            let (empty, end) = (engine.output().is_empty(), Instant::now() + TURN);
+            let mut more = engine.work();
+            while more && Instant::now() < end {
+                more = engine.work();
+            }
             (more, empty && !engine.output().is_empty())
         });
         if more.1 {

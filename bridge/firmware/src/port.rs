@@ -148,8 +148,7 @@ impl Desk {
             // The oldest bytes of the output are those in flight already.
             let (strobe, engine) = (&mut self.strobe, &self.shared);
             let given = engine.engine(|engine| {
-                let output = engine.output();
-                let fresh = output.get(strobe.in_flight()..).unwrap_or(&[]);
+                let fresh = engine.output_behind(strobe.in_flight());
                 strobe.give(&fresh[..fresh.len().min(CHUNK)])
             });
             if given == 0 {
