@@ -152,6 +152,7 @@ orders.on('close', () => process.exit(0));
 async function up() {
   const { device: own, configuration, names } = await device;
   writeFileSync(join(folder, 'descriptors'), Buffer.concat([own, configuration]));
+  writeFileSync(join(folder, 'names'), `${names.join('\n')}\n`);
   await serve('serial', serialConnected);
   await serve('usb', (socket) => urbs.connected(socket));
   await serve('printer', printerConnected);

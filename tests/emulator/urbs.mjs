@@ -5,8 +5,8 @@
 //   request  id u32, what u8 (0 submit, 1 cancel, 2 reset), type u8 (2 control, 3 bulk), endpoint u8 (0x80: to the
 //            host), flags u8, length u32, attached u32, then `attached` bytes: for bulk what is sent; for control the
 //            eight bytes of setup and what is sent
-//   answer   id u32, status i32 (0 or a negative errno), length u32, then `length` bytes that were received; for what
-//            was sent, `length` says how much, and nothing follows
+//   answer   id u32, status i32 (0 or a negative errno), length u32 (bytes received, or sent), attached u32, then
+//            `attached` bytes: what was received
 //
 // A cancelled request is answered like any other, once, with -ENOENT. The end of the connection is the device's end.
 
@@ -66,11 +66,12 @@ export class Urbs {
   }
 
   #answer({ socket, id, inward, received, sent }, status) {
-    const head = Buffer.alloc(12);
+    const head = Buffer.alloc(16);
     head.writeUInt32LE(id, 0);
     head.writeInt32LE(status, 4);
     head.writeUInt32LE(inward ? received.length : sent, 8);
-    socket.write(Buffer.concat([head, Buffer.from(inward ? received : [])]));
+    head.writeUInt32LE(received.length, 12);
+    socket.write(Buffer.concat([head, Buffer.from(received)]));
   }
 
   #finish(urb, status) {
