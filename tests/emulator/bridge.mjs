@@ -97,7 +97,8 @@ let port = null;
 function serialConnected(socket) {
   port?.destroy();
   port = socket;
-  const turn = (act) => { opened = opened.then(act).catch((error) => console.error(String(error))); };
+  // What fails here fails because the cable was pulled; the program finds out by its port's end.
+  const turn = (act) => { opened = opened.then(act).catch(() => socket.destroy()); };
   turn(async () => {
     if (port !== socket) return;
     const data = await dataInterface();

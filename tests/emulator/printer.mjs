@@ -22,8 +22,10 @@ export class Printer {
     this.pauses = []; // { after, line, level, ns }
     this.phase = 'forward';
     this.readyAt = 0;
+    this.takenAt = -Infinity;
     this.level = {};
-    for (const [line, level] of Object.entries({ ack: 1, busy: 0, paperOut: 0, select: 1, fault: 1, power: 1 })) this.set(line, level);
+    this.own = { paperOut: 0, select: 1, fault: 1 };
+    for (const [line, level] of Object.entries({ ack: 1, busy: 0, power: 1, ...this.own })) this.set(line, level);
     // What the cable shows before the buffers are enabled: pull-ups.
     this.out = { strobe: 1, autoFeed: 1, init: 1, selectIn: 1, data: 0xff };
     const outputs = [STROBE, AUTO_FEED, INIT, SELECT_IN, ENABLE, ...Array.from({ length: 8 }, (_, i) => DATA + i)];
@@ -51,11 +53,14 @@ export class Printer {
     for (const [line, level] of on ? [['power', 1], ['busy', 0], ['ack', 1]] : [['busy', 1], ['power', 0]]) this.set(line, level);
   }
 
-  /// Changes lines when a real printer would: while it is at work on a byte, or when none has come for a while.
+  /// Changes status lines when a real printer would: while it is at work on a byte, or when none has come for a while,
+  /// and after a conversation, which uses them for something else.
   change(lines) {
-    const idle = this.board.now - (this.takenAt ?? -Infinity) > 1_000_000;
-    if (this.readyAt === Infinity || idle) for (const [line, level] of Object.entries(lines)) this.set(line, level);
-    else this.later(1000, () => this.change(lines));
+    Object.assign(this.own, lines);
+    const idle = this.board.now - this.takenAt > 1_000_000;
+    if (this.phase !== 'forward') return;
+    if (this.readyAt === Infinity || idle) for (const [line, level] of Object.entries(this.own)) this.set(line, level);
+    else this.later(1000, () => this.change({}));
   }
 
   later(ns, act) {
@@ -157,9 +162,10 @@ export class Printer {
       this.phase = 'leaving';
       answer({ fault: 1, busy: 0 }, 0);
     } else if (this.phase === 'leaving' && line === 'autoFeed' && level === 0) {
-      answer({ paperOut: 0, select: 1, fault: 1 }, 1);
+      answer(this.own, 1);
     } else if (this.phase === 'leaving' && line === 'autoFeed' && level === 1 && this.level.ack === 1) {
       this.phase = 'forward';
+      this.change({});
     }
   }
 }

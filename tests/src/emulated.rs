@@ -137,7 +137,9 @@ impl Emulated {
     fn answer(&mut self) -> io::Result<Value> {
         let mut line = String::new();
         if self.answers.read_line(&mut line)? == 0 {
-            return Err(io::Error::other("the emulated board has ended; its last words are on standard error"));
+            return Err(io::Error::other(
+                "the emulated board has ended; its last words are on standard error",
+            ));
         }
         Ok(serde_json::from_str(&line)?)
     }

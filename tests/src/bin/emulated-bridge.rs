@@ -69,7 +69,10 @@ mod unix {
             let mut desk = bridge.desk();
             if trouble != desk.printer.trouble() {
                 trouble = desk.printer.trouble();
-                println!("printer: {}", trouble.map_or_else(|| "goes on".into(), |trouble| trouble.to_string()));
+                println!(
+                    "printer: {}",
+                    trouble.map_or_else(|| "goes on".into(), |trouble| trouble.to_string())
+                );
             }
             if let Some(Trouble::RibbonMismatch { wanted }) = trouble
                 && let Some(ink) = Ink::from_barcode(wanted)
