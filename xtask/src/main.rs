@@ -7,7 +7,6 @@
 mod elf;
 mod emulator;
 mod firmware;
-mod uf2;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
