@@ -323,7 +323,7 @@ mod tests {
                 continue;
             }
             let at = field(3).wrapping_sub(0x1000_0000) as usize;
-            if at + 256 > flash.len() || at % 256 != 0 {
+            if at + 256 > flash.len() || !at.is_multiple_of(256) {
                 continue;
             }
             if erased.insert(at / 4096) {
@@ -338,7 +338,7 @@ mod tests {
 
     /// An image that boots: a first page with its checksum, computed bit by bit, and a vector table.
     fn bootable() -> Vec<u8> {
-        let mut image: Vec<u8> = (0..1000u32).map(|i| (i * i >> 3) as u8).collect();
+        let mut image: Vec<u8> = (0..1000u32).map(|i| ((i * i) >> 3) as u8).collect();
         let mut crc = 0xffff_ffffu32;
         for &byte in &image[..252] {
             crc ^= u32::from(byte) << 24;
