@@ -8,7 +8,6 @@ mod elf;
 mod emulator;
 mod firmware;
 mod tools;
-mod uf2;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
