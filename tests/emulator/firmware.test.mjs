@@ -31,7 +31,7 @@ test('a composite device appears, with a serial port and bulk endpoints', { skip
   assert.deepEqual([...device.subarray(4, 7)], [0xef, 2, 1]);
   assert.deepEqual(names.slice(0, 2), ['Foilpress', 'Foilpress bridge']);
   assert.match(names[2], /^[0-9A-F]{16}$/);
-  assert.deepEqual(interfaces.map((one) => one.class), [2, 10, 0xff]);
+  assert.deepEqual(interfaces.map((one) => one.class), [2, 10, 0xff, 7]);
   assert.deepEqual(bench.board.complaints, []);
 });
 

@@ -1,12 +1,13 @@
 //! The bridge on a Raspberry Pi Pico.
 //!
 //! Everything that can be tested without a board is in the library `bridge`; here is what the board adds: pins, a
-//! strobe engine of PIO and DMA, a USB device, a lamp and a watchdog. Six tasks on one core:
+//! strobe engine of PIO and DMA, a USB device, a lamp and a watchdog. Seven tasks on one core:
 //!
 //! | task | waits for | does |
 //! |---|---|---|
 //! | `usb::run` | the bus | the device itself |
 //! | `usb::serial`, `usb::bulk` | packets | give them to the engine |
+//! | `printer::run` | packets | gives them to the engine as a job without a link |
 //! | `usb::answer` | something to say | takes frames from the engine |
 //! | `work` | data, room | lets the engine make printer bytes, a slice at a time |
 //! | `port::serve` | 1 ms, a sent buffer | feeds the strobe engine, looks at the lines, does the engine's errands |
@@ -19,6 +20,7 @@
 
 mod pins;
 mod port;
+mod printer;
 mod shared;
 mod strobe;
 mod usb;
@@ -112,14 +114,19 @@ async fn main(spawner: Spawner) {
 
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
     static FLOOR: StaticCell<usb::Floor> = StaticCell::new();
+    static FACE: StaticCell<printer::Face> = StaticCell::new();
+    let face: &'static printer::Face = FACE.init_with(printer::Face::new);
     let floor: &'static usb::Floor = FLOOR.init(usb::Floor::new());
-    let link = usb::build(usb_driver::Driver::new(board.USB, Interrupts), hex(&number, SERIAL.init([0; 16])));
+    let link =
+        usb::build(usb_driver::Driver::new(board.USB, Interrupts), hex(&number, SERIAL.init([0; 16])), face);
     // The pools hold one of each task, and each is spawned once.
     spawner.spawn(usb::run(link.device).unwrap());
     spawner.spawn(usb::serial(shared, floor, link.serial_in, link.serial_lines).unwrap());
     spawner.spawn(usb::bulk(shared, floor, link.bulk_in).unwrap());
     spawner.spawn(usb::answer(shared, floor, link.serial_out, link.bulk_out).unwrap());
-    spawner.spawn(port::serve(shared, strobe).unwrap());
+    let (from_host, to_host) = link.printer;
+    spawner.spawn(printer::run(shared, face, from_host, to_host).unwrap());
+    spawner.spawn(port::serve(shared, face, strobe).unwrap());
     spawner.spawn(watch::run(shared, Watchdog::new(board.WATCHDOG)).unwrap());
     work(shared).await
 }

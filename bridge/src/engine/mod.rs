@@ -278,6 +278,11 @@ impl<'m> Engine<'m> {
         }
     }
 
+    /// Whether no job is open and nothing is to be done: the printer may be asked something.
+    pub fn is_idle(&self) -> bool {
+        self.job.is_none() && self.task.is_none()
+    }
+
     /// What the board is to do, once.
     pub fn task(&mut self) -> Option<Task> {
         if core::mem::replace(&mut self.task_given, true) { None } else { self.task }
