@@ -58,7 +58,12 @@ pub fn build(root: &Path) -> Result<PathBuf> {
 
 /// Where the image is built: beside the workspace's own artifacts.
 pub fn target(root: &Path) -> PathBuf {
-    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from).join("firmware")
+    workspace_target(root).join("firmware")
+}
+
+/// Where the workspace is built.
+pub fn workspace_target(root: &Path) -> PathBuf {
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }
 
 fn budget(path: &Path) -> Result<Budget> {
