@@ -288,6 +288,7 @@ impl Found {
 /// The device ID as text, without the two bytes of its length.
 fn text(reply: &Reply) -> Option<String> {
     let Reply::Bytes(bytes) = reply else { return None };
+    let bytes = bytes.get(2..)?;
     let printable = |byte: &&u8| byte.is_ascii_graphic() || **byte == b' ';
     Some(bytes.iter().filter(printable).map(|&byte| char::from(byte)).collect())
 }
@@ -322,5 +323,15 @@ mod tests {
     fn the_printers_own_device_id_is_known_and_anothers_is_not() {
         assert!(is_alps("MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER"));
         assert!(!is_alps("MFG:Hewlett-Packard;MDL:LaserJet;COMMENT:not ALPS"));
+    }
+
+    #[test]
+    fn the_length_of_a_device_id_is_no_part_of_its_text() {
+        // 75 bytes: the second byte of the length is a letter.
+        let id = "MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER;";
+        let reply = Reply::Bytes([&[0, b'K'], id.as_bytes()].concat());
+        assert_eq!(text(&reply).as_deref(), Some(id));
+        assert_eq!(text(&Reply::Bytes(vec![0])), None);
+        assert_eq!(text(&Reply::Silent), None);
     }
 }

@@ -4,6 +4,9 @@
 //! Run by `cargo xtask emulator`, which builds the image and the program and names them.
 #![cfg(unix)]
 
+mod flash;
+mod found;
+
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
