@@ -197,8 +197,15 @@ impl Bench<'_, '_> {
                 assert_eq!(now.job, LOCAL);
                 assert!(self.printed == self.offered, "other bytes at the port");
             }
-            (JobState::Cancelled | JobState::Broken(_), _) => {
-                self.must_reset = !self.printed.is_empty() && !is_a_whole_job(&self.printed);
+            (JobState::Cancelled | JobState::Broken(_), job) => {
+                let proper = match job {
+                    Some(Job { kind: JobKind::Streams, .. }) => true,
+                    Some(job) => grammar(&job.data) != Grammar::Broken,
+                    None => grammar(&self.offered) != Grammar::Broken,
+                };
+                // What was broken when it came is passed through as it is.
+                self.must_reset =
+                    proper && !self.printed.is_empty() && grammar(&self.printed) != Grammar::Whole;
             }
             // Nothing is promised but that the host is told.
             (JobState::Lost, _) => {}
@@ -339,15 +346,24 @@ fn step<'m>(
     Ok(())
 }
 
-/// Whether these bytes are exactly one job by the strict grammar.
-fn is_a_whole_job(mut bytes: &[u8]) -> bool {
+#[derive(PartialEq, Eq)]
+enum Grammar {
+    /// Exactly one job.
+    Whole,
+    /// The beginning of one.
+    Beginning,
+    Broken,
+}
+
+/// What these bytes are by the strict grammar.
+fn grammar(mut bytes: &[u8]) -> Grammar {
     let mut order = Order::new();
     while !bytes.is_empty() {
-        let Ok(Step::Command(command, length)) = parse(bytes) else { return false };
-        if order.accept(&command).is_err() {
-            return false;
+        match parse(bytes) {
+            Ok(Step::Command(command, length)) if order.accept(&command).is_ok() => bytes = &bytes[length..],
+            Ok(Step::More(_)) => return Grammar::Beginning,
+            _ => return Grammar::Broken,
         }
-        bytes = &bytes[length..];
     }
-    order.is_complete()
+    if order.is_complete() { Grammar::Whole } else { Grammar::Beginning }
 }
