@@ -9,6 +9,7 @@ use protocol::link::message::{Ask, Fault, JobState, Lines, Progress, VERSION};
 use serde_json::json;
 use serialport::{SerialPortInfo, SerialPortType};
 
+use super::reset;
 use crate::send::query::{Query, Reply};
 use crate::send::session::Bridge;
 use crate::send::status::Status;
@@ -24,7 +25,8 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 #[command(after_help = "Examples:\n  \
     foilpress bridge list\n  \
     foilpress bridge status                              (the only bridge there is)\n  \
-    foilpress bridge status --to serial:/dev/ttyACM0 --json")]
+    foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
+    foilpress bridge reset                               (after a sheet was lost)")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -36,6 +38,8 @@ enum Command {
     List,
     /// The bridge, its job, the port's lines, and the printer's own answer when no job is open
     Status(StatusArgs),
+    /// Reset the printer through the bridge, after a sheet was lost in the middle
+    Reset(reset::Args),
 }
 
 /// Arguments of `bridge status`.
@@ -54,6 +58,7 @@ pub fn run(args: &Args) -> Result<()> {
     match &args.command {
         Command::List => list(),
         Command::Status(args) => status(args),
+        Command::Reset(args) => reset::run(args),
     }
 }
 
@@ -116,7 +121,7 @@ fn list() -> Result<()> {
 }
 
 /// The only bridge there is.
-fn only() -> Result<Address> {
+pub(super) fn only() -> Result<Address> {
     let mut candidates: Vec<Port> = ports().into_iter().filter(|port| port.candidate).collect();
     match (candidates.pop(), candidates.is_empty()) {
         (Some(one), true) => Ok(one.address),
@@ -141,7 +146,9 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
         JobState::Lost => {
-            format!("idle; job {job:08x} was lost. Switch the printer off and on before the next one")
+            format!(
+                "idle; job {job:08x} was lost. `foilpress bridge reset` readies the printer for the next one"
+            )
         }
     }
 }

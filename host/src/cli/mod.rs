@@ -13,6 +13,7 @@ mod inspect;
 mod output;
 mod print;
 mod progress;
+mod reset;
 mod resume;
 mod sample;
 mod send;

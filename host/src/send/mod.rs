@@ -7,12 +7,14 @@
 //! printer's port.
 
 mod address;
+pub mod finish;
 pub mod journal;
 pub mod query;
 pub mod raw;
 mod run;
 pub mod session;
 pub mod status;
+pub mod streams;
 pub mod transport;
 pub mod words;
 
