@@ -54,7 +54,9 @@ pub fn framed(body: &[u8]) -> Vec<u8> {
 
 fn said_again(message: &[u8]) {
     if let Ok(message) = frame::decode::<ToBridge<'_>>(message) {
-        comes_back(&message, |bytes| frame::decode::<ToBridge<'_>>(bytes).is_ok_and(|again| again == message));
+        comes_back(&message, |bytes| {
+            frame::decode::<ToBridge<'_>>(bytes).is_ok_and(|again| again == message)
+        });
     }
     if let Ok(message) = frame::decode::<ToHost<'_>>(message) {
         comes_back(&message, |bytes| frame::decode::<ToHost<'_>>(bytes).is_ok_and(|again| again == message));

@@ -16,7 +16,9 @@ pub fn check(bytes: &[u8]) {
                 assert_eq!(out[..length], left[..length], "{command:?}");
                 assert_eq!(parse(&left[..length]), Ok(Step::Command(command, length)));
                 for cut in 0..length.min(12) {
-                    let Ok(Step::More(needed)) = parse(&left[..cut]) else { panic!("{command:?}, {cut} bytes") };
+                    let Ok(Step::More(needed)) = parse(&left[..cut]) else {
+                        panic!("{command:?}, {cut} bytes")
+                    };
                     assert!(cut < needed && needed <= length, "{command:?}, {cut} bytes: {needed} needed");
                 }
                 if order.accept(&command).is_err() {
