@@ -232,7 +232,7 @@ impl Bench<'_, '_> {
                 1 => Answer::Stopped(Fault::OffLine),
                 _ => Answer::Bytes(b"an answer"),
             }),
-            Task::Configure(_) if bool::from(script.ratio(1u8, 2u8)?) => Outcome::BadSettings,
+            Task::Configure(_) if script.ratio(1u8, 2u8)? => Outcome::BadSettings,
             _ => Outcome::Done,
         };
         self.engine.done(outcome);
@@ -260,7 +260,7 @@ fn step<'m>(
     script: &mut Unstructured<'_>,
 ) -> Result<()> {
     let jobs = bench.jobs;
-    let job = &jobs[usize::from(bool::from(script.ratio(1u8, 4u8)?))];
+    let job = &jobs[usize::from(script.ratio(1u8, 4u8)?)];
     match script.int_in_range(0..=19)? {
         0 => bench.tell(&ToBridge::Hello { version: script.arbitrary()?, schema: 0 }),
         1 => bench.tell(&job.begin()),
