@@ -393,6 +393,44 @@ fn a_plain_printer_interface_that_falls_silent_leaves_a_whole_job_and_text_as_it
 }
 
 #[test]
+fn a_plain_printer_interface_that_is_reset_drops_what_has_not_begun_and_leaves_a_whole_job() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.engine.local_reset();
+    assert_eq!(rig.engine.progress().state, JobState::None);
+    offer(&mut rig, &stream[..stream.len() / 2], 64);
+    let before = rig.printed.len();
+    rig.engine.local_reset();
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Cancelled);
+    assert!(is_a_whole_job(&rig.printed) && rig.printed.len() - before < 1300);
+    offer(&mut rig, &stream, 64);
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Done);
+    assert!(rig.printed.ends_with(&stream));
+}
+
+#[test]
+fn a_plain_printer_interface_waits_only_while_nothing_is_on_its_way() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    assert_eq!(rig.engine.local_waits(), None);
+    rig.engine.local(&stream[..20]);
+    rig.print();
+    // Nothing has gone to the printer before the first row.
+    assert_eq!(rig.engine.local_waits(), Some(false));
+    offer(&mut rig, &stream[20..stream.len() / 2], 64);
+    rig.print();
+    assert_eq!(rig.engine.local_waits(), Some(true));
+    rig.engine.port(Lines::IDLE, Some(Fault::PaperOut));
+    assert_eq!(rig.engine.local_waits(), None);
+    rig.engine.port(Lines::IDLE, None);
+    offer(&mut rig, &stream[stream.len() / 2..], 64);
+    rig.print();
+    assert_eq!(rig.engine.local_waits(), None);
+}
+
+#[test]
 fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
@@ -571,5 +609,5 @@ fn an_undisturbed_run_of_the_model_is_the_job() {
 
 #[test]
 fn the_engine_fits_a_microcontroller() {
-    assert!(size_of::<Engine>() <= 12 * 1024, "{} bytes", size_of::<Engine>());
+    assert!(size_of::<Engine>() <= 14 * 1024, "{} bytes", size_of::<Engine>());
 }

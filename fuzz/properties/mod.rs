@@ -7,3 +7,4 @@ pub mod engine;
 pub mod frame;
 pub mod rgl;
 pub mod runs;
+pub mod uf2;

@@ -7,13 +7,11 @@
 
 use bridge::engine::{Engine, Identity, Memory};
 use foilpress::send::session::{Outcome, Record, Session};
-use foilpress::send::transport::{Serial, Socket, Transport, pair};
+use foilpress::send::transport::{Socket, Transport, pair};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{Ask, JobKind, Lines, ToBridge, ToHost};
-use serialport::{SerialPort as _, TTYPort};
 use std::convert::Infallible;
-use std::io::{Read as _, Write as _};
-use std::os::unix::net::UnixStream;
+use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -29,27 +27,46 @@ fn main() {
     );
     let (here, there) = pair();
     run("memory", Box::new(here), Box::new(there));
-    let (here, there) = UnixStream::pair().expect("a pair of sockets");
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let here = TcpStream::connect(listener.local_addr().expect("its number")).expect("a connection");
+    let (there, _) = listener.accept().expect("its other end");
+    for end in [&here, &there] {
+        end.set_nodelay(true).expect("small messages at once");
+    }
     run("socket", Box::new(Socket::new(here)), Box::new(Socket::new(there)));
-    let (there, here) = TTYPort::pair().expect("a pair of terminals");
-    let name = here.name().expect("its name");
-    drop(here);
-    run("pty", Box::new(Serial::open(&name).expect("its other end")), Box::new(Terminal(there)));
+    #[cfg(unix)]
+    terminal::run();
 }
 
-/// The bridge's end of a pseudo-terminal.
-struct Terminal(TTYPort);
+/// A pseudo-terminal, which is what a serial port on USB is to the host.
+#[cfg(unix)]
+mod terminal {
+    use foilpress::send::transport::{Serial, Transport};
+    use serialport::{SerialPort as _, TTYPort};
+    use std::io::{ErrorKind, Read as _, Result, Write as _};
+    use std::time::Duration;
 
-impl Transport for Terminal {
-    fn send(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.write(bytes)
+    pub fn run() {
+        let (there, here) = TTYPort::pair().expect("a pair of terminals");
+        let name = here.name().expect("its name");
+        drop(here);
+        super::run("pty", Box::new(Serial::open(&name).expect("its other end")), Box::new(Bridge(there)));
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> std::io::Result<usize> {
-        self.0.set_timeout(patience)?;
-        match self.0.read(buffer) {
-            Err(error) if error.kind() == std::io::ErrorKind::TimedOut => Ok(0),
-            other => other,
+    /// The bridge's end.
+    struct Bridge(TTYPort);
+
+    impl Transport for Bridge {
+        fn send(&mut self, bytes: &[u8]) -> Result<usize> {
+            self.0.write(bytes)
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> Result<usize> {
+            self.0.set_timeout(patience)?;
+            match self.0.read(buffer) {
+                Err(error) if error.kind() == ErrorKind::TimedOut => Ok(0),
+                other => other,
+            }
         }
     }
 }

@@ -70,7 +70,9 @@ export class Board {
     this.chip.core.SP = 0x20041f00;
     this.chip.core.LR = 0;
     this.chip.core.PC = FLASH;
+    // While awake.
     this.instructions = 0;
+    this.cycles = 0;
     // A pin that was never told reads low; the lines of a printer are told by the printer.
     this.machines = [];
     for (const pio of this.chip.pio) {
@@ -114,7 +116,9 @@ export class Board {
       this.pass(Math.min(Math.max(alarm, NS_PER_CYCLE), MOST_NS));
     } else {
       this.instructions += 1;
-      this.pass(chip.core.executeInstruction() * NS_PER_CYCLE);
+      const cycles = chip.core.executeInstruction();
+      this.cycles += cycles;
+      this.pass(cycles * NS_PER_CYCLE);
     }
   }
 

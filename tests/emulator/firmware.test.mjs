@@ -31,7 +31,7 @@ test('a composite device appears, with a serial port and bulk endpoints', { skip
   assert.deepEqual([...device.subarray(4, 7)], [0xef, 2, 1]);
   assert.deepEqual(names.slice(0, 2), ['Foilpress', 'Foilpress bridge']);
   assert.match(names[2], /^[0-9A-F]{16}$/);
-  assert.deepEqual(interfaces.map((one) => one.class), [2, 10, 0xff]);
+  assert.deepEqual(interfaces.map((one) => one.class), [2, 10, 0xff, 7]);
   assert.deepEqual(bench.board.complaints, []);
 });
 
@@ -262,13 +262,11 @@ test('a printer that is switched off in the middle loses the job, and nothing mo
   await bench.connect('bulk');
   const bytes = job('page.rgl');
   await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length > 3000 });
-  for (const [line, level] of [['busy', 1], ['power', 0]]) bench.printer.set(line, level);
-  bench.printer.readyAt = Infinity;
+  bench.printer.power(false);
   const { taken } = bench.printer;
   const had = taken.length;
   await bench.hear(({ kind, state }) => kind === 'progress' && state === 'lost');
-  bench.printer.readyAt = 0;
-  for (const [line, level] of [['power', 1], ['busy', 0], ['ack', 1]]) bench.printer.set(line, level);
+  bench.printer.power(true);
   await bench.pass(50);
   assert.equal(taken.length, had);
 });
@@ -320,4 +318,24 @@ test('whatever happens on the cables, the printer gets the same bytes', { skip }
     legal(bench.printer);
   }
   t.diagnostic(`${runs} runs, ${JSON.stringify(happened)}`);
+});
+
+test('decoding keeps the port at work', { skip }, async (t) => {
+  const expected = job('clusters.rgl'), streams = job('clusters.streams');
+  for (const [what, settings] of [['as quick as the timing allows', { busyAfter: 200, work: 400, ack: 400 }], ['usual', {}]]) {
+    const bench = new Bench(settings);
+    await bench.connect('bulk');
+    const before = bench.board.cycles;
+    assert.equal((await bench.print(1, STREAMS, streams)).state, 'done');
+    same(bench.printer.taken, expected);
+    legal(bench.printer);
+    const at = bench.printer.edges.filter(({ line, level }) => line === 'strobe' && level === 0).map((edge) => edge.at);
+    // The port's own pace: what most bytes take. The rest of the time it had nothing to send.
+    const paces = at.slice(1).map((time, i) => time - at[i]).sort((a, b) => a - b);
+    const pace = paces[paces.length >> 1];
+    const busy = (paces.length * pace) / (at.at(-1) - at[0]);
+    const perDot = (bench.board.cycles - before) / (2 * 4800 * 256);
+    t.diagnostic(`${what}: ${pace} ns a byte, ${(100 * busy).toFixed(1)} % of the time; ${perDot.toFixed(1)} cycles a dot, all included`);
+    assert.ok(busy >= 0.9);
+  }
 });

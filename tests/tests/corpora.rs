@@ -36,3 +36,8 @@ fn the_printers_language_holds() {
 fn the_engine_holds() {
     replay("engine", properties::engine::check);
 }
+
+#[test]
+fn firmware_images_hold() {
+    replay("uf2", properties::uf2::check);
+}

@@ -1,12 +1,13 @@
 //! The bridge on a Raspberry Pi Pico.
 //!
 //! Everything that can be tested without a board is in the library `bridge`; here is what the board adds: pins, a
-//! strobe engine of PIO and DMA, a USB device, a lamp and a watchdog. Six tasks on one core:
+//! strobe engine of PIO and DMA, a USB device, a lamp and a watchdog. Seven tasks on one core:
 //!
 //! | task | waits for | does |
 //! |---|---|---|
 //! | `usb::run` | the bus | the device itself |
 //! | `usb::serial`, `usb::bulk` | packets | give them to the engine |
+//! | `printer::run` | packets | gives them to the engine as a job without a link |
 //! | `usb::answer` | something to say | takes frames from the engine |
 //! | `work` | data, room | lets the engine make printer bytes, a slice at a time |
 //! | `port::serve` | 1 ms, a sent buffer | feeds the strobe engine, looks at the lines, does the engine's errands |
@@ -19,6 +20,7 @@
 
 mod pins;
 mod port;
+mod printer;
 mod shared;
 mod strobe;
 mod usb;
@@ -27,12 +29,14 @@ mod watch;
 use bridge::engine::{Engine, Identity, Memory};
 use embassy_executor::Spawner;
 use embassy_futures::yield_now;
+use embassy_rp::binary_info::{EntryAddr, rp_cargo_version, rp_program_name};
 use embassy_rp::clocks::RoscRng;
 use embassy_rp::flash::{Blocking, Flash};
 use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
 use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
+use embassy_time::{Duration, Instant};
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
 use strobe::{CHUNK, Strobe};
@@ -42,13 +46,19 @@ bind_interrupts!(struct Interrupts {
     PIO0_IRQ_0 => pio::InterruptHandler<PIO0>;
 });
 
+/// The program's name and version in the image, for whoever is to flash it.
+#[unsafe(link_section = ".bi_entries")]
+#[used]
+static PROGRAM: [EntryAddr; 2] = [rp_program_name!(c"foilpress-bridge"), rp_cargo_version!()];
+
 const FLASH_BYTES: usize = 2 * 1024 * 1024;
 
 /// 64 rows of 9880 dots, as `protocol::runs::band_bytes` counts them.
 const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
 
-/// Slices of the engine's work between two looks at who else wants to run.
-const SLICES: usize = 4;
+/// The engine works for so long, and for the slice under way, before others may run: a slice takes up to 0.4 ms, and the
+/// strobe engine has work for three or more.
+const TURN: Duration = Duration::from_micros(500);
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -104,24 +114,32 @@ async fn main(spawner: Spawner) {
 
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
     static FLOOR: StaticCell<usb::Floor> = StaticCell::new();
+    static FACE: StaticCell<printer::Face> = StaticCell::new();
+    let face: &'static printer::Face = FACE.init_with(printer::Face::new);
     let floor: &'static usb::Floor = FLOOR.init(usb::Floor::new());
-    let link = usb::build(usb_driver::Driver::new(board.USB, Interrupts), hex(&number, SERIAL.init([0; 16])));
+    let link =
+        usb::build(usb_driver::Driver::new(board.USB, Interrupts), hex(&number, SERIAL.init([0; 16])), face);
     // The pools hold one of each task, and each is spawned once.
     spawner.spawn(usb::run(link.device).unwrap());
     spawner.spawn(usb::serial(shared, floor, link.serial_in, link.serial_lines).unwrap());
     spawner.spawn(usb::bulk(shared, floor, link.bulk_in).unwrap());
     spawner.spawn(usb::answer(shared, floor, link.serial_out, link.bulk_out).unwrap());
-    spawner.spawn(port::serve(shared, strobe).unwrap());
+    let (from_host, to_host) = link.printer;
+    spawner.spawn(printer::run(shared, face, from_host, to_host).unwrap());
+    spawner.spawn(port::serve(shared, face, strobe).unwrap());
     spawner.spawn(watch::run(shared, Watchdog::new(board.WATCHDOG)).unwrap());
     work(shared).await
 }
 
-/// Lets the engine work, a few slices at a time.
+/// Lets the engine work, a turn at a time.
 async fn work(shared: &'static Shared) {
     loop {
         let more = shared.engine(|engine| {
-            let empty = engine.output().is_empty();
-            let more = (0..SLICES).all(|_| engine.work());
+            let (empty, end) = (engine.output().is_empty(), Instant::now() + TURN);
+            let mut more = engine.work();
+            while more && Instant::now() < end {
+                more = engine.work();
+            }
             (more, empty && !engine.output().is_empty())
         });
         if more.1 {

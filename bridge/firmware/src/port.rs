@@ -6,6 +6,7 @@
 //! ID, status answer, reset.
 
 use crate::pins::{self, Ack, Data, Line};
+use crate::printer::Face;
 use crate::shared::{Shared, Side};
 use crate::strobe::{CHUNK, SENT, Strobe};
 use crate::watch::HEARTBEAT;
@@ -56,6 +57,9 @@ const STATUS_LENGTH: usize = 38;
 const STATUS_TRIES: u32 = 200;
 const STATUS_PAUSE_US: u32 = 10_000;
 
+/// A printer is asked who it is when it has been ready for so long.
+const SETTLED: Duration = Duration::from_millis(500);
+
 /// Who works the pins.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
@@ -70,6 +74,7 @@ enum Owner {
 /// The task's own state.
 struct Desk {
     shared: &'static Shared,
+    face: &'static Face,
     strobe: Strobe,
     hand: ByHand,
     owner: Owner,
@@ -81,14 +86,18 @@ struct Desk {
     power_seen: Instant,
     /// What the port worked by hand says.
     stop: Option<Fault>,
+    /// Since when the printer has been ready, until it has been asked who it is.
+    unasked: Option<Instant>,
+    asked: bool,
 }
 
 /// Serves the port.
 #[embassy_executor::task]
-pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
+pub async fn serve(shared: &'static Shared, face: &'static Face, strobe: Strobe) -> ! {
     let now = Instant::now();
     let mut desk = Desk {
         shared,
+        face,
         strobe,
         hand: Port::new(pins::port(), Cycles),
         owner: Owner::Hand,
@@ -98,6 +107,8 @@ pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
         moved: now,
         power_seen: now,
         stop: None,
+        unasked: None,
+        asked: false,
     };
     desk.give_back();
     loop {
@@ -107,6 +118,7 @@ pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
             desk.perform(task);
         }
         desk.look();
+        desk.introduce();
         if desk.owner == Owner::Test && shared.engine(|engine| !engine.output().is_empty()) {
             desk.give_back();
         }
@@ -148,8 +160,7 @@ impl Desk {
             // The oldest bytes of the output are those in flight already.
             let (strobe, engine) = (&mut self.strobe, &self.shared);
             let given = engine.engine(|engine| {
-                let output = engine.output();
-                let fresh = output.get(strobe.in_flight()..).unwrap_or(&[]);
+                let fresh = engine.output_behind(strobe.in_flight());
                 strobe.give(&fresh[..fresh.len().min(CHUNK)])
             });
             if given == 0 {
@@ -210,8 +221,37 @@ impl Desk {
         }
     }
 
-    /// Does what only the board can do, with nothing in flight.
-    fn perform(&mut self, task: Task) {
+    /// Asks a printer that has been switched on who it is, once it has been ready for a while and nobody uses it.
+    fn introduce(&mut self) {
+        let lines = pins::status().heeding(self.heed);
+        if !lines.high(Lines::POWER) {
+            if self.asked {
+                self.face.forget();
+            }
+            self.asked = false;
+        }
+        let ready = lines.fault().is_none() && !lines.high(Lines::BUSY);
+        if self.asked || !ready || self.owner == Owner::Test || !self.shared.engine(|engine| engine.is_idle())
+        {
+            self.unasked = None;
+            return;
+        }
+        let now = Instant::now();
+        if now - *self.unasked.get_or_insert(now) < SETTLED {
+            return;
+        }
+        // Once, whatever comes of it: a printer that does not negotiate is to be left alone.
+        self.asked = true;
+        self.take_pins();
+        let mut answer = [0; ANSWER];
+        if let Ok(count) | Err(ReverseError::Silent(count)) = self.hand.device_id(&mut answer) {
+            self.face.learn(&answer[..count]);
+        }
+        self.give_back();
+    }
+
+    /// The pins to the processor, with nothing in flight.
+    fn take_pins(&mut self) {
         let crossed = self.strobe.stop();
         self.consumed(crossed);
         if self.owner == Owner::Strobe {
@@ -221,6 +261,11 @@ impl Desk {
         if self.owner == Owner::Test {
             self.hand.rest();
         }
+    }
+
+    /// Does what only the board can do, with nothing in flight.
+    fn perform(&mut self, task: Task) {
+        self.take_pins();
         let mut answer = [0; ANSWER];
         let outcome = match task {
             Task::Configure(settings) => match self.configure(&settings) {
@@ -229,6 +274,9 @@ impl Desk {
             },
             Task::DeviceId => {
                 let result = self.hand.device_id(&mut answer);
+                if let Ok(count) = result {
+                    self.face.learn(&answer[..count]);
+                }
                 Outcome::Answer(self.answer(result, &answer))
             }
             Task::PrinterStatus => Outcome::Answer(self.status(&mut answer)),

@@ -156,12 +156,27 @@ impl Engine<'_> {
         taken.len()
     }
 
-    /// No more bytes of a job come through [`Engine::local`]: the interface was reset, or has been silent for
+    /// The plain printer interface was reset: its job, if one is open, is ended as by a cancel.
+    pub fn local_reset(&mut self) {
+        if self.job.as_ref().is_some_and(|job| job.id == LOCAL) {
+            self.cancel(LOCAL);
+        }
+    }
+
+    /// No more bytes of a job come through [`Engine::local`]: the interface is gone, or has been silent for
     /// longer than anything that prints is.
     pub fn local_end(&mut self) {
         if let Some(job) = self.job.as_mut().filter(|job| job.id == LOCAL && job.phase == Phase::Running) {
             job.length = job.accepted;
         }
+    }
+
+    /// Whether a job that comes through [`Engine::local`] waits for more, all it has got having crossed the port, and then
+    /// whether it has left the printer inside a job of its language.
+    pub fn local_waits(&self) -> Option<bool> {
+        let job = self.job.as_ref().filter(|job| job.id == LOCAL && job.length == u32::MAX)?;
+        let waits = self.output.is_empty() && self.fault.is_none() && job.phase == Phase::Running;
+        waits.then(|| job.used > 0 && self.sent.is_open() && !self.sent.is_foreign())
     }
 
     /// Empties everything that belongs to a job.

@@ -114,7 +114,7 @@ struct Due {
     not_now: Option<u16>,
 }
 
-/// The engine. Some 11 KB beside the [`Memory`] it is given.
+/// The engine. Some 13 KB beside the [`Memory`] it is given.
 pub struct Engine<'m> {
     identity: Identity,
     data: Ring<'m>,
@@ -246,13 +246,18 @@ impl<'m> Engine<'m> {
 
     /// Bytes for the port. The same bytes until [`Engine::consumed`]; more may come behind them.
     pub fn output(&self) -> &[u8] {
+        self.output_behind(0)
+    }
+
+    /// Bytes for the port behind the next `skip`, which are on their way already.
+    pub fn output_behind(&self, skip: usize) -> &[u8] {
         // A task has the port for itself, and a printer that has to be reset gets nothing before that.
-        if self.task.is_some() { &[] } else { self.output.front() }
+        if self.task.is_some() { &[] } else { self.output.behind(skip) }
     }
 
     /// So many bytes of [`Engine::output`] have crossed the port.
     pub fn consumed(&mut self, count: usize) {
-        let count = count.min(self.output.front().len());
+        let count = count.min(self.output.len());
         self.output.pop(count);
         if let Some(job) = &mut self.job {
             job.printed += count as u32;
@@ -271,6 +276,11 @@ impl<'m> Engine<'m> {
             // Switched on again the printer is a new one, and the rest of a row would be text to it.
             self.end(JobState::Lost);
         }
+    }
+
+    /// Whether no job is open and nothing is to be done: the printer may be asked something.
+    pub fn is_idle(&self) -> bool {
+        self.job.is_none() && self.task.is_none()
     }
 
     /// What the board is to do, once.

@@ -7,6 +7,7 @@
 //! printer's port.
 
 mod address;
+pub mod find;
 pub mod finish;
 pub mod journal;
 pub mod query;
@@ -16,6 +17,7 @@ pub mod session;
 pub mod status;
 pub mod streams;
 pub mod transport;
+pub mod usb;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};

@@ -126,6 +126,26 @@ impl<'t> Query<'t> {
         })?
     }
 
+    /// Sends the bridge to its boot loader, which ends the link.
+    pub fn bootloader(&mut self, patience: Duration) -> Result<(), QueryError> {
+        let refused = exchange(
+            self.link,
+            &mut self.reader,
+            &[ToBridge::Bootloader],
+            patience,
+            &mut |heard| match heard {
+                Heard::Refused(Refusal::JobOpen, job) => Some(QueryError::JobOpen(job)),
+                _ => None,
+            },
+        );
+        match refused {
+            Ok(error) => Err(error),
+            // Where the end of a link is not noticed there is silence.
+            Err(QueryError::Link(_) | QueryError::NoAnswer) => Ok(()),
+            Err(error) => Err(error),
+        }
+    }
+
     fn next(&mut self) -> u16 {
         self.request = self.request.wrapping_add(1);
         self.request

@@ -4,19 +4,15 @@
 //! reset: by the bridge, which pulls the port's nInit line, or by its own switch.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
-use std::time::Duration;
 
 use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
-use super::bridge;
+use super::PATIENCE;
 use crate::observe::Observer;
 use crate::send::Address;
 use crate::send::journal::{Entry, Journal};
 use crate::send::query::Query;
-
-/// How long to wait for a bridge to answer.
-const PATIENCE: Duration = Duration::from_secs(3);
 
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]
@@ -43,11 +39,11 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let address = match &args.to {
         Some(address) => address.clone(),
-        None => bridge::only()?,
+        None => super::only()?,
     };
     let mut link = address.open()?;
     reset(&mut Query::new(&mut *link, PATIENCE)?, &journal)?;
-    super::show("the printer has been reset; if a sheet is still in it, take it out\n")
+    crate::cli::show("the printer has been reset; if a sheet is still in it, take it out\n")
 }
 
 fn reset(query: &mut Query<'_>, journal: &Journal) -> Result<()> {
