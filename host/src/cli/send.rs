@@ -150,10 +150,9 @@ pub fn go(
         }
     };
     observer.end();
-    if outcome == Outcome::Broken
-        && job.entry.record.kind == JobKind::Streams
-        && job.entry.record.printed == 0
-    {
+    let record = &job.entry.record;
+    let refused = outcome == Outcome::Broken && record.kind == JobKind::Streams && record.printed == 0;
+    if refused && !cancel {
         return once_more_as_it_is(&job, &data, journal, address, observer);
     }
     let text = words::outcome(outcome, &job.entry, session.progress());
