@@ -118,7 +118,7 @@ impl Bench {
         // The bridge knows of a byte a little before it is on the desk.
         self.until("the job's bytes come", |bench| bench.printed() >= from + job.len());
         let desk = self.bridge.desk();
-        let printed = &desk.printed[from..];
+        let printed = &desk.jobs()[from..];
         let same = printed.iter().zip(job).take_while(|(a, b)| a == b).count();
         assert!(printed == job, "{} bytes for {}, the same up to {same}", printed.len(), job.len());
         drop(desk);
@@ -185,7 +185,7 @@ fn a_printed_document_is_the_very_sheet_although_every_cassette_has_to_be_put_in
     let file = fs::read(folder.join("job.rgl")).unwrap();
     {
         let desk = bench.bridge.desk();
-        assert!(desk.printed == file, "other bytes at the port");
+        assert!(desk.jobs() == file, "other bytes at the port");
         let sheet = desk.sheets[0].sheet().unwrap();
         // Two ways to the same sheet: the file that was kept, and the planes that were kept.
         let simulated = print(&file, &Default::default(), &Silent).unwrap().sheet().unwrap();
