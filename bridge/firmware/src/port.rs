@@ -293,8 +293,12 @@ impl Desk {
                 self.hand.drive(data, control);
                 Outcome::Done
             }
+            Task::Probe { data, control } => {
+                self.hand.drive(data, control);
+                Outcome::Lines(pins::status())
+            }
         };
-        if matches!(task, Task::Drive { .. }) {
+        if matches!(task, Task::Drive { .. } | Task::Probe { .. }) {
             self.owner = Owner::Test;
         } else {
             self.give_back();
