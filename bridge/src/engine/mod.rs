@@ -29,7 +29,7 @@ use self::job::{Job, Marks, Phase};
 use crate::ring::Ring;
 use crate::streams::{Streams, WRITE_ROOM};
 use crate::track::Track;
-use protocol::link::frame::{self, MAX};
+use protocol::link::frame::MAX;
 use protocol::link::message::{
     Answer, Fault, JobKind, JobState, Lines, PortSettings, Progress, Refusal, ToHost,
 };

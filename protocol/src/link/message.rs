@@ -232,6 +232,7 @@ pub struct Progress {
 
 /// Where a job stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum JobState {
     /// There is no job.
     None,
@@ -254,6 +255,7 @@ pub enum JobState {
 
 /// Why the printer does not take bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Fault {
     /// PError is high.
     PaperOut,
@@ -271,6 +273,7 @@ pub enum Fault {
 
 /// What is wrong with a job's data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Defect {
     /// Offset in the job's data of the byte where it was noticed.
     pub at: u32,
@@ -280,6 +283,7 @@ pub struct Defect {
 
 /// Kinds of defect.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DefectKind {
     /// Not a job header this bridge knows.
     Header,
@@ -331,6 +335,7 @@ pub enum Refusal {
 
 /// Levels of the port's status lines.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lines(pub u8);
 
 impl Lines {
