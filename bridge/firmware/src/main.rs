@@ -210,7 +210,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
         }
         at += 4;
     }
-    defmt::error!("panic at {=[u32]:#x}", trace[..found]);
+    defmt::error!("panic at {:#x}", &trace[..found]);
     loop {
         cortex_m::asm::nop();
     }
