@@ -60,12 +60,7 @@ export class Bench {
 
   /// The cable is pulled and plugged in again: nothing of what was under way arrives. Then hello, and where a job stands.
   async replug(way) {
-    const { host } = this;
-    host.attached = new Promise((resolve) => { host.onReset = resolve; });
-    host.read(this.end.in, null);
-    host.queues.clear();
-    host.armed.clear();
-    host.usb.resetDevice();
+    this.host.replug();
     this.frames = new Frames();
     await this.connect(way);
     return (await this.hear(({ kind, at }) => kind === 'progress' && at > this.greeted)).accepted;

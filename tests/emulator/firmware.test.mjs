@@ -262,13 +262,11 @@ test('a printer that is switched off in the middle loses the job, and nothing mo
   await bench.connect('bulk');
   const bytes = job('page.rgl');
   await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length > 3000 });
-  for (const [line, level] of [['busy', 1], ['power', 0]]) bench.printer.set(line, level);
-  bench.printer.readyAt = Infinity;
+  bench.printer.power(false);
   const { taken } = bench.printer;
   const had = taken.length;
   await bench.hear(({ kind, state }) => kind === 'progress' && state === 'lost');
-  bench.printer.readyAt = 0;
-  for (const [line, level] of [['power', 1], ['busy', 0], ['ack', 1]]) bench.printer.set(line, level);
+  bench.printer.power(true);
   await bench.pass(50);
   assert.equal(taken.length, had);
 });

@@ -1,9 +1,12 @@
-//! `cargo xtask emulator`: the real image on an emulated board, a model printer at its pins.
+//! `cargo xtask emulator`: the real image on an emulated board, and the program at its cables.
 //!
-//! Needs Node 20 and npm, which fetches the one pinned package. The jobs it prints are made here, by the encoders
-//! the workstation uses, so that what arrives at the emulated port is compared with what a file would have held.
+//! Three kinds of tests: the image with a model printer at its pins, in the board's own time (JavaScript, rp2040js);
+//! the program against that board, over a serial port, with the simulated printer at its pins (Rust); the same over USB
+//! as libusb meets it (umockdev). The jobs of the first kind are made here, by the encoders the workstation uses, so that
+//! what arrives at the emulated port is compared with what a file would have held.
 
-use crate::{command, firmware};
+use crate::tools::{self, Node};
+use crate::{cargo, firmware};
 use anyhow::{Context, Result, bail};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
@@ -12,17 +15,40 @@ use protocol::rgl::{JobSetup, JobWriter, Page};
 use protocol::runs::{self, Header, MAX_BAND, MAX_HEADER};
 use protocol::walk::{EDGE, Walk};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What every use of the emulator needs.
+struct Bench {
+    image: PathBuf,
+    scripts: PathBuf,
+    /// Where what is made for it goes.
+    folder: PathBuf,
+    node: Node,
+}
+
+impl Bench {
+    /// `None` if there is no Node, which has then been said.
+    fn new(root: &Path) -> Result<Option<Bench>> {
+        let folder = firmware::target(root);
+        fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+        let node = match Node::find(&folder) {
+            Ok(node) => node,
+            Err(missing) => return tools::skip("the emulator", &missing).map(|()| None),
+        };
+        let image = firmware::build(root)?;
+        let scripts = root.join("tests/emulator");
+        let mut install =
+            node.command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]);
+        run_step("npm ci", install.current_dir(&scripts))?;
+        Ok(Some(Bench { image, scripts, folder, node }))
+    }
+}
 
 /// Builds image and jobs and runs the tests.
 pub fn run(root: &Path) -> Result<()> {
-    if !command("node", &["--version"]).output().is_ok_and(|output| output.status.success()) {
-        println!("skipped: Node is not installed, and the emulator runs in it");
-        return Ok(());
-    }
-    let image = firmware::build(root)?;
-    let folder = root.join("tests/emulator");
-    let jobs = firmware::target(root).join("jobs");
+    let Some(bench) = Bench::new(root)? else { return Ok(()) };
+    let jobs = bench.folder.join("jobs");
     fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
     let made = [
         ("small", 500, 150, discs(500, 150)),
@@ -34,15 +60,60 @@ pub fn run(root: &Path) -> Result<()> {
         fs::write(jobs.join(format!("{name}.rgl")), printed)?;
         fs::write(jobs.join(format!("{name}.streams")), streams)?;
     }
-    let mut install = command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts"]);
-    let mut test = command("node", &["--test", "--test-reporter=spec"]);
-    test.env("FOILPRESS_IMAGE", image).env("FOILPRESS_JOBS", jobs);
-    for (what, step) in [("npm ci", &mut install), ("the emulator's tests", &mut test)] {
-        let status =
-            step.current_dir(&folder).status().with_context(|| format!("{what}: cannot be started"))?;
-        if !status.success() {
-            bail!("{what}: {status}");
-        }
+    let mut test = bench.node.command("node", &["--test", "--test-reporter=spec"]);
+    test.current_dir(&bench.scripts).env("FOILPRESS_IMAGE", &bench.image).env("FOILPRESS_JOBS", jobs);
+    run_step("the image's tests", &mut test)?;
+
+    let usbfs = bench.folder.join("usbfs");
+    let has_usb = match tools::usbfs(&bench.scripts.join("usbfs.c"), &usbfs) {
+        Ok(()) => true,
+        Err(missing) => tools::skip("the program over USB", &missing).map(|()| false)?,
+    };
+    run_step("the program", cargo(&["build", "--package", "foilpress", "--locked"]).current_dir(root))?;
+    // A test each for the board, the program and the printer: two at a time keep two cores at work.
+    let args =
+        ["test", "--package", "foilpress-tests", "--test", "emulator", "--locked", "--", "--test-threads=2"];
+    let mut test = cargo(&args);
+    test.current_dir(root)
+        .env("FOILPRESS_IMAGE", &bench.image)
+        .env("FOILPRESS_NODE", &bench.node.program)
+        .env("FOILPRESS_PROGRAM", firmware::workspace_target(root).join("debug/foilpress"));
+    if has_usb {
+        test.env("FOILPRESS_USBFS", usbfs);
+    }
+    run_step("the program's tests", &mut test)
+}
+
+/// A bridge to play with, until standard input ends.
+pub fn serve(root: &Path) -> Result<()> {
+    let Some(bench) = Bench::new(root)? else { return Ok(()) };
+    let usbfs = bench.folder.join("usbfs");
+    let devices = bench.folder.join("bridge");
+    match tools::usbfs(&bench.scripts.join("usbfs.c"), &usbfs) {
+        Ok(()) => println!("on a program's USB: {} {} -- foilpress ...", usbfs.display(), devices.display()),
+        Err(missing) => println!("not on USB: {missing:#}"),
+    }
+    let mut bridge = cargo(&[
+        "run",
+        "--quiet",
+        "--package",
+        "foilpress-tests",
+        "--bin",
+        "emulated-bridge",
+        "--locked",
+        "--",
+    ]);
+    bridge
+        .current_dir(root)
+        .args([&bench.image, &bench.scripts, &devices])
+        .env("FOILPRESS_NODE", &bench.node.program);
+    run_step("the emulated bridge", &mut bridge)
+}
+
+fn run_step(what: &str, step: &mut Command) -> Result<()> {
+    let status = step.status().with_context(|| format!("{what}: cannot be started"))?;
+    if !status.success() {
+        bail!("{what}: {status}");
     }
     Ok(())
 }

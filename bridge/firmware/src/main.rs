@@ -31,6 +31,7 @@ mod watch;
 use bridge::engine::{Engine, Identity, Memory};
 use embassy_executor::Spawner;
 use embassy_futures::yield_now;
+use embassy_rp::binary_info::{EntryAddr, rp_cargo_version, rp_program_name};
 use embassy_rp::clocks::RoscRng;
 use embassy_rp::flash::{Blocking, Flash};
 use embassy_rp::pac;
@@ -47,6 +48,11 @@ bind_interrupts!(struct Interrupts {
     USBCTRL_IRQ => usb_driver::InterruptHandler<USB>;
     PIO0_IRQ_0 => pio::InterruptHandler<PIO0>;
 });
+
+/// The program's name and version in the image, for whoever is to flash it.
+#[unsafe(link_section = ".bi_entries")]
+#[used]
+static PROGRAM: [EntryAddr; 2] = [rp_program_name!(c"foilpress-bridge"), rp_cargo_version!()];
 
 const FLASH_BYTES: usize = 2 * 1024 * 1024;
 

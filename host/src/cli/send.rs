@@ -16,6 +16,7 @@ use crate::send::{self, Address, Checked, Destination, Event, words};
 /// Arguments of `send`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
+    foilpress send job.rgl --to usb:                     (the only bridge on USB)\n  \
     foilpress send job.rgl --to serial:/dev/ttyACM0      (a bridge; `foilpress bridge list` finds it)\n  \
     foilpress send job.rgl --to raw:/dev/usb/lp0         (a printer at a USB-to-parallel cable)\n\n\
     With a bridge the job is kept on disk until it is printed: after a pulled cable it goes on by itself, after anything \
@@ -24,20 +25,23 @@ pub struct Args {
     /// One whole job in the printer's language
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
-    /// Where to: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
+    /// Where to: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
     #[arg(long, value_name = "WHERE")]
     to: Destination,
+    /// Send also to a printer that says it is no ALPS
+    #[arg(long)]
+    force: bool,
 }
 
 /// Runs `send`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = super::read_job(&args.job)?;
     let name = args.job.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
-    deliver(&name, &job, &args.to, observer)
+    deliver(&name, &job, &args.to, args.force, observer)
 }
 
-/// Checks a job and takes it to its destination.
-pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer) -> Result<()> {
+/// Checks a job and takes it to its destination; with `force` also to a printer that is no ALPS.
+pub fn deliver(name: &str, job: &[u8], to: &Destination, force: bool, observer: &dyn Observer) -> Result<()> {
     let checked = send::check(job, observer)?;
     match to {
         Destination::File(path) => {
@@ -47,6 +51,7 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer
         }
         Destination::Raw(path) => to_device(name, job, &checked, path, observer),
         Destination::Bridge(address) => {
+            super::bridge::expect_alps(address, force, observer)?;
             let journal = Journal::of_user()?;
             journal.tidy()?;
             let queued = journal.queue(NewJob {

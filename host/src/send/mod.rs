@@ -7,6 +7,7 @@
 //! printer's port.
 
 mod address;
+pub mod find;
 pub mod journal;
 pub mod query;
 pub mod raw;
@@ -14,6 +15,7 @@ mod run;
 pub mod session;
 pub mod status;
 pub mod transport;
+pub mod usb;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};
