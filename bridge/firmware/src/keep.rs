@@ -7,7 +7,8 @@
 //! into a ring, and the processor does the same for bytes it sends itself. After a reset the marks behind the last
 //! checkpoint are counted. The ring holds more than the strobe engine can send without the processor.
 //!
-//! Limits: a byte is marked about a microsecond after its strobe began; a reset in between, which only one from outside
+//! Limits: a byte is marked about a microsecond after its strobe began, and some microseconds after it if the processor sends
+//! it; a reset in between, which only one from outside
 //! can hit (a processor that hangs is bitten seconds after the strobe engine has fallen silent), gives that byte to the
 //! printer twice. Nothing here outlives the loss of the supply; then the mark at the front is missing, and the host is
 //! told that no job is known. The same after another image was flashed.
