@@ -47,6 +47,7 @@ export const job = (name) => new Uint8Array(readFileSync(join(jobs, name)));
 
 export class Bench {
   constructor(settings) {
+    this.settings = settings;
     this.board = new Board(new Uint8Array(readFileSync(image)));
     this.printer = new Printer(this.board, settings);
     this.host = new Host(this.board);
@@ -63,6 +64,20 @@ export class Bench {
     if (!(await this.board.run(() => settled, limitMs * MS))) throw new Error(`nothing after ${limitMs} ms of the board's time`);
     if (failure) throw failure;
     return result;
+  }
+
+  /// What the watchdog does: the board begins anew, with its memory as it was. The printer notices nothing. With `memory` false,
+  /// what the loss of the supply does.
+  restarted(memory = true) {
+    const next = new this.constructor(this.settings);
+    if (memory) next.board.chip.sram.set(this.board.chip.sram);
+    next.printer.taken = this.printer.taken;
+    return next;
+  }
+
+  /// The processor hangs: it executes nothing any more, and what needs no processor goes on.
+  hang() {
+    this.board.chip.core.executeInstruction = () => 1;
   }
 
   pass(ms) {
