@@ -80,6 +80,17 @@ export class Board {
       for (const machine of pio.machines) {
         // A fresh machine has an empty output register (rp2040js begins with a full one).
         machine.outputShiftCount = 32;
+        // A change of how the FIFOs are joined empties them.
+        const write = machine.writeUint32.bind(machine);
+        machine.writeUint32 = (offset, value) => {
+          const before = machine.shiftCtrl;
+          write(offset, value);
+          if ((before ^ machine.shiftCtrl) >>> 30 === 0) return;
+          machine.txFIFO.reset();
+          machine.rxFIFO.reset();
+          machine.updateDMATx();
+          machine.updateDMARx();
+        };
         this.machines.push({ pio, machine, due: 0, idle: 0 });
       }
     }
