@@ -46,8 +46,21 @@ impl<'m> Ring<'m> {
 
     /// The oldest bytes, as many as lie side by side.
     pub(crate) fn front(&self) -> &[u8] {
-        let end = (self.start + self.length).min(self.memory.len());
-        &self.memory[self.start..end]
+        self.behind(0)
+    }
+
+    /// The bytes behind the oldest `skip`, as many as lie side by side.
+    pub(crate) fn behind(&self, skip: usize) -> &[u8] {
+        if skip >= self.length {
+            return &[];
+        }
+        let (start, end) = (self.start + skip, self.start + self.length);
+        let size = self.memory.len();
+        if start >= size {
+            &self.memory[start - size..end - size]
+        } else {
+            &self.memory[start..end.min(size)]
+        }
     }
 
     /// Removes the oldest bytes; no more than there are.
@@ -89,6 +102,11 @@ mod tests {
                 prop_assert_eq!((ring.len(), ring.free(), ring.is_empty()), (model.len(), size - model.len(), model.is_empty()));
                 prop_assert!(ring.front().iter().eq(model.iter().take(ring.front().len())));
                 prop_assert!(model.is_empty() || !ring.front().is_empty());
+                for skip in 0..=model.len() {
+                    let behind = ring.behind(skip);
+                    prop_assert!(behind.iter().eq(model.iter().skip(skip).take(behind.len())));
+                    prop_assert!(skip == model.len() || !behind.is_empty());
+                }
             }
         }
     }

@@ -11,9 +11,9 @@ use protocol::runs::{Decoder, Defect, Header, HeaderError, MAX_HEADER, Step, ban
 /// Room for whatever one slice of work writes: the longest row, 9880 dots.
 pub(crate) const WRITE_ROOM: usize = ROW_ROOM + 1235;
 
-/// Bytes of a stream read in one slice of work: some tens of runs, so that a slice takes well below a
-/// millisecond on a microcontroller unless it opens a band.
-const SLICE: usize = 32;
+/// Bytes of a stream read in one slice of work: some hundred runs, so that a slice takes well below a
+/// millisecond on a microcontroller.
+const SLICE: usize = 64;
 
 /// What a slice of work did.
 pub(crate) struct Worked {

@@ -393,6 +393,44 @@ fn a_plain_printer_interface_that_falls_silent_leaves_a_whole_job_and_text_as_it
 }
 
 #[test]
+fn a_plain_printer_interface_that_is_reset_drops_what_has_not_begun_and_leaves_a_whole_job() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.engine.local_reset();
+    assert_eq!(rig.engine.progress().state, JobState::None);
+    offer(&mut rig, &stream[..stream.len() / 2], 64);
+    let before = rig.printed.len();
+    rig.engine.local_reset();
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Cancelled);
+    assert!(is_a_whole_job(&rig.printed) && rig.printed.len() - before < 1300);
+    offer(&mut rig, &stream, 64);
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Done);
+    assert!(rig.printed.ends_with(&stream));
+}
+
+#[test]
+fn a_plain_printer_interface_waits_only_while_nothing_is_on_its_way() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    assert_eq!(rig.engine.local_waits(), None);
+    rig.engine.local(&stream[..20]);
+    rig.print();
+    // Nothing has gone to the printer before the first row.
+    assert_eq!(rig.engine.local_waits(), Some(false));
+    offer(&mut rig, &stream[20..stream.len() / 2], 64);
+    rig.print();
+    assert_eq!(rig.engine.local_waits(), Some(true));
+    rig.engine.port(Lines::IDLE, Some(Fault::PaperOut));
+    assert_eq!(rig.engine.local_waits(), None);
+    rig.engine.port(Lines::IDLE, None);
+    offer(&mut rig, &stream[stream.len() / 2..], 64);
+    rig.print();
+    assert_eq!(rig.engine.local_waits(), None);
+}
+
+#[test]
 fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
@@ -533,7 +571,7 @@ proptest! {
 
     #[test]
     fn no_conversation_makes_it_fail(
-        messages in prop::collection::vec((0u8..10, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
+        messages in prop::collection::vec((0u8..12, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
     ) {
         let mut rig = Rig::new();
         for (kind, job, number, bytes, small) in messages {
@@ -545,7 +583,9 @@ proptest! {
                 6 => ToBridge::Cancel { job },
                 7 => ToBridge::Ask { request: 1, what: Ask::Printer },
                 8 => ToBridge::Initialise,
-                _ => ToBridge::Drive { data: small, control: small },
+                9 => ToBridge::Drive { data: small, control: small },
+                10 => ToBridge::Probe { request: 1, data: small, control: small },
+                _ => ToBridge::ReadLog { request: 1, from: number },
             });
             match small % 5 {
                 0 => while rig.engine.work() {},
@@ -561,6 +601,27 @@ proptest! {
 }
 
 #[test]
+fn the_log_is_given_when_asked_for_and_a_probe_only_between_jobs() {
+    let mut rig = Rig::new();
+    assert_eq!(rig.engine.log_wanted(), None);
+    rig.engine.log(0, 2, b"no");
+    assert!(rig.said().text.is_empty());
+    rig.tell(ToBridge::ReadLog { request: 4, from: 70 });
+    assert_eq!(rig.engine.log_wanted(), Some(70));
+    rig.engine.log(80, 83, b"log");
+    let part = ToHost::LogPart { request: 4, at: 80, end: 83, bytes: b"log" };
+    assert_eq!((rig.said().text, rig.engine.log_wanted()), (vec![format!("{part:?}")], None));
+    rig.tell(ToBridge::Probe { request: 5, data: 0x80, control: 7 });
+    assert_eq!(rig.engine.task(), Some(Task::Probe { data: 0x80, control: 7 }));
+    rig.engine.done(Outcome::Lines(Lines::IDLE));
+    let lines = ToHost::Lines { request: 5, lines: Lines::IDLE, fault: None };
+    assert_eq!(rig.said().text, [format!("{lines:?}")]);
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 9 });
+    let said = rig.tell(ToBridge::Probe { request: 6, data: 0, control: 0 });
+    assert_eq!(said.text, [format!("{:?}", ToHost::Answer { request: 6, answer: Answer::NotNow })]);
+}
+
+#[test]
 fn an_undisturbed_run_of_the_model_is_the_job() {
     for seed in 0..50 {
         let mut random = seeded(seed);
@@ -571,5 +632,5 @@ fn an_undisturbed_run_of_the_model_is_the_job() {
 
 #[test]
 fn the_engine_fits_a_microcontroller() {
-    assert!(size_of::<Engine>() <= 12 * 1024, "{} bytes", size_of::<Engine>());
+    assert!(size_of::<Engine>() <= 14 * 1024, "{} bytes", size_of::<Engine>());
 }

@@ -29,6 +29,8 @@ pub mod simulate;
 
 pub mod send;
 
+pub mod flash;
+
 pub mod inspect;
 
 pub mod preview;

@@ -11,6 +11,9 @@
 /// The longest run one header can stand for.
 const LONGEST: usize = 128;
 
+/// Whether eight bytes are looked at together. A microcontroller that loads them one by one is slower that way.
+const WIDE: bool = cfg!(target_pointer_width = "64");
+
 /// Packs `row` into `out`. Returns the bytes written, or `None` when `out` is too small for the result; then the
 /// content of `out` is arbitrary. An `out` one byte shorter than `row` therefore asks for a *gain*.
 pub fn pack_into(row: &[u8], out: &mut [u8]) -> Option<usize> {
@@ -49,7 +52,7 @@ fn segment(row: &[u8]) -> (usize, bool) {
 fn after_run(row: &[u8]) -> usize {
     let mut rest = row;
     let same = u64::from_le_bytes([row[0]; 8]);
-    while let Some(chunk) = rest.first_chunk::<8>() {
+    while WIDE && let Some(chunk) = rest.first_chunk::<8>() {
         let differing = u64::from_le_bytes(*chunk) ^ same;
         if differing != 0 {
             return rest.len() - differing.trailing_zeros() as usize / 8;
@@ -63,7 +66,9 @@ fn after_run(row: &[u8]) -> usize {
 fn literal(row: &[u8]) -> usize {
     const ONES: u64 = u64::from_le_bytes([1; 8]);
     let mut at = 0;
-    while let (Some(these), Some(next)) = (row[at..].first_chunk::<8>(), row[at + 1..].first_chunk::<8>()) {
+    while WIDE
+        && let (Some(these), Some(next)) = (row[at..].first_chunk::<8>(), row[at + 1..].first_chunk::<8>())
+    {
         let differing = u64::from_le_bytes(*these) ^ u64::from_le_bytes(*next);
         // The high bit of each zero byte; those above the lowest may be wrong, the lowest is right.
         let equal = differing.wrapping_sub(ONES) & !differing & (ONES << 7);

@@ -70,7 +70,9 @@ export class Board {
     this.chip.core.SP = 0x20041f00;
     this.chip.core.LR = 0;
     this.chip.core.PC = FLASH;
+    // While awake.
     this.instructions = 0;
+    this.cycles = 0;
     // A pin that was never told reads low; the lines of a printer are told by the printer.
     this.machines = [];
     for (const pio of this.chip.pio) {
@@ -78,6 +80,17 @@ export class Board {
       for (const machine of pio.machines) {
         // A fresh machine has an empty output register (rp2040js begins with a full one).
         machine.outputShiftCount = 32;
+        // A change of how the FIFOs are joined empties them.
+        const write = machine.writeUint32.bind(machine);
+        machine.writeUint32 = (offset, value) => {
+          const before = machine.shiftCtrl;
+          write(offset, value);
+          if ((before ^ machine.shiftCtrl) >>> 30 === 0) return;
+          machine.txFIFO.reset();
+          machine.rxFIFO.reset();
+          machine.updateDMATx();
+          machine.updateDMARx();
+        };
         this.machines.push({ pio, machine, due: 0, idle: 0 });
       }
     }
@@ -114,7 +127,9 @@ export class Board {
       this.pass(Math.min(Math.max(alarm, NS_PER_CYCLE), MOST_NS));
     } else {
       this.instructions += 1;
-      this.pass(chip.core.executeInstruction() * NS_PER_CYCLE);
+      const cycles = chip.core.executeInstruction();
+      this.cycles += cycles;
+      this.pass(cycles * NS_PER_CYCLE);
     }
   }
 

@@ -10,16 +10,22 @@ const ENABLE = 20;
 const LOW = 0;
 
 export class Printer {
-  constructor(board, { busyAfter = 300, work = 1000, ack = 500, id = null, negotiates = true, status = null } = {}) {
-    Object.assign(this, { board, busyAfter, work, ack, id, negotiates, status });
+  /// `onByte` is told every byte; then neither bytes nor edges are kept here, only what they amount to.
+  constructor(board, { busyAfter = 300, work = 1000, ack = 500, id = null, negotiates = true, status = null, onByte = null } = {}) {
+    Object.assign(this, { board, busyAfter, work, ack, id, negotiates, status, onByte });
     this.taken = [];
+    this.count = 0;
+    this.room = Infinity; // bytes it takes in all before it stays busy
     this.edges = [];
+    this.waveform = new Waveform();
     this.resets = 0;
     this.pauses = []; // { after, line, level, ns }
     this.phase = 'forward';
     this.readyAt = 0;
+    this.takenAt = -Infinity;
     this.level = {};
-    for (const [line, level] of Object.entries({ ack: 1, busy: 0, paperOut: 0, select: 1, fault: 1, power: 1 })) this.set(line, level);
+    this.own = { paperOut: 0, select: 1, fault: 1 };
+    for (const [line, level] of Object.entries({ ack: 1, busy: 0, power: 1, ...this.own })) this.set(line, level);
     // What the cable shows before the buffers are enabled: pull-ups.
     this.out = { strobe: 1, autoFeed: 1, init: 1, selectIn: 1, data: 0xff };
     const outputs = [STROBE, AUTO_FEED, INIT, SELECT_IN, ENABLE, ...Array.from({ length: 8 }, (_, i) => DATA + i)];
@@ -30,8 +36,31 @@ export class Printer {
   set(line, level) {
     if (this.level[line] === level) return;
     this.level[line] = level;
-    this.edges.push({ at: this.board.now, line, level });
+    this.note(line, level);
     this.board.pin(LINES[line]).setInputValue(level === 1);
+  }
+
+  note(line, level) {
+    const edge = { at: this.board.now, line, level };
+    this.waveform.look(edge);
+    if (!this.onByte) this.edges.push(edge);
+  }
+
+  /// The printer's own switch. What it was at work on is gone.
+  power(on) {
+    this.off = !on;
+    this.readyAt = on ? 0 : Infinity;
+    for (const [line, level] of on ? [['power', 1], ['busy', 0], ['ack', 1]] : [['busy', 1], ['power', 0]]) this.set(line, level);
+  }
+
+  /// Changes status lines when a real printer would: while it is at work on a byte, or when none has come for a while,
+  /// and after a conversation, which uses them for something else.
+  change(lines) {
+    Object.assign(this.own, lines);
+    const idle = this.board.now - this.takenAt > 1_000_000;
+    if (this.phase !== 'forward') return;
+    if (this.readyAt === Infinity || idle) for (const [line, level] of Object.entries(this.own)) this.set(line, level);
+    else this.later(1000, () => this.change({}));
   }
 
   later(ns, act) {
@@ -48,7 +77,7 @@ export class Printer {
     this.out = { strobe: high(STROBE), autoFeed: high(AUTO_FEED), init: high(INIT), selectIn: high(SELECT_IN), data };
     for (const line of ['data', 'selectIn', 'autoFeed', 'init', 'strobe']) {
       if (before[line] === this.out[line]) continue;
-      this.edges.push({ at: this.board.now, line, level: this.out[line] });
+      this.note(line, this.out[line]);
       this.react(line, this.out[line]);
     }
   }
@@ -61,8 +90,10 @@ export class Printer {
 
   take() {
     if (this.board.now < this.readyAt) return;
-    this.taken.push(this.out.data);
-    const pauses = this.pauses.filter(({ after }) => after === this.taken.length);
+    this.count += 1;
+    if (this.onByte) this.onByte(this.out.data);
+    else this.taken.push(this.out.data);
+    const pauses = this.pauses.filter(({ after }) => after === this.count);
     let busy = this.work;
     for (const { line, level, ns } of pauses) {
       busy = Math.max(busy, ns);
@@ -71,14 +102,29 @@ export class Printer {
         this.later(this.busyAfter + ns, () => this.set(line, 1 - level));
       }
     }
-    this.readyAt = this.board.now + this.busyAfter + busy;
+    this.readyAt = Infinity;
+    this.takenAt = this.board.now;
     this.later(this.busyAfter, () => this.set('busy', 1));
-    this.later(this.busyAfter + busy, () => this.set('ack', 0));
-    this.later(this.busyAfter + busy + this.ack, () => { this.set('ack', 1); this.set('busy', 0); });
+    this.later(this.busyAfter + busy, () => this.finish());
     // The status question, and its answer when it is worked on.
     if (this.status && this.taken.length >= 2 && this.taken.at(-2) === 5 && this.taken.at(-1) === 1) {
       this.later(3_000_000, () => { this.say = [...this.status]; });
     }
+  }
+
+  /// Done with a byte, as soon as there is room for the next.
+  finish() {
+    this.full = this.count >= this.room;
+    if (this.full || this.off) return;
+    this.readyAt = this.board.now;
+    this.set('ack', 0);
+    this.later(this.ack, () => { this.set('ack', 1); this.set('busy', 0); });
+  }
+
+  /// Makes room for so many bytes in all.
+  grant(room) {
+    this.room = room;
+    if (this.full) this.finish();
   }
 
   say = [];
@@ -116,38 +162,53 @@ export class Printer {
       this.phase = 'leaving';
       answer({ fault: 1, busy: 0 }, 0);
     } else if (this.phase === 'leaving' && line === 'autoFeed' && level === 0) {
-      answer({ paperOut: 0, select: 1, fault: 1 }, 1);
+      answer(this.own, 1);
     } else if (this.phase === 'leaving' && line === 'autoFeed' && level === 1 && this.level.ack === 1) {
       this.phase = 'forward';
+      this.change({});
     }
   }
 }
 
 /// The shortest of every time around the strobes, and every strobe or change of data that came when it must not.
-export function waveform(edges) {
-  const shortest = { setup: Infinity, strobe: Infinity, hold: Infinity, between: Infinity };
-  const wrong = [];
-  let [dataAt, fallAt, riseAt, lastFall] = [-Infinity, null, null, null];
-  const level = { busy: 0, paperOut: 0, select: 1, fault: 1, selectIn: 0, data: 0 };
-  const least = (name, ns) => { shortest[name] = Math.min(shortest[name], ns); };
-  for (const { at, line, level: now } of edges) {
+export class Waveform {
+  shortest = { setup: Infinity, strobe: Infinity, hold: Infinity, between: Infinity };
+  wrong = [];
+  #level = { busy: 0, paperOut: 0, select: 1, fault: 1, selectIn: 0, data: 0 };
+  #dataAt = -Infinity;
+  #fallAt = null;
+  #riseAt = null;
+  #lastFall = null;
+
+  #least(name, ns) {
+    this.shortest[name] = Math.min(this.shortest[name], ns);
+  }
+
+  look({ at, line, level: now }) {
+    const level = this.#level;
     level[line] = now;
-    if (line === 'selectIn' && now === 1) [riseAt, lastFall] = [null, null];
-    if (level.selectIn === 1) continue;
+    if (line === 'selectIn' && now === 1) [this.#riseAt, this.#lastFall] = [null, null];
+    if (level.selectIn === 1) return;
     if (line === 'data') {
-      if (fallAt !== null) wrong.push({ at, what: 'data changed under the strobe' });
-      if (level.busy) wrong.push({ at, what: 'data changed while busy' });
-      if (riseAt !== null) least('hold', at - riseAt);
-      dataAt = at;
+      if (this.#fallAt !== null) this.wrong.push({ at, what: 'data changed under the strobe' });
+      if (level.busy) this.wrong.push({ at, what: 'data changed while busy' });
+      if (this.#riseAt !== null) this.#least('hold', at - this.#riseAt);
+      this.#dataAt = at;
     } else if (line === 'strobe' && now === 0) {
-      least('setup', at - dataAt);
-      if (lastFall !== null) least('between', at - lastFall);
-      if (level.busy || level.paperOut || !level.select || !level.fault) wrong.push({ at, what: 'strobe while not ready', ...level });
-      [fallAt, lastFall] = [at, at];
+      this.#least('setup', at - this.#dataAt);
+      if (this.#lastFall !== null) this.#least('between', at - this.#lastFall);
+      if (level.busy || level.paperOut || !level.select || !level.fault) this.wrong.push({ at, what: 'strobe while not ready', ...level });
+      [this.#fallAt, this.#lastFall] = [at, at];
     } else if (line === 'strobe') {
-      if (fallAt !== null) least('strobe', at - fallAt);
-      [fallAt, riseAt] = [null, at];
+      if (this.#fallAt !== null) this.#least('strobe', at - this.#fallAt);
+      [this.#fallAt, this.#riseAt] = [null, at];
     }
   }
-  return { shortest, wrong };
+}
+
+/// The same for edges that were kept.
+export function waveform(edges) {
+  const whole = new Waveform();
+  for (const edge of edges) whole.look(edge);
+  return whole;
 }

@@ -22,7 +22,8 @@ export class Host {
     this.memory = board.chip.usbDPRAM;
     this.view = board.chip.usbDPRAMView;
     this.armed = new Set();
-    this.queues = new Map(); // packets that wait for an OUT buffer: { bytes, sent }
+    this.queues = new Map(); // packets that wait for an OUT buffer: { bytes, sent, lost }
+    this.crossing = new Set(); // those of them that are on the bus
     this.reading = new Map(); // who wants packets of an IN endpoint
     this.busFreeAt = 0;
     this.packets = 0;
@@ -56,24 +57,36 @@ export class Host {
     if (out ? !queue?.length : !this.reading.get(id)) return;
     this.armed.delete(id);
     const register = control(endpoint, out);
-    const length = out ? queue[0].bytes.length : this.view.getUint32(register, true) & LENGTH;
+    const packet = out ? queue.shift() : null;
+    const length = out ? packet.bytes.length : this.view.getUint32(register, true) & LENGTH;
+    if (out) this.crossing.add(packet);
+    const resets = this.resets;
     this.onBus(packetNs(length), () => {
+      if (resets !== this.resets) return;
       const now = this.view.getUint32(register, true);
-      // Taken back by a bus reset meanwhile.
-      if (!(now & AVAILABLE)) return;
+      this.crossing.delete(packet);
+      // Taken back by the firmware meanwhile.
+      if (!(now & AVAILABLE)) {
+        packet?.lost(new Error('the buffer was taken back'));
+        return;
+      }
       const at = this.usb.getEndpointBufferOffset(endpoint, out);
       this.packets += 1;
       if (out) {
-        const { bytes, sent } = queue.shift();
-        this.memory.set(bytes, at);
-        this.view.setUint32(register, (now & ~(AVAILABLE | LENGTH)) | FULL | bytes.length, true);
+        this.memory.set(packet.bytes, at);
+        this.view.setUint32(register, (now & ~(AVAILABLE | LENGTH)) | FULL | length, true);
         this.usb.indicateBufferReady(endpoint, true);
-        sent();
+        packet.sent();
       } else {
+        // Nobody asks for it any more: it stays where it is.
+        if (!this.reading.get(id)) {
+          this.armed.add(id);
+          return;
+        }
         const bytes = this.memory.slice(at, at + length);
         this.view.setUint32(register, now & ~(AVAILABLE | FULL), true);
         this.usb.indicateBufferReady(endpoint, false);
-        this.reading.get(id)?.(bytes);
+        this.reading.get(id)(bytes);
       }
     });
   }
@@ -84,14 +97,32 @@ export class Host {
     this.board.clock.createAlarm(done).schedule(this.busFreeAt - this.board.now);
   }
 
-  /// Sends a packet; the promise is kept when it has crossed the bus.
+  /// Sends a packet; the promise is kept when it has crossed the bus, broken when it never will.
   send(endpoint, bytes) {
     const id = key(endpoint, true);
     const queue = this.queues.get(id) ?? [];
     this.queues.set(id, queue);
-    const sent = new Promise((resolve) => queue.push({ bytes, sent: resolve }));
+    const sent = new Promise((resolve, reject) => queue.push({ bytes, sent: resolve, lost: reject }));
     this.go(endpoint, true);
     return sent;
+  }
+
+  /// Takes back the packets of an OUT endpoint that have not begun to cross.
+  takeBack(endpoint) {
+    for (const packet of this.queues.get(key(endpoint, true))?.splice(0) ?? []) packet.lost(new Error('taken back'));
+  }
+
+  /// Pulls the cable and plugs it in again: nothing of what was under way arrives, and the device is to be enumerated.
+  replug() {
+    this.attached = new Promise((resolve) => { this.onReset = resolve; });
+    const lost = [...this.crossing, ...[...this.queues.values()].flat()];
+    this.queues.clear();
+    this.crossing.clear();
+    this.reading.clear();
+    this.armed.clear();
+    for (const packet of lost) packet.lost(new Error('the cable was pulled'));
+    this.stalled?.();
+    this.usb.resetDevice();
   }
 
   /// Sends bytes in packets of 64.
@@ -105,8 +136,16 @@ export class Host {
     if (take) this.go(endpoint, false);
   }
 
-  /// A control transfer; `data` is what is sent, or how many bytes are wanted. `null` if it was refused.
-  async transfer([requestType, request, value, index], data) {
+  /// A control transfer; `data` is what is sent, or how many bytes are wanted. `null` if it was refused. One at a time.
+  transfer(setup, data) {
+    const result = this.control.then(() => this.transferNow(setup, data));
+    this.control = result.catch(() => {});
+    return result;
+  }
+
+  control = Promise.resolve();
+
+  async transferNow([requestType, request, value, index], data) {
     const wanted = typeof data === 'number' ? data : data.length;
     const setup = new Uint8Array([requestType, request, value & 255, value >> 8, index & 255, index >> 8, wanted & 255, wanted >> 8]);
     const refused = new Promise((resolve) => { this.stalled = () => resolve(null); });
@@ -128,6 +167,7 @@ export class Host {
     };
     const result = await Promise.race([whole(), refused]);
     this.stalled = null;
+    this.takeBack(0);
     this.reading.delete(key(0, false));
     return result;
   }

@@ -1,1 +1,4 @@
 //! Scenarios that join every part; the tests themselves stand in `tests/`.
+
+#[cfg(unix)]
+pub mod emulated;

@@ -1,75 +1,180 @@
-//! `cargo xtask emulator`: the real image on an emulated board, a model printer at its pins.
+//! `cargo xtask emulator`: the real image on an emulated board, and the program at its cables.
 //!
-//! Needs Node 20 and npm, which fetches the one pinned package. The jobs it prints are made here, by the encoders
-//! the workstation uses, so that what arrives at the emulated port is compared with what a file would have held.
+//! Three kinds of tests: the image with a model printer at its pins, in the board's own time (JavaScript, rp2040js);
+//! the program against that board, over a serial port, with the simulated printer at its pins (Rust); the same over USB
+//! as libusb meets it (umockdev). The jobs of the first kind are made here, by the encoders the workstation uses, so that
+//! what arrives at the emulated port is compared with what a file would have held.
 
-use crate::{command, firmware};
+use crate::tools::{self, Node};
+use crate::{cargo, firmware};
 use anyhow::{Context, Result, bail};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{JobSetup, JobWriter, Page};
 use protocol::runs::{self, Header, MAX_BAND, MAX_HEADER};
+use protocol::walk::{EDGE, Walk};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What every use of the emulator needs.
+struct Bench {
+    image: PathBuf,
+    scripts: PathBuf,
+    /// Where what is made for it goes.
+    folder: PathBuf,
+    node: Node,
+}
+
+impl Bench {
+    /// `None` if there is no Node, which has then been said.
+    fn new(root: &Path) -> Result<Option<Bench>> {
+        let folder = firmware::target(root);
+        fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+        let node = match Node::find(&folder) {
+            Ok(node) => node,
+            Err(missing) => return tools::skip("the emulator", &missing).map(|()| None),
+        };
+        let image = firmware::build(root)?;
+        let scripts = root.join("tests/emulator");
+        let mut install =
+            node.command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]);
+        run_step("npm ci", install.current_dir(&scripts))?;
+        Ok(Some(Bench { image, scripts, folder, node }))
+    }
+}
 
 /// Builds image and jobs and runs the tests.
 pub fn run(root: &Path) -> Result<()> {
-    if !command("node", &["--version"]).output().is_ok_and(|output| output.status.success()) {
-        println!("skipped: Node is not installed, and the emulator runs in it");
-        return Ok(());
-    }
-    let image = firmware::build(root)?;
-    let folder = root.join("tests/emulator");
-    let jobs = firmware::target(root).join("jobs");
+    let Some(bench) = Bench::new(root)? else { return Ok(()) };
+    let jobs = bench.folder.join("jobs");
     fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
-    for (name, width, rows) in [("small", 500, 150), ("page", 4800, 130)] {
-        let (printed, streams) = job(width, rows).context("a test job cannot be made")?;
+    let made = [
+        ("small", 500, 150, discs(500, 150)),
+        ("page", 4800, 130, discs(4800, 130)),
+        ("clusters", 4800, 256, clusters(4800, 256)),
+    ];
+    for (name, width, rows, planes) in made {
+        let (printed, streams) = job(width, rows, &planes).context("a test job cannot be made")?;
         fs::write(jobs.join(format!("{name}.rgl")), printed)?;
         fs::write(jobs.join(format!("{name}.streams")), streams)?;
     }
-    let mut install = command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts"]);
-    let mut test = command("node", &["--test", "--test-reporter=spec"]);
-    test.env("FOILPRESS_IMAGE", image).env("FOILPRESS_JOBS", jobs);
-    for (what, step) in [("npm ci", &mut install), ("the emulator's tests", &mut test)] {
-        let status =
-            step.current_dir(&folder).status().with_context(|| format!("{what}: cannot be started"))?;
-        if !status.success() {
-            bail!("{what}: {status}");
-        }
+    let mut test = bench.node.command("node", &["--test", "--test-reporter=spec"]);
+    test.current_dir(&bench.scripts).env("FOILPRESS_IMAGE", &bench.image).env("FOILPRESS_JOBS", jobs);
+    run_step("the image's tests", &mut test)?;
+
+    let usbfs = bench.folder.join("usbfs");
+    let has_usb = match tools::usbfs(&bench.scripts.join("usbfs.c"), &usbfs) {
+        Ok(()) => true,
+        Err(missing) => tools::skip("the program over USB", &missing).map(|()| false)?,
+    };
+    run_step("the program", cargo(&["build", "--package", "foilpress", "--locked"]).current_dir(root))?;
+    // A test each for the board, the program and the printer: two at a time keep two cores at work.
+    let args =
+        ["test", "--package", "foilpress-tests", "--test", "emulator", "--locked", "--", "--test-threads=2"];
+    let mut test = cargo(&args);
+    test.current_dir(root)
+        .env("FOILPRESS_IMAGE", &bench.image)
+        .env("FOILPRESS_NODE", &bench.node.program)
+        .env("FOILPRESS_PROGRAM", firmware::workspace_target(root).join("debug/foilpress"));
+    if has_usb {
+        test.env("FOILPRESS_USBFS", usbfs);
+    }
+    run_step("the program's tests", &mut test)
+}
+
+/// A bridge to play with, until standard input ends.
+pub fn serve(root: &Path) -> Result<()> {
+    let Some(bench) = Bench::new(root)? else { return Ok(()) };
+    let usbfs = bench.folder.join("usbfs");
+    let devices = bench.folder.join("bridge");
+    match tools::usbfs(&bench.scripts.join("usbfs.c"), &usbfs) {
+        Ok(()) => println!("on a program's USB: {} {} -- foilpress ...", usbfs.display(), devices.display()),
+        Err(missing) => println!("not on USB: {missing:#}"),
+    }
+    let mut bridge = cargo(&[
+        "run",
+        "--quiet",
+        "--package",
+        "foilpress-tests",
+        "--bin",
+        "emulated-bridge",
+        "--locked",
+        "--",
+    ]);
+    bridge
+        .current_dir(root)
+        .args([&bench.image, &bench.scripts, &devices])
+        .env("FOILPRESS_NODE", &bench.node.program);
+    run_step("the emulated bridge", &mut bridge)
+}
+
+fn run_step(what: &str, step: &mut Command) -> Result<()> {
+    let status = step.status().with_context(|| format!("{what}: cannot be started"))?;
+    if !status.success() {
+        bail!("{what}: {status}");
     }
     Ok(())
 }
 
-/// A job of two inks as the printer's language and as pass streams: discs of two sizes, denser towards the bottom.
-fn job(width: u16, rows: u16) -> Option<(Vec<u8>, Vec<u8>)> {
-    let inks = [Ink::White, Ink::Black];
+/// The planes of two inks: discs of two sizes, denser towards the bottom.
+fn discs(width: u16, rows: u16) -> [Vec<u8>; 2] {
     let stride = runs::stride(width);
-    let planes: Vec<Vec<u8>> = [12u32, 40]
-        .iter()
-        .map(|&pitch| {
-            let mut plane = vec![0u8; stride * usize::from(rows)];
-            for y in 0..u32::from(rows) {
-                let radius = pitch / 6 + pitch * y / (3 * u32::from(rows));
-                for x in 0..u32::from(width) {
-                    let (dx, dy) = (x % pitch, y % pitch);
-                    let square = dx.abs_diff(pitch / 2).pow(2) + dy.abs_diff(pitch / 2).pow(2);
-                    if square < radius * radius {
-                        plane[y as usize * stride + x as usize / 8] |= 0x80 >> (x % 8);
-                    }
+    [12u32, 40].map(|pitch| {
+        let mut plane = vec![0u8; stride * usize::from(rows)];
+        for y in 0..u32::from(rows) {
+            let radius = pitch / 6 + pitch * y / (3 * u32::from(rows));
+            for x in 0..u32::from(width) {
+                let (dx, dy) = (x % pitch, y % pitch);
+                let square = dx.abs_diff(pitch / 2).pow(2) + dy.abs_diff(pitch / 2).pow(2);
+                if square < radius * radius {
+                    plane[y as usize * stride + x as usize / 8] |= 0x80 >> (x % 8);
                 }
             }
-            plane
-        })
-        .collect();
+        }
+        plane
+    })
+}
 
+/// Two of eight planes as the halftone makes them: clusters of eight dots or somewhat more along the walk, each of one
+/// of eight inks or of bare paper.
+fn clusters(width: u16, rows: u16) -> [Vec<u8>; 2] {
+    let stride = runs::stride(width);
+    let mut planes = [(); 2].map(|()| vec![0u8; stride * usize::from(rows)]);
+    let (mut random, mut left, mut ink) = (1u64, 0, 0);
+    for tile in Walk::new(width, rows).bands().flat_map(|band| band.tiles()) {
+        let mut dots = vec![0; usize::from(tile.area())];
+        tile.fill(&mut dots);
+        for dot in dots {
+            if left == 0 {
+                random =
+                    random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                ink = (random >> 40) as usize % 9;
+                // Eight, and one more with a chance of a half each time.
+                left = 8 + (random >> 50).trailing_ones();
+            }
+            left -= 1;
+            if let Some(plane) = planes.get_mut(ink) {
+                let (x, y) = (usize::from(tile.x + dot % EDGE), usize::from(tile.y + dot / EDGE));
+                plane[y * stride + x / 8] |= 0x80 >> (x % 8);
+            }
+        }
+    }
+    planes
+}
+
+/// A job of two inks as the printer's language and as pass streams.
+fn job(width: u16, rows: u16, planes: &[Vec<u8>; 2]) -> Option<(Vec<u8>, Vec<u8>)> {
+    let inks = [Ink::White, Ink::Black];
+    let stride = runs::stride(width);
     let page = Page::plain(Paper::A4);
     let mut writer = JobWriter::new(JobSetup::new(page, &inks, None).ok()?, rows).ok()?;
     let mut out = vec![0; COMMAND_ROOM + ROW_ROOM + stride];
     let mut printed = Vec::new();
     let length = writer.begin(&mut out).ok()?;
     printed.extend_from_slice(&out[..length]);
-    for plane in &planes {
+    for plane in planes {
         let length = writer.next_pass(&mut out).ok()?;
         printed.extend_from_slice(&out[..length]);
         for row in plane.chunks_exact(stride) {
@@ -84,7 +189,7 @@ fn job(width: u16, rows: u16) -> Option<(Vec<u8>, Vec<u8>)> {
     let length = Header::new(page, &inks, None, width, rows).ok()?.write(&mut head);
     let mut streams = head[..length].to_vec();
     let mut buffer = vec![0; MAX_BAND];
-    for plane in &planes {
+    for plane in planes {
         runs::encode(width, rows, plane, &mut buffer, |band| streams.extend_from_slice(band)).ok()?;
     }
     Some((printed, streams))

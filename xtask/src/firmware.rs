@@ -1,6 +1,6 @@
 //! `cargo xtask firmware`: the bridge's image, and whether it is as small as it is to be.
 
-use crate::{BARE_METAL, cargo, elf, uf2};
+use crate::{BARE_METAL, cargo, elf};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -11,7 +11,6 @@ struct Budget {
     memory: usize,
 }
 
-const FLASH: u64 = 0x1000_0000;
 const MEMORY: u32 = 0x2000_0000;
 
 /// Builds the image and writes it as UF2; gives the path of that.
@@ -19,7 +18,7 @@ pub fn build(root: &Path) -> Result<PathBuf> {
     let folder = root.join("bridge/firmware");
     let target = target(root);
     let mut build = cargo(&["build", "--release", "--locked"]);
-    // The folder's own settings name the processor and the linker's scripts.
+    // The folder's own settings name the processor, the linker's scripts and what is logged.
     build.current_dir(&folder).env("CARGO_TARGET_DIR", &target);
     let status = build.status().context("cargo cannot be started")?;
     if !status.success() {
@@ -39,20 +38,18 @@ pub fn build(root: &Path) -> Result<PathBuf> {
         .filter(|segment| segment.running >= MEMORY)
         .map(|segment| segment.size as usize)
         .sum();
-    if !pieces.iter().any(|&(address, _)| address == FLASH) {
-        bail!("the image has no boot loader at its beginning; is `link-rp.x` among the linker's scripts?");
-    }
 
     let image = uf2::encode(&pieces)?;
-    // What the ROM would read has to be the image.
-    let pages = uf2::decode(&image)?;
+    // What the ROM would read has to be the image, and one it starts.
+    let read = uf2::decode(&image)?;
+    read.check_boot().context("is `link-rp.x` among the linker's scripts?")?;
     let path = target.join("foilpress-bridge.uf2");
     fs::write(&path, &image).with_context(|| format!("{} cannot be written", path.display()))?;
 
     let budget = budget(&folder.join("budget.toml"))?;
     println!("flash   {flash:>7} of {:>7} bytes", budget.flash);
     println!("memory  {memory:>7} of {:>7} bytes, static; the rest of 270336 is stack", budget.memory);
-    println!("{} ({} pages)", path.display(), pages.len());
+    println!("{} ({} pages)", path.display(), read.pages().len());
     if flash > budget.flash || memory > budget.memory {
         bail!("the image is larger than bridge/firmware/budget.toml allows");
     }
@@ -61,7 +58,12 @@ pub fn build(root: &Path) -> Result<PathBuf> {
 
 /// Where the image is built: beside the workspace's own artifacts.
 pub fn target(root: &Path) -> PathBuf {
-    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from).join("firmware")
+    workspace_target(root).join("firmware")
+}
+
+/// Where the workspace is built.
+pub fn workspace_target(root: &Path) -> PathBuf {
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }
 
 fn budget(path: &Path) -> Result<Budget> {

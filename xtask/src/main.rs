@@ -1,13 +1,13 @@
 //! The project's own chores, so that a person and the gate type the same words.
 //!
-//! `cargo xtask test` is the whole gate: formatting, lints, documents, every test and the bare-metal build
-//! of `protocol` and `bridge`. It runs every step, then says which failed. The firmware and its emulator are
-//! chores of their own, because they need more than a Rust compiler.
+//! `cargo xtask test` is the whole gate: formatting, lints, documents, every test, the bare-metal build of `protocol`
+//! and `bridge`, and the firmware's image in its emulator, for which it fetches what is missing. It runs every step, then
+//! says which failed.
 
 mod elf;
 mod emulator;
 mod firmware;
-mod uf2;
+mod tools;
 
 use std::path::Path;
 use std::process::{Command, ExitCode};
@@ -26,22 +26,28 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Format check, clippy, documents, all tests, bare-metal build: what has to pass before anything lands
+    /// Format check, clippy, documents, all tests, bare-metal build, emulator: what has to pass before anything lands
     Test,
     /// The benchmarks (results are ratios to read, not tests that pass)
     Bench,
     /// The bridge's image as UF2, its size against bridge/firmware/budget.toml
     Firmware,
-    /// The bridge's image on an emulated board with a model printer at its pins (needs Node and npm)
-    Emulator,
+    /// The bridge's image on an emulated board: its tests, or with --serve a bridge for other programs
+    Emulator {
+        /// Shows the bridge on a serial port with a simulated printer behind it, until standard input ends
+        #[arg(long)]
+        serve: bool,
+    },
 }
 
 fn main() -> ExitCode {
     // The workspace, wherever this was started from: it is the folder above this package.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
-    let steps: Vec<(&str, Command)> = match Args::parse().task {
+    let task = Args::parse().task;
+    let steps: Vec<(&str, Command)> = match task {
         Task::Firmware => return finish(firmware::build(root).map(drop)),
-        Task::Emulator => return finish(emulator::run(root)),
+        Task::Emulator { serve: true } => return finish(emulator::serve(root)),
+        Task::Emulator { serve: false } => return finish(emulator::run(root)),
         Task::Test => vec![
             ("bare-metal target", command("rustup", &["target", "add", BARE_METAL])),
             ("formatting", cargo(&["fmt", "--all", "--check"])),
@@ -76,6 +82,12 @@ fn main() -> ExitCode {
             Ok(status) if status.success() => {}
             Ok(status) => failed.push(format!("{name} ({status})")),
             Err(error) => failed.push(format!("{name} (cannot start: {error})")),
+        }
+    }
+    if matches!(task, Task::Test) {
+        eprintln!("== emulator");
+        if let Err(error) = emulator::run(root) {
+            failed.push(format!("emulator ({error:#})"));
         }
     }
     if failed.is_empty() {

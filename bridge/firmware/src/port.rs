@@ -5,7 +5,9 @@
 //! works the pins itself through [`bridge::port::Port`], which it also does for everything between jobs: device
 //! ID, status answer, reset.
 
+use crate::keep::{Keeper, MARKS};
 use crate::pins::{self, Ack, Data, Line};
+use crate::printer::Face;
 use crate::shared::{Shared, Side};
 use crate::strobe::{CHUNK, SENT, Strobe};
 use crate::watch::HEARTBEAT;
@@ -56,6 +58,9 @@ const STATUS_LENGTH: usize = 38;
 const STATUS_TRIES: u32 = 200;
 const STATUS_PAUSE_US: u32 = 10_000;
 
+/// A printer is asked who it is when it has been ready for so long.
+const SETTLED: Duration = Duration::from_millis(500);
+
 /// Who works the pins.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
@@ -70,6 +75,7 @@ enum Owner {
 /// The task's own state.
 struct Desk {
     shared: &'static Shared,
+    face: &'static Face,
     strobe: Strobe,
     hand: ByHand,
     owner: Owner,
@@ -81,14 +87,21 @@ struct Desk {
     power_seen: Instant,
     /// What the port worked by hand says.
     stop: Option<Fault>,
+    /// Since when the printer has been ready, until it has been asked who it is.
+    unasked: Option<Instant>,
+    asked: bool,
+    keeper: Keeper,
+    /// Job and state last written to the log.
+    told: Option<(u32, JobState)>,
 }
 
 /// Serves the port.
 #[embassy_executor::task]
-pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
+pub async fn serve(shared: &'static Shared, face: &'static Face, strobe: Strobe, keeper: Keeper) -> ! {
     let now = Instant::now();
     let mut desk = Desk {
         shared,
+        face,
         strobe,
         hand: Port::new(pins::port(), Cycles),
         owner: Owner::Hand,
@@ -98,6 +111,10 @@ pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
         moved: now,
         power_seen: now,
         stop: None,
+        unasked: None,
+        asked: false,
+        keeper,
+        told: None,
     };
     desk.give_back();
     loop {
@@ -107,6 +124,7 @@ pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
             desk.perform(task);
         }
         desk.look();
+        desk.introduce();
         if desk.owner == Owner::Test && shared.engine(|engine| !engine.output().is_empty()) {
             desk.give_back();
         }
@@ -115,6 +133,7 @@ pub async fn serve(shared: &'static Shared, strobe: Strobe) -> ! {
             Owner::Hand => desk.send_by_hand(),
             Owner::Test => TICK,
         };
+        desk.keep();
         shared.wake(Side::Work);
         shared.wake(Side::Link);
         if pause.as_ticks() == 0 {
@@ -142,14 +161,28 @@ impl Desk {
         }
     }
 
+    /// Keeps where the job stands for the time after a reset, and says in the log what has changed.
+    fn keep(&mut self) {
+        let checkpoint = self.shared.engine(|engine| engine.checkpoint());
+        self.keeper.store(checkpoint, self.strobe.place());
+        let state = (checkpoint.progress.job, checkpoint.progress.state);
+        if self.told.replace(state) != Some(state) && state.0 != 0 {
+            defmt::info!(
+                "job {=u32:08x}: {}, {=u32} bytes printed",
+                state.0,
+                state.1,
+                checkpoint.progress.printed
+            );
+        }
+    }
+
     /// Fills the strobe engine's buffers; says when to look again.
     fn feed(&mut self) -> Duration {
         while self.strobe.has_room() {
             // The oldest bytes of the output are those in flight already.
             let (strobe, engine) = (&mut self.strobe, &self.shared);
             let given = engine.engine(|engine| {
-                let output = engine.output();
-                let fresh = output.get(strobe.in_flight()..).unwrap_or(&[]);
+                let fresh = engine.output_behind(strobe.in_flight());
                 strobe.give(&fresh[..fresh.len().min(CHUNK)])
             });
             if given == 0 {
@@ -163,15 +196,22 @@ impl Desk {
     fn send_by_hand(&mut self) -> Duration {
         let now = Instant::now().as_millis() as u32;
         let hand = &mut self.hand;
+        let keeper = &self.keeper;
         let (count, stop, more) = self.shared.engine(|engine| {
             let output = engine.output();
             let handful = &output[..output.len().min(HANDFUL)];
-            if handful.is_empty() {
-                return (0, None, false);
+            let mut count = 0;
+            for byte in handful {
+                let written = hand.write(core::slice::from_ref(byte), now);
+                if written.count == 0 {
+                    return (count, written.stop, true);
+                }
+                keeper.mark(count);
+                count += 1;
             }
-            let written = hand.write(handful, now);
-            (written.count, written.stop, true)
+            (count, None, count > 0)
         });
+        self.strobe.set_place((self.keeper.place() + count) % MARKS);
         self.consumed(count);
         self.stop = match stop {
             Some(Stop::Fault(fault)) => Some(fault),
@@ -210,8 +250,40 @@ impl Desk {
         }
     }
 
-    /// Does what only the board can do, with nothing in flight.
-    fn perform(&mut self, task: Task) {
+    /// Asks a printer that has been switched on who it is, once it has been ready for a while and nobody uses it.
+    fn introduce(&mut self) {
+        let lines = pins::status().heeding(self.heed);
+        if !lines.high(Lines::POWER) {
+            if self.asked {
+                self.face.forget();
+            }
+            self.asked = false;
+        }
+        let ready = lines.fault().is_none() && !lines.high(Lines::BUSY);
+        if self.asked || !ready || self.owner == Owner::Test || !self.shared.engine(|engine| engine.is_idle())
+        {
+            self.unasked = None;
+            return;
+        }
+        let now = Instant::now();
+        if now - *self.unasked.get_or_insert(now) < SETTLED {
+            return;
+        }
+        // Once, whatever comes of it: a printer that does not negotiate is to be left alone.
+        self.asked = true;
+        self.take_pins();
+        let mut answer = [0; ANSWER];
+        match self.hand.device_id(&mut answer) {
+            Ok(count) | Err(ReverseError::Silent(count)) if self.face.learn(&answer[..count]) => {
+                defmt::info!("the printer has said who it is, in {=usize} bytes", count);
+            }
+            _ => defmt::info!("the printer does not say who it is"),
+        }
+        self.give_back();
+    }
+
+    /// The pins to the processor, with nothing in flight.
+    fn take_pins(&mut self) {
         let crossed = self.strobe.stop();
         self.consumed(crossed);
         if self.owner == Owner::Strobe {
@@ -221,6 +293,11 @@ impl Desk {
         if self.owner == Owner::Test {
             self.hand.rest();
         }
+    }
+
+    /// Does what only the board can do, with nothing in flight.
+    fn perform(&mut self, task: Task) {
+        self.take_pins();
         let mut answer = [0; ANSWER];
         let outcome = match task {
             Task::Configure(settings) => match self.configure(&settings) {
@@ -229,6 +306,9 @@ impl Desk {
             },
             Task::DeviceId => {
                 let result = self.hand.device_id(&mut answer);
+                if let Ok(count) = result {
+                    self.face.learn(&answer[..count]);
+                }
                 Outcome::Answer(self.answer(result, &answer))
             }
             Task::PrinterStatus => Outcome::Answer(self.status(&mut answer)),
@@ -245,8 +325,12 @@ impl Desk {
                 self.hand.drive(data, control);
                 Outcome::Done
             }
+            Task::Probe { data, control } => {
+                self.hand.drive(data, control);
+                Outcome::Lines(pins::status())
+            }
         };
-        if matches!(task, Task::Drive { .. }) {
+        if matches!(task, Task::Drive { .. } | Task::Probe { .. }) {
             self.owner = Owner::Test;
         } else {
             self.give_back();

@@ -1,4 +1,5 @@
-//! The link: one USB device with a serial port and a pair of bulk endpoints, both speaking frames.
+//! The link: one USB device with a serial port and a pair of bulk endpoints, both speaking frames; and a [printer], which
+//! speaks none.
 //!
 //! The serial port (CDC-ACM) is there for every program that can open one; the bulk endpoints, a vendor function that
 //! Windows binds to WinUSB by itself, for programs with a USB library. Each has its own frame reader. Answers go
@@ -7,6 +8,8 @@
 //! What arrives is always read: flow control is by credits in the frames, never by leaving an endpoint full, so a
 //! cancel or a question is seen however much data is under way.
 
+use crate::keep;
+use crate::printer::{self, Face, LONGEST};
 use crate::shared::{Shared, Side};
 use core::cell::Cell;
 use embassy_futures::select::{Either, select};
@@ -19,12 +22,15 @@ use embassy_usb::driver::{Endpoint, EndpointError, EndpointIn, EndpointOut};
 use embassy_usb::msos::{self, windows_version};
 use embassy_usb::{Builder, Config, UsbDevice};
 use protocol::link::frame::{MAX, Reader};
+use protocol::link::message::DATA_MAX;
 use static_cell::StaticCell;
 
 /// The driver.
 pub type Usb = Driver<'static, USB>;
-type BulkIn = <Usb as embassy_usb::driver::Driver<'static>>::EndpointIn;
-type BulkOut = <Usb as embassy_usb::driver::Driver<'static>>::EndpointOut;
+/// A bulk endpoint to the host.
+pub type BulkIn = <Usb as embassy_usb::driver::Driver<'static>>::EndpointIn;
+/// A bulk endpoint from the host.
+pub type BulkOut = <Usb as embassy_usb::driver::Driver<'static>>::EndpointOut;
 
 /// A test number of pid.codes, to be replaced by one of the project's own before boards are sold.
 const VENDOR: u16 = 0x1209;
@@ -36,7 +42,8 @@ const MSOS_REQUEST: u8 = 0x20;
 /// Windows finds the bulk endpoints by it.
 const INTERFACE_GUIDS: &[&str] = &["{6E8C7E4B-3D0D-4F7A-9B0B-0F1C5C1E5F55}"];
 
-const PACKET: u16 = 64;
+/// Bytes of a full packet.
+pub const PACKET: u16 = 64;
 
 /// One less than a packet: a full one would have to be followed by an empty one for the host to stop waiting.
 const PORTION: usize = PACKET as usize - 1;
@@ -55,14 +62,16 @@ pub struct Link {
     pub bulk_out: BulkIn,
     /// The bulk endpoint from the host.
     pub bulk_in: BulkOut,
+    /// The printer's endpoints.
+    pub printer: (BulkOut, BulkIn),
 }
 
 /// Builds the device. To be called once.
-pub fn build(driver: Usb, serial_number: &'static str) -> Link {
+pub fn build(driver: Usb, serial_number: &'static str, face: &'static Face) -> Link {
     static CONFIGURATION: StaticCell<[u8; 192]> = StaticCell::new();
     static BOS: StaticCell<[u8; 64]> = StaticCell::new();
     static MSOS: StaticCell<[u8; 256]> = StaticCell::new();
-    static CONTROL: StaticCell<[u8; 64]> = StaticCell::new();
+    static CONTROL: StaticCell<[u8; LONGEST]> = StaticCell::new();
     static STATE: StaticCell<State<'static>> = StaticCell::new();
 
     let mut config = Config::new(VENDOR, PRODUCT);
@@ -76,7 +85,7 @@ pub fn build(driver: Usb, serial_number: &'static str) -> Link {
         CONFIGURATION.init([0; 192]),
         BOS.init([0; 64]),
         MSOS.init([0; 256]),
-        CONTROL.init([0; 64]),
+        CONTROL.init([0; LONGEST]),
     );
     builder.msos_descriptor(windows_version::WIN8_1, MSOS_REQUEST);
 
@@ -94,8 +103,9 @@ pub fn build(driver: Usb, serial_number: &'static str) -> Link {
     let bulk_in = setting.endpoint_bulk_out(None, PACKET);
     let bulk_out = setting.endpoint_bulk_in(None, PACKET);
     drop(function);
+    let printer = printer::build(&mut builder, face);
 
-    Link { device: builder.build(), serial_out, serial_in, serial_lines, bulk_out, bulk_in }
+    Link { device: builder.build(), serial_out, serial_in, serial_lines, bulk_out, bulk_in, printer }
 }
 
 /// Who is to be answered.
@@ -219,7 +229,13 @@ pub async fn answer(
     loop {
         shared.wait(Side::Link).await;
         while let Some(speaker) = floor.speaker.get() {
-            let length = shared.engine(|engine| engine.transmit(frame));
+            let length = shared.engine(|engine| {
+                if let Some(from) = engine.log_wanted() {
+                    let (at, end, count) = keep::read_log(from, &mut frame[..DATA_MAX]);
+                    engine.log(at, end, &frame[..count]);
+                }
+                engine.transmit(frame)
+            });
             if length == 0 {
                 break;
             }

@@ -6,7 +6,7 @@ use crate::engine::{Due, Identity, Task};
 use crate::track::Track;
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
 };
 
 impl Engine<'_> {
@@ -64,6 +64,8 @@ impl Engine<'_> {
             }
             ToBridge::Bootloader => self.between_jobs(Task::Bootloader),
             ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),
+            ToBridge::Probe { request, data, control } => self.ask(request, Task::Probe { data, control }),
+            ToBridge::ReadLog { request, from } => self.due.log = Some((request, from)),
         }
     }
 
@@ -156,12 +158,27 @@ impl Engine<'_> {
         taken.len()
     }
 
-    /// No more bytes of a job come through [`Engine::local`]: the interface was reset, or has been silent for
+    /// The plain printer interface was reset: its job, if one is open, is ended as by a cancel.
+    pub fn local_reset(&mut self) {
+        if self.job.as_ref().is_some_and(|job| job.id == LOCAL) {
+            self.cancel(LOCAL);
+        }
+    }
+
+    /// No more bytes of a job come through [`Engine::local`]: the interface is gone, or has been silent for
     /// longer than anything that prints is.
     pub fn local_end(&mut self) {
         if let Some(job) = self.job.as_mut().filter(|job| job.id == LOCAL && job.phase == Phase::Running) {
             job.length = job.accepted;
         }
+    }
+
+    /// Whether a job that comes through [`Engine::local`] waits for more, all it has got having crossed the port, and then
+    /// whether it has left the printer inside a job of its language.
+    pub fn local_waits(&self) -> Option<bool> {
+        let job = self.job.as_ref().filter(|job| job.id == LOCAL && job.length == u32::MAX)?;
+        let waits = self.output.is_empty() && self.fault.is_none() && job.phase == Phase::Running;
+        waits.then(|| job.used > 0 && self.sent.is_open() && !self.sent.is_foreign())
     }
 
     /// Empties everything that belongs to a job.
@@ -278,11 +295,23 @@ impl Engine<'_> {
             || now.printed.wrapping_sub(self.told.printed) >= 4096
     }
 
-    /// A piece of the firmware's log for the host; false if the last one has not gone yet.
-    pub fn log(&mut self, bytes: &[u8]) -> bool {
-        self.frame_length == 0 && {
-            self.frame_length = frame::write(&ToHost::Log(bytes), &mut self.frame).unwrap_or(0);
-            true
+    /// Makes a frame of a message that cannot wait in its own form.
+    pub(super) fn prepare(&mut self, message: &ToHost<'_>) {
+        self.frame_length = frame::write(message, &mut self.frame).unwrap_or(0);
+    }
+
+    /// From which byte on the host wants the log, if it does.
+    pub fn log_wanted(&self) -> Option<u32> {
+        self.due.log.filter(|_| self.frame_length == 0).map(|(_, from)| from)
+    }
+
+    /// A piece of the log for the host that wanted it: at most [`DATA_MAX`] bytes, beginning at byte `at` of `end`.
+    pub fn log(&mut self, at: u32, end: u32, bytes: &[u8]) {
+        if self.log_wanted().is_some()
+            && let Some((request, _)) = self.due.log.take()
+        {
+            let bytes = &bytes[..bytes.len().min(DATA_MAX)];
+            self.prepare(&ToHost::LogPart { request, at, end, bytes });
         }
     }
 }

@@ -1,18 +1,31 @@
-//! `foilpress bridge`: the bridges there are, and how one of them and its printer are.
+//! `foilpress bridge`: the bridges there are, how one of them and its printer are, and new firmware for it.
 
-use std::io::Write as _;
+mod flash;
+mod list;
+mod reset;
+
+pub use list::ask;
+pub use reset::before_sending;
+
+use std::io::{self, Write as _};
 use std::time::Duration;
 
 use anyhow::{Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use protocol::link::message::{Ask, Fault, JobState, Lines, Progress, VERSION};
 use serde_json::json;
-use serialport::{SerialPortInfo, SerialPortType};
 
+use crate::flash::FlashError;
+use crate::flash::image::Firmware;
+use crate::observe::Observer;
+use crate::send::find;
+use crate::send::journal::JournalError;
 use crate::send::query::{Query, Reply};
 use crate::send::session::Bridge;
 use crate::send::status::Status;
-use crate::send::{Address, words};
+use crate::send::transport::Transport;
+use crate::send::usb::UDEV_RULES;
+use crate::send::{Address, OpenError, RunError, words};
 
 /// How long to wait for a bridge to answer.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -24,7 +37,9 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 #[command(after_help = "Examples:\n  \
     foilpress bridge list\n  \
     foilpress bridge status                              (the only bridge there is)\n  \
-    foilpress bridge status --to serial:/dev/ttyACM0 --json")]
+    foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
+    foilpress bridge flash                               (new firmware, or the first one on a new board)\n  \
+    foilpress bridge reset                               (after a sheet was lost)")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -32,10 +47,14 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Serial ports on USB, and which of them are bridges
-    List,
+    /// The bridges on USB, with firmware and printer
+    List(list::Args),
+    /// Put firmware on a bridge, or on a new board
+    Flash(flash::Args),
     /// The bridge, its job, the port's lines, and the printer's own answer when no job is open
     Status(StatusArgs),
+    /// Reset the printer through the bridge, after a sheet was lost in the middle
+    Reset(reset::Args),
 }
 
 /// Arguments of `bridge status`.
@@ -50,82 +69,78 @@ struct StatusArgs {
 }
 
 /// Runs `bridge`.
-pub fn run(args: &Args) -> Result<()> {
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.command {
-        Command::List => list(),
+        Command::List(args) => list::run(args),
+        Command::Flash(args) => flash::run(args, observer),
         Command::Status(args) => status(args),
+        Command::Reset(args) => reset::run(args),
     }
-}
-
-/// A serial port on USB.
-pub struct Port {
-    /// Where it is.
-    pub address: Address,
-    /// What it says it is.
-    pub product: String,
-    /// Whether it may be a bridge, so that it may be spoken to.
-    pub candidate: bool,
-}
-
-/// The serial ports on USB. Ports of other devices are not spoken to: a greeting may mean something to them.
-pub fn ports() -> Vec<Port> {
-    // Systems that cannot list their ports have none to offer; a port can still be named.
-    let found: Vec<SerialPortInfo> = serialport::available_ports().unwrap_or_default();
-    found
-        .into_iter()
-        .filter_map(|port| {
-            let SerialPortType::UsbPort(usb) = port.port_type else { return None };
-            let product = usb.product.unwrap_or_else(|| format!("{:04x}:{:04x}", usb.vid, usb.pid));
-            let ours = |text: &str| text.to_ascii_lowercase().contains("foilpress");
-            let candidate = ours(&product) || usb.manufacturer.as_deref().is_some_and(ours);
-            Some(Port { address: Address::Serial(port.port_name), product, candidate })
-        })
-        .collect()
-}
-
-/// Who answers there.
-pub fn greet(address: &Address) -> Result<(Bridge, Progress)> {
-    let mut link = address.open()?;
-    let query = Query::new(&mut *link, PATIENCE)?;
-    Ok((query.bridge().clone(), *query.progress()))
-}
-
-fn list() -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    let ports = ports();
-    if ports.is_empty() {
-        bail!("no serial port on USB; plug the bridge in, or see `foilpress doctor`");
-    }
-    for port in &ports {
-        write!(out, "{}  {}", port.address, port.product)?;
-        match port.candidate.then(|| greet(&port.address)) {
-            None => writeln!(out, ": another device, not asked")?,
-            Some(Ok((bridge, progress))) => {
-                writeln!(
-                    out,
-                    ": bridge {:016x}, firmware {}, {}",
-                    bridge.serial,
-                    bridge.firmware,
-                    doing(&progress)
-                )?;
-            }
-            Some(Err(error)) => writeln!(out, ": {error:#}")?,
-        }
-    }
-    Ok(())
 }
 
 /// The only bridge there is.
 fn only() -> Result<Address> {
-    let mut candidates: Vec<Port> = ports().into_iter().filter(|port| port.candidate).collect();
-    match (candidates.pop(), candidates.is_empty()) {
-        (Some(one), true) => Ok(one.address),
-        (None, _) => bail!("no bridge found; name its port with --to, or see `foilpress doctor`"),
-        (Some(last), false) => {
-            candidates.push(last);
-            let names: Vec<String> = candidates.iter().map(|port| port.address.to_string()).collect();
-            bail!("several bridges: choose one with --to: {}", names.join(", "))
+    let bridge = find::only()?;
+    let (address, _) = bridge.open()?;
+    Ok(address.clone())
+}
+
+/// Whether something was not allowed that a rule for the system would allow.
+pub fn is_forbidden(error: &anyhow::Error) -> bool {
+    let refused = |open: &OpenError| matches!(open, OpenError::Forbidden(_));
+    error.chain().any(|cause| {
+        cause.downcast_ref().is_some_and(refused)
+            || match cause.downcast_ref() {
+                Some(RunError::<JournalError>::Open(open)) => refused(open),
+                _ => false,
+            }
+            || match cause.downcast_ref() {
+                Some(FlashError::Open(open)) => refused(open),
+                Some(FlashError::Closed(error)) => error.kind() == io::ErrorKind::PermissionDenied,
+                _ => false,
+            }
+    })
+}
+
+/// What gives the permission.
+pub fn permission() -> String {
+    if !cfg!(target_os = "linux") {
+        return "close other programs that may use it, and unplug it and plug it in again\n".into();
+    }
+    let rules: String = UDEV_RULES.lines().filter(|line| !line.starts_with('#') && !line.is_empty()).fold(
+        String::new(),
+        |mut rules, line| {
+            rules += line;
+            rules.push('\n');
+            rules
+        },
+    );
+    format!(
+        "Allow it once, and plug the bridge in again:\n\n\
+         sudo tee /etc/udev/rules.d/70-foilpress.rules <<'END'\n{rules}END\n\
+         sudo udevadm control --reload && sudo udevadm trigger\n"
+    )
+}
+
+/// Makes sure that the printer behind a bridge is one of ALPS, as far as it says what it is; with `force` only says so.
+/// A bridge that cannot be asked now is not judged: sending finds out what is wrong with it.
+pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> Result<()> {
+    let Ok(mut link) = address.open() else { return Ok(()) };
+    let Ok(mut query) = Query::new(&mut *link, PATIENCE) else { return Ok(()) };
+    // A printer that takes no bytes is not asked, nor one that is at work.
+    if !matches!(query.lines(PATIENCE), Ok((_, None))) {
+        return Ok(());
+    }
+    let Ok(reply) = query.printer(Ask::DeviceId, PRINTER_PATIENCE) else { return Ok(()) };
+    match text(&reply) {
+        Some(id) if !is_alps(&id) && force => {
+            observer.note(&format!("the printer says it is no ALPS: {id}"));
+            Ok(())
         }
+        Some(id) if !is_alps(&id) => {
+            bail!("not sent: the printer says it is no ALPS: {id}; to go on all the same: --force")
+        }
+        _ => Ok(()),
     }
 }
 
@@ -141,7 +156,9 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
         JobState::Lost => {
-            format!("idle; job {job:08x} was lost. Switch the printer off and on before the next one")
+            format!(
+                "idle; job {job:08x} was lost. `foilpress bridge reset` readies the printer for the next one"
+            )
         }
     }
 }
@@ -162,6 +179,28 @@ fn levels(lines: Lines) -> Vec<&'static str> {
     .collect()
 }
 
+/// What to say of a bridge whose messages are not this program's.
+fn other_version(bridge: &Bridge) -> Option<String> {
+    let Bridge { version, firmware, serial, .. } = bridge;
+    (*version != VERSION).then(|| {
+        format!(
+            "bridge {serial:016x}: its firmware {firmware} speaks version {version} of the link, this program version \
+             {VERSION}; `foilpress bridge flash` puts the firmware that came with this program on it"
+        )
+    })
+}
+
+/// What to say of a bridge that works but does not have the firmware that came with this program.
+pub fn newer_firmware(bridge: &Bridge) -> Option<String> {
+    let ours = Firmware::embedded()?.ok()?;
+    (ours.version() != bridge.firmware).then(|| {
+        format!(
+            "this program came with firmware {}; `foilpress bridge flash` puts it on the bridge",
+            ours.version()
+        )
+    })
+}
+
 /// What a bridge and its printer answer.
 pub struct Found {
     bridge: Bridge,
@@ -177,15 +216,14 @@ impl Found {
     /// Asks all there is to ask. The printer itself is asked only while no job is open; a bridge that prints says so
     /// instead.
     pub fn ask(address: &Address) -> Result<Found> {
-        let mut link = address.open()?;
-        let mut query = Query::new(&mut *link, PATIENCE)?;
-        if query.bridge().version != VERSION {
-            bail!(
-                "firmware {} speaks version {} of the link, this program version {VERSION}: flash the firmware that \
-                 came with this program",
-                query.bridge().firmware,
-                query.bridge().version
-            );
+        Found::ask_on(&mut *address.open()?)
+    }
+
+    /// The same on a link that is open.
+    pub fn ask_on(link: &mut dyn Transport) -> Result<Found> {
+        let mut query = Query::new(link, PATIENCE)?;
+        if let Some(other) = other_version(query.bridge()) {
+            bail!(other);
         }
         let (lines, fault) = query.lines(PATIENCE)?;
         let mut printer = |what| match fault {
@@ -219,15 +257,23 @@ impl Found {
         })
     }
 
+    /// The printer's device ID, if it told it.
+    pub fn device_id(&self) -> Option<String> {
+        text(&self.device_id)
+    }
+
     /// In words.
     pub fn write(&self, out: &mut impl std::io::Write) -> Result<()> {
         writeln!(out, "bridge {:016x}, firmware {}", self.bridge.serial, self.bridge.firmware)?;
+        if let Some(newer) = newer_firmware(&self.bridge) {
+            writeln!(out, "    {newer}")?;
+        }
         writeln!(out, "job: {}", doing(&self.progress))?;
         writeln!(out, "lines high: {}", levels(self.lines).join(" "))?;
         if let Some(fault) = self.fault {
             writeln!(out, "{}", words::fault(fault, None))?;
         }
-        if let Some(id) = text(&self.device_id) {
+        if let Some(id) = self.device_id() {
             writeln!(out, "device ID: {id}")?;
             if !is_alps(&id) {
                 writeln!(out, "    this is no ALPS printer")?;
@@ -250,12 +296,13 @@ impl Found {
 /// The device ID as text, without the two bytes of its length.
 fn text(reply: &Reply) -> Option<String> {
     let Reply::Bytes(bytes) = reply else { return None };
+    let bytes = bytes.get(2..)?;
     let printable = |byte: &&u8| byte.is_ascii_graphic() || **byte == b' ';
     Some(bytes.iter().filter(printable).map(|&byte| char::from(byte)).collect())
 }
 
 /// Whether a device ID names the maker of these printers.
-fn is_alps(id: &str) -> bool {
+pub fn is_alps(id: &str) -> bool {
     id.split(';').filter_map(|field| field.split_once(':')).any(|(key, value)| {
         (key.trim().ends_with("MANUFACTURER") || key.trim().ends_with("MFG")) && value.trim() == "ALPS"
     })
@@ -284,5 +331,15 @@ mod tests {
     fn the_printers_own_device_id_is_known_and_anothers_is_not() {
         assert!(is_alps("MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER"));
         assert!(!is_alps("MFG:Hewlett-Packard;MDL:LaserJet;COMMENT:not ALPS"));
+    }
+
+    #[test]
+    fn the_length_of_a_device_id_is_no_part_of_its_text() {
+        // 75 bytes: the second byte of the length is a letter.
+        let id = "MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER;";
+        let reply = Reply::Bytes([&[0, b'K'], id.as_bytes()].concat());
+        assert_eq!(text(&reply).as_deref(), Some(id));
+        assert_eq!(text(&Reply::Bytes(vec![0])), None);
+        assert_eq!(text(&Reply::Silent), None);
     }
 }

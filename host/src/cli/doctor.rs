@@ -1,13 +1,14 @@
 //! `foilpress doctor`: what is needed to print, what of it is there, and what to do next.
 
-use std::io::Write as _;
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Error, Result, bail};
 use clap::Args as ClapArgs;
 
-use super::bridge::{Found, ports};
+use super::bridge::{Found, ask, is_alps, is_forbidden, permission};
 use super::resume::line;
+use crate::flash::{drive, usb};
+use crate::send::find::{self, Candidate};
 use crate::send::journal::Journal;
 use crate::send::session::Phase;
 use crate::send::{Address, OpenError};
@@ -16,76 +17,147 @@ use crate::send::{Address, OpenError};
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress doctor\n  foilpress doctor --to serial:/dev/ttyACM0")]
 pub struct Args {
-    /// Where the bridge is [default: every port that may be one]
+    /// Where the bridge is [default: every one there is]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
 }
 
-/// What lets users other than root open a bridge on Linux.
-const UDEV_RULE: &str = "\
-    sudo tee /etc/udev/rules.d/70-foilpress.rules <<'END'
-    SUBSYSTEM==\"tty\", ATTRS{manufacturer}==\"Foilpress\", TAG+=\"uaccess\"
-    KERNEL==\"lp[0-9]*\", SUBSYSTEM==\"usbmisc\", TAG+=\"uaccess\"
-    END
-    sudo udevadm control --reload && sudo udevadm trigger";
+/// What was found so far.
+struct Visit<W> {
+    out: W,
+    /// What stands in the way.
+    troubles: usize,
+    /// Something is there that may not be used.
+    forbidden: bool,
+}
 
 /// Runs `doctor`. Fails if something stands in the way of printing.
 pub fn run(args: &Args) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    let mut troubles = 0;
-    match Journal::of_user() {
-        Ok(journal) => {
-            writeln!(out, "jobs are kept in {}", journal.folder().display())?;
-            for entry in journal.entries()? {
-                if !matches!(entry.record.phase, Phase::Ended(_)) {
-                    writeln!(out, "    waits for `foilpress resume`: {}", line(&entry))?;
-                }
-            }
-        }
-        Err(error) => {
-            troubles += 1;
-            writeln!(out, "jobs cannot be kept: {error}")?;
-        }
-    }
-    let addresses: Vec<Address> = match &args.to {
-        Some(address) => vec![address.clone()],
-        None => ports().into_iter().filter(|port| port.candidate).map(|port| port.address).collect(),
+    let mut visit = Visit { out: std::io::stdout().lock(), troubles: 0, forbidden: false };
+    visit.journal()?;
+    let bridges = match &args.to {
+        Some(address) => vec![Candidate { serial_number: None, addresses: vec![address.clone()] }],
+        None => find::survey().bridges,
     };
-    if addresses.is_empty() {
-        troubles += 1;
-        writeln!(
-            out,
-            "no bridge on USB: plug it in. If it is, its cable may carry no data, or it has no firmware yet; a bridge \
-             elsewhere can be named with --to"
+    let boards = if args.to.is_none() { visit.boards()? } else { 0 };
+    if bridges.is_empty() && boards == 0 {
+        visit.trouble(
+            "no bridge on USB: plug it in. If it is, its cable may carry no data, or it has no firmware yet: then hold its \
+             BOOTSEL button while plugging it in, and `foilpress bridge flash`. A bridge elsewhere can be named with --to",
         )?;
     }
-    for address in &addresses {
-        writeln!(out, "\n{address}")?;
-        match Found::ask(address) {
-            Ok(found) => {
-                found.write(&mut out)?;
-                troubles += usize::from(found.fault.is_some());
+    for bridge in &bridges {
+        visit.bridge(bridge)?;
+    }
+    visit.raw_device()?;
+    visit.end()
+}
+
+impl<W: std::io::Write> Visit<W> {
+    fn trouble(&mut self, text: &str) -> Result<()> {
+        self.troubles += 1;
+        Ok(writeln!(self.out, "{text}")?)
+    }
+
+    fn failure(&mut self, error: &Error) -> Result<()> {
+        self.forbidden |= is_forbidden(error);
+        self.trouble(&super::chain(error))
+    }
+
+    fn journal(&mut self) -> Result<()> {
+        match Journal::of_user() {
+            Err(error) => self.trouble(&format!("jobs cannot be kept: {error}")),
+            Ok(journal) => {
+                writeln!(self.out, "jobs are kept in {}", journal.folder().display())?;
+                for entry in journal.entries()? {
+                    if !matches!(entry.record.phase, Phase::Ended(_)) {
+                        writeln!(self.out, "    waits for `foilpress resume`: {}", line(&entry))?;
+                    }
+                }
+                Ok(())
             }
+        }
+    }
+
+    /// Boards in their boot loader; how many.
+    fn boards(&mut self) -> Result<usize> {
+        let found = match usb::boards() {
+            Ok(found) => found,
             Err(error) => {
-                troubles += 1;
-                writeln!(out, "{error:#}")?;
-                if matches!(error.downcast_ref(), Some(OpenError::Forbidden(_))) && cfg!(target_os = "linux")
-                {
-                    writeln!(out, "allow it once, as root, and plug the bridge in again:\n\n{UDEV_RULE}\n")?;
+                self.trouble(&format!("USB cannot be searched: {error}"))?;
+                Vec::new()
+            }
+        };
+        let drives = drive::find();
+        for board in &found {
+            self.trouble(
+                "\na board is in its boot loader, without firmware: `foilpress bridge flash` puts it on; if that was not \
+                 meant, plug it in again",
+            )?;
+            let Some(closed) = board.closed.filter(|_| drives.is_empty()) else { continue };
+            self.forbidden |= closed == rusb::Error::Access;
+            self.trouble(&format!(
+                "    it cannot be opened ({closed}), and its drive RPI-RP2 is not mounted"
+            ))?;
+        }
+        for drive in drives.iter().skip(found.len()) {
+            self.trouble(&format!(
+                "\na board's drive is mounted at {}: `foilpress bridge flash` puts firmware on it",
+                drive.display()
+            ))?;
+        }
+        Ok(found.len().max(drives.len()))
+    }
+
+    fn bridge(&mut self, bridge: &Candidate) -> Result<()> {
+        let ways: Vec<String> = bridge.addresses.iter().map(ToString::to_string).collect();
+        writeln!(self.out, "\n{}", ways.join("  "))?;
+        match ask(bridge) {
+            Err(error) => return self.failure(&error),
+            Ok(found) => self.answers(&found)?,
+        }
+        // It can be spoken to; but the owner may mean to use one of its other addresses.
+        for address in bridge.addresses.iter().filter(|_| bridge.addresses.len() > 1) {
+            if let Err(error @ OpenError::Forbidden(_)) = address.open() {
+                self.failure(&error.into())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn answers(&mut self, found: &Found) -> Result<()> {
+        found.write(&mut self.out)?;
+        self.troubles += usize::from(found.fault.is_some());
+        match found.device_id() {
+            Some(id) if !is_alps(&id) => self.trouble(
+                "jobs for it are refused; if it is an MD printer all the same, `--force` with send and print goes on",
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    fn raw_device(&mut self) -> Result<()> {
+        let raw = Path::new("/dev/usb/lp0");
+        if raw.exists() {
+            let (place, out) = (raw.display(), &mut self.out);
+            match std::fs::OpenOptions::new().write(true).open(raw) {
+                Ok(_) => writeln!(out, "\n{place} is there: `--to raw:{place}` sends to it")?,
+                Err(error) => {
+                    self.forbidden |= error.kind() == std::io::ErrorKind::PermissionDenied;
+                    writeln!(out, "\n{place} is there but: {error}")?;
                 }
             }
         }
+        Ok(())
     }
-    let raw = Path::new("/dev/usb/lp0");
-    if raw.exists() {
-        match std::fs::OpenOptions::new().write(true).open(raw) {
-            Ok(_) => writeln!(out, "\n{} is there: `--to raw:{}` sends to it", raw.display(), raw.display())?,
-            Err(error) => writeln!(out, "\n{} is there but: {error}", raw.display())?,
+
+    fn end(mut self) -> Result<()> {
+        if self.forbidden {
+            write!(self.out, "\n{}", permission())?;
         }
+        if self.troubles > 0 {
+            bail!("things that stand in the way of printing: {}", self.troubles);
+        }
+        Ok(writeln!(self.out, "\nall is well")?)
     }
-    if troubles > 0 {
-        bail!("things that stand in the way of printing: {troubles}");
-    }
-    writeln!(out, "\nall is well")?;
-    Ok(())
 }

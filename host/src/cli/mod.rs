@@ -25,6 +25,7 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 
+use crate::flash::FlashError;
 use crate::send::journal::JournalError;
 use crate::send::query::QueryError;
 use crate::send::raw::RawError;
@@ -99,6 +100,9 @@ pub fn main() -> ExitCode {
         Err(error) => {
             output::yield_to_interrupt();
             let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
+            if bridge::is_forbidden(&error) {
+                let _ = write!(io::stderr(), "\n{}", bridge::permission());
+            }
             ExitCode::FAILURE
         }
     }
@@ -118,7 +122,7 @@ fn run(args: Args) -> Result<()> {
         Command::Send(args) => send::run(&args, observer),
         Command::Resume(args) => resume::resume(&args, observer),
         Command::Cancel(args) => resume::cancel(&args, observer),
-        Command::Bridge(args) => bridge::run(&args),
+        Command::Bridge(args) => bridge::run(&args, observer),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
         Command::Sample(args) => sample::run(args),
@@ -163,6 +167,7 @@ fn closed_pipe(error: &anyhow::Error) -> bool {
         cause.is::<RawError>()
             || cause.is::<QueryError>()
             || cause.is::<OpenError>()
+            || cause.is::<FlashError>()
             || cause.is::<RunError<JournalError>>()
     });
     !device

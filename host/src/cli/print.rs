@@ -49,9 +49,12 @@ pub struct Args {
     /// Light probe (.hdr) for the balls in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// Also send the job there: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
+    /// Also send the job there: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
     #[arg(long, value_name = "WHERE")]
     to: Option<Destination>,
+    /// Send also to a printer that says it is no ALPS
+    #[arg(long, requires = "to")]
+    force: bool,
     /// Folder to write [default: NAME.print in the current folder]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -130,7 +133,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     match &args.to {
         Some(to @ (Destination::Raw(_) | Destination::Bridge(_))) => {
-            deliver(&document.name, &print.job, to, observer)
+            deliver(&document.name, &print.job, to, args.force, observer)
         }
         _ => Ok(()),
     }

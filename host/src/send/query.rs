@@ -4,7 +4,9 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use protocol::link::frame::{self, MAX, Read, Reader};
-use protocol::link::message::{Answer, Ask, Fault, Lines, Progress, SCHEMA, ToBridge, ToHost, VERSION};
+use protocol::link::message::{
+    Answer, Ask, Fault, Lines, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+};
 
 use super::session::{Bridge, printable};
 use super::transport::Transport;
@@ -38,6 +40,11 @@ pub enum QueryError {
         "no bridge answers there; is it the right port (`foilpress bridge list`), and does it run this program's firmware?"
     )]
     NoAnswer,
+    /// A job is open, so this must wait.
+    #[error(
+        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
+    )]
+    JobOpen(u32),
 }
 
 /// A conversation of questions.
@@ -55,6 +62,7 @@ enum Heard {
     Progress(Progress),
     Lines(u16, Lines, Option<Fault>),
     Answer(u16, Reply),
+    Refused(Refusal, u32),
 }
 
 impl<'t> Query<'t> {
@@ -63,7 +71,7 @@ impl<'t> Query<'t> {
         let mut reader = Reader::new();
         let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
         let mut bridge = None;
-        let (bridge, progress) = exchange(link, &mut reader, &hello, patience, &mut |heard| {
+        let (bridge, progress) = exchange(link, &mut reader, &[hello], patience, &mut |heard| {
             match heard {
                 Heard::Hello(found) => bridge = Some(found),
                 Heard::Progress(progress) => return Some((bridge.clone()?, progress)),
@@ -88,7 +96,7 @@ impl<'t> Query<'t> {
     pub fn lines(&mut self, patience: Duration) -> Result<(Lines, Option<Fault>), QueryError> {
         let number = self.next();
         let question = ToBridge::Ask { request: number, what: Ask::Lines };
-        exchange(self.link, &mut self.reader, &question, patience, &mut |heard| match heard {
+        exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
             Heard::Lines(request, lines, fault) if request == number => Some((lines, fault)),
             _ => None,
         })
@@ -99,10 +107,43 @@ impl<'t> Query<'t> {
         let number = self.next();
         // Asked once only: the bridge may be waiting for the printer, and a second question would wait behind.
         let question = ToBridge::Ask { request: number, what };
-        exchange(self.link, &mut self.reader, &question, patience, &mut |heard| match heard {
+        exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
             Heard::Answer(request, reply) if request == number => Some(reply),
             _ => None,
         })
+    }
+
+    /// Resets the printer by the port's nInit line. Refused while a job is open; a job that was open when the bridge
+    /// itself was reset, and whose data nobody has sent again, is given up by it.
+    pub fn initialise(&mut self, patience: Duration) -> Result<(), QueryError> {
+        let number = self.next();
+        // A reset is not answered, but a refusal would come before the answer to the question behind it.
+        let messages = [ToBridge::Initialise, ToBridge::Ask { request: number, what: Ask::Lines }];
+        exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
+            Heard::Refused(Refusal::JobOpen, job) if job != 0 => Some(Err(QueryError::JobOpen(job))),
+            Heard::Lines(request, ..) if request == number => Some(Ok(())),
+            _ => None,
+        })?
+    }
+
+    /// Sends the bridge to its boot loader, which ends the link.
+    pub fn bootloader(&mut self, patience: Duration) -> Result<(), QueryError> {
+        let refused = exchange(
+            self.link,
+            &mut self.reader,
+            &[ToBridge::Bootloader],
+            patience,
+            &mut |heard| match heard {
+                Heard::Refused(Refusal::JobOpen, job) => Some(QueryError::JobOpen(job)),
+                _ => None,
+            },
+        );
+        match refused {
+            Ok(error) => Err(error),
+            // Where the end of a link is not noticed there is silence.
+            Err(QueryError::Link(_) | QueryError::NoAnswer) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     fn next(&mut self) -> u16 {
@@ -111,20 +152,20 @@ impl<'t> Query<'t> {
     }
 }
 
-/// Says `message`, again and again, until `judge` is content with what is heard.
+/// Says `messages`, again and again, until `judge` is content with what is heard.
 fn exchange<T>(
     link: &mut dyn Transport,
     reader: &mut Reader,
-    message: &ToBridge<'_>,
+    messages: &[ToBridge<'_>],
     patience: Duration,
     judge: &mut dyn FnMut(Heard) -> Option<T>,
 ) -> Result<T, QueryError> {
-    let mut framed = [0; MAX + 1];
-    let mut room = [0; MAX];
     // A zero ends whatever stands in the bridge's reader; questions are far shorter than a frame.
-    let length = frame::write(message, &mut room).unwrap_or(0);
-    framed[1..=length].copy_from_slice(&room[..length]);
-    let out = &framed[..=length];
+    let (mut out, mut room) = (vec![0], [0; MAX]);
+    for message in messages {
+        let length = frame::write(message, &mut room).unwrap_or(0);
+        out.extend_from_slice(&room[..length]);
+    }
     let start = Instant::now();
     let (mut said, mut sent) = (None::<Duration>, out.len());
     let mut buffer = [0; 1024];
@@ -173,6 +214,7 @@ fn heard(message: &[u8]) -> Option<Heard> {
                 Answer::Stopped(fault) => Reply::Stopped(fault),
             },
         ),
+        ToHost::Refused { reason, job } => Heard::Refused(reason, job),
         _ => return None,
     })
 }

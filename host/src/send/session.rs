@@ -108,7 +108,7 @@ pub enum SessionError {
     /// Other messages than ours.
     #[error(
         "the bridge's firmware {firmware} speaks version {found} of the link, this program version {VERSION}; \
-         flash the firmware that came with this program, or use the program that came with the firmware"
+         `foilpress bridge flash` puts the firmware that came with this program on it"
     )]
     Version {
         /// The bridge's version.

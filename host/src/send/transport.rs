@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// A pipe that takes nothing for this long gives control back.
-const WRITE_PATIENCE: Duration = Duration::from_millis(50);
+pub(super) const WRITE_PATIENCE: Duration = Duration::from_millis(50);
 
 /// A pipe to a bridge.
 pub trait Transport: Send {

@@ -1,8 +1,9 @@
 //! A pass stream as bands of rows, in bounded memory and from input in any portions.
 
+use super::canvas::Canvas;
 use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
-use crate::walk::{Band, EDGE, MOST, Tile, Walk};
+use crate::walk::{Band, Tile, Walk};
 
 /// What is wrong with a stream.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,7 +56,7 @@ struct Runs {
     means: [Mean; 2],
     /// Number of the run, even ones are off.
     index: u32,
-    /// Bits read and not used, from the top, and how many.
+    /// Bits read and not used, from the top, and how many: fewer than eight between two codes.
     bits: u32,
     held: u32,
     /// Ones of the code under way.
@@ -64,9 +65,11 @@ struct Runs {
     remainder: Option<u32>,
     /// Dots of the band done.
     done: u32,
-    /// Number of the tile, and dots done before it.
+    /// The tile that is being inked, and which dots of the band are its own.
     tile: Option<Tile>,
-    before: u32,
+    from: u32,
+    to: u32,
+    /// Tiles begun.
     tiles: usize,
 }
 
@@ -103,8 +106,7 @@ pub struct Decoder {
     next: usize,
     band: Option<Band>,
     state: State,
-    shape: Option<Tile>,
-    table: [u16; MOST],
+    canvas: Canvas,
 }
 
 impl Decoder {
@@ -115,8 +117,7 @@ impl Decoder {
             next: 0,
             band: None,
             state: State::End,
-            shape: None,
-            table: [0; MOST],
+            canvas: Canvas::new(),
         };
         decoder.restart();
         decoder
@@ -165,7 +166,10 @@ impl Decoder {
                     read += 1;
                     self.state = match byte {
                         form::BLANK => State::Blank,
-                        form::RUNS => State::Minimum,
+                        form::RUNS => {
+                            self.canvas.clear();
+                            State::Minimum
+                        }
                         form::ROWS => State::Row(Row { y: 0, part: RowPart::Head }),
                         _ => return Err(Defect::Form),
                     };
@@ -189,8 +193,7 @@ impl Decoder {
                     self.state = State::Runs(Runs::new(minimum));
                 }
                 State::Runs(runs) => {
-                    let mut place =
-                        Place { band, stride, memory, shape: &mut self.shape, table: &mut self.table };
+                    let mut place = Place { band, stride, memory, canvas: &mut self.canvas };
                     let (used, complete) = runs.read(&input[read..], &mut place);
                     read += used;
                     if !complete {
@@ -220,24 +223,11 @@ struct Place<'d> {
     band: Band,
     stride: usize,
     memory: &'d mut [u8],
-    shape: &'d mut Option<Tile>,
-    table: &'d mut [u16; MOST],
+    canvas: &'d mut Canvas,
 }
 
-impl Place<'_> {
-    /// Inks dots `from..to` of a tile.
-    fn ink(&mut self, tile: &Tile, from: u32, to: u32) {
-        let shape = Tile { x: 0, y: 0, ..*tile };
-        if *self.shape != Some(shape) {
-            tile.fill(self.table);
-            *self.shape = Some(shape);
-        }
-        for &dot in &self.table[from as usize..to as usize] {
-            let x = usize::from(tile.x + dot % EDGE);
-            self.memory[usize::from(dot / EDGE) * self.stride + x / 8] |= 0x80 >> (x % 8);
-        }
-    }
-}
+/// Bytes of input with which any code is complete, whatever bits are held: 20 ones and 20 plain bits.
+const CODE_BYTES: usize = (ESCAPE + PLAIN_BITS).div_ceil(8) as usize;
 
 impl Runs {
     fn new(minimum: u8) -> Runs {
@@ -252,7 +242,8 @@ impl Runs {
             remainder: Some(PLAIN_BITS),
             done: 0,
             tile: None,
-            before: 0,
+            from: 0,
+            to: 0,
             tiles: 0,
         }
     }
@@ -261,6 +252,10 @@ impl Runs {
     fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
         let mut read = 0;
         while self.done < place.band.len() {
+            if self.ones == 0 && self.remainder.is_none() && input.len() - read >= CODE_BYTES {
+                read += self.read_codes(&input[read..], place);
+                continue;
+            }
             // Bits are needed: at least one for the ones, all of the remainder.
             let needed = self.remainder.unwrap_or(1);
             while self.held < needed {
@@ -279,7 +274,50 @@ impl Runs {
             self.drop(count);
             self.take(value, count, place);
         }
+        self.lay(place);
         (read, true)
+    }
+
+    /// Reads whole codes while there is input for any code; between two codes, and says how much was read. This is where
+    /// the time goes: the bits are held a word ahead, and what was read too much is given back in the end.
+    fn read_codes(&mut self, input: &[u8], place: &mut Place<'_>) -> usize {
+        let mut read = 0;
+        while self.done < place.band.len() && input.len() - read >= CODE_BYTES {
+            let (mut bits, mut held) = (self.bits, self.held);
+            while held <= 24 {
+                bits |= u32::from(input[read]) << (24 - held);
+                held += 8;
+                read += 1;
+            }
+            let mut ones = 0;
+            while bits >> 31 == 1 && ones < ESCAPE {
+                bits <<= 1;
+                ones += 1;
+            }
+            held -= ones;
+            let count = if ones == ESCAPE {
+                PLAIN_BITS
+            } else {
+                bits <<= 1;
+                held -= 1;
+                self.means[self.index as usize % 2].parameter()
+            };
+            // What a code needs beyond a word is still there: it is at most five bytes in all.
+            while held < count {
+                bits |= u32::from(input[read]) << (24 - held);
+                held += 8;
+                read += 1;
+            }
+            // Shifted twice, since `count` may be 0.
+            let value = bits >> 1 >> (31 - count);
+            (self.bits, self.held, self.ones) = (bits << count, held - count, ones);
+            self.take(value, count, place);
+        }
+        // Whole bytes can only be of this input: there were fewer than eight bits before it.
+        let back = self.held / 8;
+        self.held %= 8;
+        self.bits &= !(u32::MAX >> self.held);
+        read - back as usize
     }
 
     fn drop(&mut self, count: u32) {
@@ -304,10 +342,8 @@ impl Runs {
         let length = if self.index == 0 {
             bits
         } else {
-            let mean = &mut self.means[self.index as usize % 2];
-            let k = mean.parameter();
             let value = if self.ones == ESCAPE { bits } else { self.ones << count | bits };
-            mean.add(value, k);
+            self.means[self.index as usize % 2].add(value);
             value + self.minimum
         };
         let end = self.done.saturating_add(length).min(place.band.len());
@@ -324,22 +360,25 @@ impl Runs {
     fn ink(&mut self, end: u32, place: &mut Place<'_>) {
         let mut from = self.done;
         while from < end {
-            let tile = match self.tile {
-                Some(tile) if from < self.before + u32::from(tile.area()) => tile,
-                tile => {
-                    self.before += tile.map_or(0, |tile| u32::from(tile.area()));
-                    // There is a next tile: `end` lies within the band.
-                    self.tile = place.band.tiles().nth(self.tiles);
-                    self.tiles += 1;
-                    if self.tile.is_none() {
-                        return;
-                    }
-                    continue;
-                }
-            };
-            let to = end.min(self.before + u32::from(tile.area()));
-            place.ink(&tile, from - self.before, to - self.before);
+            if from >= self.to {
+                self.lay(place);
+                self.tile = place.band.tiles().nth(self.tiles);
+                self.tiles += 1;
+                // There is a next tile: `end` lies within the band.
+                let Some(tile) = &self.tile else { return };
+                (self.from, self.to) = (self.to, self.to + u32::from(tile.area()));
+                continue;
+            }
+            let to = end.min(self.to);
+            place.canvas.ink(from - self.from, to - self.from);
             from = to;
+        }
+    }
+
+    /// Lays the tile out in the band.
+    fn lay(&mut self, place: &mut Place<'_>) {
+        if let Some(tile) = self.tile.take() {
+            place.canvas.lay(&tile, place.memory, place.stride);
         }
     }
 }

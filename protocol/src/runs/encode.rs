@@ -157,7 +157,7 @@ fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mu
                 bits.put((1 << ESCAPE) - 1, ESCAPE)?;
                 bits.put(value, PLAIN_BITS)?;
             }
-            mean.add(value, k);
+            mean.add(value);
         }
         index += 1;
         Some(())

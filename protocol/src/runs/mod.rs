@@ -40,6 +40,7 @@
 //! what is left of the band, and is then cut. Bits are filled from the top of each byte; the rest of the last byte
 //! is zero.
 
+mod canvas;
 mod decode;
 mod encode;
 mod header;

