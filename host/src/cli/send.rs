@@ -1,5 +1,6 @@
 //! `foilpress send`, and what `print`, `resume` and `cancel` share with it: a job on its way to a printer.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -11,7 +12,7 @@ use super::output::{self, Staged};
 use crate::observe::Observer;
 use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
 use crate::send::session::{Outcome, Session};
-use crate::send::{self, Address, Checked, Destination, Event, words};
+use crate::send::{self, Address, Checked, Destination, Event, find, words};
 
 /// Arguments of `send`.
 #[derive(ClapArgs, Debug)]
@@ -109,15 +110,23 @@ pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Obse
     let outcome = match session.outcome() {
         Some(outcome) => outcome,
         None => {
-            send::run(&mut session, &mut || address.open(), &mut |record| job.save(record), &mut |event| {
-                reporter.tell(&event)
-            })
-            .with_context(|| {
-                format!(
-                    "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
-                    job.entry.name
-                )
-            })?
+            // Once the bridge is known, it is that one, whatever its port is called when it comes back.
+            let known = Cell::new(job.entry.record.bridge);
+            let mut watch = |event: Event<'_>| {
+                if let Event::Connected(bridge) = &event {
+                    known.set(Some(bridge.serial));
+                }
+                reporter.tell(&event);
+            };
+            let mut open = || find::open(address, known.get());
+            send::run(&mut session, &mut open, &mut |record| job.save(record), &mut watch).with_context(
+                || {
+                    format!(
+                        "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
+                        job.entry.name
+                    )
+                },
+            )?
         }
     };
     observer.end();
