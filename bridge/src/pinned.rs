@@ -69,6 +69,8 @@ where
     /// Moves what can be moved. `now_ms` may wrap.
     pub fn turn(&mut self, now_ms: u32) -> Turn {
         let worked = self.engine.work();
+        // There is no log here.
+        self.engine.log(0, 0, &[]);
         if let Some(task) = self.engine.task() {
             return self.begin(task, now_ms);
         }
@@ -122,6 +124,10 @@ where
                 self.port.drive(data, control);
                 self.engine.port(self.port.lines(), self.port.fault());
                 Outcome::Done
+            }
+            Task::Probe { data, control } => {
+                self.port.drive(data, control);
+                Outcome::Lines(self.port.lines())
             }
             Task::Bootloader => {
                 self.engine.done(Outcome::Done);

@@ -571,7 +571,7 @@ proptest! {
 
     #[test]
     fn no_conversation_makes_it_fail(
-        messages in prop::collection::vec((0u8..10, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
+        messages in prop::collection::vec((0u8..12, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
     ) {
         let mut rig = Rig::new();
         for (kind, job, number, bytes, small) in messages {
@@ -583,7 +583,9 @@ proptest! {
                 6 => ToBridge::Cancel { job },
                 7 => ToBridge::Ask { request: 1, what: Ask::Printer },
                 8 => ToBridge::Initialise,
-                _ => ToBridge::Drive { data: small, control: small },
+                9 => ToBridge::Drive { data: small, control: small },
+                10 => ToBridge::Probe { request: 1, data: small, control: small },
+                _ => ToBridge::ReadLog { request: 1, from: number },
             });
             match small % 5 {
                 0 => while rig.engine.work() {},
@@ -596,6 +598,27 @@ proptest! {
             prop_assert!(progress.accepted <= progress.limit);
         }
     }
+}
+
+#[test]
+fn the_log_is_given_when_asked_for_and_a_probe_only_between_jobs() {
+    let mut rig = Rig::new();
+    assert_eq!(rig.engine.log_wanted(), None);
+    rig.engine.log(0, 2, b"no");
+    assert!(rig.said().text.is_empty());
+    rig.tell(ToBridge::ReadLog { request: 4, from: 70 });
+    assert_eq!(rig.engine.log_wanted(), Some(70));
+    rig.engine.log(80, 83, b"log");
+    let part = ToHost::LogPart { request: 4, at: 80, end: 83, bytes: b"log" };
+    assert_eq!((rig.said().text, rig.engine.log_wanted()), (vec![format!("{part:?}")], None));
+    rig.tell(ToBridge::Probe { request: 5, data: 0x80, control: 7 });
+    assert_eq!(rig.engine.task(), Some(Task::Probe { data: 0x80, control: 7 }));
+    rig.engine.done(Outcome::Lines(Lines::IDLE));
+    let lines = ToHost::Lines { request: 5, lines: Lines::IDLE, fault: None };
+    assert_eq!(rig.said().text, [format!("{lines:?}")]);
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 9 });
+    let said = rig.tell(ToBridge::Probe { request: 6, data: 0, control: 0 });
+    assert_eq!(said.text, [format!("{:?}", ToHost::Answer { request: 6, answer: Answer::NotNow })]);
 }
 
 #[test]

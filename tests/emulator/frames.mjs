@@ -79,6 +79,8 @@ export const configure = ({ setup, strobe, hold, settle, handshake = 0, patience
   frame([5, ...[setup, strobe, hold, settle].flatMap(varint), handshake, ...varint(patience), heed]);
 export const initialise = () => frame([6]);
 export const drive = (level, lines) => frame([8, level, lines]);
+export const probe = (request, level, lines) => frame([9, ...varint(request), level, lines]);
+export const readLog = (request, from) => frame([10, ...varint(request), ...varint(from)]);
 
 const STATES = ['none', 'printing', 'stopped', 'cancelling', 'done', 'cancelled', 'broken', 'lost'];
 const FAULTS = ['paper out', 'off line', 'error', 'power off', 'busy too long', 'no ack'];
@@ -117,6 +119,8 @@ export function parse(message) {
     }
     case 4:
       return { kind: 'refused', reason: byte(), job: number() };
+    case 6:
+      return { kind: 'log', request: number(), from: number(), end: number(), bytes: bytes() };
     default:
       return { kind: 'other' };
   }

@@ -462,10 +462,10 @@ static void ended(GPid pid, gint status, gpointer loop)
     g_main_loop_quit(loop);
 }
 
-/* What we are told to do, the program does. */
+/* Who ends us ends the program, without a word. */
 static gboolean pass_on(gpointer pid)
 {
-    kill(GPOINTER_TO_INT(pid), SIGTERM);
+    kill(GPOINTER_TO_INT(pid), SIGKILL);
     return G_SOURCE_CONTINUE;
 }
 

@@ -18,7 +18,7 @@ pub fn build(root: &Path) -> Result<PathBuf> {
     let folder = root.join("bridge/firmware");
     let target = target(root);
     let mut build = cargo(&["build", "--release", "--locked"]);
-    // The folder's own settings name the processor and the linker's scripts.
+    // The folder's own settings name the processor, the linker's scripts and what is logged.
     build.current_dir(&folder).env("CARGO_TARGET_DIR", &target);
     let status = build.status().context("cargo cannot be started")?;
     if !status.success() {

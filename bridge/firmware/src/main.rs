@@ -13,11 +13,13 @@
 //! | `port::serve` | 1 ms, a sent buffer | feeds the strobe engine, looks at the lines, does the engine's errands |
 //! | `watch::run` | 50 ms | lamp, watchdog |
 //!
-//! Memory: 79,040 bytes for a band of the widest page at 1200 dpi, 40 KiB of printer bytes so that the printer has work
-//! while a band is decoded, 12 KiB of window for the link.
+//! Memory: 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the printer has work
+//! while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.
 #![no_std]
 #![no_main]
 
+mod keep;
+mod log;
 mod pins;
 mod port;
 mod printer;
@@ -32,6 +34,7 @@ use embassy_futures::yield_now;
 use embassy_rp::binary_info::{EntryAddr, rp_cargo_version, rp_program_name};
 use embassy_rp::clocks::RoscRng;
 use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::pac;
 use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
 use embassy_rp::watchdog::Watchdog;
@@ -66,6 +69,9 @@ async fn main(spawner: Spawner) {
     let board = embassy_rp::init(Default::default());
     pins::bring_up();
 
+    // Before the first word of the log, and before a byte goes to the printer.
+    let (keeper, checkpoint) = keep::Keeper::new();
+
     let number = {
         let mut flash = Flash::<_, Blocking, FLASH_BYTES>::new_blocking(board.FLASH);
         let mut number = [0; 8];
@@ -80,11 +86,36 @@ async fn main(spawner: Spawner) {
     };
 
     static DATA: ConstStaticCell<[u8; 12 * 1024]> = ConstStaticCell::new([0; 12 * 1024]);
-    static OUTPUT: ConstStaticCell<[u8; 40 * 1024]> = ConstStaticCell::new([0; 40 * 1024]);
+    static OUTPUT: ConstStaticCell<[u8; 36 * 1024]> = ConstStaticCell::new([0; 36 * 1024]);
     static BAND: ConstStaticCell<[u8; WIDEST_BAND]> = ConstStaticCell::new([0; WIDEST_BAND]);
     static SHARED: StaticCell<Shared> = StaticCell::new();
     let memory = Memory { data: DATA.take(), output: OUTPUT.take(), band: BAND.take() };
-    let shared: &'static Shared = SHARED.init_with(|| Shared::new(Engine::new(memory, identity)));
+    let reason = pac::WATCHDOG.reason().read();
+    defmt::info!(
+        "bridge {=str} {=u64:x} up, after {=str}",
+        identity.firmware,
+        identity.serial,
+        match (reason.timer(), reason.force()) {
+            (true, _) => "the watchdog's bite",
+            (_, true) => "a restart",
+            _ => "power or reset",
+        }
+    );
+    if let Some(checkpoint) = &checkpoint {
+        let bridge::engine::Checkpoint { progress, .. } = checkpoint;
+        defmt::info!(
+            "job {=u32:08x} from before: {}, {=u32} bytes printed",
+            progress.job,
+            progress.state,
+            progress.printed
+        );
+    }
+    let shared: &'static Shared = SHARED.init_with(|| {
+        Shared::new(match checkpoint {
+            Some(checkpoint) => Engine::resume(memory, identity, checkpoint),
+            None => Engine::new(memory, identity),
+        })
+    });
 
     let Pio { mut common, sm0, .. } = Pio::new(board.PIO0, Interrupts);
     let data = [
@@ -109,6 +140,7 @@ async fn main(spawner: Spawner) {
         busy,
         [first, second],
         (board.DMA_CH0, board.DMA_CH1),
+        keeper.place(),
     );
     pins::bring_up();
 
@@ -126,7 +158,7 @@ async fn main(spawner: Spawner) {
     spawner.spawn(usb::answer(shared, floor, link.serial_out, link.bulk_out).unwrap());
     let (from_host, to_host) = link.printer;
     spawner.spawn(printer::run(shared, face, from_host, to_host).unwrap());
-    spawner.spawn(port::serve(shared, face, strobe).unwrap());
+    spawner.spawn(port::serve(shared, face, strobe, keeper).unwrap());
     spawner.spawn(watch::run(shared, Watchdog::new(board.WATCHDOG)).unwrap());
     work(shared).await
 }
@@ -163,11 +195,32 @@ fn hex<'a>(bytes: &[u8; 8], text: &'a mut [u8; 16]) -> &'a str {
     core::str::from_utf8(text).unwrap_or("0")
 }
 
-/// The buffers off, so that nothing the pins may still do reaches the printer; the watchdog does the rest.
+/// A last word, and the buffers off once the byte under way has crossed; the watchdog does the rest. What was sent is marked,
+/// so the job goes on after it.
+///
+/// The word is where the program was: the return addresses on the stack, and whatever looks like one, for `addr2line`.
+/// File and line of every possible panic would take 14 KB of flash.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    strobe::halt();
     pins::enable(false);
+    let mut trace = [0; 8];
+    let (mut at, mut found) = (cortex_m::register::msp::read(), 0);
+    while at < STACK_TOP && found < trace.len() {
+        // SAFETY: a word of the stack in use, which lies between the pointer and its top.
+        let word = unsafe { (at as *const u32).read_volatile() };
+        // Instructions are in flash, and an odd address is that of Thumb code.
+        if (0x1000_0100..0x1002_0000).contains(&word) && word & 1 == 1 {
+            (trace[found], found) = (word, found + 1);
+        }
+        at += 4;
+    }
+    defmt::error!("panic at {:#x}", &trace[..found]);
     loop {
         cortex_m::asm::nop();
     }
 }
+
+/// The end of the memory, where the stack begins.
+const STACK_TOP: u32 = 0x2004_2000;

@@ -5,6 +5,7 @@
 //! works the pins itself through [`bridge::port::Port`], which it also does for everything between jobs: device
 //! ID, status answer, reset.
 
+use crate::keep::{Keeper, MARKS};
 use crate::pins::{self, Ack, Data, Line};
 use crate::printer::Face;
 use crate::shared::{Shared, Side};
@@ -89,11 +90,14 @@ struct Desk {
     /// Since when the printer has been ready, until it has been asked who it is.
     unasked: Option<Instant>,
     asked: bool,
+    keeper: Keeper,
+    /// Job and state last written to the log.
+    told: Option<(u32, JobState)>,
 }
 
 /// Serves the port.
 #[embassy_executor::task]
-pub async fn serve(shared: &'static Shared, face: &'static Face, strobe: Strobe) -> ! {
+pub async fn serve(shared: &'static Shared, face: &'static Face, strobe: Strobe, keeper: Keeper) -> ! {
     let now = Instant::now();
     let mut desk = Desk {
         shared,
@@ -109,6 +113,8 @@ pub async fn serve(shared: &'static Shared, face: &'static Face, strobe: Strobe)
         stop: None,
         unasked: None,
         asked: false,
+        keeper,
+        told: None,
     };
     desk.give_back();
     loop {
@@ -127,6 +133,7 @@ pub async fn serve(shared: &'static Shared, face: &'static Face, strobe: Strobe)
             Owner::Hand => desk.send_by_hand(),
             Owner::Test => TICK,
         };
+        desk.keep();
         shared.wake(Side::Work);
         shared.wake(Side::Link);
         if pause.as_ticks() == 0 {
@@ -154,6 +161,21 @@ impl Desk {
         }
     }
 
+    /// Keeps where the job stands for the time after a reset, and says in the log what has changed.
+    fn keep(&mut self) {
+        let checkpoint = self.shared.engine(|engine| engine.checkpoint());
+        self.keeper.store(checkpoint, self.strobe.place());
+        let state = (checkpoint.progress.job, checkpoint.progress.state);
+        if self.told.replace(state) != Some(state) && state.0 != 0 {
+            defmt::info!(
+                "job {=u32:08x}: {}, {=u32} bytes printed",
+                state.0,
+                state.1,
+                checkpoint.progress.printed
+            );
+        }
+    }
+
     /// Fills the strobe engine's buffers; says when to look again.
     fn feed(&mut self) -> Duration {
         while self.strobe.has_room() {
@@ -174,15 +196,22 @@ impl Desk {
     fn send_by_hand(&mut self) -> Duration {
         let now = Instant::now().as_millis() as u32;
         let hand = &mut self.hand;
+        let keeper = &self.keeper;
         let (count, stop, more) = self.shared.engine(|engine| {
             let output = engine.output();
             let handful = &output[..output.len().min(HANDFUL)];
-            if handful.is_empty() {
-                return (0, None, false);
+            let mut count = 0;
+            for byte in handful {
+                let written = hand.write(core::slice::from_ref(byte), now);
+                if written.count == 0 {
+                    return (count, written.stop, true);
+                }
+                keeper.mark(count);
+                count += 1;
             }
-            let written = hand.write(handful, now);
-            (written.count, written.stop, true)
+            (count, None, count > 0)
         });
+        self.strobe.set_place((self.keeper.place() + count) % MARKS);
         self.consumed(count);
         self.stop = match stop {
             Some(Stop::Fault(fault)) => Some(fault),
@@ -244,8 +273,11 @@ impl Desk {
         self.asked = true;
         self.take_pins();
         let mut answer = [0; ANSWER];
-        if let Ok(count) | Err(ReverseError::Silent(count)) = self.hand.device_id(&mut answer) {
-            self.face.learn(&answer[..count]);
+        match self.hand.device_id(&mut answer) {
+            Ok(count) | Err(ReverseError::Silent(count)) if self.face.learn(&answer[..count]) => {
+                defmt::info!("the printer has said who it is, in {=usize} bytes", count);
+            }
+            _ => defmt::info!("the printer does not say who it is"),
         }
         self.give_back();
     }
@@ -293,8 +325,12 @@ impl Desk {
                 self.hand.drive(data, control);
                 Outcome::Done
             }
+            Task::Probe { data, control } => {
+                self.hand.drive(data, control);
+                Outcome::Lines(pins::status())
+            }
         };
-        if matches!(task, Task::Drive { .. }) {
+        if matches!(task, Task::Drive { .. } | Task::Probe { .. }) {
             self.owner = Owner::Test;
         } else {
             self.give_back();

@@ -3,10 +3,10 @@
 //! Problem: a byte every 2.42 µs, each with setup, strobe and hold times that are never too short, no strobe while the
 //! printer is busy or in trouble, and an exact count of what has crossed the port whenever it stops.
 //!
-//! Method: thirteen instructions, one byte each round. The program looks at Busy, PError, Select and nFault together:
-//! before it changes the data (which stand until Busy has fallen) and again, three ticks before the strobe. Behind
+//! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data, and looks at
+//! Busy, PError, Select and nFault together until all are well, three ticks before the strobe. Behind
 //! every strobe it pushes a word; a DMA channel takes these words away, and its counter *is* the number of bytes that
-//! have crossed. A byte in a FIFO or half way through its setup is not counted and can be taken back.
+//! have crossed. It leaves them as marks in memory that outlives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is not counted and can be taken back.
 //!
 //! One tick is an eighth of the longest time asked for and of one clock cycle more:
 //!
@@ -15,7 +15,7 @@
 //! | data before nStrobe falls | 8 | setup: 8 ticks |
 //! | nStrobe low | 8 | strobe: 8 ticks |
 //! | data after nStrobe rises | 8 at least | hold: 8 ticks |
-//! | nStrobe falling until Busy is looked at | 13 at least | settle: 8 ticks |
+//! | nStrobe falling until Busy is looked at | 15 at least | settle: 8 ticks |
 //!
 //! A byte takes 24 ticks when the printer is quick enough: 2.42 µs with the default timing.
 //!
@@ -25,10 +25,11 @@
 //! Limits: the handshake is Busy, and all four status lines are heeded. For others, and for everything else the
 //! port can do, there is [`bridge::port::Port`] on the same pins.
 
+use crate::keep::{self, MARKS};
 use crate::pins;
 use bridge::port::Timing;
 use core::cell::RefCell;
-use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
+use core::sync::atomic::{Ordering, compiler_fence};
 use critical_section::{CriticalSection, Mutex};
 use embassy_rp::interrupt;
 use embassy_rp::pac;
@@ -49,7 +50,7 @@ pub const CHUNK: usize = 1024;
 const READY: u8 = 0b1100;
 
 /// The instructions during which a byte crosses: from the strobe to the push that counts it.
-const CROSSING: core::ops::RangeInclusive<u8> = 10..=12;
+const CROSSING: core::ops::RangeInclusive<u8> = 7..=9;
 
 /// Words of the DMA counter between two starts of it.
 const COUNTER: u32 = u32::MAX;
@@ -63,9 +64,6 @@ pub static SENT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// What the interrupt starts when the present buffer is through: address and length. Its other half belongs to the
 /// task; both look only inside a critical section.
 static NEXT: Mutex<RefCell<Option<(u32, u32)>>> = Mutex::new(RefCell::new(None));
-
-/// Where the counter's words go.
-static NOWHERE: AtomicU32 = AtomicU32::new(0);
 
 fn start(address: u32, length: u32) {
     let channel = pac::DMA.ch(FEED);
@@ -102,6 +100,23 @@ fn DMA_IRQ_1() {
     SENT.signal(());
 }
 
+/// Stops the machine for good, no byte being cut in two, with the last one counted.
+pub fn halt() {
+    pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << FEED));
+    let machine = pac::PIO0.sm(0);
+    // The program is the only one, loaded at the beginning. A byte takes ten microseconds at most with the slowest timing; a machine
+    // that waits for the printer is not crossing.
+    pac::PIO0.ctrl().modify(|w| w.set_sm_enable(w.sm_enable() & !1));
+    while CROSSING.contains(&(machine.addr().read().addr())) {
+        pac::PIO0.ctrl().modify(|w| w.set_sm_enable(w.sm_enable() | 1));
+        cortex_m::asm::delay(20);
+        pac::PIO0.ctrl().modify(|w| w.set_sm_enable(w.sm_enable() & !1));
+    }
+    cortex_m::asm::delay(40);
+}
+
+const _: () = assert!(MARKS > 2 * CHUNK);
+
 /// The strobe engine.
 pub struct Strobe {
     machine: StateMachine<'static, PIO0, 0>,
@@ -115,6 +130,8 @@ pub struct Strobe {
     tally: u32,
     /// Handed over and not crossed.
     in_flight: u32,
+    /// Marks made so far.
+    place: usize,
     last: u8,
 }
 
@@ -128,26 +145,25 @@ impl Strobe {
         busy: Pin<'static, PIO0>,
         buffers: [&'static mut [u8; CHUNK]; 2],
         _channels: (Peri<'static, DMA_CH0>, Peri<'static, DMA_CH1>),
+        place: usize,
     ) -> Self {
         let program = embassy_rp::pio::program::pio_asm!(
             ".side_set 1",
             ".wrap_target",
             "    pull block      side 1",
-            // The byte before must be done with before its data go: they stand until Busy has fallen.
+            // The byte before must be done with before its data go: they stand until Busy has fallen. To wait for the
+            // one line takes a tick; a look at all four would take four, and be late by as much.
+            "    wait 0 pin 0    side 1",
+            // Setup: 4 + 4 ticks. `mov` and not `out`, so that the byte is still there if it has to wait.
+            "    mov pins, osr   side 1 [3]",
             "before:",
             "    mov isr, null   side 1",
             "    in pins, 4      side 1",
             "    mov x, isr      side 1",
             "    jmp x!=y before side 1",
-            // Setup: 4 + 4 ticks. `mov` and not `out`, so that the byte is still there if it has to wait.
-            "    mov pins, osr   side 1 [3]",
-            "    mov isr, null   side 1",
-            "    in pins, 4      side 1",
-            "    mov x, isr      side 1",
-            "    jmp x!=y before side 1",
             "    nop             side 0 [7]",
-            // Hold: 2 ticks here, 2 for push and pull, 4 for the look at the lines before the data can change.
-            "    nop             side 1 [1]",
+            // Hold: 5 ticks here, 3 for push, pull and wait before the data can change.
+            "    nop             side 1 [4]",
             "    push block      side 1",
             ".wrap",
         );
@@ -163,8 +179,17 @@ impl Strobe {
         machine.set_pins(embassy_rp::gpio::Level::High, &[&strobe]);
         machine.set_pin_dirs(Direction::Out, &[&strobe]);
         machine.set_pin_dirs(Direction::Out, &data.each_ref());
-        let mut engine =
-            Strobe { machine, origin, buffers, turn: 0, given: [0; 2], tally: 0, in_flight: 0, last: 0 };
+        let mut engine = Strobe {
+            machine,
+            origin,
+            buffers,
+            turn: 0,
+            given: [0; 2],
+            tally: 0,
+            in_flight: 0,
+            place,
+            last: 0,
+        };
         engine.set_timing(&Timing::DEFAULT);
         engine.rewind();
         engine.start_tally();
@@ -225,6 +250,7 @@ impl Strobe {
         let fresh = tally - self.tally;
         self.tally = tally;
         self.in_flight -= fresh;
+        self.place = (self.place + fresh as usize) % MARKS;
         // Buffers are emptied in turn; `turn` is the older one if both are in use.
         let mut left = fresh;
         for which in [self.turn, self.turn ^ 1] {
@@ -236,6 +262,19 @@ impl Strobe {
             self.start_tally();
         }
         fresh as usize
+    }
+
+    /// How many marks there are, modulo [`MARKS`]; as of the last [`Strobe::crossed`].
+    pub fn place(&self) -> usize {
+        self.place
+    }
+
+    /// The next mark belongs there: others than this have made some.
+    pub fn set_place(&mut self, place: usize) {
+        if place != self.place {
+            self.place = place;
+            self.start_tally();
+        }
     }
 
     /// Stops and forgets what has not crossed the port; says how much has since it was last asked. No byte is cut
@@ -306,11 +345,15 @@ impl Strobe {
         pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << TALLY));
         while channel.ctrl_trig().read().busy() {}
         channel.read_addr().write_value(pac::PIO0.rxf(0).as_ptr() as u32);
-        channel.write_addr().write_value(NOWHERE.as_ptr() as u32);
+        channel.write_addr().write_value(keep::marks() as u32 + self.place as u32);
         channel.trans_count().write_value(COUNTER);
         channel.ctrl_trig().write(|w| {
             w.set_treq_sel(TreqSel::PIO0_RX0);
-            w.set_data_size(DataSize::SIZE_WORD);
+            // What was pushed is the state of the lines, which was `READY` and not zero.
+            w.set_data_size(DataSize::SIZE_BYTE);
+            w.set_incr_write(true);
+            w.set_ring_sel(true);
+            w.set_ring_size(keep::MARKS_BITS);
             w.set_chain_to(TALLY as u8);
             w.set_en(true);
         });

@@ -8,6 +8,7 @@
 //! What arrives is always read: flow control is by credits in the frames, never by leaving an endpoint full, so a
 //! cancel or a question is seen however much data is under way.
 
+use crate::keep;
 use crate::printer::{self, Face, LONGEST};
 use crate::shared::{Shared, Side};
 use core::cell::Cell;
@@ -21,6 +22,7 @@ use embassy_usb::driver::{Endpoint, EndpointError, EndpointIn, EndpointOut};
 use embassy_usb::msos::{self, windows_version};
 use embassy_usb::{Builder, Config, UsbDevice};
 use protocol::link::frame::{MAX, Reader};
+use protocol::link::message::DATA_MAX;
 use static_cell::StaticCell;
 
 /// The driver.
@@ -227,7 +229,13 @@ pub async fn answer(
     loop {
         shared.wait(Side::Link).await;
         while let Some(speaker) = floor.speaker.get() {
-            let length = shared.engine(|engine| engine.transmit(frame));
+            let length = shared.engine(|engine| {
+                if let Some(from) = engine.log_wanted() {
+                    let (at, end, count) = keep::read_log(from, &mut frame[..DATA_MAX]);
+                    engine.log(at, end, &frame[..count]);
+                }
+                engine.transmit(frame)
+            });
             if length == 0 {
                 break;
             }

@@ -6,7 +6,7 @@ use crate::engine::{Due, Identity, Task};
 use crate::track::Track;
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
 };
 
 impl Engine<'_> {
@@ -64,6 +64,8 @@ impl Engine<'_> {
             }
             ToBridge::Bootloader => self.between_jobs(Task::Bootloader),
             ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),
+            ToBridge::Probe { request, data, control } => self.ask(request, Task::Probe { data, control }),
+            ToBridge::ReadLog { request, from } => self.due.log = Some((request, from)),
         }
     }
 
@@ -293,11 +295,23 @@ impl Engine<'_> {
             || now.printed.wrapping_sub(self.told.printed) >= 4096
     }
 
-    /// A piece of the firmware's log for the host; false if the last one has not gone yet.
-    pub fn log(&mut self, bytes: &[u8]) -> bool {
-        self.frame_length == 0 && {
-            self.frame_length = frame::write(&ToHost::Log(bytes), &mut self.frame).unwrap_or(0);
-            true
+    /// Makes a frame of a message that cannot wait in its own form.
+    pub(super) fn prepare(&mut self, message: &ToHost<'_>) {
+        self.frame_length = frame::write(message, &mut self.frame).unwrap_or(0);
+    }
+
+    /// From which byte on the host wants the log, if it does.
+    pub fn log_wanted(&self) -> Option<u32> {
+        self.due.log.filter(|_| self.frame_length == 0).map(|(_, from)| from)
+    }
+
+    /// A piece of the log for the host that wanted it: at most [`DATA_MAX`] bytes, beginning at byte `at` of `end`.
+    pub fn log(&mut self, at: u32, end: u32, bytes: &[u8]) {
+        if self.log_wanted().is_some()
+            && let Some((request, _)) = self.due.log.take()
+        {
+            let bytes = &bytes[..bytes.len().min(DATA_MAX)];
+            self.prepare(&ToHost::LogPart { request, at, end, bytes });
         }
     }
 }

@@ -9,7 +9,8 @@
 //! * [`Engine::output`] to the port, [`Engine::consumed`] for what has crossed it, [`Engine::port`] for what the
 //!   lines say;
 //! * [`Engine::task`] for what only the board can do, [`Engine::done`] for what came of it;
-//! * [`Engine::transmit`] to the link until it gives nothing;
+//! * a piece of the log to [`Engine::log`] when [`Engine::log_wanted`]; [`Engine::transmit`] to the link until it gives
+//!   nothing;
 //! * [`Engine::checkpoint`] to memory that outlives a reset, whenever bytes were consumed.
 //!
 //! **One byte, once.** Data carry their offset, and only the byte that comes next is taken. What is made of them
@@ -28,7 +29,7 @@ use self::job::{Job, Marks, Phase};
 use crate::ring::Ring;
 use crate::streams::{Streams, WRITE_ROOM};
 use crate::track::Track;
-use protocol::link::frame::{self, MAX};
+use protocol::link::frame::MAX;
 use protocol::link::message::{
     Answer, Fault, JobKind, JobState, Lines, PortSettings, Progress, Refusal, ToHost,
 };
@@ -82,6 +83,13 @@ pub enum Task {
         /// nStrobe, nAutoFd, nInit, nSelectIn.
         control: u8,
     },
+    /// The same, and look at the inputs when they have settled.
+    Probe {
+        /// Data1..Data8.
+        data: u8,
+        /// nStrobe, nAutoFd, nInit, nSelectIn.
+        control: u8,
+    },
 }
 
 /// What came of a task.
@@ -93,6 +101,8 @@ pub enum Outcome<'a> {
     BadSettings,
     /// The answer to a question.
     Answer(Answer<'a>),
+    /// The inputs.
+    Lines(Lines),
 }
 
 /// What has to outlive a reset of the bridge for a job to go on after it.
@@ -112,6 +122,8 @@ struct Due {
     lines: Option<u16>,
     refused: Option<(Refusal, u32)>,
     not_now: Option<u16>,
+    /// Number of a question for the log, and from where on.
+    log: Option<(u16, u32)>,
 }
 
 /// The engine. Some 13 KB beside the [`Memory`] it is given.
@@ -296,9 +308,9 @@ impl<'m> Engine<'m> {
         match outcome {
             Outcome::Done => {}
             Outcome::BadSettings => self.refuse(Refusal::Settings, 0),
-            Outcome::Answer(answer) => {
-                let message = ToHost::Answer { request: self.request, answer };
-                self.frame_length = frame::write(&message, &mut self.frame).unwrap_or(0);
+            Outcome::Answer(answer) => self.prepare(&ToHost::Answer { request: self.request, answer }),
+            Outcome::Lines(lines) => {
+                self.prepare(&ToHost::Lines { request: self.request, lines, fault: lines.fault() });
             }
         }
         if self.needs_reset {

@@ -2,8 +2,10 @@
 
 mod flash;
 mod list;
+mod reset;
 
 pub use list::ask;
+pub use reset::before_sending;
 
 use std::io::{self, Write as _};
 use std::time::Duration;
@@ -36,7 +38,8 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
     foilpress bridge list\n  \
     foilpress bridge status                              (the only bridge there is)\n  \
     foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
-    foilpress bridge flash                               (new firmware, or the first one on a new board)")]
+    foilpress bridge flash                               (new firmware, or the first one on a new board)\n  \
+    foilpress bridge reset                               (after a sheet was lost)")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -50,6 +53,8 @@ enum Command {
     Flash(flash::Args),
     /// The bridge, its job, the port's lines, and the printer's own answer when no job is open
     Status(StatusArgs),
+    /// Reset the printer through the bridge, after a sheet was lost in the middle
+    Reset(reset::Args),
 }
 
 /// Arguments of `bridge status`.
@@ -69,11 +74,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::List(args) => list::run(args),
         Command::Flash(args) => flash::run(args, observer),
         Command::Status(args) => status(args),
+        Command::Reset(args) => reset::run(args),
     }
 }
 
 /// The only bridge there is.
-pub(super) fn only() -> Result<Address> {
+fn only() -> Result<Address> {
     let bridge = find::only()?;
     let (address, _) = bridge.open()?;
     Ok(address.clone())
@@ -150,7 +156,9 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
         JobState::Lost => {
-            format!("idle; job {job:08x} was lost. Switch the printer off and on before the next one")
+            format!(
+                "idle; job {job:08x} was lost. `foilpress bridge reset` readies the printer for the next one"
+            )
         }
     }
 }

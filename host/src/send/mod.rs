@@ -8,12 +8,14 @@
 
 mod address;
 pub mod find;
+pub mod finish;
 pub mod journal;
 pub mod query;
 pub mod raw;
 mod run;
 pub mod session;
 pub mod status;
+pub mod streams;
 pub mod transport;
 pub mod usb;
 pub mod words;

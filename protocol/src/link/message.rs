@@ -18,7 +18,7 @@ pub const VERSION: u8 = 1;
 /// Fingerprint of the message set: the CRC-32 over one example of every variant. Two sides with the same
 /// fingerprint know the same messages; with different ones, the same version still understands all that the
 /// older of them knows.
-pub const SCHEMA: u32 = 0x7e65_aacf;
+pub const SCHEMA: u32 = 0x8432_812c;
 
 /// The most data bytes to put in one [`ToBridge::Data`]; fits a frame whatever the other fields are.
 pub const DATA_MAX: usize = 960;
@@ -80,6 +80,23 @@ pub enum ToBridge<'a> {
         data: u8,
         /// Levels of nStrobe, nAutoFd, nInit, nSelectIn in bits 0..3.
         control: u8,
+    },
+    /// As [`ToBridge::Drive`], and reads the inputs when they have settled. Answered by [`ToHost::Lines`] with the same
+    /// number, or by [`Answer::NotNow`] while a job is open.
+    Probe {
+        /// Returned with the answer.
+        request: u16,
+        /// Levels of Data1..Data8, Data1 in bit 0.
+        data: u8,
+        /// Levels of nStrobe, nAutoFd, nInit, nSelectIn in bits 0..3.
+        control: u8,
+    },
+    /// Asks for a piece of the firmware's log. Answered by [`ToHost::LogPart`] with the same number, at any time.
+    ReadLog {
+        /// Returned with the answer.
+        request: u16,
+        /// From which byte on, counted since the log began. 0 gives the oldest there is.
+        from: u32,
     },
 }
 
@@ -178,8 +195,19 @@ pub enum ToHost<'a> {
         /// The job the message named, or 0.
         job: u32,
     },
-    /// A piece of the firmware's log, encoded by defmt.
+    /// A piece of the firmware's log without its place. No bridge sends it any more: [`ToHost::LogPart`].
     Log(&'a [u8]),
+    /// A piece of the firmware's log, encoded by defmt.
+    LogPart {
+        /// The number of the question.
+        request: u16,
+        /// Where the piece begins. Beyond what was asked for if that is gone: the log keeps the last bytes only.
+        at: u32,
+        /// Bytes logged so far: the piece is the last one if it ends there.
+        end: u32,
+        /// The bytes, at most [`DATA_MAX`].
+        bytes: &'a [u8],
+    },
 }
 
 /// How far a job is. All positions count from the job's beginning and never go back, except that `accepted`
@@ -204,6 +232,7 @@ pub struct Progress {
 
 /// Where a job stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum JobState {
     /// There is no job.
     None,
@@ -226,6 +255,7 @@ pub enum JobState {
 
 /// Why the printer does not take bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Fault {
     /// PError is high.
     PaperOut,
@@ -243,6 +273,7 @@ pub enum Fault {
 
 /// What is wrong with a job's data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Defect {
     /// Offset in the job's data of the byte where it was noticed.
     pub at: u32,
@@ -252,6 +283,7 @@ pub struct Defect {
 
 /// Kinds of defect.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DefectKind {
     /// Not a job header this bridge knows.
     Header,
@@ -303,6 +335,7 @@ pub enum Refusal {
 
 /// Levels of the port's status lines.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lines(pub u8);
 
 impl Lines {
@@ -408,6 +441,8 @@ mod tests {
             (ToBridge::Initialise, &[6]),
             (ToBridge::Bootloader, &[7]),
             (ToBridge::Drive { data: 0xaa, control: 0b0111 }, &[8, 0xaa, 7]),
+            (ToBridge::Probe { request: 300, data: 0xaa, control: 0b0111 }, &[9, 0xac, 0x02, 0xaa, 7]),
+            (ToBridge::ReadLog { request: 300, from: 1200 }, &[10, 0xac, 0x02, 0xb0, 9]),
         ]
     }
 
@@ -453,6 +488,10 @@ mod tests {
             (refused(Refusal::BeyondLimit), &[4, 5, 7]),
             (refused(Refusal::Settings), &[4, 6, 7]),
             (ToHost::Log(&[1, 2]), &[5, 2, 1, 2]),
+            (
+                ToHost::LogPart { request: 3, at: 1200, end: 1202, bytes: &[1, 2] },
+                &[6, 3, 0xb0, 9, 0xb2, 9, 2, 1, 2],
+            ),
         ]
     }
 
