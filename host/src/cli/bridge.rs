@@ -334,6 +334,14 @@ mod tests {
     }
 
     #[test]
+    fn a_bridge_of_other_messages_is_answered_with_the_command_that_helps() {
+        let bridge = |version| Bridge { version, boot: 1, serial: 0xab, firmware: "9.9".into() };
+        assert_eq!(other_version(&bridge(VERSION)), None);
+        let said = other_version(&bridge(VERSION + 1)).unwrap();
+        assert!(said.contains("9.9") && said.contains("foilpress bridge flash"), "{said}");
+    }
+
+    #[test]
     fn the_length_of_a_device_id_is_no_part_of_its_text() {
         // 75 bytes: the second byte of the length is a letter.
         let id = "MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER;";

@@ -130,7 +130,7 @@ impl<W: std::io::Write> Visit<W> {
         self.troubles += usize::from(found.fault.is_some());
         match found.device_id() {
             Some(id) if !is_alps(&id) => self.trouble(
-                "jobs for it are refused; if it is an MD printer all the same, `--force` with send and print goes on",
+                "the printer is no ALPS, so jobs for it are refused; if it takes them all the same, `--force` with send and print goes on",
             ),
             _ => Ok(()),
         }

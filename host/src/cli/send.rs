@@ -1,5 +1,6 @@
 //! `foilpress send`, and what `print`, `resume` and `cancel` share with it: a job on its way to a printer.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -13,7 +14,7 @@ use crate::observe::Observer;
 use crate::send::finish::{self, Sheet, await_sheet};
 use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
 use crate::send::session::{Outcome, Session};
-use crate::send::{self, Address, Checked, Destination, Event, streams, words};
+use crate::send::{self, Address, Checked, Destination, Event, find, streams, words};
 
 /// Arguments of `send`.
 #[derive(ClapArgs, Debug)]
@@ -138,15 +139,23 @@ pub fn go(
     let outcome = match session.outcome() {
         Some(outcome) => outcome,
         None => {
-            send::run(&mut session, &mut || address.open(), &mut |record| job.save(record), &mut |event| {
-                reporter.tell(&event)
-            })
-            .with_context(|| {
-                format!(
-                    "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
-                    job.entry.name
-                )
-            })?
+            // Once the bridge is known, it is that one, whatever its port is called when it comes back.
+            let known = Cell::new(job.entry.record.bridge);
+            let mut watch = |event: Event<'_>| {
+                if let Event::Connected(bridge) = &event {
+                    known.set(Some(bridge.serial));
+                }
+                reporter.tell(&event);
+            };
+            let mut open = || find::open(address, known.get());
+            send::run(&mut session, &mut open, &mut |record| job.save(record), &mut watch).with_context(
+                || {
+                    format!(
+                        "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
+                        job.entry.name
+                    )
+                },
+            )?
         }
     };
     observer.end();

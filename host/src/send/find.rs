@@ -111,6 +111,25 @@ fn joined(ports: Vec<Port>, usb: Vec<Option<String>>) -> Survey {
     survey
 }
 
+/// Opens an address; if nothing is there any more, or it fits several, the bridge with this number wherever it is now: a
+/// bridge that was plugged in again may have another port.
+pub fn open(address: &Address, number: Option<u64>) -> Result<Box<dyn Transport>, OpenError> {
+    let error = match address.open() {
+        Ok(link) => return Ok(link),
+        Err(error) => error,
+    };
+    let local = matches!(address, Address::Serial(_) | Address::Usb(_));
+    let elsewhere = matches!(error, OpenError::Absent(_) | OpenError::Several(_));
+    if local
+        && elsewhere
+        && let Some(number) = number
+        && let Some(bridge) = survey().bridges.iter().find(|bridge| bridge.number() == Some(number))
+    {
+        return bridge.open().map(|(_, link)| link);
+    }
+    Err(error)
+}
+
 /// Why there is not one bridge to take.
 #[derive(Debug, thiserror::Error)]
 pub enum ChoiceError {
