@@ -2,6 +2,9 @@
 
 mod flash;
 mod list;
+mod log;
+mod test;
+mod watch;
 
 pub use list::ask;
 
@@ -36,6 +39,9 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
     foilpress bridge list\n  \
     foilpress bridge status                              (the only bridge there is)\n  \
     foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
+    foilpress bridge status --watch                      (until Ctrl-C)\n  \
+    foilpress bridge test                                (the wiring, with a loop-back plug)\n  \
+    foilpress bridge log                                 (what the firmware has noted)\n  \
     foilpress bridge flash                               (new firmware, or the first one on a new board)")]
 pub struct Args {
     #[command(subcommand)]
@@ -50,6 +56,10 @@ enum Command {
     Flash(flash::Args),
     /// The bridge, its job, the port's lines, and the printer's own answer when no job is open
     Status(StatusArgs),
+    /// Try the wiring with a loop-back plug, or walk through the lines for a meter
+    Test(test::Args),
+    /// What the firmware has noted, also before its last restart
+    Log(log::Args),
 }
 
 /// Arguments of `bridge status`.
@@ -61,6 +71,9 @@ struct StatusArgs {
     /// As JSON
     #[arg(long)]
     json: bool,
+    /// Again and again, in place; with --json an object on a line whenever something has changed
+    #[arg(long)]
+    watch: bool,
 }
 
 /// Runs `bridge`.
@@ -69,6 +82,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::List(args) => list::run(args),
         Command::Flash(args) => flash::run(args, observer),
         Command::Status(args) => status(args),
+        Command::Test(args) => test::run(args),
+        Command::Log(args) => log::run(args),
     }
 }
 
@@ -153,6 +168,11 @@ pub fn doing(progress: &Progress) -> String {
             format!("idle; job {job:08x} was lost. Switch the printer off and on before the next one")
         }
     }
+}
+
+/// Whether a job is under way.
+fn is_open(progress: &Progress) -> bool {
+    matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling)
 }
 
 /// The lines by their names.
@@ -304,6 +324,9 @@ fn status(args: &StatusArgs) -> Result<()> {
         Some(address) => address.clone(),
         None => only()?,
     };
+    if args.watch {
+        return watch::run(&address, args.json);
+    }
     let found = Found::ask(&address)?;
     let mut out = std::io::stdout().lock();
     if args.json {

@@ -9,6 +9,7 @@
 mod address;
 pub mod find;
 pub mod journal;
+pub mod log;
 pub mod query;
 pub mod raw;
 mod run;
@@ -16,6 +17,7 @@ pub mod session;
 pub mod status;
 pub mod transport;
 pub mod usb;
+pub mod wiring;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};
