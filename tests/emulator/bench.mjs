@@ -1,10 +1,11 @@
 // A board, a printer and a program on the workstation, put together.
 
+import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Board } from './board.mjs';
 import { Frames, ask, begin, data, hello, parse } from './frames.mjs';
-import { Printer } from './printer.mjs';
+import { Printer, waveform } from './printer.mjs';
 import { Host } from './usb.mjs';
 
 export const MS = 1_000_000;
@@ -15,6 +16,32 @@ const { FOILPRESS_IMAGE: image, FOILPRESS_JOBS: jobs } = process.env;
 
 /// Why the tests cannot run, or false.
 export const skip = image && jobs ? false : 'run by `cargo xtask emulator`, which builds the image';
+
+/// Numbers from 0 to `below` - 1, the same for the same seed (mulberry32).
+export const random = (seed) => (below) => {
+  seed = (seed + 0x6d2b79f5) | 0;
+  let value = Math.imul(seed ^ (seed >>> 15), 1 | seed);
+  value = (value + Math.imul(value ^ (value >>> 7), 61 | value)) ^ value;
+  return ((value ^ (value >>> 14)) >>> 0) % below;
+};
+
+/// The same bytes, all of them.
+export const same = (taken, expected) => {
+  assert.equal(taken.length, expected.length, 'number of bytes');
+  const at = taken.findIndex((byte, i) => byte !== expected[i]);
+  assert.equal(at, -1, `first difference at byte ${at}`);
+};
+
+// 800 ns each, and a clock cycle of what an edge may be late.
+const STANDARD = 792;
+
+/// Every time kept, no strobe while the printer was not ready.
+export const legal = (printer, least = STANDARD) => {
+  const { shortest, wrong } = waveform(printer.edges);
+  assert.deepEqual(wrong.slice(0, 3), []);
+  for (const time of ['setup', 'strobe', 'hold']) assert.ok(shortest[time] >= least, `${time} ${shortest[time]} ns`);
+  return shortest;
+};
 
 export const job = (name) => new Uint8Array(readFileSync(join(jobs, name)));
 
@@ -62,7 +89,8 @@ export class Bench {
     this.device = await this.until(this.host.enumerate());
     await this.open(way);
     this.greeted = this.board.now;
-    await this.say(hello());
+    // As every host does that opens the link: the zero ends whatever stands in the reader.
+    await this.say(Uint8Array.of(0, ...hello()));
     await this.hear(({ kind, at }) => kind === 'hello' && at > this.greeted);
   }
 
@@ -86,6 +114,7 @@ export class Bench {
       const heard = { at: this.board.now, ...parse(message) };
       this.heard.push(heard);
       if (heard.kind === 'progress') this.progress = heard;
+      if (heard.kind === 'lines') this.onLines?.(heard);
     }
   }
 
@@ -107,16 +136,28 @@ export class Bench {
     return found;
   }
 
-  /// Sends a job and waits for its end, keeping to the credits; `piece` bytes in a frame.
-  async print(number, kind, bytes, { piece = 900, limitMs = 20_000, from = 0, until = () => false } = {}) {
+  /// Sends a job and waits for its end, keeping to the credits; `piece` bytes in a frame. `asking`: how the lines are is
+  /// asked again and again meanwhile, and how many nanoseconds each answer took goes there.
+  async print(number, kind, bytes, { piece = 900, limitMs = 20_000, from = 0, until = () => false, asking = null } = {}) {
     await this.say(begin(number, kind, bytes.length));
     await this.hear((heard) => heard.kind === 'progress' && heard.job === number);
-    let [next, sending, stop] = [from, false, false];
+    let [next, sending, stop, askAt] = [from, false, false, 0];
     const ended = () => ['done', 'cancelled', 'broken', 'lost'].includes(this.progress.state) && this.progress.job === number;
     const step = () => {
       stop ||= until(next);
       // Never in the middle of a frame.
       if (ended() || (stop && !sending)) return true;
+      if (asking && !sending && this.board.now >= askAt) {
+        const [request, asked] = [++this.requests, this.board.now];
+        askAt = Infinity;
+        sending = true;
+        this.host.write(this.end.out, ask(request, 0)).then(() => { sending = false; });
+        this.onLines = (heard) => {
+          if (heard.request !== request) return;
+          asking.push(heard.at - asked);
+          askAt = heard.at + 3 * MS;
+        };
+      }
       if (!sending && !stop && next < Math.min(this.progress.limit, bytes.length)) {
         const end = Math.min(next + piece, this.progress.limit, bytes.length);
         sending = true;

@@ -2,28 +2,10 @@
 
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Bench, MS, RAW, STREAMS, job, skip } from './bench.mjs';
+import { Bench, MS, RAW, STREAMS, job, legal, same, skip } from './bench.mjs';
 import { cancel, configure, data, drive, hello, initialise } from './frames.mjs';
-import { waveform } from './printer.mjs';
 
 const LINES = 0, STATUS = 1, DEVICE_ID = 2;
-// 800 ns each, and a clock cycle of what an edge may be late.
-const STANDARD = 792;
-
-const same = (taken, expected) => {
-  assert.equal(taken.length, expected.length, 'number of bytes');
-  const at = taken.findIndex((byte, i) => byte !== expected[i]);
-  assert.equal(at, -1, `first difference at byte ${at}`);
-};
-
-/// Every time kept, no strobe while the printer was not ready.
-const legal = (printer, least = STANDARD) => {
-  const { shortest, wrong } = waveform(printer.edges);
-  assert.deepEqual(wrong.slice(0, 3), []);
-  for (const time of ['setup', 'strobe', 'hold']) assert.ok(shortest[time] >= least, `${time} ${shortest[time]} ns`);
-  return shortest;
-};
-
 test('a composite device appears, with a serial port and bulk endpoints', { skip }, async () => {
   const bench = new Bench();
   await bench.connect('bulk');
@@ -269,73 +251,4 @@ test('a printer that is switched off in the middle loses the job, and nothing mo
   bench.printer.power(true);
   await bench.pass(50);
   assert.equal(taken.length, had);
-});
-
-/// Numbers from 0 to `below` - 1, the same for the same seed (mulberry32).
-const random = (seed) => (below) => {
-  seed = (seed + 0x6d2b79f5) | 0;
-  let value = Math.imul(seed ^ (seed >>> 15), 1 | seed);
-  value = (value + Math.imul(value ^ (value >>> 7), 61 | value)) ^ value;
-  return ((value ^ (value >>> 14)) >>> 0) % below;
-};
-
-test('whatever happens on the cables, the printer gets the same bytes', { skip }, async (t) => {
-  const runs = Number(process.env.FOILPRESS_RUNS ?? 8);
-  const happened = {};
-  for (let seed = 1; seed <= runs; seed++) {
-    const pick = random(seed);
-    const bench = new Bench({ busyAfter: pick(500), work: 200 + pick(4000), ack: 500 + pick(2000) });
-    const [kind, name] = pick(2) ? [RAW, 'small.rgl'] : [STREAMS, 'small.streams'];
-    const [bytes, expected] = [job(name), job('small.rgl')];
-    for (let i = pick(3); i > 0; i--) {
-      const [line, level] = [[null, 1], ['paperOut', 1], ['select', 0], ['fault', 0]][pick(4)];
-      bench.printer.pauses.push({ after: 1 + pick(expected.length - 1), line, level, ns: pick(10 * MS) });
-    }
-    await bench.connect(pick(2) ? 'bulk' : 'serial');
-    let from = 0;
-    for (let i = 1 + pick(4); i > 0; i--) {
-      const at = from + pick(3000);
-      await bench.print(3, kind, bytes, { from, piece: 1 + pick(900), until: (sent) => sent >= at });
-      const what = ['replug', 'garbage', 'repeat', 'damage', 'gap'][pick(5)];
-      happened[what] = (happened[what] ?? 0) + 1;
-      const broken = data(3, bench.progress.accepted, bytes.subarray(0, 300));
-      broken[1 + pick(broken.length - 2)] ^= 1 << pick(8);
-      if (what === 'replug') await bench.replug(pick(2) ? 'bulk' : 'serial');
-      if (what === 'garbage') await bench.say(Uint8Array.from({ length: 1 + pick(2500) }, () => pick(256)));
-      const again = pick(bench.progress.accepted + 1);
-      if (what === 'repeat') await bench.say(data(3, again, bytes.subarray(again, again + 300)));
-      if (what === 'damage') await bench.say(broken);
-      if (what === 'gap') await bench.say(data(3, bench.progress.accepted + 5000, bytes.subarray(0, 100)));
-      await bench.pass(pick(10));
-      await bench.say(Uint8Array.of(0));
-      await bench.say(hello());
-      const asked = bench.board.now;
-      from = (await bench.hear(({ kind: heard, job: number, at: when }) => heard === 'progress' && number === 3 && when > asked)).accepted;
-      if (bench.progress.state === 'done') break;
-    }
-    assert.equal((await bench.print(3, kind, bytes, { from })).state, 'done', `seed ${seed}`);
-    same(bench.printer.taken, expected);
-    legal(bench.printer);
-  }
-  t.diagnostic(`${runs} runs, ${JSON.stringify(happened)}`);
-});
-
-test('decoding keeps the port at work', { skip }, async (t) => {
-  const expected = job('clusters.rgl'), streams = job('clusters.streams');
-  for (const [what, settings] of [['as quick as the timing allows', { busyAfter: 200, work: 400, ack: 400 }], ['usual', {}]]) {
-    const bench = new Bench(settings);
-    await bench.connect('bulk');
-    const before = bench.board.cycles;
-    assert.equal((await bench.print(1, STREAMS, streams)).state, 'done');
-    same(bench.printer.taken, expected);
-    legal(bench.printer);
-    const at = bench.printer.edges.filter(({ line, level }) => line === 'strobe' && level === 0).map((edge) => edge.at);
-    // The port's own pace: what most bytes take. The rest of the time it had nothing to send.
-    const paces = at.slice(1).map((time, i) => time - at[i]).sort((a, b) => a - b);
-    const pace = paces[paces.length >> 1];
-    const busy = (paces.length * pace) / (at.at(-1) - at[0]);
-    const perDot = (bench.board.cycles - before) / (2 * 4800 * 256);
-    t.diagnostic(`${what}: ${pace} ns a byte, ${(100 * busy).toFixed(1)} % of the time; ${perDot.toFixed(1)} cycles a dot, all included`);
-    assert.ok(busy >= 0.9);
-  }
 });

@@ -55,6 +55,10 @@ struct urb {
 
 static uint32_t last_id;
 
+/* umockdev calls from a thread of its own; what comes of it, and time, come to the main thread. */
+static GRecMutex lock;
+#define LOCKED g_autoptr(GRecMutexLocker) locked = g_rec_mutex_locker_new(&lock); (void)locked
+
 static void put32(uint8_t *to, uint32_t value)
 {
     for (int i = 0; i < 4; i++) to[i] = value >> 8 * i;
@@ -127,8 +131,11 @@ static void reap(struct device *device)
 
 static gboolean nothing_to_reap(gpointer user)
 {
+    LOCKED;
     struct device *device = user;
     UMockdevIoctlClient *client = g_steal_pointer(&device->reaping);
+    /* Answered while this waited for its turn. */
+    if (!client) return G_SOURCE_REMOVE;
     device->patience = 0;
     complete(client, device->socket < 0 ? ENODEV : EAGAIN);
     g_object_unref(client);
@@ -163,6 +170,7 @@ static void unplugged(struct device *device)
 
 static gboolean answered(gint fd, GIOCondition condition, gpointer user)
 {
+    LOCKED;
     struct device *device = user;
     uint8_t piece[4096];
     ssize_t count = recv(fd, piece, sizeof piece, 0);
@@ -265,6 +273,7 @@ static void discard(struct device *device, UMockdevIoctlClient *client, gulong a
 /* The program has closed the device, or ended: what it had under way is nobody's any more. */
 static void closed(GObject *object, GParamSpec *property, gpointer user)
 {
+    LOCKED;
     struct device *device = user;
     UMockdevIoctlClient *client = UMOCKDEV_IOCTL_CLIENT(object);
     (void)property;
@@ -298,6 +307,7 @@ static unsigned number(UMockdevIoctlData *arg)
 
 static gboolean handle(UMockdevIoctlBase *base, UMockdevIoctlClient *client, gpointer user)
 {
+    LOCKED;
     struct device *device = user;
     UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
     gulong code = umockdev_ioctl_client_get_request(client);
@@ -452,10 +462,10 @@ static void ended(GPid pid, gint status, gpointer loop)
     g_main_loop_quit(loop);
 }
 
-/* What we are told to do, the program does. */
+/* Who ends us ends the program, without a word. */
 static gboolean pass_on(gpointer pid)
 {
-    kill(GPOINTER_TO_INT(pid), SIGTERM);
+    kill(GPOINTER_TO_INT(pid), SIGKILL);
     return G_SOURCE_CONTINUE;
 }
 

@@ -225,6 +225,15 @@ fn serve_printer(socket: &UnixStream, desk: &Mutex<Desk>, stop: &AtomicBool) -> 
 }
 
 impl Desk {
+    /// What crossed the port, without the status questions behind the last job: the program asks until the sheet is out.
+    pub fn jobs(&self) -> &[u8] {
+        let mut bytes = &self.printed[..];
+        while let Some(before) = bytes.strip_suffix(&[0x05, 0x01]) {
+            bytes = before;
+        }
+        bytes
+    }
+
     /// Gives the printer what waits; says how many bytes it took.
     fn take(&mut self, waiting: &mut Vec<u8>) -> u64 {
         let mut taken = 0;

@@ -3,8 +3,8 @@
 //! Problem: a byte every 2.42 µs, each with setup, strobe and hold times that are never too short, no strobe while the
 //! printer is busy or in trouble, and an exact count of what has crossed the port whenever it stops.
 //!
-//! Method: thirteen instructions, one byte each round. The program looks at Busy, PError, Select and nFault together:
-//! before it changes the data (which stand until Busy has fallen) and again, three ticks before the strobe. Behind
+//! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data, and looks at
+//! Busy, PError, Select and nFault together until all are well, three ticks before the strobe. Behind
 //! every strobe it pushes a word; a DMA channel takes these words away, and its counter *is* the number of bytes that
 //! have crossed. It leaves them as marks in memory that outlives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is not counted and can be taken back.
 //!
@@ -15,7 +15,7 @@
 //! | data before nStrobe falls | 8 | setup: 8 ticks |
 //! | nStrobe low | 8 | strobe: 8 ticks |
 //! | data after nStrobe rises | 8 at least | hold: 8 ticks |
-//! | nStrobe falling until Busy is looked at | 13 at least | settle: 8 ticks |
+//! | nStrobe falling until Busy is looked at | 15 at least | settle: 8 ticks |
 //!
 //! A byte takes 24 ticks when the printer is quick enough: 2.42 µs with the default timing.
 //!
@@ -50,7 +50,7 @@ pub const CHUNK: usize = 1024;
 const READY: u8 = 0b1100;
 
 /// The instructions during which a byte crosses: from the strobe to the push that counts it.
-const CROSSING: core::ops::RangeInclusive<u8> = 10..=12;
+const CROSSING: core::ops::RangeInclusive<u8> = 7..=9;
 
 /// Words of the DMA counter between two starts of it.
 const COUNTER: u32 = u32::MAX;
@@ -151,21 +151,19 @@ impl Strobe {
             ".side_set 1",
             ".wrap_target",
             "    pull block      side 1",
-            // The byte before must be done with before its data go: they stand until Busy has fallen.
+            // The byte before must be done with before its data go: they stand until Busy has fallen. To wait for the
+            // one line takes a tick; a look at all four would take four, and be late by as much.
+            "    wait 0 pin 0    side 1",
+            // Setup: 4 + 4 ticks. `mov` and not `out`, so that the byte is still there if it has to wait.
+            "    mov pins, osr   side 1 [3]",
             "before:",
             "    mov isr, null   side 1",
             "    in pins, 4      side 1",
             "    mov x, isr      side 1",
             "    jmp x!=y before side 1",
-            // Setup: 4 + 4 ticks. `mov` and not `out`, so that the byte is still there if it has to wait.
-            "    mov pins, osr   side 1 [3]",
-            "    mov isr, null   side 1",
-            "    in pins, 4      side 1",
-            "    mov x, isr      side 1",
-            "    jmp x!=y before side 1",
             "    nop             side 0 [7]",
-            // Hold: 2 ticks here, 2 for push and pull, 4 for the look at the lines before the data can change.
-            "    nop             side 1 [1]",
+            // Hold: 5 ticks here, 3 for push, pull and wait before the data can change.
+            "    nop             side 1 [4]",
             "    push block      side 1",
             ".wrap",
         );

@@ -269,18 +269,35 @@ pub const ALL: Mischief = Mischief {
     fault: 20,
 };
 
+/// How often a wire did what.
+#[derive(Default, Debug)]
+pub struct Damages {
+    pub drops: usize,
+    pub duplicates: usize,
+    pub swaps: usize,
+    pub flips: usize,
+}
+
 /// What a wire makes of frames.
-fn damage(frames: Vec<Vec<u8>>, mischief: &Mischief, random: &mut ChaCha8Rng) -> Vec<u8> {
-    let mut out: Vec<Vec<u8>> = Vec::new();
+pub fn damage<'f>(
+    frames: impl Iterator<Item = &'f [u8]>,
+    mischief: &Mischief,
+    random: &mut ChaCha8Rng,
+    done: &mut Damages,
+) -> Vec<u8> {
+    let mut out: Vec<&[u8]> = Vec::new();
     for frame in frames {
         if chance(mischief.drop, random) {
+            done.drops += 1;
             continue;
         }
         if chance(mischief.duplicate, random) {
-            out.push(frame.clone());
+            done.duplicates += 1;
+            out.push(frame);
         }
         out.push(frame);
         if out.len() > 1 && chance(mischief.swap, random) {
+            done.swaps += 1;
             let last = out.len() - 1;
             let other = random.random_range(0..last);
             out.swap(last, other);
@@ -289,13 +306,14 @@ fn damage(frames: Vec<Vec<u8>>, mischief: &Mischief, random: &mut ChaCha8Rng) ->
     let mut bytes = out.concat();
     for byte in &mut bytes {
         if mischief.flip > 0 && random.next_u32() % 50_000 < mischief.flip {
+            done.flips += 1;
             *byte ^= 1 << random.random_range(0..8);
         }
     }
     bytes
 }
 
-fn chance(in_1000: u32, random: &mut ChaCha8Rng) -> bool {
+pub fn chance(in_1000: u32, random: &mut ChaCha8Rng) -> bool {
     in_1000 > 0 && random.next_u32() % 1000 < in_1000
 }
 
@@ -317,6 +335,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
     let mut result =
         Run { printed: Vec::new(), state: JobState::None, accidents: [0; 3], initialised: false };
     let mut checkpoint: Option<Checkpoint> = None;
+    let mut damages = Damages::default();
     let mut host = Host::new(job);
     'powered: loop {
         let mut board = Board::new(sizes.0, sizes.1);
@@ -343,7 +362,8 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
                 reader.reset();
             }
             // To the bridge.
-            let mut there = damage(host.speak(), mischief, random);
+            let said = host.speak();
+            let mut there = damage(said.iter().map(|frame| &frame[..]), mischief, random, &mut damages);
             let cut = chance(mischief.cut, random);
             if cut {
                 there.truncate(random.random_range(0..=there.len()));
@@ -397,7 +417,7 @@ pub fn run(job: &Job, mischief: &Mischief, cancel_at: Option<usize>, random: &mu
                 }
                 back.push(frame[..length].to_vec());
             }
-            let mut back = damage(back, mischief, random);
+            let mut back = damage(back.iter().map(|frame| &frame[..]), mischief, random, &mut damages);
             if cut {
                 result.accidents[0] += 1;
                 back.truncate(random.random_range(0..=back.len()));

@@ -3,10 +3,12 @@
 mod flash;
 mod list;
 mod log;
+mod reset;
 mod test;
 mod watch;
 
 pub use list::ask;
+pub use reset::before_sending;
 
 use std::io::{self, Write as _};
 use std::time::Duration;
@@ -42,7 +44,8 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
     foilpress bridge status --watch                      (until Ctrl-C)\n  \
     foilpress bridge test                                (the wiring, with a loop-back plug)\n  \
     foilpress bridge log                                 (what the firmware has noted)\n  \
-    foilpress bridge flash                               (new firmware, or the first one on a new board)")]
+    foilpress bridge flash                               (new firmware, or the first one on a new board)\n  \
+    foilpress bridge reset                               (after a sheet was lost)")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -60,6 +63,8 @@ enum Command {
     Test(test::Args),
     /// What the firmware has noted, also before its last restart
     Log(log::Args),
+    /// Reset the printer through the bridge, after a sheet was lost in the middle
+    Reset(reset::Args),
 }
 
 /// Arguments of `bridge status`.
@@ -84,11 +89,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::Status(args) => status(args),
         Command::Test(args) => test::run(args),
         Command::Log(args) => log::run(args),
+        Command::Reset(args) => reset::run(args),
     }
 }
 
 /// The only bridge there is.
-pub(super) fn only() -> Result<Address> {
+fn only() -> Result<Address> {
     let bridge = find::only()?;
     let (address, _) = bridge.open()?;
     Ok(address.clone())
@@ -165,7 +171,9 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
         JobState::Lost => {
-            format!("idle; job {job:08x} was lost. Switch the printer off and on before the next one")
+            format!(
+                "idle; job {job:08x} was lost. `foilpress bridge reset` readies the printer for the next one"
+            )
         }
     }
 }
@@ -308,6 +316,7 @@ impl Found {
 /// The device ID as text, without the two bytes of its length.
 fn text(reply: &Reply) -> Option<String> {
     let Reply::Bytes(bytes) = reply else { return None };
+    let bytes = bytes.get(2..)?;
     let printable = |byte: &&u8| byte.is_ascii_graphic() || **byte == b' ';
     Some(bytes.iter().filter(printable).map(|&byte| char::from(byte)).collect())
 }
@@ -345,5 +354,15 @@ mod tests {
     fn the_printers_own_device_id_is_known_and_anothers_is_not() {
         assert!(is_alps("MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER"));
         assert!(!is_alps("MFG:Hewlett-Packard;MDL:LaserJet;COMMENT:not ALPS"));
+    }
+
+    #[test]
+    fn the_length_of_a_device_id_is_no_part_of_its_text() {
+        // 75 bytes: the second byte of the length is a letter.
+        let id = "MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER;";
+        let reply = Reply::Bytes([&[0, b'K'], id.as_bytes()].concat());
+        assert_eq!(text(&reply).as_deref(), Some(id));
+        assert_eq!(text(&Reply::Bytes(vec![0])), None);
+        assert_eq!(text(&Reply::Silent), None);
     }
 }

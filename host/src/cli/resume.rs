@@ -63,7 +63,7 @@ pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
     let job = journal.open(choose(&journal, args.job)?)?;
     let address = address(&job.entry, args.to.as_ref())?;
     let cancel = job.entry.record.cancel;
-    go(job, &address, cancel, observer)
+    go(job, &journal, &address, cancel, observer)
 }
 
 /// Runs `cancel`.
@@ -71,7 +71,7 @@ pub fn cancel(args: &Cancel, observer: &dyn Observer) -> Result<()> {
     let journal = Journal::of_user()?;
     let job = journal.open(choose(&journal, args.job)?)?;
     let address = address(&job.entry, args.to.as_ref())?;
-    go(job, &address, true, observer)
+    go(job, &journal, &address, true, observer)
 }
 
 fn address(entry: &Entry, asked: Option<&Address>) -> Result<Address> {

@@ -4,14 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
+use indicatif::HumanBytes;
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 
 use super::output::{self, Staged};
 use crate::observe::Observer;
+use crate::send::finish::{self, Sheet, await_sheet};
 use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
 use crate::send::session::{Outcome, Session};
-use crate::send::{self, Address, Checked, Destination, Event, words};
+use crate::send::{self, Address, Checked, Destination, Event, streams, words};
 
 /// Arguments of `send`.
 #[derive(ClapArgs, Debug)]
@@ -54,21 +56,41 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, force: bool, observer: 
             super::bridge::expect_alps(address, force, observer)?;
             let journal = Journal::of_user()?;
             journal.tidy()?;
+            super::bridge::before_sending(&journal, address, observer)?;
+            let streams = streams::of_job(job, observer).filter(|streams| streams.len() < job.len());
+            let (kind, data) = match &streams {
+                Some(streams) => (JobKind::Streams, &streams[..]),
+                None => (JobKind::Raw, job),
+            };
             let queued = journal.queue(NewJob {
                 name,
                 to: address.to_string(),
-                kind: JobKind::Raw,
-                data: job,
+                kind,
+                data,
                 port_bytes: job.len() as u64,
                 passes: checked.passes,
             })?;
             observer.note(&load(&checked.inks));
             observer.note(&format!(
-                "{name} is queued as job {:08x}; nothing is printed yet",
-                queued.entry.record.job
+                "{name} is queued as job {:08x}, {}; nothing is printed yet",
+                queued.entry.record.job,
+                how_large(kind, data.len(), job.len())
             ));
-            go(queued, address, false, observer)
+            go(queued, &journal, address, false, observer)
         }
+    }
+}
+
+/// What crosses the cable, against what the printer gets.
+fn how_large(kind: JobKind, sent: usize, printed: usize) -> String {
+    match kind {
+        JobKind::Streams => format!(
+            "{} as pass streams, 1/{:.1} of the {} the bridge makes of them",
+            HumanBytes(sent as u64),
+            printed as f64 / sent as f64,
+            HumanBytes(printed as u64)
+        ),
+        JobKind::Raw => format!("{} as they are", HumanBytes(printed as u64)),
     }
 }
 
@@ -91,8 +113,15 @@ fn load(inks: &[Ink]) -> String {
     format!("cassettes needed, in this order: {}", list.join(", "))
 }
 
-/// Sends a job from the journal, or with `cancel` brings it to its end, until the bridge says how it ended.
-pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Observer) -> Result<()> {
+/// Sends a job from the journal, or with `cancel` brings it to its end, until the bridge says how it ended and the
+/// printer, as far as it says anything, that the sheet is out.
+pub fn go(
+    mut job: OpenJob,
+    journal: &Journal,
+    address: &Address,
+    cancel: bool,
+    observer: &dyn Observer,
+) -> Result<()> {
     let number = job.entry.record.job;
     output::say_on_interrupt(&format!(
         "the bridge goes on printing what it holds. `foilpress resume {number:08x}` goes on, \
@@ -121,14 +150,68 @@ pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Obse
         }
     };
     observer.end();
+    let record = &job.entry.record;
+    let refused = outcome == Outcome::Broken && record.kind == JobKind::Streams && record.printed == 0;
+    if refused && !cancel {
+        return once_more_as_it_is(&job, &data, journal, address, observer);
+    }
     let text = words::outcome(outcome, &job.entry, session.progress());
     match outcome {
         Outcome::Printed if cancel => bail!("{text}; it was too late to cancel"),
         Outcome::Cancelled if !cancel => bail!("{text}"),
-        Outcome::Printed | Outcome::Cancelled => observer.note(&text),
+        Outcome::Printed => {
+            observer.note(&text);
+            wait_for_sheet(&job.entry.name, address, observer);
+        }
+        Outcome::Cancelled => observer.note(&text),
         Outcome::Broken | Outcome::Lost | Outcome::Forgotten => bail!("{text}"),
     }
     Ok(())
+}
+
+/// A bridge with too little memory for the page, or too old for its streams, has printed nothing of it: it gets what the
+/// printer is to get, byte for byte.
+fn once_more_as_it_is(
+    job: &OpenJob,
+    data: &[u8],
+    journal: &Journal,
+    address: &Address,
+    observer: &dyn Observer,
+) -> Result<()> {
+    let mut bytes = Vec::new();
+    streams::expand(data, &mut |piece| {
+        bytes.extend_from_slice(piece);
+        true
+    })?;
+    let queued = journal.queue(NewJob {
+        name: &job.entry.name,
+        to: address.to_string(),
+        kind: JobKind::Raw,
+        data: &bytes,
+        port_bytes: bytes.len() as u64,
+        passes: job.entry.passes.clone(),
+    })?;
+    observer.note(&format!(
+        "this bridge does not take the page as pass streams; the same job goes byte for byte, as job {:08x}",
+        queued.entry.record.job
+    ));
+    go(queued, journal, address, false, observer)
+}
+
+/// Says when the sheet is out, or why that cannot be said. Nothing that happens here changes that the job is printed.
+fn wait_for_sheet(name: &str, address: &Address, observer: &dyn Observer) {
+    output::say_on_interrupt("the printer has the whole job and goes on by itself");
+    let mut watch = |troubles: &[String]| match troubles {
+        [] => observer.note("the printer goes on"),
+        troubles => observer.note(&format!("the printer waits: {}", troubles.join("; "))),
+    };
+    let unknown =
+        |why: &str| observer.note(&format!("{name}: {why}; only the printer shows when the sheet is done"));
+    match await_sheet(&mut || address.open(), finish::EVERY, &mut watch) {
+        Ok(Sheet::Out) => observer.note(&format!("{name}: the printer says it is done; the sheet is out")),
+        Ok(Sheet::Unknown(why)) => unknown(why),
+        Err(error) => unknown(&error.to_string()),
+    }
 }
 
 /// Turns what happens into progress of passes and notes.

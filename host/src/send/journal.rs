@@ -16,7 +16,7 @@ use protocol::link::frame::checksum;
 use protocol::link::message::JobKind;
 use serde::{Deserialize, Serialize};
 
-use super::session::{Phase, Record};
+use super::session::{Outcome, Phase, Record};
 
 /// Ended jobs whose records are kept.
 const KEPT: usize = 20;
@@ -49,6 +49,16 @@ pub struct Entry {
     pub checksum: u32,
     /// Where it stands.
     pub record: Record,
+    /// Whether the printer is known to have been reset after it, should it have been left in the middle.
+    #[serde(default)]
+    pub settled: bool,
+}
+
+impl Entry {
+    /// Whether the printer may still wait for the rest of this job, so that the next one would be text to it.
+    pub fn left_open(&self) -> bool {
+        !self.settled && matches!(self.record.phase, Phase::Ended(Outcome::Lost | Outcome::Forgotten))
+    }
 }
 
 /// Why the journal cannot be used.
@@ -184,6 +194,7 @@ impl Journal {
             checksum,
             // Callers refuse data that do not fit the link's offsets.
             record: Record::new(number, job.kind, job.data.len() as u32),
+            settled: false,
         };
         write_entry(staged.path(), &entry)?;
         let folder = self.folder_of(number);
@@ -230,6 +241,17 @@ impl Journal {
         Ok(entries)
     }
 
+    /// The printer behind this bridge has been reset: it waits for nothing any more.
+    pub fn settle(&self, bridge: Option<u64>) -> Result<(), JournalError> {
+        for entry in self.entries()?.into_iter().filter(Entry::left_open) {
+            if bridge.is_none() || entry.record.bridge.is_none() || entry.record.bridge == bridge {
+                let folder = self.folder_of(entry.record.job);
+                write_entry(&folder, &Entry { settled: true, ..entry })?;
+            }
+        }
+        Ok(())
+    }
+
     fn folders(&self) -> Result<Vec<PathBuf>, JournalError> {
         let listing = fs::read_dir(&self.folder).map_err(io_error("read", &self.folder))?;
         Ok(listing
@@ -241,7 +263,8 @@ impl Journal {
     /// Removes all but the last records of jobs that are over.
     pub fn tidy(&self) -> Result<(), JournalError> {
         let mut over = self.entries()?;
-        over.retain(|entry| matches!(entry.record.phase, Phase::Ended(_)));
+        // What left a printer in the middle of a sheet has to be known until it was reset.
+        over.retain(|entry| matches!(entry.record.phase, Phase::Ended(_)) && !entry.left_open());
         for entry in &over[..over.len().saturating_sub(KEPT)] {
             let folder = self.folder_of(entry.record.job);
             fs::remove_dir_all(&folder).map_err(io_error("remove", &folder))?;
@@ -321,7 +344,6 @@ fn sync_folder(folder: &Path) -> Result<(), JournalError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::session::Outcome;
     use super::*;
 
     fn job(data: &[u8]) -> NewJob<'_> {
@@ -404,6 +426,36 @@ mod tests {
         journal.tidy().unwrap();
         assert_eq!(journal.entries().unwrap().len(), KEPT + 1);
         assert!(journal.open(waiting).is_ok());
+    }
+
+    #[test]
+    fn a_lost_job_is_known_until_its_printer_was_reset() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = Journal::at(folder.path()).unwrap();
+        for (bridge, outcome) in [(1, Outcome::Lost), (2, Outcome::Forgotten), (3, Outcome::Printed)] {
+            let mut queued = journal.queue(job(b"x")).unwrap();
+            let ended = Record { phase: Phase::Ended(outcome), bridge: Some(bridge), ..queued.entry.record };
+            queued.save(&ended).unwrap();
+        }
+        let open = || {
+            let entries = journal.entries().unwrap().into_iter();
+            let mut open: Vec<_> =
+                entries.filter(Entry::left_open).map(|entry| entry.record.bridge).collect();
+            open.sort();
+            open
+        };
+        assert_eq!(open(), [Some(1), Some(2)]);
+        journal.settle(Some(1)).unwrap();
+        assert_eq!(open(), [Some(2)]);
+        journal.tidy().unwrap();
+        journal.settle(None).unwrap();
+        assert_eq!(open(), []);
+        // Records of before this was known of.
+        let path = folder.path().join(format!("{:08x}/job.json", journal.entries().unwrap()[0].record.job));
+        let text = fs::read_to_string(&path).unwrap();
+        let older = text.lines().filter(|line| !line.contains("settled")).collect::<String>();
+        fs::write(&path, older.replace(",}", "}")).unwrap();
+        assert_eq!(journal.entries().unwrap().len(), 3);
     }
 
     #[test]

@@ -8,6 +8,7 @@
 
 mod address;
 pub mod find;
+pub mod finish;
 pub mod journal;
 pub mod log;
 pub mod query;
@@ -15,6 +16,7 @@ pub mod raw;
 mod run;
 pub mod session;
 pub mod status;
+pub mod streams;
 pub mod transport;
 pub mod usb;
 pub mod wiring;

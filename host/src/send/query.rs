@@ -158,6 +158,19 @@ impl<'t> Query<'t> {
         })?
     }
 
+    /// Resets the printer by the port's nInit line. Refused while a job is open; a job that was open when the bridge
+    /// itself was reset, and whose data nobody has sent again, is given up by it.
+    pub fn initialise(&mut self, patience: Duration) -> Result<(), QueryError> {
+        let number = self.next();
+        // A reset is not answered, but a refusal would come before the answer to the question behind it.
+        let messages = [ToBridge::Initialise, ToBridge::Ask { request: number, what: Ask::Lines }];
+        exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
+            Heard::Refused(Refusal::JobOpen, job) if job != 0 => Some(Err(QueryError::JobOpen(job))),
+            Heard::Lines(request, ..) if request == number => Some(Ok(())),
+            _ => None,
+        })?
+    }
+
     /// Where the job stands now.
     pub fn ask_progress(&mut self, patience: Duration) -> Result<Progress, QueryError> {
         let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };

@@ -126,8 +126,7 @@ impl Pair {
             io::Error::new(ErrorKind::InvalidData, "the device has no interface of the kind expected")
         })?;
         let handle = device.open().map_err(translated)?;
-        // Where no driver can be in the way the system does not know how to detach one.
-        let _ = handle.set_auto_detach_kernel_driver(true);
+        // No system has a driver of its own for the class *vendor*, so there is none to detach.
         handle.claim_interface(interface).map_err(translated)?;
         Ok(Pair { handle, interface, out, into })
     }

@@ -50,13 +50,27 @@ pub fn pass_at(passes: &[PassPlace], printed: u64) -> Option<(usize, Ink)> {
     Some((number, Ink::from_code(passes.get(number.checked_sub(1)?)?.ink)?))
 }
 
+/// What to do with a printer that was left in the middle of a sheet.
+const RESET: &str = "Before the next job `foilpress bridge reset` resets the printer through the bridge (if it keeps the \
+                     sheet all the same, switch it off and on)";
+
+/// Where on the sheet a job was last heard of.
+fn reached(entry: &Entry) -> String {
+    match pass_at(&entry.passes, u64::from(entry.record.printed)) {
+        Some((number, ink)) => format!(", in pass {number} of {} ({})", entry.passes.len(), ink.name()),
+        None => ", before its first pass".into(),
+    }
+}
+
 /// How a job ended, in a sentence that says what to do next.
 pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> String {
     let printed = entry.record.printed;
     match outcome {
         Outcome::Printed => format!(
-            "{}: the printer has taken all {} bytes; the sheet is done when the printer has put it out",
-            entry.name, printed
+            "{}: the printer has taken all {} bytes, {} passes; now it prints what it still holds",
+            entry.name,
+            printed,
+            entry.passes.len()
         ),
         Outcome::Cancelled if printed == 0 => {
             format!("{}: cancelled; the printer had not taken a byte of it", entry.name)
@@ -78,15 +92,17 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             )
         }
         Outcome::Lost => format!(
-            "{}: the sheet is lost after {printed} bytes: printer or bridge lost power in the middle. \
-             Switch the printer off and on, then send the job again",
-            entry.name
+            "{}: the sheet is lost{}: printer or bridge lost power in the middle. {RESET}, then send the job again",
+            entry.name,
+            reached(entry)
         ),
         Outcome::Forgotten => format!(
-            "{}: the bridge no longer knows this job; the printer had taken at least {printed} of {} bytes. \
-             If the sheet is complete all is well; otherwise switch the printer off and on, and send the job again. \
-             It was not sent again by itself, so that nothing is printed twice",
-            entry.name, entry.port_bytes
+            "{}: the bridge has lost its memory and no longer knows this job; the sheet had come at least so far: \
+             {printed} of {} bytes{}. If it comes out complete all is well; otherwise it is lost. {RESET}. The job was \
+             not sent again by itself, so that nothing is printed twice",
+            entry.name,
+            entry.port_bytes,
+            reached(entry)
         ),
     }
 }

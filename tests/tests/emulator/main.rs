@@ -4,6 +4,9 @@
 //! Run by `cargo xtask emulator`, which builds the image and the program and names them.
 #![cfg(unix)]
 
+mod flash;
+mod found;
+
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -35,6 +38,8 @@ struct Bench {
     folder: tempfile::TempDir,
     program: PathBuf,
     bridge: Emulated,
+    /// Shows the bridge on the program's USB.
+    usbfs: Option<PathBuf>,
 }
 
 impl Bench {
@@ -47,7 +52,23 @@ impl Bench {
         let ends = folder.path().join("bridge");
         fs::create_dir(&ends).unwrap();
         let bridge = Emulated::start(&image, &scripts, &ends, printer, Stock::of(Paper::Postcard)).unwrap();
-        Some(Bench { folder, program, bridge })
+        Some(Bench { folder, program, bridge, usbfs: None })
+    }
+
+    /// The same, on USB, where the program finds it by itself.
+    fn on_usb(cassettes: &[Cassette]) -> Option<Bench> {
+        let mut bench = Bench::new(cassettes)?;
+        bench.usbfs = std::env::var_os("FOILPRESS_USBFS").map(PathBuf::from);
+        if bench.usbfs.is_none() {
+            println!("skipped: `cargo xtask emulator` found no umockdev, and USB is shown with it");
+            return None;
+        }
+        Some(bench)
+    }
+
+    /// Where the ends of the bridge's cables are.
+    fn ends(&self) -> PathBuf {
+        self.folder.path().join("bridge")
     }
 
     fn to(&self) -> String {
@@ -97,7 +118,7 @@ impl Bench {
         // The bridge knows of a byte a little before it is on the desk.
         self.until("the job's bytes come", |bench| bench.printed() >= from + job.len());
         let desk = self.bridge.desk();
-        let printed = &desk.printed[from..];
+        let printed = &desk.jobs()[from..];
         let same = printed.iter().zip(job).take_while(|(a, b)| a == b).count();
         assert!(printed == job, "{} bytes for {}, the same up to {same}", printed.len(), job.len());
         drop(desk);
@@ -164,7 +185,7 @@ fn a_printed_document_is_the_very_sheet_although_every_cassette_has_to_be_put_in
     let file = fs::read(folder.join("job.rgl")).unwrap();
     {
         let desk = bench.bridge.desk();
-        assert!(desk.printed == file, "other bytes at the port");
+        assert!(desk.jobs() == file, "other bytes at the port");
         let sheet = desk.sheets[0].sheet().unwrap();
         // Two ways to the same sheet: the file that was kept, and the planes that were kept.
         let simulated = print(&file, &Default::default(), &Silent).unwrap().sheet().unwrap();
@@ -294,4 +315,92 @@ fn a_cancelled_sheet_comes_out_and_the_next_job_prints() {
     bench.well(&["send", "job.rgl", "--to", &bench.to()]);
     bench.came_out(cancelled, &job, 2);
     bench.check();
+}
+
+#[test]
+fn a_bridge_on_usb_is_found_by_itself_under_both_its_addresses() {
+    let Some(mut bench) = Bench::on_usb(&INKS.map(Cassette::from)) else { return };
+    let list = bench.well(&["bridge", "list"]);
+    for fact in ["serial:/dev/ttyACM0", "usb:0000000000000000", "MODEL:MD-5500"] {
+        assert!(list.contains(fact), "no `{fact}` in: {list}");
+    }
+    assert!(bench.well(&["bridge", "status"]).contains("white"));
+    assert!(bench.well(&["doctor"]).contains("all is well"));
+    bench.check_waveform();
+}
+
+#[test]
+fn a_job_goes_over_bulk_endpoints_and_survives_pulled_cables_and_a_killed_sender() {
+    let Some(mut bench) = Bench::on_usb(&INKS.map(Cassette::from)) else { return };
+    let job = job();
+    fs::write(bench.folder.path().join("job.rgl"), &job).unwrap();
+    let mut child = bench.spawn(&["send", "job.rgl", "--to", "usb:"]);
+    for fifth in 1..5 {
+        bench.until("it prints", |bench| bench.printed() > job.len() * fifth / 5);
+        if fifth % 2 == 1 {
+            bench.bridge.replug().unwrap();
+        } else {
+            // The program that shows it the device passes the signal on.
+            kill(&child);
+            assert!(!child.wait().unwrap().success());
+            child = bench.spawn(&["resume"]);
+        }
+    }
+    said(child);
+    bench.came_out(0, &job, 1);
+    bench.check();
+}
+
+#[test]
+fn two_bridges_on_usb_are_told_apart_or_the_user_is_asked() {
+    let Some(bench) = Bench::on_usb(&[]) else { return };
+    // The emulated boards all have the same serial number; this one's name is changed as the system shows it.
+    let other = bench.folder.path().join("other");
+    fs::create_dir(&other).unwrap();
+    for end in ["descriptors", "names", "usb"] {
+        std::os::unix::fs::symlink(bench.ends().join(end), other.join(end)).unwrap();
+    }
+    let output = Command::new(bench.usbfs.as_ref().unwrap())
+        .args([&bench.ends(), &other])
+        .arg("--")
+        .arg(&bench.program)
+        .args(["bridge", "status", "--to", "usb:"])
+        .output()
+        .unwrap();
+    let text = text(&output);
+    assert!(!output.status.success() && text.contains("usb:"), "{text}");
+    println!("{text}");
+}
+
+/// What a sender costs its machine: processor time against the time the job takes at the port.
+#[test]
+fn sending_takes_little_of_a_processor() {
+    let Some((mut bench, job)) = with_job() else { return };
+    let before = bench.bridge.figures().unwrap()["now"].as_f64().unwrap();
+    let child = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
+    let mut used = Duration::ZERO;
+    bench.until("the job's bytes come", |bench| {
+        used = processor_time(&child).unwrap_or(used);
+        bench.printed() >= job.len()
+    });
+    said(child);
+    let took = (bench.bridge.figures().unwrap()["now"].as_f64().unwrap() - before) / 1e9;
+    let share = used.as_secs_f64() / took;
+    println!(
+        "{} bytes: {used:?} of a processor in {took:.2} s of the board's time: {:.1} %",
+        job.len(),
+        100.0 * share
+    );
+    bench.check();
+}
+
+/// What a process has used of a processor until now, as Linux counts it.
+fn processor_time(child: &Child) -> Option<Duration> {
+    let text = fs::read_to_string(format!("/proc/{}/schedstat", child.id())).ok()?;
+    text.split_whitespace().next()?.parse().ok().map(Duration::from_nanos)
+}
+
+/// Ends a program as SIGKILL does, through the one that shows it its devices.
+fn kill(child: &Child) {
+    assert!(Command::new("kill").arg("-TERM").arg(child.id().to_string()).status().unwrap().success());
 }

@@ -17,11 +17,12 @@ use std::time::Duration;
 use wire::{Extra, World};
 
 /// What can happen beside the model's accidents.
-const EVERYTHING: Extra = Extra { delay: 40, late_kill: 20, amnesia: 0 };
-const NOTHING: Extra = Extra { delay: 0, late_kill: 0, amnesia: 0 };
+const EVERYTHING: Extra = Extra { delay: 40, late_kill: 20, away: 5, amnesia: 0 };
+const NOTHING: Extra = Extra { delay: 0, late_kill: 0, away: 0, amnesia: 0 };
 
 fn disturbed(seeds: std::ops::Range<u64>) {
     let mut accidents = wire::Accidents::default();
+    let mut streams = 0;
     for seed in seeds.clone() {
         let mut random = seeded(seed);
         let job = Job::random(random.random_range(1..=u32::MAX), &mut random);
@@ -31,9 +32,11 @@ fn disturbed(seeds: std::ops::Range<u64>) {
         assert_eq!(outcome, Outcome::Printed, "seed {seed}");
         assert!(world.printed == job.expected, "seed {seed}: other bytes at the port");
         assert!(!world.initialised, "seed {seed}: the printer was reset");
-        accidents.add(&world.accidents);
+        streams += usize::from(job.kind == JobKind::Streams);
+        accidents.add(world.accidents);
     }
-    println!("seeds {seeds:?}: {accidents:?}");
+    println!("seeds {seeds:?}, {streams} of them pass streams: {accidents:?}");
+    assert!((seeds.count() / 3..).contains(&streams));
     assert!(accidents.all_happened(), "something never went wrong, so it was not tried: {accidents:?}");
 }
 
@@ -133,6 +136,35 @@ fn a_bridge_that_forgets_never_makes_the_host_print_twice() {
     }
     println!("printed {whole}, lost with the bridge's memory {lost}");
     assert!(whole > 0 && lost > 0);
+}
+
+/// What two hosts say, one of which hears every burst whole and the other byte by byte.
+#[test]
+fn byte_by_byte_a_session_hears_the_same() {
+    for seed in 0..100 {
+        let mut random = seeded(seed);
+        let job = Job::random(3, &mut random);
+        let mut boards = wire::boards(&mut random);
+        let mut world = World::new(&job, &mut boards, Mischief { fault: 0, ..ALL }, NOTHING);
+        let record = Record::new(3, job.kind, job.data.len() as u32);
+        let mut whole = Session::new(record, &job.data);
+        let mut pieces = Session::new(record, &job.data);
+        whole.connected(Duration::ZERO);
+        pieces.connected(Duration::ZERO);
+        for i in 0..200 {
+            let now = Duration::from_millis(25 * i);
+            let mut said = [Vec::new(), Vec::new()];
+            for (session, said) in [&mut whole, &mut pieces].into_iter().zip(&mut said) {
+                let Ok(()) = session.speak(now, said, &mut |_| Ok::<(), std::convert::Infallible>(()));
+            }
+            assert!(said[0] == said[1], "seed {seed}, step {i}");
+            let answer = world.overhear(&said[0], &mut random);
+            let heard = whole.hear(now, &answer);
+            assert_eq!(answer.iter().try_for_each(|&byte| pieces.hear(now, &[byte])), heard);
+            assert_eq!((whole.record(), whole.progress()), (pieces.record(), pieces.progress()));
+        }
+        assert!(whole.record().printed > 0, "seed {seed}: nothing happened");
+    }
 }
 
 #[test]

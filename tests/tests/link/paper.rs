@@ -6,6 +6,7 @@ use crate::wire::{self, World};
 use foilpress::document::{self, Options};
 use foilpress::observe::Silent;
 use foilpress::send::session::Outcome;
+use foilpress::send::streams;
 use foilpress::simulate::{Carousel, Lever, Printer, Stock, Trouble, difference, wanted};
 use foilpress::{factor, gamut, pipeline};
 use protocol::link::message::{Fault, JobKind};
@@ -26,13 +27,16 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         size: Some("12x9mm".parse().unwrap()),
     };
     let print = pipeline::print(&document, &inks::Library::builtin(), &settings, &Silent).unwrap();
-    for seed in 0..3 {
+    let streams = streams::of_job(&print.job, &Silent).expect("a job of our own has streams");
+    for seed in 0..4 {
         let mut random = seeded(seed);
+        let (kind, data) =
+            if seed % 2 == 0 { (JobKind::Streams, &streams) } else { (JobKind::Raw, &print.job) };
         let cassettes = wanted(&print.job);
         let printer = RefCell::new(Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto));
         printer.borrow_mut().load(Stock::of(Paper::Postcard));
         let troubles = RefCell::new(0);
-        let job = Job { id: 77, kind: JobKind::Raw, data: print.job.clone(), expected: print.job.clone() };
+        let job = Job { id: 77, kind, data: data.clone(), expected: print.job.clone() };
         let mut boards = wire::boards(&mut random);
         let mut world =
             World::new(&job, &mut boards, ALL, EVERYTHING).with_port(Box::new(|bytes, random| {
@@ -58,8 +62,8 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         assert_eq!(world.run(None, &mut random), Outcome::Printed, "seed {seed}");
         assert!(world.printed == print.job, "seed {seed}");
         println!(
-            "seed {seed}: {} bytes, {:?}, {} troubles",
-            print.job.len(),
+            "seed {seed}: {} bytes of {kind:?}, {:?}, {} troubles",
+            data.len(),
             world.accidents,
             troubles.borrow()
         );

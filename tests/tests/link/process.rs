@@ -1,6 +1,6 @@
 //! Real processes, a real socket, a real journal: the sender is killed with SIGKILL again and again.
 
-use crate::model::{Board, Planes, is_a_whole_job, seeded};
+use crate::model::{Planes, is_a_whole_job, memory, seeded};
 use bridge::engine::{Engine, Identity, Outcome as Done, Task};
 use foilpress::observe::Silent;
 use foilpress::send::journal::{Journal, NewJob};
@@ -8,32 +8,58 @@ use foilpress::send::query::{Query, QueryError, Reply};
 use foilpress::send::session::{Outcome, Phase, Session};
 use foilpress::send::status::Status;
 use foilpress::send::transport::{Socket, Transport, pair};
-use foilpress::send::{self, Address};
+use foilpress::send::{self, Address, streams};
 use foilpress::simulate::{Carousel, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Ask, JobKind, JobState, Lines};
 use rand::RngExt;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::net::UnixListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 /// Says in the child what it is to send.
 const ROLE: &str = "FOILPRESS_TEST_SENDER";
 
-/// A bridge on a local socket that prints at most `rate` bytes a millisecond.
-fn bridge_at(path: &Path, rate: usize, printed: Arc<Mutex<Vec<u8>>>, stop: Arc<AtomicBool>) {
+/// What a test sees of its bridge and does to it.
+#[derive(Default)]
+struct Board {
+    printed: Mutex<Vec<u8>>,
+    stop: AtomicBool,
+    /// Its power goes, and its memory with it.
+    forget: AtomicBool,
+    /// The printer's cover is open.
+    open_cover: AtomicBool,
+    /// How often the printer was reset.
+    resets: AtomicUsize,
+}
+
+impl Board {
+    fn is(flag: &AtomicBool) -> bool {
+        flag.load(Ordering::Relaxed)
+    }
+}
+
+/// A bridge on a local socket that prints at most `rate` bytes a millisecond, with room for bands of `band` bytes.
+fn bridge_at(path: &Path, rate: usize, band: usize, board: &Board) {
     let listener = UnixListener::bind(path).unwrap();
     listener.set_nonblocking(true).unwrap();
-    let mut board = Board::new(8192, 4096);
-    let mut engine = Engine::new(board.memory(), Identity { boot: 1, serial: 7, firmware: "test" });
+    let switched_on =
+        |boot| Engine::new(memory(8192, 4096, band), Identity { boot, serial: 7, firmware: "test" });
+    let mut engine = switched_on(1);
     let mut reader = Reader::new();
     let mut link: Option<Socket<_>> = None;
     let mut buffer = [0; 4096];
-    while !stop.load(Ordering::Relaxed) {
+    while !Board::is(&board.stop) {
+        if board.forget.swap(false, Ordering::Relaxed) {
+            engine = switched_on(2);
+            reader.reset();
+            link = None;
+        }
         if let Ok((socket, _)) = listener.accept() {
             socket.set_nonblocking(false).unwrap();
             engine.link_lost();
@@ -53,7 +79,8 @@ fn bridge_at(path: &Path, rate: usize, printed: Arc<Mutex<Vec<u8>>>, stop: Arc<A
         }
         if let Some(task) = engine.task() {
             // What the board would do at the port.
-            let status = status();
+            let status = status(Board::is(&board.open_cover));
+            board.resets.fetch_add(usize::from(task == Task::Initialise), Ordering::Relaxed);
             engine.done(match task {
                 Task::PrinterStatus => Done::Answer(Answer::Bytes(&status)),
                 Task::DeviceId => Done::Answer(Answer::OneWay),
@@ -66,7 +93,7 @@ fn bridge_at(path: &Path, rate: usize, printed: Arc<Mutex<Vec<u8>>>, stop: Arc<A
         engine.port(Lines::IDLE, None);
         let bytes = engine.output();
         let count = bytes.len().min(rate);
-        printed.lock().unwrap().extend_from_slice(&bytes[..count]);
+        board.printed.lock().unwrap().extend_from_slice(&bytes[..count]);
         engine.consumed(count);
         let mut frame = [0; MAX];
         loop {
@@ -87,10 +114,12 @@ fn bridge_at(path: &Path, rate: usize, printed: Arc<Mutex<Vec<u8>>>, stop: Arc<A
     }
 }
 
-/// The answer of a printer with white in it and its cover open.
-fn status() -> [u8; STATUS_LENGTH] {
+/// The answer of a printer with white in it.
+fn status(open_cover: bool) -> [u8; STATUS_LENGTH] {
     let mut printer = Printer::new(Carousel::new(&[Ink::White.into()]).unwrap(), Lever::Manual);
-    printer.strike(Trouble::CoverOpen);
+    if open_cover {
+        printer.strike(Trouble::CoverOpen);
+    }
     printer.status()
 }
 
@@ -125,22 +154,26 @@ fn spawn(folder: &Path) -> Child {
         .unwrap()
 }
 
+/// A bridge, and a folder with a journal.
 struct Bench {
     folder: tempfile::TempDir,
-    printed: Arc<Mutex<Vec<u8>>>,
-    stop: Arc<AtomicBool>,
-    bridge: Option<std::thread::JoinHandle<()>>,
+    board: Arc<Board>,
+    thread: Option<std::thread::JoinHandle<()>>,
     job: Vec<u8>,
 }
 
 impl Bench {
     fn new(seed: u64, rate: usize) -> Bench {
+        Bench::with_band(seed, rate, 40_000)
+    }
+
+    fn with_band(seed: u64, rate: usize, band: usize) -> Bench {
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("bridge");
-        let (printed, stop) = (Arc::<Mutex<Vec<u8>>>::default(), Arc::<AtomicBool>::default());
-        let bridge = {
-            let (socket, printed, stop) = (socket.clone(), printed.clone(), stop.clone());
-            std::thread::spawn(move || bridge_at(&socket, rate, printed, stop))
+        let board = Arc::<Board>::default();
+        let thread = {
+            let (socket, board) = (socket.clone(), board.clone());
+            std::thread::spawn(move || bridge_at(&socket, rate, band, &board))
         };
         while !socket.exists() {
             std::thread::sleep(Duration::from_millis(1));
@@ -148,42 +181,169 @@ impl Bench {
         // The largest of some random jobs.
         let mut random = seeded(seed);
         let job = (0..20).map(|_| Planes::random(&mut random).printed()).max_by_key(Vec::len).unwrap();
-        let checked = send::check(&job, &Silent).unwrap();
-        let journal = Journal::at(&folder.path().join("jobs")).unwrap();
-        journal
+        Bench { folder, board, thread: Some(thread), job }
+    }
+
+    /// Puts the job into the journal.
+    fn queue(self, kind: JobKind) -> Bench {
+        let checked = send::check(&self.job, &Silent).unwrap();
+        let streams = streams::of_job(&self.job, &Silent).unwrap();
+        Journal::at(&self.jobs())
+            .unwrap()
             .queue(NewJob {
                 name: "leaf",
-                to: Address::Unix(socket).to_string(),
-                kind: JobKind::Raw,
-                data: &job,
-                port_bytes: job.len() as u64,
+                to: self.address().to_string(),
+                kind,
+                data: if kind == JobKind::Raw { &self.job } else { &streams },
+                port_bytes: self.job.len() as u64,
                 passes: checked.passes,
             })
             .unwrap();
-        Bench { folder, printed, stop, bridge: Some(bridge), job }
+        self
     }
 
-    fn jobs(&self) -> std::path::PathBuf {
+    fn jobs(&self) -> PathBuf {
         self.folder.path().join("jobs")
     }
 
+    fn address(&self) -> Address {
+        Address::Unix(self.folder.path().join("bridge"))
+    }
+
     fn printed(&self) -> Vec<u8> {
-        self.printed.lock().unwrap().clone()
+        self.board.printed.lock().unwrap().clone()
+    }
+
+    fn until_it_prints(&self) {
+        while self.printed().is_empty() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    /// A sender that is killed once something has been printed.
+    fn begun(&self) {
+        let mut child = spawn(&self.jobs());
+        self.until_it_prints();
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+
+    /// The program itself, with the job in a file beside the journal.
+    fn program(&self, args: &str) -> Command {
+        std::fs::write(self.folder.path().join("job.rgl"), &self.job).unwrap();
+        let mut command = Command::new(program());
+        command
+            .args(args.replace("BRIDGE", &self.address().to_string()).split_whitespace())
+            .current_dir(self.folder.path())
+            .env("FOILPRESS_JOBS", self.jobs())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        command
+    }
+
+    fn says(&self, code: i32, args: &str) -> String {
+        let output = self.program(args).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{args}: {said}");
+        said
     }
 }
 
 impl Drop for Bench {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        if let Some(bridge) = self.bridge.take() {
-            let _ = bridge.join();
+        self.board.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
         }
     }
 }
 
+/// The program as it stands; built if need be.
+fn program() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "--quiet", "--locked", "--package", "foilpress", "--bin", "foilpress"]);
+        if !cfg!(debug_assertions) {
+            build.arg("--release");
+        }
+        assert!(build.status().unwrap().success(), "the program cannot be built");
+        // Beside the folder this test stands in.
+        let tests = std::env::current_exe().unwrap();
+        tests.ancestors().nth(2).unwrap().join("foilpress")
+    })
+}
+
+#[test]
+fn the_program_sends_pass_streams_and_waits_for_the_sheet() {
+    let bench = Bench::new(8, 100);
+    bench.board.open_cover.store(true, Ordering::Relaxed);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let mut heard = |word: &str| {
+        assert!(lines.any(|line| line.contains(word)), "never {word:?}");
+    };
+    heard("as pass streams, 1/");
+    heard("the printer has taken all");
+    heard("the cover is open");
+    bench.board.open_cover.store(false, Ordering::Relaxed);
+    heard("the sheet is out");
+    assert!(child.wait().unwrap().success());
+    assert!(bench.printed() == bench.job, "other bytes at the port");
+    let entry = Journal::at(&bench.jobs()).unwrap().entries().unwrap().remove(0);
+    assert_eq!(entry.record.kind, JobKind::Streams);
+    assert!((entry.record.length as usize) < bench.job.len() / 2);
+}
+
+#[test]
+fn a_bridge_without_memory_for_the_page_gets_the_job_as_it_is() {
+    let bench = Bench::with_band(8, 1000, 100);
+    let said = bench.says(0, "send job.rgl --to BRIDGE");
+    assert!(said.contains("byte for byte") && said.contains("the sheet is out"), "{said}");
+    assert!(bench.printed() == bench.job, "other bytes at the port");
+}
+
+#[test]
+fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
+    let bench = Bench::new(8, 20);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    bench.until_it_prints();
+    bench.board.forget.store(true, Ordering::Relaxed);
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert!(said.contains("no longer knows this job") && said.contains("foilpress bridge reset"), "{said}");
+    let printed = bench.printed();
+    assert!(printed.len() < bench.job.len() && bench.job.starts_with(&printed), "printed twice");
+    let said = bench.says(1, "send job.rgl --to BRIDGE");
+    assert!(said.contains("not sent") && said.contains("bridge reset --to unix:"), "{said}");
+    assert_eq!(bench.printed(), printed, "something was sent all the same");
+    bench.says(0, "bridge reset --to BRIDGE");
+    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 1);
+    bench.says(0, "send job.rgl --to BRIDGE");
+    assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
+}
+
+#[test]
+fn a_reset_is_refused_while_a_job_is_open() {
+    let bench = Bench::new(8, 20).queue(JobKind::Streams);
+    bench.begun();
+    let said = bench.says(1, "bridge reset --to BRIDGE");
+    assert!(said.contains("is printing job"), "{said}");
+    assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
+    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 0);
+    assert!(bench.printed() == bench.job, "other bytes at the port");
+}
+
 #[test]
 fn a_sender_that_is_killed_again_and_again_costs_nothing() {
-    let bench = Bench::new(5, 60);
+    killed_again_and_again(JobKind::Raw);
+    killed_again_and_again(JobKind::Streams);
+}
+
+fn killed_again_and_again(kind: JobKind) {
+    let bench = Bench::new(5, 30).queue(kind);
     let mut random = seeded(6);
     let mut kills = 0;
     while bench.printed().len() < bench.job.len() && kills < 12 {
@@ -197,7 +357,7 @@ fn a_sender_that_is_killed_again_and_again_costs_nothing() {
     if !matches!(over, Phase::Ended(_)) {
         assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
     }
-    println!("{kills} kills over {} bytes", bench.job.len());
+    println!("{kills} kills over {} bytes of {kind:?}", bench.job.len());
     assert!(kills > 2);
     assert!(bench.printed() == bench.job, "other bytes at the port");
     let entry = Journal::at(&bench.jobs()).unwrap().entries().unwrap().remove(0);
@@ -206,13 +366,8 @@ fn a_sender_that_is_killed_again_and_again_costs_nothing() {
 
 #[test]
 fn another_process_cancels_what_a_killed_one_has_begun() {
-    let bench = Bench::new(8, 40);
-    let mut child = spawn(&bench.jobs());
-    while bench.printed().is_empty() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let bench = Bench::new(8, 20).queue(JobKind::Streams);
+    bench.begun();
     assert_eq!(resume(&bench.jobs(), true), Outcome::Cancelled);
     let printed = bench.printed();
     assert!(printed.len() < bench.job.len() && is_a_whole_job(&printed));
@@ -220,14 +375,11 @@ fn another_process_cancels_what_a_killed_one_has_begun() {
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn address(bench: &Bench) -> Address {
-    Journal::at(&bench.jobs()).unwrap().entries().unwrap()[0].to.parse().unwrap()
-}
-
 #[test]
 fn between_jobs_the_printer_itself_is_asked() {
     let bench = Bench::new(1, 100);
-    let mut link = address(&bench).open().unwrap();
+    bench.board.open_cover.store(true, Ordering::Relaxed);
+    let mut link = bench.address().open().unwrap();
     let mut query = Query::new(&mut *link, PATIENCE).unwrap();
     assert_eq!((query.bridge().serial, query.bridge().firmware.as_str()), (7, "test"));
     assert_eq!(query.progress().state, JobState::None);
@@ -241,15 +393,10 @@ fn between_jobs_the_printer_itself_is_asked() {
 
 #[test]
 fn while_a_job_is_open_the_lines_are_told_and_the_printer_is_left_alone() {
-    let bench = Bench::new(8, 40);
-    let mut child = spawn(&bench.jobs());
-    while bench.printed().is_empty() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
+    let bench = Bench::new(8, 20).queue(JobKind::Streams);
+    bench.begun();
     let before = bench.printed();
-    let mut link = address(&bench).open().unwrap();
+    let mut link = bench.address().open().unwrap();
     let mut query = Query::new(&mut *link, PATIENCE).unwrap();
     assert_eq!(query.printer(Ask::Printer, PATIENCE).unwrap(), Reply::NotNow);
     assert_eq!(query.lines(PATIENCE).unwrap(), (Lines::IDLE, None));

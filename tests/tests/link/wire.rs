@@ -1,12 +1,12 @@
 //! The host's real session and the bridge's real engine with a bad wire, a bad port and accidents between them, in
 //! virtual time.
 
-use crate::model::{Board, Job, Mischief};
+use crate::model::{Board, Damages, Job, Mischief, chance, damage};
 use bridge::engine::{Checkpoint, Engine, Identity, Outcome as Done, Task};
 use foilpress::send::session::{Outcome, Record, Session, SessionError};
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};
-use rand::{Rng, RngExt};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::convert::Infallible;
 use std::time::Duration;
@@ -18,6 +18,9 @@ pub struct Extra {
     pub delay: u32,
     /// The host dies after it has made its record durable and before a byte has left.
     pub late_kill: u32,
+    /// The link goes and cannot be opened again for a while: a cable, a sleeping computer, a bridge that is enumerated
+    /// anew.
+    pub away: u32,
     /// The bridge restarts and has forgotten everything.
     pub amnesia: u32,
 }
@@ -25,39 +28,44 @@ pub struct Extra {
 /// How often what happened.
 #[derive(Default, Debug)]
 pub struct Accidents {
+    pub wire: Damages,
     pub cuts: usize,
     pub kills: usize,
     pub resets: usize,
-    pub drops: usize,
-    pub duplicates: usize,
-    pub swaps: usize,
-    pub flips: usize,
+    pub aways: usize,
     pub delays: usize,
     pub stalls: usize,
-    pub faults: usize,
+    pub out_of_paper: usize,
+    pub off_line: usize,
+    pub in_error: usize,
+    pub busy: usize,
+    /// Of the last four, those that lasted for minutes.
+    pub minutes: usize,
 }
 
 impl Accidents {
-    fn counts(&mut self) -> [&mut usize; 10] {
+    fn counts(&mut self) -> [&mut usize; 15] {
         [
+            &mut self.wire.drops,
+            &mut self.wire.duplicates,
+            &mut self.wire.swaps,
+            &mut self.wire.flips,
             &mut self.cuts,
             &mut self.kills,
             &mut self.resets,
-            &mut self.drops,
-            &mut self.duplicates,
-            &mut self.swaps,
-            &mut self.flips,
+            &mut self.aways,
             &mut self.delays,
             &mut self.stalls,
-            &mut self.faults,
+            &mut self.out_of_paper,
+            &mut self.off_line,
+            &mut self.in_error,
+            &mut self.busy,
+            &mut self.minutes,
         ]
     }
 
-    pub fn add(&mut self, other: &Accidents) {
-        let Accidents { cuts, kills, resets, drops, duplicates, swaps, flips, delays, stalls, faults } =
-            *other;
-        let others = [cuts, kills, resets, drops, duplicates, swaps, flips, delays, stalls, faults];
-        self.counts().into_iter().zip(others).for_each(|(sum, count)| *sum += count);
+    pub fn add(&mut self, mut other: Accidents) {
+        self.counts().into_iter().zip(other.counts()).for_each(|(sum, count)| *sum += *count);
     }
 
     pub fn all_happened(&mut self) -> bool {
@@ -65,8 +73,12 @@ impl Accidents {
     }
 }
 
-fn chance(in_1000: u32, random: &mut ChaCha8Rng) -> bool {
-    in_1000 > 0 && random.next_u32() % 1000 < in_1000
+/// What keeps the printer from taking bytes, and until when.
+#[derive(Clone, Copy)]
+struct Trouble {
+    /// None while it is only busy.
+    fault: Option<Fault>,
+    until: Duration,
 }
 
 /// A printer's end of the port: takes some of the bytes and says how many, and what keeps it from taking more.
@@ -85,7 +97,9 @@ pub struct World<'j> {
     session: Session<'j>,
     record: Record,
     now: Duration,
-    faulty: u32,
+    trouble: Option<Trouble>,
+    /// The link cannot be opened before this.
+    away: Option<Duration>,
     /// Bursts on their way, with the time they arrive.
     to_bridge: Vec<(Duration, Vec<u8>)>,
     to_host: Vec<(Duration, Vec<u8>)>,
@@ -125,7 +139,8 @@ impl<'j> World<'j> {
             session,
             record,
             now: Duration::ZERO,
-            faulty: 0,
+            trouble: None,
+            away: None,
             to_bridge: Vec::new(),
             to_host: Vec::new(),
             port: None,
@@ -207,7 +222,9 @@ impl<'j> World<'j> {
     }
 
     pub fn step(&mut self, random: &mut ChaCha8Rng) {
-        self.now += Duration::from_millis(random.random_range(1..40));
+        // While nothing moves time passes faster, for the sake of whoever runs these tests.
+        let most = if self.trouble.is_some() || self.away.is_some() { 2000 } else { 40 };
+        self.now += Duration::from_millis(random.random_range(1..most));
         if chance(self.mischief.stall, random) {
             self.accidents.stalls += 1;
             self.now += Duration::from_millis(random.random_range(0..7000));
@@ -218,12 +235,27 @@ impl<'j> World<'j> {
         if self.session.is_dead(self.now) {
             self.cut();
         }
+        if chance(self.extra.away, random) {
+            self.accidents.aways += 1;
+            self.cut();
+            self.away = Some(self.now + Duration::from_millis(random.random_range(0..20_000)));
+        }
+        if let Some(back) = self.away {
+            self.bridge(random);
+            // Nobody listens.
+            self.answers(random, false);
+            if self.now >= back {
+                self.away = None;
+                self.cut();
+            }
+            return;
+        }
         let out = self.speak();
         if chance(self.extra.late_kill, random) {
             self.kill();
             return;
         }
-        let burst = self.damage(out, random);
+        let burst = self.wire(&out, random);
         let cut = chance(self.mischief.cut, random);
         let burst = if cut { burst[..random.random_range(0..=burst.len())].to_vec() } else { burst };
         let at = self.arrival(random);
@@ -287,12 +319,25 @@ impl<'j> World<'j> {
             });
         }
         if chance(self.mischief.fault, random) {
-            self.accidents.faults += 1;
-            self.faulty = random.random_range(1..50);
+            let happened = &mut self.accidents;
+            let (count, fault) = match random.random_range(0..4) {
+                0 => (&mut happened.out_of_paper, Some(Fault::PaperOut)),
+                1 => (&mut happened.off_line, Some(Fault::OffLine)),
+                2 => (&mut happened.in_error, Some(Fault::Error)),
+                _ => (&mut happened.busy, None),
+            };
+            *count += 1;
+            let long = chance(100, random);
+            happened.minutes += usize::from(long);
+            let most = if long { 600_000 } else { 1000 };
+            self.trouble = Some(Trouble {
+                fault,
+                until: self.now + Duration::from_millis(random.random_range(1..most)),
+            });
         }
-        self.faulty = self.faulty.saturating_sub(1);
-        let mut fault = (self.faulty > 0).then_some(Fault::PaperOut);
-        if fault.is_none() {
+        self.trouble = self.trouble.filter(|trouble| trouble.until > self.now);
+        let mut fault = self.trouble.and_then(|trouble| trouble.fault);
+        if self.trouble.is_none() {
             let bytes = engine.output();
             let count = match &mut self.port {
                 Some(port) => {
@@ -320,41 +365,26 @@ impl<'j> World<'j> {
             }
             back.extend_from_slice(&frame[..length]);
         }
-        let mut back = self.damage(back, random);
+        let mut back = self.wire(&back, random);
         if cut {
             back.truncate(random.random_range(0..=back.len()));
         }
         back
     }
 
-    /// What a wire makes of frames.
-    fn damage(&mut self, bytes: Vec<u8>, random: &mut ChaCha8Rng) -> Vec<u8> {
-        let mut out: Vec<Vec<u8>> = Vec::new();
-        for frame in bytes.split_inclusive(|&byte| byte == 0) {
-            if chance(self.mischief.drop, random) {
-                self.accidents.drops += 1;
-                continue;
-            }
-            if chance(self.mischief.duplicate, random) {
-                self.accidents.duplicates += 1;
-                out.push(frame.to_vec());
-            }
-            out.push(frame.to_vec());
-            if out.len() > 1 && chance(self.mischief.swap, random) {
-                self.accidents.swaps += 1;
-                let last = out.len() - 1;
-                let other = random.random_range(0..last);
-                out.swap(last, other);
-            }
+    fn wire(&mut self, bytes: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
+        let frames = bytes.split_inclusive(|&byte| byte == 0);
+        damage(frames, &self.mischief, random, &mut self.accidents.wire)
+    }
+
+    /// What the bridge answers to these bytes over the bad wire, and what of it comes back.
+    pub fn overhear(&mut self, bytes: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
+        let burst = self.wire(bytes, random);
+        if let Some(engine) = &mut self.engine {
+            engine.receive(&mut self.reader, &burst);
         }
-        let mut bytes = out.concat();
-        for byte in &mut bytes {
-            if self.mischief.flip > 0 && random.next_u32() % 50_000 < self.mischief.flip {
-                self.accidents.flips += 1;
-                *byte ^= 1 << random.random_range(0..8);
-            }
-        }
-        bytes
+        self.bridge(random);
+        self.answers(random, false)
     }
 
     /// Another host on the same, good link, while the printer stands still.

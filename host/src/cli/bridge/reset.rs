@@ -1,0 +1,93 @@
+//! `foilpress bridge reset`, and the look whether a printer still waits for the rest of a sheet that was lost.
+//!
+//! Half a job followed by another is text to the printer. So after a loss nothing is sent until the printer has been
+//! reset: by the bridge, which pulls the port's nInit line, or by its own switch.
+
+use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
+
+use anyhow::{Result, bail};
+use clap::Args as ClapArgs;
+
+use super::PATIENCE;
+use crate::observe::Observer;
+use crate::send::Address;
+use crate::send::journal::{Entry, Journal};
+use crate::send::query::Query;
+
+/// Arguments of `bridge reset`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress bridge reset                        (the only bridge there is)\n  \
+    foilpress bridge reset --to serial:/dev/ttyACM0\n  \
+    foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
+    Refused while the bridge prints. What a printer does with a sheet it holds is not known for certain: if it does not \
+    come out, switch the printer off and on.")]
+pub struct Args {
+    /// Where the bridge is [default: the only one there is]
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Address>,
+    /// Only note that the printer has been switched off and on
+    #[arg(long, conflicts_with = "to")]
+    by_hand: bool,
+}
+
+/// Runs `bridge reset`.
+pub fn run(args: &Args) -> Result<()> {
+    let journal = Journal::of_user()?;
+    if args.by_hand {
+        return Ok(journal.settle(None)?);
+    }
+    let address = match &args.to {
+        Some(address) => address.clone(),
+        None => super::only()?,
+    };
+    let mut link = address.open()?;
+    reset(&mut Query::new(&mut *link, PATIENCE)?, &journal)?;
+    crate::cli::show("the printer has been reset; if a sheet is still in it, take it out\n")
+}
+
+fn reset(query: &mut Query<'_>, journal: &Journal) -> Result<()> {
+    query.initialise(PATIENCE)?;
+    Ok(journal.settle(Some(query.bridge().serial))?)
+}
+
+/// Makes sure that the printer at `address` does not wait for the rest of a lost job: resets it if the user agrees, and
+/// fails if it may still wait.
+pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Observer) -> Result<()> {
+    let lost: Vec<Entry> = journal.entries()?.into_iter().filter(Entry::left_open).collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let mut link = address.open()?;
+    let mut query = Query::new(&mut *link, PATIENCE)?;
+    let serial = query.bridge().serial;
+    let Some(entry) =
+        lost.iter().rev().find(|entry| entry.record.bridge.is_none_or(|bridge| bridge == serial))
+    else {
+        return Ok(());
+    };
+    let (name, job) = (&entry.name, entry.record.job);
+    let why = format!(
+        "{name} (job {job:08x}) was lost in the middle, and the printer may still wait for the rest of it"
+    );
+    if !agreed(&format!("{why}. Reset the printer through the bridge now?"))? {
+        bail!(
+            "not sent: {why}, so that anything else would be printed as text. `foilpress bridge reset --to {address}` \
+             resets it through the bridge; if you have switched it off and on: `foilpress bridge reset --by-hand`"
+        );
+    }
+    reset(&mut query, journal)?;
+    observer.note("the printer has been reset");
+    Ok(())
+}
+
+/// Asks a person; where there is none the answer is no.
+fn agreed(question: &str) -> Result<bool> {
+    if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
+        return Ok(false);
+    }
+    write!(io::stderr(), "{question} [y/N] ")?;
+    let mut answer = String::new();
+    io::stdin().lock().read_line(&mut answer)?;
+    Ok(matches!(answer.trim(), "y" | "Y" | "yes"))
+}
