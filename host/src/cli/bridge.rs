@@ -31,7 +31,7 @@ use crate::send::usb::UDEV_RULES;
 use crate::send::{Address, OpenError, RunError, words};
 
 /// How long to wait for a bridge to answer.
-const PATIENCE: Duration = Duration::from_secs(3);
+pub(super) const PATIENCE: Duration = Duration::from_secs(3);
 /// How long to wait for the printer behind it.
 const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 

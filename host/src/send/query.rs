@@ -45,6 +45,9 @@ pub enum QueryError {
         "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
     )]
     JobOpen(u32),
+    /// The bridge has no such job.
+    #[error("the bridge has no job {0:08x}, and nothing of it to end")]
+    NoSuchJob(u32),
     /// The firmware does not know the question.
     #[error(
         "the bridge's firmware is older than this question; `foilpress bridge flash` puts the present one on it"
@@ -169,6 +172,30 @@ impl<'t> Query<'t> {
             Heard::Lines(request, ..) if request == number => Some(Ok(())),
             _ => None,
         })?
+    }
+
+    /// Ends the job of another sender early, as far as a legal end allows; says what the bridge made of it. One that is over
+    /// already stays as it is.
+    ///
+    /// Errors: [`QueryError::NoSuchJob`] beside those of every question.
+    pub fn cancel(&mut self, job: u32, patience: Duration) -> Result<Progress, QueryError> {
+        exchange(
+            self.link,
+            &mut self.reader,
+            &[ToBridge::Cancel { job }],
+            patience,
+            &mut |heard| match heard {
+                Heard::Progress(progress) if progress.job == job => match progress.state {
+                    // From before it was told.
+                    JobState::Printing | JobState::Stopped(_) => None,
+                    _ => Some(Ok(progress)),
+                },
+                Heard::Refused(Refusal::NoSuchJob, refused) if refused == job => {
+                    Some(Err(QueryError::NoSuchJob(job)))
+                }
+                _ => None,
+            },
+        )?
     }
 
     /// Where the job stands now.
