@@ -94,7 +94,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 }
 
 /// The only bridge there is.
-fn only() -> Result<Address> {
+pub(super) fn only() -> Result<Address> {
     let bridge = find::only()?;
     let (address, _) = bridge.open()?;
     Ok(address.clone())
