@@ -61,7 +61,7 @@ const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
 
 /// The engine works for so long, and for the slice under way, before others may run: a slice takes up to 0.4 ms, and the
 /// strobe engine has work for three or more.
-const TURN: Duration = Duration::from_micros(500);
+const TURN: Duration = Duration::from_micros(200);
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {

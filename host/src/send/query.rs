@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, Fault, Lines, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, Fault, JobState, Lines, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
 };
 
 use super::session::{Bridge, printable};
