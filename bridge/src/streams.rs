@@ -112,18 +112,19 @@ impl<'m> Streams<'m> {
             }
             Stage::Read => {
                 let slice = &input[..input.len().min(SLICE)];
-                let (used, step) = self.decoder.step(slice, self.band).map_err(|defect| match defect {
+                let (used, step) = self.decoder.slice(slice, self.band).map_err(|defect| match defect {
                     Defect::Memory => DefectKind::TooLarge,
                     Defect::Form | Defect::Count | Defect::Row => DefectKind::Stream,
                 })?;
                 worked.used = used;
                 match step {
-                    Step::More => worked.progress = used > 0,
-                    Step::Blank { y, rows } => (self.row, self.stage) = (y, Stage::Blank(rows)),
-                    Step::Band { y, rows } => {
+                    None => {}
+                    Some(Step::More) => worked.progress = used > 0,
+                    Some(Step::Blank { y, rows }) => (self.row, self.stage) = (y, Stage::Blank(rows)),
+                    Some(Step::Band { y, rows }) => {
                         (self.row, self.stage) = (y, Stage::Rows { next: 0, end: rows })
                     }
-                    Step::End => {}
+                    Some(Step::End) => {}
                 }
             }
             Stage::Rows { .. } | Stage::Blank(_) if !self.begun => {

@@ -266,20 +266,20 @@ pub struct Tile {
 /// A corner to start from, a side to walk along and end on, and the side across: signed dot counts.
 #[derive(Clone, Copy, Default)]
 struct Piece {
-    x: i16,
-    y: i16,
-    ax: i16,
-    ay: i16,
-    bx: i16,
-    by: i16,
+    x: i32,
+    y: i32,
+    ax: i32,
+    ay: i32,
+    bx: i32,
+    by: i32,
 }
 
 impl Piece {
-    fn along(&self) -> i16 {
+    fn along(&self) -> i32 {
         (self.ax + self.ay).abs()
     }
 
-    fn across(&self) -> i16 {
+    fn across(&self) -> i32 {
         (self.bx + self.by).abs()
     }
 
@@ -288,8 +288,8 @@ impl Piece {
         (self.along() * self.across()) as u16
     }
 
-    fn holds(&self, x: i16, y: i16) -> bool {
-        let inside = |at: i16, from: i16, by: i16| {
+    fn holds(&self, x: i32, y: i32) -> bool {
+        let inside = |at: i32, from: i32, by: i32| {
             if by > 0 { (from..from + by).contains(&at) } else { (from + by + 1..=from).contains(&at) }
         };
         inside(x, self.x, self.ax + self.bx) && inside(y, self.y, self.ay + self.by)
@@ -307,7 +307,7 @@ impl Piece {
         }
         let (dax, day) = (self.ax.signum(), self.ay.signum());
         let (dbx, dby) = (self.bx.signum(), self.by.signum());
-        let even = |n: i16| if n > 2 { (n / 2 + 1) & !1 } else { n / 2 };
+        let even = |n: i32| if n > 2 { (n / 2 + 1) & !1 } else { n / 2 };
         if 2 * a > 3 * b {
             let a1 = even(a);
             let first = Piece { ax: dax * a1, ay: day * a1, ..*self };
@@ -336,7 +336,7 @@ impl Piece {
     }
 
     /// Direction and number of dots of a single line.
-    fn line(&self) -> (i16, i16, u16) {
+    fn line(&self) -> (i32, i32, u16) {
         let (x, y) = if self.along() > 1 { (self.ax, self.ay) } else { (self.bx, self.by) };
         (x.signum(), y.signum(), self.area())
     }
@@ -353,7 +353,7 @@ impl Tile {
 
     fn piece(&self) -> Piece {
         // A side is at most 64 in any walk; a tile made by hand with longer sides is cut, not overflowed.
-        let (w, h) = (self.w.min(EDGE) as i16, self.h.min(EDGE) as i16);
+        let (w, h) = (self.w.min(EDGE) as i32, self.h.min(EDGE) as i32);
         match self.orientation {
             Orientation::Along => Piece { x: 0, y: 0, ax: w, ay: 0, bx: 0, by: h },
             Orientation::Down => Piece { x: 0, y: 0, ax: 0, ay: h, bx: w, by: 0 },
@@ -407,12 +407,12 @@ impl Tile {
             }
         }
         let (dx, dy, _) = piece.line();
-        ((piece.x + dx * rest as i16) as u16, (piece.y + dy * rest as i16) as u16)
+        ((piece.x + dx * rest as i32) as u16, (piece.y + dy * rest as i32) as u16)
     }
 
     /// The position within the tile of a dot that lies in it.
     pub fn position(&self, x: u16, y: u16) -> u16 {
-        let (x, y) = (x as i16, y as i16);
+        let (x, y) = (x as i32, y as i32);
         let mut piece = self.piece();
         let mut position = 0;
         while let Some((parts, count)) = piece.split() {
@@ -424,7 +424,7 @@ impl Tile {
                 position += part.area();
             }
         }
-        position + (x - piece.x).unsigned_abs() + (y - piece.y).unsigned_abs()
+        position + ((x - piece.x).abs() + (y - piece.y).abs()) as u16
     }
 }
 

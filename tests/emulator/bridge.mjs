@@ -8,7 +8,8 @@
 //            to here any of { "room": bytes taken in all before it stays busy, "lines": { paperOut, select, fault, power },
 //            "answer": BASE64 for nibble mode, "id": BASE64 }. Nobody there: a printer that takes everything.
 //
-// Lines on standard input are orders: `replug`, `figures`. Each is answered by a line of JSON on standard output;
+// Lines on standard input are orders: `replug`, `figures`, `plug N` (a loop-back plug in the printer's place, in position N, for
+// good). Each is answered by a line of JSON on standard output;
 // the first line there says that the bridge is up. At the end of standard input the program ends.
 //
 // The board's clock never runs ahead of the world's, so that waiting costs nothing and its timers mean what they say;
@@ -19,6 +20,7 @@ import { createServer } from 'node:net';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { Board } from './board.mjs';
+import { Plug } from './plug.mjs';
 import { Printer } from './printer.mjs';
 import { Urbs } from './urbs.mjs';
 import { Host } from './usb.mjs';
@@ -78,6 +80,8 @@ function printerConnected(socket) {
   });
   socket.on('close', () => { if (paper === socket) paper = null; });
 }
+
+let plug = null;
 
 // The device, enumerated as soon as it appears, and after every replugging.
 const urbs = new Urbs(host, () => replug());
@@ -144,6 +148,11 @@ orders.on('line', async (order) => {
     answer({ replugged: true });
   } else if (order === 'figures') {
     answer(figures());
+  } else if (order.startsWith('plug ')) {
+    printer.set = () => {};
+    plug ??= new Plug(board);
+    plug.move(order.slice(5));
+    answer({ plugged: true });
   } else {
     answer({ error: `no such order: ${order}` });
   }

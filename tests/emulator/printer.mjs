@@ -118,7 +118,8 @@ export class Printer {
     if (this.full || this.off) return;
     this.readyAt = this.board.now;
     this.set('ack', 0);
-    this.later(this.ack, () => { this.set('ack', 1); this.set('busy', 0); });
+    // It may have been switched off meanwhile.
+    this.later(this.ack, () => { if (!this.off) for (const [line, level] of [['ack', 1], ['busy', 0]]) this.set(line, level); });
   }
 
   /// Makes room for so many bytes in all.

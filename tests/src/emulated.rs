@@ -123,6 +123,11 @@ impl Emulated {
         self.order("replug").map(drop)
     }
 
+    /// Puts a loop-back plug in the printer's place, in this position. For good: no printer is connected any more.
+    pub fn plug(&mut self, position: u8) -> io::Result<()> {
+        self.order(&format!("plug {position}")).map(drop)
+    }
+
     /// What has been measured: see `figures` in bridge.mjs.
     pub fn figures(&mut self) -> io::Result<Value> {
         self.order("figures")

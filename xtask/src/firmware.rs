@@ -45,6 +45,9 @@ pub fn build(root: &Path) -> Result<PathBuf> {
     read.check_boot().context("is `link-rp.x` among the linker's scripts?")?;
     let path = target.join("foilpress-bridge.uf2");
     fs::write(&path, &image).with_context(|| format!("{} cannot be written", path.display()))?;
+    // The log is read with it.
+    let elf = path.with_extension("elf");
+    fs::write(&elf, &bytes).with_context(|| format!("{} cannot be written", elf.display()))?;
 
     let budget = budget(&folder.join("budget.toml"))?;
     println!("flash   {flash:>7} of {:>7} bytes", budget.flash);

@@ -168,8 +168,9 @@ fn read(slot: &[u8; SLOT]) -> Option<(u32, usize, Checkpoint)> {
 pub fn log(bytes: &[u8]) {
     critical_section::with(|_| {
         // SAFETY: in a critical section, and no reference to these fields outlives one.
-        let kept = unsafe { &mut *(&raw mut (*kept()).written) };
-        let ring = unsafe { &mut *(&raw mut (*self::kept()).log) };
+        let kept = unsafe { &mut (*kept()).written };
+        // SAFETY: likewise; it is another field.
+        let ring = unsafe { &mut (*self::kept()).log };
         for &byte in bytes {
             ring[kept[0] as usize % LOG] = byte;
             kept[0] = kept[0].wrapping_add(1);
@@ -183,7 +184,8 @@ pub fn read_log(from: u32, out: &mut [u8]) -> (u32, u32, usize) {
     critical_section::with(|_| {
         // SAFETY: as in `log`.
         let end = unsafe { (*kept()).written[0] };
-        let ring = unsafe { &*(&raw const (*kept()).log) };
+        // SAFETY: likewise.
+        let ring = unsafe { &(*kept()).log };
         let oldest = end.saturating_sub(LOG as u32);
         let at = if from > end { oldest } else { from.max(oldest) };
         let count = out.len().min((end - at) as usize);

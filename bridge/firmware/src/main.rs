@@ -61,7 +61,7 @@ const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
 
 /// The engine works for so long, and for the slice under way, before others may run: a slice takes up to 0.4 ms, and the
 /// strobe engine has work for three or more.
-const TURN: Duration = Duration::from_micros(500);
+const TURN: Duration = Duration::from_micros(200);
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -132,7 +132,7 @@ async fn main(spawner: Spawner) {
     let busy = common.make_pio_pin(board.PIN_15);
     static BUFFERS: ConstStaticCell<[[u8; CHUNK]; 2]> = ConstStaticCell::new([[0; CHUNK]; 2]);
     let [first, second] = BUFFERS.take();
-    let strobe = Strobe::new(
+    let mut strobe = Strobe::new(
         &mut common,
         sm0,
         data,
@@ -140,8 +140,8 @@ async fn main(spawner: Spawner) {
         busy,
         [first, second],
         (board.DMA_CH0, board.DMA_CH1),
-        keeper.place(),
     );
+    strobe.set_place(keeper.place());
     pins::bring_up();
 
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();

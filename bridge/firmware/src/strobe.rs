@@ -145,7 +145,6 @@ impl Strobe {
         busy: Pin<'static, PIO0>,
         buffers: [&'static mut [u8; CHUNK]; 2],
         _channels: (Peri<'static, DMA_CH0>, Peri<'static, DMA_CH1>),
-        place: usize,
     ) -> Self {
         let program = embassy_rp::pio::program::pio_asm!(
             ".side_set 1",
@@ -187,7 +186,7 @@ impl Strobe {
             given: [0; 2],
             tally: 0,
             in_flight: 0,
-            place,
+            place: 0,
             last: 0,
         };
         engine.set_timing(&Timing::DEFAULT);

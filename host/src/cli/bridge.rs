@@ -2,7 +2,10 @@
 
 mod flash;
 mod list;
+mod log;
 mod reset;
+mod test;
+mod watch;
 
 pub use list::ask;
 pub use reset::before_sending;
@@ -28,7 +31,7 @@ use crate::send::usb::UDEV_RULES;
 use crate::send::{Address, OpenError, RunError, words};
 
 /// How long to wait for a bridge to answer.
-const PATIENCE: Duration = Duration::from_secs(3);
+pub(super) const PATIENCE: Duration = Duration::from_secs(3);
 /// How long to wait for the printer behind it.
 const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 
@@ -38,6 +41,9 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
     foilpress bridge list\n  \
     foilpress bridge status                              (the only bridge there is)\n  \
     foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
+    foilpress bridge status --watch                      (until Ctrl-C)\n  \
+    foilpress bridge test                                (the wiring, with a loop-back plug)\n  \
+    foilpress bridge log                                 (what the firmware has noted)\n  \
     foilpress bridge flash                               (new firmware, or the first one on a new board)\n  \
     foilpress bridge reset                               (after a sheet was lost)")]
 pub struct Args {
@@ -53,6 +59,10 @@ enum Command {
     Flash(flash::Args),
     /// The bridge, its job, the port's lines, and the printer's own answer when no job is open
     Status(StatusArgs),
+    /// Try the wiring with a loop-back plug, or walk through the lines for a meter
+    Test(test::Args),
+    /// What the firmware has noted, also before its last restart
+    Log(log::Args),
     /// Reset the printer through the bridge, after a sheet was lost in the middle
     Reset(reset::Args),
 }
@@ -66,6 +76,9 @@ struct StatusArgs {
     /// As JSON
     #[arg(long)]
     json: bool,
+    /// Again and again, in place; with --json an object on a line whenever something has changed
+    #[arg(long)]
+    watch: bool,
 }
 
 /// Runs `bridge`.
@@ -74,12 +87,14 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::List(args) => list::run(args),
         Command::Flash(args) => flash::run(args, observer),
         Command::Status(args) => status(args),
+        Command::Test(args) => test::run(args),
+        Command::Log(args) => log::run(args),
         Command::Reset(args) => reset::run(args),
     }
 }
 
 /// The only bridge there is.
-fn only() -> Result<Address> {
+pub(super) fn only() -> Result<Address> {
     let bridge = find::only()?;
     let (address, _) = bridge.open()?;
     Ok(address.clone())
@@ -161,6 +176,11 @@ pub fn doing(progress: &Progress) -> String {
             )
         }
     }
+}
+
+/// Whether a job is under way.
+fn is_open(progress: &Progress) -> bool {
+    matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling)
 }
 
 /// The lines by their names.
@@ -313,6 +333,9 @@ fn status(args: &StatusArgs) -> Result<()> {
         Some(address) => address.clone(),
         None => only()?,
     };
+    if args.watch {
+        return watch::run(&address, args.json);
+    }
     let found = Found::ask(&address)?;
     let mut out = std::io::stdout().lock();
     if args.json {

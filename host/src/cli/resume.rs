@@ -5,9 +5,11 @@ use std::io::Write as _;
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
+use super::bridge;
 use super::send::go;
 use crate::observe::Observer;
 use crate::send::journal::{Entry, Journal};
+use crate::send::query::Query;
 use crate::send::session::Phase;
 use crate::send::{Address, words};
 
@@ -33,7 +35,8 @@ pub struct Resume {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress cancel                                     (the one job that is not over)\n  \
-    foilpress cancel 5f3a9c01\n\n\
+    foilpress cancel 5f3a9c01\n  \
+    foilpress cancel ffffffff                            (what the system prints through the bridge by itself)\n\n\
     A sheet that has begun is brought to an end and put out; the printer is ready for the next job. Stop a `send` that is \
     still running first (Ctrl-C).")]
 pub struct Cancel {
@@ -68,10 +71,29 @@ pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
 
 /// Runs `cancel`.
 pub fn cancel(args: &Cancel, observer: &dyn Observer) -> Result<()> {
+    if args.job == Some(PLAIN) {
+        return cancel_plain(args.to.as_ref());
+    }
     let journal = Journal::of_user()?;
     let job = journal.open(choose(&journal, args.job)?)?;
     let address = address(&job.entry, args.to.as_ref())?;
     go(job, &journal, &address, true, observer)
+}
+
+/// Number of whatever the operating system prints through the bridge as through an ordinary printer.
+const PLAIN: u32 = u32::MAX;
+
+/// Ends what the operating system prints; no journal knows of it.
+fn cancel_plain(to: Option<&Address>) -> Result<()> {
+    let address = match to {
+        Some(address) => address.clone(),
+        None => bridge::only()?,
+    };
+    let mut link = address.open()?;
+    let progress = Query::new(&mut *link, bridge::PATIENCE)?.cancel(PLAIN, bridge::PATIENCE)?;
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", bridge::doing(&progress))?;
+    Ok(())
 }
 
 fn address(entry: &Entry, asked: Option<&Address>) -> Result<Address> {

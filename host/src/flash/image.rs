@@ -69,6 +69,11 @@ impl Firmware {
         FILE
     }
 
+    /// The program it was made of, as the linker left it (ELF): what its log is read with.
+    pub fn embedded_program() -> Option<&'static [u8]> {
+        PROGRAM
+    }
+
     /// What goes into the flash.
     pub fn image(&self) -> &Image {
         &self.image

@@ -10,6 +10,7 @@ mod address;
 pub mod find;
 pub mod finish;
 pub mod journal;
+pub mod log;
 pub mod query;
 pub mod raw;
 mod run;
@@ -18,6 +19,7 @@ pub mod status;
 pub mod streams;
 pub mod transport;
 pub mod usb;
+pub mod wiring;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};

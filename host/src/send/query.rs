@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, Fault, Lines, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, Fault, JobState, Lines, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
 };
 
 use super::session::{Bridge, printable};
@@ -45,6 +45,25 @@ pub enum QueryError {
         "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
     )]
     JobOpen(u32),
+    /// The bridge has no such job.
+    #[error("the bridge has no job {0:08x}, and nothing of it to end")]
+    NoSuchJob(u32),
+    /// The firmware does not know the question.
+    #[error(
+        "the bridge's firmware is older than this question; `foilpress bridge flash` puts the present one on it"
+    )]
+    TooOld,
+}
+
+/// A piece of the firmware's log.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct LogPiece {
+    /// Place of the first byte, counted since the log began.
+    pub at: u32,
+    /// Bytes logged so far.
+    pub end: u32,
+    /// The bytes.
+    pub bytes: Vec<u8>,
 }
 
 /// A conversation of questions.
@@ -63,6 +82,7 @@ enum Heard {
     Lines(u16, Lines, Option<Fault>),
     Answer(u16, Reply),
     Refused(Refusal, u32),
+    Log(u16, LogPiece),
 }
 
 impl<'t> Query<'t> {
@@ -113,6 +133,34 @@ impl<'t> Query<'t> {
         })
     }
 
+    /// Sets the port's outputs (Data1..Data8; nStrobe, nAutoFd, nInit, nSelectIn from bit 0) and reads the inputs when they
+    /// have settled. **Never with a printer connected**: to it this is printing.
+    ///
+    /// Errors: [`QueryError::JobOpen`] while a job is open, beside those of every question.
+    pub fn probe(&mut self, data: u8, control: u8, patience: Duration) -> Result<Lines, QueryError> {
+        let (number, open) = (self.next(), self.progress.job);
+        let question = ToBridge::Probe { request: number, data, control };
+        exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
+            Heard::Lines(request, lines, _) if request == number => Some(Ok(lines)),
+            Heard::Answer(request, Reply::NotNow) if request == number => {
+                Some(Err(QueryError::JobOpen(open)))
+            }
+            Heard::Refused(Refusal::Unknown, _) => Some(Err(QueryError::TooOld)),
+            _ => None,
+        })?
+    }
+
+    /// A piece of the firmware's log from byte `from` on, 0 being the oldest.
+    pub fn log(&mut self, from: u32, patience: Duration) -> Result<LogPiece, QueryError> {
+        let number = self.next();
+        let question = ToBridge::ReadLog { request: number, from };
+        exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
+            Heard::Log(request, piece) if request == number => Some(Ok(piece)),
+            Heard::Refused(Refusal::Unknown, _) => Some(Err(QueryError::TooOld)),
+            _ => None,
+        })?
+    }
+
     /// Resets the printer by the port's nInit line. Refused while a job is open; a job that was open when the bridge
     /// itself was reset, and whose data nobody has sent again, is given up by it.
     pub fn initialise(&mut self, patience: Duration) -> Result<(), QueryError> {
@@ -124,6 +172,46 @@ impl<'t> Query<'t> {
             Heard::Lines(request, ..) if request == number => Some(Ok(())),
             _ => None,
         })?
+    }
+
+    /// Ends the job of another sender early, as far as a legal end allows; says what the bridge made of it. One that is over
+    /// already stays as it is.
+    ///
+    /// Errors: [`QueryError::NoSuchJob`] beside those of every question.
+    pub fn cancel(&mut self, job: u32, patience: Duration) -> Result<Progress, QueryError> {
+        exchange(
+            self.link,
+            &mut self.reader,
+            &[ToBridge::Cancel { job }],
+            patience,
+            &mut |heard| match heard {
+                Heard::Progress(progress) if progress.job == job => match progress.state {
+                    // From before it was told.
+                    JobState::Printing | JobState::Stopped(_) => None,
+                    _ => Some(Ok(progress)),
+                },
+                Heard::Refused(Refusal::NoSuchJob, refused) if refused == job => {
+                    Some(Err(QueryError::NoSuchJob(job)))
+                }
+                _ => None,
+            },
+        )?
+    }
+
+    /// Where the job stands now.
+    pub fn ask_progress(&mut self, patience: Duration) -> Result<Progress, QueryError> {
+        let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
+        let mut greeted = false;
+        self.progress =
+            exchange(self.link, &mut self.reader, &[hello], patience, &mut |heard| match heard {
+                Heard::Hello(_) => {
+                    greeted = true;
+                    None
+                }
+                Heard::Progress(progress) if greeted => Some(progress),
+                _ => None,
+            })?;
+        Ok(self.progress)
     }
 
     /// Sends the bridge to its boot loader, which ends the link.
@@ -215,6 +303,9 @@ fn heard(message: &[u8]) -> Option<Heard> {
             },
         ),
         ToHost::Refused { reason, job } => Heard::Refused(reason, job),
+        ToHost::LogPart { request, at, end, bytes } => {
+            Heard::Log(request, LogPiece { at, end, bytes: bytes.to_vec() })
+        }
         _ => return None,
     })
 }

@@ -89,11 +89,11 @@ impl Canvas {
     }
 
     /// Lays the tile out in rows of `stride` bytes, the first of which is that of the tile, and begins the next one. The
-    /// place for it is blank.
-    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) {
+    /// place for it is blank. Says whether there was anything to lay out.
+    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> bool {
         let (first, end) = core::mem::replace(&mut self.used, UNUSED);
         if first >= end {
-            return;
+            return false;
         }
         let whole = (tile.w, tile.h) == (EDGE, EDGE) && tile.x.is_multiple_of(8);
         if whole && self.line.iter().all(|&word| word == u32::MAX) {
@@ -107,6 +107,7 @@ impl Canvas {
         } else {
             self.lay_dots(tile, first..end, rows, stride);
         }
+        true
     }
 
     fn lay_squares(&mut self, tile: &Tile, words: core::ops::Range<usize>, rows: &mut [u8], stride: usize) {

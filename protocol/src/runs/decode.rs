@@ -71,6 +71,8 @@ struct Runs {
     to: u32,
     /// Tiles begun.
     tiles: usize,
+    /// A tile has been laid out in this step.
+    laid: bool,
 }
 
 /// Where in a rows band the decoder is.
@@ -151,18 +153,31 @@ impl Decoder {
     ///
     /// After a defect the decoder stays where it was; only [`Decoder::restart`] and [`Decoder::resize`] help.
     pub fn step(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Step), Defect> {
+        let mut read = 0;
+        loop {
+            let (used, step) = self.slice(&input[read..], memory)?;
+            read += used;
+            if let Some(step) = step {
+                return Ok((read, step));
+            }
+        }
+    }
+
+    /// As [`Decoder::step`], but it also stops behind every tile it has laid out, with `None`: for those who have other things
+    /// to do, and who call it again, with whatever input there then is.
+    pub fn slice(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Option<Step>), Defect> {
         let width = self.walk.width();
         let memory = memory.get_mut(..band_bytes(width)).ok_or(Defect::Memory)?;
         let stride = stride(width);
         let mut read = 0;
         loop {
             let Some(band) = self.band else {
-                return Ok((read, Step::End));
+                return Ok((read, Some(Step::End)));
             };
             match &mut self.state {
-                State::End => return Ok((read, Step::End)),
+                State::End => return Ok((read, Some(Step::End))),
                 State::Form => {
-                    let Some(&byte) = input.get(read) else { return Ok((read, Step::More)) };
+                    let Some(&byte) = input.get(read) else { return Ok((read, Some(Step::More))) };
                     read += 1;
                     self.state = match byte {
                         form::BLANK => State::Blank,
@@ -178,17 +193,17 @@ impl Decoder {
                     }
                 }
                 State::Blank => {
-                    let Some(&count) = input.get(read) else { return Ok((read, Step::More)) };
+                    let Some(&count) = input.get(read) else { return Ok((read, Some(Step::More))) };
                     let end = self.next + usize::from(count);
                     let last = end.checked_sub(1).filter(|&last| last >= self.next).ok_or(Defect::Count)?;
                     let last = self.walk.bands().nth(last).ok_or(Defect::Count)?;
                     read += 1;
                     self.next = end;
                     self.follow();
-                    return Ok((read, Step::Blank { y: band.y, rows: last.y + last.height - band.y }));
+                    return Ok((read, Some(Step::Blank { y: band.y, rows: last.y + last.height - band.y })));
                 }
                 State::Minimum => {
-                    let Some(&minimum) = input.get(read) else { return Ok((read, Step::More)) };
+                    let Some(&minimum) = input.get(read) else { return Ok((read, Some(Step::More))) };
                     read += 1;
                     self.state = State::Runs(Runs::new(minimum));
                 }
@@ -197,21 +212,21 @@ impl Decoder {
                     let (used, complete) = runs.read(&input[read..], &mut place);
                     read += used;
                     if !complete {
-                        return Ok((read, Step::More));
+                        return Ok((read, (!runs.laid).then_some(Step::More)));
                     }
                     self.next += 1;
                     self.follow();
-                    return Ok((read, Step::Band { y: band.y, rows: band.height }));
+                    return Ok((read, Some(Step::Band { y: band.y, rows: band.height })));
                 }
                 State::Row(row) => {
                     let (used, complete) = row.read(&input[read..], memory, stride, band.height, width)?;
                     read += used;
                     if !complete {
-                        return Ok((read, Step::More));
+                        return Ok((read, Some(Step::More)));
                     }
                     self.next += 1;
                     self.follow();
-                    return Ok((read, Step::Band { y: band.y, rows: band.height }));
+                    return Ok((read, Some(Step::Band { y: band.y, rows: band.height })));
                 }
             }
         }
@@ -245,13 +260,19 @@ impl Runs {
             from: 0,
             to: 0,
             tiles: 0,
+            laid: false,
         }
     }
 
-    /// Reads runs until the band is full; says how much was read and whether it is.
+    /// Reads runs until the band is full or a tile has been laid out; says how much was read and whether it is full.
     fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
         let mut read = 0;
+        self.laid = false;
         while self.done < place.band.len() {
+            // On a microcontroller others wait for their turn.
+            if self.laid {
+                return (read, false);
+            }
             if self.ones == 0 && self.remainder.is_none() && input.len() - read >= CODE_BYTES {
                 read += self.read_codes(&input[read..], place);
                 continue;
@@ -282,7 +303,7 @@ impl Runs {
     /// the time goes: the bits are held a word ahead, and what was read too much is given back in the end.
     fn read_codes(&mut self, input: &[u8], place: &mut Place<'_>) -> usize {
         let mut read = 0;
-        while self.done < place.band.len() && input.len() - read >= CODE_BYTES {
+        while self.done < place.band.len() && !self.laid && input.len() - read >= CODE_BYTES {
             let (mut bits, mut held) = (self.bits, self.held);
             while held <= 24 {
                 bits |= u32::from(input[read]) << (24 - held);
@@ -378,7 +399,7 @@ impl Runs {
     /// Lays the tile out in the band.
     fn lay(&mut self, place: &mut Place<'_>) {
         if let Some(tile) = self.tile.take() {
-            place.canvas.lay(&tile, place.memory, place.stride);
+            self.laid |= place.canvas.lay(&tile, place.memory, place.stride);
         }
     }
 }

@@ -4,6 +4,7 @@
 //! Run by `cargo xtask emulator`, which builds the image and the program and names them.
 #![cfg(unix)]
 
+mod care;
 mod flash;
 mod found;
 

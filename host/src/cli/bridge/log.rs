@@ -1,0 +1,86 @@
+//! `foilpress bridge log`: what the firmware has noted, in words.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args as ClapArgs;
+use serde_json::json;
+
+use super::{PATIENCE, only};
+use crate::flash::image::Firmware;
+use crate::send::Address;
+use crate::send::log;
+use crate::send::query::Query;
+
+/// A firmware's program is some megabytes.
+const LARGEST: u64 = 64 << 20;
+
+/// Arguments of `bridge log`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  foilpress bridge log\n  \
+    foilpress bridge log --elf target/firmware/foilpress-bridge.elf\n\n\
+    The bridge keeps the last few thousand bytes, over a restart too, so the log tells what came before one. Times are \
+    seconds since the start. It can be read while a job prints.")]
+pub struct Args {
+    /// Where the bridge is [default: the only one there is]
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Address>,
+    /// The firmware on the bridge as its linker left it [default: the one that came with this program]
+    #[arg(long, value_name = "FILE")]
+    elf: Option<PathBuf>,
+    /// As JSON, an object for each entry
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs `bridge log`.
+pub fn run(args: &Args) -> Result<()> {
+    let program = match &args.elf {
+        Some(path) => {
+            let what = || format!("{} cannot be read", path.display());
+            if std::fs::metadata(path).with_context(what)?.len() > LARGEST {
+                bail!("{} is far larger than any firmware", path.display());
+            }
+            std::fs::read(path).with_context(what)?
+        }
+        None => match Firmware::embedded_program() {
+            Some(program) => program.to_vec(),
+            None => bail!(
+                "this program was built without firmware; name the bridge's with --elf (`cargo xtask firmware` writes \
+                 foilpress-bridge.elf)"
+            ),
+        },
+    };
+    let address = match &args.to {
+        Some(address) => address.clone(),
+        None => only()?,
+    };
+    let mut link = address.open()?;
+    let mut query = Query::new(&mut *link, PATIENCE)?;
+    let raw = log::read(&mut query, PATIENCE)?;
+    let log = log::decode(&raw, &program)?;
+    let mut out = std::io::stdout().lock();
+    if args.json {
+        for entry in &log.entries {
+            writeln!(out, "{}", serde_json::to_string(entry)?)?;
+        }
+        writeln!(out, "{}", json!({ "lost_bytes": raw.lost, "unreadable": log.unreadable }))?;
+        return Ok(());
+    }
+    if raw.lost > 0 {
+        writeln!(out, "({} bytes before this are gone: newer entries took their place)", raw.lost)?;
+    }
+    for entry in &log.entries {
+        write!(out, "{:>12}  {:<5}  {}", entry.time, entry.level.unwrap_or(""), entry.text)?;
+        match &entry.place {
+            // Where it happened is of use if something went wrong.
+            Some(place) if matches!(entry.level, Some("error" | "warn")) => writeln!(out, "  ({place})")?,
+            _ => writeln!(out)?,
+        }
+    }
+    if log.unreadable > 0 {
+        writeln!(out, "({} entries cannot be read: is this the firmware on the bridge?)", log.unreadable)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,156 @@
+//! `foilpress bridge test`: the wiring, by a loop-back plug or by a meter.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::thread::sleep;
+use std::time::Duration;
+
+use anyhow::{Result, bail};
+use clap::Args as ClapArgs;
+use protocol::link::message::Lines;
+use serde_json::json;
+
+use super::{PATIENCE, is_open, only, other_version};
+use crate::cli::output::say_on_interrupt;
+use crate::send::Address;
+use crate::send::query::{Query, QueryError};
+use crate::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
+
+/// Between two looks whether the plug has been moved.
+const LOOK: Duration = Duration::from_millis(300);
+
+/// How long a line of the pattern is held: time to read a meter.
+const HOLD: Duration = Duration::from_secs(3);
+
+/// Arguments of `bridge test`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  foilpress bridge test\n  foilpress bridge test --pattern\n\n\
+    The loop-back plug takes the printer's place at the end of the cable; docs/wiring.md says how to make it. It has three \
+    positions, and the test waits until it has been in each. --pattern needs no plug: it holds one output after the \
+    other at its other level for three seconds each. Never with a printer: to it either is printing.")]
+pub struct Args {
+    /// Where the bridge is [default: the only one there is]
+    #[arg(long, value_name = "WHERE")]
+    to: Option<Address>,
+    /// Walk through the outputs slowly, for a meter or a scope
+    #[arg(long)]
+    pattern: bool,
+    /// As JSON
+    #[arg(long, conflicts_with = "pattern")]
+    json: bool,
+}
+
+/// Runs `bridge test`. Fails if the wiring is not good.
+pub fn run(args: &Args) -> Result<()> {
+    let address = match &args.to {
+        Some(address) => address.clone(),
+        None => only()?,
+    };
+    let mut link = address.open()?;
+    let mut query = Query::new(&mut *link, PATIENCE)?;
+    if let Some(other) = other_version(query.bridge()) {
+        bail!(other);
+    }
+    let progress = *query.progress();
+    if is_open(&progress) {
+        bail!(QueryError::JobOpen(progress.job));
+    }
+    if args.pattern { walk(&mut query) } else { test(&mut query, args.json) }
+}
+
+fn probe(query: &mut Query<'_>, levels: Levels) -> Result<Lines, QueryError> {
+    query.probe(levels.data(), levels.control(), PATIENCE)
+}
+
+fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
+    // Whoever is asked to move the plug has to be there.
+    let someone = std::io::stderr().is_terminal();
+    let mut probe = |levels| probe(query, levels);
+    let mut seen: Vec<Seen> = Vec::new();
+    let mut asked = None;
+    while let Some(next) = Plug::ALL.into_iter().find(|plug| seen.iter().all(|seen| seen.plug != *plug)) {
+        match wiring::find(&mut probe)? {
+            Some(plug) if seen.iter().all(|seen| seen.plug != plug) => {
+                let look = wiring::look(plug, &mut probe)?;
+                // Moved meanwhile?
+                if wiring::find(&mut probe)? == Some(plug) {
+                    let words = if look.is_good() { "as it should be" } else { "not as it should be" };
+                    eprintln!("position {}: {words}", plug.number());
+                    seen.push(look);
+                }
+            }
+            _ if !someone => break,
+            _ => {
+                if asked.replace(next) != Some(next) {
+                    eprintln!(
+                        "put the loop-back plug in position {} (in the printer's place)",
+                        next.number()
+                    );
+                }
+                sleep(LOOK);
+            }
+        }
+    }
+    probe(Levels::REST)?;
+    if seen.is_empty() {
+        bail!(
+            "no loop-back plug answers: it goes in the printer's place; docs/wiring.md says how to make it"
+        );
+    }
+    let verdict = wiring::judge(&seen);
+    let mut out = std::io::stdout().lock();
+    let tried: Vec<u8> = seen.iter().map(|seen| seen.plug.number()).collect();
+    if json {
+        let (faults, astray) = match &verdict {
+            Verdict::Good => (vec![], vec![]),
+            Verdict::One(faults) => (faults.iter().map(ToString::to_string).collect(), vec![]),
+            Verdict::Several(astray) => (vec![], astray.clone()),
+        };
+        let good = verdict == Verdict::Good;
+        let all = json!({ "good": good, "positions": tried, "one_of": faults, "astray": astray });
+        writeln!(out, "{}", serde_json::to_string_pretty(&all)?)?;
+    } else {
+        match &verdict {
+            Verdict::Good if tried.len() == Plug::ALL.len() => {
+                writeln!(out, "the wiring is good: all outputs and inputs do what they should")?;
+            }
+            Verdict::Good => writeln!(out, "good so far; not tried: the other positions of the plug")?,
+            Verdict::One(faults) => {
+                for (i, fault) in faults.iter().enumerate() {
+                    writeln!(out, "{}{fault}", if i > 0 { "or: " } else { "" })?;
+                }
+            }
+            Verdict::Several(astray) => {
+                writeln!(out, "more than one fault:")?;
+                for astray in astray {
+                    writeln!(out, "  {astray}")?;
+                }
+            }
+        }
+    }
+    if verdict != Verdict::Good {
+        bail!("the wiring is not good");
+    }
+    Ok(())
+}
+
+fn walk(query: &mut Query<'_>) -> Result<()> {
+    let (lines, _) = query.lines(PATIENCE)?;
+    // Inputs rest high; whatever is switched on at the other end holds one of them low.
+    if lines.high(Lines::POWER) && lines.0 & 0x1f != 0x1f {
+        bail!("something that is switched on is connected; take the cable off the printer first");
+    }
+    say_on_interrupt("the lines stay as they are until the next job begins");
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "at rest: nStrobe, nAutoFd, nInit high; nSelectIn and the data lines low")?;
+    for (bit, line) in OUTPUTS.iter().enumerate() {
+        let levels = Levels(Levels::REST.0 ^ 1 << bit);
+        probe(query, levels)?;
+        let level = if levels.0 >> bit & 1 == 1 { "high" } else { "low" };
+        writeln!(out, "{line} is {level}, all others at rest")?;
+        out.flush()?;
+        sleep(HOLD);
+    }
+    probe(query, Levels::REST)?;
+    writeln!(out, "all at rest again")?;
+    Ok(())
+}

@@ -1,0 +1,127 @@
+//! `foilpress bridge status --watch`: the same again and again, until it is interrupted.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use protocol::link::message::Ask;
+use serde_json::json;
+
+use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open, other_version};
+use crate::send::Address;
+use crate::send::query::{Query, Reply};
+use crate::send::transport::Transport;
+
+/// Between two looks at the bridge.
+const LOOK: Duration = Duration::from_secs(1);
+
+/// Between two questions to the printer, which is asked between jobs only.
+const ASK: Duration = Duration::from_secs(5);
+
+/// What is on the screen.
+struct Screen {
+    json: bool,
+    terminal: bool,
+    /// What was shown last, and on how many lines.
+    shown: String,
+}
+
+impl Screen {
+    /// Shows a text in place of the last one; where that cannot be, under it if it is another one.
+    fn show(&mut self, text: String) -> std::io::Result<()> {
+        if text == self.shown {
+            return Ok(());
+        }
+        let mut out = std::io::stdout().lock();
+        if self.terminal && !self.shown.is_empty() {
+            // Up to the first line, and everything below it away.
+            write!(out, "\x1b[{}F\x1b[J", self.shown.lines().count())?;
+        } else if !self.json && !self.shown.is_empty() {
+            writeln!(out)?;
+        }
+        out.write_all(text.as_bytes())?;
+        self.shown = text;
+        out.flush()
+    }
+
+    fn show_found(&mut self, found: &Found) -> Result<()> {
+        let mut text = Vec::new();
+        if self.json {
+            writeln!(text, "{}", serde_json::to_string(&found.json())?)?;
+        } else {
+            found.write(&mut text)?;
+        }
+        Ok(self.show(String::from_utf8_lossy(&text).into_owned())?)
+    }
+
+    fn show_loss(&mut self, address: &Address, error: &anyhow::Error) -> Result<()> {
+        Ok(self.show(if self.json {
+            format!("{}\n", json!({ "address": address.to_string(), "lost": format!("{error:#}") }))
+        } else {
+            format!("{address}: {error:#}; looking again\n")
+        })?)
+    }
+}
+
+/// Shows how bridge and printer are, for ever. A bridge that goes away is waited for, once it has been there.
+pub fn run(address: &Address, json: bool) -> Result<()> {
+    let mut screen =
+        Screen { json, terminal: std::io::stdout().is_terminal() && !json, shown: String::new() };
+    let mut been = false;
+    loop {
+        let met = match address.open() {
+            Ok(mut link) => follow(&mut *link, &mut screen, &mut been),
+            Err(error) => Err(error.into()),
+        };
+        match met {
+            Err(error) if been && error.downcast_ref::<std::io::Error>().is_none() => {
+                screen.show_loss(address, &error)?;
+            }
+            Err(error) => return Err(error),
+            Ok(never) => match never {},
+        }
+        sleep(LOOK);
+    }
+}
+
+/// Follows one connection to its end, which is an error; one of standard output's is an [`std::io::Error`].
+fn follow(
+    link: &mut dyn Transport,
+    screen: &mut Screen,
+    been: &mut bool,
+) -> Result<std::convert::Infallible> {
+    let mut query = Query::new(link, PATIENCE)?;
+    if let Some(other) = other_version(query.bridge()) {
+        bail!(other);
+    }
+    let (lines, fault) = query.lines(PATIENCE)?;
+    let mut found = Found {
+        bridge: query.bridge().clone(),
+        progress: *query.progress(),
+        lines,
+        fault,
+        device_id: Reply::NotNow,
+        status: Reply::NotNow,
+    };
+    *been = true;
+    let mut asked: Option<Instant> = None;
+    loop {
+        match (found.fault, is_open(&found.progress)) {
+            (Some(fault), _) => found.status = Reply::Stopped(fault),
+            (None, true) => found.status = Reply::NotNow,
+            (None, false) if asked.is_none_or(|at| at.elapsed() >= ASK) => {
+                if !matches!(found.device_id, Reply::Bytes(_) | Reply::OneWay) {
+                    found.device_id = query.printer(Ask::DeviceId, PRINTER_PATIENCE)?;
+                }
+                found.status = query.printer(Ask::Printer, PRINTER_PATIENCE)?;
+                asked = Some(Instant::now());
+            }
+            (None, false) => {}
+        }
+        screen.show_found(&found)?;
+        sleep(LOOK);
+        found.progress = query.ask_progress(PATIENCE)?;
+        (found.lines, found.fault) = query.lines(PATIENCE)?;
+    }
+}
