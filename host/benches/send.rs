@@ -75,7 +75,7 @@ fn talk(bencher: Bencher) {
 /// The conversation with a bridge that has endless memory and a printer without mechanics.
 fn talk_over(session: &mut Session<'_>, length: u32) -> Outcome {
     let mut reader = Reader::new();
-    let mut accepted = 0;
+    let (mut accepted, mut open) = (0, false);
     session.connected(Duration::ZERO);
     for step in 0.. {
         let now = Duration::from_millis(step);
@@ -102,14 +102,18 @@ fn talk_over(session: &mut Session<'_>, length: u32) -> Outcome {
                         firmware: "bench",
                     });
                 }
+                ToBridge::Begin { .. } => open = true,
                 ToBridge::Data { bytes, .. } => accepted += bytes.len() as u32,
                 _ => {}
             }
         }
-        let state = if accepted == length { JobState::Done } else { JobState::Printing };
-        let job = u32::from(step > 2);
+        let state = match open {
+            false => JobState::None,
+            true if accepted == length => JobState::Done,
+            true => JobState::Printing,
+        };
         say(ToHost::Progress(Progress {
-            job,
+            job: open.into(),
             state,
             accepted,
             limit: length,

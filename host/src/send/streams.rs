@@ -5,7 +5,7 @@
 //! would make of the code is made here and compared with the job, byte for byte. A job that does not come back the
 //! same (another driver's packing, a leading reset, one plane of black in its own mode) is not for this form: it goes
 //! as it is.
-//! Cost: the job is read three times, one plane is held at a time. Limits: the job must be one whole legal one.
+//! Cost: the job is read three times, one plane for each thread is held at a time. Limits: the job must be one whole legal one.
 //! Source: `docs/wire-format.md`, section 4.
 
 use protocol::ink::{Ink, Kind};
@@ -16,6 +16,7 @@ use protocol::rgl::{
     Command, Compression, Fault, FoilConsent, JobWriter, Order, Page, Resolution, Step, parse,
 };
 use protocol::runs::{self, Decoder, Header, MAX_BAND, MAX_HEADER, band_bytes, encode, stride};
+use rayon::prelude::*;
 
 use crate::observe::Observer;
 
@@ -26,15 +27,20 @@ pub fn of_job(job: &[u8], observer: &dyn Observer) -> Option<Vec<u8>> {
     let length = parts.header.write(&mut head);
     let mut streams = head[..length].to_vec();
     let (columns, rows) = (parts.header.columns(), parts.header.rows());
-    let mut plane = vec![0; stride(columns) * usize::from(rows)];
-    let mut buffer = vec![0; MAX_BAND];
     observer.begin("pass streams", 2 * job.len() as u64);
-    for commands in &parts.passes {
-        plane.fill(0);
-        draw(commands, columns, &mut plane)?;
-        encode(columns, rows, &plane, &mut buffer, |band| streams.extend_from_slice(band)).ok()?;
-        observer.advance(commands.len() as u64);
-    }
+    let coded: Option<Vec<Vec<u8>>> = parts
+        .passes
+        .par_iter()
+        .map(|commands| {
+            let mut plane = vec![0; stride(columns) * usize::from(rows)];
+            draw(commands, columns, &mut plane)?;
+            let (mut stream, mut buffer) = (Vec::new(), vec![0; MAX_BAND]);
+            encode(columns, rows, &plane, &mut buffer, |band| stream.extend_from_slice(band)).ok()?;
+            observer.advance(commands.len() as u64);
+            Some(stream)
+        })
+        .collect();
+    streams.extend(coded?.concat());
     let mut left = job;
     let mut same = true;
     expand(&streams, &mut |bytes| {

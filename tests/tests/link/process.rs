@@ -29,6 +29,8 @@ const ROLE: &str = "FOILPRESS_TEST_SENDER";
 #[derive(Default)]
 struct Board {
     printed: Mutex<Vec<u8>>,
+    /// The printer is busy once it has taken something: the job stays open for as long as a test needs.
+    busy: AtomicBool,
     stop: AtomicBool,
     /// Its power goes, and its memory with it.
     forget: AtomicBool,
@@ -92,8 +94,11 @@ fn bridge_at(path: &Path, rate: usize, band: usize, board: &Board) {
         }
         engine.port(Lines::IDLE, None);
         let bytes = engine.output();
-        let count = bytes.len().min(rate);
-        board.printed.lock().unwrap().extend_from_slice(&bytes[..count]);
+        let mut printed = board.printed.lock().unwrap();
+        let busy = Board::is(&board.busy) && !printed.is_empty();
+        let count = if busy { 0 } else { bytes.len().min(rate) };
+        printed.extend_from_slice(&bytes[..count]);
+        drop(printed);
         engine.consumed(count);
         let mut frame = [0; MAX];
         loop {
@@ -220,12 +225,17 @@ impl Bench {
         }
     }
 
-    /// A sender that is killed once something has been printed.
+    /// A sender that is killed once something has been printed; the printer is busy from then on.
     fn begun(&self) {
+        self.keep_busy(true);
         let mut child = spawn(&self.jobs());
         self.until_it_prints();
         child.kill().unwrap();
         child.wait().unwrap();
+    }
+
+    fn keep_busy(&self, busy: bool) {
+        self.board.busy.store(busy, Ordering::Relaxed);
     }
 
     /// The program itself, with the job in a file beside the journal.
@@ -306,7 +316,8 @@ fn a_bridge_without_memory_for_the_page_gets_the_job_as_it_is() {
 
 #[test]
 fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
-    let bench = Bench::new(8, 20);
+    let bench = Bench::new(8, 100);
+    bench.keep_busy(true);
     let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
     bench.until_it_prints();
     bench.board.forget.store(true, Ordering::Relaxed);
@@ -321,6 +332,7 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
     assert_eq!(bench.printed(), printed, "something was sent all the same");
     bench.says(0, "bridge reset --to BRIDGE");
     assert_eq!(bench.board.resets.load(Ordering::Relaxed), 1);
+    bench.keep_busy(false);
     bench.says(0, "send job.rgl --to BRIDGE");
     assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
 }
@@ -331,6 +343,7 @@ fn a_reset_is_refused_while_a_job_is_open() {
     bench.begun();
     let said = bench.says(1, "bridge reset --to BRIDGE");
     assert!(said.contains("is printing job"), "{said}");
+    bench.keep_busy(false);
     assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
     assert_eq!(bench.board.resets.load(Ordering::Relaxed), 0);
     assert!(bench.printed() == bench.job, "other bytes at the port");
@@ -368,6 +381,7 @@ fn killed_again_and_again(kind: JobKind) {
 fn another_process_cancels_what_a_killed_one_has_begun() {
     let bench = Bench::new(8, 20).queue(JobKind::Streams);
     bench.begun();
+    bench.keep_busy(false);
     assert_eq!(resume(&bench.jobs(), true), Outcome::Cancelled);
     let printed = bench.printed();
     assert!(printed.len() < bench.job.len() && is_a_whole_job(&printed));
@@ -401,6 +415,7 @@ fn while_a_job_is_open_the_lines_are_told_and_the_printer_is_left_alone() {
     assert_eq!(query.printer(Ask::Printer, PATIENCE).unwrap(), Reply::NotNow);
     assert_eq!(query.lines(PATIENCE).unwrap(), (Lines::IDLE, None));
     drop(link);
+    bench.keep_busy(false);
     assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
     assert!(bench.job.starts_with(&before) && bench.printed() == bench.job);
 }
