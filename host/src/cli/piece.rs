@@ -10,6 +10,7 @@ use clap::Args;
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
 use protocol::rgl::Page;
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::deliver::DeliverArgs;
@@ -129,10 +130,10 @@ pub fn write_job(
     let picture = thumbnail(printed, ground, THUMBNAIL);
     write(&folder.join("plan.html"), page::html(plan, &picture)?.as_bytes())?;
     save_sheet(printed, laid.area, ground, &folder.join("preview.png"))?;
-    for (number, pass) in (1..).zip(&printout.passes) {
-        let name = format!("preview-{number:02}-{}.png", pass.ink.name());
-        save_pass(pass, laid.area, ground, &folder.join(name))?;
-    }
+    printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
+        let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
+        save_pass(pass, laid.area, ground, &folder.join(name))
+    })?;
     Ok(())
 }
 
