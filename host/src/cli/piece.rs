@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use inks::{InkSet, Library};
-use protocol::ink::Ink;
 use protocol::rgl::Page;
 use rayon::prelude::*;
 use serde_json::json;
@@ -211,6 +210,5 @@ pub fn print_on(
             target.join("plan.html").display()
         ))?;
     }
-    let inks: Vec<Ink> = separation.plan.cartridges.clone();
-    deliver.send(job.name, &bytes, &inks, observer)
+    deliver.send(job.name, &bytes, observer)
 }
