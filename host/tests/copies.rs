@@ -53,7 +53,9 @@ fn bridge_at(path: &Path, printed: &Mutex<Vec<u8>>, stop: &AtomicBool) {
                 _ => Outcome::Done,
             });
         }
-        (0..50).for_each(|_| engine.work());
+        for _ in 0..50 {
+            engine.work();
+        }
         engine.port(Lines::IDLE, None);
         let count = engine.output().len();
         printed.lock().unwrap().extend_from_slice(engine.output());

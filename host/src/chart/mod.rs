@@ -17,6 +17,7 @@ use inks::Stack;
 
 use crate::halftone::HalftoneError;
 use crate::sheet::SheetError;
+use crate::weights::WeightError;
 
 /// Why there is no chart.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -56,6 +57,9 @@ pub enum ChartError {
         /// Name of the paper.
         paper: &'static str,
     },
+    /// A ramp without places. A bug if it is ever seen.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
     /// The halftone refused.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),

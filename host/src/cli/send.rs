@@ -46,8 +46,15 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     deliver(&name, &job, &checked, &args.to, args.copies, observer)
 }
 
-/// Checks a job and takes it to its destination, once for each copy.
-pub fn deliver(name: &str, job: &[u8], to: &Destination, copies: u16, observer: &dyn Observer) -> Result<()> {
+/// Takes a job that was checked to its destination, once for each copy.
+pub fn deliver(
+    name: &str,
+    job: &[u8],
+    checked: &Checked,
+    to: &Destination,
+    copies: u16,
+    observer: &dyn Observer,
+) -> Result<()> {
     match to {
         Destination::File(path) => {
             let staged = Staged::file(path)?;
