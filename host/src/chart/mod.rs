@@ -1,7 +1,7 @@
 //! Charts: pieces made by the program itself, to look at inks, to measure them, and to measure the machine.
 //!
 //! [`ramp`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
-//! [`registration`] shows how far passes are apart, [`calibration`] where the machine begins and how far it feeds. Each gives
+//! [`registration()`] shows how far passes are apart, [`calibration()`] where the machine begins and how far it feeds. Each gives
 //! a [`Piece`](crate::sheet::Piece) that goes the way of every other print.
 
 pub mod calibration;
