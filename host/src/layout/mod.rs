@@ -272,7 +272,8 @@ pub fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutE
 pub fn arrange(piece: &Piece, layout: &Layout, observer: &dyn Observer) -> Result<Arranged, LayoutError> {
     let block = Block::of((piece.width(), piece.length()), layout)?;
     let mut stacks = piece.stacks().to_vec();
-    let in_use = separate::passes_of(&used(piece));
+    let marked = layout.crop_marks || layout.registration_marks;
+    let in_use = if marked { separate::passes_of(&used(piece)) } else { Vec::new() };
     let (marks, marks_left_out) = marks_of(layout, &in_use, &block, &mut stacks)?;
     let page = Page { piece, layout, block: &block, marks: &marks };
     let sheet = Sheet::new(layout.paper, stacks, page.render(observer))?;
@@ -448,9 +449,6 @@ fn marks_of(
     block: &Block,
     stacks: &mut Vec<Stack>,
 ) -> Result<(Vec<(Mark, u8)>, usize), LayoutError> {
-    if !layout.crop_marks && !layout.registration_marks {
-        return Ok((Vec::new(), 0));
-    }
     let (ticks, crosses) = match &layout.mark_inks[..] {
         [] => (best(in_use).into_iter().collect(), in_use.to_vec()),
         chosen => {
