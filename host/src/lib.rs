@@ -21,6 +21,8 @@ pub mod sheet;
 
 pub mod halftone;
 
+pub mod layout;
+
 pub mod separate;
 
 pub mod job;
@@ -36,5 +38,11 @@ pub mod inspect;
 pub mod preview;
 
 pub mod pipeline;
+
+pub mod chart;
+
+pub mod folders;
+
+pub mod ledger;
 
 pub mod cli;

@@ -9,10 +9,13 @@ use indicatif::HumanBytes;
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 
+use super::deliver::{loaded, next_sheet};
+use super::ledger;
 use super::output::{self, Staged};
 use crate::observe::Observer;
 use crate::send::finish::{self, Sheet, await_sheet};
 use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
+use crate::send::raw::RawError;
 use crate::send::session::{Outcome, Session};
 use crate::send::{self, Address, Checked, Destination, Event, find, streams, words};
 
@@ -34,25 +37,50 @@ pub struct Args {
     /// Send also to a printer that says it is no ALPS
     #[arg(long)]
     force: bool,
+    /// Sheets to print; the program waits between them
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
+    copies: u16,
 }
 
 /// Runs `send`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = super::read_job(&args.job)?;
     let name = args.job.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
-    deliver(&name, &job, &args.to, args.force, observer)
+    let checked = send::check(&job, observer)?;
+    if let Destination::Bridge(address) = &args.to {
+        observer.note(&loaded(address, &checked.inks));
+    }
+    deliver(&name, &job, &checked, &args.to, args.copies, args.force, observer)
 }
 
-/// Checks a job and takes it to its destination; with `force` also to a printer that is no ALPS.
-pub fn deliver(name: &str, job: &[u8], to: &Destination, force: bool, observer: &dyn Observer) -> Result<()> {
-    let checked = send::check(job, observer)?;
+/// Takes a job that was checked to its destination, once for each copy; with `force` also to a printer that is no ALPS.
+pub fn deliver(
+    name: &str,
+    job: &[u8],
+    checked: &Checked,
+    to: &Destination,
+    copies: u16,
+    force: bool,
+    observer: &dyn Observer,
+) -> Result<()> {
     match to {
         Destination::File(path) => {
             let staged = Staged::file(path)?;
             std::fs::write(staged.path(), job).with_context(|| format!("cannot write {}", path.display()))?;
             staged.commit()
         }
-        Destination::Raw(path) => to_device(name, job, &checked, path, observer),
+        Destination::Raw(path) => {
+            for copy in 1..=copies {
+                to_device(name, job, checked, path, observer)?;
+                if copy < copies && !next_sheet(copy, copies)? {
+                    let left = copies - copy;
+                    bail!(
+                        "{copy} of {copies} sheets are sent; send the job again with --copies {left} for the others"
+                    );
+                }
+            }
+            Ok(())
+        }
         Destination::Bridge(address) => {
             super::bridge::expect_alps(address, force, observer)?;
             let journal = Journal::of_user()?;
@@ -63,21 +91,36 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, force: bool, observer: 
                 Some(streams) => (JobKind::Streams, &streams[..]),
                 None => (JobKind::Raw, job),
             };
-            let queued = journal.queue(NewJob {
-                name,
-                to: address.to_string(),
-                kind,
-                data,
-                port_bytes: job.len() as u64,
-                passes: checked.passes,
-            })?;
+            // All are on disk before the first is printed, so that an interruption between two sheets loses none.
+            let mut queue = Vec::new();
+            for copy in 1..=copies {
+                let name = if copies == 1 { name.to_owned() } else { copy_name(name, copy, copies) };
+                let queued = journal.queue(NewJob {
+                    name: &name,
+                    to: address.to_string(),
+                    kind,
+                    data,
+                    port_bytes: job.len() as u64,
+                    passes: checked.passes.clone(),
+                })?;
+                let number = format!("{:08x}", queued.entry.record.job);
+                ledger::begun(&number, &name, checked, job.len() as u64, observer);
+                queue.push(queued);
+            }
             observer.note(&load(&checked.inks));
-            observer.note(&format!(
-                "{name} is queued as job {:08x}, {}; nothing is printed yet",
-                queued.entry.record.job,
-                how_large(kind, data.len(), job.len())
-            ));
-            go(queued, &journal, address, false, observer)
+            for (copy, queued) in (1..).zip(queue) {
+                observer.note(&format!(
+                    "{} is queued as job {:08x}, {}; nothing is printed yet",
+                    queued.entry.name,
+                    queued.entry.record.job,
+                    how_large(kind, data.len(), job.len())
+                ));
+                go(queued, &journal, address, false, observer)?;
+                if copy < copies && !next_sheet(copy, copies)? {
+                    bail!("{copy} of {copies} sheets are sent; `foilpress resume` sends the next one");
+                }
+            }
+            Ok(())
         }
     }
 }
@@ -95,12 +138,37 @@ fn how_large(kind: JobKind, sent: usize, printed: usize) -> String {
     }
 }
 
+/// What a copy is called.
+fn copy_name(name: &str, copy: u16, copies: u16) -> String {
+    format!("{name} (sheet {copy} of {copies})")
+}
+
+/// Whether these are the copies of one job that wait for each other.
+pub fn are_copies(names: &[&str]) -> bool {
+    let stem = |name: &str| name.rfind(" (sheet ").map(|at| name[..at].to_owned());
+    names
+        .first()
+        .and_then(|first| stem(first))
+        .is_some_and(|first| names.iter().all(|name| stem(name).as_deref() == Some(first.as_str())))
+}
+
 fn to_device(name: &str, job: &[u8], checked: &Checked, path: &Path, observer: &dyn Observer) -> Result<()> {
     observer.note(&load(&checked.inks));
     output::say_on_interrupt(
         "the printer may have a part of the job. Switch it off and on before the next one",
     );
-    send::raw::send(job, path, observer)?;
+    // A device has no numbers for jobs; the moment and the process are one.
+    let moment = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let number = format!("raw-{}-{}", moment.as_nanos(), std::process::id());
+    ledger::begun(&number, name, checked, job.len() as u64, observer);
+    let sent = send::raw::send(job, path, observer);
+    let taken = match &sent {
+        Ok(()) => job.len(),
+        Err(RawError::Write { taken, .. }) => *taken,
+        Err(_) => 0,
+    };
+    ledger::printed(&number, taken as u64, sent.is_ok(), observer);
+    sent?;
     observer.note(&format!(
         "{name}: the system has taken all {} bytes for the printer; whether they are printed only the printer shows",
         job.len()
@@ -130,35 +198,10 @@ pub fn go(
     ));
     let data = std::mem::take(&mut job.data);
     let mut session = Session::new(job.entry.record, &data);
-    if cancel {
-        session.cancel();
-        // Whatever happens now: the next process that opens the job cancels it too.
-        job.save(session.record())?;
-    }
-    let mut reporter = Reporter::new(&job, observer);
-    let outcome = match session.outcome() {
-        Some(outcome) => outcome,
-        None => {
-            // Once the bridge is known, it is that one, whatever its port is called when it comes back.
-            let known = Cell::new(job.entry.record.bridge);
-            let mut watch = |event: Event<'_>| {
-                if let Event::Connected(bridge) = &event {
-                    known.set(Some(bridge.serial));
-                }
-                reporter.tell(&event);
-            };
-            let mut open = || find::open(address, known.get());
-            send::run(&mut session, &mut open, &mut |record| job.save(record), &mut watch).with_context(
-                || {
-                    format!(
-                        "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
-                        job.entry.name
-                    )
-                },
-            )?
-        }
-    };
-    observer.end();
+    let result = converse(&mut job, &mut session, address, cancel, observer);
+    let whole = matches!(result, Ok(Outcome::Printed));
+    ledger::printed(&format!("{number:08x}"), session.record().printed.into(), whole, observer);
+    let outcome = result?;
     let record = &job.entry.record;
     let refused = outcome == Outcome::Broken && record.kind == JobKind::Streams && record.printed == 0;
     if refused && !cancel {
@@ -176,6 +219,45 @@ pub fn go(
         Outcome::Broken | Outcome::Lost | Outcome::Forgotten => bail!("{text}"),
     }
     Ok(())
+}
+
+/// The conversation with the bridge until it says how the job ended.
+fn converse(
+    job: &mut OpenJob,
+    session: &mut Session<'_>,
+    address: &Address,
+    cancel: bool,
+    observer: &dyn Observer,
+) -> Result<Outcome> {
+    let number = job.entry.record.job;
+    if cancel {
+        session.cancel();
+        // Whatever happens now: the next process that opens the job cancels it too.
+        job.save(session.record())?;
+    }
+    let mut reporter = Reporter::new(job, observer);
+    let outcome = match session.outcome() {
+        Some(outcome) => outcome,
+        None => {
+            // Once the bridge is known, it is that one, whatever its port is called when it comes back.
+            let known = Cell::new(job.entry.record.bridge);
+            let mut watch = |event: Event<'_>| {
+                if let Event::Connected(bridge) = &event {
+                    known.set(Some(bridge.serial));
+                }
+                reporter.tell(&event);
+            };
+            let mut open = || find::open(address, known.get());
+            send::run(session, &mut open, &mut |record| job.save(record), &mut watch).with_context(|| {
+                format!(
+                    "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
+                    job.entry.name
+                )
+            })?
+        }
+    };
+    observer.end();
+    Ok(outcome)
 }
 
 /// A bridge with too little memory for the page, or too old for its streams, has printed nothing of it: it gets what the
@@ -200,9 +282,10 @@ fn once_more_as_it_is(
         port_bytes: bytes.len() as u64,
         passes: job.entry.passes.clone(),
     })?;
+    let number = format!("{:08x}", queued.entry.record.job);
+    ledger::begun(&number, &queued.entry.name, &send::check(&bytes, observer)?, bytes.len() as u64, observer);
     observer.note(&format!(
-        "this bridge does not take the page as pass streams; the same job goes byte for byte, as job {:08x}",
-        queued.entry.record.job
+        "this bridge does not take the page as pass streams; the same job goes byte for byte, as job {number}"
     ));
     go(queued, journal, address, false, observer)
 }

@@ -1,11 +1,11 @@
 //! A piece is a rectangle of dots that has not found its place on a page yet.
 //!
 //! Layers, halftoned documents and charts make pieces; the layout repeats, mirrors, marks and places them, and what
-//! comes out is a [`Sheet`](super::Sheet).
+//! comes out is a [`Sheet`].
 
 use inks::Stack;
 
-use super::{SheetError, check_stacks};
+use super::{Sheet, SheetError, check_stacks};
 
 /// One stack for every dot of a rectangle at 600 dpi. Stack 0 is always the bare substrate.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,5 +48,13 @@ impl Piece {
     /// The stack number of every dot, row by row.
     pub fn index(&self) -> &[u8] {
         &self.index
+    }
+}
+
+impl From<Sheet> for Piece {
+    /// All of a sheet, without its paper.
+    fn from(sheet: Sheet) -> Piece {
+        let (width, length) = (sheet.width(), sheet.length());
+        Piece { width, length, stacks: sheet.stacks, index: sheet.index }
     }
 }
