@@ -10,6 +10,7 @@ mod chain;
 mod doctor;
 mod inks;
 mod inspect;
+mod layers;
 mod output;
 mod print;
 mod progress;
@@ -42,6 +43,7 @@ const LARGEST_JOB: u64 = 256 << 20;
     after_help = "Examples:\n  \
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
+        foilpress layers white.png gold.png black.png --finish artwork\n  \
         foilpress inks show MS+C\n  \
         foilpress inspect job.rgl --passes passes/\n  \
         foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
@@ -60,6 +62,8 @@ struct Args {
 enum Command {
     /// Print a document: the job, the simulated sheet, and everything to look at, in one folder
     Print(Box<print::Args>),
+    /// Print spot-colour art: a picture for each ink, reserved colours, or named layers
+    Layers(Box<layers::Args>),
     /// Take a document apart into a few basis materials and their weight maps
     Factor(chain::Factor),
     /// Fit basis materials (or every pixel) to mixtures of printable stacks
@@ -108,6 +112,7 @@ fn run(args: Args) -> Result<()> {
     let observer = &Progress::new(args.quiet);
     match args.command {
         Command::Print(args) => print::run(&args, observer),
+        Command::Layers(args) => layers::run(&args, observer),
         Command::Factor(args) => args.run(observer),
         Command::Map(args) => args.run(observer),
         Command::Halftone(args) => args.run(observer),
