@@ -58,7 +58,7 @@ pub(super) struct Pixels {
 }
 
 /// Reads a picture and brings its colours to sRGB.
-pub(super) fn read(path: &Path, _: &Options) -> Result<Pixels, LayersError> {
+pub(super) fn read(path: &Path) -> Result<Pixels, LayersError> {
     let file = File::open(path).map_err(io(path, "open it"))?;
     let decoded = raster::decode(path, BufReader::new(file))?;
     let (width, height) = (decoded.image.width(), decoded.image.height());
@@ -119,7 +119,8 @@ fn to_srgb(path: &Path, profile: &[u8], rgba: &mut [u8]) -> Result<Option<String
 /// Art from one picture: reserved colours as layers if asked for, all else as colour.
 pub(super) fn artwork(name: &str, pixels: Pixels, options: &Options) -> Result<Artwork, LayersError> {
     let size = (pixels.width, pixels.height);
-    let dots = raster::dots(&pixels.path, size, pixels.density, options.size, options.dpi)?;
+    let sides = (f64::from(size.0), f64::from(size.1));
+    let dots = raster::dots(&pixels.path, sides, pixels.density, options.size, options.dpi)?;
     let Pixels { path, mut rgba, mut notes, .. } = pixels;
     let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
     let to_dots = |rgba: &[u8], is: &(dyn Fn(&[u8]) -> bool + Sync)| {

@@ -25,7 +25,7 @@ pub mod white;
 use std::path::{Path, PathBuf};
 
 use inks::InkSet;
-use protocol::ink::Ink;
+use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
 use crate::job::placement::Size;
@@ -167,7 +167,7 @@ fn one(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwor
     if !options.reserved && names::ink(&stem(file)).is_some() {
         return named_files(&stem(file), &[file.to_path_buf()], options, observer);
     }
-    let picture = colour::read(file, options)?;
+    let picture = colour::read(file)?;
     let mut art = colour::artwork(&stem(file), picture, options)?;
     if let Some(known) = names::closest(&stem(file)).filter(|_| !options.reserved) {
         art.notes.push(format!(
@@ -226,7 +226,7 @@ fn named_files(
     observer.begin("reading layers", files.len() as u64);
     let mut dots = None;
     let mut first: Option<(PathBuf, (u32, u32), Option<raster::Density>, String)> = None;
-    let mut read = Vec::new();
+    let mut art: Option<Artwork> = None;
     // Two at a time: both cores work and no more than two layers are in memory as bytes.
     for (files, named) in files.chunks(2).zip(named.chunks(2)) {
         let scans: Vec<_> = files.par_iter().map(|file| raster::scan(file)).collect();
@@ -235,7 +235,8 @@ fn named_files(
             let size = (scan.width, scan.height);
             match &first {
                 None => {
-                    dots = Some(raster::dots(&scan.path, size, scan.density, options.size, options.dpi)?);
+                    let sides = (f64::from(size.0), f64::from(size.1));
+                    dots = Some(raster::dots(&scan.path, sides, scan.density, options.size, options.dpi)?);
                     first = Some((scan.path.clone(), size, scan.density, scan.size()));
                 }
                 Some((path, pixels, density, expected)) => {
@@ -256,36 +257,75 @@ fn named_files(
                     }
                 }
             }
-            let (width, length) = dots.unwrap_or((1, 1));
-            read.push(layer(scan, *named, (width, length), options));
+            let dots = dots.unwrap_or((1, 1));
+            let file =
+                scan.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+            art.get_or_insert_with(|| Artwork::blank(name, dots)).add(scan, &file, *named, false, options);
             observer.advance(1);
         }
     }
     observer.end();
-    let (width, length) = dots.unwrap_or((1, 1));
-    let (layers, notes): (Vec<Layer>, Vec<Vec<String>>) = read.into_iter().unzip();
-    let drawn = drawn(width, length, &layers);
-    Ok(Artwork {
-        name: name.into(),
-        width,
-        length,
-        layers,
-        colour: None,
-        drawn,
-        opaque: None,
-        notes: notes.concat(),
-    })
+    // There is a file, so there is art.
+    art.ok_or_else(|| LayersError::Nothing { reason: "no file was given".into() })
+}
+
+impl Artwork {
+    /// Art of so many dots on which nothing is drawn.
+    fn blank(name: &str, (width, length): (usize, usize)) -> Artwork {
+        Artwork {
+            name: name.into(),
+            width,
+            length,
+            layers: Vec::new(),
+            colour: None,
+            drawn: bits::blank(width, length),
+            opaque: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Adds a layer. `plate` says that the coverage is a printing plate's, whose process inks have tones.
+    fn add(&mut self, scan: Scan, name: &str, named: names::Named, plate: bool, options: &Options) {
+        let (layer, mut notes) = layer(scan, name, named, plate, (self.width, self.length), options);
+        match &layer.shape {
+            Shape::Solid(plane) => bits::add(&mut self.drawn, plane),
+            Shape::Tone(tones) => {
+                bits::add(&mut self.drawn, &bits::from_bytes(self.width, tones, |c| c > PLAIN))
+            }
+        }
+        self.layers.push(layer);
+        self.notes.append(&mut notes);
+    }
+}
+
+/// The ink that a layer, channel or plate of a file names. One that names none is left out with a note, unless it looks
+/// like a slip of the pen.
+fn named_part(
+    path: &Path,
+    name: &str,
+    what: &str,
+    notes: &mut Vec<String>,
+) -> Result<Option<names::Named>, LayersError> {
+    let named = names::ink(name);
+    if named.is_none() {
+        if let suggestion @ Some(_) = names::closest(name) {
+            return Err(LayersError::UnknownInk { path: path.to_path_buf(), name: name.into(), suggestion });
+        }
+        notes.push(format!("{}: {what} `{name}` names no ink: left out", path.display()));
+    }
+    Ok(named)
 }
 
 /// A layer from its coverage, and what there is to say about it.
 fn layer(
     scan: Scan,
+    name: &str,
     named: names::Named,
+    plate: bool,
     (width, length): (usize, usize),
     options: &Options,
 ) -> (Layer, Vec<String>) {
     let mut notes = Vec::new();
-    let name = scan.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     match scan.by {
         Coverage::Dark => {}
         Coverage::Opaque => notes.push(format!("{name}: ink is where it is not transparent")),
@@ -299,12 +339,17 @@ fn layer(
             scan.size()
         ));
     }
-    let tones = options.halftone.contains(named.ink);
-    if !tones && let Some(note) = neither(&name, &scan.coverage) {
+    let toned = plate && named.ink.kind() == Kind::Process && has_tones(&scan.coverage);
+    if toned {
+        notes.push(format!("{name}: the plate has tones, so it is printed as dots"));
+    }
+    let tones = toned || options.halftone.contains(named.ink);
+    if !tones && let Some(note) = neither(name, &scan.coverage) {
         notes.push(note);
     }
     let coverage = raster::resample(scan.coverage, (scan.width, scan.height), (width, length));
-    let layer = Layer { ink: named.ink, name, place: named.place, shape: shape(width, coverage, tones) };
+    let layer =
+        Layer { ink: named.ink, name: name.into(), place: named.place, shape: shape(width, coverage, tones) };
     if let Shape::Solid(plane) = &layer.shape
         && plane.dots() == 0
     {
@@ -336,16 +381,11 @@ fn neither(name: &str, coverage: &[u8]) -> Option<String> {
     })
 }
 
-/// Dots on which any layer has ink.
-fn drawn(width: usize, length: usize, layers: &[Layer]) -> Plane {
-    let mut drawn = bits::blank(width, length);
-    for layer in layers {
-        match &layer.shape {
-            Shape::Solid(plane) => bits::add(&mut drawn, plane),
-            Shape::Tone(coverage) => bits::add(&mut drawn, &bits::from_bytes(width, coverage, |c| c > PLAIN)),
-        }
-    }
-    drawn
+/// Whether coverage has tones, not only edges: more than a twentieth of what is not bare is neither full nor none.
+fn has_tones(coverage: &[u8]) -> bool {
+    let inked = coverage.par_iter().filter(|&&c| c > PLAIN).count();
+    let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
+    20 * between > inked
 }
 
 /// A file's name without its ending.

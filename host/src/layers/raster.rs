@@ -91,7 +91,7 @@ impl Scan {
 }
 
 /// Gathers coverage pixel by pixel and decides by which rule at the end.
-struct Gather {
+pub(super) struct Gather {
     dark: Vec<u8>,
     alpha: Vec<u8>,
     /// Least and largest red, green and blue among opaque pixels.
@@ -103,7 +103,7 @@ impl Gather {
     /// Colours further apart than this in any channel are two colours.
     const ONE_COLOUR: u8 = 24;
 
-    fn new(pixels: usize, alpha: bool) -> Gather {
+    pub fn new(pixels: usize, alpha: bool) -> Gather {
         Gather {
             dark: Vec::with_capacity(pixels),
             alpha: Vec::with_capacity(if alpha { pixels } else { 0 }),
@@ -112,7 +112,8 @@ impl Gather {
         }
     }
 
-    fn row(&mut self, row: &[u8], channels: usize) {
+    /// Adds pixels of so many channels: grey, grey and alpha, RGB, RGB and alpha.
+    pub fn row(&mut self, row: &[u8], channels: usize) {
         match channels {
             1 => self.dark.extend(row.iter().map(|&v| 255 - v)),
             3 => self.dark.extend(row.as_chunks::<3>().0.iter().map(|&[r, g, b]| 255 - r.min(g).min(b))),
@@ -133,7 +134,8 @@ impl Gather {
         }
     }
 
-    fn finish(self) -> (Vec<u8>, Coverage) {
+    /// The coverage, and by which rule.
+    pub fn finish(self) -> (Vec<u8>, Coverage) {
         if !self.transparent {
             return (self.dark, Coverage::Dark);
         }
@@ -272,16 +274,16 @@ fn jfif_density(bytes: &[u8]) -> Option<Density> {
 /// Dots of 600 dpi that so many pixels fill: as the user says, else as the file says.
 pub(super) fn dots(
     path: &Path,
-    pixels: (u32, u32),
+    pixels: (f64, f64),
     density: Option<Density>,
     size: Option<Size>,
     dpi: Option<f64>,
 ) -> Result<(usize, usize), LayersError> {
     let (width, height) = pixels;
     let own = dpi.map(|dpi| (dpi, dpi)).or(density);
-    let inch = |(x, y): Density| (25.4 * f64::from(width) / x, 25.4 * f64::from(height) / y);
+    let inch = |(x, y): Density| (25.4 * width / x, 25.4 * height / y);
     let own_mm = own.map(inch);
-    let aspect = own_mm.map_or(f64::from(height) / f64::from(width), |(width, height)| height / width);
+    let aspect = own_mm.map_or(height / width, |(width, height)| height / width);
     let (width_mm, height_mm) = match (size, own_mm) {
         (Some(Size { width, height: None }), _) => (width, width * aspect),
         (Some(Size { width, height: Some(height) }), _) => {
@@ -289,7 +291,10 @@ pub(super) fn dots(
             (width, width * aspect)
         }
         (None, Some(own)) => own,
-        (None, None) => return Err(LayersError::NoSize { path: path.to_path_buf(), width, height }),
+        (None, None) => {
+            let (width, height) = (width as u32, height as u32);
+            return Err(LayersError::NoSize { path: path.to_path_buf(), width, height });
+        }
     };
     let (across, down) = ((width_mm / MM).round(), (height_mm / MM).round());
     if !(across >= 1.0 && down >= 1.0) {
