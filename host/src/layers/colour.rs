@@ -323,3 +323,85 @@ impl Materials for Lattice {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observe::Silent;
+    use proptest::prelude::*;
+
+    #[test]
+    fn greys_reflect_what_they_should_and_white_is_bare_paper() {
+        let greys: Vec<u8> = (0..=255).collect();
+        let colour = Colour { width: 256, height: 1, rgb: greys.iter().flat_map(|&v| [v; 3]).collect() };
+        let (library, inks) = (Library::builtin(), InkSet::default());
+        let mix = colour.mix(&inks, &library, &Silent).unwrap();
+        let space = Space::half_angle(SAMPLES);
+        let row = |stack: &str| {
+            let entry = library.entry(&stack.parse().unwrap()).unwrap();
+            space.row(&entry.curve_at(space.angles()))
+        };
+        let (paper, darkest) = (row("substrate"), row("K"));
+        let mut shares = vec![0.0; mix.stacks.len()];
+        for (pixel, &v) in greys.iter().enumerate() {
+            mix.shares(pixel, &mut shares);
+            let light = f64::from(crate::document::picture::decode_srgb(f32::from(v) / 255.0));
+            // The raking half of the curve: the body's colour without the surface's gloss.
+            let at = 3 * (SAMPLES - 1) + 1;
+            let printed: f64 = mix
+                .stacks
+                .iter()
+                .zip(&shares)
+                .map(|(stack, share)| share * row(&stack.to_string())[at])
+                .sum();
+            let wanted = darkest[at] + light * (paper[at] - darkest[at]);
+            assert!((printed - wanted).abs() < 0.02 * paper[at], "grey {v}: {printed}, not {wanted}");
+        }
+        mix.shares(255, &mut shares);
+        assert_eq!(shares[0], 1.0, "white has no ink: {shares:?}");
+    }
+
+    #[test]
+    fn averages_are_of_light_not_of_numbers() {
+        let checks = (0..64 * 64).flat_map(|at| if (at % 64 + at / 64) % 2 == 0 { [255; 3] } else { [0; 3] });
+        let colour = Colour { width: 64, height: 64, rgb: checks.collect() };
+        let half = colour.clone().averaged((64, 64));
+        assert_eq!((half.width, half.height), (32, 32));
+        // sRGB of half the light.
+        assert!(half.rgb.iter().all(|&v| v == 188), "{:?}", &half.rgb[..6]);
+        assert_eq!(colour.clone().averaged((128, 128)), colour, "300 dpi stays as it is");
+    }
+
+    proptest! {
+        #[test]
+        fn between_nodes_weights_stay_weights(pixel: [u8; 3], seed: u32) {
+            let random = |i: usize| f64::from((i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11);
+            let mut data = vec![0; NODES * NODES * NODES * 5];
+            for (node, out) in data.chunks_exact_mut(5).enumerate() {
+                let weights: Vec<f64> = (0..5).map(|q| random(5 * node + q)).collect();
+                crate::weights::quantise(&weights, out);
+            }
+            let nodes = WeightMaps::new(NODES * NODES, NODES, 5, data).unwrap();
+            let mut out = [0; 5];
+            interpolate(&nodes, pixel.map(|v| step(usize::from(v))), &mut out);
+            prop_assert_eq!(out.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
+            // The corners around bound what is between.
+            let corner = pixel.map(|v| step(usize::from(v)).0);
+            for q in 0..5 {
+                let around = (0..8).map(|c| {
+                    let at = |axis: usize| corner[axis] + (c >> axis & 1);
+                    nodes.at((at(0) * NODES + at(1)) * NODES + at(2))[q]
+                });
+                let (least, most) = around.fold((u16::MAX, 0), |(l, m), w| (l.min(w), m.max(w)));
+                prop_assert!(out[q] + 1 >= least && out[q] <= most + 5, "{} not in {}..={}", out[q], least, most);
+            }
+        }
+
+        #[test]
+        fn a_value_lies_between_its_nodes(value in 0usize..256) {
+            let (node, part) = step(value);
+            let at = (node as f64 + f64::from(part) / 256.0) / (NODES - 1) as f64;
+            prop_assert!((at - value as f64 / 255.0).abs() < 1.0 / 4000.0);
+        }
+    }
+}

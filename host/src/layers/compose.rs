@@ -597,3 +597,6 @@ fn suggest(stacks: &[Stack], dots: &[u64]) -> Vec<Suggestion> {
     .map(|(dots, text, how)| Suggestion { text: text.into(), how, dots })
     .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -400,3 +400,6 @@ fn common_name(files: &[PathBuf]) -> String {
         .and_then(Path::file_name)
         .map_or_else(|| "layers".into(), |name| name.to_string_lossy().into_owned())
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,10 +1,12 @@
 //! The vendor's reserved colours: a picture whose pixels name inks.
 //!
 //! Problem: owners draw white as 230,230,230 and gold as 225,160,0; drawing programs soften every edge, and a softened
-//! edge is no reserved colour, so it would be printed as a fringe of process dots around the gold.
-//! Method: pixels within the tolerance of an ink's colour, in each of red, green and blue, are that ink. Of the others,
-//! those that lie on the straight line between two colours seen next to them (an ink and white, or two inks) are the
-//! edge of those two and go to the nearer one. What is left is colour for the process inks.
+//! edge is no reserved colour, so it would be printed as a fringe of process dots around the gold. Worse, the softened
+//! edge of black on white passes through the very grey that calls for silver.
+//! Method: pixels within the tolerance of an ink's colour, in each of red, green and blue, are that ink. All others, and
+//! those that are in no square of four such pixels, go to the nearer of two colours (an ink and white, or two inks) if
+//! they lie on the straight line between them and both are seen next to them: they are the edge of those two. What is
+//! left is colour for the process inks.
 //! Cost: 20 ns a pixel. Limits: edges softened over more than two pixels remain partly colour.
 //! Source of the colours: the vendor's user's guide, in its English and its Japanese edition.
 
@@ -42,6 +44,8 @@ pub const TABLE: [Reserved; 6] = [
 /// A pixel's place in the list of colours in use, white first; or one of these.
 const OTHER: u8 = u8::MAX;
 const PAPER: u8 = 0;
+/// Marks the class of a pixel that may be the edge of two others.
+const LOOSE: u8 = 0x80;
 
 /// What was found.
 pub(super) struct Found {
@@ -105,11 +109,17 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
             *class = at;
         }
     });
+    let loose: Vec<usize> = (0..class.len())
+        .into_par_iter()
+        .filter(|&at| class[at] != PAPER && class[at] != OTHER)
+        .filter(|&at| !in_a_square(&class, width, height, at % width, at / width))
+        .collect();
+    loose.into_iter().for_each(|at| class[at] |= LOOSE);
     let edges: Vec<(usize, u8)> = (0..height)
         .into_par_iter()
         .flat_map_iter(|y| {
             let (class, rgb, colours) = (&class, &*rgb, &colours);
-            (0..width).filter(move |x| class[y * width + x] == OTHER).filter_map(move |x| {
+            (0..width).filter(move |x| class[y * width + x] >= LOOSE).filter_map(move |x| {
                 let at = y * width + x;
                 let pixel = [rgb[3 * at], rgb[3 * at + 1], rgb[3 * at + 2]];
                 edge(pixel, around(class, width, height, x, y), colours).map(|class| (at, class))
@@ -121,6 +131,7 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
         class[at] = to;
         counts[usize::from(to)].1 += 1;
     }
+    class.par_iter_mut().filter(|class| **class != OTHER).for_each(|class| *class &= !LOOSE);
     rgb.par_chunks_exact_mut(3).zip(&class).for_each(|(pixel, &class)| {
         if class != OTHER {
             pixel.fill(255);
@@ -152,12 +163,21 @@ fn in_use(inks: &InkSet, tolerance: Option<u8>) -> Vec<Reserved> {
     TABLE.iter().filter(|entry| inks.contains(entry.ink)).map(with).collect()
 }
 
+/// Whether a pixel is one of four of its class in a square.
+fn in_a_square(class: &[u8], width: usize, height: usize, x: usize, y: usize) -> bool {
+    let own = class[y * width + x];
+    let same = |x: usize, y: usize| x < width && y < height && class[y * width + x] == own;
+    let beside = [x.wrapping_sub(1), x + 1];
+    let beyond = [y.wrapping_sub(1), y + 1];
+    beside.into_iter().any(|u| same(u, y) && beyond.into_iter().any(|v| same(x, v) && same(u, v)))
+}
+
 /// The colours seen within two pixels, as bits.
 fn around(class: &[u8], width: usize, height: usize, x: usize, y: usize) -> u32 {
     let mut seen = 0;
     for v in y.saturating_sub(2)..(y + 3).min(height) {
         for &class in &class[v * width..][x.saturating_sub(2)..(x + 3).min(width)] {
-            if class != OTHER {
+            if class < LOOSE {
                 seen |= 1 << class;
             }
         }
@@ -189,4 +209,90 @@ fn edge(pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
         }
     }
     best.map(|(_, class)| class)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layers::Options;
+
+    /// Discs of an ink's colour on another, softened over a pixel as drawing programs do.
+    fn soft_disc(side: usize, colour: [u8; 3], ground: [u8; 3]) -> Vec<u8> {
+        let middle = side as f64 / 2.0;
+        (0..side * side)
+            .flat_map(|at| {
+                let (x, y) = ((at % side) as f64 + 0.5 - middle, (at / side) as f64 + 0.5 - middle);
+                let inside = (side as f64 / 3.0 - x.hypot(y) + 0.5).clamp(0.0, 1.0);
+                std::array::from_fn::<u8, 3, _>(|c| {
+                    (inside * f64::from(colour[c]) + (1.0 - inside) * f64::from(ground[c])).round() as u8
+                })
+            })
+            .collect()
+    }
+
+    fn plane(layer: &Layer) -> u64 {
+        match &layer.shape {
+            Shape::Solid(plane) => plane.dots(),
+            Shape::Tone(_) => panic!("reserved colours have no tones"),
+        }
+    }
+
+    #[test]
+    fn softened_edges_leave_no_fringe_of_colour() {
+        let side = 300;
+        let area = std::f64::consts::PI * 100.0 * 100.0;
+        for (at, entry) in TABLE.iter().enumerate() {
+            for ground in [[255; 3], TABLE[(at + 1) % TABLE.len()].colour] {
+                let mut rgb = soft_disc(side, entry.colour, ground);
+                let found = take(&mut rgb, (300, 300), (side, side), &Options::default());
+                assert!(rgb.iter().all(|&v| v == 255), "{:?} on {ground:?} leaves colour", entry.ink);
+                assert!(
+                    found.layers.iter().all(|layer| layer.ink == entry.ink || ground != [255; 3]),
+                    "an edge of {:?} on paper calls for another ink",
+                    entry.ink
+                );
+                assert!(found.layers.len() <= 2, "{:?} on {ground:?} calls for a third ink", entry.ink);
+                let layer = found.layers.iter().find(|layer| layer.ink == entry.ink).unwrap();
+                let off = (plane(layer) as f64 - area).abs() / area;
+                assert!(off < 0.005, "{:?}: {} dots, the disc has {area:.0}", entry.ink, plane(layer));
+            }
+        }
+    }
+
+    #[test]
+    fn a_stray_grey_calls_for_silver_only_if_silver_is_at_hand() {
+        let grey = [189, 193, 197].repeat(100);
+        let with = |inks: &str| Options { inks: inks.parse().unwrap(), ..Options::default() };
+        let mut rgb = grey.clone();
+        let found = take(&mut rgb, (10, 10), (10, 10), &with("white,metallic-gold,process"));
+        assert!(found.layers.is_empty() && rgb == grey);
+        assert!(found.notes("art").iter().any(|note| note.contains("metallic-silver")));
+        let found = take(&mut rgb, (10, 10), (10, 10), &with("metallic-silver"));
+        assert_eq!(found.layers.iter().map(|layer| layer.ink).collect::<Vec<_>>(), [Ink::MetallicSilver]);
+        assert!(rgb.iter().all(|&v| v == 255));
+    }
+
+    #[test]
+    fn colours_within_the_tolerance_are_the_ink_and_others_are_not() {
+        let (gold, off) = ([225, 160, 0], [225, 173, 0]);
+        for (tolerance, wanted) in [(None, 1), (Some(13), 2), (Some(0), 1)] {
+            let mut rgb = [gold, off].concat();
+            let options = Options { tolerance, ..Options::default() };
+            let found = take(&mut rgb, (2, 1), (2, 1), &options);
+            assert_eq!(plane(&found.layers[0]), wanted, "tolerance {tolerance:?}");
+        }
+    }
+
+    #[test]
+    fn tolerances_of_the_table_do_not_overlap() {
+        for (i, a) in TABLE.iter().enumerate() {
+            for b in &TABLE[..i] {
+                let apart = (0..3).any(|c| {
+                    u16::from(a.colour[c].abs_diff(b.colour[c]))
+                        > u16::from(a.tolerance) + u16::from(b.tolerance)
+                });
+                assert!(apart, "{:?} and {:?}", a.ink, b.ink);
+            }
+        }
+    }
 }
