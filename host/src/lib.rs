@@ -23,6 +23,8 @@ pub mod halftone;
 
 pub mod layers;
 
+pub mod layout;
+
 pub mod separate;
 
 pub mod job;
@@ -36,5 +38,11 @@ pub mod inspect;
 pub mod preview;
 
 pub mod pipeline;
+
+pub mod chart;
+
+pub mod folders;
+
+pub mod ledger;
 
 pub mod cli;

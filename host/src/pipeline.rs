@@ -15,10 +15,11 @@ use crate::gamut::{self, GamutError, InkMix, Mapped, Printable};
 use crate::halftone::{self, HalftoneError, Placement};
 use crate::job::placement::{self, PlacementError, Size};
 use crate::job::stream::{self, StreamError};
+use crate::layout::{self, Arranged, Laid, Layout, LayoutError};
 use crate::observe::Observer;
 use crate::separate::{self, Pass, SeparateError, Separation, Severity};
-use crate::sheet::Sheet;
-use crate::simulate::{self, Difference, PrintoutError, SimulateError};
+use crate::sheet::{Piece, Sheet};
+use crate::simulate::{self, Difference, Printout, PrintoutError, SimulateError};
 
 /// What the user may choose.
 #[derive(Clone, Debug)]
@@ -29,10 +30,12 @@ pub struct Settings {
     pub gamut: gamut::Settings,
     /// The inks at hand. Foils in the set are the user's consent to print them.
     pub inks: InkSet,
-    /// The paper.
-    pub paper: Paper,
+    /// The paper and how the document lies on it.
+    pub layout: Layout,
     /// What the paper is made of.
     pub media: Media,
+    /// Whether the machine corrects the paper's curl.
+    pub curl_correction: bool,
     /// Size on paper.
     pub size: Option<Size>,
 }
@@ -45,15 +48,21 @@ pub struct Print {
     pub factoring: Option<factor::Report>,
     /// The mixture of stacks, and what the mapping reports.
     pub mapped: Mapped,
-    /// Where it lies on the page.
+    /// The document by itself, as halftoned: what the page repeats, mirrors and marks.
+    pub halftoned: Sheet,
+    /// Where the first of it lies on the page.
     pub placement: Placement,
-    /// The sheet as halftoned.
+    /// Where everything lies on the page.
+    pub laid: Laid,
+    /// The page.
     pub sheet: Sheet,
     /// Its passes.
     pub separation: Separation,
     /// The job in the printer's language.
     pub job: Vec<u8>,
-    /// The sheet as the simulated printer made it from `job`: equal to `sheet`, dot for dot.
+    /// What the simulated printer made of `job`, pass by pass.
+    pub printout: Printout,
+    /// The same as a sheet: equal to `sheet`, dot for dot.
     pub printed: Sheet,
 }
 
@@ -72,6 +81,9 @@ pub enum PrintError {
     /// Halftoning.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),
+    /// Laying it on the page.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// Separation.
     #[error(transparent)]
     Separate(#[from] SeparateError),
@@ -101,30 +113,51 @@ pub fn print(
 ) -> Result<Print, PrintError> {
     let materials = document.materials();
     // Refused before the long work, not after it.
-    let placement = placement::place(
-        (materials.width(), materials.height()),
-        document.size_mm,
-        settings.size,
-        settings.paper,
-    )?;
+    let pixels = (materials.width(), materials.height());
+    let (width, height) = placement::dots(pixels, document.size_mm, settings.size, &settings.layout)?;
+    layout::check(width.into(), height.into(), &settings.layout)?;
     let (factored, factoring) = factor_document(document, &settings.factor, observer)?;
     if let Some(report) = &factoring {
         observer.note(&report.to_string());
     }
     let printable = Printable::from_library(library, &settings.inks, &factored.space);
     let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
-    let sheet = halftone_mix(&mapped.mix, library, &placement, observer)?;
+    let alone = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
+    let halftoned = halftone_mix(&mapped.mix, library, &alone, observer)?;
+    let Arranged { sheet, laid } =
+        layout::arrange(&Piece::from(halftoned.clone()), &settings.layout, observer)?;
     let separation = separate::separate(&sheet, library.rules(), observer)?;
     if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
         return Err(PrintError::Refused(check.with_stacks()));
     }
-    let job = job_of(&separation.passes, settings.paper, settings.media, &settings.inks, observer)?;
+    let page = Page {
+        media: settings.media,
+        curl_correction: settings.curl_correction,
+        ..Page::plain(settings.layout.paper)
+    };
+    let job = job_on(page, &separation.passes, &settings.inks, observer)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)?;
     let printed = printout.sheet_with(sheet.stacks())?;
     if let Some(difference) = simulate::difference(&sheet, &printed) {
         return Err(PrintError::Different(difference));
     }
-    Ok(Print { factored, factoring, mapped, placement, sheet, separation, job, printed })
+    // Sides of a sheet are u16, and the layout has refused a page without a piece.
+    let [x, y, width, height] =
+        laid.pieces.first().map_or([0; 4], |p| [p.left, p.top, p.width, p.length].map(|dots| dots as u16));
+    let placement = Placement { paper: settings.layout.paper, x, y, width, height };
+    Ok(Print {
+        factored,
+        factoring,
+        mapped,
+        halftoned,
+        placement,
+        laid,
+        sheet,
+        separation,
+        job,
+        printout,
+        printed,
+    })
 }
 
 /// A document's bases and maps: its own if it came factored.
@@ -159,9 +192,19 @@ pub fn job_of(
     inks: &InkSet,
     observer: &dyn Observer,
 ) -> Result<Vec<u8>, StreamError> {
+    job_on(Page { media, ..Page::plain(paper) }, passes, inks, observer)
+}
+
+/// The bytes of a job on this page. A foil among `inks` is the user's consent to print it.
+pub fn job_on(
+    page: Page,
+    passes: &[Pass],
+    inks: &InkSet,
+    observer: &dyn Observer,
+) -> Result<Vec<u8>, StreamError> {
     let foil = inks.iter().any(|ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
     let mut job = Vec::new();
-    stream::write_job(Page { media, ..Page::plain(paper) }, foil, passes, &mut job, observer)?;
+    stream::write_job(page, foil, passes, &mut job, observer)?;
     Ok(job)
 }
 

@@ -6,12 +6,12 @@ use anyhow::{Result, bail};
 use clap::Args;
 use inks::{InkSet, Library};
 use protocol::paper::Paper;
-use protocol::rgl::Media;
 
 use crate::document::{self, ColourSpace, Document};
 use crate::factor::{self, Method};
 use crate::gamut::{self, Intent};
 use crate::job::placement::Size;
+use crate::layout;
 use crate::observe::Observer;
 
 /// What to read.
@@ -141,27 +141,7 @@ pub struct PageArgs {
     /// [default: the document's own size, else as large as the page allows]
     #[arg(long)]
     pub size: Option<Size>,
-    /// Paper: a4, letter, legal, executive, b5 or postcard
-    #[arg(long, default_value = "a4", value_parser = paper)]
+    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     pub paper: Paper,
-}
-
-fn paper(name: &str) -> Result<Paper, String> {
-    Paper::from_name(name).ok_or_else(|| {
-        format!("the papers are {}", Paper::named().map(Paper::name).collect::<Vec<_>>().join(", "))
-    })
-}
-
-/// What the sheet is made of.
-#[derive(Args, Debug)]
-pub struct MediaArgs {
-    /// Media type, which sets the head's heat: plain, cardboard, glossy-paper, …
-    #[arg(long, default_value = "plain", value_parser = media)]
-    pub media: Media,
-}
-
-fn media(name: &str) -> Result<Media, String> {
-    Media::from_name(name).ok_or_else(|| {
-        format!("the media are {}", Media::all().map(Media::name).collect::<Vec<_>>().join(", "))
-    })
 }

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
-use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
+use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, PageArgs};
+use super::layout::MediaArgs;
 use super::output::{Kind, Staged};
 use crate::document::{self, ColourSpace, foil};
 use crate::gamut::files::Provenance;
@@ -196,7 +197,7 @@ impl Encode {
         let saved = separate::files::load(&self.passes)?;
         let staged = Staged::file(&self.output)?;
         let inks = if self.foil { inks::InkSet::ALL } else { inks::InkSet::default() };
-        let job = pipeline::job_of(&saved.passes, saved.paper, self.media.media, &inks, observer)?;
+        let job = pipeline::job_on(self.media.page(saved.paper), &saved.passes, &inks, observer)?;
         fs::write(staged.path(), job).with_context(|| format!("cannot write {}", self.output.display()))?;
         staged.commit()
     }

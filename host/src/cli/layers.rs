@@ -1,6 +1,5 @@
 //! `foilpress layers`: spot-colour art in, the job and everything to look at out.
 
-use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
@@ -9,20 +8,13 @@ use inks::{InkSet, Library};
 use protocol::ink::Ink;
 use serde_json::json;
 
-use super::args::{MediaArgs, PageArgs};
-use super::output::{self, Kind, Staged};
-use super::send::deliver;
-use crate::halftone::Placement;
-use crate::job::placement::DOTS_PER_MM;
-use crate::job::plan::Plan;
-use crate::layers::{self, Accept, Composed, Finish, Order, White, names};
+use super::piece::{self, Job, PieceArgs};
+use super::preset::PresetArg;
+use crate::job::placement::{DOTS_PER_MM, Size};
+use crate::job::plan::grouped;
+use crate::layers::{self, Accept, Composed, Finish, Order, Suggestion, White, names};
+use crate::layout::{Mm, NoLength};
 use crate::observe::Observer;
-use crate::pipeline;
-use crate::preview::Area;
-use crate::send::Destination;
-use crate::separate::{self, Severity};
-use crate::sheet::Sheet;
-use crate::simulate;
 
 /// What to read and how it becomes layers of ink.
 #[derive(ClapArgs, Debug)]
@@ -86,19 +78,10 @@ fn dpi(text: &str) -> Result<f64, String> {
     if (20.0..=10_000.0).contains(&dpi) { Ok(dpi) } else { Err("expected 20 to 10000".into()) }
 }
 
-/// A length in dots of 600 dpi.
+/// A length that is not negative, in dots of 600 dpi.
 fn length(text: &str) -> Result<f64, String> {
-    let lower = text.trim().to_ascii_lowercase();
-    let (number, mm) = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)]
-        .into_iter()
-        .find_map(|(unit, mm)| Some((lower.strip_suffix(unit)?, mm)))
-        .ok_or("expected a length such as 0.1mm")?;
-    let value: f64 = number.trim().parse().map_err(|_| "expected a length such as 0.1mm".to_string())?;
-    if value.is_finite() && value >= 0.0 {
-        Ok(value * mm * DOTS_PER_MM)
-    } else {
-        Err("expected a length of 0 or more".into())
-    }
+    let length: Mm = text.parse().map_err(|error: NoLength| error.to_string())?;
+    if length.0 >= 0.0 { Ok(length.0 * DOTS_PER_MM) } else { Err("expected a length of 0 or more".into()) }
 }
 
 fn passes(text: &str) -> Result<(Ink, u8), String> {
@@ -151,9 +134,9 @@ impl LayersArgs {
     }
 
     /// How the art is read.
-    pub fn options(&self, page: &PageArgs) -> Result<layers::Options> {
+    pub fn options(&self, size: Option<Size>) -> Result<layers::Options> {
         Ok(layers::Options {
-            size: page.size,
+            size,
             dpi: self.dpi,
             reserved: self.reserved || self.white == Some(White::Reserved),
             tolerance: self.tolerance,
@@ -185,117 +168,63 @@ impl LayersArgs {
 
 /// Arguments of `layers`.
 #[derive(ClapArgs, Debug)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
     foilpress layers white.png gold.png black.png\n  \
-    foilpress layers decal/ --passes white=3 --finish artwork\n  \
+    foilpress layers decal/ --passes white=3 --finish artwork --mirror --media film\n  \
     foilpress layers art.png --reserved --inks white,gold,black\n  \
-    foilpress layers art.svg --white silhouette --choke 0.1mm\n  \
+    foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
     foilpress layers decal.pdf --page 1 --white alpha\n  \
-    foilpress layers photo.png --size 120mm\n\n\
-    In layers dark is ink; on a transparent ground, what is drawn is ink. Art drawn at 600 dpi is printed as drawn.")]
+    foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n\n\
+    In layers dark is ink; on a transparent ground, what is drawn is ink. Art drawn at 600 dpi is printed as drawn."
+)]
 pub struct Args {
     #[command(flatten)]
     layers: LayersArgs,
-    #[command(flatten)]
-    page: PageArgs,
-    #[command(flatten)]
-    media: MediaArgs,
-    /// Also send the job there: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
-    #[arg(long, value_name = "WHERE")]
-    to: Option<Destination>,
-    /// Folder to write [default: NAME.print in the current folder]
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Print the report instead of the plan in words
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the art keeps its shape [default: what the files say]
     #[arg(long)]
-    json: bool,
+    size: Option<Size>,
+    #[command(flatten)]
+    piece: PieceArgs,
+    #[command(flatten)]
+    preset: PresetArg,
 }
 
 /// Runs `layers`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let library = args.layers.library()?;
-    let (options, settings) = (args.layers.options(&args.page)?, args.layers.settings()?);
+    let (options, settings) = (args.layers.options(args.size)?, args.layers.settings()?);
     let art = layers::open(&args.layers.art, &options, observer)?;
-    let target =
-        args.output.clone().unwrap_or_else(|| format!("{}.print", output::file_name(&art.name)).into());
-    let staged = Staged::folder(&target, Kind::Print)?;
     let composed = layers::compose(&art, &settings, &library, observer)?;
-    let (sheet, placement) = centred(&composed, &args.page)?;
-    let separation = separate::separate(&sheet, library.rules(), observer)?;
-    if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
-        bail!("this must not be printed: {}", check.with_stacks());
-    }
-    let job =
-        pipeline::job_of(&separation.passes, args.page.paper, args.media.media, &settings.inks, observer)?;
-    let printed = simulate::print(&job, &simulate::Setup::default(), observer)?.sheet_with(sheet.stacks())?;
-    if let Some(difference) = simulate::difference(&sheet, &printed) {
-        bail!("the simulated sheet is not the one that was sent: {difference}");
-    }
-    let plan = Plan::new(&art.name, &sheet, &placement, &separation, &library);
-
-    let folder = staged.create()?;
-    let write = |name: &str, bytes: &[u8]| {
-        fs::write(folder.join(name), bytes).with_context(|| format!("cannot write {name}"))
+    let job = Job {
+        name: &art.name,
+        piece: &composed.piece,
+        allowed: settings.inks,
+        library: &library,
+        report: Some(("art", json!({ "composed": composed.report, "suggestions": composed.suggestions }))),
+        advice: words(&composed),
     };
-    write("job.rgl", &job)?;
-    fs::create_dir(folder.join("passes")).context("cannot write passes")?;
-    separate::files::save(&separation, &folder.join("passes"))?;
-    sheet.save_colours(Area::of(&placement), &folder.join("separation.png"))?;
-    let report = json!({
-        "program": concat!("foilpress ", env!("CARGO_PKG_VERSION")),
-        "art": { "name": art.name, "report": composed.report, "suggestions": composed.suggestions },
-        "plan": plan,
-        "job": { "bytes": job.len() },
-        // Compared above, dot for dot.
-        "simulated": { "equal": true },
-    });
-    let report = serde_json::to_string_pretty(&report)?;
-    write("report.json", report.as_bytes())?;
-    staged.commit()?;
-    if args.json {
-        super::show(&format!("{report}\n"))?;
-    } else {
-        super::show(&format!("{plan}{}", words(&composed)))?;
-    }
-    match &args.to {
-        Some(to) => deliver(&art.name, &job, to, observer),
-        None => Ok(()),
-    }
+    piece::print(&job, &args.piece, observer)
 }
 
-/// What the art needs, in words.
+/// What was laid and what the art needs, in words.
 fn words(composed: &Composed) -> String {
-    let mut text = String::new();
-    if !composed.suggestions.is_empty() {
-        text.push_str("\nSuggestions, followed only if you say so:\n");
+    let mut text = String::from("\nFrom the art, lowest first:\n");
+    for laid in &composed.report.laid {
+        let times = if laid.passes > 1 { format!(", {} times", laid.passes) } else { String::new() };
+        text.push_str(&format!(
+            "    {:<18} {:>13} dots  {}{times}\n",
+            laid.ink,
+            grouped(laid.dots),
+            laid.from
+        ));
     }
-    for suggestion in &composed.suggestions {
-        text.push_str(&format!("    {} ({} dots): {}\n", suggestion.text, suggestion.dots, suggestion.how));
+    if !composed.suggestions.is_empty() {
+        text.push_str("\nSuggestions, followed only when you say so:\n");
+    }
+    for Suggestion { text: why, how, dots } in &composed.suggestions {
+        text.push_str(&format!("    {how:<26} {why} ({} dots)\n", grouped(*dots)));
     }
     text
-}
-
-/// The piece in the middle of the page.
-fn centred(composed: &Composed, page: &PageArgs) -> Result<(Sheet, Placement)> {
-    let (piece, paper) = (&composed.piece, page.paper);
-    let (across, down) = (usize::from(paper.width()), usize::from(paper.length()));
-    let (width, length) = (piece.width(), piece.length());
-    if width > across || length > down {
-        let (wide, long) = composed.report.size_mm;
-        bail!(
-            "{wide:.1} x {long:.1} mm does not fit: {} prints {:.1} x {:.1} mm; give a smaller --size or another --paper",
-            paper.name(),
-            across as f64 / DOTS_PER_MM,
-            down as f64 / DOTS_PER_MM
-        );
-    }
-    let (left, top) = ((across - width) / 2, (down - length) / 2);
-    let mut index = vec![0; across * down];
-    for (y, row) in piece.index().chunks_exact(width).enumerate() {
-        index[(top + y) * across + left..][..width].copy_from_slice(row);
-    }
-    // Sides fit the page's, which are u16.
-    let (x, y, w, h) = (left as u16, top as u16, width as u16, length as u16);
-    let placement = Placement { paper, x, y, width: w, height: h };
-    Ok((Sheet::new(paper, piece.stacks().to_vec(), index)?, placement))
 }

@@ -7,11 +7,18 @@
 mod args;
 mod bridge;
 mod chain;
+mod chart;
+mod deliver;
 mod doctor;
 mod inks;
 mod inspect;
 mod layers;
+mod layout;
+mod ledger;
 mod output;
+mod piece;
+mod plan;
+mod preset;
 mod print;
 mod progress;
 mod resume;
@@ -64,6 +71,16 @@ enum Command {
     Print(Box<print::Args>),
     /// Print spot-colour art: a picture for each ink, reserved colours, or named layers
     Layers(Box<layers::Args>),
+    /// What a job or a document needs: cartridges, passes, ribbon, time, cautions. Nothing is sent
+    Plan(Box<plan::Args>),
+    /// Sheets to look at, to measure inks and to measure the machine
+    Chart(Box<chart::Args>),
+    /// Options under a name: save, list, use
+    Preset(preset::Args),
+    /// How much of each ribbon has gone
+    Ledger(ledger::Args),
+    /// Machines as measured: offset and feed
+    Profile(layout::ProfileArgs),
     /// Take a document apart into a few basis materials and their weight maps
     Factor(chain::Factor),
     /// Fit basis materials (or every pixel) to mixtures of printable stacks
@@ -96,7 +113,13 @@ enum Command {
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = match preset::expand(std::env::args_os().collect()) {
+        Ok(args) => Args::parse_from(args),
+        Err(error) => {
+            let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
+            return ExitCode::FAILURE;
+        }
+    };
     match output::remove_on_interrupt().and_then(|()| run(args)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
@@ -113,6 +136,11 @@ fn run(args: Args) -> Result<()> {
     match args.command {
         Command::Print(args) => print::run(&args, observer),
         Command::Layers(args) => layers::run(&args, observer),
+        Command::Plan(args) => plan::run(&args, observer),
+        Command::Chart(args) => chart::run(&args, observer),
+        Command::Preset(args) => preset::run(&args),
+        Command::Ledger(args) => ledger::run(&args),
+        Command::Profile(args) => layout::profile_command(&args),
         Command::Factor(args) => args.run(observer),
         Command::Map(args) => args.run(observer),
         Command::Halftone(args) => args.run(observer),

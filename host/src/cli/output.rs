@@ -61,7 +61,9 @@ impl Kind {
         self.marker() == Some(name)
             || match self {
                 Kind::Print => {
-                    ["job.rgl", "sheet.png", "materials.png", "separation.png", "passes"].contains(&name)
+                    ["job.rgl", "plan.html", "sheet.png", "materials.png", "separation.png", "passes"].contains(&name)
+                        || name == "preview.png"
+                        || (name.starts_with("preview-") && picture(name))
                 }
                 Kind::Foil => name == "bases.csv" || (name.starts_with("weights-") && picture(name)),
                 Kind::Mix => name.starts_with("weights-") && picture(name),

@@ -1,22 +1,26 @@
 //! `foilpress print`: a document in, a folder with the job and everything to look at out.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use image::RgbImage;
+use inks::{InkSet, Library};
 use serde_json::json;
 
-use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, MediaArgs, PageArgs};
-use super::output::{self, Kind, Staged};
-use super::send::deliver;
+use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
+use super::deliver::DeliverArgs;
+use super::layout::{LayoutArgs, MediaArgs};
+use super::piece::{Places, ResultArgs, write, write_job};
+use super::preset::PresetArg;
 use crate::document::Document;
-use crate::job::plan::Plan;
+use crate::job::placement::Size;
+use crate::job::plan::{Plan, Subject};
+use crate::layout::Mm;
 use crate::observe::Observer;
 use crate::pipeline::{self, Print};
 use crate::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
-use crate::send::Destination;
 use crate::separate;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
@@ -26,79 +30,118 @@ const BALL: usize = 160;
 /// Where the eye is when print and document are compared, in metres.
 const EYE: f64 = 0.5;
 
+/// A document and everything that decides how it is printed.
+#[derive(ClapArgs, Debug)]
+pub struct Work {
+    #[command(flatten)]
+    pub document: DocumentArgs,
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape
+    /// [default: the document's own size, else as large as the page allows]
+    #[arg(long)]
+    pub size: Option<Size>,
+    #[command(flatten)]
+    pub layout: LayoutArgs,
+    #[command(flatten)]
+    pub media: MediaArgs,
+    #[command(flatten)]
+    pub factor: FactorArgs,
+    #[command(flatten)]
+    pub gamut: GamutArgs,
+    #[command(flatten)]
+    pub inks: InkArgs,
+    #[command(flatten)]
+    pub preset: PresetArg,
+}
+
+/// A document that was printed on the simulated printer.
+pub struct Done {
+    /// The document.
+    pub document: Document,
+    /// The ink library.
+    pub library: Library,
+    /// What was decided.
+    pub settings: pipeline::Settings,
+    /// What came of it.
+    pub print: Print,
+    /// The plan.
+    pub plan: Plan,
+}
+
+impl Work {
+    /// Opens the document.
+    pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
+        self.document.open(observer)
+    }
+
+    /// Opens the document and prints it.
+    pub fn print(&self, observer: &dyn Observer) -> Result<Done> {
+        let (inks, library) = self.inks.at_hand()?;
+        self.print_document(self.open(observer)?, inks, library, observer)
+    }
+
+    fn print_document(
+        &self,
+        document: Document,
+        inks: InkSet,
+        library: Library,
+        observer: &dyn Observer,
+    ) -> Result<Done> {
+        let layout = self.layout.layout(observer)?;
+        let page = self.media.page(layout.paper);
+        let settings = pipeline::Settings {
+            factor: self.factor.settings(),
+            gamut: self.gamut.settings(self.factor.seed),
+            inks,
+            layout,
+            media: page.media,
+            curl_correction: page.curl_correction,
+            size: self.size,
+        };
+        let print = pipeline::print(&document, &library, &settings, observer)?;
+        let subject = Subject::new(&document.name, &print.sheet, &print.laid, &print.separation, &page);
+        let plan = Plan::new(&subject, &library);
+        Ok(Done { document, library, settings, print, plan })
+    }
+}
+
 /// Arguments of `print`.
 #[derive(ClapArgs, Debug)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
     foilpress print sample:leaf\n  \
     foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
+    foilpress print sample:leaf --size 60mm --repeat fill --gap 3mm --crop-marks\n  \
     foilpress print helmet.gltf --material 0 --factor sacls --intent clamp\n  \
-    foilpress print sample:card --inks all          (with foils)")]
+    foilpress print sample:card --inks all          (with foils)"
+)]
 pub struct Args {
     #[command(flatten)]
-    document: DocumentArgs,
-    #[command(flatten)]
-    page: PageArgs,
-    #[command(flatten)]
-    media: MediaArgs,
-    #[command(flatten)]
-    factor: FactorArgs,
-    #[command(flatten)]
-    gamut: GamutArgs,
-    #[command(flatten)]
-    inks: InkArgs,
+    work: Work,
     /// Light probe (.hdr) for the balls in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
-    /// Also send the job there: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
-    #[arg(long, value_name = "WHERE")]
-    to: Option<Destination>,
-    /// Folder to write [default: NAME.print in the current folder]
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Print the report instead of the plan in words
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    result: ResultArgs,
+    #[command(flatten)]
+    deliver: DeliverArgs,
 }
 
 /// Runs `print`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let (inks, library) = args.inks.at_hand()?;
+    let (inks, library) = args.work.inks.at_hand()?;
     let probe = match &args.probe {
         Some(path) => Probe::read_hdr(path)?,
         None => Probe::studio(128),
     };
-    let document = args.document.open(observer)?;
-    let target =
-        args.output.clone().unwrap_or_else(|| format!("{}.print", output::file_name(&document.name)).into());
-    let to_file = match &args.to {
-        Some(Destination::File(path)) => Some(path),
-        _ => None,
-    };
-    if let Some(to) = to_file
-        && absolute(to)?.starts_with(absolute(&target)?)
-    {
-        bail!(
-            "--to {} lies in {}, which is written whole; choose another place",
-            to.display(),
-            target.display()
-        );
-    }
-    let staged = Staged::folder(&target, Kind::Print)?;
-    let also = to_file.map(|path| Staged::file(path)).transpose()?;
+    let document = args.work.open(observer)?;
+    let places = Places::new(args.result.target(&document.name), args.deliver.file())?;
+    let Done { document, library, settings, print, plan } =
+        args.work.print_document(document, inks, library, observer)?;
 
-    let settings = pipeline::Settings {
-        factor: args.factor.settings(),
-        gamut: args.gamut.settings(args.factor.seed),
-        inks,
-        paper: args.page.paper,
-        media: args.media.media,
-        size: args.page.size,
-    };
-    let print = pipeline::print(&document, &library, &settings, observer)?;
-    let plan = Plan::new(&document.name, &print.sheet, &print.placement, &print.separation, &library);
-
-    let folder = staged.create()?;
-    write(&folder.join("job.rgl"), &print.job)?;
+    let folder = places.create()?;
+    let ground = args.result.background.unwrap_or_default();
+    write_job(folder, &print.job, &plan, &print.printed, &print.printout, &print.laid, ground)?;
     let passes = folder.join("passes");
     fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
     separate::files::save(&print.separation, &passes)?;
@@ -106,19 +149,14 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
         picture.save(folder.join(name)).with_context(|| format!("cannot write {name}"))?;
     }
-    print.sheet.save_colours(Area::of(&print.placement), &folder.join("separation.png"))?;
+    print.sheet.save_colours(print.laid.area, &folder.join("separation.png"))?;
     let report = report(&document, &settings, &print, &plan, &pictures.fidelity);
     let report = serde_json::to_string_pretty(&report)?;
     write(&folder.join("report.json"), report.as_bytes())?;
-    if let Some(also) = &also {
-        write(also.path(), &print.job)?;
-    }
-    staged.commit()?;
-    if let Some(also) = also {
-        also.commit()?;
-    }
+    let target = places.target.clone();
+    places.commit(&print.job)?;
 
-    if args.json {
+    if args.result.json {
         super::show(&format!("{report}\n"))?;
     } else {
         super::show(&format!(
@@ -128,20 +166,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             target.join("sheet.png").display()
         ))?;
     }
-    match &args.to {
-        Some(to @ (Destination::Raw(_) | Destination::Bridge(_))) => {
-            deliver(&document.name, &print.job, to, observer)
-        }
-        _ => Ok(()),
-    }
-}
-
-fn absolute(path: &Path) -> Result<PathBuf> {
-    std::path::absolute(path).with_context(|| format!("`{}` is no path", path.display()))
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    args.deliver.send(&document.name, &print.job, &print.separation.plan.cartridges, observer)
 }
 
 /// What there is to look at, and how far print and document are apart.
@@ -159,15 +184,18 @@ fn pictures(
     observer: &dyn Observer,
 ) -> Result<Pictures> {
     let space = &print.factored.space;
-    let stacks = pipeline::stack_table(&print.printed, library, space);
-    let area = Area::of(&print.placement);
+    // The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
+    // machine profile do to the page is undone on paper.
+    let halftoned = &print.halftoned;
+    let stacks = pipeline::stack_table(halftoned, library, space);
+    let area = Area::whole(halftoned);
     let target = match document.as_factored() {
         Some(factored) => Source::Factored(factored),
         None => Source::Document(document.materials()),
     };
-    let printed = Source::Print { sheet: &print.printed, space, stacks: &stacks, area };
+    let printed = Source::Print { sheet: halftoned, space, stacks: &stacks, area };
     let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
-    let (width, height) = crate::job::placement::size_mm(&print.placement);
+    let (width, height) = (Mm::of_dots(area.width as i64).0, Mm::of_dots(area.length as i64).0);
     let notes = [
         format!("{width:.0} x {height:.0} mm, {} passes", print.separation.passes.len()),
         format!("seen from {EYE} m: mean d {:.3}, 95 % below {:.3}", fidelity.mean, fidelity.p95),

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
-use super::send::go;
+use super::send::{are_copies, go};
 use crate::observe::Observer;
 use crate::send::journal::{Entry, Journal};
 use crate::send::session::Phase;
@@ -94,6 +94,11 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
     match &open[..] {
         [] => bail!("no job waits; every one that was sent is over (`foilpress resume --list`)"),
         [one] => Ok(one.record.job),
+        // Sheets of one job wait for each other; any of them is the next.
+        several if are_copies(&several.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>()) => {
+            let next = several.iter().min_by_key(|entry| (entry.name.len(), &entry.name));
+            next.map(|entry| entry.record.job).context("several jobs are none")
+        }
         several => {
             let lines: Vec<String> = several.iter().map(line).collect();
             bail!("several jobs are not over; say which:\n{}", lines.join("\n"))

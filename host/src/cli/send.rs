@@ -7,9 +7,12 @@ use clap::Args as ClapArgs;
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 
+use super::deliver::next_sheet;
+use super::ledger;
 use super::output::{self, Staged};
 use crate::observe::Observer;
 use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
+use crate::send::raw::RawError;
 use crate::send::session::{Outcome, Session};
 use crate::send::{self, Address, Checked, Destination, Event, words};
 
@@ -27,17 +30,20 @@ pub struct Args {
     /// Where to: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
     #[arg(long, value_name = "WHERE")]
     to: Destination,
+    /// Sheets to print; the program waits between them
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
+    copies: u16,
 }
 
 /// Runs `send`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = super::read_job(&args.job)?;
     let name = args.job.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
-    deliver(&name, &job, &args.to, observer)
+    deliver(&name, &job, &args.to, args.copies, observer)
 }
 
-/// Checks a job and takes it to its destination.
-pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer) -> Result<()> {
+/// Checks a job and takes it to its destination, once for each copy.
+pub fn deliver(name: &str, job: &[u8], to: &Destination, copies: u16, observer: &dyn Observer) -> Result<()> {
     let checked = send::check(job, observer)?;
     match to {
         Destination::File(path) => {
@@ -45,26 +51,68 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer
             std::fs::write(staged.path(), job).with_context(|| format!("cannot write {}", path.display()))?;
             staged.commit()
         }
-        Destination::Raw(path) => to_device(name, job, &checked, path, observer),
+        Destination::Raw(path) => {
+            for copy in 1..=copies {
+                to_device(name, job, &checked, path, observer)?;
+                if copy < copies && !next_sheet(copy, copies)? {
+                    let left = copies - copy;
+                    bail!(
+                        "{copy} of {copies} sheets are sent; send the job again with --copies {left} for the others"
+                    );
+                }
+            }
+            Ok(())
+        }
         Destination::Bridge(address) => {
             let journal = Journal::of_user()?;
             journal.tidy()?;
-            let queued = journal.queue(NewJob {
-                name,
-                to: address.to_string(),
-                kind: JobKind::Raw,
-                data: job,
-                port_bytes: job.len() as u64,
-                passes: checked.passes,
-            })?;
+            // All are on disk before the first is printed, so that an interruption between two sheets loses none.
+            let mut queue = (1..=copies)
+                .map(|copy| {
+                    let name = if copies == 1 { name.to_owned() } else { copy_name(name, copy, copies) };
+                    journal.queue(NewJob {
+                        name: &name,
+                        to: address.to_string(),
+                        kind: JobKind::Raw,
+                        data: job,
+                        port_bytes: job.len() as u64,
+                        passes: checked.passes.clone(),
+                    })
+                })
+                .collect::<Result<Vec<_>, _>>()?
+                .into_iter();
             observer.note(&load(&checked.inks));
-            observer.note(&format!(
-                "{name} is queued as job {:08x}; nothing is printed yet",
-                queued.entry.record.job
-            ));
-            go(queued, address, false, observer)
+            let mut copy = 0;
+            while let Some(queued) = queue.next() {
+                copy += 1;
+                let number = format!("{:08x}", queued.entry.record.job);
+                observer.note(&format!(
+                    "{} is queued as job {number}; nothing is printed yet",
+                    queued.entry.name
+                ));
+                ledger::begun(&number, &queued.entry.name, &checked, job.len() as u64, observer);
+                go(queued, address, false, observer)?;
+                if copy < copies && !next_sheet(copy, copies)? {
+                    bail!("{copy} of {copies} sheets are sent; `foilpress resume` sends the next one");
+                }
+            }
+            Ok(())
         }
     }
+}
+
+/// What a copy is called.
+fn copy_name(name: &str, copy: u16, copies: u16) -> String {
+    format!("{name} (sheet {copy} of {copies})")
+}
+
+/// Whether these are the copies of one job that wait for each other.
+pub fn are_copies(names: &[&str]) -> bool {
+    let stem = |name: &str| name.rfind(" (sheet ").map(|at| name[..at].to_owned());
+    names
+        .first()
+        .and_then(|first| stem(first))
+        .is_some_and(|first| names.iter().all(|name| stem(name).as_deref() == Some(first.as_str())))
 }
 
 fn to_device(name: &str, job: &[u8], checked: &Checked, path: &Path, observer: &dyn Observer) -> Result<()> {
@@ -72,7 +120,18 @@ fn to_device(name: &str, job: &[u8], checked: &Checked, path: &Path, observer: &
     output::say_on_interrupt(
         "the printer may have a part of the job. Switch it off and on before the next one",
     );
-    send::raw::send(job, path, observer)?;
+    // A device has no numbers for jobs; the moment and the process are one.
+    let moment = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+    let number = format!("raw-{}-{}", moment.as_nanos(), std::process::id());
+    ledger::begun(&number, name, checked, job.len() as u64, observer);
+    let sent = send::raw::send(job, path, observer);
+    let taken = match &sent {
+        Ok(()) => job.len(),
+        Err(RawError::Write { taken, .. }) => *taken,
+        Err(_) => 0,
+    };
+    ledger::printed(&number, taken as u64, sent.is_ok(), observer);
+    sent?;
     observer.note(&format!(
         "{name}: the system has taken all {} bytes for the printer; whether they are printed only the printer shows",
         job.len()
@@ -95,27 +154,10 @@ pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Obse
     ));
     let data = std::mem::take(&mut job.data);
     let mut session = Session::new(job.entry.record, &data);
-    if cancel {
-        session.cancel();
-        // Whatever happens now: the next process that opens the job cancels it too.
-        job.save(session.record())?;
-    }
-    let mut reporter = Reporter::new(&job, observer);
-    let outcome = match session.outcome() {
-        Some(outcome) => outcome,
-        None => {
-            send::run(&mut session, &mut || address.open(), &mut |record| job.save(record), &mut |event| {
-                reporter.tell(&event)
-            })
-            .with_context(|| {
-                format!(
-                    "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
-                    job.entry.name
-                )
-            })?
-        }
-    };
-    observer.end();
+    let result = converse(&mut job, &mut session, address, cancel, observer);
+    let whole = matches!(result, Ok(Outcome::Printed));
+    ledger::printed(&format!("{number:08x}"), session.record().printed.into(), whole, observer);
+    let outcome = result?;
     let text = words::outcome(outcome, &job.entry, session.progress());
     match outcome {
         Outcome::Printed if cancel => bail!("{text}; it was too late to cancel"),
@@ -124,6 +166,37 @@ pub fn go(mut job: OpenJob, address: &Address, cancel: bool, observer: &dyn Obse
         Outcome::Broken | Outcome::Lost | Outcome::Forgotten => bail!("{text}"),
     }
     Ok(())
+}
+
+/// The conversation with the bridge until it says how the job ended.
+fn converse(
+    job: &mut OpenJob,
+    session: &mut Session<'_>,
+    address: &Address,
+    cancel: bool,
+    observer: &dyn Observer,
+) -> Result<Outcome> {
+    let number = job.entry.record.job;
+    if cancel {
+        session.cancel();
+        // Whatever happens now: the next process that opens the job cancels it too.
+        job.save(session.record())?;
+    }
+    let mut reporter = Reporter::new(job, observer);
+    let outcome = match session.outcome() {
+        Some(outcome) => outcome,
+        None => send::run(session, &mut || address.open(), &mut |record| job.save(record), &mut |event| {
+            reporter.tell(&event)
+        })
+        .with_context(|| {
+            format!(
+                "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
+                job.entry.name
+            )
+        })?,
+    };
+    observer.end();
+    Ok(outcome)
 }
 
 /// Turns what happens into progress of passes and notes.

@@ -1,5 +1,8 @@
-//! Placement on the page, the plan in words, and the bytes of a job.
+//! The size of a document on paper, the plan in words, figures and as a page, and the bytes of a job.
 
+pub mod page;
 pub mod placement;
 pub mod plan;
+pub mod ribbon;
 pub mod stream;
+mod thin;

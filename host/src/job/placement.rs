@@ -1,14 +1,15 @@
-//! Where a document lies on the page.
+//! How large a document is on the page.
 //!
-//! Millimetres exist only here and at the command line: what comes out is a rectangle of 600 dpi dots inside the
-//! printable area. A document keeps its shape; it is centred, and it is never cut.
+//! Millimetres exist only here, in the layout and at the command line: what comes out is a size in 600 dpi dots. A document
+//! keeps its shape; where it lies is the layout's business.
 
 use std::fmt;
 use std::str::FromStr;
 
-use protocol::paper::Paper;
+use protocol::paper::{LARGEST, Paper};
 
 use crate::halftone::Placement;
+use crate::layout::Layout;
 
 /// Dots in a millimetre at 600 dpi.
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
@@ -30,8 +31,8 @@ pub enum PlacementError {
     Size(String),
     /// Larger than the printable area.
     #[error(
-        "{width:.1} x {height:.1} mm does not fit: {paper} prints {most_width:.1} x {most_height:.1} mm; \
-         give a smaller --size or another --paper"
+        "{width:.1} x {height:.1} mm does not fit: {paper} prints {most_width:.1} x {most_height:.1} mm here; \
+         give a smaller --size, another --paper, or --crop to cut"
     )]
     TooLarge {
         /// Width asked for, in mm.
@@ -85,18 +86,20 @@ impl fmt::Display for Size {
     }
 }
 
-/// Places a document of `pixels` (width, height) on `paper`, centred.
+/// Dots across and down of a document of `pixels` (width, height) that a layout has room for.
 ///
 /// `asked` is the size wanted: the document fills it as far as its shape allows. Without it the document's own
-/// size `own_mm` counts, and without that the largest size that fits the page.
-pub fn place(
+/// size `own_mm` counts, and without that the largest size that fits. A layout that cuts has room for any document up to
+/// the largest sheet.
+pub fn dots(
     pixels: (usize, usize),
     own_mm: Option<(f64, f64)>,
     asked: Option<Size>,
-    paper: Paper,
-) -> Result<Placement, PlacementError> {
-    let most = (f64::from(paper.width()), f64::from(paper.length()));
-    let most_mm = (most.0 / DOTS_PER_MM, most.1 / DOTS_PER_MM);
+    layout: &Layout,
+) -> Result<(u16, u16), PlacementError> {
+    let largest = layout.largest();
+    let fill = (largest.0 as f64 / DOTS_PER_MM, largest.1 as f64 / DOTS_PER_MM);
+    let most = if layout.cut { (usize::from(LARGEST.0), usize::from(LARGEST.1)) } else { largest };
     let aspect = match own_mm {
         Some((width, height)) => height / width,
         None => pixels.1 as f64 / pixels.0 as f64,
@@ -109,23 +112,34 @@ pub fn place(
         (Some(Size { width, height: Some(height) }), _) => within(width, height),
         (Some(Size { width, height: None }), _) => (width, width * aspect),
         (None, Some(own)) => own,
-        (None, None) => within(most_mm.0, most_mm.1),
+        (None, None) => within(fill.0, fill.1),
     };
     // Rounding gives half a dot of grace, so that a size computed from the page's own dots is not refused.
     let dots = ((width * DOTS_PER_MM).round(), (height * DOTS_PER_MM).round());
     if !(dots.0 >= 1.0 && dots.1 >= 1.0) {
         return Err(PlacementError::TooSmall { width, height });
     }
-    if dots.0 > most.0 || dots.1 > most.1 {
+    if dots.0 > most.0 as f64 || dots.1 > most.1 as f64 {
         return Err(PlacementError::TooLarge {
             width,
             height,
-            paper: paper.name(),
-            most_width: most_mm.0,
-            most_height: most_mm.1,
+            paper: layout.paper.name(),
+            most_width: most.0 as f64 / DOTS_PER_MM,
+            most_height: most.1 as f64 / DOTS_PER_MM,
         });
     }
-    let (width, height) = (dots.0 as u16, dots.1 as u16);
+    // No layout has more room than the largest sheet, whose sides are u16.
+    Ok((dots.0 as u16, dots.1 as u16))
+}
+
+/// Places a document in the middle of `paper`; its size is that of [`dots`].
+pub fn place(
+    pixels: (usize, usize),
+    own_mm: Option<(f64, f64)>,
+    asked: Option<Size>,
+    paper: Paper,
+) -> Result<Placement, PlacementError> {
+    let (width, height) = dots(pixels, own_mm, asked, &Layout::centred(paper))?;
     Ok(Placement { paper, x: (paper.width() - width) / 2, y: (paper.length() - height) / 2, width, height })
 }
 

@@ -11,6 +11,7 @@
 
 pub mod fidelity;
 pub mod flat;
+pub mod inks;
 pub mod probe;
 pub mod source;
 pub mod sphere;

@@ -7,6 +7,7 @@
 //! printer's port.
 
 mod address;
+pub mod cassettes;
 pub mod journal;
 pub mod query;
 pub mod raw;
@@ -22,6 +23,7 @@ pub use run::{Event, RunError, run};
 use protocol::ink::Ink;
 
 use crate::inspect::{StreamError, inspect};
+use crate::job::ribbon;
 use crate::observe::Observer;
 use journal::PassPlace;
 
@@ -43,6 +45,8 @@ pub struct Checked {
     pub passes: Vec<PassPlace>,
     /// Its inks in the order of first use.
     pub inks: Vec<Ink>,
+    /// Ribbon that each pass takes in millimetres, an estimate.
+    pub ribbon_mm: Vec<f64>,
 }
 
 /// Looks whether these bytes are one whole legal job, and nothing else.
@@ -67,5 +71,7 @@ pub fn check(job: &[u8], observer: &dyn Observer) -> Result<Checked, Unsendable>
             inks.push(ink);
         }
     }
-    Ok(Checked { passes, inks })
+    let dpi = inspected.inspection.setup.resolution.unwrap_or((600, 600));
+    let ribbon_mm = inspected.passes.iter().map(|pass| ribbon::of(&pass.plane, dpi).ribbon_mm).collect();
+    Ok(Checked { passes, inks, ribbon_mm })
 }

@@ -172,6 +172,17 @@ fn names(inks: &[Ink]) -> String {
     inks.iter().map(|ink| ink.name()).collect::<Vec<_>>().join(", ")
 }
 
+/// The passes that lay down all of these stacks, lowest first: what [`separate`] does when all are in use.
+pub fn passes_of(stacks: &[Stack]) -> Vec<Ink> {
+    order::order(&stacks.iter().map(Stack::layers).collect::<Vec<_>>()).inks
+}
+
+/// What the rules on stacks and pages say of a sheet that is printed in these passes, most severe first.
+pub fn check(sheet: &Sheet, passes: &[Planned], order: &[Rule]) -> Vec<Check> {
+    let plan = Plan { passes: passes.to_vec(), cartridges: Vec::new(), fewest: false };
+    rules::check(sheet, &sheet.census(), &plan, order)
+}
+
 /// Separates a sheet into passes. Only stacks that occur on a dot count. `order` are the ink library's rules on the
 /// order of layers ([`inks::Library::rules`]).
 ///

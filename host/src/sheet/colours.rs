@@ -30,8 +30,18 @@ fn tint(ink: Ink) -> [f64; 3] {
     }
 }
 
-fn look(stack: &Stack) -> [f64; 3] {
-    let mut colour = [0.99, 0.99, 0.98];
+/// Nearly white paper, 0..=1.
+const PAPER: [f64; 3] = [0.99, 0.99, 0.98];
+
+/// How a stack looks on a screen upon a ground of this colour, both sRGB. Transparent inks tint what is below them, the
+/// others hide it. Stacks that look alike have the same colour.
+pub fn upon(stack: &Stack, ground: [u8; 3]) -> [u8; 3] {
+    // Within 0..=255: tints and grounds are.
+    look(stack, ground.map(|c| f64::from(c) / 255.0)).map(|c| c.round() as u8)
+}
+
+fn look(stack: &Stack, ground: [f64; 3]) -> [f64; 3] {
+    let mut colour = ground;
     for &ink in stack.layers() {
         let tint = tint(ink);
         colour = match ink.kind() {
@@ -57,7 +67,7 @@ pub fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
     let mut free = vec![f64::INFINITY; grid.len()];
     let mut taken: Vec<[f64; 3]> = Vec::with_capacity(stacks.len());
     for stack in stacks {
-        let wanted = look(stack).map(f64::round);
+        let wanted = look(stack, PAPER).map(f64::round);
         let nearest = taken.iter().map(|&other| distance(wanted, other)).fold(f64::INFINITY, f64::min);
         let mut far = FAR;
         let colour = loop {

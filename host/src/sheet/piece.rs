@@ -5,7 +5,7 @@
 
 use inks::Stack;
 
-use super::{SheetError, check_stacks};
+use super::{Sheet, SheetError, check_stacks};
 
 /// One stack for every dot of a rectangle at 600 dpi. Stack 0 is always the bare substrate.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,5 +48,13 @@ impl Piece {
     /// The stack number of every dot, row by row.
     pub fn index(&self) -> &[u8] {
         &self.index
+    }
+}
+
+impl From<Sheet> for Piece {
+    /// All of a sheet, without its paper.
+    fn from(sheet: Sheet) -> Piece {
+        let (width, length) = (sheet.width(), sheet.length());
+        Piece { width, length, stacks: sheet.stacks, index: sheet.index }
     }
 }

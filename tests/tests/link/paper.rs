@@ -4,6 +4,7 @@ use crate::EVERYTHING;
 use crate::model::{ALL, Job, seeded};
 use crate::wire::{self, World};
 use foilpress::document::{self, Options};
+use foilpress::layout::Layout;
 use foilpress::observe::Silent;
 use foilpress::send::session::Outcome;
 use foilpress::simulate::{Carousel, Lever, Printer, Stock, Trouble, difference, wanted};
@@ -21,8 +22,9 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         factor: factor::Settings::default(),
         gamut: gamut::Settings::default(),
         inks: inks::InkSet::default(),
-        paper: Paper::Postcard,
+        layout: Layout::centred(Paper::Postcard),
         media: Media::default(),
+        curl_correction: true,
         size: Some("12x9mm".parse().unwrap()),
     };
     let print = pipeline::print(&document, &inks::Library::builtin(), &settings, &Silent).unwrap();

@@ -1,0 +1,173 @@
+//! `foilpress chart`: sheets made to look at, to measure inks and to measure the machine.
+
+use anyhow::{Context, Result, bail};
+use clap::{Args as ClapArgs, Subcommand};
+use inks::{InkSet, Library, Stack};
+use protocol::ink::Ink;
+
+use super::args::InkArgs;
+use super::deliver::DeliverArgs;
+use super::layout::{MediaArgs, ink};
+use super::piece::{self, Job, PieceArgs, ResultArgs};
+use crate::chart;
+use crate::layout::{self, Layout};
+use crate::observe::Observer;
+use crate::separate::MOST_CARTRIDGES;
+use crate::sheet::Piece;
+
+/// Arguments of `chart`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress chart ramp silver-foil metallic-silver     (figure 2 of the paper)\n  \
+    foilpress chart ladder MS+F MS                       (figure 5: four levels of gloss)\n  \
+    foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
+    foilpress chart registration --inks black,cyan,white\n  \
+    foilpress chart calibration --to serial:/dev/ttyACM0")]
+pub struct Args {
+    #[command(subcommand)]
+    chart: Chart,
+}
+
+#[derive(Subcommand, Debug)]
+enum Chart {
+    /// From one stack to another, halftoned, with a checkerboard to hold so that it is reflected
+    Ramp(Two),
+    /// Four levels of gloss between a glossy and a dull stack: clamped, and with their differences kept
+    Ladder(Two),
+    /// A labelled patch of every stack that a choice of inks can make
+    Stacks(Stacks),
+    /// Verniers between the first ink and the others: how far passes are apart
+    Registration(Registration),
+    /// Two crosses to measure with a ruler: where this machine prints and how far it feeds (`foilpress profile set`)
+    Calibration(Calibration),
+}
+
+#[derive(ClapArgs, Debug)]
+struct Two {
+    /// The first stack, or the glossier one: short or long names of inks joined by +, from the bottom, such as MS or MS+C
+    first: Stack,
+    /// The second stack
+    second: Stack,
+    /// Folder of an ink library of your own
+    #[arg(long, value_name = "DIR")]
+    library: Option<std::path::PathBuf>,
+    #[command(flatten)]
+    piece: PieceArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Stacks {
+    #[command(flatten)]
+    inks: InkArgs,
+    #[command(flatten)]
+    piece: PieceArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Registration {
+    /// The inks, joined by commas; the first is compared with each of the others
+    #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = ink)]
+    inks: Vec<Ink>,
+    #[command(flatten)]
+    whole: WholePage,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Calibration {
+    /// The ink to print with
+    #[arg(long, default_value = "black", value_parser = ink)]
+    ink: Ink,
+    #[command(flatten)]
+    whole: WholePage,
+}
+
+/// Charts of the whole printable area have no layout but their paper, and measure the machine as it is.
+#[derive(ClapArgs, Debug)]
+struct WholePage {
+    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
+    paper: protocol::paper::Paper,
+    #[command(flatten)]
+    media: MediaArgs,
+    #[command(flatten)]
+    result: ResultArgs,
+    #[command(flatten)]
+    deliver: DeliverArgs,
+}
+
+/// Inks of `chart stacks` when none are named: as many as go in.
+const USUAL: &str = "process,metallic-silver,white,finish";
+
+/// Runs `chart`.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    match &args.chart {
+        Chart::Ramp(two) => two.run("ramp", chart::ramp, observer),
+        Chart::Ladder(two) => two.run("ladder", chart::ladder, observer),
+        Chart::Stacks(stacks) => {
+            let usual = InkArgs { inks: Some(USUAL.into()), library: stacks.inks.library.clone() };
+            let (set, library) = if stacks.inks.inks.is_some() { &stacks.inks } else { &usual }.at_hand()?;
+            if set.len() > MOST_CARTRIDGES {
+                bail!(
+                    "--inks: {} inks, but the machine holds {MOST_CARTRIDGES} cartridges; print a chart for some at a time, \
+                     such as --inks {USUAL}",
+                    set.len()
+                );
+            }
+            let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
+            let piece = chart::stacks(&all, stacks.piece.layout.paper)?;
+            let job = Job {
+                name: "stacks",
+                piece: &piece,
+                allowed: set,
+                library: &library,
+                report: None,
+                advice: String::new(),
+            };
+            piece::print(&job, &stacks.piece, observer)
+        }
+        Chart::Registration(registration) => {
+            let inks = &registration.inks;
+            if let Some(twice) = inks.iter().enumerate().find(|(i, ink)| inks[..*i].contains(ink)) {
+                bail!("--inks: {} comes twice", twice.1.name());
+            }
+            let piece = chart::registration(inks, registration.whole.paper)?;
+            registration.whole.print("registration", &piece, inks, observer)
+        }
+        Chart::Calibration(calibration) => {
+            let ink = calibration.ink;
+            let piece = chart::calibration(ink, calibration.whole.paper)?;
+            calibration.whole.print("calibration", &piece, &[ink], observer)
+        }
+    }
+}
+
+type Make = fn(&Stack, &Stack, &Library, &dyn Observer) -> Result<Piece, chart::ChartError>;
+
+impl Two {
+    fn run(&self, name: &str, make: Make, observer: &dyn Observer) -> Result<()> {
+        let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
+        let piece = make(&self.first, &self.second, &library, observer)?;
+        // Who names a foil wants it.
+        let allowed = InkSet::ALL;
+        let name = format!("{name} {} {}", self.first, self.second);
+        let job = Job {
+            name: &name,
+            piece: &piece,
+            allowed,
+            library: &library,
+            report: None,
+            advice: String::new(),
+        };
+        piece::print(&job, &self.piece, observer).with_context(|| name.clone())
+    }
+}
+
+impl WholePage {
+    fn print(&self, name: &str, piece: &Piece, inks: &[Ink], observer: &dyn Observer) -> Result<()> {
+        let library = Library::builtin();
+        let allowed = InkSet::of(inks.iter().copied());
+        let job = Job { name, piece, allowed, library: &library, report: None, advice: String::new() };
+        let layout = Layout::centred(self.paper);
+        piece::print_on(&job, &layout, &self.media, &self.result, &self.deliver, observer)
+    }
+}

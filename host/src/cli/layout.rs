@@ -1,0 +1,287 @@
+//! Arguments of the page: paper, position, repeats, marks, the machine, and what the sheet is made of.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use inks::InkSet;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+use protocol::rgl::{Media, Page};
+
+use crate::folders;
+use crate::layout::{self, Layout, Mm, Point, Position, Profile, Repeat};
+use crate::observe::Observer;
+
+/// The profile that is used when none is named.
+pub const DEFAULT_PROFILE: &str = "default";
+
+/// How things lie on the page.
+#[derive(Args, Debug)]
+pub struct LayoutArgs {
+    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
+    pub paper: Paper,
+    /// Top left corner of the print, such as 20x30mm: across, then down [default: centred]
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    pub at: Option<Point>,
+    /// What --at is measured from
+    #[arg(long, value_name = "WHERE", default_value = "edge", requires = "at")]
+    pub from: From,
+    /// The print several times side by side and below each other, such as 3x4, or as often as it fits: fill
+    #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = repeat)]
+    pub repeat: Repeat,
+    /// Space between repeats: 2mm, or across and down 2x5mm
+    #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = gap)]
+    pub gap: Point,
+    /// Turn the print left to right: water-slide decals put face down, window decals seen from inside
+    #[arg(long)]
+    pub mirror: bool,
+    /// Ticks where to cut
+    #[arg(long)]
+    pub crop_marks: bool,
+    /// A cross at each side that every pass prints, to see whether passes meet
+    #[arg(long)]
+    pub registration_marks: bool,
+    /// Inks of the marks, joined by commas [default: those in use: the one that shows best for ticks, all for crosses]
+    #[arg(long, value_name = "INKS")]
+    pub mark_ink: Option<InkSet>,
+    /// Cut off what lies beyond the printable area instead of refusing
+    #[arg(long)]
+    pub crop: bool,
+    /// Profile of the machine (`foilpress profile`) [default: the one named `default`, if there is one]
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
+}
+
+/// What a position is measured from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum From {
+    /// The edge of the sheet of paper
+    Edge,
+    /// The edge of the printable area
+    Printable,
+}
+
+fn repeat(text: &str) -> Result<Repeat, String> {
+    if text.eq_ignore_ascii_case("fill") {
+        return Ok(Repeat::Fill);
+    }
+    let grid = text.split_once('x').and_then(|(columns, rows)| {
+        let count = |text: &str| {
+            text.trim().parse::<u16>().ok().filter(|count| (1..=layout::MOST_REPEATS).contains(count))
+        };
+        Some(Repeat::Grid(count(columns)?, count(rows)?))
+    });
+    grid.ok_or_else(|| {
+        format!("write columns x rows, such as 3x4, each up to {}; or fill", layout::MOST_REPEATS)
+    })
+}
+
+fn gap(text: &str) -> Result<Point, String> {
+    let point: Point = match text.parse::<Mm>() {
+        Ok(both) => Point(both, both),
+        Err(error) => text.parse().map_err(|_| error.to_string())?,
+    };
+    if point.0.0 < 0.0 || point.1.0 < 0.0 {
+        return Err("pieces cannot overlap; the gap is 0 or more".into());
+    }
+    Ok(point)
+}
+
+impl LayoutArgs {
+    /// The layout meant. A profile that is used without being named is told to the observer.
+    pub fn layout(&self, observer: &dyn Observer) -> Result<Layout> {
+        let position = match (self.at, self.from) {
+            (None, _) => Position::Centred,
+            (Some(at), From::Edge) => Position::FromEdge(at),
+            (Some(at), From::Printable) => Position::FromPrintable(at),
+        };
+        Ok(Layout {
+            paper: self.paper,
+            position,
+            repeat: self.repeat,
+            gap: self.gap,
+            mirror: self.mirror,
+            crop_marks: self.crop_marks,
+            registration_marks: self.registration_marks,
+            mark_inks: self.mark_ink.map_or_else(Vec::new, |set| set.iter().collect()),
+            cut: self.crop,
+            profile: profile(self.profile.as_deref(), observer)?,
+        })
+    }
+}
+
+/// One ink by its name; a misspelt one is answered with the one meant.
+pub fn ink(name: &str) -> Result<Ink, String> {
+    let set: InkSet = name.parse().map_err(|error: inks::InkSetError| error.to_string())?;
+    match set.iter().collect::<Vec<_>>()[..] {
+        [ink] => Ok(ink),
+        _ => Err(format!("`{name}` is not one ink")),
+    }
+}
+
+/// The folder of profiles.
+pub fn profiles() -> Result<PathBuf> {
+    Ok(folders::config()?.join("profiles"))
+}
+
+/// The profile of this name, or the default one if there is one.
+fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
+    let folder = match (profiles(), name) {
+        (Ok(folder), _) => folder,
+        // Without a place for settings there are none.
+        (Err(_), None) => return Ok(Profile::default()),
+        (Err(error), Some(_)) => return Err(error),
+    };
+    let path = folders::file(&folder, name.unwrap_or(DEFAULT_PROFILE))?;
+    match (name, path.is_file()) {
+        (None, false) => Ok(Profile::default()),
+        (Some(name), false) => {
+            let known = folders::names(&folder).unwrap_or_default();
+            bail!(
+                "there is no profile `{name}` in {}{}; `foilpress profile set {name}` makes it",
+                folder.display(),
+                if known.is_empty() { String::new() } else { format!(" (there are: {})", known.join(", ")) }
+            )
+        }
+        (name, true) => {
+            let profile = Profile::load(&path)?;
+            if name.is_none() && profile != Profile::default() {
+                let [x, y] = profile.offset_mm;
+                observer.note(&format!(
+                    "the machine's profile is used ({}): offset {x}, {y} mm, feed {}",
+                    path.display(),
+                    profile.feed
+                ));
+            }
+            Ok(profile)
+        }
+    }
+}
+
+/// What the sheet is made of.
+#[derive(Args, Debug)]
+pub struct MediaArgs {
+    /// What the sheet is made of: paper, thick (card), film (decal film: curl correction off), or the printer's own
+    /// word for it, such as plain, cardboard, glossy-paper
+    #[arg(long, default_value = "paper", value_parser = Stock::read)]
+    pub media: Stock,
+    /// Whether the machine corrects the curl of the sheet [default: on for all but film]
+    #[arg(long, value_name = "on|off")]
+    pub curl: Option<Curl>,
+}
+
+/// Curl correction.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum Curl {
+    /// Corrected
+    On,
+    /// Left alone
+    Off,
+}
+
+impl MediaArgs {
+    /// The page in the printer's language, on this paper.
+    pub fn page(&self, paper: Paper) -> Page {
+        let curl = self.curl.map_or(self.media.curl_correction, |curl| curl == Curl::On);
+        Page { media: self.media.media, curl_correction: curl, ..Page::plain(paper) }
+    }
+}
+
+/// A sheet by what it is made of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Stock {
+    /// The printer's media type, which sets its heat.
+    pub media: Media,
+    /// Whether curl is corrected.
+    pub curl_correction: bool,
+}
+
+impl Stock {
+    /// The three that owners use, by their own words: decals come off film that went through curl correction.
+    const PRESETS: [(&'static str, Stock); 3] = [
+        ("paper", Stock { media: Media::Plain, curl_correction: true }),
+        ("thick", Stock { media: Media::Cardboard, curl_correction: true }),
+        ("film", Stock { media: Media::Plain, curl_correction: false }),
+    ];
+
+    /// A preset or a media type by its name.
+    fn read(name: &str) -> Result<Stock, String> {
+        if let Some((_, stock)) = Stock::PRESETS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
+            return Ok(*stock);
+        }
+        Media::from_name(name).map(|media| Stock { media, curl_correction: true }).ok_or_else(|| {
+            let names: Vec<&str> =
+                Stock::PRESETS.iter().map(|(name, _)| *name).chain(Media::all().map(Media::name)).collect();
+            format!("the media are {}", names.join(", "))
+        })
+    }
+}
+
+/// Arguments of `profile`.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress chart calibration --to serial:/dev/ttyACM0     (print it, then measure with a ruler)\n  \
+    foilpress profile set default --cross 20.4x29.7mm --distance 200.3mm\n  \
+    foilpress profile list\n  \
+    foilpress print sample:leaf --profile default")]
+pub struct ProfileArgs {
+    #[command(subcommand)]
+    command: ProfileCommand,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum ProfileCommand {
+    /// The profiles there are
+    List,
+    /// What was measured on the calibration chart becomes a profile; `default` is used without being named
+    Set(SetProfile),
+}
+
+#[derive(Args, Debug)]
+struct SetProfile {
+    /// Its name
+    name: String,
+    /// Where the middle of the first cross is, from the left and from the top edge of the sheet
+    #[arg(long, value_name = "X,Y")]
+    cross: Point,
+    /// From the first cross to the one below it [default: not measured, feed taken as exact]
+    #[arg(long, value_name = "LENGTH")]
+    distance: Option<Mm>,
+}
+
+/// Runs `profile`.
+pub fn profile_command(args: &ProfileArgs) -> Result<()> {
+    use std::fmt::Write as _;
+    let folder = profiles()?;
+    match &args.command {
+        ProfileCommand::List => {
+            let mut text = String::new();
+            for name in
+                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?
+            {
+                let Profile { offset_mm: [x, y], feed } = Profile::load(&folders::file(&folder, &name)?)?;
+                writeln!(text, "{name:<16} offset {x:.2}, {y:.2} mm, feed {feed:.4}")?;
+            }
+            if text.is_empty() {
+                text = format!(
+                    "no profiles in {}; `foilpress chart calibration` is the way to one\n",
+                    folder.display()
+                );
+            }
+            super::show(&text)
+        }
+        ProfileCommand::Set(set) => {
+            let profile = crate::chart::calibration::profile(set.cross, set.distance);
+            if let Some(problem) = profile.problem() {
+                bail!("{problem}; measure again");
+            }
+            let path = folders::file(&folder, &set.name)?;
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            profile.save(&path)?;
+            let Profile { offset_mm: [x, y], feed } = profile;
+            super::show(&format!("{}: offset {x:.2}, {y:.2} mm, feed {feed:.4}\n", path.display()))
+        }
+    }
+}

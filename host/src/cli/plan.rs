@@ -1,0 +1,126 @@
+//! `foilpress plan`: what a job or a document needs, before anything is sent.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args as ClapArgs;
+use inks::Library;
+use protocol::rgl::Page;
+
+use super::output::Staged;
+use super::print::Work;
+use crate::job::page;
+use crate::job::plan::{Plan, Subject};
+use crate::layout::Laid;
+use crate::observe::Observer;
+use crate::preview::Area;
+use crate::preview::inks::{Ground, thumbnail};
+use crate::separate::{self, Pass, Planned};
+use crate::sheet::Sheet;
+use crate::simulate;
+
+/// Arguments of `plan`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
+    foilpress plan job.rgl\n  \
+    foilpress plan sample:leaf --size 80mm --repeat 2x3 --gap 2mm\n  \
+    foilpress plan job.rgl --page plan.html              (one page to print and lay beside the machine)\n  \
+    foilpress plan job.rgl --json\n\n\
+    A job is planned from its bytes; the options of page, inks and materials are for documents."
+)]
+pub struct Args {
+    #[command(flatten)]
+    work: Work,
+    /// Also write the plan as a page (HTML, whole in itself) into this file
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
+    /// Colour of the ground in the page's picture: #204080, black, white, clear
+    #[arg(long, value_name = "COLOUR")]
+    background: Option<Ground>,
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs `plan`.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    let staged = args.page.as_deref().map(Staged::file).transpose()?;
+    let path = Path::new(&args.work.document.document);
+    let (plan, sheet) = if is_job(path) {
+        of_job(path, &args.work.inks.library()?, observer)?
+    } else {
+        let done = args.work.print(observer)?;
+        (done.plan, done.print.printed)
+    };
+    if let Some(staged) = staged {
+        let picture = thumbnail(&sheet, args.background.unwrap_or_default(), 640);
+        super::piece::write(staged.path(), page::html(&plan, &picture)?.as_bytes())?;
+        staged.commit()?;
+    }
+    if args.json {
+        super::show(&format!("{}\n", serde_json::to_string_pretty(&plan)?))
+    } else {
+        super::show(&plan.to_string())
+    }
+}
+
+/// Whether a file begins like a job. All jobs begin with an escape; no document's file does.
+fn is_job(path: &Path) -> bool {
+    let mut first = [0];
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl"))
+        || (path.is_file()
+            && File::open(path).and_then(|mut file| file.read_exact(&mut first)).is_ok()
+            && first == *b"\x1b")
+}
+
+/// The plan of a job from its bytes, and the sheet it prints.
+fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<(Plan, Sheet)> {
+    let job = super::read_job(path)?;
+    let printout = simulate::print(&job, &simulate::Setup::default(), observer)
+        .with_context(|| format!("{}", path.display()))?;
+    let sheet = printout.sheet().with_context(|| format!("{}", path.display()))?;
+    let curl = crate::inspect::inspect(&job, observer).inspection.setup.curl_correction;
+    let page = Page {
+        media: printout.media,
+        resolution: printout.resolution,
+        curl_correction: curl.unwrap_or(true),
+        ..Page::plain(printout.paper)
+    };
+    let passes: Vec<Pass> = printout.passes.into_iter().filter(|pass| pass.plane.dots() > 0).collect();
+    let Some(area) = inked(&sheet) else { bail!("{}: there is nothing on the sheet", path.display()) };
+    let planned: Vec<Planned> =
+        passes.iter().map(|pass| Planned { ink: pass.ink, dots: pass.plane.dots() }).collect();
+    let checks = separate::check(&sheet, &planned, library.rules());
+    let laid = Laid { pieces: vec![area], area, grid: (1, 1), cut: None, marks_left_out: 0 };
+    let name = path.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
+    let subject = Subject {
+        name: &name,
+        sheet: &sheet,
+        laid: &laid,
+        passes: &passes,
+        planned: &planned,
+        checks: &checks,
+        page: &page,
+    };
+    Ok((Plan::new(&subject, library), sheet))
+}
+
+/// The smallest rectangle that holds all ink.
+fn inked(sheet: &Sheet) -> Option<Area> {
+    let rows = sheet.index().chunks_exact(sheet.width());
+    let (mut top, mut bottom, mut left, mut right) = (None, 0, sheet.width(), 0);
+    for (y, row) in rows.enumerate() {
+        if let (Some(first), Some(last)) =
+            (row.iter().position(|&dot| dot != 0), row.iter().rposition(|&dot| dot != 0))
+        {
+            top.get_or_insert(y);
+            (bottom, left, right) = (y, left.min(first), right.max(last));
+        }
+    }
+    let top = top?;
+    Some(Area { left, top, width: right + 1 - left, length: bottom + 1 - top })
+}

@@ -1,0 +1,288 @@
+//! `foilpress preset`: options under a name.
+//!
+//! A preset is a table of long options. It is applied before the arguments are read, as if its options had been typed first:
+//! so every option of a command can be in it, is checked by the same rules, and gives way to what is typed.
+
+use std::ffi::{OsStr, OsString};
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::{Args as ClapArgs, CommandFactory as _, Subcommand};
+use serde::{Deserialize, Serialize};
+
+use crate::folders;
+use crate::sheet::picture::{read_toml, write_toml};
+
+/// `--preset`, for commands whose options can be kept under a name.
+#[derive(ClapArgs, Debug)]
+pub struct PresetArg {
+    /// Options kept under this name by `foilpress preset save`; what is typed counts more
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
+}
+
+/// Arguments of `preset`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress preset save decal --media film --mirror --paper postcard\n  \
+    foilpress print sample:leaf --preset decal --size 60mm\n  \
+    foilpress preset use decal         (from now on without being named)\n  \
+    foilpress preset use none\n  \
+    foilpress preset list")]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Keep options under a name, replacing what had it
+    Save {
+        /// The name
+        name: String,
+        /// The options, as they would be typed
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "OPTIONS")]
+        options: Vec<String>,
+    },
+    /// The presets there are, and which is in use
+    List,
+    /// Use a preset wherever it fits without naming it; `none` ends that
+    Use {
+        /// Its name, or none
+        name: String,
+    },
+}
+
+/// A preset as it is kept.
+#[derive(Serialize, Deserialize, Debug, PartialEq)]
+#[serde(deny_unknown_fields)]
+struct Preset {
+    options: toml::Table,
+}
+
+impl Preset {
+    /// Options as typed: `--name value`, `--name=value` or `--name`.
+    fn of_words(words: &[String]) -> Result<Preset> {
+        let mut options = toml::Table::new();
+        let mut words = words.iter().peekable();
+        while let Some(word) = words.next() {
+            let Some(name) = word.strip_prefix("--").filter(|name| !name.is_empty()) else {
+                bail!(
+                    "`{word}` is no option; a preset holds options by their long names, such as --media film"
+                );
+            };
+            let (name, value) = match name.split_once('=') {
+                Some((name, value)) => (name, Some(value.to_owned())),
+                None => (name, words.next_if(|next| !next.starts_with("--")).cloned()),
+            };
+            let value = value.map_or(toml::Value::Boolean(true), toml::Value::String);
+            if options.insert(name.to_owned(), value).is_some() {
+                bail!("--{name} comes twice");
+            }
+        }
+        Ok(Preset { options })
+    }
+
+    /// The options as words.
+    fn words(&self) -> Result<Vec<String>> {
+        let mut words = Vec::new();
+        for (name, value) in &self.options {
+            match value {
+                toml::Value::Boolean(false) => {}
+                toml::Value::Boolean(true) => words.push(format!("--{name}")),
+                toml::Value::String(text) => words.push(format!("--{name}={text}")),
+                toml::Value::Integer(number) => words.push(format!("--{name}={number}")),
+                toml::Value::Float(number) => words.push(format!("--{name}={number}")),
+                _ => bail!("option {name}: a text, a number, true or false is expected"),
+            }
+        }
+        Ok(words)
+    }
+
+    fn load(name: &str) -> Result<Preset> {
+        let folder = presets()?;
+        let path = folders::file(&folder, name)?;
+        if !path.is_file() {
+            let known = folders::names(&folder).unwrap_or_default();
+            bail!(
+                "there is no preset `{name}`{}; `foilpress preset save {name} OPTIONS` makes it",
+                if known.is_empty() { String::new() } else { format!(" (there are: {})", known.join(", ")) }
+            );
+        }
+        Ok(read_toml(&path)?)
+    }
+}
+
+fn presets() -> Result<PathBuf> {
+    Ok(folders::config()?.join("presets"))
+}
+
+/// The file that names the preset in use.
+fn marker() -> Result<PathBuf> {
+    Ok(folders::config()?.join("preset-in-use"))
+}
+
+/// The preset in use, if there is one.
+fn in_use() -> Option<String> {
+    let text = std::fs::read_to_string(marker().ok()?).ok()?;
+    let name = text.trim();
+    (!name.is_empty()).then(|| name.to_owned())
+}
+
+/// Whether a command takes `--preset`.
+fn takes_preset(command: &clap::Command) -> bool {
+    command.get_arguments().any(|arg| arg.get_id() == "preset")
+}
+
+/// Why a command would not take these options, in clap's words; `None` if it would.
+fn refusal(command: &str, words: &[String]) -> Option<String> {
+    let typed = ["foilpress", command].into_iter().map(str::to_owned).chain(words.iter().cloned());
+    // What the command works on is not a preset's business: any name will do.
+    match super::Args::command().try_get_matches_from(typed.chain(["document".to_owned()])) {
+        Ok(_) => None,
+        Err(error) => Some(error.to_string()),
+    }
+}
+
+/// Runs `preset`.
+pub fn run(args: &Args) -> Result<()> {
+    match &args.command {
+        Command::Save { name, options } => {
+            let preset = Preset::of_words(options)?;
+            let (words, program) = (preset.words()?, super::Args::command());
+            let able: Vec<&str> = program
+                .get_subcommands()
+                .filter(|command| takes_preset(command))
+                .map(clap::Command::get_name)
+                .collect();
+            let refusals: Vec<Option<String>> = able.iter().map(|command| refusal(command, &words)).collect();
+            if words.iter().any(|word| word.starts_with("--preset")) {
+                bail!("a preset cannot name another one");
+            }
+            if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
+                bail!(
+                    "no command takes these options together: {}",
+                    first.trim_start_matches("error: ").trim_end()
+                );
+            }
+            let folder = presets()?;
+            let path = folders::file(&folder, name)?;
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            write_toml(&path, &preset)?;
+            let fits: Vec<&str> = able
+                .into_iter()
+                .zip(&refusals)
+                .filter(|(_, refusal)| refusal.is_none())
+                .map(|(name, _)| name)
+                .collect();
+            super::show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
+        }
+        Command::List => {
+            let folder = presets()?;
+            let names =
+                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+            let used = in_use();
+            let mut text = String::new();
+            for name in &names {
+                let words = Preset::load(name)?.words()?.join(" ");
+                let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
+                text.push_str(&format!("{name:<16} {words}{used}\n"));
+            }
+            if names.is_empty() {
+                text = format!(
+                    "no presets in {}; `foilpress preset save NAME OPTIONS` makes one\n",
+                    folder.display()
+                );
+            }
+            super::show(&text)
+        }
+        Command::Use { name } => {
+            let path = marker()?;
+            if name == "none" {
+                return match std::fs::remove_file(&path) {
+                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                        Err(error).with_context(|| format!("cannot remove {}", path.display()))
+                    }
+                    _ => super::show("no preset is in use\n"),
+                };
+            }
+            let words = Preset::load(name)?.words()?.join(" ");
+            std::fs::write(&path, format!("{name}\n"))
+                .with_context(|| format!("cannot write {}", path.display()))?;
+            super::show(&format!("from now on: {words}\n"))
+        }
+    }
+}
+
+/// The arguments with the options of a preset put in, if one is named or in use.
+pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
+    let program = super::Args::command();
+    let place = args.iter().skip(1).position(|arg| !arg.to_string_lossy().starts_with('-')).map(|at| at + 1);
+    let Some(place) = place else { return Ok(args) };
+    let able = program.get_subcommands().find(|command| OsStr::new(command.get_name()) == args[place]);
+    let Some(command) = able.filter(|command| takes_preset(command)) else { return Ok(args) };
+    let typed = &args[place + 1..];
+    let end = typed.iter().position(|arg| arg == "--").unwrap_or(typed.len());
+    let named = typed[..end].iter().enumerate().find_map(|(at, arg)| {
+        let arg = arg.to_str()?;
+        match arg.strip_prefix("--preset=") {
+            Some(name) => Some(name.to_owned()),
+            None if arg == "--preset" => Some(typed.get(at + 1)?.to_str()?.to_owned()),
+            None => None,
+        }
+    });
+    let words = match (&named, in_use()) {
+        (Some(name), _) => Preset::load(name)?.words().with_context(|| format!("preset `{name}`"))?,
+        (None, Some(name)) => {
+            let words = Preset::load(&name).and_then(|preset| preset.words()).with_context(|| {
+                format!("preset `{name}` is in use (`foilpress preset use none` ends that)")
+            })?;
+            let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
+            let fits = refusal(command.get_name(), &words).is_none();
+            if !quiet {
+                let what =
+                    if fits { words.join(" ") } else { "does not fit this command and is left out".into() };
+                let _ = writeln!(std::io::stderr(), "note: preset `{name}`: {what}");
+            }
+            if !fits {
+                return Ok(args);
+            }
+            words
+        }
+        (None, None) => return Ok(args),
+    };
+    let mut all = args[..=place].to_vec();
+    all.extend(words.into_iter().map(OsString::from));
+    all.extend_from_slice(typed);
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_come_back_as_they_were_typed() {
+        let typed = ["--media", "film", "--mirror", "--size=8cm", "--at", "-1x2mm"].map(str::to_owned);
+        let preset = Preset::of_words(&typed).unwrap();
+        let text = toml::to_string(&preset).unwrap();
+        let read: Preset = toml::from_str(&text).unwrap();
+        assert_eq!(read, preset);
+        let mut words = read.words().unwrap();
+        words.sort();
+        assert_eq!(words, ["--at=-1x2mm", "--media=film", "--mirror", "--size=8cm"]);
+        for wrong in [&["-q"][..], &["film"], &["--"], &["--a", "--a"]] {
+            let words: Vec<String> = wrong.iter().map(|&word| word.to_owned()).collect();
+            assert!(Preset::of_words(&words).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_typed_counts_more_than_a_preset() {
+        let words: Vec<String> =
+            ["--media=film", "--media=thick", "--mirror", "--mirror"].map(str::to_owned).to_vec();
+        assert_eq!(refusal("print", &words), None);
+        assert!(refusal("print", &["--meda=film".to_owned()]).is_some());
+    }
+}

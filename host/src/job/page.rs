@@ -1,0 +1,124 @@
+//! The plan as one page to print and lay beside the machine: HTML that needs nothing but itself.
+
+use std::fmt::Write as _;
+use std::io::Cursor;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use image::{ImageFormat, RgbImage};
+
+use super::plan::{Plan, grouped};
+use super::ribbon;
+
+/// The plan with a picture of the sheet, for a sheet of A4 or letter.
+pub fn html(plan: &Plan, picture: &RgbImage) -> Result<String, image::ImageError> {
+    let mut png = Cursor::new(Vec::new());
+    picture.write_to(&mut png, ImageFormat::Png)?;
+    let mut page = String::new();
+    // Writing to a string does not fail.
+    let _ = write(plan, &STANDARD.encode(png.into_inner()), &mut page);
+    Ok(page)
+}
+
+/// Text as it stands in HTML: names come from anybody's files.
+fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&#39;"),
+            c if c.is_control() => safe.push(' '),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+const STYLE: &str = "@page{margin:15mm}body{font:10.5pt/1.35 sans-serif;color:#111;max-width:180mm;margin:0 auto}\
+    h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}p{margin:1mm 0}\
+    table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.6mm 2mm;border-bottom:.2mm solid #bbb}\
+    th{font-weight:600}td.n,th.n{text-align:right}img{float:right;width:52mm;border:.2mm solid #999;margin:0 0 3mm 5mm}\
+    .box{display:inline-block;width:3.4mm;height:3.4mm;border:.3mm solid #111;vertical-align:-.5mm}small{color:#555}";
+
+fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
+    let name = escape(&plan.document);
+    write!(
+        page,
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}: job plan</title>\
+         <style>{STYLE}</style></head><body>\n\
+         <img alt=\"the sheet\" src=\"data:image/png;base64,{picture}\">\n<h1>{name}</h1>\n"
+    )?;
+    let (width, height) = plan.size_mm;
+    writeln!(page, "<p>{width:.1} &times; {height:.1} mm on {}", plan.paper)?;
+    if plan.pieces != (1, 1) {
+        write!(page, ", {} &times; {} times", plan.pieces.0, plan.pieces.1)?;
+    }
+    writeln!(
+        page,
+        "; its corner {:.1} mm from the left and {:.1} mm from the top edge of the sheet.</p>\n\
+         <p>Media <b>{}</b>, curl correction <b>{}</b>.</p>\n<p>About <b>{}</b> <small>({})</small></p>",
+        plan.from_edge_mm.0,
+        plan.from_edge_mm.1,
+        plan.media,
+        if plan.curl_correction { "on" } else { "off" },
+        ribbon::duration(plan.seconds_estimated),
+        Plan::TIME_NOTE
+    )?;
+    writeln!(
+        page,
+        "<h2>Load</h2>\n<table><tr><th></th><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
+         <th class=\"n\">From pass</th><th class=\"n\">Ribbon*</th></tr>"
+    )?;
+    for cartridge in &plan.cartridges {
+        writeln!(
+            page,
+            "<tr><td><span class=\"box\"></span></td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{}</td></tr>",
+            escape(&cartridge.sold_as),
+            cartridge.part,
+            cartridge.barcode,
+            cartridge.first_pass,
+            ribbon::length(cartridge.ribbon_mm_estimated)
+        )?;
+    }
+    writeln!(
+        page,
+        "</table>\n<p><small>A cartridge that is not loaded: the machine stops before its pass, asks for it, and goes on \
+         when it is in.</small></p>\n<h2>Passes</h2>\n<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
+         <th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>"
+    )?;
+    for pass in &plan.passes {
+        writeln!(
+            page,
+            "<tr><td class=\"n\">{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.1} %</td><td class=\"n\">{}</td>\
+             </tr>",
+            pass.number,
+            pass.ink,
+            grouped(pass.dots),
+            100.0 * pass.share,
+            ribbon::length(pass.estimate.ribbon_mm)
+        )?;
+    }
+    writeln!(page, "</table>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
+    if !plan.checks.is_empty() {
+        writeln!(page, "<h2>Before you print</h2>\n<ul>")?;
+        for check in &plan.checks {
+            writeln!(page, "<li><b>{}</b>: {}</li>", check.severity, escape(&check.text))?;
+        }
+        writeln!(page, "</ul>")?;
+    }
+    writeln!(page, "</body></html>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::escape;
+
+    #[test]
+    fn names_from_files_stay_text() {
+        assert_eq!(escape("<b>\"a\" & 'c'\u{7}"), "&lt;b&gt;&quot;a&quot; &amp; &#39;c&#39; ");
+    }
+}

@@ -1,0 +1,125 @@
+//! Crop marks and registration marks around a block of pieces.
+//!
+//! Crop marks are ticks outside the block in line with every edge that is cut. Registration marks are a cross in a ring in
+//! the middle of each side, printed by every pass on the same place, so that a pass that is off shows beside the others.
+//! Where the printable area leaves no room a tick becomes shorter; what cannot be drawn is counted.
+
+use super::Rect;
+use super::length::Mm;
+
+/// From the block to a mark, in millimetres.
+const AWAY: f64 = 1.5;
+/// Length of a tick, and the least that is still one.
+const TICK: f64 = 4.0;
+const LEAST_TICK: f64 = 1.0;
+/// Width of all lines in dots: 0.17 mm, as fine as foil goes.
+const LINE: i64 = 4;
+/// Side of a registration mark in millimetres.
+const TARGET: f64 = 5.0;
+
+/// What a mark is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Shape {
+    /// A filled rectangle.
+    Tick,
+    /// A cross in a ring that fills the rectangle.
+    Target,
+}
+
+/// A mark and its place on the ideal page.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Mark {
+    pub(super) place: Rect,
+    pub(super) shape: Shape,
+}
+
+impl Mark {
+    /// Whether the mark has ink at (x, y) of the page.
+    pub(super) fn covers(&self, x: i64, y: i64) -> bool {
+        if !self.place.contains(x, y) {
+            return false;
+        }
+        match self.shape {
+            Shape::Tick => true,
+            Shape::Target => {
+                // In half dots from the middle, so that even sides have one.
+                let side = self.place.width();
+                let dx = 2 * (x - self.place.left) + 1 - side;
+                let dy = 2 * (y - self.place.top) + 1 - side;
+                let reach = dx * dx + dy * dy;
+                let (outer, inner) = (side * 2 / 3, side * 2 / 3 - 2 * LINE);
+                dx.abs() < LINE
+                    || dy.abs() < LINE
+                    || (reach < outer * outer && reach >= inner.max(0) * inner.max(0))
+            }
+        }
+    }
+}
+
+/// Ticks in line with the columns' and rows' edges (first and one past the last dot), and how many had no room.
+pub(super) fn crop(
+    block: Rect,
+    columns: &[(i64, i64)],
+    rows: &[(i64, i64)],
+    room: Rect,
+) -> (Vec<Mark>, usize) {
+    let (away, tick) = (Mm(AWAY).dots(), Mm(TICK).dots());
+    let mut places = Vec::new();
+    for edge in edges(columns) {
+        let (left, right) = (edge - LINE / 2, edge + LINE / 2);
+        places.push((Rect { left, right, top: block.top - away - tick, bottom: block.top - away }, true));
+        places
+            .push((Rect { left, right, top: block.bottom + away, bottom: block.bottom + away + tick }, true));
+    }
+    for edge in edges(rows) {
+        let (top, bottom) = (edge - LINE / 2, edge + LINE / 2);
+        places.push((Rect { top, bottom, left: block.left - away - tick, right: block.left - away }, false));
+        places
+            .push((Rect { top, bottom, left: block.right + away, right: block.right + away + tick }, false));
+    }
+    let mut missing = 0;
+    let marks = places
+        .into_iter()
+        .filter_map(|(place, upright)| {
+            let fits = place.meet(room);
+            let (length, width) =
+                if upright { (fits.length(), fits.width()) } else { (fits.width(), fits.length()) };
+            // Half a line at the very edge of the printable area still shows where to cut.
+            if length < Mm(LEAST_TICK).dots() || width < LINE / 2 {
+                missing += 1;
+                return None;
+            }
+            Some(Mark { place: fits, shape: Shape::Tick })
+        })
+        .collect();
+    (marks, missing)
+}
+
+/// All edges, each once; two that touch are one cut.
+fn edges(spans: &[(i64, i64)]) -> Vec<i64> {
+    let mut edges: Vec<i64> = spans.iter().flat_map(|&(start, end)| [start, end]).collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}
+
+/// A registration mark in the middle of each side of the block, and how many had no room. They stand clear of `ticks`.
+pub(super) fn registration(block: Rect, room: Rect, ticks: bool) -> (Vec<Mark>, usize) {
+    let side = Mm(TARGET).dots();
+    let away = if ticks { Mm(AWAY + TICK + AWAY).dots() } else { Mm(AWAY).dots() };
+    let (x, y) = ((block.left + block.right - side) / 2, (block.top + block.bottom - side) / 2);
+    let corners = [
+        (x, block.top - away - side),
+        (x, block.bottom + away),
+        (block.left - away - side, y),
+        (block.right + away, y),
+    ];
+    let places = corners.map(|(left, top)| Rect { left, top, right: left + side, bottom: top + side });
+    let marks: Vec<Mark> = places
+        .into_iter()
+        .filter(|place| place.meet(room) == *place)
+        .map(|place| Mark { place, shape: Shape::Target })
+        .collect();
+    let missing = places.len() - marks.len();
+    (marks, missing)
+}

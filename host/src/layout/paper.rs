@@ -1,0 +1,136 @@
+//! Sheets of paper: their size, and how near to each edge the machine prints.
+//!
+//! The machine itself keeps the left and the top margin; the others are what the printable area leaves of the sheet.
+//! Source: sizes are the standards'; printable areas the established open driver's; which margins were measured on
+//! hardware is said with each. Custom sheets get the margins measured on A4.
+
+use protocol::paper::{LARGEST, LEFT, Paper};
+
+use super::length::{Mm, Point};
+
+/// Right and bottom margin of a sheet of a size of its own, in dots: those measured on A4.
+const RIGHT: i64 = 80;
+const BOTTOM: i64 = 360;
+
+/// The smallest printable side of a custom sheet, in dots: 10 mm, so that a slip of the finger is noticed.
+const LEAST: i64 = 236;
+
+/// A sheet and its margins, all in millimetres.
+#[derive(Clone, Copy, PartialEq, Debug, serde::Serialize)]
+pub struct Known {
+    /// Name on the command line.
+    pub name: &'static str,
+    /// Width and length of the sheet.
+    pub sheet_mm: (f64, f64),
+    /// Width and length of what can be printed.
+    pub printable_mm: (f64, f64),
+    /// Margins: left, top, right, bottom.
+    pub margins_mm: [f64; 4],
+    /// How well they are known.
+    pub known: &'static str,
+}
+
+const TABLE: [(Paper, (f64, f64), &str); 6] = [
+    (Paper::A4, (210.0, 297.0), "all four margins measured: 3.39, 12.03, 3.41, 15.23"),
+    (Paper::Letter, (215.9, 279.4), "printed, margins not measured"),
+    (Paper::Legal, (215.9, 355.6), "never tried"),
+    (Paper::Executive, (184.15, 266.7), "printed, margins not measured"),
+    (Paper::B5, (182.0, 257.0), "printed, margins not measured"),
+    (Paper::Postcard, (100.0, 148.0), "top and right measured; a mark 21 mm above the lower edge printed"),
+];
+
+/// Every paper with a name.
+pub fn table() -> impl Iterator<Item = Known> {
+    TABLE.iter().map(|&(paper, (width, length), known)| {
+        let printable = (Mm::of_dots(paper.width().into()).0, Mm::of_dots(paper.length().into()).0);
+        let (left, top) = (Mm::of_dots(LEFT.into()).0, Mm::of_dots(paper.top().into()).0);
+        Known {
+            name: paper.name(),
+            sheet_mm: (width, length),
+            printable_mm: printable,
+            margins_mm: [left, top, width - left - printable.0, length - top - printable.1],
+            known,
+        }
+    })
+}
+
+/// The size of the sheet of this paper in millimetres.
+pub fn sheet_mm(paper: Paper) -> (f64, f64) {
+    match TABLE.iter().find(|row| row.0 == paper) {
+        Some(row) => row.1,
+        None => (
+            Mm::of_dots(i64::from(LEFT) + i64::from(paper.width()) + RIGHT).0,
+            Mm::of_dots(i64::from(paper.top()) + i64::from(paper.length()) + BOTTOM).0,
+        ),
+    }
+}
+
+/// The paper meant by a name, or by the size of a sheet such as `120x180mm`.
+///
+/// Errors, in words: neither, or a sheet that the machine cannot take.
+pub fn read(text: &str) -> Result<Paper, String> {
+    if let Some(paper) = Paper::from_name(text) {
+        return Ok(paper);
+    }
+    let names: Vec<&str> = Paper::named().map(Paper::name).collect();
+    let Ok(Point(width, length)) = text.parse() else {
+        return Err(format!("the papers are {}, or the size of a sheet such as 120x180mm", names.join(", ")));
+    };
+    let custom = |top: i64| (width.dots() - i64::from(LEFT) - RIGHT, length.dots() - top - BOTTOM);
+    let (across, along) = custom(Paper::Custom { width: 0, length: 0 }.top().into());
+    let (most, longest) = (i64::from(LARGEST.0), i64::from(LARGEST.1));
+    if across < LEAST || along < LEAST {
+        return Err(format!(
+            "a sheet of {:.1} x {:.1} mm leaves {:.1} x {:.1} mm to print, with margins of 3.4 mm at the sides, 12.0 mm \
+             at the top and 15.2 mm at the bottom; at least 10 x 10 mm are needed",
+            width.0,
+            length.0,
+            Mm::of_dots(across.max(0)).0,
+            Mm::of_dots(along.max(0)).0
+        ));
+    }
+    if across > most || along > longest {
+        let (width_mm, length_mm) = (sheet_mm(Paper::Letter).0, sheet_mm(Paper::Legal).1);
+        return Err(format!(
+            "a sheet of {:.1} x {:.1} mm does not go in: {width_mm} x {length_mm} mm is the most",
+            width.0, length.0
+        ));
+    }
+    // Within `LARGEST`, which is u16.
+    Ok(Paper::Custom { width: across as u16, length: along as u16 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn margins_come_out_as_they_were_measured() {
+        let a4 = table().find(|known| known.name == "a4").unwrap();
+        for (margin, measured) in a4.margins_mm.into_iter().zip([3.39, 12.03, 3.41, 15.23]) {
+            assert!((margin - measured).abs() < 0.05, "{margin} {measured}");
+        }
+        assert!(table().all(|known| known.margins_mm.iter().all(|&margin| margin > 2.9)));
+        assert_eq!(table().count(), Paper::named().count());
+    }
+
+    #[test]
+    fn a_custom_sheet_has_the_margins_of_a4() {
+        let a4 = read("210x297mm").unwrap();
+        assert!(a4.width().abs_diff(Paper::A4.width()) <= 1 && a4.length().abs_diff(Paper::A4.length()) <= 1);
+        assert_eq!((a4.name(), a4.code()), ("custom", 0));
+        let (width, length) = sheet_mm(a4);
+        assert!((width - 210.0).abs() < 0.05 && (length - 297.0).abs() < 0.05);
+        assert_eq!(read("A4"), Ok(Paper::A4));
+    }
+
+    #[test]
+    fn sheets_that_do_not_go_in_are_refused_with_figures() {
+        assert!(read("300x200mm").unwrap_err().contains("215.9 x 355.6"));
+        assert!(read("15x30mm").unwrap_err().contains("at least 10 x 10"));
+        assert!(read("-5x30mm").is_err() && read("0x0mm").is_err());
+        assert!(read("a3").unwrap_err().contains("postcard"));
+        // The largest that goes in does.
+        assert!(read("215.9x355.6mm").is_ok());
+    }
+}

@@ -1,0 +1,161 @@
+//! The dots as ink on a ground of any colour: all together, and each pass by itself.
+//!
+//! Method: a palette. Every stack gets the colour of its layers upon the ground (transparent inks tint, the others hide), and
+//! the dots stay what they are, a pixel each. Cost: one look at each dot. Limits: colours to tell inks apart by, not a proof:
+//! gloss and metal do not show. For light there is [`super::flat()`].
+
+use std::path::Path;
+use std::str::FromStr;
+
+use image::RgbImage;
+use inks::Stack;
+
+use super::Area;
+use crate::separate::Pass;
+use crate::sheet::colours::upon;
+use crate::sheet::picture::{FileError, Kind, write_png};
+use crate::sheet::{Sheet, picture};
+
+/// A ground to print on, sRGB.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Ground(pub [u8; 3]);
+
+impl Default for Ground {
+    /// Nearly white paper.
+    fn default() -> Ground {
+        Ground([252, 252, 250])
+    }
+}
+
+/// Not a colour.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is no colour; write it like #204080, or black, white, clear")]
+pub struct NoColour(String);
+
+impl FromStr for Ground {
+    type Err = NoColour;
+
+    fn from_str(text: &str) -> Result<Ground, NoColour> {
+        match text.to_ascii_lowercase().as_str() {
+            "white" => return Ok(Ground([255; 3])),
+            "black" => return Ok(Ground([0; 3])),
+            // The bluish grey of decal film on its backing.
+            "clear" => return Ok(Ground([205, 214, 222])),
+            _ => {}
+        }
+        let digits = text.strip_prefix('#').unwrap_or(text);
+        let value = (digits.len() == 6 && digits.bytes().all(|c| c.is_ascii_hexdigit()))
+            .then(|| u32::from_str_radix(digits, 16).ok())
+            .flatten();
+        let [_, r, g, b] = value.ok_or_else(|| NoColour(text.into()))?.to_be_bytes();
+        Ok(Ground([r, g, b]))
+    }
+}
+
+/// Writes an area of a sheet as its inks look on the ground, a pixel a dot.
+///
+/// # Panics
+/// When the area leaves the sheet: a bug of the caller, never a matter of input.
+pub fn save_sheet(sheet: &Sheet, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
+    let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
+    let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
+    let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
+    write_png(path, (area.width, area.length), Kind::Indexed(&palette), &dots)
+}
+
+/// Writes an area of one pass in its ink on the ground, a pixel a dot.
+///
+/// # Panics
+/// When the area leaves the plane: a bug of the caller, never a matter of input.
+pub fn save_pass(pass: &Pass, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
+    let palette = [ground.0, upon(&Stack::new([pass.ink]), ground.0)];
+    let plane = &pass.plane;
+    let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
+    let dots: Vec<u8> = rows
+        .flat_map(|row| (area.left..area.left + area.width).map(|x| row[x / 8] >> (7 - x % 8) & 1))
+        .collect();
+    write_png(path, (area.width, area.length), picture::Kind::Indexed(&palette), &dots)
+}
+
+/// The whole sheet small, `longest` pixels on its longer side at most: each pixel is the mean of its dots on the ground.
+pub fn thumbnail(sheet: &Sheet, ground: Ground, longest: usize) -> RgbImage {
+    let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
+    let step = sheet.width().max(sheet.length()).div_ceil(longest.max(1)).max(1);
+    let (width, height) = (sheet.width().div_ceil(step), sheet.length().div_ceil(step));
+    let mut sums = vec![[0u32; 4]; width * height];
+    for (y, row) in sheet.index().chunks_exact(sheet.width()).enumerate() {
+        for (sum, dots) in sums[y / step * width..].iter_mut().zip(row.chunks(step)) {
+            for &dot in dots {
+                let colour = palette[usize::from(dot)];
+                (0..3).for_each(|c| sum[c] += u32::from(colour[c]));
+                sum[3] += 1;
+            }
+        }
+    }
+    // Sides of a sheet are u16, and a mean of bytes is one.
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let [r, g, b, count] = sums[y as usize * width + x as usize];
+        image::Rgb([r, g, b].map(|sum| ((sum + count / 2) / count.max(1)) as u8))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::ink::Ink;
+    use protocol::paper::Paper;
+
+    fn sheet() -> Sheet {
+        let stacks = ["substrate", "W", "C", "W+C"].map(|text| text.parse().unwrap()).to_vec();
+        let index = (0..20 * 12).map(|i| ((i % 20) / 5) as u8).collect();
+        Sheet::new(Paper::Custom { width: 20, length: 12 }, stacks, index).unwrap()
+    }
+
+    #[test]
+    fn colours_are_read_and_nonsense_is_not() {
+        assert_eq!("#204080".parse(), Ok(Ground([0x20, 0x40, 0x80])));
+        assert_eq!("204080".parse::<Ground>(), "#204080".parse());
+        assert_eq!("Black".parse(), Ok(Ground([0; 3])));
+        for wrong in ["", "#12345", "#1234567", "#+12345", "blue", "#ggгг"] {
+            assert!(wrong.parse::<Ground>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn white_hides_the_ground_and_cyan_does_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("preview.png");
+        let area = Area { left: 0, top: 2, width: 20, length: 3 };
+        save_sheet(&sheet(), area, Ground([0x20, 0x40, 0x80]), &path).unwrap();
+        let picture = image::open(&path).unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), (20, 3));
+        let at = |x: u32| picture.get_pixel(x, 1).0;
+        assert_eq!(at(0), [0x20, 0x40, 0x80]);
+        assert!(at(5).iter().all(|&c| c > 200), "white on blue is white");
+        assert!(at(10).iter().all(|&c| c < 0x80), "cyan on blue is dark");
+        assert!(at(15)[2] > 200 && at(15)[0] < 30, "cyan on white on blue is cyan");
+    }
+
+    #[test]
+    fn a_pass_shows_its_own_dots_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pass.png");
+        let plane =
+            crate::separate::Plane { width: 20, length: 2, stride: 3, bits: vec![0, 0x18, 0, 0x80, 0, 0x10] };
+        let area = Area { left: 4, top: 0, width: 16, length: 2 };
+        save_pass(&Pass { ink: Ink::White, plane }, area, Ground([0; 3]), &path).unwrap();
+        let picture = image::open(&path).unwrap().to_rgb8();
+        let lit: Vec<(u32, u32)> =
+            picture.enumerate_pixels().filter(|(_, _, p)| p.0[0] > 100).map(|(x, y, _)| (x, y)).collect();
+        assert_eq!(lit, [(7, 0), (8, 0), (15, 1)]);
+    }
+
+    #[test]
+    fn a_thumbnail_keeps_the_mean() {
+        let small = thumbnail(&sheet(), Ground([0; 3]), 10);
+        assert_eq!(small.dimensions(), (10, 6));
+        let white = f64::from(upon(&"W".parse().unwrap(), [0; 3])[0]);
+        // Dots 4 and 5: half ground, half white.
+        assert!((f64::from(small.get_pixel(2, 0).0[0]) - white / 2.0).abs() <= 1.0);
+    }
+}
