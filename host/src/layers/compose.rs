@@ -545,13 +545,14 @@ fn stack_up(
             passes: slot.passes,
         })
         .collect();
-    let suggestions = suggest(piece.stacks(), &dots);
+    let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
+    let suggestions = suggest(piece.stacks(), &dots, &order);
     let size_mm = (width as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: dots[0], notes }, piece, suggestions })
 }
 
-/// What the stacks need.
-fn suggest(stacks: &[Stack], dots: &[u64]) -> Vec<Suggestion> {
+/// What the stacks need; `order` are the inks from the paper up.
+fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Suggestion> {
     let about = |touches: &dyn Fn(&[Ink]) -> bool| -> u64 {
         stacks.iter().zip(dots).filter(|(stack, _)| touches(stack.layers())).map(|(_, dots)| dots).sum()
     };
@@ -564,10 +565,16 @@ fn suggest(stacks: &[Stack], dots: &[u64]) -> Vec<Suggestion> {
     let white_on_black = about(&|layers| layers.windows(2).any(|pair| pair == [Ink::Black, Ink::White]));
     let thin_white = about(&|layers| layers.iter().filter(|&&ink| ink == Ink::White).count() == 1);
     let primed = about(&|layers| layers.contains(&Ink::Primer));
-    let hidden = about(&|layers| {
-        let metal = layers.iter().position(|ink| ink.kind() == Kind::Metallic);
-        metal.is_some_and(|metal| layers[metal..].contains(&Ink::Black))
-    });
+    let metal = |layers: &[Ink]| layers.iter().position(|ink| ink.kind() == Kind::Metallic);
+    let metals = about(&|layers| metal(layers).is_some());
+    let covered = about(&|layers| metal(layers).is_some_and(|metal| layers[metal..].contains(&Ink::Black)));
+    // A little black on metal is lettering; most of the metal under black is a mistake.
+    let hidden = if 2 * covered > metals { covered } else { 0 };
+    let (metal_inks, others): (Vec<Ink>, Vec<Ink>) =
+        order.iter().partition(|ink| ink.kind() == Kind::Metallic);
+    let beneath = others.iter().rposition(|ink| ink.kind() == Kind::Process).map_or(0, |at| at + 1);
+    let metal_above = [&others[..beneath], &metal_inks, &others[beneath..]].concat();
+    let metal_above: Vec<_> = metal_above.into_iter().map(Ink::name).collect();
     let accept = |what: Accept| format!("--accept {}", what.name());
     [
         (
@@ -588,8 +595,8 @@ fn suggest(stacks: &[Stack], dots: &[u64]) -> Vec<Suggestion> {
         ),
         (
             hidden,
-            "black covers metallic ink; where the metal is meant to be seen, list it after black and it is knocked out",
-            "--order …,black,…".into(),
+            "black covers most of the metallic ink; laid above black the metal is seen, and black is left out beneath it",
+            format!("--order {}", metal_above.join(",")),
         ),
     ]
     .into_iter()

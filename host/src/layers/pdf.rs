@@ -127,7 +127,7 @@ fn ghostscript(
     let file = std::path::absolute(path).map_err(raster::io(path, "find it"))?;
     let mut command = Command::new("gs");
     command
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dUseCropBox"])
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dUseCropBox", "-sstdout=%stderr"])
         .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
         .args([format!("-dFirstPage={page}"), format!("-dLastPage={page}")])
         .arg(format!("-r{:.4}x{:.4}", density.0, density.1))

@@ -230,6 +230,12 @@ pub(super) fn decode(path: &Path, mut file: impl Read) -> Result<Decoded, Layers
             format!("expected a PNG, TIFF, JPEG, PNM, SVG, PDF or PostScript file, found {found}"),
         ));
     };
+    if format == ImageFormat::Jpeg && jpeg_channels(&bytes) == Some(4) {
+        return Err(wrong(
+            path,
+            "the picture is CMYK, whose colours a JPEG does not settle; convert it to sRGB, or save its plates as a TIFF",
+        ));
+    }
     let bad = |error: image::ImageError| wrong(path, format!("cannot decode the picture: {error}"));
     let mut reader = image::ImageReader::with_format(Cursor::new(&bytes[..]), format);
     let mut limits = image::Limits::default();
@@ -257,6 +263,19 @@ fn density(bytes: &[u8], format: ImageFormat) -> Option<Density> {
         _ => None,
     }
     .filter(plausible)
+}
+
+/// How many channels a JPEG has: said in the first of its frame headers.
+fn jpeg_channels(bytes: &[u8]) -> Option<u8> {
+    let mut rest = bytes.strip_prefix(b"\xff\xd8")?;
+    loop {
+        let (&[0xff, marker, high, low], body) = rest.split_first_chunk::<4>()? else { return None };
+        // C4, C8 and CC are tables, all others of this row are frames.
+        if (0xc0..=0xcf).contains(&marker) && ![0xc4, 0xc8, 0xcc].contains(&marker) {
+            return body.get(5).copied();
+        }
+        rest = body.get(usize::from(u16::from_be_bytes([high, low])).checked_sub(2)?..)?;
+    }
 }
 
 /// The density in the JFIF segment, which follows the start of the file when there is one.

@@ -55,6 +55,10 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     };
     if text.contains("<text") {
         Arc::make_mut(&mut usual.fontdb).load_system_fonts();
+        notes.push(format!(
+            "{}: text is drawn with this computer's fonts; turn it into paths to have it as designed",
+            path.display()
+        ));
     }
     let tree =
         usvg::Tree::from_str(&text, &usual).map_err(|error| wrong(path, format!("no drawing: {error}")))?;
@@ -88,7 +92,14 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
                 let node = usvg::Node::Group(node.clone());
                 resvg::render_node(&node, place, &mut pixmap.as_mut());
             }
-            _ => notes.push(format!("layer `{}` is hidden or empty: left out", group.label)),
+            _ => {
+                notes.push(format!(
+                    "{}: layer `{}` is hidden or empty: left out",
+                    path.display(),
+                    group.label
+                ));
+                continue;
+            }
         }
         let rgba = straight(pixmap);
         let mut gather = Gather::new(rgba.len() / 4, true);

@@ -21,9 +21,9 @@ use super::raster::{self, Coverage, Density, Scan, wrong};
 use super::{Artwork, LayersError, Options, names};
 
 const INK_SET: Tag = Tag::Unknown(332);
-const INK_NAMES: Tag = Tag::Unknown(333);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);
 const PHOTOMETRIC: u16 = 262;
+const INK_NAMES: u16 = 333;
 
 /// Values of the photometric tag.
 const BLACK_IS_ZERO: u16 = 1;
@@ -53,7 +53,11 @@ fn density_of(decoder: &mut Reader<'_>) -> Option<Density> {
         Some(3) => 2.54,
         Some(_) => return None,
     };
-    let mut along = |tag| Some(f64::from(decoder.get_tag_f64(tag).ok()? as f32) * inch);
+    let mut along = |tag| {
+        let ratio = decoder.get_tag(tag).ok()?.into_u64_vec().ok()?;
+        let &[numerator, denominator] = ratio.as_slice() else { return None };
+        Some(numerator as f64 / denominator as f64 * inch)
+    };
     Some((along(Tag::XResolution)?, along(Tag::YResolution)?))
 }
 
@@ -90,7 +94,7 @@ pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, L
     if samples < base || samples == base && photometric != SEPARATED {
         return Ok(None);
     }
-    let (named_inks, named_extra) = (ink_names(&mut decoder), photoshop_names(&mut decoder));
+    let (named_inks, named_extra) = (ink_names(&bytes), photoshop_names(&mut decoder));
     // One extra channel without a name is transparency.
     if photometric != SEPARATED && named_extra.is_empty() {
         return Ok(None);
@@ -169,11 +173,11 @@ fn channels(
     Ok(channels)
 }
 
-/// Names of all inks: text ended by NUL, one after the other.
-fn ink_names(decoder: &mut Reader<'_>) -> Vec<String> {
-    let text = decoder.find_tag(INK_NAMES).ok().flatten().and_then(|value| value.into_string().ok());
-    let text = text.unwrap_or_default();
-    text.split('\0').map(str::trim).filter(|name| !name.is_empty()).map(str::to_owned).collect()
+/// Names of all inks: text ended by NUL, one after the other. The decoder stops at the first.
+fn ink_names(bytes: &[u8]) -> Vec<String> {
+    let text = field(bytes, INK_NAMES).and_then(|field| bytes.get(field)).unwrap_or_default();
+    let names = text.split(|&byte| byte == 0).map(|name| String::from_utf8_lossy(name).trim().to_owned());
+    names.filter(|name| !name.is_empty()).collect()
 }
 
 /// Names of the channels beyond the picture's own, from Photoshop's resource block.
@@ -227,26 +231,35 @@ fn unicode_strings(mut data: &[u8]) -> Vec<String> {
     strings
 }
 
-/// Calls the first image grey, so that the decoder hands out all of its channels. Leaves alone what it does not
-/// understand; the decoder then says what is wrong.
+/// Calls the first image grey, so that the decoder hands out all of its channels.
 fn set_photometric(bytes: &mut [u8]) {
+    let grey =
+        if bytes.starts_with(b"II") { BLACK_IS_ZERO.to_le_bytes() } else { BLACK_IS_ZERO.to_be_bytes() };
+    // A file without the field is for the decoder to refuse.
+    if let Some(value) =
+        field(bytes, PHOTOMETRIC).filter(|f| f.len() == 2).and_then(|field| bytes.get_mut(field))
+    {
+        value.copy_from_slice(&grey);
+    }
+}
+
+/// Where the value of a tag of the first image lies, for values of bytes and short numbers.
+fn field(bytes: &[u8], tag: u16) -> Option<std::ops::Range<usize>> {
     let little = bytes.starts_with(b"II");
-    let short = |bytes: &[u8], at: usize| -> Option<u16> {
+    let short = |at: usize| -> Option<u16> {
         let two = *bytes.get(at..)?.first_chunk::<2>()?;
         Some(if little { u16::from_le_bytes(two) } else { u16::from_be_bytes(two) })
     };
-    let Some(four) = bytes.get(4..).and_then(|rest| rest.first_chunk::<4>()) else { return };
-    let start = if little { u32::from_le_bytes(*four) } else { u32::from_be_bytes(*four) } as usize;
-    let Some(count) = short(bytes, start) else { return };
-    for entry in 0..usize::from(count) {
-        let at = start + 2 + 12 * entry;
-        if short(bytes, at) == Some(PHOTOMETRIC)
-            && let Some(value) = bytes.get_mut(at + 8..at + 10)
-        {
-            let grey = if little { BLACK_IS_ZERO.to_le_bytes() } else { BLACK_IS_ZERO.to_be_bytes() };
-            value.copy_from_slice(&grey);
-        }
-    }
+    let long = |at: usize| -> Option<usize> {
+        let four = *bytes.get(at..)?.first_chunk::<4>()?;
+        Some(if little { u32::from_le_bytes(four) } else { u32::from_be_bytes(four) } as usize)
+    };
+    let start = long(4)?;
+    let entry =
+        (0..usize::from(short(start)?)).map(|i| start + 2 + 12 * i).find(|&at| short(at) == Some(tag))?;
+    let length = long(entry + 4)?.checked_mul(if short(entry + 2)? == 3 { 2 } else { 1 })?;
+    let at = if length <= 4 { entry + 8 } else { long(entry + 8)? };
+    Some(at..at.checked_add(length)?)
 }
 
 /// A byte a pixel for each channel.
