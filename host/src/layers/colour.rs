@@ -30,6 +30,7 @@ use crate::gamut::{self, Gloss, InkMix, Intent, Printable};
 use crate::halftone::Placement;
 use crate::observe::Observer;
 use crate::pipeline;
+use crate::separate::Plane;
 use crate::weights::{ONE, WeightMaps};
 
 /// Nodes along an edge of the lattice.
@@ -123,18 +124,14 @@ pub(super) fn artwork(name: &str, pixels: Pixels, options: &Options) -> Result<A
     let dots = raster::dots(&pixels.path, sides, pixels.density, options.size, options.dpi)?;
     let Pixels { path, mut rgba, mut notes, .. } = pixels;
     let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
-    let to_dots = |rgba: &[u8], is: &(dyn Fn(&[u8]) -> bool + Sync)| {
-        let bytes: Vec<u8> = rgba.par_chunks_exact(4).map(|p| u8::from(is(p))).collect();
-        bits::from_bytes(dots.0, &raster::nearest(bytes, size, dots), |byte| byte > 0)
-    };
-    let opaque = transparent.then(|| to_dots(&rgba, &|p| p[3] > 0));
+    let opaque = transparent.then(|| plane_of(&rgba, size, dots, |p| p[3] > 0));
     rgba.par_chunks_exact_mut(4).for_each(|p| {
         let alpha = u32::from(p[3]);
         for v in &mut p[..3] {
             *v = ((u32::from(*v) * alpha + 255 * (255 - alpha) + 127) / 255) as u8;
         }
     });
-    let drawn = to_dots(&rgba, &|p| p[..3] != [255; 3]);
+    let drawn = plane_of(&rgba, size, dots, |p| p[..3] != [255; 3]);
     let mut rgb = rgba;
     // In place: three bytes of a pixel never lie after its four.
     for at in 0..rgb.len() / 4 {
@@ -155,6 +152,17 @@ pub(super) fn artwork(name: &str, pixels: Pixels, options: &Options) -> Result<A
     Ok(Artwork { name: name.into(), width: dots.0, length: dots.1, layers, colour, drawn, opaque, notes })
 }
 
+/// The dots whose pixel is so.
+fn plane_of(
+    rgba: &[u8],
+    size: (u32, u32),
+    dots: (usize, usize),
+    is: impl Fn(&[u8; 4]) -> bool + Sync,
+) -> Plane {
+    let bytes: Vec<u8> = rgba.as_chunks::<4>().0.par_iter().map(|pixel| u8::from(is(pixel))).collect();
+    bits::from_bytes(dots.0, &raster::nearest(bytes, size, dots), |byte| byte > 0)
+}
+
 impl Colour {
     /// At most one pixel for two dots along each side.
     fn averaged(self, dots: (usize, usize)) -> Colour {
@@ -166,11 +174,13 @@ impl Colour {
         let linear: Vec<u32> = (0..=255u8)
             .map(|v| (65535.0 * crate::document::picture::decode_srgb(f32::from(v) / 255.0)).round() as u32)
             .collect();
-        let coded = |light: u32| {
-            let above = linear.partition_point(|&v| v < light).clamp(1, 255);
-            let nearer = light.abs_diff(linear[above]) <= light.abs_diff(linear[above - 1]);
-            (if nearer { above } else { above - 1 }) as u8
-        };
+        let coded: Vec<u8> = (0..=65535)
+            .map(|light| {
+                let above = linear.partition_point(|&v| v < light).clamp(1, 255);
+                let nearer = light.abs_diff(linear[above]) <= light.abs_diff(linear[above - 1]);
+                (if nearer { above } else { above - 1 }) as u8
+            })
+            .collect();
         // Whole pixels: the first and last are shared where sides are no multiples, which no dot shows.
         let span = |at: usize, from: usize, to: usize| at * from / to..((at + 1) * from).div_ceil(to);
         let mut rgb = vec![0; to.0 * to.1 * 3];
@@ -188,7 +198,7 @@ impl Colour {
                     }
                 }
                 let count = (rows.len() * columns.len()) as u64;
-                *out = sum.map(|sum| coded(((sum + count / 2) / count) as u32));
+                *out = sum.map(|sum| coded[((sum + count / 2) / count) as usize]);
             }
         });
         Colour { width: to.0, height: to.1, rgb }

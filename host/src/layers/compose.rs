@@ -268,10 +268,13 @@ fn drawn_slots(
         let (stacks, index) = colour.halftone((art.width, art.length), &process, library, observer)?;
         let mut spot = bits::blank(art.width, art.length);
         slots.iter().for_each(|slot| bits::add(&mut spot, &slot.plane));
-        for ink in process.iter() {
-            let mut plane = bits::from_bytes(art.width, &index, |stack| {
-                stacks[usize::from(stack)].layers().contains(&ink)
-            });
+        let mut inks_of = [0u16; 256];
+        for (inks_of, stack) in inks_of.iter_mut().zip(&stacks) {
+            let has = process.iter().enumerate().filter(|(_, ink)| stack.layers().contains(ink));
+            *inks_of = has.fold(0, |bits, (at, _)| bits | 1 << at);
+        }
+        let planes = pack::pack(art.width, &index, &inks_of, process.len());
+        for (ink, mut plane) in process.iter().zip(planes) {
             // What an ink was drawn for by its reserved colour is that ink alone.
             bits::merge(&mut plane, &spot, |dots, spot| dots & !spot);
             match slots.iter_mut().find(|slot| slot.ink == ink) {

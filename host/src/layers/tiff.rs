@@ -37,7 +37,7 @@ type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
 
 fn open(bytes: &[u8]) -> Option<Reader<'_>> {
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = 1 << 31;
+    limits.decoding_buffer_size = 1 << 30;
     limits.intermediate_buffer_size = 1 << 30;
     Some(Decoder::new(Cursor::new(bytes)).ok()?.with_limits(limits))
 }

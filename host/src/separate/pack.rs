@@ -24,7 +24,7 @@ fn transpose(mut x: u64) -> u64 {
 }
 
 /// A plane for each pass. `passes_of[stack]` has bit p set if the stack is in pass p, `passes` of them (16 at most).
-pub(super) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: usize) -> Vec<Plane> {
+pub(crate) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: usize) -> Vec<Plane> {
     let (stride, length) = (width.div_ceil(8), index.len() / width);
     let mut planes: Vec<Plane> =
         (0..passes).map(|_| Plane { width, length, stride, bits: vec![0; stride * length] }).collect();
