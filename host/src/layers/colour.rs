@@ -1,10 +1,10 @@
 //! Plain colour to the process inks: an image is a matte document.
 //!
 //! Problem: a photograph has millions of colours and a page thirty million dots, and white must stay bare paper.
-//! Method: sRGB is taken relative to the paper: white is the bare paper and black the darkest stack of the process
-//! inks at hand, colours lie between them in linear light, with the paper's own gloss. A lattice of 17 x 17 x 17 such
-//! colours is fitted to the stacks by the gamut stage (eq. 1 at every node, so what cannot be printed is clamped to the
-//! nearest that can), pixels are interpolated in it among the four corners of a tetrahedron, and the mix of stacks goes
+//! Method: sRGB is taken relative to the paper: white is the bare paper and black is black ink (without it, the darkest
+//! stack of the process inks at hand), colours lie between them in linear light. A lattice of 17 x 17 x 17 such colours is
+//! fitted to the stacks by the gamut stage (eq. 1 at every node, so what cannot be printed is clamped to the nearest that
+//! can), pixels are interpolated in it among the four corners of a tetrahedron, and the mix of stacks goes
 //! to the halftone stage. Interpolated mixtures are mixtures, so every pixel is printable.
 //! Cost: 50 ms for the lattice, 20 ns a pixel, 10 ns a dot. Pictures finer than 300 dpi are averaged to it, in linear
 //! light: no cluster of dots is finer. Limits: colours are clamped, not compressed; the ink library decides how true
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use image::DynamicImage;
 use inks::{InkSet, Library, Stack};
 use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
-use protocol::ink::Kind;
+use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 use rayon::prelude::*;
 
@@ -301,9 +301,11 @@ impl Lattice {
     fn new(space: Space, printable: &Printable) -> Lattice {
         let bright = |row: &[f64]| row.iter().zip(space.weight()).map(|(r, w)| r * w).sum::<f64>();
         let bare = printable.stacks.iter().position(|stack| stack.layers().is_empty()).unwrap_or(0);
+        let black = printable.stacks.iter().position(|stack| stack.layers() == [Ink::Black]);
         let darkest = (0..printable.stacks.len())
-            .min_by(|&a, &b| bright(printable.curves.row(a)).total_cmp(&bright(printable.curves.row(b))))
-            .unwrap_or(0);
+            .min_by(|&a, &b| bright(printable.curves.row(a)).total_cmp(&bright(printable.curves.row(b))));
+        // Black is black ink, where there is any: text in three inks is never sharp.
+        let darkest = black.or(darkest).unwrap_or(0);
         let paper = printable.curves.row(bare).to_vec();
         let black = printable.curves.row(darkest).to_vec();
         let light = std::array::from_fn(|i| {

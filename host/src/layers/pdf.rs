@@ -63,8 +63,10 @@ fn page(
     // The page's true size is less than a pixel of the look away; what is rendered decides.
     let mut notes = Vec::new();
     let mut plates = Vec::new();
-    for (name, _) in files(&look, folder)? {
+    for (name, file) in files(&look, folder)? {
+        // Plates of other pages are there, too, and blank. A page paints every pixel it touches, so none is missed.
         if !PROCESS.contains(&name.as_str())
+            && raster::scan(&file)?.coverage.iter().any(|&c| c > 0)
             && let Some(named) = super::named_part(path, &name, "plate", &mut notes)?
         {
             plates.push((name, named));
