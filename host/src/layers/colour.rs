@@ -399,13 +399,13 @@ mod tests {
             prop_assert_eq!(out.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
             // The corners around bound what is between.
             let corner = pixel.map(|v| step(usize::from(v)).0);
-            for q in 0..5 {
+            for (q, &out) in out.iter().enumerate() {
                 let around = (0..8).map(|c| {
                     let at = |axis: usize| corner[axis] + (c >> axis & 1);
                     nodes.at((at(0) * NODES + at(1)) * NODES + at(2))[q]
                 });
                 let (least, most) = around.fold((u16::MAX, 0), |(l, m), w| (l.min(w), m.max(w)));
-                prop_assert!(out[q] + 1 >= least && out[q] <= most + 5, "{} not in {}..={}", out[q], least, most);
+                prop_assert!(out + 1 >= least && out <= most + 5, "{} not in {}..={}", out, least, most);
             }
         }
 

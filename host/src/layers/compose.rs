@@ -369,7 +369,7 @@ fn lay_white(
         return Ok(());
     }
     let radius = settings.choke.abs();
-    if !(radius <= f64::from(distance::MOST)) {
+    if radius.is_nan() || radius > f64::from(distance::MOST) {
         let option = if settings.choke > 0.0 { "--choke" } else { "--spread" };
         return wrong(
             option,

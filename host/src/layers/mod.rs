@@ -156,10 +156,10 @@ fn one(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwor
     if start.starts_with(b"%PDF") || start.starts_with(b"%!") {
         return pdf::read(file, options, observer);
     }
-    if start.starts_with(b"II*\0") || start.starts_with(b"MM\0*") {
-        if let Some(art) = tiff::spots(file, options)? {
-            return Ok(art);
-        }
+    if (start.starts_with(b"II*\0") || start.starts_with(b"MM\0*"))
+        && let Some(art) = tiff::spots(file, options)?
+    {
+        return Ok(art);
     }
     if svg::is_svg(&start) {
         return svg::read(file, options, observer);
@@ -224,40 +224,17 @@ fn named_files(
         })
         .collect::<Result<_, _>>()?;
     observer.begin("reading layers", files.len() as u64);
-    let mut dots = None;
-    let mut first: Option<(PathBuf, (u32, u32), Option<raster::Density>, String)> = None;
+    let mut first: Option<First> = None;
     let mut art: Option<Artwork> = None;
     // Two at a time: both cores work and no more than two layers are in memory as bytes.
     for (files, named) in files.chunks(2).zip(named.chunks(2)) {
         let scans: Vec<_> = files.par_iter().map(|file| raster::scan(file)).collect();
         for (scan, named) in scans.into_iter().zip(named) {
             let scan = scan?;
-            let size = (scan.width, scan.height);
-            match &first {
-                None => {
-                    let sides = (f64::from(size.0), f64::from(size.1));
-                    dots = Some(raster::dots(&scan.path, sides, scan.density, options.size, options.dpi)?);
-                    first = Some((scan.path.clone(), size, scan.density, scan.size()));
-                }
-                Some((path, pixels, density, expected)) => {
-                    // A layer without a resolution follows the first; two that differ cannot both be right.
-                    let apart = match (density, scan.density) {
-                        (Some(a), Some(b)) if options.dpi.is_none() && options.size.is_none() => {
-                            (a.0 - b.0).abs() > 0.5 || (a.1 - b.1).abs() > 0.5
-                        }
-                        _ => false,
-                    };
-                    if *pixels != size || apart {
-                        return Err(LayersError::Sizes {
-                            found: scan.size(),
-                            path: scan.path,
-                            first: path.clone(),
-                            expected: expected.clone(),
-                        });
-                    }
-                }
-            }
-            let dots = dots.unwrap_or((1, 1));
+            let dots = match &first {
+                Some(first) => first.fits(&scan, options)?,
+                None => first.insert(First::new(&scan, options)?).dots,
+            };
             let file =
                 scan.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
             art.get_or_insert_with(|| Artwork::blank(name, dots)).add(scan, &file, *named, false, options);
@@ -267,6 +244,47 @@ fn named_files(
     observer.end();
     // There is a file, so there is art.
     art.ok_or_else(|| LayersError::Nothing { reason: "no file was given".into() })
+}
+
+/// The first of several layers: the others must be of its size.
+struct First {
+    path: PathBuf,
+    pixels: (u32, u32),
+    density: Option<raster::Density>,
+    size: String,
+    dots: (usize, usize),
+}
+
+impl First {
+    fn new(scan: &Scan, options: &Options) -> Result<First, LayersError> {
+        let sides = (f64::from(scan.width), f64::from(scan.height));
+        Ok(First {
+            path: scan.path.clone(),
+            pixels: (scan.width, scan.height),
+            density: scan.density,
+            size: scan.size(),
+            dots: raster::dots(&scan.path, sides, scan.density, options.size, options.dpi)?,
+        })
+    }
+
+    /// The size in dots, if another layer is of the same.
+    fn fits(&self, other: &Scan, options: &Options) -> Result<(usize, usize), LayersError> {
+        // A layer without a resolution follows the first; two that differ cannot both be right.
+        let told = options.dpi.is_some() || options.size.is_some();
+        let apart = self
+            .density
+            .zip(other.density)
+            .is_some_and(|(a, b)| !told && ((a.0 - b.0).abs() > 0.5 || (a.1 - b.1).abs() > 0.5));
+        if self.pixels == (other.width, other.height) && !apart {
+            return Ok(self.dots);
+        }
+        Err(LayersError::Sizes {
+            found: other.size(),
+            path: other.path.clone(),
+            first: self.path.clone(),
+            expected: self.size.clone(),
+        })
+    }
 }
 
 impl Artwork {
@@ -370,7 +388,7 @@ fn shape(width: usize, coverage: Vec<u8>, tones: bool) -> Shape {
 /// What the threshold did to pixels that are neither ink nor paper, if there are any.
 fn neither(name: &str, coverage: &[u8]) -> Option<String> {
     let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
-    let inked = coverage.par_iter().filter(|&&c| c >= THRESHOLD && c < 255 - PLAIN).count();
+    let inked = coverage.par_iter().filter(|c| (THRESHOLD..255 - PLAIN).contains(c)).count();
     let share = 100.0 * between as f64 / coverage.len().max(1) as f64;
     let advice = if share > 5.0 { "; if these are tones, not edges, print them with --halftone" } else { "" };
     (between > 0).then(|| {

@@ -146,7 +146,8 @@ fn channels(
     let mut channels = Vec::new();
     for at in 0..samples {
         if at < base {
-            let ink = (photometric == SEPARATED).then(|| names::Named { place: None, ink: PROCESS[at] });
+            let ink = PROCESS.get(at).filter(|_| photometric == SEPARATED);
+            let ink = ink.map(|&ink| names::Named { place: None, ink });
             channels.push(Channel { name: format!("channel {}", at + 1), ink, inverted: false });
             continue;
         }

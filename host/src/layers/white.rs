@@ -75,7 +75,7 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
         let mut x = 0;
         while x < width {
             // Eight drawn dots at a time, and eight undrawn ones below.
-            if x % 8 == 0 && row[x / 8] == 0xff {
+            if x.is_multiple_of(8) && row[x / 8] == 0xff {
                 x += 8;
                 continue;
             }
@@ -85,7 +85,7 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
             }
             let from = x;
             while x < width {
-                if x % 8 == 0 && row[x / 8] == 0 {
+                if x.is_multiple_of(8) && row[x / 8] == 0 {
                     x += 8;
                 } else if row[x / 8] & 0x80 >> (x % 8) == 0 {
                     x += 1;
@@ -124,7 +124,7 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
 fn clear(row: &mut [u8], from: usize, to: usize) {
     let mut x = from;
     while x < to {
-        if x % 8 == 0 && x + 8 <= to {
+        if x.is_multiple_of(8) && x + 8 <= to {
             row[x / 8] = 0;
             x += 8;
         } else {
