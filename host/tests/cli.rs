@@ -18,7 +18,13 @@ fn a_folder_becomes_a_print_with_everything_in_it() {
     }
     assert_eq!(bench.entries(), ["tile", "tile.print"]);
     let made = entries(&bench.path("tile.print"));
-    assert_eq!(made, ["job.rgl", "materials.png", "passes", "report.json", "separation.png", "sheet.png"]);
+    let (previews, others): (Vec<_>, Vec<_>) = made.into_iter().partition(|name| name.starts_with("preview"));
+    assert_eq!(
+        others,
+        ["job.rgl", "materials.png", "passes", "plan.html", "report.json", "separation.png", "sheet.png"]
+    );
+    let passes = entries(&bench.path("tile.print/passes")).len() - 1;
+    assert_eq!(previews.len(), passes + 1, "all inks together and each pass by itself: {previews:?}");
     let report = fs::read_to_string(bench.path("tile.print/report.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
     assert_eq!(report["simulated"]["equal"], true);

@@ -6,6 +6,7 @@
 use foilpress::document::{self, Options};
 use foilpress::gamut::{self, Intent};
 use foilpress::job::placement::Size;
+use foilpress::layout::Layout;
 use foilpress::observe::Silent;
 use foilpress::pipeline::{self, Print, Settings};
 use foilpress::{factor, sample};
@@ -20,8 +21,9 @@ fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
         factor: factor::Settings { bases: Some(4), ..Default::default() },
         gamut: gamut::Settings { intent, ..Default::default() },
         inks,
-        paper: Paper::Postcard,
+        layout: Layout::centred(Paper::Postcard),
         media: Media::Plain,
+        curl_correction: true,
         size: Some(Size { width: 80.0, height: Some(80.0) }),
     };
     pipeline::print(&document, &Library::builtin(), &settings, &Silent)

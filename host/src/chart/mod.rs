@@ -1,7 +1,7 @@
 //! Charts: pieces made by the program itself, to look at inks, to measure them, and to measure the machine.
 //!
 //! [`ramp`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
-//! [`registration`] shows how far passes are apart, [`calibration`] where the machine begins and how far it feeds. Each gives
+//! [`registration()`] shows how far passes are apart, [`calibration()`] where the machine begins and how far it feeds. Each gives
 //! a [`Piece`](crate::sheet::Piece) that goes the way of every other print.
 
 pub mod calibration;
@@ -17,6 +17,7 @@ use inks::Stack;
 
 use crate::halftone::HalftoneError;
 use crate::sheet::SheetError;
+use crate::weights::WeightError;
 
 /// Why there is no chart.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -56,6 +57,9 @@ pub enum ChartError {
         /// Name of the paper.
         paper: &'static str,
     },
+    /// A ramp without places. A bug if it is ever seen.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
     /// The halftone refused.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),

@@ -99,11 +99,10 @@ impl Sketch {
     ) -> Result<(), ChartError> {
         let mut stacks = vec![Stack::SUBSTRATE];
         let mut row_of = |stack: &Stack| {
-            let at = stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
+            stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
                 stacks.push(stack.clone());
                 stacks.len() - 1
-            });
-            at
+            })
         };
         let rows = [row_of(a), row_of(b)];
         let matrix =
@@ -113,9 +112,9 @@ impl Sketch {
             .map(|share| (share.clamp(0.0, 1.0) * f64::from(ONE)).round() as u16)
             .flat_map(|first| [first, ONE - first])
             .collect();
-        // One pixel a share, each pair summing to ONE; sides of a chart are those of a sheet, which are u16.
+        // Sides of a chart are those of a sheet, which are u16.
         let (wide, long) = (width as u16, length as u16);
-        let maps = WeightMaps::new(share.len(), 1, 2, weights).unwrap_or_else(|_| WeightMaps::uniform(1, 1));
+        let maps = WeightMaps::new(share.len(), 1, 2, weights)?;
         let mix = InkMix { stacks, maps, matrix };
         let minimum = mix.stacks.iter().map(|stack| library.minimum_cluster(stack)).collect();
         let place = Placement {

@@ -1,12 +1,13 @@
 //! Inks side by side: the paper's figures 2 and 5, and every stack as a patch to measure.
 
 use inks::{Library, Stack};
-use protocol::ink::Ink;
+use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
 use super::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::observe::Observer;
+use crate::separate::MOST_CARTRIDGES;
 use crate::sheet::Piece;
 
 /// Scale of labels: letters 3.4 mm high.
@@ -19,23 +20,15 @@ pub const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
 /// The gloss of the two inks of figure 5.
 pub const INKS: [f64; 2] = [0.5, 0.1];
 
-/// What labels are written in when the stacks are these: black if it is among their inks, else the first that shows, so that
-/// a label never asks for a cartridge of its own.
+/// What labels and checkerboards are printed in: black, unless the stacks fill all seven places without it.
 fn pen(stacks: &[&Stack]) -> Stack {
-    let has = |wanted: Ink| stacks.iter().any(|stack| stack.layers().contains(&wanted));
-    let pens = [
-        Ink::Black,
-        Ink::MetallicSilver,
-        Ink::MetallicGold,
-        Ink::MetallicCyan,
-        Ink::MetallicMagenta,
-        Ink::Magenta,
-        Ink::Cyan,
-        Ink::SilverFoil,
-        Ink::GoldFoil,
-    ];
-    let ink = pens.into_iter().find(|&ink| has(ink)).unwrap_or(Ink::Black);
-    Stack::new([ink])
+    let mut inks: Vec<Ink> = stacks.iter().flat_map(|stack| stack.layers().iter().copied()).collect();
+    inks.sort_unstable();
+    inks.dedup();
+    let full = inks.len() >= MOST_CARTRIDGES && !inks.contains(&Ink::Black);
+    let pigment = |ink: &&Ink| matches!(ink.kind(), Kind::Metallic | Kind::Foil | Kind::Process);
+    let other = inks.iter().find(pigment).or(inks.first()).filter(|_| full);
+    Stack::new([other.copied().unwrap_or(Ink::Black)])
 }
 
 fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), ChartError> {

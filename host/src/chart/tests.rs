@@ -40,7 +40,7 @@ fn a_ramp_has_the_tone_of_its_place() {
 fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
     let piece = ladder(&stack("SF"), &stack("MS"), &Library::builtin(), &Silent).unwrap();
     let (patch, gap) = (709, 94);
-    let mut share = |row: usize, column: usize| {
+    let share = |row: usize, column: usize| {
         // In the middle of the patch, clear of its labels.
         let block = piece.length() / 2;
         let place = (column * (patch + gap), row * block + 80 + 24 + 2, patch, patch - 4);

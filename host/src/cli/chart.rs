@@ -96,7 +96,7 @@ struct WholePage {
 }
 
 /// Inks of `chart stacks` when none are named: as many as go in.
-const USUAL: &str = "process,metallic-silver,white,finish";
+const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
 
 /// Runs `chart`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {

@@ -44,23 +44,24 @@ impl DeliverArgs {
     }
 
     /// Sends a job whose plan was shown. A job for a file was written with everything else.
-    pub fn send(&self, name: &str, job: &[u8], inks: &[Ink], observer: &dyn Observer) -> Result<()> {
+    pub fn send(&self, name: &str, job: &[u8], observer: &dyn Observer) -> Result<()> {
         let to = match &self.to {
             None | Some(Destination::File(_)) => return Ok(()),
             Some(to) => to,
         };
+        let checked = crate::send::check(job, observer)?;
         if let Destination::Bridge(address) = to {
-            super::show(&format!("{}\n", loaded(address, inks)))?;
+            super::show(&format!("{}\n", loaded(address, &checked.inks)))?;
         }
         if !self.yes {
             confirm(name)?;
         }
-        send::deliver(name, job, to, self.copies, observer)
+        send::deliver(name, job, &checked, to, self.copies, observer)
     }
 }
 
 /// What the printer says of the cassettes, in words. The bridge may not answer; then the job will not go either.
-fn loaded(address: &Address, inks: &[Ink]) -> String {
+pub fn loaded(address: &Address, inks: &[Ink]) -> String {
     let unknown = |why: &str| format!("Which cassettes are in is not known: {why}.");
     let ask = || -> Result<Reply> {
         let mut link = address.open()?;

@@ -219,6 +219,37 @@ impl Stock {
     }
 }
 
+/// Arguments of `papers`.
+#[derive(Args, Debug)]
+pub struct PapersArgs {
+    /// As JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs `papers`.
+pub fn papers(args: &PapersArgs) -> Result<()> {
+    use std::fmt::Write as _;
+    let table: Vec<_> = layout::paper::table().collect();
+    if args.json {
+        return super::show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
+    }
+    let mut text =
+        String::from("            sheet, mm        printable, mm    margins: left, top, right, bottom\n");
+    for paper in table {
+        let ((width, length), (across, along)) = (paper.sheet_mm, paper.printable_mm);
+        let [left, top, right, bottom] = paper.margins_mm;
+        writeln!(
+            text,
+            "{:<10} {width:>6.1} x {length:<6.1}  {across:>6.1} x {along:<6.1}  {left:>4.1} {top:>5.1} {right:>4.1} \
+             {bottom:>5.1}  {}",
+            paper.name, paper.known
+        )?;
+    }
+    text.push_str("Any other size as --paper 120x180mm, with the margins of a4.\n");
+    super::show(&text)
+}
+
 /// Arguments of `profile`.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  \

@@ -79,6 +79,8 @@ enum Command {
     Preset(preset::Args),
     /// How much of each ribbon has gone
     Ledger(ledger::Args),
+    /// The papers, their printable areas and margins, and how well they are known
+    Papers(layout::PapersArgs),
     /// Machines as measured: offset and feed
     Profile(layout::ProfileArgs),
     /// Take a document apart into a few basis materials and their weight maps
@@ -140,6 +142,7 @@ fn run(args: Args) -> Result<()> {
         Command::Chart(args) => chart::run(&args, observer),
         Command::Preset(args) => preset::run(&args),
         Command::Ledger(args) => ledger::run(&args),
+        Command::Papers(args) => layout::papers(&args),
         Command::Profile(args) => layout::profile_command(&args),
         Command::Factor(args) => args.run(observer),
         Command::Map(args) => args.run(observer),

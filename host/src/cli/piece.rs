@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use inks::{InkSet, Library};
-use protocol::ink::Ink;
 use protocol::rgl::Page;
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::deliver::DeliverArgs;
@@ -129,10 +129,10 @@ pub fn write_job(
     let picture = thumbnail(printed, ground, THUMBNAIL);
     write(&folder.join("plan.html"), page::html(plan, &picture)?.as_bytes())?;
     save_sheet(printed, laid.area, ground, &folder.join("preview.png"))?;
-    for (number, pass) in (1..).zip(&printout.passes) {
-        let name = format!("preview-{number:02}-{}.png", pass.ink.name());
-        save_pass(pass, laid.area, ground, &folder.join(name))?;
-    }
+    printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
+        let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
+        save_pass(pass, laid.area, ground, &folder.join(name))
+    })?;
     Ok(())
 }
 
@@ -213,6 +213,5 @@ pub fn print_on(
             target.join("plan.html").display()
         ))?;
     }
-    let inks: Vec<Ink> = separation.plan.cartridges.clone();
-    deliver.send(job.name, &bytes, &inks, observer)
+    deliver.send(job.name, &bytes, observer)
 }

@@ -141,7 +141,8 @@ fn refusal(command: &str, words: &[String]) -> Option<String> {
     // What the command works on is not a preset's business: any name will do.
     match super::Args::command().try_get_matches_from(typed.chain(["document".to_owned()])) {
         Ok(_) => None,
-        Err(error) => Some(error.to_string()),
+        // The first line says what is wrong, the others how to get help.
+        Err(error) => Some(error.to_string().lines().next().unwrap_or_default().to_owned()),
     }
 }
 
@@ -161,10 +162,7 @@ pub fn run(args: &Args) -> Result<()> {
                 bail!("a preset cannot name another one");
             }
             if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
-                bail!(
-                    "no command takes these options together: {}",
-                    first.trim_start_matches("error: ").trim_end()
-                );
+                bail!("no command takes these options together: {}", first.trim_start_matches("error: "));
             }
             let folder = presets()?;
             let path = folders::file(&folder, name)?;

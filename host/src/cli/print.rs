@@ -166,7 +166,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             target.join("sheet.png").display()
         ))?;
     }
-    args.deliver.send(&document.name, &print.job, &print.separation.plan.cartridges, observer)
+    args.deliver.send(&document.name, &print.job, observer)
 }
 
 /// What there is to look at, and how far print and document are apart.

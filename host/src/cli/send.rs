@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 
-use super::deliver::next_sheet;
+use super::deliver::{loaded, next_sheet};
 use super::ledger;
 use super::output::{self, Staged};
 use crate::observe::Observer;
@@ -39,12 +39,22 @@ pub struct Args {
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = super::read_job(&args.job)?;
     let name = args.job.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
-    deliver(&name, &job, &args.to, args.copies, observer)
+    let checked = send::check(&job, observer)?;
+    if let Destination::Bridge(address) = &args.to {
+        observer.note(&loaded(address, &checked.inks));
+    }
+    deliver(&name, &job, &checked, &args.to, args.copies, observer)
 }
 
-/// Checks a job and takes it to its destination, once for each copy.
-pub fn deliver(name: &str, job: &[u8], to: &Destination, copies: u16, observer: &dyn Observer) -> Result<()> {
-    let checked = send::check(job, observer)?;
+/// Takes a job that was checked to its destination, once for each copy.
+pub fn deliver(
+    name: &str,
+    job: &[u8],
+    checked: &Checked,
+    to: &Destination,
+    copies: u16,
+    observer: &dyn Observer,
+) -> Result<()> {
     match to {
         Destination::File(path) => {
             let staged = Staged::file(path)?;
@@ -53,7 +63,7 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, copies: u16, observer: 
         }
         Destination::Raw(path) => {
             for copy in 1..=copies {
-                to_device(name, job, &checked, path, observer)?;
+                to_device(name, job, checked, path, observer)?;
                 if copy < copies && !next_sheet(copy, copies)? {
                     let left = copies - copy;
                     bail!(
@@ -67,30 +77,27 @@ pub fn deliver(name: &str, job: &[u8], to: &Destination, copies: u16, observer: 
             let journal = Journal::of_user()?;
             journal.tidy()?;
             // All are on disk before the first is printed, so that an interruption between two sheets loses none.
-            let mut queue = (1..=copies)
-                .map(|copy| {
-                    let name = if copies == 1 { name.to_owned() } else { copy_name(name, copy, copies) };
-                    journal.queue(NewJob {
-                        name: &name,
-                        to: address.to_string(),
-                        kind: JobKind::Raw,
-                        data: job,
-                        port_bytes: job.len() as u64,
-                        passes: checked.passes.clone(),
-                    })
-                })
-                .collect::<Result<Vec<_>, _>>()?
-                .into_iter();
-            observer.note(&load(&checked.inks));
-            let mut copy = 0;
-            while let Some(queued) = queue.next() {
-                copy += 1;
+            let mut queue = Vec::new();
+            for copy in 1..=copies {
+                let name = if copies == 1 { name.to_owned() } else { copy_name(name, copy, copies) };
+                let queued = journal.queue(NewJob {
+                    name: &name,
+                    to: address.to_string(),
+                    kind: JobKind::Raw,
+                    data: job,
+                    port_bytes: job.len() as u64,
+                    passes: checked.passes.clone(),
+                })?;
                 let number = format!("{:08x}", queued.entry.record.job);
+                ledger::begun(&number, &name, checked, job.len() as u64, observer);
+                queue.push(queued);
+            }
+            observer.note(&load(&checked.inks));
+            for (copy, queued) in (1..).zip(queue) {
                 observer.note(&format!(
-                    "{} is queued as job {number}; nothing is printed yet",
-                    queued.entry.name
+                    "{} is queued as job {:08x}; nothing is printed yet",
+                    queued.entry.name, queued.entry.record.job
                 ));
-                ledger::begun(&number, &queued.entry.name, &checked, job.len() as u64, observer);
                 go(queued, address, false, observer)?;
                 if copy < copies && !next_sheet(copy, copies)? {
                     bail!("{copy} of {copies} sheets are sent; `foilpress resume` sends the next one");

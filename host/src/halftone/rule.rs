@@ -21,9 +21,10 @@
 //! cost(j) <= cost(k), and the sums of squares differ by -2 m (look_j - look_k) < 0, which decides a tie for j. Equal
 //! looks make both equal. Hence a decision is an argmax.
 //!
-//! Method: looks are kept, not debts, one set for each minimum in use: printing d dots adds d weights at the far end
-//! of each window and takes d off the stack printed. While the current stack stays, no gap to it shrinks by more than
-//! 2 (1 - w) a dot, w its own weight at the far end, so runs go on many dots at a time with one division.
+//! Method: looks are kept, not debts, over the horizon of the last decision: printing d dots adds d weights at the far
+//! end of the window and takes d off the stack printed; another horizon adds or takes what lies between the two ends.
+//! While the current stack stays, no gap to it shrinks by more than 2 (1 - w) a dot, w its own weight at the far end, so
+//! runs go on many dots at a time with one division.
 //!
 //! Debts of the absent. A stack without weight for [`ABSENT`] dots is parked: its debt is set aside and handed in
 //! equal parts to the others, and taken back from them when it returns. Otherwise the stacks still present would owe
@@ -62,6 +63,16 @@ fn get_mut(lanes: &mut [Lanes], k: usize) -> &mut i32 {
     &mut lanes[k / LANES].0[k % LANES]
 }
 
+/// Adds so many dots of these weights.
+#[inline(always)]
+fn add(look: &mut [Lanes], weights: &[Lanes], dots: i32) {
+    for (look, weight) in look.iter_mut().zip(weights) {
+        for l in 0..LANES {
+            look.0[l] = look.0[l].wrapping_add(weight.0[l].wrapping_mul(dots));
+        }
+    }
+}
+
 /// Where the weights come from, in stretches of constant weight.
 pub(super) trait Source {
     /// Writes the weights of the next stretch, 0 or more each with sum [`UNIT`] and 0 in lanes without a stack, and says
@@ -88,18 +99,18 @@ struct Ahead {
     spare: Vec<Stretch>,
 }
 
-/// Stacks of one minimum, and what all stacks look like over that horizon.
+/// Stacks of one minimum, and the window of that many dots.
 struct Class {
     minimum: u32,
     /// -1 for the stacks of this class.
     member: Vec<Lanes>,
-    look: Vec<Lanes>,
-    /// End of the last stretch, up to `front`, in which a stack of this class has weight.
+    /// End of the last stretch that the window has reached in which a stack of this class has weight.
     until: u32,
     /// End of the window.
     front: u32,
-    /// Stretch at the end of the window, and how many of its dots are in the window.
+    /// Stretch at the end of the window, where it ends, and how many of its dots are in the window.
     stretch: usize,
+    end: u32,
     used: u32,
 }
 
@@ -109,6 +120,9 @@ pub(super) struct Rule {
     /// By minimum, the smallest first.
     classes: Vec<Class>,
     class_of: Vec<usize>,
+    /// What the stacks look like over the window of class `horizon`.
+    look: Vec<Lanes>,
+    horizon: usize,
     /// Of each stack the end of the last stretch with weight that its class's window has reached.
     seen: Vec<Lanes>,
     lane: Vec<Lanes>,
@@ -167,19 +181,13 @@ impl Rule {
             for (k, _) in class_of.iter().enumerate().filter(|(_, of)| **of == c) {
                 *get_mut(&mut member, k) = -1;
             }
-            Class {
-                minimum: kind,
-                member,
-                look: vec![Lanes::default(); n],
-                until: 0,
-                front: 0,
-                stretch: 0,
-                used: 0,
-            }
+            Class { minimum: kind, member, until: 0, front: 0, stretch: 0, end: 0, used: 0 }
         };
         Rule {
             dots,
             classes: kinds.iter().enumerate().map(class).collect(),
+            look: vec![Lanes::default(); n],
+            horizon: kinds.len().saturating_sub(1),
             seen: vec![Lanes::default(); n],
             lane: (0..n).map(|b| Lanes(std::array::from_fn(|l| (b * LANES + l) as i32))).collect(),
             ahead: Ahead { first: 0, held: VecDeque::new(), spare: Vec::new() },
@@ -207,9 +215,9 @@ impl Rule {
             if at + run < self.dots {
                 for c in 0..self.classes.len() {
                     self.look_on(c, run, source);
-                    let look = get_mut(&mut self.classes[c].look, stack);
-                    *look = look.wrapping_sub((run as i32).wrapping_mul(UNIT));
                 }
+                let look = get_mut(&mut self.look, stack);
+                *look = look.wrapping_sub((run as i32).wrapping_mul(UNIT));
             }
             sink.run(stack, run);
             (at, current) = (at + run, Some(stack));
@@ -221,7 +229,7 @@ impl Rule {
 
     /// The next stack and for how many dots.
     #[inline(always)]
-    fn decide(&self, at: u32, current: Option<usize>) -> (usize, u32) {
+    fn decide(&mut self, at: u32, current: Option<usize>) -> (usize, u32) {
         let left = self.dots - at;
         // Only at the very end do minima no longer fit; there every dot is decided by itself.
         let largest = self.classes.last().map_or(1, |class| class.minimum);
@@ -235,8 +243,10 @@ impl Rule {
                 None => return (self.anyone(at), left),
             },
         };
-        let look = &self.classes[top].look;
-        let best = if end { self.best_at_end(look, at, left, current) } else { self.best(look, at, current) };
+        if top != self.horizon {
+            self.look_over(top);
+        }
+        let best = if end { self.best_at_end(at, left, current) } else { self.best(at, current) };
         let Some(best) = best else { return (current.unwrap_or(0), left.min(1)) };
         if Some(best.stack) != current {
             return (best.stack, self.classes[self.class_of[best.stack]].minimum.min(left));
@@ -281,8 +291,8 @@ impl Rule {
 
     /// The candidate with the largest look; ties go to the current stack, then to the lower index. All minima fit.
     #[inline(always)]
-    fn best(&self, look: &[Lanes], at: u32, current: Option<usize>) -> Option<Candidate> {
-        let now = at as i32;
+    fn best(&self, at: u32, current: Option<usize>) -> Option<Candidate> {
+        let (look, now) = (&self.look[..], at as i32);
         let mut most = Lanes([NEVER; LANES]);
         for (look, seen) in look.iter().zip(&self.seen) {
             for l in 0..LANES {
@@ -319,21 +329,46 @@ impl Rule {
 
     /// As [`Rule::best`] where a minimum may not fit any more.
     #[cold]
-    fn best_at_end(&self, look: &[Lanes], at: u32, left: u32, current: Option<usize>) -> Option<Candidate> {
+    fn best_at_end(&self, at: u32, left: u32, current: Option<usize>) -> Option<Candidate> {
         let candidate = |k: &usize| {
             let fits = self.classes[self.class_of[*k]].minimum <= left;
             get(&self.seen, *k) > at as i32 && (fits || Some(*k) == current)
         };
-        let order = |&k: &usize| (get(look, k), Some(k) == current, std::cmp::Reverse(k));
+        let order = |&k: &usize| (get(&self.look, k), Some(k) == current, std::cmp::Reverse(k));
         let stack = (0..self.class_of.len()).filter(candidate).max_by_key(order)?;
         Some(Candidate { stack, margin: 0 })
     }
 
     /// The largest look of all that have weight, whatever their minimum, each over its own.
-    fn anyone(&self, at: u32) -> usize {
-        let look = |&k: &usize| (get(&self.classes[self.class_of[k]].look, k), std::cmp::Reverse(k));
-        let weighty = (0..self.class_of.len()).filter(|&k| get(&self.seen, k) > at as i32);
-        weighty.max_by_key(look).unwrap_or(0)
+    #[cold]
+    fn anyone(&mut self, at: u32) -> usize {
+        let mut best: Option<(i32, usize)> = None;
+        for c in 0..self.classes.len() {
+            self.look_over(c);
+            for k in (0..self.class_of.len()).filter(|&k| self.class_of[k] == c) {
+                let look = get(&self.look, k);
+                let better = best.is_none_or(|(most, first)| look > most || (look == most && k < first));
+                if get(&self.seen, k) > at as i32 && better {
+                    best = Some((look, k));
+                }
+            }
+        }
+        best.map_or(0, |(_, k)| k)
+    }
+
+    /// Makes the window of class `c` the horizon: the looks gain or lose the weights between the two ends.
+    #[inline(never)]
+    fn look_over(&mut self, c: usize) {
+        let (near, far) = (self.horizon.min(c), self.horizon.max(c));
+        let sign = if c == far { 1 } else { -1 };
+        let (from, to) = (&self.classes[near], &self.classes[far]);
+        for s in from.stretch..=to.stretch {
+            let Some(stretch) = self.ahead.held.get(s - self.ahead.first) else { break };
+            let begin = if s == from.stretch { from.used } else { 0 };
+            let end = if s == to.stretch { to.used } else { stretch.dots };
+            add(&mut self.look, &stretch.weights, sign * (end - begin) as i32);
+        }
+        self.horizon = c;
     }
 
     /// Moves the end of a class's window on, to the end of the walk at most.
@@ -341,28 +376,15 @@ impl Rule {
     fn look_on<S: Source>(&mut self, c: usize, dots: u32, source: &mut S) {
         let mut dots = dots.min(self.dots - self.classes[c].front);
         while dots > 0 {
-            let class = &self.classes[c];
-            let here = class.stretch.wrapping_sub(self.ahead.first);
-            if self.ahead.held.get(here).is_none_or(|s| class.used == s.dots) {
+            if self.classes[c].front == self.classes[c].end {
                 self.enter(c, source);
             }
             let class = &mut self.classes[c];
-            let stretch = &self.ahead.held[class.stretch - self.ahead.first];
-            let step = dots.min(stretch.dots - class.used);
+            let step = dots.min(class.end - class.front);
             (class.front, class.used, dots) = (class.front + step, class.used + step, dots - step);
-            let (step, front) = (step as i32, class.front as i32);
-            let lanes = class.look.iter_mut().zip(&mut self.seen).zip(&class.member).zip(&stretch.weights);
-            let mut any = Lanes::default();
-            for (((look, seen), member), weight) in lanes {
-                for l in 0..LANES {
-                    look.0[l] = look.0[l].wrapping_add(weight.0[l].wrapping_mul(step));
-                    let own = weight.0[l] & member.0[l];
-                    any.0[l] |= own;
-                    seen.0[l] = if own > 0 { front } else { seen.0[l] };
-                }
-            }
-            if any.0.into_iter().fold(0, |all, own| all | own) > 0 {
-                class.until = class.front;
+            if c == self.horizon {
+                let stretch = &self.ahead.held[class.stretch - self.ahead.first];
+                add(&mut self.look, &stretch.weights, step as i32);
             }
         }
     }
@@ -378,9 +400,28 @@ impl Rule {
             self.ahead.spare.extend(self.ahead.held.pop_front());
             self.ahead.first += 1;
         }
-        if self.classes[c].stretch - self.ahead.first < self.ahead.held.len() {
-            return;
+        if self.classes[c].stretch - self.ahead.first == self.ahead.held.len() {
+            self.fetch(source);
         }
+        let class = &mut self.classes[c];
+        let stretch = &self.ahead.held[class.stretch - self.ahead.first];
+        class.end = class.front.saturating_add(stretch.dots).min(self.dots);
+        let (mut any, end) = (Lanes::default(), class.end as i32);
+        for ((seen, member), weight) in self.seen.iter_mut().zip(&class.member).zip(&stretch.weights) {
+            for l in 0..LANES {
+                let own = weight.0[l] & member.0[l];
+                any.0[l] |= own;
+                seen.0[l] = if own > 0 { end } else { seen.0[l] };
+            }
+        }
+        if any.0.into_iter().fold(0, |all, own| all | own) > 0 {
+            class.until = class.end;
+        }
+    }
+
+    /// Asks for the next stretch.
+    #[inline(always)]
+    fn fetch<S: Source>(&mut self, source: &mut S) {
         let mut stretch = self.ahead.spare.pop().unwrap_or_default();
         stretch.weights.resize(self.live.len(), Lanes::default());
         stretch.dots = source.stretch(&mut stretch.weights).max(1);
@@ -417,8 +458,8 @@ impl Rule {
         for k in 0..self.parked.len() {
             let last = get(&self.last, k) as u32;
             if get(&self.live, k) != 0 && at.saturating_sub(last) >= self.absent {
-                // Without weight in any window every class's look is the bare debt.
-                let debt = get(&self.classes[0].look, k);
+                // Without weight in any window the look is the bare debt.
+                let debt = get(&self.look, k);
                 self.parked[k] = debt;
                 *get_mut(&mut self.live, k) = 0;
                 self.away += 1;
@@ -434,17 +475,12 @@ impl Rule {
             return;
         }
         let mut odd = debt % live;
-        for class in &mut self.classes {
-            let own = get_mut(&mut class.look, k);
-            *own = own.wrapping_sub(debt);
-        }
+        let own = get_mut(&mut self.look, k);
+        *own = own.wrapping_sub(debt);
         for other in 0..self.parked.len() {
             if get(&self.live, other) != 0 {
-                for class in &mut self.classes {
-                    let look = get_mut(&mut class.look, other);
-                    *look = look.wrapping_add(debt / live + odd);
-                }
-                odd = 0;
+                let look = get_mut(&mut self.look, other);
+                *look = look.wrapping_add(debt / live + std::mem::take(&mut odd));
             }
         }
     }

@@ -38,7 +38,7 @@ fn escape(text: &str) -> String {
 }
 
 const STYLE: &str = "@page{margin:15mm}body{font:10.5pt/1.35 sans-serif;color:#111;max-width:180mm;margin:0 auto}\
-    h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}p{margin:1mm 0}\
+    h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}h2:first-of-type{clear:both}p{margin:1mm 0}\
     table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.6mm 2mm;border-bottom:.2mm solid #bbb}\
     th{font-weight:600}td.n,th.n{text-align:right}img{float:right;width:52mm;border:.2mm solid #999;margin:0 0 3mm 5mm}\
     .box{display:inline-block;width:3.4mm;height:3.4mm;border:.3mm solid #111;vertical-align:-.5mm}small{color:#555}";
@@ -52,7 +52,7 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
          <img alt=\"the sheet\" src=\"data:image/png;base64,{picture}\">\n<h1>{name}</h1>\n"
     )?;
     let (width, height) = plan.size_mm;
-    writeln!(page, "<p>{width:.1} &times; {height:.1} mm on {}", plan.paper)?;
+    write!(page, "<p>{width:.1} &times; {height:.1} mm on {}", plan.paper)?;
     if plan.pieces != (1, 1) {
         write!(page, ", {} &times; {} times", plan.pieces.0, plan.pieces.1)?;
     }

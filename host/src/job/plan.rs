@@ -178,7 +178,7 @@ impl Plan {
             cartridges: cartridges(subject.planned, &passes, library),
             seconds_estimated: passes.iter().map(|pass| pass.estimate.seconds).sum(),
             passes,
-            stacks: shares(sheet, area, library),
+            stacks: shares(sheet, &laid.pieces, library),
             checks: checks(subject),
         }
     }
@@ -213,23 +213,28 @@ fn cartridges(planned: &[Planned], passes: &[Pass], library: &Library) -> Vec<Ca
     inks.into_iter().map(cartridge).collect()
 }
 
-fn shares(sheet: &Sheet, area: u64, library: &Library) -> Vec<Share> {
-    let outside = (sheet.index().len() as u64).saturating_sub(area);
+/// The stacks on the pieces; what marks take stands in the passes only.
+fn shares(sheet: &Sheet, pieces: &[Area], library: &Library) -> Vec<Share> {
+    let mut census = [0u64; 256];
+    for piece in pieces {
+        for row in sheet.index().chunks_exact(sheet.width()).skip(piece.top).take(piece.length) {
+            for &stack in &row[piece.left..][..piece.width] {
+                census[usize::from(stack)] += 1;
+            }
+        }
+    }
+    let area = census.iter().sum::<u64>().max(1);
     let mut stacks: Vec<Share> = sheet
         .stacks()
         .iter()
-        .zip(sheet.census())
+        .zip(census)
         .zip(colours(sheet.stacks()))
-        .enumerate()
-        .map(|(i, ((stack, dots), [r, g, b]))| {
-            let dots = if i == 0 { dots.saturating_sub(outside) } else { dots };
-            Share {
-                stack: stack.to_string(),
-                words: library.words(stack),
-                colour: format!("#{r:02x}{g:02x}{b:02x}"),
-                dots,
-                share: dots as f64 / area.max(1) as f64,
-            }
+        .map(|((stack, dots), [r, g, b])| Share {
+            stack: stack.to_string(),
+            words: library.words(stack),
+            colour: format!("#{r:02x}{g:02x}{b:02x}"),
+            dots,
+            share: dots as f64 / area as f64,
         })
         .filter(|stack| stack.dots > 0)
         .collect();

@@ -57,8 +57,8 @@ mod tests {
             width in 1usize..70, length in 1usize..24, side in 1usize..5, seed: u32, dense in 1u32..8,
         ) {
             let dot = |x: usize, y: usize| {
-                let n = (x as u32 + 97 * y as u32 ^ seed).wrapping_mul(0x9e37_79b1);
-                (n >> 13) % 8 < dense || (x / 6 + y / 5) % 2 == 0
+                let n = ((x as u32 + 97 * y as u32) ^ seed).wrapping_mul(0x9e37_79b1);
+                (n >> 13) % 8 < dense || (x / 6 + y / 5).is_multiple_of(2)
             };
             let plane = plane(width, length, dot);
             let inside = |x: usize, y: usize| x < width && y < length && dot(x, y);

@@ -40,7 +40,7 @@ impl Profile {
         if !(x.abs() <= MOST_OFFSET && y.abs() <= MOST_OFFSET) {
             return Some(format!("offset_mm: {x}, {y}; no machine is more than {MOST_OFFSET} mm off"));
         }
-        if !((self.feed - 1.0).abs() <= MOST_FEED) {
+        if (self.feed - 1.0).abs() > MOST_FEED || self.feed.is_nan() {
             return Some(format!(
                 "feed: {}; it is the length on paper of what should be 1 mm, between {} and {}",
                 self.feed,

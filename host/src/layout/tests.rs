@@ -188,7 +188,7 @@ fn registration_marks_have_every_pass_and_the_ink_can_be_chosen() {
     let census = arranged.sheet.census();
     assert_eq!(arranged.sheet.stacks().last().unwrap().to_string(), "M");
     // Four rings with crosses, alike: the paper's own symmetry.
-    assert!(census.last().unwrap() % 4 == 0 && *census.last().unwrap() > 4 * 118 * 4);
+    assert!(census.last().unwrap().is_multiple_of(4) && *census.last().unwrap() > 4 * 118 * 4);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A piece is a rectangle of dots that has not found its place on a page yet.
 //!
 //! Layers, halftoned documents and charts make pieces; the layout repeats, mirrors, marks and places them, and what
-//! comes out is a [`Sheet`](super::Sheet).
+//! comes out is a [`Sheet`].
 
 use inks::Stack;
 

@@ -10,12 +10,15 @@ use tempfile::TempDir;
 /// A fresh folder to run the program in.
 pub struct Bench {
     folder: TempDir,
+    /// Where the program keeps settings and jobs: not those of whoever runs the tests.
+    home: TempDir,
 }
 
 impl Bench {
     #[allow(clippy::new_without_default, reason = "a test's helper")]
     pub fn new() -> Bench {
-        Bench { folder: tempfile::tempdir().expect("a temporary folder") }
+        let folder = || tempfile::tempdir().expect("a temporary folder");
+        Bench { folder: folder(), home: folder() }
     }
 
     /// A name in the folder.
@@ -27,6 +30,8 @@ impl Bench {
     pub fn command(&self, args: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_foilpress"));
         command.args(args.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
+        command.env("FOILPRESS_CONFIG", self.home.path().join("config"));
+        command.env("FOILPRESS_JOBS", self.home.path().join("jobs"));
         command
     }
 
