@@ -133,7 +133,9 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
         }
         [folder] if folder.is_dir() => {
             let files = pictures_in(folder)?;
-            named_files(&stem(folder), &files, options, observer)?
+            // `.` has a name, too.
+            let own = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
+            named_files(&stem(&own), &files, options, observer)?
         }
         [file] => one(file, options, observer)?,
         files => named_files(&common_name(files), files, options, observer)?,
@@ -302,8 +304,12 @@ impl Artwork {
         }
     }
 
-    /// Adds a layer. `plate` says that the coverage is a printing plate's, whose process inks have tones.
+    /// Adds a layer. `plate` says that the coverage is a printing plate's: process inks have tones, and blank plates are
+    /// nothing to speak of.
     fn add(&mut self, scan: Scan, name: &str, named: names::Named, plate: bool, options: &Options) {
+        if plate && scan.coverage.iter().all(|&c| c == 0) {
+            return;
+        }
         let (layer, mut notes) = layer(scan, name, named, plate, (self.width, self.length), options);
         match &layer.shape {
             Shape::Solid(plane) => bits::add(&mut self.drawn, plane),

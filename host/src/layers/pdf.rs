@@ -91,9 +91,6 @@ fn page(
         let spot = plates.iter().find(|(name, _)| *name == plate).map(|&(_, named)| named);
         let Some(named) = spot.or(process) else { continue };
         let scan = raster::scan(&file)?;
-        if scan.coverage.iter().all(|&c| c == 0) {
-            continue;
-        }
         let dots = (scan.width as usize, scan.height as usize);
         art.get_or_insert_with(|| Artwork::blank(&name, dots)).add(scan, &plate, named, true, &rendered);
     }

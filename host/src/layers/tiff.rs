@@ -148,7 +148,8 @@ fn channels(
         if at < base {
             let ink = PROCESS.get(at).filter(|_| photometric == SEPARATED);
             let ink = ink.map(|&ink| names::Named { place: None, ink });
-            channels.push(Channel { name: format!("channel {}", at + 1), ink, inverted: false });
+            let name = ink.map_or_else(String::new, |named| format!("the {} plate", named.ink.name()));
+            channels.push(Channel { name, ink, inverted: false });
             continue;
         }
         let (name, inverted) = match (named_inks.get(at), named_extra.get(at - base)) {
