@@ -21,6 +21,8 @@ pub mod sheet;
 
 pub mod halftone;
 
+pub mod layers;
+
 pub mod layout;
 
 pub mod separate;

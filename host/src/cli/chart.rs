@@ -115,7 +115,14 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             }
             let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
             let piece = chart::stacks(&all, stacks.piece.layout.paper)?;
-            let job = Job { name: "stacks", piece: &piece, allowed: set, library: &library, report: None };
+            let job = Job {
+                name: "stacks",
+                piece: &piece,
+                allowed: set,
+                library: &library,
+                report: None,
+                advice: String::new(),
+            };
             piece::print(&job, &stacks.piece, observer)
         }
         Chart::Registration(registration) => {
@@ -143,7 +150,14 @@ impl Two {
         // Who names a foil wants it.
         let allowed = InkSet::ALL;
         let name = format!("{name} {} {}", self.first, self.second);
-        let job = Job { name: &name, piece: &piece, allowed, library: &library, report: None };
+        let job = Job {
+            name: &name,
+            piece: &piece,
+            allowed,
+            library: &library,
+            report: None,
+            advice: String::new(),
+        };
         piece::print(&job, &self.piece, observer).with_context(|| name.clone())
     }
 }
@@ -152,7 +166,7 @@ impl WholePage {
     fn print(&self, name: &str, piece: &Piece, inks: &[Ink], observer: &dyn Observer) -> Result<()> {
         let library = Library::builtin();
         let allowed = InkSet::of(inks.iter().copied());
-        let job = Job { name, piece, allowed, library: &library, report: None };
+        let job = Job { name, piece, allowed, library: &library, report: None, advice: String::new() };
         let layout = Layout::centred(self.paper);
         piece::print_on(&job, &layout, &self.media, &self.result, &self.deliver, observer)
     }

@@ -12,6 +12,7 @@ mod deliver;
 mod doctor;
 mod inks;
 mod inspect;
+mod layers;
 mod layout;
 mod ledger;
 mod output;
@@ -50,6 +51,7 @@ const LARGEST_JOB: u64 = 256 << 20;
     after_help = "Examples:\n  \
         foilpress print sample:leaf\n  \
         foilpress print my-material/ --size 120x90mm --bases 8 --to file:job.rgl\n  \
+        foilpress layers white.png gold.png black.png --finish artwork\n  \
         foilpress inks show MS+C\n  \
         foilpress inspect job.rgl --passes passes/\n  \
         foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
@@ -68,6 +70,8 @@ struct Args {
 enum Command {
     /// Print a document: the job, the simulated sheet, and everything to look at, in one folder
     Print(Box<print::Args>),
+    /// Print spot-colour art: a picture for each ink, reserved colours, or named layers
+    Layers(Box<layers::Args>),
     /// What a job or a document needs: cartridges, passes, ribbon, time, cautions. Nothing is sent
     Plan(Box<plan::Args>),
     /// Sheets to look at, to measure inks and to measure the machine
@@ -137,6 +141,7 @@ fn run(args: Args) -> Result<()> {
     let observer = &Progress::new(args.quiet);
     match args.command {
         Command::Print(args) => print::run(&args, observer),
+        Command::Layers(args) => layers::run(&args, observer),
         Command::Plan(args) => plan::run(&args, observer),
         Command::Chart(args) => chart::run(&args, observer),
         Command::Preset(args) => preset::run(&args),

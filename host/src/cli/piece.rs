@@ -148,6 +148,8 @@ pub struct Job<'a> {
     pub library: &'a Library,
     /// What else the report should hold, under a name of its own.
     pub report: Option<(&'static str, serde_json::Value)>,
+    /// What else to say below the plan; empty for nothing.
+    pub advice: String,
 }
 
 /// Lays a piece on its page, prints it on the simulated printer, writes everything, shows the plan and sends the job.
@@ -205,7 +207,8 @@ pub fn print_on(
         super::show(&format!("{report}\n"))?;
     } else {
         super::show(&format!(
-            "{plan}\nThe simulated printer made exactly this sheet. Look at {}; {} is the plan on one page.\n",
+            "{plan}{}\nThe simulated printer made exactly this sheet. Look at {}; {} is the plan on one page.\n",
+            job.advice,
             target.join("preview.png").display(),
             target.join("plan.html").display()
         ))?;

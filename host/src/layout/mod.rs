@@ -15,7 +15,7 @@ use protocol::ink::Ink;
 use protocol::paper::{LEFT, Paper};
 use rayon::prelude::*;
 
-pub use length::{Mm, Point};
+pub use length::{Mm, NoLength, Point};
 pub use profile::Profile;
 
 use crate::observe::Observer;

@@ -9,7 +9,7 @@
 
 pub mod files;
 mod order;
-mod pack;
+pub(crate) mod pack;
 pub mod rules;
 
 use std::collections::HashMap;
@@ -22,6 +22,7 @@ use crate::observe::Observer;
 use crate::sheet::{Sheet, SheetError};
 
 pub use inks::{Certainty, Severity};
+pub use order::place as customary;
 pub use rules::Check;
 
 /// Places for cartridges in the machine.

@@ -25,7 +25,7 @@ pub(super) struct Order {
 }
 
 /// The customary place of an ink: undercoats first, opaque below transparent, clear coat last.
-fn place(ink: Ink) -> (u8, u8) {
+pub fn place(ink: Ink) -> (u8, u8) {
     let kind = match ink.kind() {
         Kind::Primer => 0,
         Kind::White => 1,

@@ -24,7 +24,7 @@ fn transpose(mut x: u64) -> u64 {
 }
 
 /// A plane for each pass. `passes_of[stack]` has bit p set if the stack is in pass p, `passes` of them (16 at most).
-pub(super) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: usize) -> Vec<Plane> {
+pub(crate) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: usize) -> Vec<Plane> {
     let (stride, length) = (width.div_ceil(8), index.len() / width);
     let mut planes: Vec<Plane> =
         (0..passes).map(|_| Plane { width, length, stride, bits: vec![0; stride * length] }).collect();
@@ -64,29 +64,49 @@ pub(super) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: u
     planes
 }
 
+/// The planes that each of eight dots has, as bits; `at` is the place of their byte.
+fn masks(planes: &[&Plane], at: usize) -> [usize; 8] {
+    let mut masks = [0usize; 8];
+    for (eight, planes) in planes.chunks(8).enumerate() {
+        let mut bytes = [0u8; 8];
+        for (byte, plane) in bytes.iter_mut().zip(planes) {
+            *byte = plane.bits[at];
+        }
+        let dots = transpose(u64::from_le_bytes(bytes)).to_be_bytes();
+        for (mask, bits) in masks.iter_mut().zip(dots) {
+            *mask |= usize::from(bits) << (8 * eight);
+        }
+    }
+    masks
+}
+
+/// How many dots have each combination of 16 planes at most, all of one size; bit p of an entry's number is plane p.
+pub(crate) fn census(planes: &[&Plane], width: usize, length: usize) -> Vec<u64> {
+    let stride = width.div_ceil(8);
+    let none = || vec![0u64; 1 << planes.len()];
+    let slabs = (0..length).into_par_iter().with_min_len(ROWS);
+    slabs
+        .fold(none, |mut counts, row| {
+            for at in 0..stride {
+                for &mask in &masks(planes, row * stride + at)[..8.min(width - 8 * at)] {
+                    counts[mask] += 1;
+                }
+            }
+            counts
+        })
+        .reduce(none, |a, b| a.into_iter().zip(b).map(|(a, b)| a + b).collect())
+}
+
 /// Stack numbers from planes of one size: `stack_of[mask]` for the dots with these passes, where the table says
 /// [`NONE`] there is none. The error is the first such dot and its mask.
-pub(super) fn unpack(
+pub(crate) fn unpack(
     planes: &[&Plane],
     width: usize,
     length: usize,
     stack_of: &[u16],
 ) -> Result<Vec<u8>, (usize, usize)> {
     let stride = width.div_ceil(8);
-    let mask_of = |row: usize, at: usize| {
-        let mut masks = [0usize; 8];
-        for (eight, planes) in planes.chunks(8).enumerate() {
-            let mut bytes = [0u8; 8];
-            for (byte, plane) in bytes.iter_mut().zip(planes) {
-                *byte = plane.bits[row * stride + at];
-            }
-            let dots = transpose(u64::from_le_bytes(bytes)).to_be_bytes();
-            for (mask, bits) in masks.iter_mut().zip(dots) {
-                *mask |= usize::from(bits) << (8 * eight);
-            }
-        }
-        masks
-    };
+    let mask_of = |row: usize, at: usize| masks(planes, row * stride + at);
     let mut index = vec![0u8; width * length];
     let bad = index
         .par_chunks_mut(width)
@@ -109,7 +129,7 @@ pub(super) fn unpack(
 }
 
 /// No stack has these passes.
-pub(super) const NONE: u16 = u16::MAX;
+pub(crate) const NONE: u16 = u16::MAX;
 
 #[cfg(test)]
 mod tests {

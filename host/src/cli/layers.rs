@@ -1,0 +1,230 @@
+//! `foilpress layers`: spot-colour art in, the job and everything to look at out.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use clap::Args as ClapArgs;
+use inks::{InkSet, Library};
+use protocol::ink::Ink;
+use serde_json::json;
+
+use super::piece::{self, Job, PieceArgs};
+use super::preset::PresetArg;
+use crate::job::placement::{DOTS_PER_MM, Size};
+use crate::job::plan::grouped;
+use crate::layers::{self, Accept, Composed, Finish, Order, Suggestion, White, names};
+use crate::layout::{Mm, NoLength};
+use crate::observe::Observer;
+
+/// What to read and how it becomes layers of ink.
+#[derive(ClapArgs, Debug)]
+pub struct LayersArgs {
+    /// Pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with named spot channels,
+    /// an SVG with named layers, a PDF or PostScript file, or one picture
+    #[arg(value_name = "ART", required = true)]
+    pub art: Vec<PathBuf>,
+    /// The vendor's reserved colours stand for inks: white 230,230,230, gold 225,160,0, silver 189,193,197,
+    /// metallic red 163,36,115, metallic blue 0,176,201, black 0,0,0
+    #[arg(long)]
+    pub reserved: bool,
+    /// How far red, green and blue may be from a reserved colour [default: 8 for white and black, 12 for metals]
+    #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = clap::value_parser!(u8).range(0..=60))]
+    pub tolerance: Option<u8>,
+    /// Resolution of pictures that do not say theirs, or say it wrongly, in pixels an inch
+    #[arg(long, value_name = "DPI", value_parser = dpi)]
+    pub dpi: Option<f64>,
+    /// Page of a PDF or PostScript file
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub page: u32,
+    /// Layers that keep their tones, as dots; the others are solid where they are darker than half
+    #[arg(long, value_name = "INKS")]
+    pub halftone: Option<String>,
+    /// Inks that may be used: names and the groups process, metallic, clear, foil, all, joined by commas; + and -
+    /// change the default [default: all but the foils]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub inks: Option<String>,
+    /// Order from the paper up: rules, given, or the inks one by one, such as white,black,white
+    /// [default: as numbered names say, else by the ink library's rules]
+    #[arg(long, value_name = "ORDER", value_parser = order)]
+    pub order: Option<Order>,
+    /// How often an ink is laid, such as white=3,primer=2
+    #[arg(long, value_name = "INK=N", value_delimiter = ',', value_parser = passes)]
+    pub passes: Vec<(Ink, u8)>,
+    /// Inks that leave out the process inks beneath them, or none [default: metallic]
+    #[arg(long, value_name = "INKS")]
+    pub knockout: Option<String>,
+    /// Where white goes [default: where the art draws it]
+    #[arg(long, value_name = "MODE")]
+    pub white: Option<White>,
+    /// Shrink the white by this, so that it does not show beside the colours, such as 0.1mm
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "spread")]
+    pub choke: Option<f64>,
+    /// Spread the white by this
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub spread: Option<f64>,
+    /// Where glossy finish goes [default: where the art draws it]
+    #[arg(long, value_name = "WHERE")]
+    pub finish: Option<Finish>,
+    /// Suggestions of the plan to follow
+    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    pub accept: Vec<Accept>,
+    /// Folder of an ink library of your own: its order rules and clusters count
+    #[arg(long, value_name = "DIR")]
+    pub library: Option<PathBuf>,
+}
+
+fn dpi(text: &str) -> Result<f64, String> {
+    let dpi: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
+    if (20.0..=10_000.0).contains(&dpi) { Ok(dpi) } else { Err("expected 20 to 10000".into()) }
+}
+
+/// A length that is not negative, in dots of 600 dpi.
+fn length(text: &str) -> Result<f64, String> {
+    let length: Mm = text.parse().map_err(|error: NoLength| error.to_string())?;
+    if length.0 >= 0.0 { Ok(length.0 * DOTS_PER_MM) } else { Err("expected a length of 0 or more".into()) }
+}
+
+fn passes(text: &str) -> Result<(Ink, u8), String> {
+    let (ink, times) = text.split_once('=').ok_or("expected INK=N, such as white=3")?;
+    match times.trim().parse() {
+        Ok(times @ 1..=9) => Ok((names::typed(ink)?, times)),
+        _ => Err(format!("`{times}`: expected 1 to 9 passes")),
+    }
+}
+
+fn order(text: &str) -> Result<Order, String> {
+    match text {
+        "rules" => Ok(Order::Rules),
+        "given" => Ok(Order::Given),
+        list => list.split(',').map(names::typed).collect::<Result<_, _>>().map(Order::Inks),
+    }
+}
+
+/// Inks as typed: any of their names, or groups.
+fn set(option: &str, text: &str) -> Result<InkSet> {
+    let words = text.split(',').map(str::trim).filter(|word| !word.is_empty());
+    let known = words.map(|word| match names::typed(word) {
+        Ok(ink) => ink.name().to_owned(),
+        Err(_) => word.to_owned(),
+    });
+    known.collect::<Vec<_>>().join(",").parse().with_context(|| option.to_owned())
+}
+
+impl LayersArgs {
+    /// The library.
+    pub fn library(&self) -> Result<Library> {
+        Ok(match &self.library {
+            Some(folder) => Library::from_dir(folder)?,
+            None => Library::builtin(),
+        })
+    }
+
+    /// The inks that may be used: white is among the usual ones here.
+    pub fn inks(&self) -> Result<InkSet> {
+        let text = match self.inks.as_deref().map(str::trim) {
+            None => "default,white".into(),
+            Some(change) if change.starts_with(['+', '-']) => format!("default,white,{change}"),
+            Some(list) => list.to_owned(),
+        };
+        let inks = set("--inks", &text)?;
+        if inks.is_empty() {
+            bail!("--inks leaves no ink to print with");
+        }
+        Ok(inks)
+    }
+
+    /// How the art is read.
+    pub fn options(&self, size: Option<Size>) -> Result<layers::Options> {
+        Ok(layers::Options {
+            size,
+            dpi: self.dpi,
+            reserved: self.reserved || self.white == Some(White::Reserved),
+            tolerance: self.tolerance,
+            page: self.page,
+            halftone: self.halftone.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--halftone", text))?,
+            inks: self.inks()?,
+        })
+    }
+
+    /// How layers become stacks.
+    pub fn settings(&self) -> Result<layers::Settings> {
+        let usual = layers::Settings::default();
+        Ok(layers::Settings {
+            inks: self.inks()?,
+            order: self.order.clone().unwrap_or_default(),
+            passes: self.passes.clone(),
+            knockout: match self.knockout.as_deref() {
+                None => usual.knockout,
+                Some("none") => InkSet::EMPTY,
+                Some(text) => set("--knockout", text)?,
+            },
+            white: self.white,
+            choke: self.choke.unwrap_or(0.0) - self.spread.unwrap_or(0.0),
+            finish: self.finish,
+            accept: self.accept.clone(),
+        })
+    }
+}
+
+/// Arguments of `layers`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
+    foilpress layers white.png gold.png black.png\n  \
+    foilpress layers decal/ --passes white=3 --finish artwork --mirror --media film\n  \
+    foilpress layers art.png --reserved --inks white,gold,black\n  \
+    foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
+    foilpress layers decal.pdf --page 1 --white alpha\n  \
+    foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n\n\
+    In layers dark is ink; on a transparent ground, what is drawn is ink. Art drawn at 600 dpi is printed as drawn."
+)]
+pub struct Args {
+    #[command(flatten)]
+    layers: LayersArgs,
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the art keeps its shape [default: what the files say]
+    #[arg(long)]
+    size: Option<Size>,
+    #[command(flatten)]
+    piece: PieceArgs,
+    #[command(flatten)]
+    preset: PresetArg,
+}
+
+/// Runs `layers`.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    let library = args.layers.library()?;
+    let (options, settings) = (args.layers.options(args.size)?, args.layers.settings()?);
+    let art = layers::open(&args.layers.art, &options, observer)?;
+    let composed = layers::compose(&art, &settings, &library, observer)?;
+    let job = Job {
+        name: &art.name,
+        piece: &composed.piece,
+        allowed: settings.inks,
+        library: &library,
+        report: Some(("art", json!({ "composed": composed.report, "suggestions": composed.suggestions }))),
+        advice: words(&composed),
+    };
+    piece::print(&job, &args.piece, observer)
+}
+
+/// What was laid and what the art needs, in words.
+fn words(composed: &Composed) -> String {
+    let mut text = String::from("\nFrom the art, lowest first:\n");
+    for laid in &composed.report.laid {
+        let times = if laid.passes > 1 { format!(", {} times", laid.passes) } else { String::new() };
+        text.push_str(&format!(
+            "    {:<18} {:>13} dots  {}{times}\n",
+            laid.ink,
+            grouped(laid.dots),
+            laid.from
+        ));
+    }
+    if !composed.suggestions.is_empty() {
+        text.push_str("\nSuggestions, followed only when you say so:\n");
+    }
+    for Suggestion { text: why, how, dots } in &composed.suggestions {
+        text.push_str(&format!("    {how:<26} {why} ({} dots)\n", grouped(*dots)));
+    }
+    text
+}

@@ -1,0 +1,43 @@
+//! Operations on one-bit planes: made from bytes, joined, taken from each other.
+
+use rayon::prelude::*;
+
+use crate::separate::Plane;
+
+/// A plane without ink.
+pub(super) fn blank(width: usize, length: usize) -> Plane {
+    let stride = width.div_ceil(8);
+    Plane { width, length, stride, bits: vec![0; stride * length] }
+}
+
+/// A plane with ink everywhere.
+pub(super) fn full(width: usize, length: usize) -> Plane {
+    from_bytes(width, &vec![1; width * length], |_| true)
+}
+
+/// The plane of the bytes, one a dot, that `ink` is true for. `width` at least 1.
+pub(super) fn from_bytes(width: usize, bytes: &[u8], ink: impl Fn(u8) -> bool + Sync) -> Plane {
+    let mut plane = blank(width, bytes.len() / width);
+    plane.bits.par_chunks_mut(plane.stride).zip(bytes.par_chunks_exact(width)).for_each(|(bits, bytes)| {
+        for (bits, bytes) in bits.iter_mut().zip(bytes.chunks(8)) {
+            *bits = bytes.iter().zip(0..).fold(0, |bits, (&byte, at)| bits | u8::from(ink(byte)) << (7 - at));
+        }
+    });
+    plane
+}
+
+/// Combines `with` into `plane` byte by byte. Both are of one size.
+pub(super) fn merge(plane: &mut Plane, with: &Plane, join: impl Fn(u8, u8) -> u8 + Sync) {
+    let rows = plane.bits.par_chunks_mut(1 << 12).zip(with.bits.par_chunks(1 << 12));
+    rows.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, &from)| *to = join(*to, from)));
+}
+
+/// Adds the ink of another plane.
+pub(super) fn add(plane: &mut Plane, with: &Plane) {
+    merge(plane, with, |a, b| a | b);
+}
+
+/// Whether the dot has ink.
+pub(super) fn at(plane: &Plane, x: usize, y: usize) -> bool {
+    plane.bits[y * plane.stride + x / 8] & 0x80 >> (x % 8) != 0
+}

@@ -1,0 +1,181 @@
+//! Which ink a file, a layer or a channel names.
+//!
+//! Owners write `white.png`, `01-white.png`, `Gold Foil`, `decal_metallic gold 2`. A leading number is the layer's
+//! place from the paper up; a trailing one tells two layers of one ink apart. What is left is compared word by word,
+//! first whole, then its end, then its beginning, the longest name first, so that `gold foil` is never `gold`.
+
+use protocol::ink::Ink;
+
+/// Names beside [`Ink::name`] and [`Ink::short`], their words joined by `-`.
+const ALSO: [(&str, Ink); 32] = [
+    ("k", Ink::Black),
+    ("key", Ink::Black),
+    ("gold", Ink::MetallicGold),
+    ("silver", Ink::MetallicSilver),
+    ("metallic-red", Ink::MetallicMagenta),
+    ("metallic-blue", Ink::MetallicCyan),
+    ("metal-gold", Ink::MetallicGold),
+    ("metal-silver", Ink::MetallicSilver),
+    ("gold-metallic", Ink::MetallicGold),
+    ("silver-metallic", Ink::MetallicSilver),
+    ("foil-gold", Ink::GoldFoil),
+    ("foil-silver", Ink::SilverFoil),
+    ("flash-gold", Ink::GoldFoil),
+    ("flash-silver", Ink::SilverFoil),
+    ("spot-white", Ink::White),
+    ("under-white", Ink::White),
+    ("undercoat-white", Ink::White),
+    ("process-black", Ink::Black),
+    ("process-cyan", Ink::Cyan),
+    ("process-magenta", Ink::Magenta),
+    ("process-yellow", Ink::Yellow),
+    ("gloss", Ink::Finish),
+    ("glossy", Ink::Finish),
+    ("glossy-finish", Ink::Finish),
+    ("gloss-finish", Ink::Finish),
+    ("finish-ii", Ink::Finish),
+    ("clear-coat", Ink::Finish),
+    ("varnish", Ink::Finish),
+    ("vphoto-primer", Ink::Primer),
+    ("photo-primer", Ink::Primer),
+    ("mf", Ink::Primer),
+    ("mf-ink", Ink::Primer),
+];
+
+/// What a name says.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Named {
+    /// Place from the paper up, when the name begins with a number.
+    pub place: Option<u32>,
+    /// The ink.
+    pub ink: Ink,
+}
+
+fn exact(words: &[String]) -> Option<Ink> {
+    let name = words.join("-");
+    let also = || ALSO.iter().find(|(known, _)| *known == name).map(|&(_, ink)| ink);
+    Ink::from_name(&name).or_else(also)
+}
+
+/// The words of a name in lower case, and the number it begins with.
+fn words(name: &str) -> (Option<u32>, Vec<String>) {
+    let mut words: Vec<String> = name
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_lowercase)
+        .collect();
+    let mut place = None;
+    // `01white` is two words as `01-white` is.
+    if let Some(first) = words.first().cloned() {
+        let digits = first.len() - first.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        if digits > 0 && (digits < first.len() || words.len() > 1) {
+            place = first[..digits].parse().ok();
+            words[0] = first[digits..].to_owned();
+            words.retain(|word| !word.is_empty());
+        }
+    }
+    if words.len() > 1 && words.last().is_some_and(|last| last.chars().all(|c| c.is_ascii_digit())) {
+        words.pop();
+    }
+    (place, words)
+}
+
+/// The ink a name names, if it names one. `name` is a file's stem, a layer's or a channel's name.
+pub fn ink(name: &str) -> Option<Named> {
+    let (place, words) = words(name);
+    let n = words.len();
+    let ends = (0..n).map(|at| &words[at..]);
+    let begins = (1..n).rev().map(|at| &words[..at]);
+    // Short names of one or two letters count alone only: `logo-m` may be a size.
+    ends.chain(begins)
+        .filter(|part| part.len() == n || part.join("-").len() > 2)
+        .find_map(exact)
+        .map(|ink| Named { place, ink })
+}
+
+/// The known name most like this one, if any is like it at all.
+pub fn closest(name: &str) -> Option<&'static str> {
+    let (_, words) = words(name);
+    let name = words.join("-");
+    let known = Ink::ALL.into_iter().map(Ink::name).chain(ALSO.iter().map(|(name, _)| *name));
+    known
+        .filter(|known| known.len() > 2)
+        .map(|known| (strsim::normalized_damerau_levenshtein(&name, known), known))
+        .filter(|(likeness, _)| *likeness >= 0.6)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, known)| known)
+}
+
+/// An ink as it is typed on the command line: any of its names.
+pub fn typed(word: &str) -> Result<Ink, String> {
+    let (place, words) = words(word);
+    match (place, exact(&words)) {
+        (None, Some(ink)) => Ok(ink),
+        _ => {
+            let hint = closest(word).map_or(String::new(), |s| format!(", did you mean `{s}`?"));
+            Err(format!("`{word}` is no ink{hint}; inks are {}", Ink::ALL.map(Ink::name).join(", ")))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn owners_names_lead_to_their_ink() {
+        for (name, place, wanted) in [
+            ("white", None, Ink::White),
+            ("01-white", Some(1), Ink::White),
+            ("2_Gold Foil", Some(2), Ink::GoldFoil),
+            ("gold", None, Ink::MetallicGold),
+            ("10silver-foil", Some(10), Ink::SilverFoil),
+            ("decal_metallic gold 2", None, Ink::MetallicGold),
+            ("k", None, Ink::Black),
+            ("MS", None, Ink::MetallicSilver),
+            ("white-logo", None, Ink::White),
+            ("Spot White", None, Ink::White),
+            ("white-2", None, Ink::White),
+            ("badge (Black)", None, Ink::Black),
+        ] {
+            assert_eq!(ink(name), Some(Named { place, ink: wanted }), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_names_no_ink_is_none_and_slips_are_understood() {
+        for name in ["logo", "logo-m", "photo", "2024", "", "golden", "whitee"] {
+            assert_eq!(ink(name), None, "{name}");
+        }
+        assert_eq!(closest("whitee"), Some("white"));
+        assert_eq!(closest("01-golld"), Some("gold"));
+        assert_eq!(closest("holiday"), None);
+        assert!(typed("sliver").unwrap_err().contains("did you mean `silver`?"));
+        assert_eq!(typed("silver foil"), Ok(Ink::SilverFoil));
+    }
+
+    #[test]
+    fn every_name_is_that_of_one_ink() {
+        for known in Ink::ALL {
+            assert_eq!(ink(known.name()).map(|named| named.ink), Some(known));
+            assert_eq!(ink(known.short()).map(|named| named.ink), Some(known));
+        }
+        for (i, (name, _)) in ALSO.iter().enumerate() {
+            assert!(ALSO[..i].iter().all(|(other, _)| other != name), "{name} is listed twice");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_name_panics(name in "\\PC{0,40}") {
+            let _ = (ink(&name), closest(&name), typed(&name));
+        }
+
+        #[test]
+        fn a_number_before_the_name_is_its_place(place in 0u32..1000, which in 0usize..13) {
+            let wanted = Some(Named { place: Some(place), ink: Ink::ALL[which] });
+            prop_assert_eq!(ink(&format!("{place:02}-{}", Ink::ALL[which].name())), wanted);
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! The vendor's reserved colours: a picture whose pixels name inks.
+//!
+//! Problem: owners draw white as 230,230,230 and gold as 225,160,0; drawing programs soften every edge, and a softened
+//! edge is no reserved colour, so it would be printed as a fringe of process dots around the gold. Worse, the softened
+//! edge of black on white passes through the very grey that calls for silver.
+//! Method: pixels within the tolerance of an ink's colour, in each of red, green and blue, are that ink. All others, and
+//! those that are in no square of four such pixels, go to the nearer of two colours (an ink and white, or two inks) if
+//! they lie on the straight line between them and both are seen next to them: they are the edge of those two. What is
+//! left is colour for the process inks.
+//! Cost: 20 ns a pixel. Limits: edges softened over more than two pixels remain partly colour.
+//! Source of the colours: the vendor's user's guide, in its English and its Japanese edition.
+
+use inks::InkSet;
+use protocol::ink::Ink;
+use rayon::prelude::*;
+
+use super::{Layer, Options, Shape, bits, raster};
+
+/// A reserved colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reserved {
+    /// The ink it stands for.
+    pub ink: Ink,
+    /// sRGB as drawn.
+    pub colour: [u8; 3],
+    /// How far each channel may be off. White and silver are 33 to 41 apart.
+    pub tolerance: u8,
+}
+
+const fn reserved(ink: Ink, colour: [u8; 3], tolerance: u8) -> Reserved {
+    Reserved { ink, colour, tolerance }
+}
+
+/// The vendor's table. Black is among it so that black lines stay solid.
+pub const TABLE: [Reserved; 6] = [
+    reserved(Ink::White, [230, 230, 230], 8),
+    reserved(Ink::MetallicGold, [225, 160, 0], 12),
+    reserved(Ink::MetallicSilver, [189, 193, 197], 12),
+    reserved(Ink::MetallicMagenta, [163, 36, 115], 12),
+    reserved(Ink::MetallicCyan, [0, 176, 201], 12),
+    reserved(Ink::Black, [0, 0, 0], 8),
+];
+
+/// A pixel's place in the list of colours in use, white first; or one of these.
+const OTHER: u8 = u8::MAX;
+const PAPER: u8 = 0;
+/// Marks the class of a pixel that may be the edge of two others.
+const LOOSE: u8 = 0x80;
+
+/// What was found.
+pub(super) struct Found {
+    pub layers: Vec<Layer>,
+    /// Pixels of each layer, and how many of them by being edges.
+    counts: Vec<(u64, u64)>,
+    /// Edge pixels that became bare paper.
+    bared: u64,
+    /// Inks of the table that were not looked for.
+    left_out: Vec<Ink>,
+}
+
+impl Found {
+    /// What to tell.
+    pub fn notes(&self, file: &str) -> Vec<String> {
+        let mut notes = Vec::new();
+        let edges: u64 = self.counts.iter().map(|(_, edges)| edges).sum();
+        if edges + self.bared > 0 {
+            notes.push(format!(
+                "{file}: {} pixels lie between two colours, such as anti-aliased edges; {edges} became the ink next to \
+                 them, {} bare paper",
+                edges + self.bared, self.bared
+            ));
+        }
+        for (layer, (pixels, _)) in self.layers.iter().zip(&self.counts) {
+            if *pixels < 64 {
+                notes.push(format!(
+                    "{file}: only {pixels} pixels have the colour of {}; if that is chance, leave it out with --inks",
+                    layer.ink.name()
+                ));
+            }
+        }
+        if !self.left_out.is_empty() {
+            let names: Vec<_> = self.left_out.iter().map(|ink| ink.name()).collect();
+            notes
+                .push(format!("{file}: the reserved colours of {} are printed as colours", names.join(", ")));
+        }
+        if self.layers.is_empty() {
+            notes.push(format!("{file}: there is no reserved colour in it"));
+        }
+        notes
+    }
+}
+
+/// Takes the reserved colours out of a picture, leaving white, as layers at the dots.
+pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), options: &Options) -> Found {
+    let table = in_use(&options.inks, options.tolerance);
+    let (width, height) = (size.0 as usize, size.1 as usize);
+    let mut colours = vec![[255; 3]];
+    colours.extend(table.iter().map(|entry| entry.colour));
+    let mut class = vec![OTHER; width * height];
+    class.par_iter_mut().zip(rgb.par_chunks_exact(3)).for_each(|(class, pixel)| {
+        let off = |colour: [u8; 3]| (0..3).map(|c| colour[c].abs_diff(pixel[c])).max().unwrap_or(0);
+        if *pixel == [255; 3] {
+            *class = PAPER;
+        } else if let Some((at, _)) = (1..)
+            .zip(&table)
+            .filter(|(_, entry)| off(entry.colour) <= entry.tolerance)
+            .min_by_key(|(_, entry)| off(entry.colour))
+        {
+            *class = at;
+        }
+    });
+    let loose: Vec<usize> = (0..class.len())
+        .into_par_iter()
+        .filter(|&at| class[at] != PAPER && class[at] != OTHER)
+        .filter(|&at| !in_a_square(&class, width, height, at % width, at / width))
+        .collect();
+    loose.into_iter().for_each(|at| class[at] |= LOOSE);
+    let edges: Vec<(usize, u8)> = (0..height)
+        .into_par_iter()
+        .flat_map_iter(|y| {
+            let (class, rgb, colours) = (&class, &*rgb, &colours);
+            (0..width).filter(move |x| class[y * width + x] >= LOOSE).filter_map(move |x| {
+                let at = y * width + x;
+                let pixel = [rgb[3 * at], rgb[3 * at + 1], rgb[3 * at + 2]];
+                edge(pixel, around(class, width, height, x, y), colours).map(|class| (at, class))
+            })
+        })
+        .collect();
+    let mut counts = vec![(0u64, 0u64); colours.len()];
+    for &(at, to) in &edges {
+        class[at] = to;
+        counts[usize::from(to)].1 += 1;
+    }
+    class.par_iter_mut().filter(|class| **class != OTHER).for_each(|class| *class &= !LOOSE);
+    rgb.par_chunks_exact_mut(3).zip(&class).for_each(|(pixel, &class)| {
+        if class != OTHER {
+            pixel.fill(255);
+        }
+    });
+    for &class in class.iter().filter(|&&class| class != OTHER) {
+        counts[usize::from(class)].0 += 1;
+    }
+    let class = raster::nearest(class, size, dots);
+    let layers = |(at, entry): (u8, &Reserved)| {
+        let plane = bits::from_bytes(dots.0, &class, |class| class == at);
+        let colour = entry.colour.map(|v| v.to_string()).join(",");
+        (counts[usize::from(at)].0 > 0).then(|| Layer {
+            ink: entry.ink,
+            name: format!("the reserved colour {colour}"),
+            place: None,
+            shape: Shape::Solid(plane),
+        })
+    };
+    let layers = (1..).zip(&table).filter_map(layers).collect();
+    let left_out = TABLE.iter().map(|entry| entry.ink).filter(|&ink| !options.inks.contains(ink)).collect();
+    let bared = counts[0].1;
+    let counts = counts.into_iter().skip(1).filter(|(pixels, _)| *pixels > 0).collect();
+    Found { layers, counts, bared, left_out }
+}
+
+fn in_use(inks: &InkSet, tolerance: Option<u8>) -> Vec<Reserved> {
+    let with = |entry: &Reserved| Reserved { tolerance: tolerance.unwrap_or(entry.tolerance), ..*entry };
+    TABLE.iter().filter(|entry| inks.contains(entry.ink)).map(with).collect()
+}
+
+/// Whether a pixel is one of four of its class in a square.
+fn in_a_square(class: &[u8], width: usize, height: usize, x: usize, y: usize) -> bool {
+    let own = class[y * width + x];
+    let same = |x: usize, y: usize| x < width && y < height && class[y * width + x] == own;
+    let beside = [x.wrapping_sub(1), x + 1];
+    let beyond = [y.wrapping_sub(1), y + 1];
+    beside.into_iter().any(|u| same(u, y) && beyond.into_iter().any(|v| same(x, v) && same(u, v)))
+}
+
+/// The colours seen within two pixels, as bits.
+fn around(class: &[u8], width: usize, height: usize, x: usize, y: usize) -> u32 {
+    let mut seen = 0;
+    for v in y.saturating_sub(2)..(y + 3).min(height) {
+        for &class in &class[v * width..][x.saturating_sub(2)..(x + 3).min(width)] {
+            if class < LOOSE {
+                seen |= 1 << class;
+            }
+        }
+    }
+    seen
+}
+
+/// The nearer of the two colours whose mixture the pixel is, if it is one of two that are seen around it.
+fn edge(pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
+    /// Squared distance from the line, in 8-bit steps, that rounding and gamma-blended edges need.
+    const OFF: i64 = 12 * 12;
+    let vector =
+        |a: [u8; 3], b: [u8; 3]| -> [i64; 3] { std::array::from_fn(|c| i64::from(b[c]) - i64::from(a[c])) };
+    let dot = |a: [i64; 3], b: [i64; 3]| (0..3).map(|c| a[c] * b[c]).sum::<i64>();
+    let mut best: Option<(i64, u8)> = None;
+    for a in (0..colours.len()).filter(|a| seen & 1 << a != 0) {
+        for b in (a + 1..colours.len()).filter(|b| seen & 1 << b != 0) {
+            let (along, to) = (vector(colours[a], colours[b]), vector(colours[a], pixel));
+            let (length, at) = (dot(along, along), dot(along, to));
+            if at < 0 || at > length {
+                continue;
+            }
+            // |to|^2 - at^2 / length, the squared distance from the line.
+            let off = dot(to, to) - at * at / length;
+            let nearer = if 2 * at < length { a } else { b } as u8;
+            if off <= OFF && best.is_none_or(|(least, _)| off < least) {
+                best = Some((off, nearer));
+            }
+        }
+    }
+    best.map(|(_, class)| class)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layers::Options;
+
+    /// Discs of an ink's colour on another, softened over a pixel as drawing programs do.
+    fn soft_disc(side: usize, colour: [u8; 3], ground: [u8; 3]) -> Vec<u8> {
+        let middle = side as f64 / 2.0;
+        (0..side * side)
+            .flat_map(|at| {
+                let (x, y) = ((at % side) as f64 + 0.5 - middle, (at / side) as f64 + 0.5 - middle);
+                let inside = (side as f64 / 3.0 - x.hypot(y) + 0.5).clamp(0.0, 1.0);
+                std::array::from_fn::<u8, 3, _>(|c| {
+                    (inside * f64::from(colour[c]) + (1.0 - inside) * f64::from(ground[c])).round() as u8
+                })
+            })
+            .collect()
+    }
+
+    fn plane(layer: &Layer) -> u64 {
+        match &layer.shape {
+            Shape::Solid(plane) => plane.dots(),
+            Shape::Tone(_) => panic!("reserved colours have no tones"),
+        }
+    }
+
+    #[test]
+    fn softened_edges_leave_no_fringe_of_colour() {
+        let side = 300;
+        let area = std::f64::consts::PI * 100.0 * 100.0;
+        for (at, entry) in TABLE.iter().enumerate() {
+            for ground in [[255; 3], TABLE[(at + 1) % TABLE.len()].colour] {
+                let mut rgb = soft_disc(side, entry.colour, ground);
+                let found = take(&mut rgb, (300, 300), (side, side), &Options::default());
+                assert!(rgb.iter().all(|&v| v == 255), "{:?} on {ground:?} leaves colour", entry.ink);
+                assert!(
+                    found.layers.iter().all(|layer| layer.ink == entry.ink || ground != [255; 3]),
+                    "an edge of {:?} on paper calls for another ink",
+                    entry.ink
+                );
+                assert!(found.layers.len() <= 2, "{:?} on {ground:?} calls for a third ink", entry.ink);
+                let layer = found.layers.iter().find(|layer| layer.ink == entry.ink).unwrap();
+                let off = (plane(layer) as f64 - area).abs() / area;
+                assert!(off < 0.005, "{:?}: {} dots, the disc has {area:.0}", entry.ink, plane(layer));
+            }
+        }
+    }
+
+    #[test]
+    fn a_stray_grey_calls_for_silver_only_if_silver_is_at_hand() {
+        let grey = [189, 193, 197].repeat(100);
+        let with = |inks: &str| Options { inks: inks.parse().unwrap(), ..Options::default() };
+        let mut rgb = grey.clone();
+        let found = take(&mut rgb, (10, 10), (10, 10), &with("white,metallic-gold,process"));
+        assert!(found.layers.is_empty() && rgb == grey);
+        assert!(found.notes("art").iter().any(|note| note.contains("metallic-silver")));
+        let found = take(&mut rgb, (10, 10), (10, 10), &with("metallic-silver"));
+        assert_eq!(found.layers.iter().map(|layer| layer.ink).collect::<Vec<_>>(), [Ink::MetallicSilver]);
+        assert!(rgb.iter().all(|&v| v == 255));
+    }
+
+    #[test]
+    fn colours_within_the_tolerance_are_the_ink_and_others_are_not() {
+        let (gold, off) = ([225, 160, 0], [225, 173, 0]);
+        for (tolerance, wanted) in [(None, 1), (Some(13), 2), (Some(0), 1)] {
+            let mut rgb = [gold, off].concat();
+            let options = Options { tolerance, ..Options::default() };
+            let found = take(&mut rgb, (2, 1), (2, 1), &options);
+            assert_eq!(plane(&found.layers[0]), wanted, "tolerance {tolerance:?}");
+        }
+    }
+
+    #[test]
+    fn tolerances_of_the_table_do_not_overlap() {
+        for (i, a) in TABLE.iter().enumerate() {
+            for b in &TABLE[..i] {
+                let apart = (0..3).any(|c| {
+                    u16::from(a.colour[c].abs_diff(b.colour[c]))
+                        > u16::from(a.tolerance) + u16::from(b.tolerance)
+                });
+                assert!(apart, "{:?} and {:?}", a.ink, b.ink);
+            }
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! TIFF files whose channels name inks: CMYK plates, spot channels, or both.
+//!
+//! Problem: drawing programs hand over spot inks as extra channels, named in one of two places, and stored either way
+//! round.
+//! Method: names come from the InkNames tag (every channel an ink, the largest value full ink) or from the resource block
+//! Photoshop leaves (extra channels only, 0 is full ink, as it shows them). CMYK channels are the process inks' plates. The
+//! decoder drops extra channels unless the file calls itself grey, so the photometric tag is changed in memory before
+//! it is asked.
+//! Cost: the file in memory, and a byte a pixel for each channel. Limits: 8 and 16 bits a channel, the first image of the file.
+//! Source: TIFF 6.0 sections 16 and 18; Adobe's file format specification for the resource block.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use ::tiff::decoder::{Decoder, DecodingResult, Limits};
+use ::tiff::tags::Tag;
+use protocol::ink::Ink;
+
+use super::colour::{self, Pixels};
+use super::raster::{self, Coverage, Density, Scan, wrong};
+use super::{Artwork, LayersError, Options, names};
+
+const INK_SET: Tag = Tag::Unknown(332);
+const PHOTOSHOP: Tag = Tag::Unknown(34377);
+const PHOTOMETRIC: u16 = 262;
+const INK_NAMES: u16 = 333;
+
+/// Values of the photometric tag.
+const BLACK_IS_ZERO: u16 = 1;
+const RGB: u16 = 2;
+const SEPARATED: u16 = 5;
+
+/// The most channels that are looked at.
+const MOST_CHANNELS: usize = 24;
+
+type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
+
+fn open(bytes: &[u8]) -> Option<Reader<'_>> {
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = 1 << 30;
+    limits.intermediate_buffer_size = 1 << 30;
+    Some(Decoder::new(Cursor::new(bytes)).ok()?.with_limits(limits))
+}
+
+/// The resolution in the file.
+pub(super) fn density(bytes: &[u8]) -> Option<Density> {
+    density_of(&mut open(bytes)?)
+}
+
+fn density_of(decoder: &mut Reader<'_>) -> Option<Density> {
+    let inch = match decoder.find_tag_unsigned::<u16>(Tag::ResolutionUnit).ok()? {
+        None | Some(2) => 1.0,
+        Some(3) => 2.54,
+        Some(_) => return None,
+    };
+    let mut along = |tag| {
+        let ratio = decoder.get_tag(tag).ok()?.into_u64_vec().ok()?;
+        let &[numerator, denominator] = ratio.as_slice() else { return None };
+        Some(numerator as f64 / denominator as f64 * inch)
+    };
+    Some((along(Tag::XResolution)?, along(Tag::YResolution)?))
+}
+
+/// What a channel is.
+struct Channel {
+    name: String,
+    ink: Option<names::Named>,
+    /// Whether 0 is full ink.
+    inverted: bool,
+}
+
+/// The art of a TIFF with more in it than a picture; nothing if it is a plain picture.
+pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
+    let read = raster::io(path, "read it");
+    if std::fs::metadata(path).map_err(&read)?.len() > raster::MOST_BYTES {
+        return Err(wrong(path, "the file is larger than a gigabyte"));
+    }
+    let mut bytes = std::fs::read(path).map_err(&read)?;
+    let Some(mut decoder) = open(&bytes) else { return Ok(None) };
+    let number = |decoder: &mut Reader<'_>, tag| decoder.find_tag_unsigned::<u16>(tag).ok().flatten();
+    let photometric = number(&mut decoder, Tag::PhotometricInterpretation).unwrap_or(BLACK_IS_ZERO);
+    let samples = usize::from(number(&mut decoder, Tag::SamplesPerPixel).unwrap_or(1));
+    let ink_set = number(&mut decoder, INK_SET).unwrap_or(1);
+    let base = match (photometric, ink_set) {
+        (SEPARATED, 2) => 0,
+        (SEPARATED, _) => 4,
+        (RGB, _) => 3,
+        (BLACK_IS_ZERO, _) => 1,
+        _ => return Ok(None),
+    };
+    if samples > MOST_CHANNELS {
+        return Err(wrong(path, format!("{samples} channels; at most {MOST_CHANNELS} can be inks")));
+    }
+    if samples < base || samples == base && photometric != SEPARATED {
+        return Ok(None);
+    }
+    let (named_inks, named_extra) = (ink_names(&bytes), photoshop_names(&mut decoder));
+    // One extra channel without a name is transparency.
+    if photometric != SEPARATED && named_extra.is_empty() {
+        return Ok(None);
+    }
+    let mut notes = Vec::new();
+    let channels = channels(path, base, samples, &named_inks, &named_extra, photometric, &mut notes)?;
+    if photometric != SEPARATED && channels.iter().all(|channel| channel.ink.is_none()) {
+        return Ok(None);
+    }
+    let (width, height) = decoder.dimensions().map_err(|error| wrong(path, format!("damaged: {error}")))?;
+    raster::check_size(path, width, height)?;
+    let density = density_of(&mut decoder);
+    drop(decoder);
+    set_photometric(&mut bytes);
+    let planes = planes(path, &bytes, samples, width as usize * height as usize)?;
+
+    let dots = raster::dots(path, (f64::from(width), f64::from(height)), density, options.size, options.dpi)?;
+    let mut art = if photometric == SEPARATED {
+        Artwork::blank(&super::stem(path), dots)
+    } else {
+        let colour = |c: usize| &planes[if base == 3 { c } else { 0 }];
+        let rgba =
+            (0..planes[0].len()).flat_map(|at| [colour(0)[at], colour(1)[at], colour(2)[at], 255]).collect();
+        let path = path.to_path_buf();
+        let pixels = Pixels { path, width, height, density, rgba, notes: Vec::new() };
+        colour::artwork(&super::stem(&pixels.path.clone()), pixels, options)?
+    };
+    for (channel, plane) in channels.into_iter().zip(planes) {
+        let Some(named) = channel.ink else { continue };
+        let coverage = if channel.inverted { plane.iter().map(|v| 255 - v).collect() } else { plane };
+        let (path, by) = (path.to_path_buf(), Coverage::Dark);
+        let scan = Scan { path, width, height, density, coverage, by };
+        art.add(scan, &channel.name, named, true, options);
+    }
+    art.notes.append(&mut notes);
+    Ok(Some(art))
+}
+
+fn channels(
+    path: &Path,
+    base: usize,
+    samples: usize,
+    named_inks: &[String],
+    named_extra: &[String],
+    photometric: u16,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Channel>, LayersError> {
+    const PROCESS: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];
+    let mut channels = Vec::new();
+    for at in 0..samples {
+        if at < base {
+            let ink = PROCESS.get(at).filter(|_| photometric == SEPARATED);
+            let ink = ink.map(|&ink| names::Named { place: None, ink });
+            let name = ink.map_or_else(String::new, |named| format!("the {} plate", named.ink.name()));
+            channels.push(Channel { name, ink, inverted: false });
+            continue;
+        }
+        let (name, inverted) = match (named_inks.get(at), named_extra.get(at - base)) {
+            (Some(name), _) if base == 0 || named_inks.len() == samples => (name, false),
+            (_, Some(name)) => (name, true),
+            _ => {
+                return Err(wrong(
+                    path,
+                    format!(
+                        "channel {} of {samples} has no name; name every spot channel after its ink, such as white or gold",
+                        at + 1
+                    ),
+                ));
+            }
+        };
+        let ink = super::named_part(path, name, "channel", notes)?;
+        if ink.is_some() && inverted {
+            notes
+                .push(format!("{}: in channel `{name}` black is ink, as Photoshop shows it", path.display()));
+        }
+        channels.push(Channel { name: name.clone(), ink, inverted });
+    }
+    Ok(channels)
+}
+
+/// Names of all inks: text ended by NUL, one after the other. The decoder stops at the first.
+fn ink_names(bytes: &[u8]) -> Vec<String> {
+    let text = field(bytes, INK_NAMES).and_then(|field| bytes.get(field)).unwrap_or_default();
+    let names = text.split(|&byte| byte == 0).map(|name| String::from_utf8_lossy(name).trim().to_owned());
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+/// Names of the channels beyond the picture's own, from Photoshop's resource block.
+fn photoshop_names(decoder: &mut Reader<'_>) -> Vec<String> {
+    let block = decoder.find_tag(PHOTOSHOP).ok().flatten().and_then(|value| value.into_u8_vec().ok());
+    let block = block.unwrap_or_default();
+    let (mut plain, mut unicode) = (Vec::new(), Vec::new());
+    let mut rest = block.as_slice();
+    while let Some((id, data, after)) = resource(rest) {
+        match id {
+            1006 => plain = pascal_strings(data),
+            1045 => unicode = unicode_strings(data),
+            _ => {}
+        }
+        rest = after;
+    }
+    if unicode.is_empty() { plain } else { unicode }
+}
+
+/// One resource: its number, its data, and what follows. A name and the data are padded to even lengths.
+fn resource(block: &[u8]) -> Option<(u16, &[u8], &[u8])> {
+    let rest = block.strip_prefix(b"8BIM")?;
+    let (id, rest) = rest.split_first_chunk::<2>()?;
+    let name = (1 + usize::from(*rest.first()?)).next_multiple_of(2);
+    let (size, rest) = rest.get(name..)?.split_first_chunk::<4>()?;
+    let size = u32::from_be_bytes(*size) as usize;
+    let data = rest.get(..size)?;
+    Some((u16::from_be_bytes(*id), data, rest.get(size.next_multiple_of(2)..).unwrap_or_default()))
+}
+
+fn pascal_strings(mut data: &[u8]) -> Vec<String> {
+    let mut strings = Vec::new();
+    while let Some((&length, rest)) = data.split_first()
+        && let Some(text) = rest.get(..usize::from(length))
+    {
+        strings.push(String::from_utf8_lossy(text).into_owned());
+        data = &rest[text.len()..];
+    }
+    strings
+}
+
+fn unicode_strings(mut data: &[u8]) -> Vec<String> {
+    let mut strings = Vec::new();
+    while let Some((length, rest)) = data.split_first_chunk::<4>()
+        && let Some(text) = (u32::from_be_bytes(*length) as usize).checked_mul(2).and_then(|n| rest.get(..n))
+    {
+        let units: Vec<u16> = text.as_chunks::<2>().0.iter().map(|&two| u16::from_be_bytes(two)).collect();
+        strings.push(String::from_utf16_lossy(&units).trim_end_matches('\0').to_owned());
+        data = &rest[text.len()..];
+    }
+    strings
+}
+
+/// Calls the first image grey, so that the decoder hands out all of its channels.
+fn set_photometric(bytes: &mut [u8]) {
+    let grey =
+        if bytes.starts_with(b"II") { BLACK_IS_ZERO.to_le_bytes() } else { BLACK_IS_ZERO.to_be_bytes() };
+    // A file without the field is for the decoder to refuse.
+    if let Some(value) =
+        field(bytes, PHOTOMETRIC).filter(|f| f.len() == 2).and_then(|field| bytes.get_mut(field))
+    {
+        value.copy_from_slice(&grey);
+    }
+}
+
+/// Where the value of a tag of the first image lies, for values of bytes and short numbers.
+fn field(bytes: &[u8], tag: u16) -> Option<std::ops::Range<usize>> {
+    let little = bytes.starts_with(b"II");
+    let short = |at: usize| -> Option<u16> {
+        let two = *bytes.get(at..)?.first_chunk::<2>()?;
+        Some(if little { u16::from_le_bytes(two) } else { u16::from_be_bytes(two) })
+    };
+    let long = |at: usize| -> Option<usize> {
+        let four = *bytes.get(at..)?.first_chunk::<4>()?;
+        Some(if little { u32::from_le_bytes(four) } else { u32::from_be_bytes(four) } as usize)
+    };
+    let start = long(4)?;
+    let entry =
+        (0..usize::from(short(start)?)).map(|i| start + 2 + 12 * i).find(|&at| short(at) == Some(tag))?;
+    let length = long(entry + 4)?.checked_mul(if short(entry + 2)? == 3 { 2 } else { 1 })?;
+    let at = if length <= 4 { entry + 8 } else { long(entry + 8)? };
+    Some(at..at.checked_add(length)?)
+}
+
+/// A byte a pixel for each channel.
+fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Vec<Vec<u8>>, LayersError> {
+    let bad = |error: ::tiff::TiffError| {
+        wrong(
+            path,
+            format!("cannot decode its channels: {error}; save it uncompressed or with LZW, 8 or 16 bits"),
+        )
+    };
+    let Some(mut decoder) = open(bytes) else { return Err(wrong(path, "damaged")) };
+    let mut decoded = DecodingResult::U8(Vec::new());
+    decoder.read_image_to_buffer(&mut decoded).map_err(bad)?;
+    let values: Vec<u8> = match decoded {
+        DecodingResult::U8(values) => values,
+        DecodingResult::U16(values) => values.into_iter().map(|v| (v >> 8) as u8).collect(),
+        _ => return Err(wrong(path, "its channels are neither of 8 nor of 16 bits; save it with 8")),
+    };
+    if values.len() != samples * pixels {
+        return Err(wrong(
+            path,
+            "it holds fewer channels than it says; save it with interleaved channels of 8 bits",
+        ));
+    }
+    let planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).ok().flatten() == Some(2);
+    let plane = |c: usize| -> Vec<u8> {
+        if planar {
+            values[c * pixels..(c + 1) * pixels].to_vec()
+        } else {
+            values.iter().skip(c).step_by(samples).copied().collect()
+        }
+    };
+    Ok((0..samples).map(plane).collect())
+}
