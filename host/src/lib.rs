@@ -37,4 +37,6 @@ pub mod preview;
 
 pub mod pipeline;
 
+pub mod queue;
+
 pub mod cli;

@@ -255,7 +255,7 @@ fn text(reply: &Reply) -> Option<String> {
 }
 
 /// Whether a device ID names the maker of these printers.
-fn is_alps(id: &str) -> bool {
+pub fn is_alps(id: &str) -> bool {
     id.split(';').filter_map(|field| field.split_once(':')).any(|(key, value)| {
         (key.trim().ends_with("MANUFACTURER") || key.trim().ends_with("MFG")) && value.trim() == "ALPS"
     })

@@ -14,6 +14,7 @@ mod layers;
 mod output;
 mod print;
 mod progress;
+mod queue;
 mod resume;
 mod sample;
 mod send;
@@ -90,6 +91,14 @@ enum Command {
     Doctor(doctor::Args),
     /// The ink library: list, show, check
     Inks(inks::Args),
+    /// Print queues of the system: make, remove, list
+    Queue(queue::Args),
+    /// What the print system starts to bring a job to the printer
+    #[command(hide = true)]
+    CupsBackend(queue::Conventional),
+    /// What the print system starts to make jobs of pages
+    #[command(hide = true)]
+    CupsFilter(queue::Conventional),
     /// Documents made by the program itself: list them or write one as a texture folder
     Sample(sample::Args),
 }
@@ -97,6 +106,12 @@ enum Command {
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
     let args = Args::parse();
+    match &args.command {
+        // They speak the print system's language, signals and exit codes included.
+        Command::CupsBackend(args) => return queue::backend(args),
+        Command::CupsFilter(args) => return queue::filter(args),
+        _ => {}
+    }
     match output::remove_on_interrupt().and_then(|()| run(args)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
@@ -126,7 +141,10 @@ fn run(args: Args) -> Result<()> {
         Command::Bridge(args) => bridge::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
+        Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),
+        // Done before anything else; see `main`.
+        Command::CupsBackend(_) | Command::CupsFilter(_) => Ok(()),
     }
 }
 

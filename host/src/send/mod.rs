@@ -17,7 +17,7 @@ pub mod transport;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};
-pub use run::{Event, RunError, run};
+pub use run::{Event, RunError, Wish, run, run_while};
 
 use protocol::ink::Ink;
 
@@ -43,6 +43,8 @@ pub struct Checked {
     pub passes: Vec<PassPlace>,
     /// Its inks in the order of first use.
     pub inks: Vec<Ink>,
+    /// Whose dialect it is, if it is not ours: worth a word, for only ours is known to print.
+    pub dialect: Option<&'static str>,
 }
 
 /// Looks whether these bytes are one whole legal job, and nothing else.
@@ -67,5 +69,5 @@ pub fn check(job: &[u8], observer: &dyn Observer) -> Result<Checked, Unsendable>
             inks.push(ink);
         }
     }
-    Ok(Checked { passes, inks })
+    Ok(Checked { passes, inks, dialect: inspected.inspection.dialect })
 }
