@@ -74,7 +74,7 @@ pub fn description() -> String {
          *FormatVersion: \"4.3\"\n\
          *FileVersion: \"{version}\"\n\
          *LanguageVersion: English\n\
-         *LanguageEncoding: UTF-8\n\
+         *LanguageEncoding: ISOLatin1\n\
          *PCFileName: \"FOILPRES.PPD\"\n\
          *Manufacturer: \"ALPS\"\n\
          *Product: \"(MD-5500)\"\n\
