@@ -1,12 +1,14 @@
 //! The project's own chores, so that a person and the gate type the same words.
 //!
-//! `cargo xtask test` is the whole gate: formatting, lints, documents, every test and the bare-metal build
-//! of `protocol` and `bridge`. It runs every step, then says which failed. The firmware and its emulator are
+//! `cargo xtask test` is the whole gate: formatting, lints, documents, every test, the bare-metal build
+//! of `protocol` and `bridge`, the Debian package. It runs every step, then says which failed. The firmware and its emulator are
 //! chores of their own, because they need more than a Rust compiler.
 
 mod elf;
 mod emulator;
 mod firmware;
+mod package;
+mod queue;
 mod uf2;
 
 use std::path::Path;
@@ -26,7 +28,7 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Format check, clippy, documents, all tests, bare-metal build: what has to pass before anything lands
+    /// Format check, clippy, documents, all tests, bare-metal build, package: what has to pass before anything lands
     Test,
     /// The benchmarks (results are ratios to read, not tests that pass)
     Bench,
@@ -34,14 +36,21 @@ enum Task {
     Firmware,
     /// The bridge's image on an emulated board with a model printer at its pins (needs Node and npm)
     Emulator,
+    /// Print queues on a print server of their own, which is installed if need be (needs root)
+    Queue,
+    /// The Debian package, tried in a root of its own
+    Package,
 }
 
 fn main() -> ExitCode {
     // The workspace, wherever this was started from: it is the folder above this package.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
-    let steps: Vec<(&str, Command)> = match Args::parse().task {
+    let task = Args::parse().task;
+    let steps: Vec<(&str, Command)> = match task {
         Task::Firmware => return finish(firmware::build(root).map(drop)),
         Task::Emulator => return finish(emulator::run(root)),
+        Task::Queue => return finish(queue::run()),
+        Task::Package => return finish(package::run(root, package::Profile::Release)),
         Task::Test => vec![
             ("bare-metal target", command("rustup", &["target", "add", BARE_METAL])),
             ("formatting", cargo(&["fmt", "--all", "--check"])),
@@ -70,12 +79,24 @@ fn main() -> ExitCode {
     };
 
     let mut failed = Vec::new();
+    if matches!(task, Task::Test)
+        && let Err(error) = queue::install()
+    {
+        // The tests then say that they are skipped, or fail where they have to run.
+        eprintln!("print queues: {error:#}");
+    }
     for (name, mut step) in steps {
         eprintln!("== {name}: {step:?}");
         match step.status() {
             Ok(status) if status.success() => {}
             Ok(status) => failed.push(format!("{name} ({status})")),
             Err(error) => failed.push(format!("{name} (cannot start: {error})")),
+        }
+    }
+    if matches!(task, Task::Test) && failed.is_empty() {
+        eprintln!("== package");
+        if let Err(error) = package::run_where_possible(root) {
+            failed.push(format!("package ({error:#})"));
         }
     }
     if failed.is_empty() {

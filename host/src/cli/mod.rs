@@ -8,6 +8,7 @@ mod args;
 mod bridge;
 mod chain;
 mod doctor;
+mod generate;
 mod inks;
 mod inspect;
 mod layers;
@@ -99,6 +100,9 @@ enum Command {
     /// What the print system starts to make jobs of pages
     #[command(hide = true)]
     CupsFilter(queue::Conventional),
+    /// What a package needs beside the program
+    #[command(hide = true)]
+    Generate(generate::Args),
     /// Documents made by the program itself: list them or write one as a texture folder
     Sample(sample::Args),
 }
@@ -141,6 +145,7 @@ fn run(args: Args) -> Result<()> {
         Command::Bridge(args) => bridge::run(&args),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
+        Command::Generate(args) => generate::run(&args),
         Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),
         // Done before anything else; see `main`.

@@ -648,3 +648,148 @@ impl<'a, W: Write + Send> Reporter<'a, W> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspect::inspect;
+    use crate::job::stream::write_job;
+    use crate::separate::{Pass, Plane};
+    use protocol::paper::Paper;
+    use protocol::rgl::Page;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    fn job(ink: Ink, rows: usize) -> Vec<u8> {
+        let paper = Paper::Custom { width: 800, length: 400 };
+        let bits: Vec<u8> = (0..100 * rows).map(|i| (i * 37 % 255) as u8 | 1).collect();
+        let bits = [bits, vec![0; 100 * (400 - rows)]].concat();
+        let pass = Pass { ink, plane: Plane { width: 800, length: 400, stride: 100, bits } };
+        let mut bytes = Vec::new();
+        write_job(Page::plain(paper), None, &[pass], &mut bytes, &Silent).unwrap();
+        bytes
+    }
+
+    /// A queue that leads to a device which is a file, so that what it got can be looked at.
+    struct Rig {
+        folder: tempfile::TempDir,
+        call: Call,
+    }
+
+    impl Rig {
+        fn new() -> Rig {
+            let folder = tempfile::tempdir().unwrap();
+            let device = folder.path().join("lp0");
+            File::create(&device).unwrap();
+            let call = Call {
+                title: "leaf".into(),
+                identity: "one".into(),
+                copies: 1,
+                file: None,
+                to: Destination::Raw(device),
+                journal: folder.path().join("jobs"),
+                in_class: false,
+            };
+            Rig { folder, call }
+        }
+
+        fn run(&self, job: &[u8], stop: &(dyn Fn() -> bool + Sync)) -> (Exit, String) {
+            let mut said = Vec::new();
+            let exit = run(&self.call, &mut &*job, &Messages::new(&mut said), stop);
+            (exit, String::from_utf8(said).unwrap())
+        }
+
+        fn got(&self) -> Vec<u8> {
+            fs::read(self.folder.path().join("lp0")).unwrap()
+        }
+    }
+
+    #[test]
+    fn sheets_go_to_a_device_one_after_the_other_and_are_counted() {
+        let rig = Rig::new();
+        let both = [job(Ink::Cyan, 30), job(Ink::Black, 20)].concat();
+        let (exit, said) = rig.run(&both, &|| false);
+        assert_eq!(exit, Exit::Ok, "{said}");
+        // Each opens the device anew, and a file is then written from its start.
+        assert!(rig.got().starts_with(&job(Ink::Black, 20)));
+        assert!(said.contains("PAGE: 1 1\n") && said.contains("PAGE: 2 1\n"), "{said}");
+        assert_eq!(
+            fs::read_dir(&rig.call.journal).unwrap().count(),
+            0,
+            "nothing is kept of a job that is printed"
+        );
+    }
+
+    #[test]
+    fn a_job_that_was_interrupted_at_a_device_is_held_and_printed_again_only_when_released() {
+        let rig = Rig::new();
+        let bytes = job(Ink::Cyan, 30);
+        let folder = rig.call.journal.join("one/0001");
+        fs::create_dir_all(&folder).unwrap();
+        File::create(folder.join("begun")).unwrap();
+        let (exit, said) = rig.run(&bytes, &|| false);
+        assert_eq!(exit, Exit::Hold);
+        assert!(said.contains("ERROR: the job was interrupted") && rig.got().is_empty(), "{said}");
+        assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
+        assert!(rig.got() == bytes);
+    }
+
+    #[test]
+    fn a_job_cancelled_at_a_device_becomes_a_shorter_whole_job() {
+        let rig = Rig::new();
+        let bytes = job(Ink::Cyan, 400);
+        // Asked before each piece; cancelled after some.
+        let asked = AtomicUsize::new(0);
+        let (exit, said) = rig.run(&bytes, &|| asked.fetch_add(1, Ordering::SeqCst) > 8);
+        assert_eq!(exit, Exit::Ok, "{said}");
+        let got = rig.got();
+        assert!(!got.is_empty() && got.len() < bytes.len());
+        assert!(inspect(&got, &Silent).inspection.complete);
+        assert!(!said.contains("PAGE:"), "{said}");
+    }
+
+    #[test]
+    fn what_is_no_whole_job_is_cancelled_before_the_first_byte() {
+        let rig = Rig::new();
+        let good = job(Ink::Cyan, 30);
+        for wrong in [&[][..], b"Hello", &good[..good.len() - 5], &[&good[..], b"x"].concat()] {
+            let (exit, said) = rig.run(wrong, &|| false);
+            assert_eq!(exit, Exit::Cancel, "{said}");
+            assert!(rig.got().is_empty() && said.contains("ERROR: "), "{said}");
+        }
+    }
+
+    #[test]
+    fn a_device_that_is_not_there_is_waited_for_unless_another_printer_may_do_it() {
+        let mut rig = Rig::new();
+        rig.call.to = Destination::Raw(rig.folder.path().join("no/such/device"));
+        let asked = AtomicUsize::new(0);
+        let (exit, said) = rig.run(&job(Ink::Cyan, 3), &|| asked.fetch_add(1, Ordering::SeqCst) > 5);
+        assert_eq!(exit, Exit::Ok, "ended by the print system: {said}");
+        assert!(said.contains("STATE: +connecting-to-device,offline-report"), "{said}");
+        rig.call.in_class = true;
+        assert_eq!(rig.run(&job(Ink::Cyan, 3), &|| false).0, Exit::Failed);
+    }
+
+    #[test]
+    fn a_call_is_read_as_the_print_system_makes_it() {
+        let arguments = |list: &[&str]| list.iter().map(OsString::from).collect::<Vec<_>>();
+        let environment = |name: &str| -> Option<OsString> {
+            Some(match name {
+                "DEVICE_URI" => "foilpress:/serial/dev/ttyACM0".into(),
+                "PRINTER" => "Alps".into(),
+                "CUPS_CACHEDIR" => "/var/cache/cups".into(),
+                _ => return None,
+            })
+        };
+        let options = "media=A4 job-uuid=urn:uuid:0f0e-/../x copies=3";
+        let call = Call::read(&arguments(&["7", "me", "My title", "3", options, "/spool/d7"]), &environment)
+            .unwrap();
+        assert_eq!((call.identity.as_str(), call.copies, call.in_class), ("0f0e-x", 3, false));
+        assert_eq!(call.journal, Path::new("/var/cache/cups/foilpress/Alps"));
+        // On standard input the filters have made the copies.
+        let call = Call::read(&arguments(&["7", "me", "../t", "3", ""]), &environment).unwrap();
+        assert_eq!((call.identity.as_str(), call.copies), ("job-7-t", 1));
+        assert!(matches!(Call::read(&arguments(&["7"]), &environment), Err(CallError::Arguments(1))));
+        assert!(matches!(Call::read(&arguments(&["7", "", "", "", ""]), &|_| None), Err(CallError::NoUri)));
+    }
+}

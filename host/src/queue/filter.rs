@@ -388,3 +388,162 @@ fn printable(
     }
     Ok((rgba, beyond))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::inspect::{inspect, sheets};
+    use crate::observe::Silent;
+    use std::cell::RefCell;
+    use std::sync::Mutex;
+
+    /// Keeps what is told.
+    #[derive(Default)]
+    struct Notes(Mutex<Vec<String>>);
+
+    impl Observer for Notes {
+        fn begin(&self, _: &str, _: u64) {}
+        fn advance(&self, _: u64) {}
+        fn end(&self) {}
+        fn note(&self, text: &str) {
+            self.0.lock().unwrap().push(text.into());
+        }
+    }
+
+    /// A whole postcard, white but for black rectangles (x0, y0, x1, y1) in pixels of the sheet.
+    fn raster(dpi: u32, black: &[[usize; 4]]) -> Vec<u8> {
+        let (width, height) = (2362 * dpi / 600, 3496 * dpi / 600);
+        let mut stream = b"RaS2".to_vec();
+        let mut header = vec![0; 1796];
+        let fields = [
+            (276, dpi),
+            (280, dpi),
+            (372, width),
+            (376, height),
+            (384, 8),
+            (388, 8),
+            (392, width),
+            (400, 18),
+        ];
+        for (at, value) in fields {
+            header[at..at + 4].copy_from_slice(&value.to_be_bytes());
+        }
+        stream.extend(header);
+        for y in 0..height as usize {
+            let row: Vec<u8> = (0..width as usize)
+                .map(|x| {
+                    if black.iter().any(|&[x0, y0, x1, y1]| (x0..x1).contains(&x) && (y0..y1).contains(&y)) {
+                        0
+                    } else {
+                        255
+                    }
+                })
+                .collect();
+            stream.push(0);
+            for part in row.chunks(128).filter(|part| part.len() > 1) {
+                stream.push((257 - part.len()) as u8);
+                stream.extend(part);
+            }
+            if row.len() % 128 == 1 {
+                stream.extend([0, row[row.len() - 1]]);
+            }
+        }
+        stream
+    }
+
+    fn filtered(stream: Vec<u8>, choices: &Choices) -> (Vec<u8>, Vec<String>) {
+        let (mut out, notes) = (Vec::new(), Notes::default());
+        run(io::Cursor::new(stream), None, choices, &Library::builtin(), &mut out, &notes).unwrap();
+        (out, notes.0.into_inner().unwrap())
+    }
+
+    #[test]
+    fn a_page_becomes_its_dots_without_the_margins_and_blank_pages_become_nothing() {
+        let usual = Choices::read(&[], None).unwrap();
+        let pages = [raster(600, &[[1000, 500, 1400, 800]]), raster(600, &[])[4..].to_vec()].concat();
+        let (job, notes) = filtered(pages, &usual);
+        assert_eq!(sheets(&job).len(), 1);
+        let seen = inspect(&job, &Silent);
+        assert!(seen.inspection.complete);
+        assert_eq!(seen.inspection.setup.paper, Some("postcard"));
+        let [pass] = &seen.inspection.passes[..] else { panic!("{:?}", seen.inspection.passes) };
+        let bounds = pass.bounds.unwrap();
+        // A postcard's margins are 80 dots at the left and 71 at the top.
+        assert_eq!(
+            (pass.ink, bounds.x, bounds.y, bounds.width, bounds.height),
+            ("black", 920, 429, 400, 300)
+        );
+        assert_eq!(pass.dots, 400 * 300);
+        assert!(notes.iter().any(|note| note.contains("page 2 is blank")), "{notes:?}");
+    }
+
+    #[test]
+    fn a_draft_is_the_same_page_at_half_the_resolution() {
+        let usual = Choices::read(&[], None).unwrap();
+        let (job, _) = filtered(raster(300, &[[500, 250, 700, 400]]), &usual);
+        let seen = inspect(&job, &Silent);
+        let bounds = seen.inspection.passes[0].bounds.unwrap();
+        // The top margin is no whole number of these pixels.
+        assert_eq!((bounds.x, bounds.width, bounds.height), (920, 400, 300));
+        assert!(bounds.y.abs_diff(429) <= 1, "{bounds:?}");
+    }
+
+    #[test]
+    fn the_choices_of_the_dialog_are_in_the_job() {
+        let options = super::super::options::parse(
+            "MediaType=Cardboard FoilpressCurl=Off FoilpressWhite=Under FoilpressFinish=All",
+        );
+        let choices = Choices::read(&options, None).unwrap();
+        let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
+        let seen = inspect(&job, &Silent).inspection;
+        assert_eq!((seen.setup.media, seen.setup.curl_correction), (Some("cardboard"), Some(false)));
+        let passes: Vec<(&str, u64)> = seen.passes.iter().map(|pass| (pass.ink, pass.dots)).collect();
+        assert_eq!(passes, [("white", 400 * 300), ("black", 400 * 300), ("finish", 2202 * 3082)]);
+    }
+
+    #[test]
+    fn what_lies_on_the_margins_is_told_in_millimetres() {
+        let usual = Choices::read(&[], None).unwrap();
+        // 71 rows at the top, 80 dots at the left; 2 mm are 47 dots.
+        let marks = [[1000, 71 - 47, 1100, 300], [80 - 47, 1000, 200, 1100]];
+        let (_, notes) = filtered(raster(600, &marks), &usual);
+        assert!(
+            notes
+                .iter()
+                .any(|note| note.contains("2.0 mm at the left, 2.0 mm at the top lies on the margins")),
+            "{notes:?}"
+        );
+    }
+
+    #[test]
+    fn a_page_of_no_known_paper_is_refused_with_its_size() {
+        let read = RefCell::new(0);
+        let usual = Choices::read(&[], None).unwrap();
+        let library = Library::builtin();
+        let mut press =
+            Press { choices: &usual, library: &library, out: &mut io::sink(), observer: &Silent, jobs: 0 };
+        let page = press.page(3, (1200, 1200, 600), &mut |_| {
+            *read.borrow_mut() += 1;
+            Ok(())
+        });
+        let error = page.unwrap_err().to_string();
+        assert!(error.contains("page 3 is 51 x 51 mm") && error.contains("Postcard"), "{error}");
+        assert_eq!(*read.borrow(), 0);
+    }
+
+    #[test]
+    fn what_is_no_document_is_refused() {
+        let usual = Choices::read(&[], None).unwrap();
+        for wrong in [&b"GIF89a"[..], b"", b"%P"] {
+            let result = run(
+                io::Cursor::new(wrong.to_vec()),
+                None,
+                &usual,
+                &Library::builtin(),
+                &mut io::sink(),
+                &Silent,
+            );
+            assert!(matches!(result, Err(FilterError::Kind | FilterError::Io { .. })));
+        }
+    }
+}

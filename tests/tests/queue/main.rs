@@ -351,6 +351,27 @@ fn after_a_crash_of_the_print_system_a_job_goes_on_where_the_printer_is() {
 }
 
 #[test]
+fn a_sheet_lost_with_its_bridge_is_held_and_printed_again_only_when_released() {
+    let server = server!();
+    let bridge = Bridge::start(100);
+    let address = bridge.address;
+    server.queue("Alps", &bridge.uri());
+    let file = server.path("files/job.rgl");
+    let bytes = job(9, &[Ink::Cyan], 1000);
+    fs::write(&file, &bytes).unwrap();
+    let job = server.print(&["-d", "Alps", "-o", "raw", file.to_str().unwrap()]);
+    server.wait_for("some rows", |_| bridge.printed().len() > 20_000);
+    drop(bridge);
+    let bridge = Bridge::at(address, FAST);
+    server.wait_for("the job to be held", |server| server.job(job, "job-state") == "pending-held");
+    assert!(bridge.printed().is_empty());
+    assert!(server.log().contains("release it to print this sheet again"), "{}", server.log());
+    server.say("lp", &["-i", &format!("Alps-{job}"), "-H", "resume"]);
+    assert_eq!(server.wait_for_job(job), "completed");
+    assert!(bridge.printed() == bytes);
+}
+
+#[test]
 fn a_stopped_queue_ends_its_sheet_and_begins_it_anew_when_it_is_started() {
     let server = server!();
     let bridge = Bridge::start(100);

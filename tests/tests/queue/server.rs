@@ -53,7 +53,8 @@ pub fn missing() -> Option<String> {
             format!("skipped: {} not here; `cargo xtask queue` installs what is needed", absent.join(", "))
         }
     };
-    assert!(std::env::var_os("CI").is_none(), "{why}, but everything is to be tested");
+    let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
+    assert!(!required, "{why}, but everything is to be tested");
     Some(why)
 }
 
