@@ -24,20 +24,23 @@ pub enum Profile {
 /// Builds the package, tries it, and says where it is.
 pub fn run(root: &Path, profile: Profile) -> Result<()> {
     let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
-    let (name, folder) = match profile {
-        Profile::Release => ("release", target.join("release")),
-        Profile::Dev => ("dev", target.join("debug")),
+    let (name, built) = match profile {
+        Profile::Release => ("release", target.join("release/foilpress")),
+        Profile::Dev => ("dev", target.join("debug/foilpress")),
     };
     succeed(cargo(&["build", "--package", "foilpress", "--locked", "--profile", name]).current_dir(root))?;
-    let tree = folder.join("package");
-    // What an earlier version wrote is not to get into the package.
-    let _ = fs::remove_dir_all(&tree);
-    succeed(Command::new(folder.join("foilpress")).arg("generate").arg(&tree))?;
-    let cargo_deb = tool(&target)?;
-    let package = folder.join("foilpress.deb");
-    let mut make = Command::new(cargo_deb);
-    make.args(["--no-build", "--locked", "--profile", name, "--output"]).arg(&package);
-    succeed(make.current_dir(root.join("host")))?;
+    // `cargo-deb` looks for what it packs below the build's folder, in `release`: one of our own, to hold nothing else.
+    let target_of_package = target.join("package");
+    let folder = target_of_package.join("release");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder)?;
+    fs::copy(&built, folder.join("foilpress"))?;
+    let tree = folder.join("tree");
+    succeed(Command::new(&built).arg("generate").arg(&tree))?;
+    let package = target_of_package.join("foilpress.deb");
+    let mut make = Command::new(tool(&target)?);
+    make.args(["--no-build", "--locked", "--quiet", "--output"]).arg(&package);
+    succeed(make.current_dir(root.join("host")).env("CARGO_TARGET_DIR", &target_of_package))?;
     check(&package, &tree)?;
     println!("{}", package.display());
     Ok(())
@@ -84,7 +87,7 @@ fn tool(target: &Path) -> Result<PathBuf> {
 
 /// Installs the package into an empty root and does there what its users do first.
 fn check(package: &Path, tree: &Path) -> Result<()> {
-    let root = tree.with_file_name("package-root");
+    let root = tree.with_file_name("root");
     let _ = fs::remove_dir_all(&root);
     for folder in ["var/lib/dpkg/updates", "var/lib/dpkg/info", "tmp"] {
         fs::create_dir_all(root.join(folder))?;

@@ -39,6 +39,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 /// Checks a job and takes it to its destination.
 pub fn deliver(name: &str, job: &[u8], to: &Destination, observer: &dyn Observer) -> Result<()> {
     let checked = send::check(job, observer)?;
+    if let Some(driver) = checked.dialect {
+        observer.note(&format!(
+            "{name} is in the dialect of {driver}'s drivers, which was never tried; it is sent as it is"
+        ));
+    }
     match to {
         Destination::File(path) => {
             let staged = Staged::file(path)?;

@@ -17,7 +17,7 @@ use model::{is_a_whole_job, seeded};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
-use rand::{Rng, RngExt};
+use rand::Rng;
 use server::Server;
 use std::fs;
 use std::sync::atomic::Ordering;
