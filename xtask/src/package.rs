@@ -37,9 +37,11 @@ pub fn run(root: &Path, profile: Profile) -> Result<()> {
     fs::copy(&built, folder.join("foilpress"))?;
     let tree = folder.join("tree");
     succeed(Command::new(&built).arg("generate").arg(&tree))?;
+    let mut pages = command("gzip", &["-9", "--no-name", "--recursive"]);
+    succeed(pages.arg(tree.join("usr/share/man")))?;
     let package = target_of_package.join("foilpress.deb");
     let mut make = Command::new(tool(&target)?);
-    make.args(["--no-build", "--locked", "--quiet", "--output"]).arg(&package);
+    make.args(["--no-build", "--locked", "--quiet", "--strip", "--output"]).arg(&package);
     succeed(make.current_dir(root.join("host")).env("CARGO_TARGET_DIR", &target_of_package))?;
     check(&package, &tree)?;
     println!("{}", package.display());
