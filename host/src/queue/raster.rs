@@ -224,7 +224,7 @@ mod tests {
             (376, height),
             (384, bits),
             (388, pixel),
-            (392, (width * pixel).div_ceil(8)),
+            (392, width.wrapping_mul(pixel).div_ceil(8)),
             (400, space),
         ];
         for (at, value) in fields {
