@@ -252,8 +252,8 @@ impl<W: Write + Send> Delivery<'_, W> {
     ) -> Result<bool, Stopped> {
         let data = &job[place.clone()];
         let whole = match &self.call.to {
-            Destination::Bridge(address) => self.to_bridge(data, checked, address, folder)?,
-            Destination::Raw(device) => self.to_device(data, checked, device, folder)?,
+            Destination::Bridge(address) => self.bridge_prints(data, checked, address, folder)?,
+            Destination::Raw(device) => self.device_prints(data, checked, device, folder)?,
             // A URI never leads to a file.
             Destination::File(_) => return Err(self.fail(Exit::Stop, &uri::UriError::File)),
         };
@@ -263,7 +263,7 @@ impl<W: Write + Send> Delivery<'_, W> {
         Ok(whole)
     }
 
-    fn to_bridge(
+    fn bridge_prints(
         &mut self,
         data: &[u8],
         checked: &Checked,
@@ -494,7 +494,7 @@ impl<W: Write + Send> Delivery<'_, W> {
     }
 
     /// A device that tells nothing: what it may have got of an interrupted job is not known.
-    fn to_device(
+    fn device_prints(
         &mut self,
         data: &[u8],
         checked: &Checked,
