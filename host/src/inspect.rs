@@ -3,7 +3,7 @@
 //! Method: the strict reader, without a printer: whatever the cassettes and the sheet, the bytes alone are looked at.
 //! What was read before a fault is reported with it.
 //! Cost: one look at each byte, one bit for each dot and pass.
-//! The [dialect of Ghostscript's drivers](ghostscript) is read too, leniently.
+//! The dialect of Ghostscript's drivers is read too, leniently.
 
 mod ending;
 mod ghostscript;

@@ -4,7 +4,7 @@
 //! Method: a PDF is drawn by Ghostscript, row by row through a pipe; of each page the printable area is kept, and
 //! becomes art as if it were a picture given to `foilpress layers`: black is solid black, reserved colours are inks of
 //! their own if wanted, everything else is halftoned in process inks. What lies on the margins is told in millimetres.
-//! Cost: the printable area at four bytes a pixel, and what [`layers`](crate::layers) costs.
+//! Cost: the printable area at four bytes a pixel, and what [`layers`] costs.
 //! Limits: sheets of the known papers, upright. Transparency is gone when a page has been drawn, so white cannot follow it.
 
 use std::io::{self, BufReader, Read, Write};
