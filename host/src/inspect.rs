@@ -3,6 +3,14 @@
 //! Method: the strict reader, without a printer: whatever the cassettes and the sheet, the bytes alone are looked at.
 //! What was read before a fault is reported with it.
 //! Cost: one look at each byte, one bit for each dot and pass.
+//! The dialect of Ghostscript's drivers is read too, leniently.
+
+mod ending;
+mod ghostscript;
+
+use std::ops::Range;
+
+pub use ending::ending;
 
 use protocol::ink::Ink;
 use protocol::rgl::{Command, Compression, Fault, Mode, Order, Step, parse};
@@ -17,6 +25,8 @@ use crate::simulate::{Canvas, words};
 pub struct Inspection {
     /// Length of the stream.
     pub bytes: u64,
+    /// Whose dialect it is, if not that of the established open driver, which is ours: `Ghostscript`.
+    pub dialect: Option<&'static str>,
     /// Whether it is one whole legal job.
     pub complete: bool,
     /// What the setup declares; parts that did not come are absent.
@@ -85,6 +95,27 @@ pub struct PassReport {
     pub bytes: u64,
 }
 
+impl PassReport {
+    /// A pass of which nothing has come but its beginning, at offset `at`.
+    fn begin(number: usize, ink: Ink, last: bool, at: usize) -> PassReport {
+        PassReport {
+            number,
+            ink: ink.name(),
+            code: ink.code(),
+            barcode: ink.barcode(),
+            cartridge: ink.part(),
+            last,
+            dots: 0,
+            bounds: None,
+            rows: 0,
+            packed_rows: 0,
+            plain_rows: 0,
+            offset: at as u64,
+            bytes: 0,
+        }
+    }
+}
+
 /// A rectangle of dots inside the printable area, and its place on paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bounds {
@@ -127,8 +158,45 @@ struct Open {
     canvas: Canvas,
 }
 
+/// Where the sheets of a stream stand: several jobs may follow one another, as a driver writes the pages of a document.
+///
+/// A stream that is no job, or whose last job does not end, is in the result all the same; only [`inspect`] judges.
+pub fn sheets(stream: &[u8]) -> Vec<Range<usize>> {
+    let mut sheets = Vec::new();
+    let mut at = 0;
+    while at < stream.len() || sheets.is_empty() {
+        let rest = &stream[at..];
+        let length =
+            if ghostscript::begins(rest) { ghostscript::first_sheet(rest) } else { first_sheet(rest) };
+        let end = at + length.unwrap_or(rest.len());
+        sheets.push(at..end);
+        at = end;
+    }
+    sheets
+}
+
+/// The length of the first job, its final reset included.
+fn first_sheet(stream: &[u8]) -> Option<usize> {
+    let mut at = 0;
+    let mut left = false;
+    loop {
+        match parse(stream.get(at..)?) {
+            Ok(Step::Command(Command::Reset, length)) if left => return Some(at + length),
+            _ if left => return Some(at),
+            Ok(Step::Command(command, length)) => {
+                left = command == Command::LeaveRgl;
+                at += length;
+            }
+            _ => return None,
+        }
+    }
+}
+
 /// Looks at a stream. It never fails: what is wrong is part of the result.
 pub fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
+    if ghostscript::begins(stream) {
+        return ghostscript::inspect(stream, observer);
+    }
     observer.begin("inspect", stream.len() as u64);
     let mut reader = Reader { order: Order::new(), open: None, reports: Vec::new(), passes: Vec::new() };
     let (mut at, mut reported) = (0, 0);
@@ -156,6 +224,7 @@ pub fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
     observer.end();
     let inspection = Inspection {
         bytes: stream.len() as u64,
+        dialect: None,
         complete: fault.is_none(),
         setup: setup(&reader.order),
         passes: reader.reports,
@@ -203,21 +272,7 @@ impl Reader {
         let declared = self.order.declared();
         let shift = (declared.shift_x.into(), declared.shift_y.into());
         let canvas = Canvas::new(declared.width.into(), declared.length.into(), shift, usize::MAX, 1);
-        let report = PassReport {
-            number: self.reports.len() + 1,
-            ink: ink.name(),
-            code: ink.code(),
-            barcode: ink.barcode(),
-            cartridge: ink.part(),
-            last,
-            dots: 0,
-            bounds: None,
-            rows: 0,
-            packed_rows: 0,
-            plain_rows: 0,
-            offset: at as u64,
-            bytes: 0,
-        };
+        let report = PassReport::begin(self.reports.len() + 1, ink, last, at);
         self.open = Some(Open { report, canvas });
     }
 
@@ -251,12 +306,16 @@ fn setup(order: &Order) -> Setup {
         shift_y: declared.shift_y,
         curl_correction: declared.curl,
         built_in_gloss: declared.gloss,
-        mode: declared.mode.map(|mode| match mode {
-            Mode::BlackRaster => "blackRaster",
-            Mode::ColourPlane => "colourPlane",
-            Mode::MultiPlane => "multiPlane",
-        }),
+        mode: declared.mode.map(mode_name),
         cassettes: declared.cassettes.map(|list| list.inks().iter().map(|ink| ink.name()).collect()),
+    }
+}
+
+fn mode_name(mode: Mode) -> &'static str {
+    match mode {
+        Mode::BlackRaster => "blackRaster",
+        Mode::ColourPlane => "colourPlane",
+        Mode::MultiPlane => "multiPlane",
     }
 }
 

@@ -47,4 +47,6 @@ pub mod folders;
 
 pub mod ledger;
 
+pub mod queue;
+
 pub mod cli;

@@ -1,12 +1,14 @@
 //! The project's own chores, so that a person and the gate type the same words.
 //!
 //! `cargo xtask test` is the whole gate: formatting, lints, documents, every test, the bare-metal build of `protocol`
-//! and `bridge`, and the firmware's image in its emulator, for which it fetches what is missing. It runs every step, then
-//! says which failed.
+//! and `bridge`, the firmware's image in its emulator and the Debian package, for which it fetches what is missing. It
+//! runs every step, then says which failed.
 
 mod elf;
 mod emulator;
 mod firmware;
+mod package;
+mod queue;
 mod tools;
 
 use std::path::Path;
@@ -26,7 +28,8 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Format check, clippy, documents, all tests, bare-metal build, emulator: what has to pass before anything lands
+    /// Format check, clippy, documents, all tests, bare-metal build, emulator, package: what has to pass before anything
+    /// lands
     Test,
     /// The benchmarks (results are ratios to read, not tests that pass)
     Bench,
@@ -38,6 +41,10 @@ enum Task {
         #[arg(long)]
         serve: bool,
     },
+    /// Print queues on a print server of their own, which is installed if need be (needs root)
+    Queue,
+    /// The Debian package, tried in a root of its own
+    Package,
 }
 
 fn main() -> ExitCode {
@@ -48,6 +55,8 @@ fn main() -> ExitCode {
         Task::Firmware => return finish(firmware::build(root).map(drop)),
         Task::Emulator { serve: true } => return finish(emulator::serve(root)),
         Task::Emulator { serve: false } => return finish(emulator::run(root)),
+        Task::Queue => return finish(queue::run()),
+        Task::Package => return finish(package::run(root, package::Profile::Release)),
         Task::Test => vec![
             ("bare-metal target", command("rustup", &["target", "add", BARE_METAL])),
             ("formatting", cargo(&["fmt", "--all", "--check"])),
@@ -76,6 +85,12 @@ fn main() -> ExitCode {
     };
 
     let mut failed = Vec::new();
+    if matches!(task, Task::Test)
+        && let Err(error) = queue::install()
+    {
+        // The tests then say that they are skipped, or fail where they have to run.
+        eprintln!("print queues: {error:#}");
+    }
     for (name, mut step) in steps {
         eprintln!("== {name}: {step:?}");
         match step.status() {
@@ -88,6 +103,12 @@ fn main() -> ExitCode {
         eprintln!("== emulator");
         if let Err(error) = emulator::run(root) {
             failed.push(format!("emulator ({error:#})"));
+        }
+    }
+    if matches!(task, Task::Test) && failed.is_empty() {
+        eprintln!("== package");
+        if let Err(error) = package::run_where_possible(root) {
+            failed.push(format!("package ({error:#})"));
         }
     }
     if failed.is_empty() {

@@ -7,14 +7,16 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use super::output::{Kind, Staged};
-use crate::inspect::{Inspection, inspect};
+use crate::inspect::{Inspected, Inspection, inspect, sheets};
 use crate::observe::Observer;
 use crate::separate::files::{self, save_plane};
 
 /// Arguments of `inspect`.
 #[derive(ClapArgs, Debug)]
 #[command(
-    after_help = "Examples:\n  foilpress inspect job.rgl\n  foilpress inspect job.rgl --passes passes/ --json"
+    after_help = "Examples:\n  foilpress inspect job.rgl\n  foilpress inspect job.rgl --passes passes/ --json\n\n\
+    A stream of several sheets, as drivers write the pages of a document, is told sheet by sheet, in JSON as a list. \
+    Streams of Ghostscript's drivers for these printers are understood as well."
 )]
 pub struct Args {
     /// A stream in the printer's language
@@ -31,25 +33,43 @@ pub struct Args {
 /// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = super::read_job(&args.job)?;
-    let inspected = inspect(&job, observer);
-    let summary = &inspected.inspection;
-    if let Some(folder) = &args.passes {
-        let staged = Staged::folder(folder, Kind::Pictures)?;
-        let inside = staged.create()?;
-        for (report, pass) in summary.passes.iter().zip(&inspected.passes) {
-            let name = files::name(report.number - 1, pass.ink);
-            save_plane(&pass.plane, &inside.join(name))?;
+    let places = sheets(&job);
+    let several = places.len() > 1;
+    let mut out = std::io::stdout().lock();
+    let staged = args.passes.as_deref().map(|folder| Staged::folder(folder, Kind::Pictures)).transpose()?;
+    let inside = staged.as_ref().map(Staged::create).transpose()?;
+    let mut summaries = Vec::new();
+    let mut written = 0;
+    for (number, place) in (1..).zip(&places) {
+        let Inspected { inspection, passes } = inspect(&job[place.clone()], observer);
+        if let Some(inside) = inside {
+            for pass in &passes {
+                save_plane(&pass.plane, &inside.join(files::name(written, pass.ink)))?;
+                written += 1;
+            }
         }
+        if !args.json {
+            if several {
+                writeln!(out, "sheet {number} of {}, from byte {}:", places.len(), place.start)?;
+            }
+            write_words(&inspection, &mut out)?;
+        }
+        summaries.push(inspection);
+    }
+    if let Some(staged) = staged {
         staged.commit()?;
     }
-    let mut out = std::io::stdout().lock();
     if args.json {
-        writeln!(out, "{}", serde_json::to_string_pretty(summary)?)?;
-    } else {
-        write_words(summary, &mut out)?;
+        let text = match &summaries[..] {
+            [one] => serde_json::to_string_pretty(one)?,
+            all => serde_json::to_string_pretty(all)?,
+        };
+        writeln!(out, "{text}")?;
     }
-    match &summary.error {
-        Some(error) => bail!("{}: {error}", args.job.display()),
+    let faulty = (1..).zip(&summaries).find_map(|(number, summary)| Some((number, summary.error.as_ref()?)));
+    match faulty {
+        Some((number, error)) if several => bail!("{}: sheet {number}: {error}", args.job.display()),
+        Some((_, error)) => bail!("{}: {error}", args.job.display()),
         None => Ok(()),
     }
 }
@@ -60,19 +80,22 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
     let (across, along) = setup.resolution.unwrap_or_default();
     writeln!(
         out,
-        "{} bytes, {}",
+        "{} bytes, {}{}",
         summary.bytes,
-        if summary.complete { "one whole job" } else { "no whole job" }
+        if summary.complete { "one whole job" } else { "no whole job" },
+        summary.dialect.map_or(String::new(), |driver| format!(", in the dialect of {driver}'s drivers"))
     )?;
     if setup.resolution.is_none() {
         return Ok(writeln!(out, "no page is set up")?);
     }
     writeln!(
         out,
-        "{across} x {along} dpi, {} paper ({} x {} dots), {} media, {} mode, curl correction {}",
+        "{across} x {along} dpi, {} paper ({}), {} media, {} mode, curl correction {}",
         setup.paper.unwrap_or(unknown),
-        setup.width,
-        setup.length,
+        match setup.width {
+            0 => format!("{} rows, no width declared", setup.length),
+            width => format!("{width} x {} dots", setup.length),
+        },
         setup.media.unwrap_or(unknown),
         setup.mode.map_or(unknown, |mode| match mode {
             "blackRaster" => "black raster",

@@ -10,6 +10,7 @@ mod chain;
 mod chart;
 mod deliver;
 mod doctor;
+mod generate;
 mod inks;
 mod inspect;
 mod layers;
@@ -21,6 +22,7 @@ mod plan;
 mod preset;
 mod print;
 mod progress;
+mod queue;
 mod resume;
 mod sample;
 mod send;
@@ -110,6 +112,17 @@ enum Command {
     Doctor(doctor::Args),
     /// The ink library: list, show, check
     Inks(inks::Args),
+    /// Print queues of the system: make, remove, list
+    Queue(queue::Args),
+    /// What the print system starts to bring a job to the printer
+    #[command(hide = true)]
+    CupsBackend(queue::Conventional),
+    /// What the print system starts to make jobs of pages
+    #[command(hide = true)]
+    CupsFilter(queue::Conventional),
+    /// What a package needs beside the program
+    #[command(hide = true)]
+    Generate(generate::Args),
     /// Documents made by the program itself: list them or write one as a texture folder
     Sample(sample::Args),
 }
@@ -123,6 +136,12 @@ pub fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
+    match &args.command {
+        // They speak the print system's language, signals and exit codes included.
+        Command::CupsBackend(args) => return queue::backend(args),
+        Command::CupsFilter(args) => return queue::filter(args),
+        _ => {}
+    }
     match output::remove_on_interrupt().and_then(|()| run(args)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
@@ -161,7 +180,11 @@ fn run(args: Args) -> Result<()> {
         Command::Bridge(args) => bridge::run(&args, observer),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
+        Command::Generate(args) => generate::run(&args),
+        Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),
+        // Done before anything else; see `main`.
+        Command::CupsBackend(_) | Command::CupsFilter(_) => Ok(()),
     }
 }
 

@@ -63,6 +63,11 @@ pub fn deliver(
     force: bool,
     observer: &dyn Observer,
 ) -> Result<()> {
+    if let Some(driver) = checked.dialect {
+        observer.note(&format!(
+            "{name} is in the dialect of {driver}'s drivers, which was never tried; it is sent as it is"
+        ));
+    }
     match to {
         Destination::File(path) => {
             let staged = Staged::file(path)?;

@@ -150,6 +150,27 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
     Ok(art)
 }
 
+/// Art from a picture in memory: sRGB with opacity, four bytes a pixel, row by row from the top.
+///
+/// # Errors
+/// As [`open`]; `rgba` of another size than `size`.
+pub fn picture(
+    name: &str,
+    size: (usize, usize),
+    rgba: Vec<u8>,
+    options: &Options,
+) -> Result<Artwork, LayersError> {
+    let path = PathBuf::from(name);
+    let (Ok(width), Ok(height)) = (u32::try_from(size.0), u32::try_from(size.1)) else {
+        return Err(raster::wrong(&path, "it is too large"));
+    };
+    if Some(rgba.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(4)) {
+        return Err(raster::wrong(&path, "it has another number of pixels than its sides say"));
+    }
+    let pixels = colour::Pixels { path, width, height, density: None, rgba, notes: Vec::new() };
+    colour::artwork(name, pixels, options)
+}
+
 fn one(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
     use std::io::Read;
     let mut start = Vec::new();

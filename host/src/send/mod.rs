@@ -24,7 +24,7 @@ pub mod wiring;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};
-pub use run::{Event, RunError, run};
+pub use run::{Event, RunError, Wish, run, run_while};
 
 use protocol::ink::Ink;
 
@@ -53,6 +53,8 @@ pub struct Checked {
     pub inks: Vec<Ink>,
     /// Ribbon that each pass takes in millimetres, an estimate.
     pub ribbon_mm: Vec<f64>,
+    /// Whose dialect it is, if it is not ours: worth a word, for only ours is known to print.
+    pub dialect: Option<&'static str>,
 }
 
 /// Looks whether these bytes are one whole legal job, and nothing else.
@@ -79,5 +81,5 @@ pub fn check(job: &[u8], observer: &dyn Observer) -> Result<Checked, Unsendable>
     }
     let dpi = inspected.inspection.setup.resolution.unwrap_or((600, 600));
     let ribbon_mm = inspected.passes.iter().map(|pass| ribbon::of(&pass.plane, dpi).ribbon_mm).collect();
-    Ok(Checked { passes, inks, ribbon_mm })
+    Ok(Checked { passes, inks, ribbon_mm, dialect: inspected.inspection.dialect })
 }

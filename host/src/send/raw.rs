@@ -1,7 +1,8 @@
 //! A job to a device that takes the printer's bytes as they are, such as `/dev/usb/lp0` behind a USB-to-parallel cable.
 //!
 //! Limits: such a device says only that the system took the bytes, not that the printer did, and after an interruption
-//! nobody knows which it got. So a job can neither be resumed nor cancelled here; that is what the bridge is for.
+//! nobody knows which it got. So a job cannot be resumed here, and ended early only by the process that sends it; that is
+//! what the bridge is for.
 
 use std::fs::OpenOptions;
 use std::io::{self, Write as _};
@@ -9,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
+use crate::inspect::ending;
 use crate::observe::Observer;
 
 /// Bytes handed over at once.
@@ -48,6 +50,17 @@ pub enum RawError {
 
 /// Hands a job over, waiting for the operator as long as it takes. The job must have been [checked](super::check).
 pub fn send(job: &[u8], path: &Path, observer: &dyn Observer) -> Result<(), RawError> {
+    send_while(job, path, observer, &|| false).map(drop)
+}
+
+/// Like [`send`]; when `stop` says so the job is brought to an [early end](crate::inspect::ending), as soon as the device
+/// takes bytes. False if it was.
+pub fn send_while(
+    job: &[u8],
+    path: &Path,
+    observer: &dyn Observer,
+    stop: &dyn Fn() -> bool,
+) -> Result<bool, RawError> {
     let mut device = OpenOptions::new()
         .write(true)
         .open(path)
@@ -74,7 +87,17 @@ pub fn send(job: &[u8], path: &Path, observer: &dyn Observer) -> Result<(), RawE
             }
         });
         let mut taken = 0;
-        while taken < job.len() {
+        let mut cut: Option<Vec<u8>> = None;
+        loop {
+            if cut.is_none() && stop() {
+                let mut shorter = job[..taken].to_vec();
+                shorter.extend(ending(job, taken));
+                cut = Some(shorter);
+            }
+            let job = cut.as_deref().unwrap_or(job);
+            if taken == job.len() {
+                break;
+            }
             match device.write(&job[taken..(taken + PIECE).min(job.len())]) {
                 Ok(0) => return Err((taken, io::ErrorKind::WriteZero.into())),
                 Ok(count) => {
@@ -89,7 +112,7 @@ pub fn send(job: &[u8], path: &Path, observer: &dyn Observer) -> Result<(), RawE
         }
         let flushed = device.flush().map_err(|error| (taken, error));
         drop(tell);
-        flushed
+        flushed.map(|()| cut.is_none())
     });
     observer.end();
     result.map_err(|(taken, source)| RawError::Write {

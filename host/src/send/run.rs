@@ -33,6 +33,17 @@ pub enum Event<'a> {
     Fault(Option<Fault>),
 }
 
+/// What the caller wants while a job is sent.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Wish {
+    /// That it is printed.
+    GoOn,
+    /// That it ends early, the printer being ready for the next one.
+    Cancel,
+    /// To be let go, wherever the job is.
+    Leave,
+}
+
 /// Why sending stopped. The job is in the journal, and can be resumed unless its outcome says otherwise.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError<E: std::error::Error + 'static> {
@@ -52,6 +63,9 @@ pub enum RunError<E: std::error::Error + 'static> {
     /// The record could not be saved, so nothing more was sent.
     #[error("cannot keep the job's record")]
     Save(#[source] E),
+    /// The caller wished to be let go; the job goes on where it stands when it is resumed.
+    #[error("left before the job was over")]
+    Left,
 }
 
 fn rubbish(bytes: usize) -> String {
@@ -68,12 +82,23 @@ pub fn run<E: std::error::Error>(
     save: &mut dyn FnMut(&Record) -> Result<(), E>,
     watch: &mut dyn FnMut(Event<'_>),
 ) -> Result<Outcome, RunError<E>> {
+    run_while(session, open, save, watch, &mut || Wish::GoOn)
+}
+
+/// Like [`run`]; `wish` is asked again and again what the caller wants.
+pub fn run_while<E: std::error::Error>(
+    session: &mut Session<'_>,
+    open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
+    save: &mut dyn FnMut(&Record) -> Result<(), E>,
+    watch: &mut dyn FnMut(Event<'_>),
+    wish: &mut dyn FnMut() -> Wish,
+) -> Result<Outcome, RunError<E>> {
     let start = Instant::now();
     let mut met = false;
     loop {
-        let link = if met { reopen(open, watch) } else { open()? };
+        let link = if met { reopen(open, watch, wish).ok_or(RunError::Left)? } else { open()? };
         session.connected(start.elapsed());
-        match converse(session, link, start, save, watch, &mut met)? {
+        match converse(session, link, start, save, watch, wish, &mut met)? {
             Some(outcome) => return Ok(outcome),
             None if met => std::thread::sleep(REOPEN),
             None => return Err(RunError::NoAnswer(0)),
@@ -81,14 +106,17 @@ pub fn run<E: std::error::Error>(
     }
 }
 
+/// Opens the link again, however long that takes; `None` when the caller wishes to be let go.
 fn reopen(
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
     watch: &mut dyn FnMut(Event<'_>),
-) -> Box<dyn Transport> {
+    wish: &mut dyn FnMut() -> Wish,
+) -> Option<Box<dyn Transport>> {
     let mut told = String::new();
     loop {
         match open() {
-            Ok(link) => return link,
+            Ok(link) => return Some(link),
+            Err(_) if wish() == Wish::Leave => return None,
             Err(error) => {
                 let text = error.to_string();
                 if text != told {
@@ -108,6 +136,7 @@ fn converse<E: std::error::Error>(
     start: Instant,
     save: &mut dyn FnMut(&Record) -> Result<(), E>,
     watch: &mut dyn FnMut(Event<'_>),
+    wish: &mut dyn FnMut() -> Wish,
     met: &mut bool,
 ) -> Result<Option<Outcome>, RunError<E>> {
     let opened = start.elapsed();
@@ -120,6 +149,11 @@ fn converse<E: std::error::Error>(
     let (mut saved, mut saved_at) = (session.record().printed, opened);
     loop {
         let now = start.elapsed();
+        match wish() {
+            Wish::Cancel if !session.record().cancel => session.cancel(),
+            Wish::Leave => return Err(RunError::Left),
+            Wish::GoOn | Wish::Cancel => {}
+        }
         if sent == out.len() {
             out.clear();
             sent = 0;

@@ -1,0 +1,47 @@
+//! `foilpress generate`: what a package needs beside the program, as a tree of files. Not for people; no help shows it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use clap::{Args as ClapArgs, CommandFactory as _};
+use clap_complete::Shell;
+
+use crate::queue::install::{Places, put};
+
+/// Where a package puts the program.
+const PROGRAM: &str = "/usr/bin/foilpress";
+
+/// Arguments of `generate`.
+#[derive(ClapArgs, Debug)]
+pub struct Args {
+    /// Folder that stands for the root of the file system
+    #[arg(value_name = "DIR")]
+    root: PathBuf,
+}
+
+/// Runs `generate`.
+pub fn run(args: &Args) -> Result<()> {
+    let command = super::Args::command();
+    let folder = |path: &str| -> Result<PathBuf> {
+        let folder = args.root.join(path);
+        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        Ok(folder)
+    };
+    clap_mangen::generate_to(command.clone(), folder("usr/share/man/man1")?)
+        .context("cannot write man pages")?;
+    for (shell, path, name) in [
+        (Shell::Bash, "usr/share/bash-completion/completions", "foilpress"),
+        (Shell::Zsh, "usr/share/zsh/vendor-completions", "_foilpress"),
+        (Shell::Fish, "usr/share/fish/vendor_completions.d", "foilpress.fish"),
+    ] {
+        let mut text = Vec::new();
+        clap_complete::generate(shell, &mut command.clone(), "foilpress", &mut text);
+        let path = folder(path)?.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    for file in Places::usual(&args.root).files(Path::new(PROGRAM)) {
+        put(&file).with_context(|| format!("cannot write {}", file.path.display()))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,294 @@
+//! `foilpress queue`: print queues of the system, and what the print system itself starts.
+
+use std::ffi::OsString;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, ExitCode};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context, Result, bail};
+use clap::{Args as ClapArgs, Subcommand};
+use inks::Library;
+
+use crate::observe::Observer;
+use crate::queue::backend::{self, Call, Exit};
+use crate::queue::install::{self, Places};
+use crate::queue::messages::Messages;
+use crate::queue::options::{self, Choices};
+use crate::queue::{filter, ppd, uri};
+use crate::send::find;
+
+/// Arguments of `queue`.
+#[derive(ClapArgs, Debug)]
+#[command(after_help = "Examples:\n  \
+    sudo foilpress queue install --name Alps --to serial:/dev/ttyACM0\n  \
+    lp -d Alps file.pdf\n  \
+    lp -d Alps -o MediaType=GlossyPaper -o FoilpressWhite=Under photo.png\n  \
+    lp -d Alps job.rgl                                   (a job as it is)\n  \
+    foilpress queue list\n  \
+    sudo foilpress queue remove --name Alps")]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Make a queue, so that every application can print (as root)
+    Install(Install),
+    /// Remove a queue (as root)
+    Remove(Remove),
+    /// The queues that lead to this program
+    List,
+    /// The printer description, for print systems that want it by hand
+    Ppd,
+}
+
+/// Arguments of `queue install`.
+#[derive(ClapArgs, Debug)]
+struct Install {
+    /// Name of the queue
+    #[arg(long, value_parser = queue_name)]
+    name: String,
+    /// Where it leads: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE
+    #[arg(long, value_name = "WHERE", value_parser = uri::of)]
+    to: String,
+}
+
+/// Arguments of `queue remove`.
+#[derive(ClapArgs, Debug)]
+struct Remove {
+    /// Name of the queue
+    #[arg(long, value_parser = queue_name)]
+    name: String,
+}
+
+/// What the print system takes as a name.
+fn queue_name(name: &str) -> Result<String, String> {
+    let fits = !name.is_empty()
+        && name.len() <= 127
+        && !name.starts_with('-')
+        && name.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c));
+    if fits { Ok(name.into()) } else { Err("a queue's name has letters, digits, - and _".into()) }
+}
+
+/// Runs `queue`.
+pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
+    match &args.command {
+        Command::Install(args) => install(args, observer),
+        Command::Remove(args) => ours(&args.name)
+            .and_then(|()| system("lpadmin", &["-x", &args.name]))
+            .map(|_| observer.note(&format!("{} is no queue any more", args.name))),
+        Command::List => list(),
+        Command::Ppd => super::show(&ppd::description()),
+    }
+}
+
+/// Starts a program of the print system and gives what it says.
+fn system(program: &str, arguments: &[&str]) -> Result<String> {
+    let output = Process::new(program).args(arguments).env("LC_ALL", "C").output().with_context(|| {
+        format!("cannot start {program}; is CUPS installed (Debian: apt install cups ghostscript)?")
+    })?;
+    if !output.status.success() {
+        bail!("{program}: {}", String::from_utf8_lossy(&output.stderr).trim());
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
+    let places = Places::usual(Path::new("/"));
+    if !places.programs.is_dir() {
+        bail!(
+            "{} is not there; is CUPS installed (Debian: apt install cups ghostscript)?",
+            places.programs.display()
+        );
+    }
+    let mut program = std::env::current_exe().context("cannot find this program")?;
+    let as_root = || "only root may make queues; the same command with sudo does it".to_owned();
+    // A package has put its own files there, which stay.
+    let packaged = Path::new("/usr/bin/foilpress");
+    if program != packaged && !install::is_roots(&program).with_context(as_root)? {
+        install::copy_program(&program, &places.program).with_context(as_root)?;
+        observer.note(&format!(
+            "{} is not root's, so the print system gets a copy: {}; after an update, install the queue again",
+            program.display(),
+            places.program.display()
+        ));
+        program = places.program.clone();
+    }
+    for file in places.files(&program) {
+        if install::put(&file)
+            .with_context(|| format!("cannot write {}", file.path.display()))
+            .with_context(as_root)?
+        {
+            observer.note(&format!("wrote {}", file.path.display()));
+        }
+    }
+    let description = places.descriptions.join(install::DESCRIPTION);
+    let description = description.to_str().context("the path of the printer description is no text")?;
+    // A job that fails is not begun again by itself, and one lost sheet is not to stop the others.
+    system(
+        "lpadmin",
+        &[
+            "-p",
+            &args.name,
+            "-v",
+            &args.to,
+            "-P",
+            description,
+            "-D",
+            "ALPS MD-5500",
+            "-o",
+            "printer-error-policy=abort-job",
+            "-E",
+        ],
+    )?;
+    observer.note(&format!("{} is a queue now: lp -d {} file.pdf", args.name, args.name));
+    Ok(())
+}
+
+/// Names and devices of all queues.
+fn queues() -> Result<Vec<(String, String)>> {
+    // Without any queue the program fails, which is no error here.
+    let text = match system("lpstat", &["-v"]) {
+        Err(error) if error.to_string().contains("No destinations") => String::new(),
+        other => other?,
+    };
+    Ok(text
+        .lines()
+        .filter_map(|line| line.strip_prefix("device for ")?.split_once(": "))
+        .map(|(name, device)| (name.into(), device.into()))
+        .collect())
+}
+
+fn ours(name: &str) -> Result<()> {
+    match queues()?.iter().find(|(queue, _)| queue == name) {
+        None => bail!("there is no queue {name}; `foilpress queue list` shows those there are"),
+        Some((_, device)) if uri::parse(device).is_err() => {
+            bail!("{name} leads to {device}, which is not this program's; `lpadmin -x {name}` removes it")
+        }
+        Some(_) => Ok(()),
+    }
+}
+
+fn list() -> Result<()> {
+    let mut out = io::stdout().lock();
+    let mut found = false;
+    for (name, device) in queues()? {
+        if uri::parse(&device).is_ok() {
+            found = true;
+            let state = system("lpstat", &["-p", &name])?;
+            writeln!(out, "{name}  {device}")?;
+            state.lines().try_for_each(|line| writeln!(out, "    {}", line.trim()))?;
+        }
+    }
+    if !found {
+        writeln!(out, "no queue leads to this program; `foilpress queue install` makes one")?;
+    }
+    Ok(())
+}
+
+/// Arguments the print system gives; they are not for people.
+#[derive(ClapArgs, Debug)]
+pub struct Conventional {
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<OsString>,
+}
+
+/// Set by a signal that asks to end.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// The backend: without arguments a list of devices, otherwise a job.
+pub fn backend(args: &Conventional) -> ExitCode {
+    if args.arguments.is_empty() {
+        return devices();
+    }
+    let messages = Messages::new(io::stderr());
+    // The print system asks a job to end by SIGTERM.
+    if let Err(error) = ctrlc::set_handler(|| STOP.store(true, Ordering::SeqCst)) {
+        messages.debug(&format!("cannot listen to signals: {error}"));
+    }
+    let exit = match Call::read(&args.arguments, &|name| std::env::var_os(name)) {
+        Ok(call) => backend::run(&call, &mut io::stdin().lock(), &messages, &|| STOP.load(Ordering::SeqCst)),
+        Err(error) => {
+            messages.error(&error.to_string());
+            Exit::Stop
+        }
+    };
+    ExitCode::from(exit as u8)
+}
+
+/// The bridges, and printers at cables of their own.
+fn devices() -> ExitCode {
+    let mut lines = Vec::new();
+    for address in find::survey().bridges.iter().filter_map(|bridge| bridge.addresses.first()) {
+        let about = format!("ALPS MD-5500 through a Foilpress bridge ({address})");
+        lines.extend(backend::device(
+            &address.to_string(),
+            "ALPS MD-5500",
+            &about,
+            "MFG:ALPS;MDL:MD-5500;CMD:RGL;",
+        ));
+    }
+    for number in 0..8 {
+        let device = PathBuf::from(format!("/dev/usb/lp{number}"));
+        let id = std::fs::read_to_string(format!("/sys/class/usbmisc/lp{number}/device/ieee1284_id"));
+        if let Ok(id) = id
+            && device.exists()
+            && super::bridge::is_alps(&id)
+        {
+            let about = format!("ALPS MD-5500 at a cable ({})", device.display());
+            lines.extend(backend::device(
+                &format!("raw:{}", device.display()),
+                "ALPS MD-5500",
+                &about,
+                id.trim(),
+            ));
+        }
+    }
+    if lines.is_empty() {
+        lines.push(backend::NO_DEVICE.into());
+    }
+    let text: String = lines.into_iter().map(|line| line + "\n").collect();
+    match super::show(&text) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) => ExitCode::from(Exit::Failed as u8),
+    }
+}
+
+/// The filter: `job user title copies options [file]`, jobs to standard output.
+pub fn filter(args: &Conventional) -> ExitCode {
+    let messages = Messages::of_filter(io::stderr());
+    match filtered(&args.arguments, &messages) {
+        Ok(0) => {
+            messages.error("there is nothing to print: every page is blank");
+            ExitCode::FAILURE
+        }
+        Ok(_) => ExitCode::SUCCESS,
+        Err(error) => {
+            messages.error(&super::chain(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
+    let (asked, file) = match arguments {
+        [_job, _user, _title, _copies, options] => (options, None),
+        [_job, _user, _title, _copies, options, file] => (options, Some(PathBuf::from(file))),
+        other => bail!("expected job-id user title copies options [file], found {} arguments", other.len()),
+    };
+    // Its defaults are the queue's; without it the usual ones count.
+    let description = std::env::var_os("PPD").and_then(|path| std::fs::read_to_string(path).ok());
+    let choices = Choices::read(&options::parse(&asked.to_string_lossy()), description.as_deref())?;
+    let mut out = io::BufWriter::with_capacity(1 << 18, io::stdout());
+    let library = Library::builtin();
+    Ok(match &file {
+        Some(path) => {
+            let document =
+                std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+            filter::run(document, Some(path), &choices, &library, &mut out, observer)?
+        }
+        None => filter::run(io::stdin(), None, &choices, &library, &mut out, observer)?,
+    })
+}

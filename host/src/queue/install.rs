@@ -1,0 +1,154 @@
+//! What makes the program part of the print system: where its files go.
+//!
+//! CUPS starts a backend and a filter by their place in its own folders, as a user of its own, and refuses what others
+//! than root could change. So what is put there are two lines of shell that start this program, and the program
+//! itself has to be root's too: one that is not is copied to a place that is.
+//! Limits: Unix.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::ppd;
+
+/// Where a print system keeps its things.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Places {
+    /// Folder of `backend/` and `filter/`.
+    pub programs: PathBuf,
+    /// Folder of `*.types` files.
+    pub types: PathBuf,
+    /// Folder of printer descriptions.
+    pub descriptions: PathBuf,
+    /// Where a program that is not root's is copied to.
+    pub program: PathBuf,
+}
+
+/// A file to be there.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Wanted {
+    /// Where.
+    pub path: PathBuf,
+    /// What is in it.
+    pub text: String,
+    /// Whether it is a program.
+    pub executable: bool,
+}
+
+/// Name of the printer description's file.
+pub const DESCRIPTION: &str = "foilpress-md5500.ppd";
+
+impl Places {
+    /// Where the print system of Debian and its kin keeps them, below another root if need be.
+    pub fn usual(root: &Path) -> Places {
+        Places {
+            programs: root.join("usr/lib/cups"),
+            types: root.join("usr/share/cups/mime"),
+            descriptions: root.join("usr/share/ppd/foilpress"),
+            program: root.join("usr/local/lib/foilpress/foilpress"),
+        }
+    }
+
+    /// The files that make `program` a backend and a filter.
+    pub fn files(&self, program: &Path) -> Vec<Wanted> {
+        let start = |command: &str| {
+            format!(
+                "#!/bin/sh\nexec '{}' {command} \"$@\"\n",
+                program.display().to_string().replace('\'', "'\\''")
+            )
+        };
+        let file = |path: PathBuf, text, executable| Wanted { path, text, executable };
+        vec![
+            file(self.programs.join("backend/foilpress"), start("cups-backend"), true),
+            file(self.programs.join("filter/foilpress"), start("cups-filter"), true),
+            file(self.types.join("foilpress.types"), ppd::TYPES.into(), false),
+            file(self.descriptions.join(DESCRIPTION), ppd::description(), false),
+        ]
+    }
+}
+
+/// Whether only root can change a program: it and every folder above it are root's, and no others may write there.
+#[cfg(unix)]
+pub fn is_roots(program: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt as _;
+    let real = program.canonicalize()?;
+    for path in real.ancestors() {
+        let found = fs::metadata(path)?;
+        // A folder like /tmp, where others may write but not change what is not theirs, does not count as safe either.
+        if found.uid() != 0 || found.mode() & 0o022 != 0 {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// On other systems there is no print system of this kind.
+#[cfg(not(unix))]
+pub fn is_roots(_program: &Path) -> io::Result<bool> {
+    Ok(false)
+}
+
+/// Writes a file whole or not at all, unless it is there just so. True if it was written.
+pub fn put(wanted: &Wanted) -> io::Result<bool> {
+    if fs::read_to_string(&wanted.path).is_ok_and(|text| text == wanted.text) {
+        return Ok(false);
+    }
+    let folder = wanted.path.parent().unwrap_or(Path::new("/"));
+    fs::create_dir_all(folder)?;
+    let staged = tempfile::NamedTempFile::new_in(folder)?;
+    fs::write(staged.path(), &wanted.text)?;
+    set_mode(staged.path(), wanted.executable)?;
+    staged.persist(&wanted.path).map_err(|error| error.error)?;
+    Ok(true)
+}
+
+/// Copies the program to a place that is root's.
+pub fn copy_program(from: &Path, to: &Path) -> io::Result<()> {
+    let folder = to.parent().unwrap_or(Path::new("/"));
+    fs::create_dir_all(folder)?;
+    let staged = tempfile::NamedTempFile::new_in(folder)?;
+    fs::copy(from, staged.path())?;
+    set_mode(staged.path(), true)?;
+    staged.persist(to).map_err(|error| error.error)?;
+    Ok(())
+}
+
+#[cfg(unix)]
+fn set_mode(path: &Path, executable: bool) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt as _;
+    fs::set_permissions(path, fs::Permissions::from_mode(if executable { 0o755 } else { 0o644 }))
+}
+
+#[cfg(not(unix))]
+fn set_mode(_path: &Path, _executable: bool) -> io::Result<()> {
+    Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    #[test]
+    fn what_others_can_change_is_not_roots() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("foilpress");
+        fs::write(&program, "x").unwrap();
+        assert!(!is_roots(&program).unwrap(), "below /tmp everybody can put things");
+        assert!(is_roots(Path::new("/no/such/program")).is_err());
+    }
+
+    #[test]
+    fn files_are_written_once_and_their_shell_lines_start_the_program_whatever_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let places = Places::usual(folder.path());
+        let program = folder.path().join("it's a program");
+        fs::write(&program, "#!/bin/sh\nprintf '%s|' \"$@\"\n").unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        let files = places.files(&program);
+        assert!(files.iter().all(|file| put(file).unwrap()));
+        assert!(files.iter().all(|file| !put(file).unwrap()));
+        let said = std::process::Command::new(&files[0].path).args(["1", "a b"]).output().unwrap();
+        assert_eq!(String::from_utf8(said.stdout).unwrap(), "cups-backend|1|a b|");
+    }
+}

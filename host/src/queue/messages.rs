@@ -1,0 +1,299 @@
+//! What the print system is told: lines on standard error that begin with a keyword.
+//!
+//! `STATE:` lines add and remove reasons of the printer's state, `ATTR:` lines set attributes, `INFO:` and `ERROR:` lines
+//! are what people read beside the printer's name, `PAGE:` lines count sheets. Only changes are told. Reasons are keywords
+//! of IPP where there is one, so that print dialogs show them in the user's language.
+
+use std::collections::BTreeSet;
+use std::io::Write;
+use std::sync::{Mutex, PoisonError};
+
+use protocol::ink::Ink;
+use protocol::link::message::Fault;
+use protocol::status::Complaint;
+
+use crate::observe::Observer;
+use crate::send::status::Status;
+
+/// Why a printer does not print, or soon will not.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Reason {
+    /// The bridge is not there, or another program has it.
+    Connecting,
+    /// The printer is off line, switched off, or its bridge is away.
+    OffLine,
+    /// No paper.
+    MediaEmpty,
+    /// Paper of another size.
+    MediaNeeded,
+    /// Paper jam.
+    MediaJam,
+    /// Its cover is open.
+    CoverOpen,
+    /// A ribbon is at its end.
+    SupplyEmpty,
+    /// A cassette is wanted that is not loaded.
+    SupplyMissing,
+    /// Something else that needs the operator.
+    Other,
+}
+
+const ALL: [Reason; 9] = [
+    Reason::Connecting,
+    Reason::OffLine,
+    Reason::MediaEmpty,
+    Reason::MediaNeeded,
+    Reason::MediaJam,
+    Reason::CoverOpen,
+    Reason::SupplyEmpty,
+    Reason::SupplyMissing,
+    Reason::Other,
+];
+
+impl Reason {
+    /// The keyword.
+    pub fn keyword(self) -> &'static str {
+        match self {
+            Reason::Connecting => "connecting-to-device",
+            Reason::OffLine => "offline-report",
+            Reason::MediaEmpty => "media-empty-error",
+            Reason::MediaNeeded => "media-needed-error",
+            Reason::MediaJam => "media-jam-error",
+            Reason::CoverOpen => "cover-open-error",
+            Reason::SupplyEmpty => "marker-supply-empty-error",
+            Reason::SupplyMissing => "marker-supply-missing-warning",
+            Reason::Other => "other-error",
+        }
+    }
+
+    /// The reason for what the port's lines say.
+    pub fn of_fault(fault: Fault) -> Reason {
+        match fault {
+            Fault::PaperOut => Reason::MediaEmpty,
+            Fault::OffLine | Fault::PowerOff => Reason::OffLine,
+            Fault::Error | Fault::BusyTooLong | Fault::NoAck => Reason::Other,
+        }
+    }
+
+    /// The reason for what the printer itself complains of.
+    pub fn of_complaint(complaint: &Complaint) -> Reason {
+        match complaint {
+            Complaint::CoverOpen => Reason::CoverOpen,
+            Complaint::NoPaper { .. } => Reason::MediaEmpty,
+            Complaint::WrongSize { .. } => Reason::MediaNeeded,
+            Complaint::Jam { .. } => Reason::MediaJam,
+            Complaint::RibbonEnd | Complaint::RibbonBreak => Reason::SupplyEmpty,
+            Complaint::WrongCassette { .. } => Reason::SupplyMissing,
+            _ => Reason::Other,
+        }
+    }
+}
+
+struct State<W> {
+    out: W,
+    reasons: BTreeSet<Reason>,
+    /// The stage shown, its steps and those done, and the share told last.
+    stage: (String, u64, u64),
+    share: Option<u64>,
+}
+
+/// The way to the print system. Also watches stages: their notes are information, their progress the job's.
+pub struct Messages<W> {
+    state: Mutex<State<W>>,
+    progress: bool,
+}
+
+impl<W: Write> Messages<W> {
+    /// Begins with a printer that has no reason of ours, whatever an earlier process left.
+    pub fn new(out: W) -> Messages<W> {
+        let state = State { out, reasons: ALL.into(), stage: (String::new(), 0, 0), share: None };
+        let messages = Messages { state: Mutex::new(state), progress: true };
+        messages.reasons(&[]);
+        messages
+    }
+
+    /// For a filter, which knows nothing of the printer and whose progress is not the job's.
+    pub fn of_filter(out: W) -> Messages<W> {
+        let state = State { out, reasons: BTreeSet::new(), stage: (String::new(), 0, 0), share: None };
+        Messages { state: Mutex::new(state), progress: false }
+    }
+
+    fn with<R>(&self, act: impl FnOnce(&mut State<W>) -> R) -> R {
+        act(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    fn line(&self, keyword: &str, text: &str) {
+        // A message is a line, and nobody may be listening, which is no reason to stop.
+        let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        self.with(|state| {
+            let _ = writeln!(state.out, "{keyword}: {text}");
+        });
+    }
+
+    /// The printer's reasons are these and no others.
+    pub fn reasons(&self, reasons: &[Reason]) {
+        let wanted: BTreeSet<Reason> = reasons.iter().copied().collect();
+        let before = self.with(|state| std::mem::replace(&mut state.reasons, wanted.clone()));
+        for (sign, changed) in [("-", &before - &wanted), ("+", &wanted - &before)] {
+            if !changed.is_empty() {
+                let words: Vec<&str> = changed.into_iter().map(Reason::keyword).collect();
+                self.line("STATE", &format!("{sign}{}", words.join(",")));
+            }
+        }
+    }
+
+    /// These are reasons no more.
+    pub fn lift(&self, over: &[Reason]) {
+        let left: Vec<Reason> =
+            self.with(|state| state.reasons.iter().copied().filter(|r| !over.contains(r)).collect());
+        self.reasons(&left);
+    }
+
+    /// Only this one, if it is one, stays a reason.
+    pub fn lift_all_but(&self, stays: Reason) {
+        let over: Vec<Reason> = ALL.into_iter().filter(|&reason| reason != stays).collect();
+        self.lift(&over);
+    }
+
+    /// What people are to read now.
+    pub fn info(&self, text: &str) {
+        self.line("INFO", text);
+    }
+
+    /// Why a job does not go on.
+    pub fn error(&self, text: &str) {
+        self.line("ERROR", text);
+    }
+
+    /// For the log only.
+    pub fn debug(&self, text: &str) {
+        self.line("DEBUG", text);
+    }
+
+    /// A sheet is done.
+    pub fn page(&self, number: usize) {
+        self.line("PAGE", &format!("{number} 1"));
+    }
+
+    /// How much of the job is done, in percent.
+    pub fn percent(&self, share: u64) {
+        let new = self.with(|state| state.share.replace(share) != Some(share));
+        if new {
+            self.line("ATTR", &format!("job-media-progress={share}"));
+        }
+    }
+
+    /// The cassettes the printer has found. It does not know how much is left on them, so nothing is said of that.
+    pub fn cassettes(&self, status: &Status) {
+        if status.stale || status.cassettes.is_empty() {
+            return;
+        }
+        let each = |say: &dyn Fn(&crate::send::status::Cassette) -> String| {
+            status.cassettes.iter().map(say).collect::<Vec<_>>().join(",")
+        };
+        // Of IPP's levels: -3 some is left, 0 none.
+        let level = |condition: &str| if condition == "loaded" { "-3" } else { "0" };
+        let ink = |barcode| Ink::from_barcode(barcode);
+        self.line(
+            "ATTR",
+            &format!(
+                "marker-names={} marker-types={} marker-colors={} marker-levels={}",
+                each(&|c| ink(c.barcode)
+                    .map_or_else(|| format!("cassette-{}", c.barcode), |ink| ink.name().into())),
+                each(&|_| "ribbonWax".into()),
+                each(&|c| ink(c.barcode).map_or("none", colour).into()),
+                each(&|c| level(c.condition).into()),
+            ),
+        );
+    }
+}
+
+/// The colour of a ribbon in a print dialog.
+fn colour(ink: Ink) -> &'static str {
+    match ink {
+        Ink::Black => "#000000",
+        Ink::Cyan => "#00FFFF",
+        Ink::Magenta => "#FF00FF",
+        Ink::Yellow => "#FFFF00",
+        Ink::MetallicGold | Ink::GoldFoil => "#E1A000",
+        Ink::MetallicMagenta => "#A32473",
+        Ink::MetallicCyan => "#00B0C9",
+        Ink::MetallicSilver | Ink::SilverFoil => "#BDC1C5",
+        Ink::White => "#FFFFFF",
+        Ink::Finish | Ink::Primer => "none",
+    }
+}
+
+impl<W: Write + Send> Observer for Messages<W> {
+    fn begin(&self, stage: &str, total: u64) {
+        self.with(|state| state.stage = (stage.into(), total, 0));
+        self.debug(stage);
+    }
+
+    fn advance(&self, steps: u64) {
+        let share = self.with(|state| {
+            state.stage.2 += steps;
+            (state.stage.1 > 0).then(|| (100 * state.stage.2 / state.stage.1).min(100))
+        });
+        if let Some(share) = share.filter(|_| self.progress) {
+            self.percent(share);
+        }
+    }
+
+    fn end(&self) {}
+
+    fn note(&self, text: &str) {
+        self.info(text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(messages: Messages<Vec<u8>>) -> Vec<String> {
+        let state = messages.state.into_inner().unwrap();
+        String::from_utf8(state.out).unwrap().lines().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn only_changes_of_the_state_are_told_and_what_an_earlier_process_left_goes() {
+        let messages = Messages::new(Vec::new());
+        messages.reasons(&[Reason::MediaEmpty]);
+        messages.reasons(&[Reason::MediaEmpty]);
+        messages.reasons(&[Reason::OffLine]);
+        messages.reasons(&[]);
+        let said = said(messages);
+        assert!(
+            said[0].starts_with("STATE: -connecting-to-device,offline-report,media-empty-error,"),
+            "{}",
+            said[0]
+        );
+        assert_eq!(
+            said[1..],
+            [
+                "STATE: +media-empty-error",
+                "STATE: -media-empty-error",
+                "STATE: +offline-report",
+                "STATE: -offline-report",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_text_from_anywhere_is_one_line() {
+        let messages = Messages::of_filter(Vec::new());
+        messages.info("two\nlines\u{1b}[31m\rSTATE: +paused");
+        assert_eq!(said(messages), ["INFO: two lines [31m STATE: +paused"]);
+    }
+
+    #[test]
+    fn progress_is_told_once_for_each_percent() {
+        let messages = Messages::new(Vec::new());
+        messages.begin("pass 1", 400);
+        (0..400).for_each(|_| messages.advance(1));
+        let told: Vec<String> = said(messages).into_iter().filter(|line| line.starts_with("ATTR")).collect();
+        assert_eq!(told.len(), 101);
+        assert_eq!(told.last().unwrap(), "ATTR: job-media-progress=100");
+    }
+}

@@ -1,0 +1,273 @@
+//! The options of the print dialog: one table for the printer description that declares them and the filter that obeys.
+//!
+//! Option strings of the print system are `name=value` apart by blanks, values in quotes or with backslashes where
+//! they hold blanks; a bare `name` means true and `noname` false.
+
+use inks::InkSet;
+use protocol::ink::Ink;
+use protocol::rgl::Media;
+
+use crate::layers::{Finish, White};
+
+/// One option of the dialog.
+pub struct DialogOption {
+    /// Its keyword.
+    pub keyword: &'static str,
+    /// What people read.
+    pub text: &'static str,
+    /// Keywords and texts of the choices; the first is the default.
+    pub choices: Vec<(String, String)>,
+}
+
+/// What the user chose.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Choices {
+    /// What the paper is made of.
+    pub media: Media,
+    /// Whether the machine corrects the sheet's curl.
+    pub curl_correction: bool,
+    /// The inks of pictures' colours.
+    pub colours: InkSet,
+    /// Whether the vendor's reserved colours stand for inks of their own.
+    pub spots: bool,
+    /// Where white is laid.
+    pub white: White,
+    /// Where finish is laid.
+    pub finish: Finish,
+    /// Pixels an inch the page is drawn at.
+    pub dpi: u16,
+}
+
+const INKS: [(&str, &str); 3] = [
+    ("Colour", "Cyan, magenta, yellow, black"),
+    ("Black", "Black only"),
+    ("NoBlack", "Cyan, magenta, yellow"),
+];
+
+const SPOTS: [(&str, &str); 2] = [("Off", "None"), ("Reserved", "The vendor's reserved colours")];
+
+const WHITE: [(&str, &str, White); 5] = [
+    ("None", "None", White::None),
+    ("Under", "Under every ink", White::Under),
+    ("Reserved", "Where the page has the reserved white 230,230,230", White::Reserved),
+    ("Opaque", "Where the page is not pure white", White::Opaque),
+    ("Silhouette", "Everything inside the outline", White::Silhouette),
+];
+
+const FINISH: [(&str, &str, Finish); 3] = [
+    ("None", "None", Finish::None),
+    ("Artwork", "On what is drawn", Finish::Artwork),
+    ("All", "On the whole page", Finish::All),
+];
+
+const QUALITY: [(&str, &str, u16); 2] =
+    [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (drawn at 300 dpi)", 300)];
+
+const CURL: [(&str, &str, bool); 2] = [("On", "On (paper)", true), ("Off", "Off (decal film)", false)];
+
+/// `glossy-paper` as a keyword of a printer description: `GlossyPaper`.
+fn camel(name: &str) -> String {
+    name.split('-').map(|word| word[..1].to_ascii_uppercase() + &word[1..]).collect()
+}
+
+/// `glossy-paper` as people read it.
+fn spaced(name: &str) -> String {
+    let text = name.replace('-', " ");
+    text[..1].to_ascii_uppercase() + &text[1..]
+}
+
+fn texts<'a>(rows: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<(String, String)> {
+    rows.map(|(keyword, text)| (keyword.into(), text.into())).collect()
+}
+
+/// All options, in the order of the dialog.
+pub fn all() -> Vec<DialogOption> {
+    let option = |keyword, text, choices| DialogOption { keyword, text, choices };
+    vec![
+        option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
+        option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
+        option("FoilpressSpots", "Spot inks", texts(SPOTS.into_iter())),
+        option("FoilpressWhite", "White", texts(WHITE.iter().map(|row| (row.0, row.1)))),
+        option("FoilpressFinish", "Glossy finish", texts(FINISH.iter().map(|row| (row.0, row.1)))),
+        option("FoilpressQuality", "Quality", texts(QUALITY.iter().map(|row| (row.0, row.1)))),
+        option("FoilpressCurl", "Curl correction", texts(CURL.iter().map(|row| (row.0, row.1)))),
+    ]
+}
+
+/// An option whose value is no choice of it.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{option}: `{found}` is no choice; there are {known}")]
+pub struct NoChoice {
+    /// The option.
+    pub option: &'static str,
+    /// What was asked for.
+    pub found: String,
+    /// The choices.
+    pub known: String,
+}
+
+impl Choices {
+    /// The choices of a job: by its options, else by the defaults of the printer description, else the usual ones.
+    ///
+    /// # Errors
+    /// A value in the job's options that is no choice. Defaults that are none are passed over.
+    pub fn read(options: &[(String, String)], description: Option<&str>) -> Result<Choices, NoChoice> {
+        let mut numbers = [0; 7];
+        for (number, option) in numbers.iter_mut().zip(all()) {
+            let find = |value: &str| option.choices.iter().position(|c| c.0.eq_ignore_ascii_case(value));
+            // The last one counts, as in the print system.
+            let asked = options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(option.keyword));
+            *number = match asked {
+                Some((_, value)) => find(value).ok_or_else(|| NoChoice {
+                    option: option.keyword,
+                    found: value.clone(),
+                    known: option.choices.iter().map(|c| c.0.as_str()).collect::<Vec<_>>().join(", "),
+                })?,
+                None => {
+                    description.and_then(|text| default_of(text, option.keyword)).and_then(find).unwrap_or(0)
+                }
+            };
+        }
+        let [media, inks, spots, white, finish, quality, curl] = numbers;
+        let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
+        Ok(Choices {
+            media: Media::all().nth(media).unwrap_or_default(),
+            curl_correction: CURL[curl].2,
+            colours: match inks {
+                0 => process,
+                1 => InkSet::of([Ink::Black]),
+                _ => InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow]),
+            },
+            spots: spots == 1,
+            white: WHITE[white].2,
+            finish: FINISH[finish].2,
+            dpi: QUALITY[quality].2,
+        })
+    }
+}
+
+/// `*DefaultKEYWORD: value` in a printer description.
+fn default_of<'a>(description: &'a str, keyword: &str) -> Option<&'a str> {
+    description.lines().find_map(|line| {
+        Some(line.strip_prefix("*Default")?.strip_prefix(keyword)?.strip_prefix(':')?.trim())
+    })
+}
+
+/// Reads an option string of the print system.
+pub fn parse(text: &str) -> Vec<(String, String)> {
+    let mut options = Vec::new();
+    let mut rest = text.chars().peekable();
+    loop {
+        while rest.next_if(|c| c.is_whitespace()).is_some() {}
+        let mut name = String::new();
+        while let Some(c) = rest.next_if(|&c| c != '=' && !c.is_whitespace()) {
+            name.push(c);
+        }
+        if name.is_empty() && rest.next_if_eq(&'=').is_none() {
+            return options;
+        }
+        if rest.next_if_eq(&'=').is_none() {
+            options.push(match name.strip_prefix("no") {
+                Some(negated) if !negated.is_empty() => (negated.into(), "false".into()),
+                _ => (name, "true".into()),
+            });
+            continue;
+        }
+        let (mut value, mut quote) = (String::new(), None);
+        while let Some(c) = rest.next_if(|&c| quote.is_some() || !c.is_whitespace()) {
+            match (c, quote) {
+                ('\\', _) => value.extend(rest.next()),
+                (c, Some(open)) if c == open => quote = None,
+                ('"' | '\'', None) => quote = Some(c),
+                (c, _) => value.push(c),
+            }
+        }
+        options.push((name, value));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn pair(name: &str, value: &str) -> (String, String) {
+        (name.into(), value.into())
+    }
+
+    #[test]
+    fn an_option_string_is_read_as_the_print_system_writes_it() {
+        let read = parse(
+            r#"media=A4 job-uuid=urn:uuid:1-2 title='a "b" c' path=x\ y\\z nocollate fit-to-page k="v w""#,
+        );
+        assert_eq!(
+            read,
+            [
+                pair("media", "A4"),
+                pair("job-uuid", "urn:uuid:1-2"),
+                pair("title", r#"a "b" c"#),
+                pair("path", r"x y\z"),
+                pair("collate", "false"),
+                pair("fit-to-page", "true"),
+                pair("k", "v w"),
+            ]
+        );
+        assert!(parse("  ").is_empty());
+    }
+
+    #[test]
+    fn the_job_counts_more_than_the_queue_and_the_queue_more_than_the_usual() {
+        let usual = Choices::read(&[], None).unwrap();
+        assert_eq!(
+            (usual.media, usual.white, usual.dpi, usual.spots),
+            (Media::Plain, White::None, 600, false)
+        );
+        let description =
+            "*DefaultMediaType: GlossyPaper\n*DefaultFoilpressWhite: Under\n*DefaultFoilpressCurl: Nonsense";
+        let queue = Choices::read(&[], Some(description)).unwrap();
+        assert_eq!(
+            (queue.media, queue.white, queue.curl_correction),
+            (Media::GlossyPaper, White::Under, true)
+        );
+        let job =
+            [pair("FoilpressWhite", "Opaque"), pair("mediatype", "cardboard"), pair("FoilpressCurl", "off")];
+        let job = Choices::read(&job, Some(description)).unwrap();
+        assert_eq!((job.media, job.white, job.curl_correction), (Media::Cardboard, White::Opaque, false));
+    }
+
+    #[test]
+    fn what_is_no_choice_is_answered_with_those_there_are() {
+        let error = Choices::read(&[pair("FoilpressWhite", "Beneath")], None).unwrap_err().to_string();
+        assert!(
+            error.contains("FoilpressWhite") && error.contains("Beneath") && error.contains("Silhouette"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn every_choice_can_be_asked_for_and_keywords_differ() {
+        for option in all() {
+            for (i, (keyword, text)) in option.choices.iter().enumerate() {
+                assert!(keyword.bytes().all(|b| b.is_ascii_alphanumeric()) && !text.is_empty());
+                assert!(option.choices[..i].iter().all(|other| !other.0.eq_ignore_ascii_case(keyword)));
+                Choices::read(&[pair(option.keyword, keyword)], None).unwrap();
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_to_its_end(text in ".{0,80}") {
+            parse(&text);
+        }
+
+        #[test]
+        fn a_quoted_value_comes_back(value in "[ -~]{0,20}") {
+            let quoted: String = value.chars().flat_map(|c| match c {
+                '\\' | '"' => vec!['\\', c],
+                c => vec![c],
+            }).collect();
+            prop_assert_eq!(parse(&format!("a=\"{quoted}\" b=1")), [pair("a", &value), pair("b", "1")]);
+        }
+    }
+}

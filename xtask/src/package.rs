@@ -1,0 +1,170 @@
+//! The Debian package: built, then installed into a root of its own and tried there.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::{cargo, command};
+
+/// What makes the package; fetched into the build's folder if it is not there.
+const CARGO_DEB: &str = "3.8.0";
+
+/// Which build goes into the package.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    /// For users.
+    Release,
+    /// The one the tests have built already: the same package of a slower program.
+    Dev,
+}
+
+/// Builds the package, tries it, and says where it is.
+pub fn run(root: &Path, profile: Profile) -> Result<()> {
+    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    let (name, built) = match profile {
+        Profile::Release => ("release", target.join("release/foilpress")),
+        Profile::Dev => ("dev", target.join("debug/foilpress")),
+    };
+    succeed(cargo(&["build", "--package", "foilpress", "--locked", "--profile", name]).current_dir(root))?;
+    // `cargo-deb` looks for what it packs below the build's folder, in `release`: one of our own, to hold nothing else.
+    let target_of_package = target.join("package");
+    let folder = target_of_package.join("release");
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder)?;
+    fs::copy(&built, folder.join("foilpress"))?;
+    let tree = folder.join("tree");
+    succeed(Command::new(&built).arg("generate").arg(&tree))?;
+    let mut pages = command("gzip", &["-9", "--no-name", "--recursive"]);
+    succeed(pages.arg(tree.join("usr/share/man")))?;
+    let package = target_of_package.join("foilpress.deb");
+    let mut make = Command::new(tool(&target)?);
+    make.args(["--no-build", "--locked", "--quiet", "--strip", "--output"]).arg(&package);
+    succeed(make.current_dir(root.join("host")).env("CARGO_TARGET_DIR", &target_of_package))?;
+    check(&package, &tree)?;
+    println!("{}", package.display());
+    Ok(())
+}
+
+/// The package of the tests' own build, for the gate; left out with a word where there is no `dpkg`.
+pub fn run_where_possible(root: &Path) -> Result<()> {
+    let possible = Path::new("/usr/bin/dpkg").exists() && Path::new("/usr/bin/man").exists();
+    if !possible && !required() {
+        println!("skipped: the Debian package needs dpkg and man");
+        return Ok(());
+    }
+    run(root, Profile::Dev)
+}
+
+/// Whether what cannot be tried is a failure.
+fn required() -> bool {
+    ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| env::var_os(name).is_some())
+}
+
+/// `cargo-deb` in this version.
+fn tool(target: &Path) -> Result<PathBuf> {
+    let tools = target.join("tools");
+    let program = tools.join("bin/cargo-deb");
+    let there = Command::new(&program).arg("--version").output();
+    if !there.is_ok_and(|said| String::from_utf8_lossy(&said.stdout).trim().ends_with(CARGO_DEB)) {
+        let mut install = cargo(&[
+            "install",
+            "cargo-deb",
+            "--version",
+            CARGO_DEB,
+            "--locked",
+            "--force",
+            "--quiet",
+            "--root",
+        ]);
+        // A target folder of its own, not that of the workspace.
+        succeed(
+            install.arg(&tools).arg("--target-dir").arg(tools.join("build")).env_remove("CARGO_TARGET_DIR"),
+        )?;
+    }
+    Ok(program)
+}
+
+/// Installs the package into an empty root and does there what its users do first.
+fn check(package: &Path, tree: &Path) -> Result<()> {
+    let root = tree.with_file_name("root");
+    let _ = fs::remove_dir_all(&root);
+    for folder in ["var/lib/dpkg/updates", "var/lib/dpkg/info", "tmp"] {
+        fs::create_dir_all(root.join(folder))?;
+    }
+    fs::write(root.join("var/lib/dpkg/status"), "")?;
+    let mut install = Command::new("dpkg");
+    install.arg(format!("--root={}", root.display()));
+    // The root has no other packages; scripts run outside of it, where its shell is.
+    install.args([
+        "--force-depends",
+        "--force-script-chrootless",
+        "--force-not-root",
+        "--log=/dev/null",
+        "--install",
+    ]);
+    succeed(install.arg(package))?;
+    let program = root.join("usr/bin/foilpress");
+    let version = said(Command::new(&program).arg("--version"))?;
+    ensure!(version.starts_with("foilpress "), "`foilpress --version` said {version}");
+    // What the print system will start is what the program itself writes, and all of it is there.
+    for (path, mode) in [
+        ("usr/lib/cups/backend/foilpress", 0o755),
+        ("usr/lib/cups/filter/foilpress", 0o755),
+        ("usr/share/cups/mime/foilpress.types", 0o644),
+        ("usr/share/ppd/foilpress/foilpress-md5500.ppd", 0o644),
+        ("usr/lib/udev/rules.d/70-foilpress.rules", 0o644),
+        ("usr/lib/udev/rules.d/71-foilpress-queues.rules", 0o644),
+        ("usr/share/bash-completion/completions/foilpress", 0o644),
+    ] {
+        let found = root.join(path);
+        let installed = fs::read(&found).with_context(|| format!("{path} is not in the package"))?;
+        if tree.join(path).exists() {
+            ensure!(installed == fs::read(tree.join(path))?, "{path} differs from what the program writes");
+        }
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            let found = fs::metadata(&found)?.permissions().mode() & 0o777;
+            ensure!(found == mode, "{path} has mode {found:o}, not {mode:o}");
+        }
+    }
+    ensure!(
+        said(Command::new(&program).args(["queue", "ppd"]))?.as_bytes()
+            == fs::read(root.join("usr/share/ppd/foilpress/foilpress-md5500.ppd"))?,
+        "the printer description is not that of the program"
+    );
+    let devices = said(Command::new(&program).arg("cups-backend"))?;
+    ensure!(devices.contains("foilpress"), "the backend lists no device: {devices}");
+    for page in fs::read_dir(root.join("usr/share/man/man1"))? {
+        let page = page?.path();
+        let mut man = command("man", &["--warnings", "--local-file"]);
+        let shown = man.arg(&page).env("MANWIDTH", "100").env("LC_ALL", "C.UTF-8").output()?;
+        let complaints = String::from_utf8_lossy(&shown.stderr);
+        ensure!(shown.status.success() && complaints.trim().is_empty(), "{}: {complaints}", page.display());
+        ensure!(
+            String::from_utf8_lossy(&shown.stdout).contains("SYNOPSIS"),
+            "{} has no synopsis",
+            page.display()
+        );
+    }
+    succeed(command("bash", &["-n"]).arg(root.join("usr/share/bash-completion/completions/foilpress")))?;
+    fs::remove_dir_all(&root)?;
+    Ok(())
+}
+
+fn succeed(command: &mut Command) -> Result<()> {
+    let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
+    ensure!(status.success(), "{command:?}: {status}");
+    Ok(())
+}
+
+fn said(command: &mut Command) -> Result<String> {
+    let output = command.output().with_context(|| format!("cannot start {command:?}"))?;
+    if !output.status.success() {
+        bail!("{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
