@@ -329,10 +329,19 @@ impl Strobe {
             delay: 0,
             side_set: Some(1),
         };
+        let drain = Instruction {
+            operands: InstructionOperands::PULL { if_empty: false, block: false },
+            delay: 0,
+            side_set: Some(1),
+        };
         let side_set = embassy_rp::pio::program::SideSet::new(false, 1, false);
         // SAFETY: the machine stands still; both are instructions of its own kind with nStrobe high, and the program
         // is where it was loaded.
         unsafe {
+            // What waits in the queue is taken out and thrown away, should it have outlived its clearing.
+            for _ in 0..8 {
+                self.machine.exec_instr(drain.encode(side_set));
+            }
             self.machine.exec_instr(ready.encode(side_set));
             self.machine.exec_instr(jump.encode(side_set));
         }
