@@ -26,13 +26,13 @@ pub struct Line {
     /// When, in seconds since 1970.
     pub at: u64,
     /// What.
-    #[serde(flatten)]
     pub event: Event,
 }
 
 /// What happens to ribbons.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
-#[serde(tag = "event", rename_all = "lowercase")]
+// Not tagged inside, for then numbers would depend on how another library of the program has them parsed.
+#[serde(rename_all = "lowercase")]
 pub enum Event {
     /// A fresh cartridge is put in.
     New {

@@ -18,7 +18,7 @@ use foilpress::job::stream::write_job;
 use foilpress::observe::Silent;
 use foilpress::separate::{self, Pass, Plane};
 use foilpress::simulate::{Carousel, Cassette, Lever, Printer, Stock, Trouble, difference, print};
-use foilpress_tests::emulated::Emulated;
+use foilpress_tests::emulated::{Desk, Emulated};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
@@ -121,13 +121,18 @@ impl Bench {
         self.bridge.desk().printed.len()
     }
 
-    /// From `from` on, exactly these bytes crossed the port, then nothing but questions how the printer is, and so many
-    /// sheets have come out.
+    /// From `from` on, exactly these bytes crossed the port, before and after them nothing but questions how the printer
+    /// is, and so many sheets have come out.
     fn came_out(&self, from: usize, job: &[u8], sheets: usize) {
+        let asked =
+            |desk: &Desk| 2 * desk.printed[from..].chunks(2).take_while(|pair| *pair == [0x05, 0x01]).count();
         // The bridge knows of a byte a little before it is on the desk.
-        self.until("the job's bytes come", |bench| bench.printed() >= from + job.len());
+        self.until("the job's bytes come", |bench| {
+            let desk = bench.bridge.desk();
+            desk.printed.len() >= from + asked(&desk) + job.len()
+        });
         let desk = self.bridge.desk();
-        let (printed, after) = desk.printed[from..].split_at(job.len());
+        let (printed, after) = desk.printed[from + asked(&desk)..].split_at(job.len());
         let same = printed.iter().zip(job).take_while(|(a, b)| a == b).count();
         assert!(printed == job, "the same up to byte {same} of {}", job.len());
         assert!(after.chunks(2).all(|question| [0x05, 0x01].starts_with(question)), "{after:02x?}");
@@ -176,6 +181,7 @@ fn a_printed_document_is_the_very_sheet_although_every_cassette_has_to_be_put_in
         "postcard",
         "-o",
         "leaf",
+        "--yes",
         "--to",
         &bench.to(),
     ]);
