@@ -102,7 +102,7 @@ fn a_job_whose_bridge_is_not_there_waits_and_can_be_cancelled_without_it() {
 #[test]
 fn a_wrong_destination_is_wrong_usage_and_the_right_ones_are_shown() {
     let bench = Bench::new();
-    for args in ["send job.rgl", "send job.rgl --to usb:", "cancel 123456789", "bridge status --to file:x"] {
+    for args in ["send job.rgl", "send job.rgl --to lpt1:", "cancel 123456789", "bridge status --to file:x"] {
         bench.says(2, args);
     }
     assert!(bench.says(2, "send job.rgl --to paper").contains("serial:/dev/ttyACM0"));
