@@ -137,7 +137,12 @@ impl Bench {
         assert!(printed == job, "the same up to byte {same} of {}", job.len());
         assert!(after.chunks(2).all(|question| [0x05, 0x01].starts_with(question)), "{after:02x?}");
         drop(desk);
-        self.until("the sheet comes out", |bench| bench.bridge.desk().sheets.len() == sheets);
+        self.until("the sheet comes out", |bench| {
+            let desk = bench.bridge.desk();
+            assert_eq!(desk.refused, None);
+            assert!(desk.sheets.len() <= sheets, "{} sheets", desk.sheets.len());
+            desk.sheets.len() == sheets
+        });
     }
 
     /// What crossed the port was legal in every respect: edges and language.
