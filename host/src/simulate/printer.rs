@@ -466,7 +466,8 @@ impl Printer {
             return None;
         }
         let printout = self.finished.take()?;
-        if self.order.is_complete() && self.carry.is_empty() {
+        // Half a question behind the job is no byte of the next one.
+        if self.order.is_complete() && self.carry.first().is_none_or(|&first| is_question(first)) {
             self.order = Order::new();
         }
         Some(printout)
