@@ -6,7 +6,9 @@ use inks::{Curve, InkSet, Library};
 use proptest::prelude::*;
 use protocol::ink::Ink;
 
+use super::super::hull::LAYER_PRICE;
 use super::*;
+use crate::brdf::{Space, Table};
 use crate::gamut::Printable;
 
 fn library(space: &Space) -> Table {
