@@ -157,7 +157,7 @@ impl Mixer {
 
         let mut results = Vec::with_capacity(starts.len());
         for mut a in starts {
-            let fit = self.refine(hull, target, &mut a)?;
+            let fit = self.refine(hull, target, &mut a, 0.0)?;
             let value = fit.distance * fit.distance + dot(&hull.price, &a);
             results.push((value, fit, a));
         }
@@ -209,36 +209,27 @@ impl Mixer {
         Ok(())
     }
 
-    /// Refines a start to the minimum. `a` is the start, a point of the simplex, and receives the weights.
-    pub fn refine(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::All, 0.0)
-    }
-
-    /// The same, ending when the gap (in squared distance) is at most `gap`: for a picture's worth of targets.
-    pub fn refine_to(
+    /// Refines a start until the gap (in squared distance) is at most `enough`; 0: as far as it goes. `a` is the start, a
+    /// point of the simplex, and receives the weights.
+    pub fn refine(
         &mut self,
         hull: &Hull,
         target: &Target,
         a: &mut [f64],
-        gap: f64,
+        enough: f64,
     ) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::All, gap)
+        self.descend(hull, target, a, Reach::All, enough)
     }
 
-    /// The best mixture of the stacks that have weight in `a`. The gap is over these stacks alone.
-    pub fn polish(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::Support, 0.0)
-    }
-
-    /// The same, ending when the gap (in squared distance) is at most `gap`.
-    pub fn polish_to(
+    /// The same with the stacks alone that have weight in `a`; the gap is over these.
+    pub fn polish(
         &mut self,
         hull: &Hull,
         target: &Target,
         a: &mut [f64],
-        gap: f64,
+        enough: f64,
     ) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::Support, gap)
+        self.descend(hull, target, a, Reach::Support, enough)
     }
 
     fn descend(
