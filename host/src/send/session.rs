@@ -374,7 +374,7 @@ impl<'d> Session<'d> {
     fn convinced(&mut self, now: Duration) -> bool {
         if self.contradicted.is_none_or(|at| now.saturating_sub(at) >= REPEAT) {
             self.contradicted = Some(now);
-            self.contradictions += 1;
+            self.contradictions = self.contradictions.saturating_add(1);
         }
         self.contradictions >= CONVINCED
     }
