@@ -52,3 +52,6 @@ pub mod ledger;
 pub mod queue;
 
 pub mod cli;
+
+#[cfg(test)]
+mod damage;

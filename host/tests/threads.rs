@@ -30,7 +30,7 @@ fn document(folder: &Path) {
         (v >> 27) as u8
     };
     let picture =
-        |rgb: &dyn Fn(u32, u32) -> [u8; 3]| image::RgbImage::from_fn(70, 240, |x, y| image::Rgb(rgb(x, y)));
+        |rgb: &dyn Fn(u32, u32) -> [u8; 3]| image::RgbImage::from_fn(40, 240, |x, y| image::Rgb(rgb(x, y)));
     let maps: [(&str, image::RgbImage); 3] = [
         ("base_color.png", picture(&|x, y| [60 + (y / 2) as u8, 40 + 2 * x as u8, 50 + noise(x, y, 1)])),
         ("roughness.png", picture(&|x, y| [90 + noise(x, y, 2) + x as u8; 3])),
@@ -65,7 +65,7 @@ fn a_document_is_printed_and_shown_the_same_with_any_number_of_threads() {
     let bench = Bench::new();
     document(&bench.path("tile"));
     // The blend clamps too. Long enough for two strips of the halftone.
-    let args = "print tile --size 26x90mm --bases 4 --intent blend --inks all";
+    let args = "print tile --size 15x90mm --bases 4 --intent blend --inks all";
     the_same_with_one_thread_and_with_three(&bench, args);
 }
 
@@ -74,5 +74,5 @@ fn a_picture_in_process_inks_is_printed_the_same_with_any_number_of_threads() {
     let bench = Bench::new();
     document(&bench.path("tile"));
     fs::rename(bench.path("tile/base_color.png"), bench.path("photo.png")).unwrap();
-    the_same_with_one_thread_and_with_three(&bench, "layers photo.png --size 26x90mm");
+    the_same_with_one_thread_and_with_three(&bench, "layers photo.png --size 15x90mm");
 }

@@ -1,17 +1,15 @@
 //! Every reader against files nobody would send in good faith.
 //!
-//! Starting from good documents of every kind: files cut short anywhere, bytes changed, pieces left out or said twice, numbers
-//! in text replaced by impossible ones. Checksums of PNG files are mended afterwards, or nothing would get past
-//! them. Whatever comes, the answer is a document or an error that names the file; a panic or an endless loop fails the test.
+//! Starting from good documents of every kind, one file of which is [damaged](crate::damage). Whatever comes, the answer is a document or an error that names the file; a panic or an endless loop fails the test.
 
 use std::path::Path;
 
 use base64::Engine;
 use proptest::prelude::*;
-use proptest::sample::Index;
 
 use super::*;
 use crate::brdf::Table;
+use crate::damage::{damages, spoilt};
 use crate::observe::Silent;
 use crate::weights::{WeightMaps, quantise};
 
@@ -151,11 +149,6 @@ impl Victim {
         bytes
     }
 
-    /// Whether it is a file people write by hand.
-    fn is_text(&self) -> bool {
-        [".toml", ".csv", ".gltf"].iter().any(|ending| self.damaged.ends_with(ending))
-    }
-
     /// Puts the files, one of them with other bytes, into a folder and opens them.
     fn open_with(&self, folder: &Path, bytes: &[u8]) -> Result<Document, DocumentError> {
         for (name, good) in &self.files {
@@ -187,105 +180,6 @@ impl Victim {
     }
 }
 
-/// One thing that happens to the bytes of a file.
-#[derive(Clone, Debug)]
-enum Damage {
-    Set(Index, u8),
-    Cut(Index),
-    LeaveOut(Index, Index),
-    Repeat(Index, Index),
-    /// Another number in the place of one written in text.
-    Number(Index, &'static str),
-}
-
-const NUMBERS: [&str; 14] = [
-    "0",
-    "-1",
-    "1",
-    "2",
-    "1e999",
-    "-1e999",
-    "nan",
-    "inf",
-    "1e-320",
-    "65536",
-    "4294967295",
-    "18446744073709551615",
-    "99999999999999999999999",
-    "",
-];
-
-fn damage() -> impl Strategy<Value = Damage> {
-    prop_oneof![
-        4 => (any::<Index>(), any::<u8>()).prop_map(|(at, byte)| Damage::Set(at, byte)),
-        1 => any::<Index>().prop_map(Damage::Cut),
-        1 => (any::<Index>(), any::<Index>()).prop_map(|(a, b)| Damage::LeaveOut(a, b)),
-        1 => (any::<Index>(), any::<Index>()).prop_map(|(a, b)| Damage::Repeat(a, b)),
-        6 => (any::<Index>(), prop::sample::select(&NUMBERS[..])).prop_map(|(at, n)| Damage::Number(at, n)),
-    ]
-}
-
-/// Where numbers stand in a text.
-fn numbers(text: &[u8]) -> Vec<std::ops::Range<usize>> {
-    let part = |byte: &u8| byte.is_ascii_digit() || b".-".contains(byte);
-    let mut found = Vec::new();
-    let mut at = 0;
-    while at < text.len() {
-        let length = text[at..].iter().take_while(|byte| part(byte)).count();
-        if length > 0 {
-            found.push(at..at + length);
-        }
-        at += length.max(1);
-    }
-    found
-}
-
-impl Damage {
-    /// `reach`: how far from the start bytes are changed.
-    fn apply(&self, bytes: &mut Vec<u8>, reach: usize, is_text: bool) {
-        let reach = bytes.len().min(reach);
-        if reach == 0 {
-            return;
-        }
-        let range = |a: &Index, b: &Index| {
-            let (a, b) = (a.index(reach), b.index(reach));
-            a.min(b)..a.max(b)
-        };
-        match self {
-            Damage::Set(at, byte) => bytes[at.index(reach)] = *byte,
-            Damage::Cut(at) => bytes.truncate(at.index(reach)),
-            Damage::LeaveOut(a, b) => drop(bytes.drain(range(a, b))),
-            Damage::Repeat(a, b) => {
-                let range = range(a, b);
-                let piece = bytes[range.clone()].to_vec();
-                bytes.splice(range.end..range.end, piece);
-            }
-            Damage::Number(at, number) => {
-                let places = if is_text { numbers(bytes) } else { Vec::new() };
-                if !places.is_empty() {
-                    bytes.splice(places[at.index(places.len())].clone(), number.bytes());
-                }
-            }
-        }
-    }
-}
-
-/// Mends the checksums of a PNG file's chunks, as far as they still are chunks.
-fn mended(mut bytes: Vec<u8>) -> Vec<u8> {
-    let mut at = 8;
-    while let Some(length) = bytes.get(at..at + 4).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]])) {
-        let end = at + 8 + length as usize;
-        let Some(chunk) = bytes.get(at + 4..end) else { break };
-        let crc = !chunk.iter().fold(!0u32, |crc, &byte| {
-            (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg()))
-        });
-        let Some(sum) = bytes.get_mut(end..end + 4) else { break };
-        sum.copy_from_slice(&crc.to_be_bytes());
-        at = end + 4;
-    }
-    bytes
-}
-
 #[test]
 fn the_good_files_are_good() {
     for victim in victims() {
@@ -312,16 +206,9 @@ proptest! {
     #[test]
     fn damaged_files_are_answered(
         which in prop::sample::select(victims()).no_shrink(),
-        damages in prop::collection::vec(damage(), 1..6),
-        near_start in any::<bool>(),
+        damages in damages(),
     ) {
-        let mut bytes = which.bytes().to_vec();
-        // Headers hold the sizes: half of the damage goes there.
-        let reach = if near_start { 64 } else { usize::MAX };
-        for damage in damages {
-            damage.apply(&mut bytes, reach, which.is_text());
-        }
-        which.survive(&if bytes.starts_with(b"\x89PNG") { mended(bytes) } else { bytes });
+        which.survive(&spoilt(which.damaged, which.bytes(), &damages));
     }
 
     #[test]
