@@ -45,6 +45,8 @@ pub mod chart;
 
 pub mod folders;
 
+pub mod scratch;
+
 pub mod ledger;
 
 pub mod queue;

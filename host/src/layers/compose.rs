@@ -6,7 +6,7 @@
 //! the combinations that occur, which are counted, and each is turned into a stack once: in the order of the inks
 //! ([`Order`]), each as often as [`Settings::passes`] says, with knocked-out inks taken away and accepted undercoats put
 //! in. What the art needs and did not ask for comes back as [`Suggestion`]s, never silently.
-//! Cost: about 2 ns a dot and the halftones'. Limits: [`MOST_PASSES`] planes, [`MOST_CARTRIDGES`] inks, 256 stacks.
+//! Cost: about 2 ns a dot and the halftones'. Limits: [`MOST_PASSES`] planes, 256 stacks.
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::{Ink, Kind};
@@ -19,7 +19,7 @@ use crate::gamut::InkMix;
 use crate::halftone::Placement;
 use crate::observe::Observer;
 use crate::pipeline;
-use crate::separate::{MOST_CARTRIDGES, MOST_PASSES, Plane, customary, pack};
+use crate::separate::{MOST_PASSES, Plane, customary, pack};
 use crate::sheet::Piece;
 use crate::weights::{ONE, WeightMaps};
 
@@ -169,7 +169,7 @@ struct Slot {
 /// Composes art to one stack for every dot.
 ///
 /// # Errors
-/// Settings that do not fit the art, more inks or layers than the machine takes, nothing to print.
+/// Settings that do not fit the art, more layers than the machine takes, nothing to print.
 pub fn compose(
     art: &Artwork,
     settings: &Settings,
@@ -198,9 +198,6 @@ pub fn compose(
     let mut inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
     inks.sort_unstable();
     inks.dedup();
-    if inks.len() > MOST_CARTRIDGES {
-        return Err(LayersError::Cartridges { inks });
-    }
     let mut slots = arranged(slots, &settings.order, library)?;
     for slot in &mut slots {
         slot.passes =

@@ -206,6 +206,21 @@ pub struct Laid {
     pub marks_left_out: usize,
 }
 
+impl Laid {
+    /// How many dots of the pieces each stack of the sheet has; what marks take does not count.
+    pub fn census(&self, sheet: &Sheet) -> [u64; 256] {
+        let mut census = [0; 256];
+        for piece in &self.pieces {
+            for row in sheet.index().chunks_exact(sheet.width()).skip(piece.top).take(piece.length) {
+                for &stack in &row[piece.left..][..piece.width] {
+                    census[usize::from(stack)] += 1;
+                }
+            }
+        }
+        census
+    }
+}
+
 /// Why a piece cannot be laid on a page.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LayoutError {
