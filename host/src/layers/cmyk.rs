@@ -108,6 +108,7 @@ pub(super) fn note(path: &Path, profile: bool) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Shape;
     use super::*;
 
     /// 16 x 8 pixels written by libjpeg (through Pillow): the left half 200, 0, 40, 20 of 255 in cyan, magenta, yellow and
@@ -120,14 +121,15 @@ mod tests {
         std::fs::write(&path, bytes).unwrap();
         let options = Options { dpi: Some(600.0), ..Options::default() };
         let art = jpeg(&path, &options).unwrap().unwrap();
-        let of = |ink: Ink| art.layers.iter().find(|layer| layer.ink == ink);
-        PLATES
-            .into_iter()
-            .map(|ink| match of(ink).map(|layer| &layer.shape) {
-                Some(super::super::Shape::Tone(tones)) => tones.clone(),
-                _ => vec![0; 128],
-            })
-            .collect()
+        let plane =
+            |ink: Ink| match art.layers.iter().find(|layer| layer.ink == ink).map(|layer| &layer.shape) {
+                Some(Shape::Tone(tones)) => tones.clone(),
+                Some(Shape::Solid(plane)) => {
+                    (0..128).map(|at| 255 * (plane.bits[at / 8] >> (7 - at % 8) & 1)).collect()
+                }
+                None => vec![0; 128],
+            };
+        PLATES.map(plane).to_vec()
     }
 
     fn near(planes: &[Vec<u8>], wanted: [u8; 4], tolerance: u8) {
