@@ -116,6 +116,9 @@ pub struct Composed {
     pub suggestions: Vec<Suggestion>,
 }
 
+/// Where the planes of plain colour come from.
+const COLOURS: &str = "the picture's colours";
+
 /// A plane on its way into the stacks.
 struct Slot {
     ink: Ink,
@@ -235,13 +238,7 @@ fn drawn_slots(
             bits::merge(&mut plane, &spot, |dots, spot| dots & !spot);
             match slots.iter_mut().find(|slot| slot.ink == ink) {
                 Some(slot) => bits::add(&mut slot.plane, &plane),
-                None => slots.push(Slot {
-                    ink,
-                    from: "the picture's colours".into(),
-                    place: None,
-                    plane,
-                    passes: 1,
-                }),
+                None => slots.push(Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 }),
             }
         }
     }
@@ -325,7 +322,7 @@ fn stack_up(
     // No entry of the table says there is no stack, so there is no such dot.
     let index = pack::unpack(&planes, width, length, &stack_of).unwrap_or_default();
     let piece = Piece::new(width, length, stacks, index)?;
-    let laid = slots
+    let laid: Vec<Laid> = slots
         .iter()
         .enumerate()
         .map(|(at, slot)| Laid {
@@ -341,7 +338,8 @@ fn stack_up(
         })
         .collect();
     let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
-    let suggestions = suggest::suggest(piece.stacks(), &dots, &order);
+    let mut suggestions = suggest::suggest(piece.stacks(), &dots, &order);
+    suggestions.extend(suggest::rare(&laid, &settings.inks));
     let size_mm = (width as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: dots[0], notes }, piece, suggestions })
 }

@@ -3,9 +3,14 @@
 //! Nothing here is done unasked: a suggestion says what and why, how many dots it is about, and what to type to have it.
 //! Source: the vendor's guide and owners' reports, as the ink library's rules.
 
-use inks::Stack;
+use inks::{InkSet, Stack};
 use protocol::ink::{Ink, Kind};
 use serde::Serialize;
+
+use super::{COLOURS, Laid, Settings};
+
+/// An ink with fewer than one of so many of the dots of a picture's colours is not worth a pass.
+const RARE: u64 = 1000;
 
 /// A suggestion that the user accepts: what the plan adds to the art.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize)]
@@ -93,4 +98,29 @@ pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Sugg
     .filter(|(dots, ..)| *dots > 0)
     .map(|(dots, text, how)| Suggestion { text: text.into(), how, dots })
     .collect()
+}
+
+/// Inks that plain colour asks for on so few dots that nobody would miss them; `allowed` are the inks that may be used.
+pub(super) fn rare(laid: &[Laid], allowed: &InkSet) -> Vec<Suggestion> {
+    let coloured: Vec<&Laid> = laid.iter().filter(|laid| laid.from == COLOURS).collect();
+    let all: u64 = coloured.iter().map(|laid| laid.dots).sum();
+    let without = |name: &str| {
+        if *allowed == Settings::default().inks {
+            return format!("--inks -{name}");
+        }
+        let others: Vec<_> = allowed.iter().map(Ink::name).filter(|&other| other != name).collect();
+        format!("--inks {}", others.join(","))
+    };
+    coloured
+        .into_iter()
+        .filter(|laid| laid.dots * RARE < all)
+        .map(|laid| Suggestion {
+            text: format!(
+                "the colours have next to no {}; without it a pass and a cartridge are saved",
+                laid.ink
+            ),
+            how: without(laid.ink),
+            dots: laid.dots,
+        })
+        .collect()
 }
