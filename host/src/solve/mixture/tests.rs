@@ -127,7 +127,9 @@ proptest! {
         a.iter_mut().for_each(|w| *w /= sum);
         let target = hull.target(&mixture(&curves, &a)).unwrap();
         let best = Mixer::new().best(&hull, &target).unwrap();
-        prop_assert!(best.fit.distance < 1e-11, "{:?}", best.fit);
+        // What the last steps can still win is lost in rounding: of squared distance, some 1e-16.
+        prop_assert!(best.fit.distance < 1e-7, "{:?}", best.fit);
+        prop_assert!(best.fit.distance.powi(2) <= best.fit.gap + 1e-20, "{:?}", best.fit);
     }
 
     /// Whatever the target: feasible, no vertex and no random mixture is nearer, and where E is convex the gap
