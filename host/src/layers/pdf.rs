@@ -53,7 +53,7 @@ fn page(
 ) -> Result<Artwork, LayersError> {
     let look = folder.path().join("look.tif");
     ghostscript(path, options.page, "tiffsep", (LOOK, LOOK), &look)?;
-    let missing = || wrong(path, format!("there is no page {}", options.page));
+    let missing = || wrong(path, format!("there is no page {}, or the file is damaged", options.page));
     let (width, height) = image::image_dimensions(&look).map_err(|_| missing())?;
     observer.advance(1);
     let size = (f64::from(width), f64::from(height));

@@ -6,7 +6,7 @@
 //! Method: pixels within the tolerance of an ink's colour, in each of red, green and blue, are that ink. All others, and
 //! those that are in no square of four such pixels, go to the nearer of two colours (an ink and white, or two inks) if
 //! they lie on the straight line between them, or little beyond its ends as sharpening leaves them, and both are seen next to
-//! them: they are the edge of those two. A lone pixel in the colour of a metal that is none of these is chance. What is left is
+//! them: they are the edge of those two. A lone pixel that is nearly the colour of a metal is chance. What is left is
 //! colour for the process inks.
 //! Cost: 20 ns a pixel. Limits: edges softened over more than two pixels remain partly colour.
 //! Source of the colours: the vendor's user's guide, in its English and its Japanese edition.
@@ -45,6 +45,8 @@ pub const TABLE: [Reserved; 6] = [
 /// A pixel's place in the list of colours in use, white first; or one of these.
 const OTHER: u8 = u8::MAX;
 const PAPER: u8 = 0;
+/// How far from a reserved colour a pixel is that was given it, whatever a file's depth and profile did.
+const EXACT: u8 = 2;
 /// Marks the class of a pixel that may be the edge of two others.
 const LOOSE: u8 = 0x80;
 
@@ -132,9 +134,13 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
         let entry = usize::from(class & !LOOSE).checked_sub(1).and_then(|at| table.get(at));
         entry.is_some_and(|entry| entry.ink.kind() == Kind::Metallic)
     };
+    let exact = |at: usize| {
+        let colour = colours.get(usize::from(class[at] & !LOOSE));
+        colour.is_some_and(|colour| (0..3).all(|c| colour[c].abs_diff(rgb[3 * at + c]) <= EXACT))
+    };
     let chance: Vec<usize> = edges
         .iter()
-        .filter(|(at, to)| to.is_none() && class[*at] != OTHER && metal(class[*at]))
+        .filter(|(at, to)| to.is_none() && class[*at] != OTHER && metal(class[*at]) && !exact(*at))
         .map(|&(at, _)| at)
         .filter(|&at| is_alone(&class, width, height, at % width, at / width))
         .collect();
@@ -307,7 +313,8 @@ mod tests {
 
     #[test]
     fn a_lone_pixel_of_metal_beside_colours_is_a_colour_and_a_line_of_it_is_metal() {
-        let silver = [189, 193, 197];
+        // Within the tolerance, not exact.
+        let silver = [197, 197, 197];
         let green = [40, 160, 60];
         let picture = |is_silver: &dyn Fn(usize, usize) -> bool| -> Vec<u8> {
             (0..400).flat_map(|at| if is_silver(at % 20, at / 20) { silver } else { green }).collect()

@@ -159,7 +159,8 @@ pub enum LayoutError {
     /// A part lies beyond the printable area.
     #[error(
         "{cut} of {width:.1} x {length:.1} mm would be cut off: {paper} prints {most_width:.1} x {most_length:.1} mm here; \
-         move it, make it smaller, take a larger --paper, or give --crop to cut"
+         {}, take a larger --paper, or give --crop to cut",
+        smaller(*width, *length, *most_width, *most_length)
     )]
     Beyond {
         /// What would be cut.
@@ -206,6 +207,17 @@ pub enum LayoutError {
     /// The page is no sheet.
     #[error(transparent)]
     Sheet(#[from] SheetError),
+}
+
+/// What to do with something of this size that has more or less room: move it, or make it as small as this.
+fn smaller(width: f64, length: f64, most_width: f64, most_length: f64) -> String {
+    let scale = (most_width / width).min(most_length / length);
+    if scale >= 1.0 {
+        return "move it".into();
+    }
+    // Never more than fits.
+    let below = |mm: f64| (10.0 * scale * mm).floor() / 10.0;
+    format!("make it smaller ({:.1} x {:.1} mm fits)", below(width), below(length))
 }
 
 /// Whether a piece of this size can be laid so, before it is made. Errors: those of [`arrange`].

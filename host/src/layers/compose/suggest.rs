@@ -124,3 +124,40 @@ pub(super) fn rare(laid: &[Laid], allowed: &InkSet) -> Vec<Suggestion> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn laid(ink: Ink, dots: u64, from: &str) -> Laid {
+        Laid { ink: ink.name(), dots, from: from.into(), passes: 1 }
+    }
+
+    #[test]
+    fn an_ink_on_next_to_no_dots_of_the_colours_is_suggested_to_be_left_out() {
+        let laid = [
+            laid(Ink::White, 3, "white.png"),
+            laid(Ink::Cyan, 90_000, COLOURS),
+            laid(Ink::Black, 9_910, COLOURS),
+            laid(Ink::Yellow, 90, COLOURS),
+        ];
+        let how = |allowed: &InkSet| {
+            rare(&laid, allowed)
+                .into_iter()
+                .map(|suggestion| (suggestion.how, suggestion.dots))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(how(&Settings::default().inks), [("--inks -yellow".to_owned(), 90)]);
+        let some = InkSet::of([Ink::White, Ink::Cyan, Ink::Yellow, Ink::Black]);
+        let [(words, 90)] = &how(&some)[..] else { panic!("one suggestion") };
+        // What is typed means the same inks but that one.
+        let typed: InkSet = words.strip_prefix("--inks ").unwrap().parse().unwrap();
+        assert_eq!(typed, InkSet::of([Ink::White, Ink::Cyan, Ink::Black]));
+    }
+
+    #[test]
+    fn few_dots_that_were_drawn_are_meant() {
+        let laid = [laid(Ink::Cyan, 90_000, COLOURS), laid(Ink::Yellow, 3, "yellow.png")];
+        assert!(rare(&laid, &Settings::default().inks).is_empty());
+    }
+}

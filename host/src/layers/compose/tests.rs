@@ -264,23 +264,3 @@ proptest! {
         prop_assert_eq!(laid, drawn);
     }
 }
-
-#[test]
-fn an_ink_on_next_to_no_dots_of_a_picture_is_suggested_to_be_left_out() {
-    // Cyan paper with a speck of pure yellow.
-    let (width, length) = (200, 200);
-    let mut art = Artwork::blank("speck", (width, length));
-    let pixel = |at: usize| if at % 100 < 2 && at / 100 < 2 { [255, 240, 0] } else { [0, 160, 220] };
-    art.colour = Some(Colour { width: 100, height: 100, rgb: (0..100 * 100).flat_map(pixel).collect() });
-    let how = |settings: &Settings| {
-        let composed = composed(&art, settings);
-        let rare = composed.suggestions.iter().filter(|s| s.text.contains("next to no yellow"));
-        rare.map(|s| (s.how.clone(), s.dots)).collect::<Vec<_>>()
-    };
-    let found = how(&Settings::default());
-    assert!(found.len() == 1 && found[0].0 == "--inks -yellow" && (1..40).contains(&found[0].1), "{found:?}");
-    let process = with(|s| s.inks = InkSet::of([Black, Cyan, Ink::Magenta, Ink::Yellow]));
-    assert_eq!(how(&process)[0].0, "--inks black,cyan,magenta");
-    // Followed, it is gone.
-    assert!(how(&with(|s| s.inks = InkSet::of([Black, Cyan, Ink::Magenta]))).is_empty());
-}
