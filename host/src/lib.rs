@@ -47,6 +47,8 @@ pub mod chart;
 
 pub mod folders;
 
+pub mod scratch;
+
 pub mod ledger;
 
 pub mod queue;

@@ -139,7 +139,7 @@ fn the_plan_of_a_job_has_the_figures_that_are_in_its_bytes() {
         bench.done(&format!("plan tile {SMALL} --repeat 2x1 --gap 3mm --media thick --curl off --json"));
     assert_eq!(json(&before)["passes"].as_array().map(Vec::len), Some(planned.len()));
     assert_eq!(json(&before)["pieces"], serde_json::json!([2, 1]));
-    bench.done("plan job.rgl --page page.html");
+    bench.done("plan job.rgl --html page.html");
     let page = fs::read_to_string(bench.path("page.html")).unwrap();
     assert!(page.contains("data:image/png;base64,") && !page.contains("http"), "whole in itself");
     assert!(page.contains("cardboard") && page.contains(passes[0]["cartridge"].as_str().unwrap()));

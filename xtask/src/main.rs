@@ -98,7 +98,7 @@ fn main() -> ExitCode {
         && let Err(error) = queue::install()
     {
         // The tests then say that they are skipped, or fail where they have to run.
-        eprintln!("print queues: {error:#}");
+        eprintln!("print queues and PDF: {error:#}");
     }
     for (name, mut step) in steps {
         eprintln!("== {name}: {step:?}");

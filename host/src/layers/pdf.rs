@@ -14,11 +14,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
-
-use super::raster::{self, wrong};
+use super::raster::{self, Unstated, wrong};
 use super::{Artwork, LayersError, Options, colour, names};
 use crate::observe::Observer;
+use crate::scratch::Scratch;
 
 /// Resolution of the first look.
 const LOOK: f64 = 36.0;
@@ -30,7 +29,7 @@ const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
 
 /// Reads a page.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
-    let folder = tempfile::tempdir().map_err(raster::io(path, "make a folder for its plates"))?;
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
     observer.begin("reading the page", 2);
     let art = match page(path, options, &folder, observer) {
         Err(LayersError::Program { .. }) if is_pdf(path)? => poppler(path, options, &folder),
@@ -49,19 +48,20 @@ fn is_pdf(path: &Path) -> Result<bool, LayersError> {
 fn page(
     path: &Path,
     options: &Options,
-    folder: &TempDir,
+    folder: &Scratch,
     observer: &dyn Observer,
 ) -> Result<Artwork, LayersError> {
     let look = folder.path().join("look.tif");
     ghostscript(path, options.page, "tiffsep", (LOOK, LOOK), &look)?;
-    let missing = || wrong(path, format!("there is no page {}", options.page));
+    let missing = || wrong(path, format!("there is no page {}, or the file is damaged", options.page));
     let (width, height) = image::image_dimensions(&look).map_err(|_| missing())?;
     observer.advance(1);
     let size = (f64::from(width), f64::from(height));
-    let dots = raster::dots(path, size, Some((LOOK, LOOK)), options.size, options.dpi)?;
+    let mut notes = Vec::new();
+    let look_density = Some((LOOK, LOOK));
+    let dots = raster::dots(path, size, look_density, Unstated::IsDots, &options.sized(), &mut notes)?;
     let density = (LOOK * dots.0 as f64 / size.0, LOOK * dots.1 as f64 / size.1);
     // The page's true size is less than a pixel of the look away; what is rendered decides.
-    let mut notes = Vec::new();
     let mut plates = Vec::new();
     for (name, file) in files(&look, folder)? {
         // Plates of other pages are there, too, and blank. A page paints every pixel it touches, so none is missed.
@@ -73,12 +73,12 @@ fn page(
         }
     }
     let name = super::stem(path);
-    // What is rendered is as many dots as it is pixels.
-    let rendered = Options { size: None, dpi: Some(600.0), ..options.clone() };
     if plates.is_empty() {
         let picture = folder.path().join("page.png");
         ghostscript(path, options.page, "pngalpha", density, &picture)?;
-        let mut art = colour::artwork(&name, colour::read(&picture)?, &rendered)?;
+        let picture = colour::read(&picture)?;
+        let dots = (picture.width as usize, picture.height as usize);
+        let mut art = colour::artwork_of(&name, picture, dots, options);
         art.notes.retain(|note| !note.contains("colour profile"));
         art.notes.append(&mut notes);
         return Ok(art);
@@ -92,7 +92,7 @@ fn page(
         let Some(named) = spot.or(process) else { continue };
         let scan = raster::scan(&file)?;
         let dots = (scan.width as usize, scan.height as usize);
-        art.get_or_insert_with(|| Artwork::blank(&name, dots)).add(scan, &plate, named, true, &rendered);
+        art.get_or_insert_with(|| Artwork::blank(&name, dots)).add(scan, &plate, named, true, options);
     }
     let mut art =
         art.ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
@@ -101,7 +101,7 @@ fn page(
 }
 
 /// The plates beside a separated page: `page(Gold Foil).tif`.
-fn files(page: &Path, folder: &TempDir) -> Result<Vec<(String, PathBuf)>, LayersError> {
+fn files(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
     let stem = super::stem(page);
     let mut plates = Vec::new();
     for entry in std::fs::read_dir(folder.path()).map_err(raster::io(page, "list its plates"))? {
@@ -143,7 +143,7 @@ fn ghostscript(
 }
 
 /// A PDF's page as a picture, where there is no Ghostscript.
-fn poppler(path: &Path, options: &Options, folder: &TempDir) -> Result<Artwork, LayersError> {
+fn poppler(path: &Path, options: &Options, folder: &Scratch) -> Result<Artwork, LayersError> {
     let to = folder.path().join("page");
     let file = std::path::absolute(path).map_err(raster::io(path, "find it"))?;
     let mut command = Command::new("pdftocairo");
@@ -158,7 +158,8 @@ fn poppler(path: &Path, options: &Options, folder: &TempDir) -> Result<Artwork, 
         install: "install it (Debian: apt install ghostscript), or Poppler (poppler-utils), or export the page as PNG",
     };
     run(path, command, missing)?;
-    let mut art = colour::artwork(&super::stem(path), colour::read(&to.with_extension("png"))?, options)?;
+    let mut art =
+        colour::artwork(&super::stem(path), colour::read(&to.with_extension("png"))?, &options.sized())?;
     art.notes.push(format!(
         "{}: read by Poppler, which knows no spot plates; install Ghostscript to have them as inks",
         path.display()

@@ -16,7 +16,7 @@ use inks::{Certainty, Rule, Severity, Stack};
 use protocol::ink::Kind;
 use serde::Serialize;
 
-use super::Plan;
+use super::{MOST_CARTRIDGES, Plan};
 use crate::halftone::metrics::smallest_clusters;
 use crate::sheet::Sheet;
 
@@ -218,6 +218,26 @@ pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, order: &[Rule]) 
             let PageRule { severity, certainty, .. } = *rule;
             checks.push(Check { rule: rule.name.into(), severity, certainty, text, stacks });
         }
+    }
+    if plan.cartridges.len() > MOST_CARTRIDGES {
+        let dots = |ink| plan.passes.iter().filter(|pass| pass.ink == ink).map(|pass| pass.dots).sum::<u64>();
+        let least = plan.cartridges.iter().copied().min_by_key(|&ink| dots(ink));
+        checks.push(Check {
+            rule: "cartridges".into(),
+            severity: Severity::Error,
+            certainty: Certainty::Vendor,
+            text: format!(
+                "{} cartridges, and the machine holds {MOST_CARTRIDGES}: one would have to be changed in the middle of the \
+                 sheet, and how long the machine holds it then is not known, so no such job is sent; leave out an ink{}",
+                plan.cartridges.len(),
+                least.map_or_else(String::new, |ink| format!(
+                    ", {} has the fewest dots ({})",
+                    ink.name(),
+                    dots(ink)
+                ))
+            ),
+            stacks: Vec::new(),
+        });
     }
     checks.sort_by_key(|check| Reverse(check.severity));
     checks
