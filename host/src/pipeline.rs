@@ -199,17 +199,6 @@ pub fn separate_page(
     Ok(separation)
 }
 
-/// The bytes of a job on plain settings of the page.
-pub fn job_of(
-    passes: &[Pass],
-    paper: Paper,
-    media: Media,
-    inks: &InkSet,
-    observer: &dyn Observer,
-) -> Result<Vec<u8>, StreamError> {
-    job_on(Page { media, ..Page::plain(paper) }, passes, inks, observer)
-}
-
 /// The bytes of a job on this page. A foil among `inks` is the user's consent to print it.
 pub fn job_on(
     page: Page,

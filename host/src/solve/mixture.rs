@@ -44,13 +44,6 @@ pub struct Fit {
     pub convex: bool,
 }
 
-impl Fit {
-    /// A distance no mixture can be below, by the gap (a bound where [`Fit::convex`]).
-    pub fn at_least(&self) -> f64 {
-        (self.distance * self.distance - self.gap).max(0.0).sqrt()
-    }
-}
-
 /// The best mixture over several starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Best {
