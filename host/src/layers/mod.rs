@@ -21,6 +21,7 @@ pub mod reserved;
 mod svg;
 mod tiff;
 pub mod white;
+mod window;
 
 use std::path::{Path, PathBuf};
 
@@ -36,6 +37,7 @@ pub use colour::Colour;
 pub use compose::{Accept, Composed, Finish, Order, Report, Settings, Suggestion, compose};
 pub use error::LayersError;
 pub use white::White;
+pub use window::Window;
 
 use raster::{Coverage, Scan};
 
@@ -150,11 +152,11 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
     Ok(art)
 }
 
-/// Art from a whole page in memory, drawn at `dpi` pixels an inch: sRGB without transparency, three bytes a pixel, row by
-/// row from the top. It may be larger than what can be printed of it.
+/// Art from a page in memory, drawn at `dpi` pixels an inch: sRGB without transparency, three bytes a pixel, row by
+/// row from the top.
 ///
 /// # Errors
-/// `rgb` of another size than `size`, or sides of more than 65535 dots.
+/// `rgb` of another size than `size`, or sides of no or more than 65535 dots.
 pub fn page(
     name: &str,
     size: (usize, usize),

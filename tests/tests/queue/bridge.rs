@@ -18,6 +18,8 @@ pub struct Port {
     /// Bytes it takes in a millisecond at most.
     pub rate: AtomicUsize,
     pub paper: AtomicBool,
+    /// The maker its device ID names; none for a port that does not talk back.
+    pub maker: Mutex<Option<&'static str>>,
     /// Everything that crossed it.
     pub printed: Mutex<Vec<u8>>,
     stop: AtomicBool,
@@ -41,6 +43,7 @@ impl Bridge {
         let port = Arc::new(Port {
             rate: rate.into(),
             paper: true.into(),
+            maker: Mutex::default(),
             printed: Mutex::default(),
             stop: false.into(),
         });
@@ -74,6 +77,12 @@ fn status() -> [u8; STATUS_LENGTH] {
     Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto).status()
 }
 
+/// A device ID as IEEE 1284 has it: its length, itself counted, then keys and values.
+fn device_id(maker: &str) -> Vec<u8> {
+    let text = format!("MFG:{maker};MDL:Test;CLS:PRINTER;");
+    [&[0, (text.len() + 2) as u8], text.as_bytes()].concat()
+}
+
 fn serve(listener: &TcpListener, port: &Port) {
     listener.set_nonblocking(true).unwrap();
     let mut board = Board::new(16_384, 8192);
@@ -101,9 +110,11 @@ fn serve(listener: &TcpListener, port: &Port) {
         }
         if let Some(task) = engine.task() {
             let status = status();
-            engine.done(match task {
-                Task::PrinterStatus => Outcome::Answer(Answer::Bytes(&status)),
-                Task::DeviceId => Outcome::Answer(Answer::OneWay),
+            let id = port.maker.lock().unwrap().map(device_id);
+            engine.done(match (task, &id) {
+                (Task::PrinterStatus, _) => Outcome::Answer(Answer::Bytes(&status)),
+                (Task::DeviceId, Some(id)) => Outcome::Answer(Answer::Bytes(id)),
+                (Task::DeviceId, None) => Outcome::Answer(Answer::OneWay),
                 _ => Outcome::Done,
             });
         }
