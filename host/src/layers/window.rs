@@ -45,6 +45,19 @@ impl Window {
         Window { left, top, width: right - left, height: bottom - top }
     }
 
+    /// What two have in common.
+    pub fn meet(&self, other: &Window) -> Option<Window> {
+        let (left, top) = (self.left.max(other.left), self.top.max(other.top));
+        let right = (self.left + self.width).min(other.left + other.width);
+        let bottom = (self.top + self.height).min(other.top + other.height);
+        (left < right && top < bottom).then(|| Window {
+            left,
+            top,
+            width: right - left,
+            height: bottom - top,
+        })
+    }
+
     /// The part of a picture in the window, which lies on it. Pixels are `bytes` long, rows `width` pixels.
     pub fn cut(&self, pixels: &[u8], width: usize, bytes: usize) -> Vec<u8> {
         let mut cut = Vec::with_capacity(bytes * self.width * self.height);
@@ -61,6 +74,23 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
+        #[test]
+        fn a_pixel_is_in_what_windows_have_in_common_if_it_is_in_both(sides: [(u8, u8, u8, u8); 2], at: (u8, u8)) {
+            let [a, b] = sides.map(|(left, top, width, height)| Window {
+                left: usize::from(left / 4),
+                top: usize::from(top / 4),
+                width: usize::from(width / 4),
+                height: usize::from(height / 4),
+            });
+            let at = (usize::from(at.0 / 2), usize::from(at.1 / 2));
+            let has = |window: &Window| {
+                (window.left..window.left + window.width).contains(&at.0)
+                    && (window.top..window.top + window.height).contains(&at.1)
+            };
+            prop_assert_eq!(a.meet(&b).is_some_and(|both| has(&both)), has(&a) && has(&b));
+            prop_assert!(!has(&a) && !has(&b) || has(&a.join(&b)));
+        }
+
         #[test]
         fn what_is_drawn_lies_in_its_window_and_touches_all_its_sides(
             width in 1usize..40,

@@ -215,7 +215,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         let in_page = |source| FilterError::Layers { page: number, source };
         let page = layers::pdf::separated(path, number, plates, dpi.into()).map_err(in_page)?;
         let paper = press::paper(number, page.size, dpi, press.choices)?;
-        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds()) {
+        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
             let art =
                 page.art(&format!("page {number}"), &view.window, &press.options(dpi)).map_err(in_page)?;
             let job = press.job(number, paper, &art, &view, false)?;
@@ -249,7 +249,7 @@ fn picture(
     press: &Press<'_>,
 ) -> Result<Vec<u8>, FilterError> {
     let drawn = Window::around(rgb, size.0, 3, 255);
-    let Some(view) = press.view(number, paper, (size, dpi), drawn) else { return Ok(Vec::new()) };
+    let Some(view) = press.view(number, paper, (size, dpi), drawn, mirrored) else { return Ok(Vec::new()) };
     let (window, name) = (&view.window, format!("page {number}"));
     let rgb = window.cut(rgb, size.0, 3);
     let art = layers::page(&name, (window.width, window.height), dpi, rgb, &press.options(dpi))
@@ -387,6 +387,24 @@ mod tests {
         assert_eq!((seen.setup.media, seen.setup.curl_correction), (Some("cardboard"), Some(false)));
         let passes: Vec<(&str, u64)> = seen.passes.iter().map(|pass| (pass.ink, pass.dots)).collect();
         assert_eq!(passes, [("white", 400 * 300), ("black", 400 * 300), ("finish", 2202 * 3082)]);
+    }
+
+    #[test]
+    fn a_page_that_comes_as_a_picture_is_mirrored_about_its_middle_and_moved_where_it_is_wanted() {
+        let place = |options: &str| {
+            let choices = Choices::read(&super::super::options::parse(options), None).unwrap();
+            let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
+            let bounds = inspect(&job, &Silent).inspection.passes[0].bounds.unwrap();
+            assert_eq!((bounds.width, bounds.height), (400, 300));
+            (bounds.x, bounds.y)
+        };
+        assert_eq!(place(""), (920, 429));
+        // What is 920 dots from the left of 2202 is as far from the right.
+        assert_eq!(place("MirrorPrint=True"), (2202 - 920 - 400, 429));
+        // An inch and two from the corner of the sheet.
+        assert_eq!(place("FoilpressPosition=1x2in"), (600 - 80, 1200 - 71));
+        assert_eq!(place("FoilpressPosition=Centre"), ((2202 - 400) / 2, (3082 - 300) / 2));
+        assert_eq!(place("FoilpressPosition=1x2in mirror=true"), (600 - 80, 1200 - 71));
     }
 
     #[test]

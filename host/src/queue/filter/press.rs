@@ -9,7 +9,7 @@ use protocol::rgl::Page;
 
 use super::{FilterError, io_error};
 use crate::layers::{self, Artwork, Window};
-use crate::layout::{self, Cut, Layout, Point, Position};
+use crate::layout::{self, Cut, Layout, Mm, Point, Position};
 use crate::observe::Observer;
 use crate::pipeline;
 use crate::queue::options::{Choices, Spots};
@@ -82,12 +82,15 @@ impl Press<'_> {
         paper: Paper,
         (size, dpi): ((usize, usize), u16),
         drawn: Option<Window>,
+        mirrored: bool,
     ) -> Option<View> {
         let Some(drawn) = drawn else {
             self.observer.note(&format!("page {number} is blank; no sheet is made of it"));
             return None;
         };
-        let view = View::of(self.choices.place, paper, size, dpi, drawn);
+        // A page is turned about its middle, not what is drawn on it.
+        let whole = mirrored || self.choices.finish == layers::Finish::All;
+        let view = View::of(self.choices.place, paper, (size, dpi), drawn, whole);
         if view.is_none() {
             self.observer.note(&format!(
                 "all that page {number} has lies on the margins, where this machine cannot print; no sheet is made of it"
@@ -178,7 +181,14 @@ pub(super) struct View {
 }
 
 impl View {
-    fn of(place: Place, paper: Paper, size: (usize, usize), dpi: u16, drawn: Window) -> Option<View> {
+    /// `whole` asks for all that can be printed, also where nothing is drawn.
+    fn of(
+        place: Place,
+        paper: Paper,
+        (size, dpi): ((usize, usize), u16),
+        drawn: Window,
+        whole: bool,
+    ) -> Option<View> {
         let pixels = |dots: u16| usize::from(dots) * usize::from(dpi) / 600;
         let (across, down) = (pixels(paper.width()), pixels(paper.length()));
         let position = match place {
@@ -194,13 +204,17 @@ impl View {
                     right: mm((drawn.left + drawn.width).saturating_sub(left + width)),
                     bottom: mm((drawn.top + drawn.height).saturating_sub(top + height)),
                 };
-                let inside = drawn.left < left + width
-                    && drawn.top < top + height
-                    && drawn.left + drawn.width > left
-                    && drawn.top + drawn.height > top;
-                return inside.then_some(View {
-                    window: Window { left, top, width, height },
-                    position: Position::FromPrintable(Point::default()),
+                let room = Window { left, top, width, height };
+                let seen = drawn.meet(&room)?;
+                // What is bare costs as much time as what is drawn.
+                let window = if whole { room } else { seen };
+                let dots = |pixels: usize| Mm::of_dots((pixels * 600 / usize::from(dpi)) as i64);
+                return Some(View {
+                    window,
+                    position: Position::FromPrintable(Point(
+                        dots(window.left - left),
+                        dots(window.top - top),
+                    )),
                     beyond: (beyond != Cut::default()).then_some(beyond),
                 });
             }
