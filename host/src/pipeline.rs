@@ -126,7 +126,7 @@ pub fn print(
     let halftoned = halftone_mix(&mapped.mix, library, &alone, observer)?;
     let Arranged { sheet, laid } =
         layout::arrange(&Piece::from(halftoned.clone()), &settings.layout, observer)?;
-    let separation = separate::separate(&sheet, library.rules(), observer)?;
+    let separation = separate_page(&sheet, &laid, library, observer)?;
     if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
         return Err(PrintError::Refused(check.with_stacks()));
     }
@@ -182,6 +182,21 @@ pub fn halftone_mix(
 ) -> Result<Sheet, HalftoneError> {
     let minimum = mix.stacks.iter().map(|stack| library.minimum_cluster(stack)).collect();
     halftone::halftone(mix, placement, &halftone::Settings { minimum }, observer)
+}
+
+/// The passes of a page. What the rules say is about its pieces: marks are cut off.
+pub fn separate_page(
+    sheet: &Sheet,
+    laid: &Laid,
+    library: &Library,
+    observer: &dyn Observer,
+) -> Result<Separation, SeparateError> {
+    let mut separation = separate::separate(sheet, library.rules(), observer)?;
+    let census = laid.census(sheet);
+    separation.spare_marks(|stack| {
+        sheet.stacks().iter().zip(census).any(|(known, dots)| known == stack && dots > 0)
+    });
+    Ok(separation)
 }
 
 /// The bytes of a job on plain settings of the page.

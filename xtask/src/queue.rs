@@ -1,4 +1,5 @@
-//! What the tests of print queues need beside Rust: a print server with its filters and clients, from Debian.
+//! What the tests of print queues and of PDF art need beside Rust, from Debian: a print server with its filters and clients,
+//! Ghostscript and Poppler.
 
 use std::env;
 use std::path::Path;
@@ -9,12 +10,13 @@ use anyhow::{Result, bail};
 use crate::{cargo, command};
 
 /// Programs the tests start, and the packages they are in.
-const NEEDED: [(&str, &str); 6] = [
+const NEEDED: [(&str, &str); 7] = [
     ("/usr/sbin/cupsd", "cups-daemon"),
     ("/usr/bin/lp", "cups-client"),
     ("/usr/bin/ipptool", "cups-ipp-utils"),
     ("/usr/lib/cups/filter/pdftopdf", "cups-filters"),
     ("/usr/bin/gs", "ghostscript"),
+    ("/usr/bin/pdftocairo", "poppler-utils"),
     ("/usr/bin/man", "man-db"),
 ];
 

@@ -15,11 +15,11 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use protocol::ink::Kind;
-use tempfile::TempDir;
 
-use super::raster::{self, wrong};
+use super::raster::{self, Unstated, wrong};
 use super::{Artwork, LayersError, Options, Window, colour, names};
 use crate::observe::Observer;
+use crate::scratch::Scratch;
 
 /// Resolution of the first look.
 const LOOK: f64 = 36.0;
@@ -31,7 +31,7 @@ const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
 
 /// Reads a page.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
-    let folder = tempfile::tempdir().map_err(raster::io(path, "make a folder for its plates"))?;
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
     observer.begin("reading the page", 2);
     let art = match page(path, options, &folder, observer) {
         Err(LayersError::Program { .. }) if is_pdf(path)? => poppler(path, options, &folder),
@@ -50,19 +50,20 @@ fn is_pdf(path: &Path) -> Result<bool, LayersError> {
 fn page(
     path: &Path,
     options: &Options,
-    folder: &TempDir,
+    folder: &Scratch,
     observer: &dyn Observer,
 ) -> Result<Artwork, LayersError> {
     let look = folder.path().join("look.tif");
     ghostscript(path, options.page, "tiffsep", (LOOK, LOOK), &look)?;
-    let missing = || wrong(path, format!("there is no page {}", options.page));
+    let missing = || wrong(path, format!("there is no page {}, or the file is damaged", options.page));
     let (width, height) = image::image_dimensions(&look).map_err(|_| missing())?;
     observer.advance(1);
     let size = (f64::from(width), f64::from(height));
-    let dots = raster::dots(path, size, Some((LOOK, LOOK)), options.size, options.dpi)?;
+    let mut notes = Vec::new();
+    let look_density = Some((LOOK, LOOK));
+    let dots = raster::dots(path, size, look_density, Unstated::IsDots, &options.sized(), &mut notes)?;
     let density = (LOOK * dots.0 as f64 / size.0, LOOK * dots.1 as f64 / size.1);
     // The page's true size is less than a pixel of the look away; what is rendered decides.
-    let mut notes = Vec::new();
     let mut plates = Vec::new();
     for (name, file) in files(&look, folder)? {
         // Plates of other pages are there, too, and blank. A page paints every pixel it touches, so none is missed.
@@ -74,19 +75,19 @@ fn page(
         }
     }
     let name = super::stem(path);
-    // What is rendered is as many dots as it is pixels.
-    let rendered = Options { size: None, dpi: Some(600.0), ..options.clone() };
     if plates.is_empty() {
         let picture = folder.path().join("page.png");
         ghostscript(path, options.page, "pngalpha", density, &picture)?;
-        let mut art = colour::artwork(&name, colour::read(&picture)?, &rendered)?;
+        let picture = colour::read(&picture)?;
+        let dots = (picture.width as usize, picture.height as usize);
+        let mut art = colour::artwork_of(&name, picture, dots, options);
         art.notes.retain(|note| !note.contains("colour profile"));
         art.notes.append(&mut notes);
         return Ok(art);
     }
     let full = folder.path().join("page.tif");
     ghostscript(path, options.page, "tiffsep", density, &full)?;
-    let mut art = of_plates(&name, &full, folder, &plates, &rendered)?
+    let mut art = of_plates(&name, &full, folder, &plates, options)?
         .ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
     art.notes.append(&mut notes);
     Ok(art)
@@ -96,7 +97,7 @@ fn page(
 fn of_plates(
     name: &str,
     page: &Path,
-    folder: &TempDir,
+    folder: &Scratch,
     spots: &[(String, names::Named)],
     options: &Options,
 ) -> Result<Option<Artwork>, LayersError> {
@@ -117,7 +118,7 @@ fn of_plates(
 /// # Errors
 /// As [`open`](super::open): a document that Ghostscript cannot read, or no Ghostscript.
 pub fn spots(path: &Path) -> Result<Vec<Vec<String>>, LayersError> {
-    let folder = tempfile::tempdir().map_err(raster::io(path, "make a folder for its plates"))?;
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
     let look = folder.path().join("look%d.tif");
     run_ghostscript(path, &["-sCompression=lzw".into()], "tiffsep", (LOOK, LOOK), &look, &[])?;
     let mut pages = Vec::new();
@@ -152,7 +153,7 @@ pub struct Separated {
 /// # Errors
 /// As [`open`](super::open).
 pub fn separated(path: &Path, page: usize, names: &[String], dpi: f64) -> Result<Separated, LayersError> {
-    let folder = tempfile::tempdir().map_err(raster::io(path, "make a folder for its plates"))?;
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
     let full = folder.path().join("page.tif");
     // Only colours it is told of become plates of their own; it draws all others by their process colours.
     let list: String = names.iter().map(|name| format!("({}) cvn ", escaped(name))).collect();
@@ -225,7 +226,7 @@ fn escaped(name: &str) -> String {
 }
 
 /// The plates beside a separated page: `page(Gold Foil).tif`.
-fn files(page: &Path, folder: &TempDir) -> Result<Vec<(String, PathBuf)>, LayersError> {
+fn files(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
     let stem = super::stem(page);
     let mut plates = Vec::new();
     for entry in std::fs::read_dir(folder.path()).map_err(raster::io(page, "list its plates"))? {
@@ -281,7 +282,7 @@ fn run_ghostscript(
 }
 
 /// A PDF's page as a picture, where there is no Ghostscript.
-fn poppler(path: &Path, options: &Options, folder: &TempDir) -> Result<Artwork, LayersError> {
+fn poppler(path: &Path, options: &Options, folder: &Scratch) -> Result<Artwork, LayersError> {
     let to = folder.path().join("page");
     let file = std::path::absolute(path).map_err(raster::io(path, "find it"))?;
     let mut command = Command::new("pdftocairo");
@@ -296,7 +297,8 @@ fn poppler(path: &Path, options: &Options, folder: &TempDir) -> Result<Artwork, 
         install: "install it (Debian: apt install ghostscript), or Poppler (poppler-utils), or export the page as PNG",
     };
     run(path, command, missing)?;
-    let mut art = colour::artwork(&super::stem(path), colour::read(&to.with_extension("png"))?, options)?;
+    let mut art =
+        colour::artwork(&super::stem(path), colour::read(&to.with_extension("png"))?, &options.sized())?;
     art.notes.push(format!(
         "{}: read by Poppler, which knows no spot plates; install Ghostscript to have them as inks",
         path.display()

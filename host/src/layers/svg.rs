@@ -14,7 +14,7 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, roxmltree};
 
 use super::colour::{self, Pixels};
-use super::raster::{self, Gather, Scan, wrong};
+use super::raster::{self, Gather, Scan, Unstated, wrong};
 use super::{Artwork, LayersError, Options, names};
 use crate::observe::Observer;
 
@@ -63,20 +63,19 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let tree =
         usvg::Tree::from_str(&text, &usual).map_err(|error| wrong(path, format!("no drawing: {error}")))?;
     let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
-    let dots = raster::dots(path, size, Some((UNITS, UNITS)), options.size, options.dpi)?;
+    let dots =
+        raster::dots(path, size, Some((UNITS, UNITS)), Unstated::IsDots, &options.sized(), &mut notes)?;
     let scale = Transform::from_scale((dots.0 as f64 / size.0) as f32, (dots.1 as f64 / size.1) as f32);
     let canvas =
         || Pixmap::new(dots.0 as u32, dots.1 as u32).ok_or_else(|| wrong(path, "the drawing is too large"));
     let (width, height) = (dots.0 as u32, dots.1 as u32);
-    // From here on a pixel is a dot.
-    let options = &Options { size: None, dpi: Some(600.0), ..options.clone() };
 
     if groups.is_empty() {
         let mut pixmap = canvas()?;
         resvg::render(&tree, scale, &mut pixmap.as_mut());
         let rgba = straight(pixmap);
         let pixels = Pixels { path: path.to_path_buf(), width, height, density: None, rgba, notes };
-        return colour::artwork(&super::stem(path), pixels, options);
+        return Ok(colour::artwork_of(&super::stem(path), pixels, dots, options));
     }
     observer.begin("rendering layers", groups.len() as u64);
     let mut art = Artwork::blank(&super::stem(path), dots);
