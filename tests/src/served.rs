@@ -27,6 +27,8 @@ pub struct Port {
     pub paper: AtomicBool,
     /// The printer's cover is open.
     pub open_cover: AtomicBool,
+    /// The maker its device ID names; none for a port that does not talk back.
+    pub maker: Mutex<Option<&'static str>>,
     /// How often the printer was reset.
     pub resets: AtomicUsize,
     /// The bridge's power goes, and its memory with it.
@@ -47,6 +49,7 @@ impl Port {
             busy: false.into(),
             paper: true.into(),
             open_cover: false.into(),
+            maker: Mutex::default(),
             resets: 0.into(),
             forget: false.into(),
             cassettes: cassettes.iter().copied().map(Cassette::from).collect(),
@@ -159,9 +162,11 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
             // What the board would do at the port.
             let status = port.status();
             port.resets.fetch_add(usize::from(task == Task::Initialise), Ordering::Relaxed);
-            engine.done(match task {
-                Task::PrinterStatus => Outcome::Answer(Answer::Bytes(&status)),
-                Task::DeviceId => Outcome::Answer(Answer::OneWay),
+            let id = port.maker.lock().ok().and_then(|maker| maker.map(device_id));
+            engine.done(match (task, &id) {
+                (Task::PrinterStatus, _) => Outcome::Answer(Answer::Bytes(&status)),
+                (Task::DeviceId, Some(id)) => Outcome::Answer(Answer::Bytes(id)),
+                (Task::DeviceId, None) => Outcome::Answer(Answer::OneWay),
                 _ => Outcome::Done,
             });
         }
@@ -192,4 +197,10 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
             }
         }
     }
+}
+
+/// A device ID as IEEE 1284 has it: its length, itself counted, then keys and values.
+fn device_id(maker: &str) -> Vec<u8> {
+    let text = format!("MFG:{maker};MDL:Test;CLS:PRINTER;");
+    [&[0, (text.len() + 2) as u8], text.as_bytes()].concat()
 }

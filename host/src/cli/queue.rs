@@ -96,7 +96,7 @@ fn system(program: &str, arguments: &[&str]) -> Result<String> {
         if ["Forbidden", "Unauthorized", "Not authorized"].iter().any(|word| said.contains(word)) {
             bail!("{} ({program}: {said})", as_root());
         }
-        if said.contains("Unable to connect") || said.contains("Bad file descriptor") {
+        if ["Unable to connect", "Scheduler is not running"].iter().any(|words| said.contains(words)) {
             bail!(
                 "the print system does not answer; is it running (Debian: sudo service cups start)? ({program}: {said})"
             );
@@ -125,6 +125,8 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             places.programs.display()
         );
     }
+    // Before anything is written: without an answer there will be no queue.
+    queues()?;
     let mut program = std::env::current_exe().context("cannot find this program")?;
     // A package has put its own files there, which stay.
     if program != Path::new(PACKAGED) && !install::is_roots(&program).with_context(as_root)? {

@@ -22,6 +22,7 @@ pub mod reserved;
 mod svg;
 mod tiff;
 pub mod white;
+mod window;
 
 use std::path::{Path, PathBuf};
 
@@ -37,6 +38,7 @@ pub use colour::Colour;
 pub use compose::{Accept, Composed, Finish, Order, Report, Settings, Suggestion, compose};
 pub use error::LayersError;
 pub use white::White;
+pub use window::Window;
 
 use raster::{Coverage, Scan, Unstated};
 
@@ -196,11 +198,11 @@ pub fn is_art(path: &Path) -> bool {
         || PICTURES.contains(&extension.as_str()) && names::ink(&stem(path)).is_some()
 }
 
-/// Art from a whole page in memory, drawn at `dpi` pixels an inch: sRGB without transparency, three bytes a pixel, row by
-/// row from the top. It may be larger than what can be printed of it.
+/// Art from a page in memory, drawn at `dpi` pixels an inch: sRGB without transparency, three bytes a pixel, row by
+/// row from the top.
 ///
 /// # Errors
-/// `rgb` of another size than `size`, or sides of more than 65535 dots.
+/// `rgb` of another size than `size`, or sides of no or more than 65535 dots.
 pub fn page(
     name: &str,
     size: (usize, usize),

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use protocol::ink::Kind;
 
 use super::raster::{self, Unstated, wrong};
-use super::{Artwork, LayersError, Options, colour, names};
+use super::{Artwork, LayersError, Options, Window, colour, names};
 use crate::observe::Observer;
 use crate::scratch::Scratch;
 
@@ -87,19 +87,18 @@ fn page(
     }
     let full = folder.path().join("page.tif");
     ghostscript(path, options.page, "tiffsep", density, &full)?;
-    let mut art = of_plates(&name, &full, folder, &plates, None, options)?
+    let mut art = of_plates(&name, &full, folder, &plates, options)?
         .ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
     art.notes.append(&mut notes);
     Ok(art)
 }
 
-/// The art of a separated page: its process plates, and those of `spots`; of `size` in dots, if not of its pixels.
+/// The art of a separated page: its process plates, and those of `spots`.
 fn of_plates(
     name: &str,
     page: &Path,
     folder: &Scratch,
     spots: &[(String, names::Named)],
-    size: Option<(usize, usize)>,
     options: &Options,
 ) -> Result<Option<Artwork>, LayersError> {
     let mut art: Option<Artwork> = None;
@@ -108,7 +107,7 @@ fn of_plates(
         let spot = spots.iter().find(|(name, _)| *name == plate).map(|&(_, named)| named);
         let Some(named) = spot.or(process) else { continue };
         let scan = raster::scan(&file)?;
-        let dots = size.unwrap_or((scan.width as usize, scan.height as usize));
+        let dots = (scan.width as usize, scan.height as usize);
         art.get_or_insert_with(|| Artwork::blank(name, dots)).add(scan, &plate, named, true, options);
     }
     Ok(art)
@@ -140,38 +139,79 @@ pub fn spots(path: &Path) -> Result<Vec<Vec<String>>, LayersError> {
     }
 }
 
-/// A whole page with the plates of these names as layers; whatever else it has is in its process plates, spot colours that
-/// name no ink among them. At `options.dpi` pixels an inch, 600 without.
+/// A page as plates: those of spot colours that name inks, and those of the process inks for all else.
+pub struct Separated {
+    /// Pixels across and down.
+    pub size: (usize, usize),
+    dpi: f64,
+    plates: Vec<(String, names::Named, Vec<u8>)>,
+}
+
+/// Separates a page so that these names have plates of their own; whatever else it has is in the process plates, spot colours
+/// that name no ink among them. Drawn at `dpi` pixels an inch.
 ///
 /// # Errors
 /// As [`open`](super::open).
-pub fn separated(
-    path: &Path,
-    page: u32,
-    plates: &[String],
-    options: &Options,
-) -> Result<Artwork, LayersError> {
+pub fn separated(path: &Path, page: usize, names: &[String], dpi: f64) -> Result<Separated, LayersError> {
     let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
     let full = folder.path().join("page.tif");
-    let dpi = options.dpi.unwrap_or(600.0);
     // Only colours it is told of become plates of their own; it draws all others by their process colours.
-    let list: String = plates.iter().map(|name| format!("({}) cvn ", escaped(name))).collect();
+    let list: String = names.iter().map(|name| format!("({}) cvn ", escaped(name))).collect();
     let before = [
         format!("-dFirstPage={page}"),
         format!("-dLastPage={page}"),
-        format!("-dMaxSeparations={}", PROCESS.len() + plates.len()),
+        format!("-dMaxSeparations={}", PROCESS.len() + names.len()),
     ];
     let told = ["-c".to_owned(), format!("<</SeparationColorNames[{list}]>>setpagedevice")];
     run_ghostscript(path, &before, "tiffsep", (dpi, dpi), &full, &told)?;
     let (width, height) =
         image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
-    raster::check_size(path, width, height)?;
-    let dots = super::page_dots((width as usize, height as usize), dpi)
-        .ok_or_else(|| wrong(path, format!("{width} x {height} pixels are no page")))?;
-    let spots: Vec<_> = plates.iter().filter_map(|name| Some((name.clone(), names::ink(name)?))).collect();
-    let name = format!("page {page}");
-    let art = of_plates(&name, &full, &folder, &spots, Some(dots), options)?;
-    Ok(art.unwrap_or_else(|| Artwork::blank(&name, dots)))
+    let size = (width as usize, height as usize);
+    let mut plates = Vec::new();
+    for (plate, file) in files(&full, &folder)? {
+        let wanted = PROCESS.contains(&plate.as_str()) || names.contains(&plate);
+        let Some(named) = names::ink(&plate).filter(|_| wanted) else { continue };
+        let scan = raster::scan(&file)?;
+        if (scan.width, scan.height) != (width, height) {
+            return Err(wrong(path, format!("plate {plate} of page {page} has another size than the page")));
+        }
+        plates.push((plate, named, scan.coverage));
+    }
+    Ok(Separated { size, dpi, plates })
+}
+
+impl Separated {
+    /// The smallest rectangle around everything drawn, in pixels.
+    pub fn bounds(&self) -> Option<Window> {
+        let plates = self.plates.iter();
+        plates
+            .filter_map(|(.., coverage)| Window::around(coverage, self.size.0, 1, 0))
+            .reduce(|all, window| all.join(&window))
+    }
+
+    /// The part of the page in a window as art, a layer for each plate.
+    ///
+    /// # Errors
+    /// A window of no dots.
+    pub fn art(&self, name: &str, window: &Window, options: &Options) -> Result<Artwork, LayersError> {
+        let path = Path::new(name);
+        let empty = || wrong(path, "nothing of it is in the window");
+        let dots = super::page_dots((window.width, window.height), self.dpi).ok_or_else(empty)?;
+        let mut art = Artwork::blank(name, dots);
+        for (plate, named, coverage) in &self.plates {
+            let scan = raster::Scan {
+                path: path.to_path_buf(),
+                // No page has more pixels than u32 holds: they were read from a TIFF.
+                width: window.width as u32,
+                height: window.height as u32,
+                density: None,
+                coverage: window.cut(coverage, self.size.0, 1),
+                by: raster::Coverage::Dark,
+            };
+            art.add(scan, plate, *named, true, options);
+        }
+        Ok(art)
+    }
 }
 
 /// A name as PostScript writes it between parentheses.

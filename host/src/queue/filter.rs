@@ -20,12 +20,13 @@ use std::path::Path;
 use inks::Library;
 use memchr::memmem;
 use protocol::ink::Ink;
+use protocol::paper::Paper;
 use tempfile::NamedTempFile;
 
 use super::options::{Choices, NoChoice, Spots};
 use super::raster::{self, RasterError};
 use crate::job::stream::StreamError;
-use crate::layers::{self, LayersError};
+use crate::layers::{self, LayersError, Window};
 use crate::layout::LayoutError;
 use crate::observe::Observer;
 use crate::separate::SeparateError;
@@ -185,9 +186,8 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
             reader.row(&mut row)?;
             rgb.extend_from_slice(&row);
         }
-        let art = art(number, size, rgb, page.dpi, press)?;
         // Of a PDF the print system has turned the pages itself.
-        let job = press.job(number, paper, &art, press.choices.mirror)?;
+        let job = picture(number, paper, (size, page.dpi), &rgb, press.choices.mirror, press)?;
         for _ in 0..page.copies {
             press.write(&job)?;
         }
@@ -212,12 +212,15 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
             continue;
         }
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
-        // The list is as long as there are pages, far fewer than u32 holds.
-        let art = layers::pdf::separated(path, number as u32, plates, &press.options(dpi))
-            .map_err(|source| FilterError::Layers { page: number, source })?;
-        let paper = press::paper(number, (art.width, art.length), 600, press.choices)?;
-        let job = press.job(number, paper, &art, false)?;
-        press.write(&job)?;
+        let in_page = |source| FilterError::Layers { page: number, source };
+        let page = layers::pdf::separated(path, number, plates, dpi.into()).map_err(in_page)?;
+        let paper = press::paper(number, page.size, dpi, press.choices)?;
+        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
+            let art =
+                page.art(&format!("page {number}"), &view.window, &press.options(dpi)).map_err(in_page)?;
+            let job = press.job(number, paper, &art, &view, false)?;
+            press.write(&job)?;
+        }
     }
     Ok(())
 }
@@ -229,23 +232,29 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
     let mut number = only.unwrap_or(1);
     while let Some(size) = drawing.next_page()? {
         let paper = press::paper(number, size, dpi, press.choices)?;
-        let art = art(number, size, drawing.pixels(size)?, dpi, press)?;
-        let job = press.job(number, paper, &art, false)?;
+        let job = picture(number, paper, (size, dpi), &drawing.pixels(size)?, false, press)?;
         press.write(&job)?;
         number += 1;
     }
     drawing.end()
 }
 
-fn art(
+/// The job of a page that is a picture; empty if nothing is on it.
+fn picture(
     number: usize,
-    size: (usize, usize),
-    rgb: Vec<u8>,
-    dpi: u16,
+    paper: Paper,
+    (size, dpi): ((usize, usize), u16),
+    rgb: &[u8],
+    mirrored: bool,
     press: &Press<'_>,
-) -> Result<layers::Artwork, FilterError> {
-    layers::page(&format!("page {number}"), size, dpi, rgb, &press.options(dpi))
-        .map_err(|source| FilterError::Layers { page: number, source })
+) -> Result<Vec<u8>, FilterError> {
+    let drawn = Window::around(rgb, size.0, 3, 255);
+    let Some(view) = press.view(number, paper, (size, dpi), drawn, mirrored) else { return Ok(Vec::new()) };
+    let (window, name) = (&view.window, format!("page {number}"));
+    let rgb = window.cut(rgb, size.0, 3);
+    let art = layers::page(&name, (window.width, window.height), dpi, rgb, &press.options(dpi))
+        .map_err(|source| FilterError::Layers { page: number, source })?;
+    press.job(number, paper, &art, &view, mirrored)
 }
 
 /// Whether a document may have spot colours: it is a program, or their words are in it, or parts of it are packed.
@@ -378,6 +387,24 @@ mod tests {
         assert_eq!((seen.setup.media, seen.setup.curl_correction), (Some("cardboard"), Some(false)));
         let passes: Vec<(&str, u64)> = seen.passes.iter().map(|pass| (pass.ink, pass.dots)).collect();
         assert_eq!(passes, [("white", 400 * 300), ("black", 400 * 300), ("finish", 2202 * 3082)]);
+    }
+
+    #[test]
+    fn a_page_that_comes_as_a_picture_is_mirrored_about_its_middle_and_moved_where_it_is_wanted() {
+        let place = |options: &str| {
+            let choices = Choices::read(&super::super::options::parse(options), None).unwrap();
+            let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
+            let bounds = inspect(&job, &Silent).inspection.passes[0].bounds.unwrap();
+            assert_eq!((bounds.width, bounds.height), (400, 300));
+            (bounds.x, bounds.y)
+        };
+        assert_eq!(place(""), (920, 429));
+        // What is 920 dots from the left of 2202 is as far from the right.
+        assert_eq!(place("MirrorPrint=True"), (2202 - 920 - 400, 429));
+        // An inch and two from the corner of the sheet.
+        assert_eq!(place("FoilpressPosition=1x2in"), (600 - 80, 1200 - 71));
+        assert_eq!(place("FoilpressPosition=Centre"), ((2202 - 400) / 2, (3082 - 300) / 2));
+        assert_eq!(place("FoilpressPosition=1x2in mirror=true"), (600 - 80, 1200 - 71));
     }
 
     #[test]

@@ -8,14 +8,13 @@ use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Page;
 
 use super::{FilterError, io_error};
-use crate::job::placement::DOTS_PER_MM;
-use crate::layers::{self, Artwork};
+use crate::layers::{self, Artwork, Window};
 use crate::layout::{self, Cut, Layout, Mm, Point, Position};
 use crate::observe::Observer;
 use crate::pipeline;
 use crate::queue::options::{Choices, Spots};
 use crate::queue::ppd;
-use crate::separate::{self, Plane, Severity};
+use crate::separate::{self, Severity};
 
 /// What makes jobs of pages.
 pub(super) struct Press<'a> {
@@ -75,18 +74,40 @@ impl Press<'_> {
         }
     }
 
-    /// The job of a page; empty if nothing is on it. `mirrored` turns it left to right.
+    /// What of a page is printed, and where. `drawn` is the window around everything on it; none if it is blank, which is
+    /// told.
+    pub(super) fn view(
+        &self,
+        number: usize,
+        paper: Paper,
+        (size, dpi): ((usize, usize), u16),
+        drawn: Option<Window>,
+        mirrored: bool,
+    ) -> Option<View> {
+        let Some(drawn) = drawn else {
+            self.observer.note(&format!("page {number} is blank; no sheet is made of it"));
+            return None;
+        };
+        // A page is turned about its middle, not what is drawn on it.
+        let whole = mirrored || self.choices.finish == layers::Finish::All;
+        let view = View::of(self.choices.place, paper, (size, dpi), drawn, whole);
+        if view.is_none() {
+            self.observer.note(&format!(
+                "all that page {number} has lies on the margins, where this machine cannot print; no sheet is made of it"
+            ));
+        }
+        view
+    }
+
+    /// The job of a page's art. `mirrored` turns it left to right.
     pub(super) fn job(
-        &mut self,
+        &self,
         number: usize,
         paper: Paper,
         art: &Artwork,
+        view: &View,
         mirrored: bool,
     ) -> Result<Vec<u8>, FilterError> {
-        let Some(drawn) = bounds(&art.drawn) else {
-            self.observer.note(&format!("page {number} is blank; no sheet is made of it"));
-            return Ok(Vec::new());
-        };
         let settings = self.settings();
         let foil = art.layers.iter().map(|layer| layer.ink).find(|ink| ink.kind() == Kind::Foil);
         if let Some(ink) = foil.filter(|&ink| !settings.inks.contains(ink)) {
@@ -98,20 +119,21 @@ impl Press<'_> {
             self.observer.note(&format!("page {number}: {}", suggestion.text));
         }
         let layout = Layout {
-            position: position(self.choices.place, paper, drawn),
+            position: view.position,
             mirror: mirrored,
-            // What is cut off is told below: a page is always larger than what can be printed of it.
             cut: true,
             profile: self.choices.profile,
             ..Layout::centred(paper)
         };
-        if let Some(cut) = beyond(&layout, art.width, drawn) {
+        let arranged = layout::arrange(&composed.piece, &layout, self.observer)
+            .map_err(|source| FilterError::Layout { page: number, source })?;
+        // What a page has on its margins was left out before; what is moved there is cut off now.
+        let moved = !matches!(self.choices.place, Place::Page);
+        if let Some(cut) = view.beyond.or(arranged.laid.cut.filter(|_| moved)) {
             self.observer
                 .note(&format!("page {number}: {cut} lies on the margins, where this machine cannot print"));
         }
-        let in_page = |source| FilterError::Layout { page: number, source };
-        let sheet = layout::arrange(&composed.piece, &layout, self.observer).map_err(in_page)?.sheet;
-        let separation = separate::separate(&sheet, self.library.rules(), self.observer)?;
+        let separation = separate::separate(&arranged.sheet, self.library.rules(), self.observer)?;
         if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
             return Err(FilterError::Refused { page: number, why: check.with_stacks() });
         }
@@ -148,81 +170,65 @@ pub enum Place {
     At(Point),
 }
 
-/// The smallest rectangle around the dots of a plane: left, top, and one past right and bottom.
-fn bounds(plane: &Plane) -> Option<[usize; 4]> {
-    let mut columns = vec![0u8; plane.stride];
-    let (mut top, mut bottom) = (None, 0);
-    for (y, row) in plane.bits.chunks_exact(plane.stride).enumerate() {
-        if row.iter().any(|&bits| bits != 0) {
-            columns.iter_mut().zip(row).for_each(|(all, &bits)| *all |= bits);
-            top = top.or(Some(y));
-            bottom = y + 1;
-        }
-    }
-    let left = columns.iter().position(|&bits| bits != 0)?;
-    let right = columns.iter().rposition(|&bits| bits != 0)?;
-    Some([
-        8 * left + columns[left].leading_zeros() as usize,
-        top?,
-        8 * right + 8 - columns[right].trailing_zeros() as usize,
-        bottom,
-    ])
+/// What of a page is printed, and where.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct View {
+    /// The part of the page, in its pixels.
+    pub window: Window,
+    position: Position,
+    /// What is left out on the margins.
+    beyond: Option<Cut>,
 }
 
-/// The place of the whole page when what is drawn of it lies in this rectangle.
-fn position(place: Place, paper: Paper, [left, top, right, bottom]: [usize; 4]) -> Position {
-    // Pages are held in memory: their sides are far below the limits of i64.
-    let (left, top) = (left as i64, top as i64);
-    let (width, length) = (right as i64 - left, bottom as i64 - top);
-    let corner = match place {
-        Place::Page => (left, top),
-        Place::At(Point(x, y)) => (x.dots(), y.dots()),
-        Place::Centre => (
-            i64::from(LEFT) + (i64::from(paper.width()) - width).div_euclid(2),
-            i64::from(paper.top()) + (i64::from(paper.length()) - length).div_euclid(2),
-        ),
-    };
-    Position::FromEdge(Point(Mm::of_dots(corner.0 - left), Mm::of_dots(corner.1 - top)))
-}
-
-/// How far what is drawn reaches beyond the printable area. `width` is that of the page.
-fn beyond(layout: &Layout, width: usize, [left, top, right, bottom]: [usize; 4]) -> Option<Cut> {
-    let Position::FromEdge(Point(x, y)) = layout.position else { return None };
-    let (left, right) = if layout.mirror { (width - right, width - left) } else { (left, right) };
-    let (x, y) = (x.dots() - i64::from(LEFT), y.dots() - i64::from(layout.paper.top()));
-    let mm = |dots: i64| dots.max(0) as f64 / DOTS_PER_MM;
-    let cut = Cut {
-        left: mm(-(x + left as i64)),
-        top: mm(-(y + top as i64)),
-        right: mm(x + right as i64 - i64::from(layout.paper.width())),
-        bottom: mm(y + bottom as i64 - i64::from(layout.paper.length())),
-    };
-    (cut != Cut::default()).then_some(cut)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn bounds_are_those_of_the_outermost_dots(
-            width in 1usize..40,
-            dots in prop::collection::vec((0usize..40, 0usize..9), 0..6),
-        ) {
-            let stride = width.div_ceil(8);
-            let mut plane = Plane { width, length: 9, stride, bits: vec![0; 9 * stride] };
-            let dots: Vec<(usize, usize)> = dots.into_iter().map(|(x, y)| (x % width, y)).collect();
-            for (x, y) in &dots {
-                plane.bits[y * stride + x / 8] |= 0x80 >> (x % 8);
+impl View {
+    /// `whole` asks for all that can be printed, also where nothing is drawn.
+    fn of(
+        place: Place,
+        paper: Paper,
+        (size, dpi): ((usize, usize), u16),
+        drawn: Window,
+        whole: bool,
+    ) -> Option<View> {
+        let pixels = |dots: u16| usize::from(dots) * usize::from(dpi) / 600;
+        let (across, down) = (pixels(paper.width()), pixels(paper.length()));
+        let position = match place {
+            Place::Page => {
+                // A page that is a little smaller than its paper is paper there.
+                let (left, top) = (pixels(LEFT), pixels(paper.top()));
+                let (width, height) =
+                    (across.min(size.0.saturating_sub(left)), down.min(size.1.saturating_sub(top)));
+                let mm = |pixels: usize| pixels as f64 * 25.4 / f64::from(dpi);
+                let beyond = Cut {
+                    left: mm(left.saturating_sub(drawn.left)),
+                    top: mm(top.saturating_sub(drawn.top)),
+                    right: mm((drawn.left + drawn.width).saturating_sub(left + width)),
+                    bottom: mm((drawn.top + drawn.height).saturating_sub(top + height)),
+                };
+                let room = Window { left, top, width, height };
+                let seen = drawn.meet(&room)?;
+                // What is bare costs as much time as what is drawn.
+                let window = if whole { room } else { seen };
+                let dots = |pixels: usize| Mm::of_dots((pixels * 600 / usize::from(dpi)) as i64);
+                return Some(View {
+                    window,
+                    position: Position::FromPrintable(Point(
+                        dots(window.left - left),
+                        dots(window.top - top),
+                    )),
+                    beyond: (beyond != Cut::default()).then_some(beyond),
+                });
             }
-            let expected = (!dots.is_empty()).then(|| {
-                let xs = || dots.iter().map(|dot| dot.0);
-                let ys = || dots.iter().map(|dot| dot.1);
-                [xs().min().unwrap(), ys().min().unwrap(), xs().max().unwrap() + 1, ys().max().unwrap() + 1]
-            });
-            prop_assert_eq!(bounds(&plane), expected);
-        }
+            Place::Centre => Position::Centred,
+            Place::At(corner) => Position::FromEdge(corner),
+        };
+        // No more than the sheet holds can be halftoned.
+        let window = Window { width: drawn.width.min(across), height: drawn.height.min(down), ..drawn };
+        let over = |found: usize, most: usize| (found - most) as f64 * 25.4 / f64::from(dpi);
+        let beyond = Cut {
+            right: over(drawn.width, window.width),
+            bottom: over(drawn.height, window.height),
+            ..Cut::default()
+        };
+        Some(View { window, position, beyond: (beyond != Cut::default()).then_some(beyond) })
     }
 }
