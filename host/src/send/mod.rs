@@ -14,6 +14,7 @@ pub mod journal;
 pub mod log;
 pub mod query;
 pub mod raw;
+mod record;
 mod run;
 pub mod session;
 pub mod status;

@@ -6,7 +6,8 @@
 //! table of conditions on what only the page knows: how small the dots are, how much an ink covers, what is used.
 //! `check` tries each. Nothing here changes the passes. Cost: negligible, except that rules on cluster size look at
 //! the whole page once for each ink concerned.
-//! Source: the notes on the machine, sections 9 and 14; the 2009 paper, section 4.2.
+//! Source: the vendor's guides, what owners have reported, the open driver's habits, and section 4.2 of the 2009 paper; each
+//! rule's certainty says which.
 
 use std::cmp::Reverse;
 use std::fmt;
