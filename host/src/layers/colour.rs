@@ -137,45 +137,61 @@ pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Resu
 
 /// The same at a size that is known.
 pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
-    let Pixels { path, width, height, mut rgba, mut notes, .. } = pixels;
+    let Pixels { path, width, height, mut rgba, notes, .. } = pixels;
     let size = (width, height);
     let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
-    let opaque = transparent.then(|| plane_of(&rgba, size, dots, |p| p[3] > 0));
+    let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 0));
     rgba.par_chunks_exact_mut(4).for_each(|p| {
         let alpha = u32::from(p[3]);
         for v in &mut p[..3] {
             *v = ((u32::from(*v) * alpha + 255 * (255 - alpha) + 127) / 255) as u8;
         }
     });
-    let drawn = plane_of(&rgba, size, dots, |p| p[..3] != [255; 3]);
     let mut rgb = rgba;
     // In place: three bytes of a pixel never lie after its four.
     for at in 0..rgb.len() / 4 {
         rgb.copy_within(4 * at..4 * at + 3, 3 * at);
     }
     rgb.truncate(rgb.len() / 4 * 3);
-    let mut layers = Vec::new();
+    let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
+    let mut art = flat(name, &file, size, dots, rgb, options);
+    art.opaque = opaque;
+    art.notes.splice(..0, notes);
+    art
+}
+
+/// Art from pixels without transparency, three bytes each. `file` is what notes call it.
+pub(super) fn flat(
+    name: &str,
+    file: &str,
+    size: (u32, u32),
+    dots: (usize, usize),
+    mut rgb: Vec<u8>,
+    options: &Options,
+) -> Artwork {
+    let drawn = plane_of::<3>(&rgb, size, dots, |p| *p != [255; 3]);
+    let (mut layers, mut notes) = (Vec::new(), Vec::new());
     if options.reserved {
         let found = reserved::take(&mut rgb, size, dots, options);
-        let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
-        notes.extend(found.notes(&file));
+        notes.extend(found.notes(file));
         layers = found.layers;
     }
     let colour = rgb.par_iter().any(|&v| v < 255).then(|| {
         let full = Colour { width: size.0 as usize, height: size.1 as usize, rgb };
         full.averaged(dots)
     });
-    Artwork { name: name.into(), width: dots.0, length: dots.1, layers, colour, drawn, opaque, notes }
+    let (width, length) = dots;
+    Artwork { name: name.into(), width, length, layers, colour, drawn, opaque: None, notes }
 }
 
-/// The dots whose pixel is so.
-fn plane_of(
-    rgba: &[u8],
+/// The dots whose pixel, of `N` bytes, is so.
+fn plane_of<const N: usize>(
+    pixels: &[u8],
     size: (u32, u32),
     dots: (usize, usize),
-    is: impl Fn(&[u8; 4]) -> bool + Sync,
+    is: impl Fn(&[u8; N]) -> bool + Sync,
 ) -> Plane {
-    let bytes: Vec<u8> = rgba.as_chunks::<4>().0.par_iter().map(|pixel| u8::from(is(pixel))).collect();
+    let bytes: Vec<u8> = pixels.as_chunks::<N>().0.par_iter().map(|pixel| u8::from(is(pixel))).collect();
     bits::from_bytes(dots.0, &raster::nearest(bytes, size, dots), |byte| byte > 0)
 }
 

@@ -16,7 +16,7 @@ mod distance;
 pub mod error;
 pub mod names;
 mod order;
-mod pdf;
+pub mod pdf;
 pub mod raster;
 pub mod reserved;
 mod svg;
@@ -196,25 +196,34 @@ pub fn is_art(path: &Path) -> bool {
         || PICTURES.contains(&extension.as_str()) && names::ink(&stem(path)).is_some()
 }
 
-/// Art from a picture in memory: sRGB with opacity, four bytes a pixel, row by row from the top.
+/// Art from a whole page in memory, drawn at `dpi` pixels an inch: sRGB without transparency, three bytes a pixel, row by
+/// row from the top. It may be larger than what can be printed of it.
 ///
 /// # Errors
-/// As [`open`]; `rgba` of another size than `size`.
-pub fn picture(
+/// `rgb` of another size than `size`, or sides of more than 65535 dots.
+pub fn page(
     name: &str,
     size: (usize, usize),
-    rgba: Vec<u8>,
+    dpi: u16,
+    rgb: Vec<u8>,
     options: &Options,
 ) -> Result<Artwork, LayersError> {
-    let path = PathBuf::from(name);
-    let (Ok(width), Ok(height)) = (u32::try_from(size.0), u32::try_from(size.1)) else {
-        return Err(raster::wrong(&path, "it is too large"));
-    };
-    if Some(rgba.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(4)) {
-        return Err(raster::wrong(&path, "it has another number of pixels than its sides say"));
+    let problem = || raster::wrong(Path::new(name), format!("{} x {} pixels are no page", size.0, size.1));
+    if Some(rgb.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(3)) {
+        return Err(problem());
     }
-    let pixels = colour::Pixels { path, width, height, density: None, rgba, notes: Vec::new() };
-    colour::artwork(name, pixels, options)
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
+    let dots = page_dots(size, dpi.into()).ok_or_else(problem)?;
+    Ok(colour::flat(name, name, (side(size.0)?, side(size.1)?), dots, rgb, options))
+}
+
+/// The dots of a page of so many pixels.
+fn page_dots(pixels: (usize, usize), dpi: f64) -> Option<(usize, usize)> {
+    let side = |pixels: usize| {
+        let dots = (pixels as f64 * 600.0 / dpi).round();
+        (1.0..=65535.0).contains(&dots).then_some(dots as usize)
+    };
+    Some((side(pixels.0)?, side(pixels.1)?))
 }
 
 fn one(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {

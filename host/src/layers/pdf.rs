@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use protocol::ink::Kind;
+
 use super::raster::{self, Unstated, wrong};
 use super::{Artwork, LayersError, Options, colour, names};
 use crate::observe::Observer;
@@ -85,19 +87,102 @@ fn page(
     }
     let full = folder.path().join("page.tif");
     ghostscript(path, options.page, "tiffsep", density, &full)?;
-    let mut art: Option<Artwork> = None;
-    for (plate, file) in files(&full, folder)? {
-        let process = PROCESS.contains(&plate.as_str()).then(|| names::ink(&plate)).flatten();
-        let spot = plates.iter().find(|(name, _)| *name == plate).map(|&(_, named)| named);
-        let Some(named) = spot.or(process) else { continue };
-        let scan = raster::scan(&file)?;
-        let dots = (scan.width as usize, scan.height as usize);
-        art.get_or_insert_with(|| Artwork::blank(&name, dots)).add(scan, &plate, named, true, options);
-    }
-    let mut art =
-        art.ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
+    let mut art = of_plates(&name, &full, folder, &plates, None, options)?
+        .ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
     art.notes.append(&mut notes);
     Ok(art)
+}
+
+/// The art of a separated page: its process plates, and those of `spots`; of `size` in dots, if not of its pixels.
+fn of_plates(
+    name: &str,
+    page: &Path,
+    folder: &Scratch,
+    spots: &[(String, names::Named)],
+    size: Option<(usize, usize)>,
+    options: &Options,
+) -> Result<Option<Artwork>, LayersError> {
+    let mut art: Option<Artwork> = None;
+    for (plate, file) in files(page, folder)? {
+        let process = PROCESS.contains(&plate.as_str()).then(|| names::ink(&plate)).flatten();
+        let spot = spots.iter().find(|(name, _)| *name == plate).map(|&(_, named)| named);
+        let Some(named) = spot.or(process) else { continue };
+        let scan = raster::scan(&file)?;
+        let dots = size.unwrap_or((scan.width as usize, scan.height as usize));
+        art.get_or_insert_with(|| Artwork::blank(name, dots)).add(scan, &plate, named, true, options);
+    }
+    Ok(art)
+}
+
+/// The names of the plates of each page that name inks and have a dot. Without a page there is no list.
+///
+/// # Errors
+/// As [`open`](super::open): a document that Ghostscript cannot read, or no Ghostscript.
+pub fn spots(path: &Path) -> Result<Vec<Vec<String>>, LayersError> {
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
+    let look = folder.path().join("look%d.tif");
+    run_ghostscript(path, &["-sCompression=lzw".into()], "tiffsep", (LOOK, LOOK), &look, &[])?;
+    let mut pages = Vec::new();
+    loop {
+        let page = folder.path().join(format!("look{}.tif", pages.len() + 1));
+        if !page.exists() {
+            return Ok(pages);
+        }
+        let mut spots = Vec::new();
+        for (name, file) in files(&page, &folder)? {
+            // A colour that names a process ink is drawn by its process colours all the same.
+            let spot = names::ink(&name).is_some_and(|named| named.ink.kind() != Kind::Process);
+            if spot && raster::scan(&file)?.coverage.iter().any(|&c| c > 0) {
+                spots.push(name);
+            }
+        }
+        pages.push(spots);
+    }
+}
+
+/// A whole page with the plates of these names as layers; whatever else it has is in its process plates, spot colours that
+/// name no ink among them. At `options.dpi` pixels an inch, 600 without.
+///
+/// # Errors
+/// As [`open`](super::open).
+pub fn separated(
+    path: &Path,
+    page: u32,
+    plates: &[String],
+    options: &Options,
+) -> Result<Artwork, LayersError> {
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
+    let full = folder.path().join("page.tif");
+    let dpi = options.dpi.unwrap_or(600.0);
+    // Only colours it is told of become plates of their own; it draws all others by their process colours.
+    let list: String = plates.iter().map(|name| format!("({}) cvn ", escaped(name))).collect();
+    let before = [
+        format!("-dFirstPage={page}"),
+        format!("-dLastPage={page}"),
+        format!("-dMaxSeparations={}", PROCESS.len() + plates.len()),
+    ];
+    let told = ["-c".to_owned(), format!("<</SeparationColorNames[{list}]>>setpagedevice")];
+    run_ghostscript(path, &before, "tiffsep", (dpi, dpi), &full, &told)?;
+    let (width, height) =
+        image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
+    raster::check_size(path, width, height)?;
+    let dots = super::page_dots((width as usize, height as usize), dpi)
+        .ok_or_else(|| wrong(path, format!("{width} x {height} pixels are no page")))?;
+    let spots: Vec<_> = plates.iter().filter_map(|name| Some((name.clone(), names::ink(name)?))).collect();
+    let name = format!("page {page}");
+    let art = of_plates(&name, &full, &folder, &spots, Some(dots), options)?;
+    Ok(art.unwrap_or_else(|| Artwork::blank(&name, dots)))
+}
+
+/// A name as PostScript writes it between parentheses.
+fn escaped(name: &str) -> String {
+    name.bytes()
+        .map(|byte| match byte {
+            b'(' | b')' | b'\\' => format!("\\{}", char::from(byte)),
+            b' '..=b'~' => char::from(byte).to_string(),
+            _ => format!("\\{byte:03o}"),
+        })
+        .collect()
 }
 
 /// The plates beside a separated page: `page(Gold Foil).tif`.
@@ -123,15 +208,29 @@ fn ghostscript(
     density: (f64, f64),
     to: &Path,
 ) -> Result<(), LayersError> {
+    let only = ["-dUseCropBox".into(), format!("-dFirstPage={page}"), format!("-dLastPage={page}")];
+    run_ghostscript(path, &only, device, density, to, &[])
+}
+
+/// Ghostscript on a document; `told` stands right before it.
+fn run_ghostscript(
+    path: &Path,
+    options: &[String],
+    device: &str,
+    density: (f64, f64),
+    to: &Path,
+    told: &[String],
+) -> Result<(), LayersError> {
     let file = std::path::absolute(path).map_err(raster::io(path, "find it"))?;
     let mut command = Command::new("gs");
     command
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dUseCropBox", "-sstdout=%stderr"])
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
         .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
-        .args([format!("-dFirstPage={page}"), format!("-dLastPage={page}")])
+        .args(options)
         .arg(format!("-r{:.4}x{:.4}", density.0, density.1))
         .arg(format!("-sDEVICE={device}"))
         .arg(format!("-sOutputFile={}", to.display()))
+        .args(told)
         .arg("-f")
         .arg(file);
     let missing = LayersError::Program {

@@ -6,6 +6,7 @@ mod model;
 
 mod bridge;
 mod server;
+mod system;
 
 use bridge::Bridge;
 use foilpress::inspect::{inspect, sheets};
