@@ -231,7 +231,8 @@ pub fn yield_to_interrupt() {
     drop(scratch::folders());
 }
 
-/// Removes what is staged, and every other temporary folder, when the program is told to stop, which then ends with exit code 130.
+/// Removes what is staged, and every other temporary folder, when the program is told to stop, which then ends with exit
+/// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
         // Never released: nothing new is staged, and nothing is moved to its place, from here on.

@@ -40,8 +40,12 @@ pub(super) fn jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, La
     let usual = DecoderOptions::default().set_max_width(1 << 16).set_max_height(1 << 16);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&bytes[..]), usual);
     decoder.decode_headers().map_err(bad)?;
-    let luminance = decoder.input_colorspace() == Some(ColorSpace::YCCK);
-    let stored = if luminance { ColorSpace::YCCK } else { ColorSpace::CMYK };
+    let stored = match decoder.input_colorspace() {
+        Some(space @ (ColorSpace::CMYK | ColorSpace::YCCK)) => space,
+        // Four channels that a later segment calls three: the decoder would not know what to do with them.
+        _ => return Err(wrong(path, "it has four channels and calls them something else than CMYK or YCCK")),
+    };
+    let luminance = stored == ColorSpace::YCCK;
     decoder.set_options(usual.jpeg_set_out_colorspace(stored));
     let pixels = decoder.decode().map_err(bad)?;
     let profile = decoder.icc_profile().is_some();
@@ -110,6 +114,7 @@ pub(super) fn note(path: &Path, profile: bool) -> String {
 mod tests {
     use super::super::Shape;
     use super::*;
+    use proptest::prelude::*;
 
     /// 16 x 8 pixels written by libjpeg (through Pillow): the left half 200, 0, 40, 20 of 255 in cyan, magenta, yellow and
     /// black, the right half bare.
@@ -162,6 +167,26 @@ mod tests {
             for (at, &tone) in plane.iter().enumerate() {
                 let wanted: u8 = if at % 16 < 8 { left } else { right };
                 assert!(tone.abs_diff(wanted) <= 4, "{at}: {tone}, not {wanted}");
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+        #[test]
+        fn no_change_to_a_file_panics(changes in prop::collection::vec((2usize..CMYK.len(), any::<u8>()), 1..4), cut in 0usize..40) {
+            let mut bytes = CMYK.to_vec();
+            changes.iter().for_each(|&(at, value)| bytes[at] = value);
+            bytes.truncate(bytes.len() - cut / 2);
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("photo.jpg");
+            std::fs::write(&path, &bytes).unwrap();
+            // A pixel a dot: a page of them takes its time.
+            let options = Options { dpi: Some(600.0), ..Options::default() };
+            if let Err(error) = jpeg(&path, &options) {
+                // Sizes are of the page, all else of the file.
+                let size = matches!(error, LayersError::TooSmall { .. } | LayersError::TooLarge { .. });
+                prop_assert!(size || error.to_string().contains("photo.jpg"), "{}", error);
             }
         }
     }

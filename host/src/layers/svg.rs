@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::{self, roxmltree};
+use resvg::usvg::{self, fontdb, roxmltree};
 
 use super::colour::{self, Pixels};
 use super::raster::{self, Gather, Scan, Unstated, wrong};
@@ -54,7 +54,7 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         ..usvg::Options::default()
     };
     if text.contains("<text") {
-        Arc::make_mut(&mut usual.fontdb).load_system_fonts();
+        load_fonts(path, Arc::make_mut(&mut usual.fontdb))?;
         notes.push(format!(
             "{}: text is drawn with this computer's fonts; turn it into paths to have it as designed",
             path.display()
@@ -111,6 +111,28 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     observer.end();
     art.notes.append(&mut notes);
     Ok(art)
+}
+
+/// This computer's fonts. The renderer leaves out text of a family that is not there, unless the usual one is: so there must
+/// be a usual one.
+fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersError> {
+    fonts.load_system_fonts();
+    let usual = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
+    if fonts.query(&usual).is_some() {
+        return Ok(());
+    }
+    // A face that is neither bold nor slanted reads best in place of any other; of several always the same.
+    let plain = |face: &fontdb::FaceInfo| {
+        face.style == fontdb::Style::Normal && face.weight == fontdb::Weight::NORMAL && !face.monospaced
+    };
+    let named = |face: &fontdb::FaceInfo| Some((!plain(face), face.families.first()?.0.clone()));
+    match fonts.faces().filter_map(named).min() {
+        Some((_, family)) => {
+            fonts.set_serif_family(family);
+            Ok(())
+        }
+        None => Err(wrong(path, "it has text, and this computer has no fonts; turn the text into paths")),
+    }
 }
 
 /// The topmost groups that name an ink, and the drawing with an identifier on each of them.

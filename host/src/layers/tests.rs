@@ -424,6 +424,25 @@ fn a_drawings_layers_lie_where_they_are_drawn() {
 }
 
 #[test]
+fn text_is_drawn_even_if_its_font_is_missing_and_refused_without_any() {
+    let bench = Bench::new();
+    let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="25.4mm" height="12.7mm" viewBox="0 0 600 300">
+        <g id="black"><text x="50" y="200" font-family="No Such Family" font-size="150">HHH</text></g></svg>"##;
+    let found = open(&[bench.write("art.svg", svg)], &Options::default(), &Silent);
+    let mut fonts = resvg::usvg::fontdb::Database::new();
+    fonts.load_system_fonts();
+    if fonts.is_empty() {
+        assert!(found.unwrap_err().to_string().contains("this computer has no fonts"));
+        return;
+    }
+    // Three letters in a row, as high as capitals are: two thirds of their size or so, on the line.
+    let (left, top, right, bottom, dots) = extent(&found.unwrap().layers[0]);
+    assert!((50..80).contains(&left) && right - left > 150, "{left} to {right}");
+    assert!((70..130).contains(&top) && (195..205).contains(&bottom), "{top} to {bottom}");
+    assert!(dots > 3000, "{dots} dots");
+}
+
+#[test]
 fn a_drawing_without_layers_is_a_picture_with_exact_edges() {
     let bench = Bench::new();
     let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="2.54mm" height="2.54mm" viewBox="0 0 60 60">
