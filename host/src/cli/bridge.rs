@@ -171,9 +171,7 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
         JobState::Lost => {
-            format!(
-                "idle; job {job:08x} was lost. `foilpress bridge reset` readies the printer for the next one"
-            )
+            format!("idle; job {job:08x} was lost; the bridge resets the printer before the next one")
         }
     }
 }

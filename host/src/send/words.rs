@@ -92,7 +92,9 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             )
         }
         Outcome::Lost => format!(
-            "{}: the sheet is lost{}: printer or bridge lost power in the middle. {RESET}, then send the job again",
+            "{}: the sheet is lost{}: the printer was switched off or its cable pulled in the middle, or the bridge restarted \
+             and nobody had the job any more. The bridge resets the printer before the next job; take out what is in it, and \
+             send the job again",
             entry.name,
             reached(entry)
         ),

@@ -323,6 +323,32 @@ fn an_open_cover_stops_the_job_and_a_closed_one_lets_it_go_on() {
 }
 
 #[test]
+fn a_printer_switched_off_in_a_job_costs_the_sheet_and_the_next_one_is_printed_whole() {
+    let Some((mut bench, job)) = with_job() else { return };
+    let mut child = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
+    bench.until("it prints", |bench| bench.printed() > job.len() / 2);
+    bench.bridge.desk().switch(false);
+    let mut text = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut text).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert!(text.contains("the sheet is lost, in pass") && text.contains("switched off"), "{text}");
+    assert!(bench.well(&["bridge", "status", "--to", &bench.to()]).contains("+5 V absent"));
+    let (lost, resets) = (bench.printed(), bench.bridge.desk().resets);
+    assert!(lost < job.len(), "the whole job had crossed the port");
+    // Sent before the printer is back: it waits, and the printer is reset before its first byte.
+    let next = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(bench.printed(), lost, "bytes for a printer that is off");
+    bench.bridge.desk().switch(true);
+    let text = said(next);
+    assert!(text.contains("+5 V absent") && text.contains("goes on"), "{text}");
+    // The printer has put out what there was of the first.
+    bench.came_out(lost, &job, 2);
+    assert_eq!(bench.bridge.desk().resets, resets + 1);
+    bench.check();
+}
+
+#[test]
 fn a_cancelled_sheet_comes_out_and_the_next_job_prints() {
     let Some((mut bench, job)) = with_job() else { return };
     let mut child = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);

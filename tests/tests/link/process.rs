@@ -12,7 +12,7 @@ use foilpress::send::{self, Address, streams};
 use foilpress::simulate::{Carousel, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
-use protocol::link::message::{Answer, Ask, JobKind, JobState, Lines};
+use protocol::link::message::{Answer, Ask, Fault, JobKind, JobState, Lines};
 use rand::RngExt;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::os::unix::net::UnixListener;
@@ -34,6 +34,8 @@ struct Board {
     stop: AtomicBool,
     /// Its power goes, and its memory with it.
     forget: AtomicBool,
+    /// The printer is switched off.
+    printer_off: AtomicBool,
     /// The printer's cover is open.
     open_cover: AtomicBool,
     /// How often the printer was reset.
@@ -92,10 +94,12 @@ fn bridge_at(path: &Path, rate: usize, band: usize, board: &Board) {
         for _ in 0..50 {
             engine.work();
         }
-        engine.port(Lines::IDLE, None);
+        let off = Board::is(&board.printer_off);
+        let fault = off.then_some(Fault::PowerOff);
+        engine.port(if off { Lines(0) } else { Lines::IDLE }, fault);
         let bytes = engine.output();
         let mut printed = board.printed.lock().unwrap();
-        let busy = Board::is(&board.busy) && !printed.is_empty();
+        let busy = off || Board::is(&board.busy) && !printed.is_empty();
         let count = if busy { 0 } else { bytes.len().min(rate) };
         printed.extend_from_slice(&bytes[..count]);
         drop(printed);
@@ -334,6 +338,33 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
     assert_eq!(bench.board.resets.load(Ordering::Relaxed), 1);
     bench.keep_busy(false);
     bench.says(0, "send job.rgl --to BRIDGE");
+    assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
+}
+
+#[test]
+fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_one() {
+    let bench = Bench::new(8, 100);
+    bench.keep_busy(true);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    bench.until_it_prints();
+    bench.board.printer_off.store(true, Ordering::Relaxed);
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert!(said.contains("the sheet is lost") && said.contains("switched off"), "{said}");
+    let printed = bench.printed();
+    assert!(printed.len() < bench.job.len() && bench.job.starts_with(&printed), "printed twice");
+    // The next one is queued while it is off, and waits.
+    bench.keep_busy(false);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("+5 V absent")));
+    assert_eq!(bench.printed(), printed, "bytes for a printer that is off");
+    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 0);
+    bench.board.printer_off.store(false, Ordering::Relaxed);
+    let rest: Vec<String> = lines.collect();
+    assert!(child.wait().unwrap().success(), "{rest:?}");
+    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 1);
     assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
 }
 

@@ -1,7 +1,8 @@
 //! `foilpress bridge reset`, and the look whether a printer still waits for the rest of a sheet that was lost.
 //!
-//! Half a job followed by another is text to the printer. So after a loss nothing is sent until the printer has been
-//! reset: by the bridge, which pulls the port's nInit line, or by its own switch.
+//! Half a job followed by another is text to the printer. A bridge that knows of the half resets the printer by itself. One
+//! that has lost its memory does not; then nothing is sent until the printer has been reset: by the bridge, which pulls
+//! the port's nInit line, or by its own switch.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 
@@ -68,7 +69,7 @@ pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Obser
     };
     let (name, job) = (&entry.name, entry.record.job);
     let why = format!(
-        "{name} (job {job:08x}) was lost in the middle, and the printer may still wait for the rest of it"
+        "the bridge lost its memory in the middle of {name} (job {job:08x}), and the printer may still wait for the rest"
     );
     if !agreed(&format!("{why}. Reset the printer through the bridge now?"))? {
         bail!(
