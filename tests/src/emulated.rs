@@ -86,7 +86,15 @@ impl Emulated {
         let missing = || io::Error::other("a pipe to Node is missing");
         let orders = board.stdin.take().ok_or_else(missing)?;
         let answers = BufReader::new(board.stdout.take().ok_or_else(missing)?);
-        let mut desk = Desk { printer, stock, printed: Vec::new(), sheets: Vec::new(), refused: None, resets: 0, on: true };
+        let mut desk = Desk {
+            printer,
+            stock,
+            printed: Vec::new(),
+            sheets: Vec::new(),
+            refused: None,
+            resets: 0,
+            on: true,
+        };
         desk.printer.load(stock);
         let mut emulated = Emulated {
             folder: folder.to_path_buf(),

@@ -13,9 +13,9 @@ pub use reset::before_sending;
 use std::io::{self, Write as _};
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
-use protocol::link::message::{Ask, Fault, JobState, Lines, Progress, VERSION};
+use protocol::link::message::{Ask, Fault, JobState, Lines, Progress};
 use serde_json::json;
 
 use crate::flash::FlashError;
@@ -63,7 +63,7 @@ enum Command {
     Test(test::Args),
     /// What the firmware has noted, also before its last restart
     Log(log::Args),
-    /// Reset the printer through the bridge, after a sheet was lost in the middle
+    /// Reset the printer through the bridge, after a bridge has lost its memory in the middle of a sheet
     Reset(reset::Args),
 }
 
@@ -137,11 +137,11 @@ pub fn permission() -> String {
     )
 }
 
-/// Makes sure that the printer behind a bridge is one of ALPS, as far as it says what it is; with `force` only says so.
-/// A bridge that cannot be asked now is not judged: sending finds out what is wrong with it.
+/// Makes sure that a bridge is there and that the printer behind it is one of ALPS, as far as it says what it is; with
+/// `force` that is only said. So a mistyped address or a missing permission leaves no job behind that waits.
 pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> Result<()> {
-    let Ok(mut link) = address.open() else { return Ok(()) };
-    let Ok(mut query) = Query::new(&mut *link, PATIENCE) else { return Ok(()) };
+    let mut link = address.open().context("not sent")?;
+    let mut query = Query::new(&mut *link, PATIENCE).context("not sent")?;
     // A printer that takes no bytes is not asked, nor one that is at work.
     if !matches!(query.lines(PATIENCE), Ok((_, None))) {
         return Ok(());
@@ -197,17 +197,6 @@ fn levels(lines: Lines) -> Vec<&'static str> {
     .collect()
 }
 
-/// What to say of a bridge whose messages are not this program's.
-fn other_version(bridge: &Bridge) -> Option<String> {
-    let Bridge { version, firmware, serial, .. } = bridge;
-    (*version != VERSION).then(|| {
-        format!(
-            "bridge {serial:016x}: its firmware {firmware} speaks version {version} of the link, this program version \
-             {VERSION}; `foilpress bridge flash` puts the firmware that came with this program on it"
-        )
-    })
-}
-
 /// What to say of a bridge that works but does not have the firmware that came with this program.
 pub fn newer_firmware(bridge: &Bridge) -> Option<String> {
     let ours = Firmware::embedded()?.ok()?;
@@ -240,9 +229,6 @@ impl Found {
     /// The same on a link that is open.
     pub fn ask_on(link: &mut dyn Transport) -> Result<Found> {
         let mut query = Query::new(link, PATIENCE)?;
-        if let Some(other) = other_version(query.bridge()) {
-            bail!(other);
-        }
         let (lines, fault) = query.lines(PATIENCE)?;
         let mut printer = |what| match fault {
             Some(fault) => Ok(Reply::Stopped(fault)),
@@ -263,6 +249,7 @@ impl Found {
     fn json(&self) -> serde_json::Value {
         json!({
             "bridge": self.bridge,
+            "serial_number": format!("{:016X}", self.bridge.serial),
             "job": { "number": self.progress.job, "doing": doing(&self.progress),
                      "accepted": self.progress.accepted, "printed": self.progress.printed },
             "lines_high": levels(self.lines),
@@ -352,14 +339,6 @@ mod tests {
     fn the_printers_own_device_id_is_known_and_anothers_is_not() {
         assert!(is_alps("MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER"));
         assert!(!is_alps("MFG:Hewlett-Packard;MDL:LaserJet;COMMENT:not ALPS"));
-    }
-
-    #[test]
-    fn a_bridge_of_other_messages_is_answered_with_the_command_that_helps() {
-        let bridge = |version| Bridge { version, boot: 1, serial: 0xab, firmware: "9.9".into() };
-        assert_eq!(other_version(&bridge(VERSION)), None);
-        let said = other_version(&bridge(VERSION + 1)).unwrap();
-        assert!(said.contains("9.9") && said.contains("foilpress bridge flash"), "{said}");
     }
 
     #[test]

@@ -40,6 +40,13 @@ pub enum QueryError {
         "no bridge answers there; is it the right port (`foilpress bridge list`), and does it run this program's firmware?"
     )]
     NoAnswer,
+    /// Other messages than ours.
+    #[error(
+        "bridge {:016x}: its firmware {} speaks version {} of the link, this program version {VERSION}; `foilpress bridge \
+         flash` puts the firmware that came with this program on it",
+        .0.serial, .0.firmware, .0.version
+    )]
+    Version(Bridge),
     /// A job is open, so this must wait.
     #[error(
         "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
@@ -86,8 +93,14 @@ enum Heard {
 }
 
 impl<'t> Query<'t> {
-    /// Greets the bridge. Changes nothing: a job under way goes on.
+    /// Greets the bridge, which has to speak this program's messages. Changes nothing: a job under way goes on.
     pub fn new(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
+        let query = Query::with_any(link, patience)?;
+        if query.bridge.version == VERSION { Ok(query) } else { Err(QueryError::Version(query.bridge)) }
+    }
+
+    /// The same whatever messages it speaks: to put other firmware on it.
+    pub fn with_any(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
         let mut reader = Reader::new();
         let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
         let mut bridge = None;

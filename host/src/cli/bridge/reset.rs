@@ -21,7 +21,7 @@ use crate::send::query::Query;
     foilpress bridge reset                        (the only bridge there is)\n  \
     foilpress bridge reset --to serial:/dev/ttyACM0\n  \
     foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
-    Refused while the bridge prints. What a printer does with a sheet it holds is not known for certain: if it does not \
+    A bridge that has lost its memory in the middle of a sheet does not do this by itself. Refused while it prints. What a printer does with a sheet it holds is not known for certain: if it does not \
     come out, switch the printer off and on.")]
 pub struct Args {
     /// Where the bridge is [default: the only one there is]
@@ -69,7 +69,7 @@ pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Obser
     };
     let (name, job) = (&entry.name, entry.record.job);
     let why = format!(
-        "the bridge lost its memory in the middle of {name} (job {job:08x}), and the printer may still wait for the rest"
+        "what became of {name} (job {job:08x}) is not known, and the printer may still wait for the rest of it"
     );
     if !agreed(&format!("{why}. Reset the printer through the bridge now?"))? {
         bail!(
