@@ -235,15 +235,13 @@ impl Found {
             None => query.printer(what, PRINTER_PATIENCE),
         };
         let device_id = printer(Ask::DeviceId)?;
-        let status = printer(Ask::Printer)?;
-        Ok(Found {
-            bridge: query.bridge().clone(),
-            progress: *query.progress(),
-            lines,
-            fault,
-            device_id,
-            status,
-        })
+        let mut status = printer(Ask::Printer)?;
+        // A job may have ended meanwhile, between two of these answers.
+        let progress = query.ask_progress(PATIENCE)?;
+        if status == Reply::NotNow && !is_open(&progress) {
+            status = query.printer(Ask::Printer, PRINTER_PATIENCE)?;
+        }
+        Ok(Found { bridge: query.bridge().clone(), progress, lines, fault, device_id, status })
     }
 
     fn json(&self) -> serde_json::Value {

@@ -9,7 +9,7 @@ mod flash;
 mod found;
 
 use std::fs;
-use std::io::Read as _;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -279,8 +279,12 @@ fn a_sender_killed_again_and_again_prints_the_same_sheet() {
         child.kill().unwrap();
         child.wait().unwrap();
         let before = bench.well(&["bridge", "status", "--to", &bench.to()]);
-        assert!(before.contains("printing job") || before.contains("waits"), "{before}");
-        assert!(before.contains("a job is open"), "{before}");
+        // On a slow machine the bridge may be through with what it holds by now, which can be all of the job.
+        let open = before.contains("printing job") || before.contains("waits");
+        assert!(
+            if open { before.contains("a job is open") } else { before.contains("was printed") },
+            "{before}"
+        );
         child = bench.spawn(&["resume"]);
     }
     said(child);
@@ -336,12 +340,14 @@ fn a_printer_switched_off_in_a_job_costs_the_sheet_and_the_next_one_is_printed_w
     let (lost, resets) = (bench.printed(), bench.bridge.desk().resets);
     assert!(lost < job.len(), "the whole job had crossed the port");
     // Sent before the printer is back: it waits, and the printer is reset before its first byte.
-    let next = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
-    std::thread::sleep(Duration::from_secs(2));
+    let mut next = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
+    let mut lines = BufReader::new(next.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("nothing is printed yet")));
+    assert!(lines.any(|line| line.contains("+5 V absent")));
     assert_eq!(bench.printed(), lost, "bytes for a printer that is off");
     bench.bridge.desk().switch(true);
-    let text = said(next);
-    assert!(text.contains("+5 V absent") && text.contains("goes on"), "{text}");
+    let text: Vec<String> = lines.collect();
+    assert!(next.wait().unwrap().success() && text.iter().any(|line| line.contains("goes on")), "{text:?}");
     // The printer has put out what there was of the first.
     bench.came_out(lost, &job, 2);
     assert_eq!(bench.bridge.desk().resets, resets + 1);
