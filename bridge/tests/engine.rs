@@ -302,6 +302,34 @@ fn a_printer_switched_off_in_the_middle_gets_nothing_more() {
 }
 
 #[test]
+fn a_printer_that_went_in_a_job_is_reset_when_it_is_back_and_before_the_next_one() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    while rig.engine.work() {}
+    rig.engine.consumed(1);
+    rig.engine.port(Lines(0), Some(Fault::PowerOff));
+    // The host has the next one ready, and the bridge is restarted meanwhile: none of that counts as a reset.
+    let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+    rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &stream[..DATA_MAX] });
+    while rig.engine.work() {}
+    for fault in [Fault::PowerOff, Fault::Error, Fault::OffLine] {
+        rig.engine.port(Lines(0), Some(fault));
+        assert!(rig.engine.output().is_empty() && rig.engine.task().is_none(), "{fault:?}");
+    }
+    rig.engine.port(Lines::IDLE, None);
+    assert!(rig.engine.output().is_empty(), "bytes before the reset");
+    assert_eq!(rig.engine.task(), Some(Task::Initialise));
+    rig.engine.done(Outcome::Done);
+    assert!(!rig.engine.output().is_empty());
+    rig.engine.port(Lines::IDLE, None);
+    assert_eq!(rig.engine.task(), None, "it is reset once");
+}
+
+#[test]
 fn a_job_nobody_has_the_data_of_any_more_can_be_given_up() {
     let stream = a_raw_job();
     let mut rig = Rig::new();

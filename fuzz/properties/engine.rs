@@ -207,8 +207,7 @@ impl Bench<'_, '_> {
                 self.must_reset =
                     proper && !self.printed.is_empty() && grammar(&self.printed) != Grammar::Whole;
             }
-            // Nothing is promised but that the host is told.
-            (JobState::Lost, _) => {}
+            (JobState::Lost, _) => self.must_reset = !self.printed.is_empty(),
             (state, _) => panic!("a job has ended {state:?}"),
         }
     }
@@ -315,7 +314,8 @@ fn step<'m>(
         }
         13 | 14 => bench.consume(script.int_in_range(0..=2048)?),
         15 => {
-            let lines = Lines(script.arbitrary::<u8>()? | Lines::POWER);
+            let power = if script.ratio(7u8, 8u8)? { Lines::POWER } else { 0 };
+            let lines = Lines(script.arbitrary::<u8>()? & !Lines::POWER | power);
             bench.engine.port(lines, lines.fault());
         }
         16 => bench.answer(script)?,

@@ -5,8 +5,9 @@
 //   serial   the serial port. A connection is a program that has it open; the bytes are plain.
 //   usb      the whole device, for requests as the kernel gets them (urbs.mjs).
 //   printer  the parallel port. Lines of JSON: from here { "bytes": BASE64 } that crossed the port and { "init": true };
-//            to here any of { "room": bytes taken in all before it stays busy, "lines": { paperOut, select, fault, power },
-//            "answer": BASE64 for nibble mode, "id": BASE64 }. Nobody there: a printer that takes everything.
+//            to here any of { "room": bytes taken in all before it stays busy, "lines": { paperOut, select, fault },
+//            "power": whether it is switched on, "answer": BASE64 for nibble mode, "id": BASE64 }. Nobody there: a printer
+//            that takes everything.
 //
 // Lines on standard input are orders: `replug`, `figures`, `plug N` (a loop-back plug in the printer's place, in position N, for
 // good). Each is answered by a line of JSON on standard output;
@@ -72,9 +73,10 @@ function printerConnected(socket) {
   const lines = createInterface({ input: socket });
   lines.on('error', () => {});
   lines.on('line', (line) => {
-    const { room, lines: levels, answer, id } = JSON.parse(line);
+    const { room, lines: levels, power, answer, id } = JSON.parse(line);
     if (room !== undefined) printer.grant(room);
     if (levels) printer.change(levels);
+    if (power !== undefined && power === printer.off) printer.power(power);
     if (answer) printer.say.push(...Buffer.from(answer, 'base64'));
     if (id) printer.id = [...Buffer.from(id, 'base64')];
   });

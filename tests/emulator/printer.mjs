@@ -23,6 +23,7 @@ export class Printer {
     this.phase = 'forward';
     this.readyAt = 0;
     this.takenAt = -Infinity;
+    this.off = false;
     this.level = {};
     this.own = { paperOut: 0, select: 1, fault: 1 };
     for (const [line, level] of Object.entries({ ack: 1, busy: 0, power: 1, ...this.own })) this.set(line, level);
@@ -50,6 +51,7 @@ export class Printer {
   power(on) {
     this.off = !on;
     this.readyAt = on ? 0 : Infinity;
+    [this.phase, this.full, this.say] = ['forward', false, []];
     for (const [line, level] of on ? [['power', 1], ['busy', 0], ['ack', 1]] : [['busy', 1], ['power', 0]]) this.set(line, level);
   }
 

@@ -59,7 +59,9 @@ for (const [what, settings] of [['the model printer', MODEL], ['a printer that i
   });
 }
 
-for (const [way, kind, name, end] of [['serial', RAW, 'page', 'rgl'], ['bulk', RAW, 'page', 'rgl'], ['bulk', STREAMS, 'clusters', 'streams']]) {
+const ASKED = [['serial', RAW, 'page', 'rgl'], ['bulk', RAW, 'page', 'rgl'], ['bulk', STREAMS, 'clusters', 'streams'], ['bulk', STREAMS, 'page', 'streams']];
+
+for (const [way, kind, name, end] of ASKED) {
   test(`how the printer is, is answered within 5 ms while ${name}.${end} goes out over ${way}`, { skip }, async (t) => {
     const bench = new Bench(MODEL);
     await bench.connect(way);

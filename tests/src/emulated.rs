@@ -4,7 +4,7 @@
 //! meets. The serial port is a pseudo-terminal under the name [`Emulated::port`], which, as with a real device, hangs
 //! up and gets another terminal behind it when the cable is pulled. Opening and closing it raise and lower the port's
 //! lines. The parallel port leads to a [`Printer`] with a buffer: while that is full or the printer is in trouble, Busy
-//! stays up and the status lines say why.
+//! stays up and the status lines say why. It can be switched off, too.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
@@ -49,6 +49,10 @@ pub struct Desk {
     pub sheets: Vec<Printout>,
     /// The printer's refusal: what follows is taken and thrown away.
     pub refused: Option<String>,
+    /// How often it was reset through the port.
+    pub resets: usize,
+    /// The printer's own switch.
+    on: bool,
 }
 
 /// An emulated bridge with a simulated printer. Dropping it switches it off.
@@ -82,7 +86,15 @@ impl Emulated {
         let missing = || io::Error::other("a pipe to Node is missing");
         let orders = board.stdin.take().ok_or_else(missing)?;
         let answers = BufReader::new(board.stdout.take().ok_or_else(missing)?);
-        let mut desk = Desk { printer, stock, printed: Vec::new(), sheets: Vec::new(), refused: None };
+        let mut desk = Desk {
+            printer,
+            stock,
+            printed: Vec::new(),
+            sheets: Vec::new(),
+            refused: None,
+            resets: 0,
+            on: true,
+        };
         desk.printer.load(stock);
         let mut emulated = Emulated {
             folder: folder.to_path_buf(),
@@ -196,8 +208,9 @@ fn serve_printer(socket: &UnixStream, desk: &Mutex<Desk>, stop: &AtomicBool) -> 
                     waiting.extend_from_slice(&bytes);
                 }
                 if message["init"] == true {
+                    desk.resets += 1;
                     desk.printer.power_cycle();
-                    waiting.clear();
+                    taken += std::mem::take(&mut waiting).len() as u64;
                 }
             }
             Ok(_) => {}
@@ -208,6 +221,7 @@ fn serve_printer(socket: &UnixStream, desk: &Mutex<Desk>, stop: &AtomicBool) -> 
         taken += desk.take(&mut waiting);
         let trouble = desk.printer.trouble();
         let answers = desk.printer.answers();
+        let on = desk.on;
         drop(desk);
         if !answers.is_empty() {
             say(json!({ "answer": BASE64.encode(&answers) }))?;
@@ -215,6 +229,7 @@ fn serve_printer(socket: &UnixStream, desk: &Mutex<Desk>, stop: &AtomicBool) -> 
         // The lines as IEEE 1284 defines them; which of them this printer moves for which trouble is not known.
         let now = json!({
             "room": taken + BUFFER,
+            "power": on,
             "lines": {
                 "paperOut": u8::from(trouble == Some(Trouble::NoPaper)),
                 "select": u8::from(trouble.is_none()),
@@ -230,11 +245,17 @@ fn serve_printer(socket: &UnixStream, desk: &Mutex<Desk>, stop: &AtomicBool) -> 
 }
 
 impl Desk {
+    /// Switches the printer off, or on again. What it was at work on is lost.
+    pub fn switch(&mut self, on: bool) {
+        self.on = on;
+        self.printer.power_cycle();
+    }
+
     /// Gives the printer what waits; says how many bytes it took.
     fn take(&mut self, waiting: &mut Vec<u8>) -> u64 {
         let mut taken = 0;
         loop {
-            if self.refused.is_some() {
+            if self.refused.is_some() || !self.on {
                 taken += std::mem::take(waiting).len();
                 break;
             }

@@ -25,6 +25,8 @@ pub struct Port {
     pub busy: AtomicBool,
     /// There is paper.
     pub paper: AtomicBool,
+    /// The printer is switched off.
+    pub off: AtomicBool,
     /// The printer's cover is open.
     pub open_cover: AtomicBool,
     /// The maker its device ID names; none for a port that does not talk back.
@@ -48,6 +50,7 @@ impl Port {
             rate: rate.into(),
             busy: false.into(),
             paper: true.into(),
+            off: false.into(),
             open_cover: false.into(),
             maker: Mutex::default(),
             resets: 0.into(),
@@ -173,11 +176,15 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
         for _ in 0..50 {
             engine.work();
         }
-        let paper = is(&port.paper);
-        engine.port(Lines::IDLE, (!paper).then_some(Fault::PaperOut));
+        let (lines, fault) = match (is(&port.off), is(&port.paper)) {
+            (true, _) => (Lines(0), Some(Fault::PowerOff)),
+            (false, false) => (Lines::IDLE, Some(Fault::PaperOut)),
+            (false, true) => (Lines::IDLE, None),
+        };
+        engine.port(lines, fault);
         let bytes = engine.output();
         let mut printed = port.printed.lock().expect("no test panicked with it");
-        let waits = !paper || is(&port.busy) && !printed.is_empty();
+        let waits = fault.is_some() || is(&port.busy) && !printed.is_empty();
         let count = if waits { 0 } else { bytes.len().min(port.rate.load(Ordering::Relaxed)) };
         printed.extend_from_slice(&bytes[..count]);
         drop(printed);

@@ -5,14 +5,17 @@
 //! them; so a reader that wants to be sure has to look first. [`decode`] takes one whole image for an RP2040 with the
 //! flash of a Pico and nothing else; [`Image::check_boot`] says whether the boot ROM would start it.
 //!
-//! Cost: one pass over the file, a copy of its pages. Limits: no other chips, no files of several chips, none of the
+//! The format has no checksum. [`encode`] writes one of each block behind its page, into bytes that boot loaders do not look
+//! at, and [`decode`] holds a file that has any to all of them.
+//!
+//! Cost: two passes over the file, a copy of its pages. Limits: no other chips, no files of several chips, none of the
 //! format's extensions; the linker and the usual tools write none of these for the RP2040.
 //! Source: Microsoft's description of UF2; RP2040 data sheet, 2.8.1.3.1 (checksum) and 2.8.4 (UF2).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use crc::{CRC_32_MPEG_2, Crc};
+use crc::{CRC_32_ISO_HDLC, CRC_32_MPEG_2, Crc};
 
 /// Bytes of the image in one block, which is a page of the flash.
 pub const PAGE: usize = 256;
@@ -26,6 +29,10 @@ pub const FLASH: Range<u32> = 0x1000_0000..0x1020_0000;
 pub const LARGEST_FILE: usize = (FLASH.end - FLASH.start) as usize / PAGE * BLOCK;
 
 const MAGIC: [u32; 3] = [0x0A32_4655, 0x9E5D_5157, 0x0AB1_6F30];
+/// Stands behind the page, before the checksum of everything in front of it.
+const CHECKED: u32 = 0x4352_4331;
+/// Where.
+const CHECK: usize = 32 + PAGE;
 const FAMILY_PRESENT: u32 = 0x2000;
 const RP2040: u32 = 0xE48B_FF56;
 /// The chips of the Pico 2.
@@ -71,6 +78,9 @@ pub enum Uf2Error {
         /// Its chip, 0 if it names none.
         family: u32,
     },
+    /// Changed since it was made.
+    #[error("block {0} is damaged: its checksum is not that of its bytes; get the file anew")]
+    Checksum(usize),
     /// Something the boot ROM would not write.
     #[error(
         "block {at} is of a kind a Pico does not take (flags {flags:#x}, {size} bytes; 0x2000 and 256 are usual)"
@@ -238,14 +248,17 @@ pub fn encode(pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
         let words = [MAGIC[0], MAGIC[1], FAMILY_PRESENT, address, PAGE as u32, number as u32, total, RP2040];
         file.extend(words.iter().flat_map(|word| word.to_le_bytes()));
         file.extend(bytes);
-        file.resize(file.len() + BLOCK - 4 - 32 - PAGE, 0);
+        let checksum = checksum(&file[number * BLOCK..]);
+        file.extend(CHECKED.to_le_bytes());
+        file.extend(checksum.to_le_bytes());
+        file.resize((number + 1) * BLOCK - 4, 0);
         file.extend(MAGIC[2].to_le_bytes());
     }
     Ok(file)
 }
 
 /// The image in a file. Refuses anything that is not one whole image for a Pico: every block once, every page once,
-/// all of them inside the flash.
+/// all of them inside the flash; and damaged ones, if [`encode`] made them.
 pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
     if file.is_empty() {
         return Err(Uf2Error::Empty);
@@ -292,7 +305,19 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
             return Err(Uf2Error::Twice { at, address });
         }
     }
+    // Last, so that what is wrong with a block is said more exactly if it can be.
+    let is_sound =
+        |block: &[u8]| (word(block, CHECK), word(block, CHECK + 4)) == (CHECKED, checksum(&block[..CHECK]));
+    if file.chunks_exact(BLOCK).any(|block| word(block, CHECK) == CHECKED)
+        && let Some(at) = file.chunks_exact(BLOCK).position(|block| !is_sound(block))
+    {
+        return Err(Uf2Error::Checksum(at));
+    }
     Ok(Image { pages })
+}
+
+fn checksum(bytes: &[u8]) -> u32 {
+    Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(bytes)
 }
 
 /// The little-endian word at `offset`, which is inside `bytes`.

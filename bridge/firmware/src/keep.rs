@@ -123,8 +123,8 @@ impl Keeper {
         slot[4..8].copy_from_slice(&self.number.to_le_bytes());
         // Below MARKS, and what follows is far shorter than a slot.
         slot[8..10].copy_from_slice(&(place as u16).to_le_bytes());
-        let Ok(used) = postcard::to_slice(&(checkpoint.progress, checkpoint.ends_at), &mut slot[HEAD..])
-        else {
+        let Checkpoint { progress, ends_at, needs_reset } = checkpoint;
+        let Ok(used) = postcard::to_slice(&(progress, ends_at, needs_reset), &mut slot[HEAD..]) else {
             return;
         };
         slot[10] = used.len() as u8;
@@ -159,23 +159,23 @@ fn read(slot: &[u8; SLOT]) -> Option<(u32, usize, Checkpoint)> {
         return None;
     }
     let body = slot.get(HEAD..HEAD + usize::from(slot[10]))?;
-    let (progress, ends_at) = postcard::from_bytes(body).ok()?;
+    let (progress, ends_at, needs_reset) = postcard::from_bytes(body).ok()?;
     let place = usize::from(u16::from_le_bytes([slot[8], slot[9]]));
-    Some((word(4), place, Checkpoint { progress, ends_at }))
+    Some((word(4), place, Checkpoint { progress, ends_at, needs_reset }))
 }
 
 /// Adds bytes to the log, over the oldest.
 pub fn log(bytes: &[u8]) {
     critical_section::with(|_| {
         // SAFETY: in a critical section, and no reference to these fields outlives one.
-        let kept = unsafe { &mut (*kept()).written };
+        let written = unsafe { &mut (*kept()).written };
         // SAFETY: likewise; it is another field.
-        let ring = unsafe { &mut (*self::kept()).log };
+        let ring = unsafe { &mut (*kept()).log };
         for &byte in bytes {
-            ring[kept[0] as usize % LOG] = byte;
-            kept[0] = kept[0].wrapping_add(1);
+            ring[written[0] as usize % LOG] = byte;
+            written[0] = written[0].wrapping_add(1);
         }
-        kept[1] = !kept[0];
+        written[1] = !written[0];
     });
 }
 

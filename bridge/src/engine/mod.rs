@@ -112,6 +112,8 @@ pub struct Checkpoint {
     pub progress: Progress,
     /// Where its early end begins, in bytes at the port, once that is decided.
     pub ends_at: Option<u32>,
+    /// Whether it is over and the printer still has to be reset behind it.
+    pub needs_reset: bool,
 }
 
 /// What is to be said to the host.
@@ -159,6 +161,8 @@ pub struct Engine<'m> {
     request: u16,
     /// A job was ended where the printer's state is not known: it has to be reset before anything else.
     needs_reset: bool,
+    /// The same, as soon as the printer is ready: it was switched off, or the bridge was reset before the printer was.
+    reset_when_ready: bool,
 }
 
 const NOTHING: Progress =
@@ -190,15 +194,17 @@ impl<'m> Engine<'m> {
             task_given: false,
             request: 0,
             needs_reset: false,
+            reset_when_ready: false,
         }
     }
 
     /// An engine that goes on where another one was when it was reset.
     pub fn resume(memory: Memory<'m>, identity: Identity, checkpoint: Checkpoint) -> Self {
         let mut engine = Self::new(memory, identity);
-        let Checkpoint { progress, ends_at } = checkpoint;
+        let Checkpoint { progress, ends_at, needs_reset } = checkpoint;
         if progress.job == 0 || is_final(progress.state) {
             engine.last = progress;
+            engine.reset_when_ready = needs_reset;
             return engine;
         }
         if progress.job == LOCAL {
@@ -230,7 +236,11 @@ impl<'m> Engine<'m> {
 
     /// What has to be kept so that [`Engine::resume`] can go on.
     pub fn checkpoint(&self) -> Checkpoint {
-        Checkpoint { progress: self.progress(), ends_at: self.job.as_ref().and_then(|job| job.ends_at) }
+        Checkpoint {
+            progress: self.progress(),
+            ends_at: self.job.as_ref().and_then(|job| job.ends_at),
+            needs_reset: self.job.is_none() && (self.needs_reset || self.reset_when_ready),
+        }
     }
 
     /// Where the job stands.
@@ -264,7 +274,7 @@ impl<'m> Engine<'m> {
     /// Bytes for the port behind the next `skip`, which are on their way already.
     pub fn output_behind(&self, skip: usize) -> &[u8] {
         // A task has the port for itself, and a printer that has to be reset gets nothing before that.
-        if self.task.is_some() { &[] } else { self.output.behind(skip) }
+        if self.task.is_some() || self.reset_when_ready { &[] } else { self.output.behind(skip) }
     }
 
     /// So many bytes of [`Engine::output`] have crossed the port.
@@ -285,8 +295,12 @@ impl<'m> Engine<'m> {
     pub fn port(&mut self, lines: Lines, fault: Option<Fault>) {
         (self.lines, self.fault) = (lines, fault);
         if fault == Some(Fault::PowerOff) && self.job.as_ref().is_some_and(|job| job.printed > 0) {
-            // Switched on again the printer is a new one, and the rest of a row would be text to it.
+            // Switched on again the printer is a new one, and the rest of a row would be text to it. If only the cable
+            // was pulled it is not, and the next job would be.
             self.end(JobState::Lost);
+            self.reset_when_ready = true;
+        } else if self.reset_when_ready && fault.is_none() && self.assign(Task::Initialise) {
+            self.reset_when_ready = false;
         }
     }
 

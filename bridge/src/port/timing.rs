@@ -25,7 +25,7 @@ pub struct Timing {
 pub struct BadSettings;
 
 impl Timing {
-    /// 800 ns each: above the standard's 750, and a whole number of ticks of a 10 MHz clock.
+    /// 800 ns around the strobe: above the standard's 750, and a whole number of ticks of a 10 MHz clock.
     pub const DEFAULT: Timing = Timing { setup: 800, strobe: 800, hold: 800, settle: 500 };
     /// Older printers and short cables.
     pub const FAST: Timing = Timing { setup: 500, strobe: 500, hold: 500, settle: 500 };

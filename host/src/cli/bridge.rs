@@ -13,9 +13,9 @@ pub use reset::before_sending;
 use std::io::{self, Write as _};
 use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
-use protocol::link::message::{Ask, Fault, JobState, Lines, Progress, VERSION};
+use protocol::link::message::{Ask, Fault, JobState, Lines, Progress};
 use serde_json::json;
 
 use crate::flash::FlashError;
@@ -63,7 +63,7 @@ enum Command {
     Test(test::Args),
     /// What the firmware has noted, also before its last restart
     Log(log::Args),
-    /// Reset the printer through the bridge, after a sheet was lost in the middle
+    /// Reset the printer through the bridge, after a bridge has lost its memory in the middle of a sheet
     Reset(reset::Args),
 }
 
@@ -137,11 +137,11 @@ pub fn permission() -> String {
     )
 }
 
-/// Makes sure that the printer behind a bridge is one of ALPS, as far as it says what it is; with `force` only says so.
-/// A bridge that cannot be asked now is not judged: sending finds out what is wrong with it.
+/// Makes sure that a bridge is there and that the printer behind it is one of ALPS, as far as it says what it is; with
+/// `force` that is only said. So a mistyped address or a missing permission leaves no job behind that waits.
 pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> Result<()> {
-    let Ok(mut link) = address.open() else { return Ok(()) };
-    let Ok(mut query) = Query::new(&mut *link, PATIENCE) else { return Ok(()) };
+    let mut link = address.open().context("not sent")?;
+    let mut query = Query::new(&mut *link, PATIENCE).context("not sent")?;
     match query.device_id(PATIENCE, PRINTER_PATIENCE) {
         Some(id) if !is_alps(&id) && force => {
             observer.note(&format!("the printer says it is no ALPS: {id}"));
@@ -166,9 +166,7 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
         JobState::Lost => {
-            format!(
-                "idle; job {job:08x} was lost. `foilpress bridge reset` readies the printer for the next one"
-            )
+            format!("idle; job {job:08x} was lost; the bridge resets the printer before the next one")
         }
     }
 }
@@ -192,17 +190,6 @@ fn levels(lines: Lines) -> Vec<&'static str> {
     .filter(|&(line, _)| lines.high(line))
     .map(|(_, name)| name)
     .collect()
-}
-
-/// What to say of a bridge whose messages are not this program's.
-fn other_version(bridge: &Bridge) -> Option<String> {
-    let Bridge { version, firmware, serial, .. } = bridge;
-    (*version != VERSION).then(|| {
-        format!(
-            "bridge {serial:016x}: its firmware {firmware} speaks version {version} of the link, this program version \
-             {VERSION}; `foilpress bridge flash` puts the firmware that came with this program on it"
-        )
-    })
 }
 
 /// What to say of a bridge that works but does not have the firmware that came with this program.
@@ -237,29 +224,25 @@ impl Found {
     /// The same on a link that is open.
     pub fn ask_on(link: &mut dyn Transport) -> Result<Found> {
         let mut query = Query::new(link, PATIENCE)?;
-        if let Some(other) = other_version(query.bridge()) {
-            bail!(other);
-        }
         let (lines, fault) = query.lines(PATIENCE)?;
         let mut printer = |what| match fault {
             Some(fault) => Ok(Reply::Stopped(fault)),
             None => query.printer(what, PRINTER_PATIENCE),
         };
         let device_id = printer(Ask::DeviceId)?;
-        let status = printer(Ask::Printer)?;
-        Ok(Found {
-            bridge: query.bridge().clone(),
-            progress: *query.progress(),
-            lines,
-            fault,
-            device_id,
-            status,
-        })
+        let mut status = printer(Ask::Printer)?;
+        // A job may have ended meanwhile, between two of these answers.
+        let progress = query.ask_progress(PATIENCE)?;
+        if status == Reply::NotNow && !is_open(&progress) {
+            status = query.printer(Ask::Printer, PRINTER_PATIENCE)?;
+        }
+        Ok(Found { bridge: query.bridge().clone(), progress, lines, fault, device_id, status })
     }
 
     fn json(&self) -> serde_json::Value {
         json!({
             "bridge": self.bridge,
+            "serial_number": format!("{:016X}", self.bridge.serial),
             "job": { "number": self.progress.job, "doing": doing(&self.progress),
                      "accepted": self.progress.accepted, "printed": self.progress.printed },
             "lines_high": levels(self.lines),
@@ -324,17 +307,4 @@ fn status(args: &StatusArgs) -> Result<()> {
         found.write(&mut out)?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_bridge_of_other_messages_is_answered_with_the_command_that_helps() {
-        let bridge = |version| Bridge { version, boot: 1, serial: 0xab, firmware: "9.9".into() };
-        assert_eq!(other_version(&bridge(VERSION)), None);
-        let said = other_version(&bridge(VERSION + 1)).unwrap();
-        assert!(said.contains("9.9") && said.contains("foilpress bridge flash"), "{said}");
-    }
 }

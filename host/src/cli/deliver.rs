@@ -65,7 +65,7 @@ impl DeliverArgs {
 
 /// What the printer says of the cassettes, in words. The bridge may not answer; then the job will not go either.
 pub fn loaded(address: &Address, inks: &[Ink]) -> String {
-    let unknown = |why: &str| format!("Which cassettes are in is not known: {why}.");
+    let unknown = |why: &str| format!("Which cassettes are in is not known: {why}");
     let ask = || -> Result<Reply> {
         let mut link = address.open()?;
         let mut query = Query::new(&mut *link, BRIDGE)?;

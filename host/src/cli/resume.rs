@@ -57,8 +57,12 @@ fn number(text: &str) -> Result<u32, String> {
 pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
     let journal = Journal::of_user()?;
     if args.list {
+        let entries = journal.entries()?;
+        if entries.is_empty() {
+            observer.note("no job has been sent to a bridge yet");
+        }
         let mut out = std::io::stdout().lock();
-        for entry in journal.entries()? {
+        for entry in entries {
             writeln!(out, "{}", line(&entry))?;
         }
         return Ok(());

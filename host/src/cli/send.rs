@@ -352,8 +352,7 @@ impl<'o> Reporter<'o> {
                 self.show();
             }
             Event::Fault(Some(fault)) => {
-                let ink = words::pass_at(&self.passes, self.printed).map(|(_, ink)| ink);
-                self.observer.note(&words::fault(*fault, ink));
+                self.observer.note(&words::fault(*fault, words::wanted(&self.passes, self.printed)));
             }
             Event::Fault(None) => self.observer.note("the printer goes on"),
         }

@@ -269,7 +269,7 @@ impl Computer for ThisComputer {
 
     fn enter(&mut self, bridge: &Candidate) -> Result<u64, FlashError> {
         let (_, mut link) = bridge.open()?;
-        let mut query = Query::new(&mut *link, ANSWER_PATIENCE).map_err(FlashError::Enter)?;
+        let mut query = Query::with_any(&mut *link, ANSWER_PATIENCE).map_err(FlashError::Enter)?;
         let number = query.bridge().serial;
         query.bootloader(ANSWER_PATIENCE).map(|()| number).map_err(|error| match error {
             QueryError::JobOpen(job) => FlashError::Printing(job),
@@ -279,7 +279,7 @@ impl Computer for ThisComputer {
 
     fn greet(&mut self, candidate: &Candidate) -> Option<Bridge> {
         let (_, mut link) = candidate.open().ok()?;
-        let query = Query::new(&mut *link, ANSWER_PATIENCE).ok()?;
+        let query = Query::with_any(&mut *link, ANSWER_PATIENCE).ok()?;
         Some(query.bridge().clone())
     }
 

@@ -55,9 +55,10 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// Whether the printer may still wait for the rest of this job, so that the next one would be text to it.
+    /// Whether the printer may still wait for the rest of this job, so that the next one would be text to it. A bridge that
+    /// says itself that a job is lost resets the printer before the next one.
     pub fn left_open(&self) -> bool {
-        !self.settled && matches!(self.record.phase, Phase::Ended(Outcome::Lost | Outcome::Forgotten))
+        !self.settled && matches!(self.record.phase, Phase::Ended(Outcome::Forgotten))
     }
 }
 
@@ -429,10 +430,12 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_job_is_known_until_its_printer_was_reset() {
+    fn a_forgotten_job_is_known_until_its_printer_was_reset() {
         let folder = tempfile::tempdir().unwrap();
         let journal = Journal::at(folder.path()).unwrap();
-        for (bridge, outcome) in [(1, Outcome::Lost), (2, Outcome::Forgotten), (3, Outcome::Printed)] {
+        for (bridge, outcome) in
+            [(1, Outcome::Forgotten), (2, Outcome::Forgotten), (3, Outcome::Printed), (4, Outcome::Lost)]
+        {
             let mut queued = journal.queue(job(b"x")).unwrap();
             let ended = Record { phase: Phase::Ended(outcome), bridge: Some(bridge), ..queued.entry.record };
             queued.save(&ended).unwrap();
@@ -455,7 +458,7 @@ mod tests {
         let text = fs::read_to_string(&path).unwrap();
         let older = text.lines().filter(|line| !line.contains("settled")).collect::<String>();
         fs::write(&path, older.replace(",}", "}")).unwrap();
-        assert_eq!(journal.entries().unwrap().len(), 3);
+        assert_eq!(journal.entries().unwrap().len(), 4);
     }
 
     #[test]

@@ -56,6 +56,13 @@ pub enum QueryError {
         "no bridge answers there; is it the right port (`foilpress bridge list`), and does it run this program's firmware?"
     )]
     NoAnswer,
+    /// Other messages than ours.
+    #[error(
+        "bridge {:016x}: its firmware {} speaks version {} of the link, this program version {VERSION}; `foilpress bridge \
+         flash` puts the firmware that came with this program on it",
+        .0.serial, .0.firmware, .0.version
+    )]
+    Version(Bridge),
     /// A job is open, so this must wait.
     #[error(
         "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
@@ -102,8 +109,14 @@ enum Heard {
 }
 
 impl<'t> Query<'t> {
-    /// Greets the bridge. Changes nothing: a job under way goes on.
+    /// Greets the bridge, which has to speak this program's messages. Changes nothing: a job under way goes on.
     pub fn new(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
+        let query = Query::with_any(link, patience)?;
+        if query.bridge.version == VERSION { Ok(query) } else { Err(QueryError::Version(query.bridge)) }
+    }
+
+    /// The same whatever messages it speaks: to put other firmware on it.
+    pub fn with_any(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
         let mut reader = Reader::new();
         let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
         let mut bridge = None;
@@ -337,6 +350,40 @@ fn heard(message: &[u8]) -> Option<Heard> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bridge_of_other_messages_is_refused_with_the_command_that_helps() {
+        use crate::send::transport::pair;
+        use protocol::link::message::JobState;
+        for (version, fits) in [(VERSION, true), (VERSION + 1, false), (VERSION - 1, false)] {
+            let (mut host, mut board) = pair();
+            let progress = Progress {
+                job: 0,
+                state: JobState::None,
+                accepted: 0,
+                limit: 0,
+                printed: 0,
+                pass: 0,
+                row: 0,
+            };
+            let hello = ToHost::Hello { version, schema: SCHEMA, boot: 1, serial: 0xab, firmware: "9.9" };
+            for message in [hello, ToHost::Progress(progress)] {
+                let mut bytes = [0; frame::MAX];
+                let length = frame::write(&message, &mut bytes).unwrap();
+                assert_eq!(board.send(&bytes[..length]).unwrap(), length);
+            }
+            match Query::new(&mut host, Duration::from_secs(1)) {
+                Ok(query) => assert!(fits && query.bridge().version == version),
+                Err(error) => {
+                    let said = error.to_string();
+                    assert!(
+                        !fits && said.contains("9.9") && said.contains("foilpress bridge flash"),
+                        "{said}"
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn the_printers_own_device_id_is_known_and_anothers_is_not() {

@@ -29,7 +29,8 @@ pub enum Outcome {
     Cancelled,
     /// The bridge could not make sense of the data.
     Broken,
-    /// Printer or bridge lost their place in the middle: the sheet is lost, the printer must be reset.
+    /// Printer or bridge lost their place in the middle: the sheet is lost. The bridge resets the printer before anything
+    /// else goes to it.
     Lost,
     /// The bridge does not know of the job any more, though data had left for it. The sheet may be complete; if it is
     /// not, it is lost.

@@ -328,15 +328,15 @@ impl<'d> Session<'d> {
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
         let open = matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling);
         match self.record.phase {
-            Phase::Queued | Phase::Begun if open => {
-                if self.convinced(now) {
-                    return Err(SessionError::Busy(progress.job));
-                }
-            }
             // Nothing of it has ever left, and the bridge does not have it.
             Phase::Begun if self.record.cancel => {
                 if self.convinced(now) {
                     self.record.phase = Phase::Ended(Outcome::Cancelled);
+                }
+            }
+            Phase::Queued | Phase::Begun if open => {
+                if self.convinced(now) {
+                    return Err(SessionError::Busy(progress.job));
                 }
             }
             Phase::Sending => {

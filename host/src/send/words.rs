@@ -50,6 +50,14 @@ pub fn pass_at(passes: &[PassPlace], printed: u64) -> Option<(usize, Ink)> {
     Some((number, Ink::from_code(passes.get(number.checked_sub(1)?)?.ink)?))
 }
 
+/// The ink whose cassette the printer may want with `printed` bytes at the port: that of the pass, or of the first one once
+/// a job has begun.
+pub fn wanted(passes: &[PassPlace], printed: u64) -> Option<Ink> {
+    let first = passes.first()?.offset;
+    let at = if printed > 0 { printed.max(first) } else { 0 };
+    pass_at(passes, at).map(|(_, ink)| ink)
+}
+
 /// What to do with a printer that was left in the middle of a sheet.
 const RESET: &str = "Before the next job `foilpress bridge reset` resets the printer through the bridge (if it keeps the \
                      sheet all the same, switch it off and on)";
@@ -92,13 +100,15 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             )
         }
         Outcome::Lost => format!(
-            "{}: the sheet is lost{}: printer or bridge lost power in the middle. {RESET}, then send the job again",
+            "{}: the sheet is lost{}: the printer was switched off or its cable pulled in the middle, or the bridge restarted \
+             and nobody had the job any more. The bridge resets the printer before the next job; take out what is in it, and \
+             send the job again",
             entry.name,
             reached(entry)
         ),
         Outcome::Forgotten => format!(
-            "{}: the bridge has lost its memory and no longer knows this job; the sheet had come at least so far: \
-             {printed} of {} bytes{}. If it comes out complete all is well; otherwise it is lost. {RESET}. The job was \
+            "{}: the bridge no longer knows this job, because it lost its memory or has printed others since; the sheet had \
+             come at least so far: {printed} of {} bytes{}. If it comes out complete all is well; otherwise it is lost. {RESET}. The job was \
              not sent again by itself, so that nothing is printed twice",
             entry.name,
             entry.port_bytes,
@@ -162,5 +172,10 @@ mod tests {
         assert_eq!(at(49), None);
         assert_eq!((at(50), at(899)), (Some((1, Ink::White)), Some((1, Ink::White))));
         assert_eq!(at(5000), Some((2, Ink::Cyan)));
+        // The first cassette is fetched before its first row; a printer that has not begun wants none.
+        assert_eq!(
+            [0, 1, 49, 900].map(|printed| wanted(&passes, printed)),
+            [None, Some(Ink::White), Some(Ink::White), Some(Ink::Cyan)]
+        );
     }
 }

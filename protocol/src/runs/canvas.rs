@@ -41,6 +41,20 @@ const fn laid() -> [[[u16; 16]; 4]; 4] {
     laid
 }
 
+/// Words of the line that are laid out dot by dot before others may run: a thousand dots.
+const PORTION: usize = 32;
+
+/// What [`Canvas::lay`] has come to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Laid {
+    /// There was nothing to lay out.
+    Blank,
+    /// There is more: it is to be called again, nothing being inked in between.
+    Part,
+    /// The tile is laid out.
+    Whole,
+}
+
 /// Where a square of a full tile is and how it is walked.
 #[derive(Clone, Copy)]
 struct Square {
@@ -88,26 +102,28 @@ impl Canvas {
         self.used = (self.used.0.min(first), self.used.1.max(last + 1));
     }
 
-    /// Lays the tile out in rows of `stride` bytes, the first of which is that of the tile, and begins the next one. The
-    /// place for it is blank. Says whether there was anything to lay out.
-    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> bool {
-        let (first, end) = core::mem::replace(&mut self.used, UNUSED);
+    /// Lays the tile out in rows of `stride` bytes, the first of which is that of the tile, and begins the next one; a tile
+    /// that takes long only in part. The place for it is blank.
+    pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
+        let (first, end) = self.used;
         if first >= end {
-            return false;
+            return Laid::Blank;
         }
         let whole = (tile.w, tile.h) == (EDGE, EDGE) && tile.x.is_multiple_of(8);
-        if whole && self.line.iter().all(|&word| word == u32::MAX) {
+        if !whole {
+            return self.lay_dots(tile, rows, stride);
+        }
+        self.used = UNUSED;
+        if self.line.iter().all(|&word| word == u32::MAX) {
             let at = usize::from(tile.x / 8);
             for row in rows.chunks_mut(stride) {
                 row[at..at + usize::from(EDGE / 8)].fill(0xff);
             }
             self.line.fill(0);
-        } else if whole {
-            self.lay_squares(tile, first..end, rows, stride);
         } else {
-            self.lay_dots(tile, first..end, rows, stride);
+            self.lay_squares(tile, first..end, rows, stride);
         }
-        true
+        Laid::Whole
     }
 
     fn lay_squares(&mut self, tile: &Tile, words: core::ops::Range<usize>, rows: &mut [u8], stride: usize) {
@@ -138,14 +154,18 @@ impl Canvas {
         }
     }
 
-    fn lay_dots(&mut self, tile: &Tile, words: core::ops::Range<usize>, rows: &mut [u8], stride: usize) {
+    /// Makes the table if it is another tile's, or lays out a portion of the line.
+    fn lay_dots(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
         let shape = Tile { x: 0, y: 0, ..*tile };
         if self.shape != Some(shape) {
             tile.fill(&mut self.table);
             self.shape = Some(shape);
+            return Laid::Part;
         }
+        let (first, end) = self.used;
+        let until = end.min(first + PORTION);
         let table = self.table.chunks_exact(32).zip(&mut self.line);
-        for (dots, word) in table.take(words.end).skip(words.start) {
+        for (dots, word) in table.take(until).skip(first) {
             let mut word = core::mem::take(word);
             let mut dots = dots.iter();
             while word != 0
@@ -158,6 +178,12 @@ impl Canvas {
                 word <<= 1;
             }
         }
+        if until < end {
+            self.used = (until, end);
+            return Laid::Part;
+        }
+        self.used = UNUSED;
+        Laid::Whole
     }
 }
 

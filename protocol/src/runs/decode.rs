@@ -1,6 +1,6 @@
 //! A pass stream as bands of rows, in bounded memory and from input in any portions.
 
-use super::canvas::Canvas;
+use super::canvas::{Canvas, Laid};
 use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
 use crate::walk::{Band, Tile, Walk};
@@ -65,13 +65,15 @@ struct Runs {
     remainder: Option<u32>,
     /// Dots of the band done.
     done: u32,
+    /// Where the run under way ends: beyond `done` while it is being inked.
+    end: u32,
     /// The tile that is being inked, and which dots of the band are its own.
     tile: Option<Tile>,
     from: u32,
     to: u32,
     /// Tiles begun.
     tiles: usize,
-    /// A tile has been laid out in this step.
+    /// A tile, or a part of one, has been laid out in this step.
     laid: bool,
 }
 
@@ -163,8 +165,8 @@ impl Decoder {
         }
     }
 
-    /// As [`Decoder::step`], but it also stops behind every tile it has laid out, with `None`: for those who have other things
-    /// to do, and who call it again, with whatever input there then is.
+    /// As [`Decoder::step`], but it also stops, with `None`, behind every tile it has laid out, and several times within
+    /// those that take long: for those who have other things to do, and who call it again, with whatever input there then is.
     pub fn slice(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Option<Step>), Defect> {
         let width = self.walk.width();
         let memory = memory.get_mut(..band_bytes(width)).ok_or(Defect::Memory)?;
@@ -256,6 +258,7 @@ impl Runs {
             // The first run is plain.
             remainder: Some(PLAIN_BITS),
             done: 0,
+            end: 0,
             tile: None,
             from: 0,
             to: 0,
@@ -264,7 +267,7 @@ impl Runs {
         }
     }
 
-    /// Reads runs until the band is full or a tile has been laid out; says how much was read and whether it is full.
+    /// Reads runs until the band is full or something has been laid out; says how much was read and whether it is full.
     fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
         let mut read = 0;
         self.laid = false;
@@ -272,6 +275,10 @@ impl Runs {
             // On a microcontroller others wait for their turn.
             if self.laid {
                 return (read, false);
+            }
+            if self.done < self.end {
+                self.ink(place);
+                continue;
             }
             if self.ones == 0 && self.remainder.is_none() && input.len() - read >= CODE_BYTES {
                 read += self.read_codes(&input[read..], place);
@@ -296,7 +303,7 @@ impl Runs {
             self.take(value, count, place);
         }
         self.lay(place);
-        (read, true)
+        (read, self.tile.is_none())
     }
 
     /// Reads whole codes while there is input for any code; between two codes, and says how much was read. This is where
@@ -367,39 +374,44 @@ impl Runs {
             self.means[self.index as usize % 2].add(value);
             value + self.minimum
         };
-        let end = self.done.saturating_add(length).min(place.band.len());
+        self.end = self.done.saturating_add(length).min(place.band.len());
         if self.index % 2 == 1 {
-            self.ink(end, place);
+            self.ink(place);
+        } else {
+            self.done = self.end;
         }
-        self.done = end;
         self.index += 1;
         self.ones = 0;
         self.remainder = None;
     }
 
-    /// Inks the dots from `done` to `end`.
-    fn ink(&mut self, end: u32, place: &mut Place<'_>) {
-        let mut from = self.done;
-        while from < end {
-            if from >= self.to {
-                self.lay(place);
-                self.tile = place.band.tiles().nth(self.tiles);
-                self.tiles += 1;
-                // There is a next tile: `end` lies within the band.
-                let Some(tile) = &self.tile else { return };
-                (self.from, self.to) = (self.to, self.to + u32::from(tile.area()));
+    /// Inks the run under way to its end, or until something has been laid out.
+    fn ink(&mut self, place: &mut Place<'_>) {
+        while self.done < self.end && !self.laid {
+            if self.done < self.to {
+                let to = self.end.min(self.to);
+                place.canvas.ink(self.done - self.from, to - self.from);
+                self.done = to;
                 continue;
             }
-            let to = end.min(self.to);
-            place.canvas.ink(from - self.from, to - self.from);
-            from = to;
+            self.lay(place);
+            if self.tile.is_none() {
+                self.tile = place.band.tiles().nth(self.tiles);
+                self.tiles += 1;
+                // There is a next tile: the run ends within the band.
+                let Some(tile) = &self.tile else { return };
+                (self.from, self.to) = (self.to, self.to + u32::from(tile.area()));
+            }
         }
     }
 
-    /// Lays the tile out in the band.
+    /// Lays the tile out in the band, or a part of it; there is none any more when it is done.
     fn lay(&mut self, place: &mut Place<'_>) {
-        if let Some(tile) = self.tile.take() {
-            self.laid |= place.canvas.lay(&tile, place.memory, place.stride);
+        let Some(tile) = &self.tile else { return };
+        let laid = place.canvas.lay(tile, place.memory, place.stride);
+        self.laid |= laid != Laid::Blank;
+        if laid != Laid::Part {
+            self.tile = None;
         }
     }
 }

@@ -200,6 +200,32 @@ fn rows_are_those_of_the_format() {
 }
 
 #[test]
+fn a_run_over_many_tiles_is_laid_out_a_little_at_a_time() {
+    // Two bands of 34 and 32 rows, none of whose tiles is full, and one of tiles that are: each a single run.
+    for (width, height, most) in [(4800, 66, 1024), (4803, 64, 4096)] {
+        for band in Walk::new(width, height).bands() {
+            // Twenty zeros, twenty ones, the length in twenty bits, four to fill the byte.
+            let bits = ((1 << 20) - 1) << 24 | u64::from(band.len()) << 4;
+            let mut input = &[&[form::RUNS, 0][..], &bits.to_be_bytes()].concat()[..];
+            let mut decoder = Decoder::new(width, band.height);
+            let mut memory = vec![0; band_bytes(width)];
+            let mut before = 0;
+            loop {
+                let (used, step) = decoder.slice(input, &mut memory).unwrap();
+                input = &input[used..];
+                let dots: u32 = memory.iter().map(|byte| byte.count_ones()).sum();
+                assert!(dots - before <= most, "{} dots in one slice", dots - before);
+                before = dots;
+                if step.is_some() {
+                    assert_eq!((step, dots), (Some(Step::Band { y: 0, rows: band.height }), band.len()));
+                    break;
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn blank_bands_are_counted() {
     assert_eq!(coded(4800, 6372, &vec![0; 600 * 6372]), [form::BLANK, 100]);
     assert_eq!(coded(8, 300 * 64, &vec![0; 300 * 64]), [form::BLANK, 255, form::BLANK, 45]);

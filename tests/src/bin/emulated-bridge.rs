@@ -32,7 +32,8 @@ mod unix {
     use protocol::ink::Ink;
     use protocol::paper::Paper;
 
-    const ORDERS: &str = "orders: replug (the USB cable), cover (open, then close), figures, quit";
+    const ORDERS: &str = "orders: replug (the USB cable), cover (open, then close), paper (out, then in), power (the \
+                          printer's, off, then on), figures, quit";
 
     pub fn run() -> io::Result<()> {
         let args: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
@@ -53,12 +54,18 @@ mod unix {
             }
         });
         let mut trouble = None;
-        let mut kept = 0;
+        let (mut kept, mut resets, mut on) = (0, 0, true);
         loop {
             match order.recv_timeout(Duration::from_millis(100)) {
                 Ok(order) => match order.trim() {
                     "replug" => bridge.replug()?,
                     "cover" => open_or_close(&mut bridge.desk().printer),
+                    "paper" => take_or_load(&mut bridge.desk().printer),
+                    "power" => {
+                        on = !on;
+                        bridge.desk().switch(on);
+                        println!("printer: switched {}", if on { "on" } else { "off" });
+                    }
                     "figures" => println!("{}", bridge.figures()?),
                     "quit" => return Ok(()),
                     _ => println!("{ORDERS}"),
@@ -80,6 +87,10 @@ mod unix {
                 println!("operator: puts in {}", ink.name());
                 put_in(&mut desk.printer, ink).map_err(io::Error::other)?;
             }
+            if desk.resets > resets {
+                resets = desk.resets;
+                println!("printer: reset through the port");
+            }
             if let Some(refused) = desk.refused.take() {
                 println!("printer: does not understand: {refused}; it is switched off and on");
                 desk.printer.power_cycle();
@@ -99,6 +110,13 @@ mod unix {
         match printer.trouble() {
             Some(Trouble::CoverOpen) => printer.close_cover(),
             _ => printer.strike(Trouble::CoverOpen),
+        }
+    }
+
+    fn take_or_load(printer: &mut Printer) {
+        match printer.trouble() {
+            Some(Trouble::NoPaper) => printer.load(Stock::of(Paper::A4)),
+            _ => printer.strike(Trouble::NoPaper),
         }
     }
 

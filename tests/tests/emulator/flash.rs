@@ -333,9 +333,11 @@ fn a_damaged_image_is_refused_before_the_board_is_touched() {
     let Some(bench) = Bench::new() else { return };
     let damaged = bench.folder.path().join("damaged.uf2");
     let file = fs::read(&bench.image).unwrap();
-    let mut boot = file.clone();
-    boot[40] ^= 1;
-    for (bytes, word) in [(&file[..file.len() - 512], "copied to its end"), (&boot[..], "would not start")] {
+    let mut flipped = file.clone();
+    flipped[50 * 512 + 40] ^= 1;
+    for (bytes, word) in
+        [(&file[..file.len() - 512], "copied to its end"), (&flipped[..], "block 50 is damaged")]
+    {
         fs::write(&damaged, bytes).unwrap();
         let said = bench.flash(&damaged).unwrap_err();
         assert!(said.contains("not flashed") && said.contains(word), "{said}");

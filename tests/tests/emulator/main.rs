@@ -9,7 +9,7 @@ mod flash;
 mod found;
 
 use std::fs;
-use std::io::Read as _;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -279,8 +279,12 @@ fn a_sender_killed_again_and_again_prints_the_same_sheet() {
         child.kill().unwrap();
         child.wait().unwrap();
         let before = bench.well(&["bridge", "status", "--to", &bench.to()]);
-        assert!(before.contains("printing job") || before.contains("waits"), "{before}");
-        assert!(before.contains("a job is open"), "{before}");
+        // On a slow machine the bridge may be through with what it holds by now, which can be all of the job.
+        let open = before.contains("printing job") || before.contains("waits");
+        assert!(
+            if open { before.contains("a job is open") } else { before.contains("was printed") },
+            "{before}"
+        );
         child = bench.spawn(&["resume"]);
     }
     said(child);
@@ -319,6 +323,34 @@ fn an_open_cover_stops_the_job_and_a_closed_one_lets_it_go_on() {
     let text = said(child);
     assert!(text.contains("the printer has stopped") && text.contains("goes on"), "{text}");
     bench.came_out(0, &job, 1);
+    bench.check();
+}
+
+#[test]
+fn a_printer_switched_off_in_a_job_costs_the_sheet_and_the_next_one_is_printed_whole() {
+    let Some((mut bench, job)) = with_job() else { return };
+    let mut child = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
+    bench.until("it prints", |bench| bench.printed() > job.len() / 2);
+    bench.bridge.desk().switch(false);
+    let mut text = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut text).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert!(text.contains("the sheet is lost, in pass") && text.contains("switched off"), "{text}");
+    assert!(bench.well(&["bridge", "status", "--to", &bench.to()]).contains("+5 V absent"));
+    let (lost, resets) = (bench.printed(), bench.bridge.desk().resets);
+    assert!(lost < job.len(), "the whole job had crossed the port");
+    // Sent before the printer is back: it waits, and the printer is reset before its first byte.
+    let mut next = bench.spawn(&["send", "job.rgl", "--to", &bench.to()]);
+    let mut lines = BufReader::new(next.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("nothing is printed yet")));
+    assert!(lines.any(|line| line.contains("+5 V absent")));
+    assert_eq!(bench.printed(), lost, "bytes for a printer that is off");
+    bench.bridge.desk().switch(true);
+    let text: Vec<String> = lines.collect();
+    assert!(next.wait().unwrap().success() && text.iter().any(|line| line.contains("goes on")), "{text:?}");
+    // The printer has put out what there was of the first.
+    bench.came_out(lost, &job, 2);
+    assert_eq!(bench.bridge.desk().resets, resets + 1);
     bench.check();
 }
 

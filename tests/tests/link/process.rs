@@ -240,6 +240,33 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
 }
 
 #[test]
+fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_one() {
+    let bench = Bench::new(8, 100);
+    bench.keep_busy(true);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    bench.until_it_prints();
+    bench.bridge.port.off.store(true, Ordering::Relaxed);
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert!(said.contains("the sheet is lost") && said.contains("switched off"), "{said}");
+    let printed = bench.printed();
+    assert!(printed.len() < bench.job.len() && bench.job.starts_with(&printed), "printed twice");
+    // The next one is queued while it is off, and waits.
+    bench.keep_busy(false);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("+5 V absent")));
+    assert_eq!(bench.printed(), printed, "bytes for a printer that is off");
+    assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 0);
+    bench.bridge.port.off.store(false, Ordering::Relaxed);
+    let rest: Vec<String> = lines.collect();
+    assert!(child.wait().unwrap().success(), "{rest:?}");
+    assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 1);
+    assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
+}
+
+#[test]
 fn a_reset_is_refused_while_a_job_is_open() {
     let bench = Bench::new(8, 20).queue(JobKind::Streams);
     bench.begun();

@@ -1,7 +1,8 @@
 //! `foilpress bridge reset`, and the look whether a printer still waits for the rest of a sheet that was lost.
 //!
-//! Half a job followed by another is text to the printer. So after a loss nothing is sent until the printer has been
-//! reset: by the bridge, which pulls the port's nInit line, or by its own switch.
+//! Half a job followed by another is text to the printer. A bridge that knows of the half resets the printer by itself. One
+//! that has lost its memory does not; then nothing is sent until the printer has been reset: by the bridge, which pulls
+//! the port's nInit line, or by its own switch.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 
@@ -20,7 +21,7 @@ use crate::send::query::Query;
     foilpress bridge reset                        (the only bridge there is)\n  \
     foilpress bridge reset --to serial:/dev/ttyACM0\n  \
     foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
-    Refused while the bridge prints. What a printer does with a sheet it holds is not known for certain: if it does not \
+    A bridge that has lost its memory in the middle of a sheet does not do this by itself. Refused while it prints. What a printer does with a sheet it holds is not known for certain: if it does not \
     come out, switch the printer off and on.")]
 pub struct Args {
     /// Where the bridge is [default: the only one there is]
@@ -68,7 +69,7 @@ pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Obser
     };
     let (name, job) = (&entry.name, entry.record.job);
     let why = format!(
-        "{name} (job {job:08x}) was lost in the middle, and the printer may still wait for the rest of it"
+        "what became of {name} (job {job:08x}) is not known, and the printer may still wait for the rest of it"
     );
     if !agreed(&format!("{why}. Reset the printer through the bridge now?"))? {
         bail!(

@@ -9,7 +9,7 @@ use clap::Args as ClapArgs;
 use protocol::link::message::Lines;
 use serde_json::json;
 
-use super::{PATIENCE, is_open, only, other_version};
+use super::{PATIENCE, is_open, only};
 use crate::cli::output::say_on_interrupt;
 use crate::send::Address;
 use crate::send::query::{Query, QueryError};
@@ -47,9 +47,6 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
-    if let Some(other) = other_version(query.bridge()) {
-        bail!(other);
-    }
     let progress = *query.progress();
     if is_open(&progress) {
         bail!(QueryError::JobOpen(progress.job));

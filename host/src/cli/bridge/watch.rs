@@ -4,11 +4,12 @@ use std::io::{IsTerminal as _, Write as _};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use anyhow::{Result, bail};
+use anyhow::Result;
+use console::Term;
 use protocol::link::message::Ask;
 use serde_json::json;
 
-use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open, other_version};
+use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
 use crate::send::Address;
 use crate::send::query::{Query, Reply};
 use crate::send::transport::Transport;
@@ -18,6 +19,11 @@ const LOOK: Duration = Duration::from_secs(1);
 
 /// Between two questions to the printer, which is asked between jobs only.
 const ASK: Duration = Duration::from_secs(5);
+
+/// Rows a text takes on a terminal that is so many columns wide.
+fn rows(text: &str, columns: usize) -> usize {
+    text.lines().map(|line| line.chars().count().div_ceil(columns.max(1)).max(1)).sum()
+}
 
 /// What is on the screen.
 struct Screen {
@@ -36,7 +42,8 @@ impl Screen {
         let mut out = std::io::stdout().lock();
         if self.terminal && !self.shown.is_empty() {
             // Up to the first line, and everything below it away.
-            write!(out, "\x1b[{}F\x1b[J", self.shown.lines().count())?;
+            let columns = usize::from(Term::stdout().size().1);
+            write!(out, "\x1b[{}F\x1b[J", rows(&self.shown, columns))?;
         } else if !self.json && !self.shown.is_empty() {
             writeln!(out)?;
         }
@@ -92,9 +99,6 @@ fn follow(
     been: &mut bool,
 ) -> Result<std::convert::Infallible> {
     let mut query = Query::new(link, PATIENCE)?;
-    if let Some(other) = other_version(query.bridge()) {
-        bail!(other);
-    }
     let (lines, fault) = query.lines(PATIENCE)?;
     let mut found = Found {
         bridge: query.bridge().clone(),
@@ -123,5 +127,16 @@ fn follow(
         sleep(LOOK);
         found.progress = query.ask_progress(PATIENCE)?;
         (found.lines, found.fault) = query.lines(PATIENCE)?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_longer_than_the_terminal_takes_more_rows() {
+        assert_eq!(rows("12345678\n\n123456789\n", 8), 1 + 1 + 2);
+        assert_eq!(rows("", 80), 0);
     }
 }

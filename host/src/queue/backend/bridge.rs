@@ -325,7 +325,7 @@ impl<'a, W: Write + Send> Reporter<'a, W> {
                 self.messages.percent(100 * self.printed / self.entry.port_bytes.max(1));
             }
             Event::Fault(Some(fault)) => {
-                let ink = words::pass_at(&self.entry.passes, self.printed).map(|(_, ink)| ink);
+                let ink = words::wanted(&self.entry.passes, self.printed);
                 self.faulty = true;
                 self.messages.reasons(&[Reason::of_fault(*fault)]);
                 self.messages.info(&words::fault(*fault, ink));
