@@ -47,7 +47,7 @@ fn tangent_start(bencher: Bencher) {
     bencher.counter(divan::counter::ItemsCount::new(targets.len())).bench_local(|| {
         for target in &targets {
             mixer.tangent(&hull, target, &mut a).unwrap();
-            black_box(mixer.refine(&hull, target, &mut a).unwrap());
+            black_box(mixer.refine(&hull, target, &mut a, 0.0).unwrap());
         }
     });
 }
@@ -60,7 +60,7 @@ fn from_another_answer(bencher: Bencher) {
     a[0] = 1.0;
     bencher.counter(divan::counter::ItemsCount::new(targets.len())).bench_local(|| {
         for target in &targets {
-            black_box(mixer.refine_to(&hull, target, &mut a, 1e-8).unwrap());
+            black_box(mixer.refine(&hull, target, &mut a, 1e-8).unwrap());
         }
     });
 }

@@ -222,19 +222,28 @@ pub fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
     };
     reader.close(at);
     observer.end();
-    let inspection = Inspection {
-        bytes: stream.len() as u64,
-        dialect: None,
-        complete: fault.is_none(),
-        setup: setup(&reader.order),
-        passes: reader.reports,
-        error: fault.map(|(fault, offset)| StreamError {
+    let setup = setup(&reader.order);
+    Inspected::of(stream, None, setup, (reader.reports, reader.passes), fault)
+}
+
+impl Inspected {
+    fn of(
+        stream: &[u8],
+        dialect: Option<&'static str>,
+        setup: Setup,
+        (reports, passes): (Vec<PassReport>, Vec<Pass>),
+        fault: Option<(Fault, usize)>,
+    ) -> Inspected {
+        let error = fault.map(|(fault, offset)| StreamError {
             offset: offset as u64,
             fault: fault.number(),
             words: words(fault),
-        }),
-    };
-    Inspected { inspection, passes: reader.passes }
+        });
+        let bytes = stream.len() as u64;
+        let complete = error.is_none();
+        let inspection = Inspection { bytes, dialect, complete, setup, passes: reports, error };
+        Inspected { inspection, passes }
+    }
 }
 
 struct Reader {

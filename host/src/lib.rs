@@ -1,8 +1,10 @@
 //! From a document of materials to one-bit ink passes and back to a simulated sheet.
 //!
-//! The modules stand in the order of the data: `document` → `factor` → `gamut` → `halftone` → `separate` →
-//! `job` → `simulate` → `preview`. A stage is a function of its input and its settings; it prints nothing and
-//! knows no neighbour. Progress goes through [`observe::Observer`].
+//! The modules stand in the order of the data: [`document`] → [`factor`] → [`gamut`] → [`halftone`] → [`layout`] →
+//! [`separate`] → [`job`] → [`simulate`] → [`preview`]; [`pipeline`] is their order in one function. Flat art comes in by
+//! [`layers`] and [`chart`] and takes the same way from the layout on. [`send`] brings a job to a printer. A stage is a function
+//! of its input and its settings; it prints nothing and knows no neighbour. Progress goes through [`observe::Observer`].
+//! `docs/code.md` leads from each command to its module.
 
 pub mod observe;
 
@@ -45,8 +47,13 @@ pub mod chart;
 
 pub mod folders;
 
+pub mod scratch;
+
 pub mod ledger;
 
 pub mod queue;
 
 pub mod cli;
+
+#[cfg(test)]
+mod damage;

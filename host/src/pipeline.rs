@@ -126,7 +126,7 @@ pub fn print(
     let halftoned = halftone_mix(&mapped.mix, library, &alone, observer)?;
     let Arranged { sheet, laid } =
         layout::arrange(&Piece::from(halftoned.clone()), &settings.layout, observer)?;
-    let separation = separate::separate(&sheet, library.rules(), observer)?;
+    let separation = separate_page(&sheet, &laid, library, observer)?;
     if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
         return Err(PrintError::Refused(check.with_stacks()));
     }
@@ -184,15 +184,19 @@ pub fn halftone_mix(
     halftone::halftone(mix, placement, &halftone::Settings { minimum }, observer)
 }
 
-/// The bytes of a job on plain settings of the page.
-pub fn job_of(
-    passes: &[Pass],
-    paper: Paper,
-    media: Media,
-    inks: &InkSet,
+/// The passes of a page. What the rules say is about its pieces: marks are cut off.
+pub fn separate_page(
+    sheet: &Sheet,
+    laid: &Laid,
+    library: &Library,
     observer: &dyn Observer,
-) -> Result<Vec<u8>, StreamError> {
-    job_on(Page { media, ..Page::plain(paper) }, passes, inks, observer)
+) -> Result<Separation, SeparateError> {
+    let mut separation = separate::separate(sheet, library.rules(), observer)?;
+    let census = laid.census(sheet);
+    separation.spare_marks(|stack| {
+        sheet.stacks().iter().zip(census).any(|(known, dots)| known == stack && dots > 0)
+    });
+    Ok(separation)
 }
 
 /// The bytes of a job on this page. A foil among `inks` is the user's consent to print it.

@@ -75,6 +75,107 @@ fn pictures_that_claim_to_be_huge_are_refused_before_they_are_decoded() {
     with_map("base_color.png", "base_color.exr", &exr_header(8192, 8192));
 }
 
+/// The header of a TIFF picture of 8-bit RGB whose one strip would begin behind the file's end.
+fn tiff_header(side: u32) -> Vec<u8> {
+    let mut bytes = b"II\x2a\0\x08\0\0\0".to_vec();
+    let entries = [
+        (256u16, side),
+        (257, side),
+        (258, 8),
+        (259, 1),
+        (262, 2),
+        (273, 4096),
+        (277, 3),
+        (278, side),
+        (279, 3 * side * side),
+    ];
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    for (tag, value) in entries {
+        bytes.extend([tag.to_le_bytes(), 4u16.to_le_bytes()].concat());
+        bytes.extend([1u32.to_le_bytes(), value.to_le_bytes()].concat());
+    }
+    bytes.extend([0; 4]);
+    bytes
+}
+
+/// The header of a JPEG picture without a scan.
+fn jpeg_header(width: u16, height: u16) -> Vec<u8> {
+    let mut bytes = vec![0xff, 0xd8, 0xff, 0xc0, 0, 17, 8];
+    bytes.extend([height.to_be_bytes(), width.to_be_bytes()].concat());
+    bytes.extend([3, 1, 0x11, 0, 2, 0x11, 0, 3, 0x11, 0, 0xff, 0xd9]);
+    bytes
+}
+
+/// Every reader, on the largest sizes it takes and on larger ones, with nothing behind the header: an answer within two
+/// gigabytes.
+#[test]
+#[cfg(target_os = "linux")]
+fn files_that_only_claim_to_be_large_are_answered_within_bounds_of_memory() {
+    let bench = Bench::new();
+    let within = |command: &str, name: &str| {
+        let mut shell = std::process::Command::new("sh");
+        let program = env!("CARGO_BIN_EXE_foilpress");
+        shell.args(["-c", &format!("ulimit -v 2000000; exec {program} {command}")]);
+        shell.env("FOILPRESS_CONFIG", bench.path("config")).env("FOILPRESS_JOBS", bench.path("jobs"));
+        let output = shell.current_dir(bench.path("")).stdin(Stdio::null()).output().unwrap();
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{command}, {name}: {said}");
+        assert!(said.contains(name) && !said.contains("panicked"), "{command}, {name}: {said}");
+    };
+    let maps: [(&str, Vec<u8>); 8] = [
+        ("base_color.png", boast(8192, 8192)),
+        ("base_color.exr", exr_header(8192, 8192)),
+        ("base_color.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 8192\n".to_vec()),
+        ("base_color.tif", tiff_header(8192)),
+        ("base_color.tif", tiff_header(30_000)),
+        ("base_color.jpg", jpeg_header(16_384, 4096)),
+        ("base_color.jpg", jpeg_header(65_535, 65_535)),
+        ("material.toml", b"size_mm = [1e300, 1e300]\n".to_vec()),
+    ];
+    for (name, bytes) in maps {
+        let _ = fs::remove_dir_all(bench.path("tile"));
+        small_document(&bench.path("tile"));
+        if name != "material.toml" {
+            fs::remove_file(bench.path("tile/base_color.png")).unwrap();
+        }
+        fs::write(bench.path("tile").join(name), bytes).unwrap();
+        within("factor tile -o x.foil -q", name);
+    }
+    fs::create_dir(bench.path("a.foil")).unwrap();
+    let bases: String = (0..16).map(|basis| format!("{basis},0,1,1,1\n{basis},90,1,1,1\n")).collect();
+    fs::write(bench.path("a.foil/bases.csv"), format!("basis,theta_h_deg,r,g,b\n{bases}")).unwrap();
+    for side in [8192, 1 << 31] {
+        let maps = vec!["\"w.png\""; 16].join(",");
+        let index = format!(
+            "format = 1\nname = \"a\"\nwidth = {side}\nheight = {side}\nsamples = 4096\nbases = \"bases.csv\"\n\
+             maps = [{maps}]\n"
+        );
+        fs::write(bench.path("a.foil/document.toml"), index).unwrap();
+        within("map a.foil -o x.mix -q", "a.foil");
+    }
+    let mut tensor = b"tensor_file\0\x01\0\x01\0\0\0\x03\0rgb\x02\0\x0a".to_vec();
+    tensor.extend([64, 1 << 40, 1 << 40].map(u64::to_le_bytes).concat());
+    let gltf = br#"{"asset":{"version":"2.0"},"images":[{"bufferView":0}],"textures":[{"source":0}],
+        "buffers":[{"byteLength":18446744073709551615}],
+        "bufferViews":[{"buffer":0,"byteOffset":18446744073709551615,"byteLength":18446744073709551615}],
+        "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}]}"#;
+    let mut glb = b"glTF\x02\0\0\0".to_vec();
+    glb.extend([u32::MAX, u32::MAX].map(u32::to_le_bytes).concat());
+    glb.extend(b"JSON{}  ");
+    let files: [(&str, Vec<u8>); 5] = [
+        ("a.binary", [1 << 12, 1 << 12, 1].map(i32::to_le_bytes).concat()),
+        ("b.binary", [i32::MAX; 3].map(i32::to_le_bytes).concat()),
+        ("a.bsdf", tensor),
+        ("a.gltf", gltf.to_vec()),
+        ("a.glb", glb),
+    ];
+    for (name, bytes) in files {
+        fs::write(bench.path(name), bytes).unwrap();
+        within(&format!("factor {name} -o x.foil -q"), name);
+    }
+    assert!(!bench.path("x.foil").exists() && !bench.path("x.mix").exists());
+}
+
 #[test]
 fn a_number_that_is_none_is_named_with_its_pixel() {
     let picture = image::Rgb32FImage::from_fn(24, 16, |x, y| {

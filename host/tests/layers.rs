@@ -3,6 +3,7 @@
 use std::fs;
 
 use image::{GrayImage, Luma};
+use serde_json::Value;
 
 mod common;
 
@@ -22,8 +23,8 @@ fn layer(bench: &Bench, name: &str, x: std::ops::Range<u32>, y: std::ops::Range<
 
 fn inspected(bench: &Bench, job: &str) -> Vec<(String, u64)> {
     let summary = bench.done(&format!("inspect {job} --json"));
-    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
-    let pass = |pass: &serde_json::Value| {
+    let summary: Value = serde_json::from_str(&summary).expect("JSON");
+    let pass = |pass: &Value| {
         (pass["ink"].as_str().expect("an ink").to_owned(), pass["dots"].as_u64().expect("dots"))
     };
     summary["passes"].as_array().expect("passes").iter().map(pass).collect()
@@ -85,4 +86,223 @@ fn what_is_wrong_is_said_and_nothing_is_left() {
         assert!(said.contains(words), "{args}: {words} in {said}");
     }
     assert_eq!(bench.entries(), before);
+}
+
+#[test]
+fn the_plan_of_art_is_that_of_its_print_and_writes_nothing_else() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 5..55, 5..35);
+    layer(&bench, "gold.png", 10..20, 10..30);
+    let before = bench.entries();
+    let options = "white.png gold.png --paper postcard --passes white=3 --repeat 2x3 --gap 2mm";
+    let plan: Value = serde_json::from_str(&bench.done(&format!("plan layers {options} --json"))).unwrap();
+    assert_eq!(bench.entries(), before);
+    let report: Value =
+        serde_json::from_str(&bench.done(&format!("layers {options} --json -o d.print"))).unwrap();
+    let (mut own, suggestions) = (plan.clone(), plan["art"]["suggestions"].as_array().unwrap());
+    assert!(suggestions.is_empty(), "white is laid three times: {suggestions:?}");
+    assert_eq!(own.as_object_mut().unwrap().remove("art").as_ref(), Some(&report["art"]));
+    assert_eq!(own, report["plan"]);
+    assert_eq!(plan["pieces"], serde_json::json!([2, 3]));
+    let words = bench.done(&format!("plan layers {options} --html plan.html"));
+    assert!(words.contains("From the art, lowest first"), "{words}");
+    let page = fs::read_to_string(bench.path("plan.html")).unwrap();
+    assert!(page.contains("MDC-SCWH") && page.ends_with("</html>\n"), "a whole page of this job");
+    let said = bench.refused(2, "plan layers white.png --page plan.html");
+    assert!(said.contains("--html"), "{said}");
+}
+
+#[test]
+fn art_given_as_a_document_is_answered_with_the_right_command() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 5..55, 5..35);
+    fs::create_dir(bench.path("decal")).unwrap();
+    for name in ["decal/white.png", "decal/gold.png"] {
+        layer(&bench, name, 5..55, 5..35);
+    }
+    fs::write(bench.path("art.svg"), "<svg xmlns='http://www.w3.org/2000/svg'/>").unwrap();
+    for art in ["white.png", "decal", "art.svg"] {
+        for command in ["plan", "print"] {
+            let said = bench.refused(1, &format!("{command} {art}"));
+            assert!(said.contains(&format!("`foilpress plan layers {art}`")), "{command} {art}: {said}");
+        }
+    }
+    let said = bench.refused(1, "plan nothing.txt");
+    assert!(!said.contains("layers"), "{said}");
+}
+
+#[test]
+fn presets_reach_the_plan_of_art() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 5..55, 5..35);
+    bench.done("preset save decal --media film --mirror --paper postcard");
+    for preset in
+        ["plan layers white.png --json --preset decal", "plan layers --preset=decal --json white.png"]
+    {
+        let plan: Value = serde_json::from_str(&bench.done(preset)).unwrap();
+        assert_eq!(
+            (&plan["paper"], &plan["curl_correction"]),
+            (&Value::from("postcard"), &Value::from(false))
+        );
+    }
+}
+
+#[test]
+fn more_cartridges_than_the_machine_holds_are_planned_and_not_sent() {
+    let bench = Bench::new();
+    let inks = ["white", "gold", "silver", "metallic-red", "metallic-blue", "cyan", "yellow", "black"];
+    let names: Vec<String> = inks.iter().map(|ink| format!("{ink}.png")).collect();
+    for (at, name) in (0..).zip(&names) {
+        layer(&bench, name, 7 * at..7 * at + 5, 5..10 + at);
+    }
+    let art = names.join(" ");
+    let plan: Value =
+        serde_json::from_str(&bench.done(&format!("plan layers {art} --paper postcard --json"))).unwrap();
+    assert_eq!(plan["cartridges"].as_array().unwrap().len(), 8);
+    let change = &plan["changes"][0];
+    assert_eq!(change["before_pass"], 8);
+    assert_eq!(change["put_in"], plan["passes"][7]["ink"]);
+    assert_eq!(plan["checks"][0]["rule"], "cartridges");
+    let words = bench.done(&format!("plan layers {art} --paper postcard --html plan.html"));
+    let page = fs::read_to_string(bench.path("plan.html")).unwrap();
+    for text in [words, page] {
+        assert!(
+            text.contains("The machine holds no more") && text.contains("white has the fewest dots (25)"),
+            "{text}"
+        );
+    }
+    let said = bench.refused(1, &format!("layers {art} --paper postcard --to file:job.rgl"));
+    assert!(said.contains("8 cartridges, and the machine holds 7"), "{said}");
+    assert!(!bench.path("job.rgl").exists() && !bench.entries().iter().any(|name| name.ends_with(".print")));
+}
+
+#[test]
+fn marks_of_all_inks_are_no_stack_to_warn_of() {
+    let bench = Bench::new();
+    for (at, name) in ["white.png", "gold.png", "cyan.png", "black.png"].into_iter().enumerate() {
+        let left = 12 * at as u32;
+        layer(&bench, name, left..left + 10, 5..35);
+    }
+    let plan = |more: &str| {
+        let art = "plan layers white.png gold.png cyan.png black.png --paper postcard";
+        let plan: Value = serde_json::from_str(&bench.done(&format!("{art} {more} --json"))).unwrap();
+        let rules = plan["checks"].as_array().unwrap().iter().map(|check| check["rule"].clone());
+        rules.collect::<Vec<Value>>()
+    };
+    assert_eq!(plan("--registration-marks --crop-marks"), plan(""));
+    assert!(!plan("").contains(&Value::from("three-layers")));
+    // What the art itself does is still said.
+    let art = "plan layers white.png --order white,white,white,white --paper postcard --registration-marks";
+    assert!(bench.done(art).contains("more than three layers"));
+}
+
+/// A page of 72 x 36 points with a red rectangle and a white one, a PDF as the standard has it.
+fn pdf() -> Vec<u8> {
+    let content = "0.8 0.1 0.1 rg 12 6 24 24 re f 1 1 1 rg 48 12 12 12 re f";
+    let objects = [
+        "<< /Type /Catalog /Pages 2 0 R >>".to_owned(),
+        "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".to_owned(),
+        "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 72 36] /Contents 4 0 R /Resources << >> >>".to_owned(),
+        format!("<< /Length {} >>\nstream\n{content}\nendstream", content.len()),
+    ];
+    let mut file = String::from("%PDF-1.4\n");
+    let mut places = Vec::new();
+    for (number, object) in (1..).zip(&objects) {
+        places.push(file.len());
+        file += &format!("{number} 0 obj\n{object}\nendobj\n");
+    }
+    let table = file.len();
+    file += "xref\n0 5\n0000000000 65535 f \n";
+    places.iter().for_each(|place| file += &format!("{place:010} 00000 n \n"));
+    file += &format!("trailer\n<< /Size 5 /Root 1 0 R >>\nstartxref\n{table}\n%%EOF\n");
+    file.into_bytes()
+}
+
+#[cfg(unix)]
+mod programs {
+    use super::*;
+    use std::os::unix::fs::symlink;
+    use std::path::PathBuf;
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+
+    /// Where a program is. The gate installs them all.
+    fn installed(program: &str) -> Option<PathBuf> {
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let found =
+            std::env::split_paths(&path).map(|folder| folder.join(program)).find(|file| file.is_file());
+        let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
+        assert!(found.is_some() || !required, "{program} is not installed; `cargo xtask test` installs it");
+        if found.is_none() {
+            println!("skipped: {program} is not installed");
+        }
+        found
+    }
+
+    #[test]
+    fn poppler_draws_a_page_as_ghostscript_does() {
+        let bench = Bench::new();
+        fs::write(bench.path("page.pdf"), pdf()).unwrap();
+        for program in ["gs", "pdftocairo"] {
+            let Some(file) = installed(program) else { return };
+            // Nothing else is to be found.
+            fs::create_dir(bench.path(program)).unwrap();
+            symlink(file, bench.path(program).join(program)).unwrap();
+            let mut command =
+                bench.command("layers page.pdf --white alpha --paper postcard --inks white,black");
+            let output =
+                command.args(["-o", &format!("{program}.print")]).env("PATH", bench.path(program)).output();
+            let output = output.unwrap();
+            let said = common::text(&output.stderr);
+            assert!(output.status.success(), "{program}: {said}");
+            assert_eq!(said.contains("read by Poppler"), program == "pdftocairo", "{said}");
+            // 24 x 24 and 12 x 12 points at 600 dpi, edges on whole dots; the white one, too.
+            let passes = inspected(&bench, &format!("{program}.print/job.rgl"));
+            assert_eq!(passes[0], ("white".to_owned(), 200 * 200 + 100 * 100), "{program}: {passes:?}");
+        }
+    }
+
+    #[test]
+    fn a_page_that_is_interrupted_or_damaged_leaves_no_folder() {
+        let bench = Bench::new();
+        fs::write(bench.path("page.pdf"), pdf()).unwrap();
+        for folder in ["bin", "scratch"] {
+            fs::create_dir(bench.path(folder)).unwrap();
+        }
+        // A Ghostscript that has begun and does not end.
+        let script = "#!/bin/sh\necho > \"$TMPDIR/begun\"\nexec /bin/sleep 20\n";
+        fs::write(bench.path("bin/gs"), script).unwrap();
+        let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+        fs::set_permissions(bench.path("bin/gs"), mode).unwrap();
+        let mut child = bench
+            .command("layers page.pdf")
+            .env("PATH", bench.path("bin"))
+            .env("TMPDIR", bench.path("scratch"))
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let begun = bench.path("scratch/begun");
+        let started = Instant::now();
+        while !begun.exists() {
+            assert!(started.elapsed() < Duration::from_secs(60), "the page is never begun");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert_eq!(entries(&bench.path("scratch")).len(), 2, "the plates' folder and the sign");
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert_eq!(entries(&bench.path("scratch")), ["begun"]);
+        assert!(!bench.entries().iter().any(|name| name.ends_with(".print")), "{:?}", bench.entries());
+
+        fs::remove_file(begun).unwrap();
+        fs::write(bench.path("bin/gs"), "#!/bin/sh\necho broken >&2\nexit 1\n").unwrap();
+        let output = bench
+            .command("layers page.pdf")
+            .env("PATH", bench.path("bin"))
+            .env("TMPDIR", bench.path("scratch"))
+            .output()
+            .unwrap();
+        assert!(common::text(&output.stderr).contains("cannot be read: broken"));
+        assert!(entries(&bench.path("scratch")).is_empty());
+    }
 }

@@ -1,8 +1,6 @@
 //! Pages, plans, presets and ribbons as users of the program meet them.
 
 use std::fs;
-use std::io::Write as _;
-use std::process::Stdio;
 
 use foilpress::observe::Silent;
 use foilpress::sheet::Sheet;
@@ -94,15 +92,7 @@ fn copies_wait_for_enter_and_every_ribbon_is_counted() {
     let job = fs::read(bench.path("job.rgl")).unwrap();
     let send = |answers: &str| {
         fs::write(bench.path("port"), "").unwrap();
-        let mut child = bench
-            .command("send job.rgl --to raw:port --copies 3")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        child.stdin.take().unwrap().write_all(answers.as_bytes()).unwrap();
-        let output = child.wait_with_output().unwrap();
+        let output = bench.answered("send job.rgl --to raw:port --copies 3", answers);
         (output.status.code(), text(&output.stderr), fs::read(bench.path("port")).unwrap().len())
     };
     let (code, _, length) = send("\n\n");
@@ -149,7 +139,7 @@ fn the_plan_of_a_job_has_the_figures_that_are_in_its_bytes() {
         bench.done(&format!("plan tile {SMALL} --repeat 2x1 --gap 3mm --media thick --curl off --json"));
     assert_eq!(json(&before)["passes"].as_array().map(Vec::len), Some(planned.len()));
     assert_eq!(json(&before)["pieces"], serde_json::json!([2, 1]));
-    bench.done("plan job.rgl --page page.html");
+    bench.done("plan job.rgl --html page.html");
     let page = fs::read_to_string(bench.path("page.html")).unwrap();
     assert!(page.contains("data:image/png;base64,") && !page.contains("http"), "whole in itself");
     assert!(page.contains("cardboard") && page.contains(passes[0]["cartridge"].as_str().unwrap()));

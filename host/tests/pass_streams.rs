@@ -5,16 +5,13 @@ use embedded_graphics::mono_font::ascii::FONT_10X20;
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::Text;
-use foilpress::gamut::InkMix;
-use foilpress::halftone::{Placement, Settings, halftone};
-use foilpress::observe::Silent;
-use foilpress::weights::{WeightMaps, quantise};
-use inks::Stack;
-use protocol::ink::Ink;
 use protocol::packbits;
 use protocol::paper::Paper;
 use protocol::runs::{MAX_BAND, encode, stride};
 use std::convert::Infallible;
+
+#[path = "../benches/common/planes.rs"]
+mod planes;
 
 struct Plane {
     width: u16,
@@ -161,28 +158,9 @@ fn drawn_planes_are_never_larger_than_packed_rows() {
 
 #[test]
 fn eight_clustered_planes_are_a_quarter_of_their_packed_rows_at_most() {
-    let (width, height, count) = (300, 160, 9);
-    let mut data = vec![0; width * height * count];
-    for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
-        let (x, y) = ((pixel % width) as f64 / 90.0, (pixel / width) as f64 / 70.0);
-        let weights: Vec<f64> = (0..count)
-            .map(|i| 1.05 + (x * (1.0 + i as f64 * 0.3) + y * (2.0 - i as f64 * 0.2)).sin())
-            .collect();
-        quantise(&weights, out);
-    }
-    let stacks =
-        std::iter::once(Stack::SUBSTRATE).chain(Ink::ALL[..8].iter().map(|&ink| Stack::new(vec![ink])));
-    let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { 1 << 15 } else { 0 }).collect()).collect();
-    let maps = WeightMaps::new(width, height, count, data).unwrap();
-    let mix = InkMix { stacks: stacks.collect(), maps, matrix };
     let paper = Paper::Custom { width: 2400, length: 1280 };
-    let page = Placement { paper, x: 0, y: 0, width: 2400, height: 1280 };
-    let sheet = halftone(&mix, &page, &Settings::uniform(count, 8), &Silent).unwrap();
     let (mut packed, mut streams) = (0, 0);
-    for ink in 1..9u8 {
-        let dots = sheet.index().chunks_exact(8);
-        let bits =
-            dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect();
+    for bits in planes::clustered((300, 160), (90.0, 70.0), paper) {
         let plane = Plane { width: 2400, rows: 1280, bits };
         packed += plane.packed();
         streams += plane.stream();

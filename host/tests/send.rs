@@ -34,6 +34,7 @@ impl Bench {
             .args(args.split_whitespace())
             .current_dir(self.folder.path())
             .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
+            .env("FOILPRESS_CONFIG", self.folder.path().join("config"))
             .stdin(Stdio::null())
             .output()
             .expect("the program starts")

@@ -2,3 +2,4 @@
 
 #[cfg(unix)]
 pub mod emulated;
+pub mod served;

@@ -1,13 +1,14 @@
-//! The Debian package: built, then installed into a root of its own and tried there.
+//! The Debian package: built, installed into a root of its own and looked at there; as root also installed on this machine,
+//! where it prints through the machine's own print system, and taken away again.
 
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{cargo, command};
+use crate::{cargo, command, queue};
 
 /// What makes the package; fetched into the build's folder if it is not there.
 const CARGO_DEB: &str = "3.8.0";
@@ -42,25 +43,29 @@ pub fn run(root: &Path, profile: Profile) -> Result<()> {
     let package = target_of_package.join("foilpress.deb");
     let mut make = Command::new(tool(&target)?);
     make.args(["--no-build", "--locked", "--quiet", "--strip", "--output"]).arg(&package);
+    if profile == Profile::Dev {
+        // Nobody keeps this one.
+        make.arg("--fast");
+    }
     succeed(make.current_dir(root.join("host")).env("CARGO_TARGET_DIR", &target_of_package))?;
     check(&package, &tree)?;
+    if is_root() {
+        install_here(root, &package)?;
+    } else {
+        println!("not installed on this machine: only root can");
+    }
     println!("{}", package.display());
     Ok(())
 }
 
-/// The package of the tests' own build, for the gate; left out with a word where there is no `dpkg`.
+/// The package of the tests' own build, for the gate; left out with a word where print queues are.
 pub fn run_where_possible(root: &Path) -> Result<()> {
-    let possible = Path::new("/usr/bin/dpkg").exists() && Path::new("/usr/bin/man").exists();
-    if !possible && !required() {
-        println!("skipped: the Debian package needs dpkg and man");
+    let possible = is_root() && Path::new("/usr/bin/dpkg").exists() && Path::new("/usr/bin/man").exists();
+    if !possible && !queue::required() {
+        println!("skipped: the Debian package needs root, dpkg and man");
         return Ok(());
     }
     run(root, Profile::Dev)
-}
-
-/// Whether what cannot be tried is a failure.
-fn required() -> bool {
-    ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| env::var_os(name).is_some())
 }
 
 /// `cargo-deb` in this version.
@@ -77,6 +82,9 @@ fn tool(target: &Path) -> Result<PathBuf> {
             "--locked",
             "--force",
             "--quiet",
+            // It packs for a second; optimised it is built for minutes.
+            "--debug",
+            "--no-default-features",
             "--root",
         ]);
         // A target folder of its own, not that of the workspace.
@@ -105,7 +113,7 @@ fn check(package: &Path, tree: &Path) -> Result<()> {
         "--log=/dev/null",
         "--install",
     ]);
-    succeed(install.arg(package))?;
+    succeed(install.arg(package).stdout(Stdio::null()))?;
     let program = root.join("usr/bin/foilpress");
     let version = said(Command::new(&program).arg("--version"))?;
     ensure!(version.starts_with("foilpress "), "`foilpress --version` said {version}");
@@ -153,6 +161,44 @@ fn check(package: &Path, tree: &Path) -> Result<()> {
     succeed(command("bash", &["-n"]).arg(root.join("usr/share/bash-completion/completions/foilpress")))?;
     fs::remove_dir_all(&root)?;
     Ok(())
+}
+
+/// What the package puts on a machine.
+const INSTALLED: [&str; 3] =
+    ["/usr/bin/foilpress", "/usr/lib/cups/backend/foilpress", "/usr/lib/cups/filter/foilpress"];
+
+fn is_root() -> bool {
+    #[cfg(unix)]
+    return fs::metadata("/proc/self").is_ok_and(|data| std::os::unix::fs::MetadataExt::uid(&data) == 0);
+    #[cfg(not(unix))]
+    return false;
+}
+
+/// Installs the package, prints through it, and removes it. A machine that has one keeps it.
+fn install_here(root: &Path, package: &Path) -> Result<()> {
+    if let Some(path) = INSTALLED.into_iter().find(|path| Path::new(path).exists()) {
+        println!("not installed on this machine: {path} is there already, and stays");
+        return Ok(());
+    }
+    queue::install()?;
+    succeed(command("dpkg", &["--install"]).arg(package).stdout(Stdio::null()))?;
+    // Whatever comes of it, the machine is left as it was.
+    let tried = try_here(root);
+    let removed = succeed(command("dpkg", &["--purge", "foilpress"]).stdout(Stdio::null()));
+    tried.and(removed)?;
+    let left: Vec<&str> = INSTALLED.into_iter().filter(|path| Path::new(path).exists()).collect();
+    ensure!(left.is_empty(), "left behind by the package: {}", left.join(", "));
+    Ok(())
+}
+
+fn try_here(root: &Path) -> Result<()> {
+    let version = said(Command::new(INSTALLED[0]).arg("--version"))?;
+    ensure!(version.starts_with("foilpress "), "`foilpress --version` said {version}");
+    let page = said(command("man", &["foilpress-queue"]).env("MANWIDTH", "100").env("LC_ALL", "C.UTF-8"))?;
+    ensure!(page.contains("SYNOPSIS"), "`man foilpress-queue` shows {page}");
+    let mut queues =
+        cargo(&["test", "--package", "foilpress-tests", "--test", "queue", "--locked", "--quiet"]);
+    succeed(queues.args(["--", "--ignored", "system::"]).current_dir(root))
 }
 
 fn succeed(command: &mut Command) -> Result<()> {

@@ -1,5 +1,7 @@
-//! What the tests of print queues need beside Rust: a print server with its filters and clients, from Debian.
+//! What the tests of print queues and of PDF art need beside Rust, from Debian: a print server with its filters and clients,
+//! Ghostscript and Poppler.
 
+use std::env;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -8,14 +10,20 @@ use anyhow::{Result, bail};
 use crate::{cargo, command};
 
 /// Programs the tests start, and the packages they are in.
-const NEEDED: [(&str, &str); 6] = [
+const NEEDED: [(&str, &str); 7] = [
     ("/usr/sbin/cupsd", "cups-daemon"),
     ("/usr/bin/lp", "cups-client"),
     ("/usr/bin/ipptool", "cups-ipp-utils"),
     ("/usr/lib/cups/filter/pdftopdf", "cups-filters"),
     ("/usr/bin/gs", "ghostscript"),
+    ("/usr/bin/pdftocairo", "poppler-utils"),
     ("/usr/bin/man", "man-db"),
 ];
+
+/// Whether leaving print queues out is a failure, as the tests see it, too.
+pub fn required() -> bool {
+    ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| env::var_os(name).is_some())
+}
 
 /// Installs what is missing.
 pub fn install() -> Result<()> {

@@ -3,7 +3,7 @@
 //! Method: a vernier. Below a comb of lines of the first ink, 24 dots from line to line, stands one of the other ink, 25
 //! dots from line to line. Where two lines meet is how far the passes are apart, one dot (0.04 mm) for each line from the
 //! middle. Each ink is compared across and along the feed, at the top, in the middle and at the bottom of the page, since
-//! the sheet is pulled back between passes. Limits: offsets of up to 10 dots (0.4 mm).
+//! the sheet is pulled back between passes, and at both sides where there is room, since it may come back askew. Limits: offsets of up to 10 dots (0.4 mm).
 
 use inks::Stack;
 use protocol::ink::Ink;
@@ -72,9 +72,12 @@ pub fn registration(inks: &[Ink], paper: Paper) -> Result<Piece, ChartError> {
     }
     let first = Stack::new([*first]);
     let mut sketch = Sketch::new(width, length);
-    for top in [0, (length - block) / 2, length - block] {
+    let group = others.len() * column - mm(4.0);
+    let sides = if 2 * group + mm(4.0) <= width { &[0, width - group][..] } else { &[0] };
+    let tops = [0, (length - block) / 2, length - block];
+    for (top, side) in tops.into_iter().flat_map(|top| sides.iter().map(move |side| (top, side))) {
         for (i, &other) in others.iter().enumerate() {
-            let left = i * column;
+            let left = side + i * column;
             let other = Stack::new([other]);
             let label = format!("{first} / {other}");
             sketch.text(left, top, LABEL, &first, &label);

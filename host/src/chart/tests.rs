@@ -82,13 +82,14 @@ fn lines_of_a_vernier_meet_in_the_middle_and_a_dot_apart_for_each_line_from_it()
         let row = &piece.index()[from * piece.width()..][..piece.width()];
         (1..row.len()).filter(|&x| row[x] == number && row[x - 1] != number).collect()
     };
-    // The first row that has 21 lines of white; 10 rows above it the black ones.
-    let white = (0..piece.length()).find(|&y| row_of("W", y).len() == 21).unwrap();
+    // The first row that has 21 lines of white at each side; 10 rows above it the black ones.
+    let white = (0..piece.length()).find(|&y| row_of("W", y).len() == 42).unwrap();
     let (other, first) = (row_of("W", white), row_of("K", white - 10));
-    assert_eq!(first.len(), 21);
-    for i in 0..21 {
-        assert_eq!(other[i] as i64 - first[i] as i64, i as i64 - 10);
+    assert_eq!(first.len(), 42);
+    for i in 0..42 {
+        assert_eq!(other[i] as i64 - first[i] as i64, (i % 21) as i64 - 10);
     }
+    assert!(other[20] < piece.width() / 4 && other[21] > piece.width() / 4 * 3);
     assert!(matches!(registration(&[Ink::Black], Paper::A4), Err(ChartError::OneInk)));
     assert!(registration(&Ink::ALL, Paper::A4).is_err());
 }

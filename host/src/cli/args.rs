@@ -1,6 +1,6 @@
 //! Arguments that several subcommands share, and the settings they mean.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
@@ -11,6 +11,7 @@ use crate::document::{self, ColourSpace, Document};
 use crate::factor::{self, Method};
 use crate::gamut::{self, Intent};
 use crate::job::placement::Size;
+use crate::layers;
 use crate::layout;
 use crate::observe::Observer;
 
@@ -40,7 +41,16 @@ impl DocumentArgs {
             colour_space: self.colour_space,
             samples: self.samples,
         };
-        let mut document = document::open(&self.document, &options, observer)?;
+        let mut document = match document::open(&self.document, &options, observer) {
+            Ok(document) => document,
+            Err(error) if layers::is_art(Path::new(&self.document)) => {
+                return Err(anyhow::Error::new(error).context(format!(
+                    "{0} is art, not a material: `foilpress layers {0}` prints it, `foilpress plan layers {0}` plans it",
+                    self.document
+                )));
+            }
+            Err(error) => return Err(error.into()),
+        };
         // A name may come from anybody's file, and is shown on the terminal.
         document.name.retain(|c| !c.is_control());
         if document.name.trim().is_empty() {

@@ -23,7 +23,7 @@ use crate::flash::image::Firmware;
 use crate::observe::Observer;
 use crate::send::find;
 use crate::send::journal::JournalError;
-use crate::send::query::{Query, Reply};
+use crate::send::query::{Query, Reply, is_alps};
 use crate::send::session::Bridge;
 use crate::send::status::Status;
 use crate::send::transport::Transport;
@@ -142,12 +142,7 @@ pub fn permission() -> String {
 pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> Result<()> {
     let mut link = address.open().context("not sent")?;
     let mut query = Query::new(&mut *link, PATIENCE).context("not sent")?;
-    // A printer that takes no bytes is not asked, nor one that is at work.
-    if !matches!(query.lines(PATIENCE), Ok((_, None))) {
-        return Ok(());
-    }
-    let Ok(reply) = query.printer(Ask::DeviceId, PRINTER_PATIENCE) else { return Ok(()) };
-    match text(&reply) {
+    match query.device_id(PATIENCE, PRINTER_PATIENCE) {
         Some(id) if !is_alps(&id) && force => {
             observer.note(&format!("the printer says it is no ALPS: {id}"));
             Ok(())
@@ -252,7 +247,7 @@ impl Found {
                      "accepted": self.progress.accepted, "printed": self.progress.printed },
             "lines_high": levels(self.lines),
             "fault": self.fault.map(|fault| words::fault(fault, None)),
-            "device_id": text(&self.device_id),
+            "device_id": self.device_id.device_id(),
             "printer": match &self.status {
                 Reply::Bytes(bytes) => Status::read(bytes).ok(),
                 _ => None,
@@ -262,7 +257,7 @@ impl Found {
 
     /// The printer's device ID, if it told it.
     pub fn device_id(&self) -> Option<String> {
-        text(&self.device_id)
+        self.device_id.device_id()
     }
 
     /// In words.
@@ -296,21 +291,6 @@ impl Found {
     }
 }
 
-/// The device ID as text, without the two bytes of its length.
-fn text(reply: &Reply) -> Option<String> {
-    let Reply::Bytes(bytes) = reply else { return None };
-    let bytes = bytes.get(2..)?;
-    let printable = |byte: &&u8| byte.is_ascii_graphic() || **byte == b' ';
-    Some(bytes.iter().filter(printable).map(|&byte| char::from(byte)).collect())
-}
-
-/// Whether a device ID names the maker of these printers.
-pub fn is_alps(id: &str) -> bool {
-    id.split(';').filter_map(|field| field.split_once(':')).any(|(key, value)| {
-        (key.trim().ends_with("MANUFACTURER") || key.trim().ends_with("MFG")) && value.trim() == "ALPS"
-    })
-}
-
 fn status(args: &StatusArgs) -> Result<()> {
     let address = match &args.to {
         Some(address) => address.clone(),
@@ -327,25 +307,4 @@ fn status(args: &StatusArgs) -> Result<()> {
         found.write(&mut out)?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_printers_own_device_id_is_known_and_anothers_is_not() {
-        assert!(is_alps("MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER"));
-        assert!(!is_alps("MFG:Hewlett-Packard;MDL:LaserJet;COMMENT:not ALPS"));
-    }
-
-    #[test]
-    fn the_length_of_a_device_id_is_no_part_of_its_text() {
-        // 75 bytes: the second byte of the length is a letter.
-        let id = "MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER;";
-        let reply = Reply::Bytes([&[0, b'K'], id.as_bytes()].concat());
-        assert_eq!(text(&reply).as_deref(), Some(id));
-        assert_eq!(text(&Reply::Bytes(vec![0])), None);
-        assert_eq!(text(&Reply::Silent), None);
-    }
 }

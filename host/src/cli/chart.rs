@@ -19,7 +19,8 @@ use crate::sheet::Piece;
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress chart ramp silver-foil metallic-silver     (figure 2 of the paper)\n  \
-    foilpress chart ladder MS+F MS                       (figure 5: four levels of gloss)\n  \
+    foilpress chart ladder                               (figure 5: four levels of gloss, MS+F to MS)\n  \
+    foilpress chart ladder C+M+Y+F C+M+Y\n  \
     foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
     foilpress chart registration --inks black,cyan,white\n  \
     foilpress chart calibration --to serial:/dev/ttyACM0")]
@@ -31,9 +32,9 @@ pub struct Args {
 #[derive(Subcommand, Debug)]
 enum Chart {
     /// From one stack to another, halftoned, with a checkerboard to hold so that it is reflected
-    Ramp(Two),
+    Ramp(Ramp),
     /// Four levels of gloss between a glossy and a dull stack: clamped, and with their differences kept
-    Ladder(Two),
+    Ladder(Ladder),
     /// A labelled patch of every stack that a choice of inks can make
     Stacks(Stacks),
     /// Verniers between the first ink and the others: how far passes are apart
@@ -43,16 +44,35 @@ enum Chart {
 }
 
 #[derive(ClapArgs, Debug)]
-struct Two {
-    /// The first stack, or the glossier one: short or long names of inks joined by +, from the bottom, such as MS or MS+C
+struct Ramp {
+    /// The stack at the left: short or long names of inks joined by +, from the bottom, such as MS or MS+C
     first: Stack,
-    /// The second stack
+    /// The stack at the right
     second: Stack,
+    #[command(flatten)]
+    step: StepArgs,
+}
+
+/// What charts between two stacks share.
+#[derive(ClapArgs, Debug)]
+struct StepArgs {
     /// Folder of an ink library of your own
     #[arg(long, value_name = "DIR")]
     library: Option<std::path::PathBuf>,
     #[command(flatten)]
     piece: PieceArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Ladder {
+    /// The glossier stack: short or long names of inks joined by +, from the bottom
+    #[arg(default_value = "MS+F", requires = "dull")]
+    glossy: Stack,
+    /// The duller stack
+    #[arg(default_value = "MS")]
+    dull: Stack,
+    #[command(flatten)]
+    step: StepArgs,
 }
 
 #[derive(ClapArgs, Debug)]
@@ -101,8 +121,10 @@ const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
 /// Runs `chart`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.chart {
-        Chart::Ramp(two) => two.run("ramp", chart::ramp, observer),
-        Chart::Ladder(two) => two.run("ladder", chart::ladder, observer),
+        Chart::Ramp(Ramp { first, second, step }) => step.run("ramp", chart::ramp, [first, second], observer),
+        Chart::Ladder(Ladder { glossy, dull, step }) => {
+            step.run("ladder", chart::ladder, [glossy, dull], observer)
+        }
         Chart::Stacks(stacks) => {
             let usual = InkArgs { inks: Some(USUAL.into()), library: stacks.inks.library.clone() };
             let (set, library) = if stacks.inks.inks.is_some() { &stacks.inks } else { &usual }.at_hand()?;
@@ -143,13 +165,19 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 
 type Make = fn(&Stack, &Stack, &Library, &dyn Observer) -> Result<Piece, chart::ChartError>;
 
-impl Two {
-    fn run(&self, name: &str, make: Make, observer: &dyn Observer) -> Result<()> {
+impl StepArgs {
+    fn run(
+        &self,
+        name: &str,
+        make: Make,
+        [first, second]: [&Stack; 2],
+        observer: &dyn Observer,
+    ) -> Result<()> {
         let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
-        let piece = make(&self.first, &self.second, &library, observer)?;
+        let piece = make(first, second, &library, observer)?;
         // Who names a foil wants it.
         let allowed = InkSet::ALL;
-        let name = format!("{name} {} {}", self.first, self.second);
+        let name = format!("{name} {first} {second}");
         let job = Job {
             name: &name,
             piece: &piece,

@@ -5,11 +5,12 @@ use std::path::Path;
 use anyhow::{Error, Result, bail};
 use clap::Args as ClapArgs;
 
-use super::bridge::{Found, ask, is_alps, is_forbidden, permission};
+use super::bridge::{Found, ask, is_forbidden, permission};
 use super::resume::line;
 use crate::flash::{drive, usb};
 use crate::send::find::{self, Candidate};
 use crate::send::journal::Journal;
+use crate::send::query::is_alps;
 use crate::send::session::Phase;
 use crate::send::{Address, OpenError};
 

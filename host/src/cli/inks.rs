@@ -13,6 +13,10 @@ use crate::brdf::plot;
 
 /// The library of inks and stacks.
 #[derive(clap::Args, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress inks list --inks process,metallic-silver\n  \
+    foilpress inks show MS+C --figures                   (what its curve rests on)\n  \
+    foilpress inks check my-library/                     (before it is used with --library)")]
 pub struct Args {
     #[command(subcommand)]
     what: What,

@@ -8,12 +8,15 @@ use inks::{InkSet, Library};
 use protocol::ink::Ink;
 use serde_json::json;
 
-use super::piece::{self, Job, PieceArgs};
+use super::deliver::DeliverArgs;
+use super::layout::{LayoutArgs, MediaArgs};
+use super::piece::{self, Job, ResultArgs};
+use super::plan::Shown;
 use super::preset::PresetArg;
 use crate::job::placement::{DOTS_PER_MM, Size};
 use crate::job::plan::grouped;
-use crate::layers::{self, Accept, Composed, Finish, Order, Suggestion, White, names};
-use crate::layout::{Mm, NoLength};
+use crate::layers::{self, Accept, Composed, Finish, Order, Room, Suggestion, White, names};
+use crate::layout::{Layout, Mm, NoLength};
 use crate::observe::Observer;
 
 /// What to read and how it becomes layers of ink.
@@ -34,7 +37,7 @@ pub struct LayersArgs {
     #[arg(long, value_name = "DPI", value_parser = dpi)]
     pub dpi: Option<f64>,
     /// Page of a PDF or PostScript file
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = page)]
     pub page: u32,
     /// Layers that keep their tones, as dots; the others are solid where they are darker than half
     #[arg(long, value_name = "INKS")]
@@ -76,6 +79,16 @@ pub struct LayersArgs {
 fn dpi(text: &str) -> Result<f64, String> {
     let dpi: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
     if (20.0..=10_000.0).contains(&dpi) { Ok(dpi) } else { Err("expected 20 to 10000".into()) }
+}
+
+fn page(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(page @ 1..) => Ok(page),
+        _ if text.ends_with(".html") => {
+            Err("expected the number of a page of the art; the plan goes into a file with --html".into())
+        }
+        _ => Err("expected the number of a page, from 1".into()),
+    }
 }
 
 /// A length that is not negative, in dots of 600 dpi.
@@ -134,7 +147,8 @@ impl LayersArgs {
     }
 
     /// How the art is read.
-    pub fn options(&self, size: Option<Size>) -> Result<layers::Options> {
+    pub fn options(&self, size: Option<Size>, layout: &Layout) -> Result<layers::Options> {
+        let (width, length) = layout.largest();
         Ok(layers::Options {
             size,
             dpi: self.dpi,
@@ -143,6 +157,7 @@ impl LayersArgs {
             page: self.page,
             halftone: self.halftone.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--halftone", text))?,
             inks: self.inks()?,
+            room: Room { width, length, cut: layout.cut },
         })
     }
 
@@ -166,6 +181,23 @@ impl LayersArgs {
     }
 }
 
+/// Art and everything that decides what comes of it on paper.
+#[derive(ClapArgs, Debug)]
+pub struct Work {
+    #[command(flatten)]
+    layers: LayersArgs,
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the art keeps its shape
+    /// [default: what the files say, else 600 dpi for layers and as large as the page allows for a plain picture]
+    #[arg(long)]
+    size: Option<Size>,
+    #[command(flatten)]
+    layout: LayoutArgs,
+    #[command(flatten)]
+    media: MediaArgs,
+    #[command(flatten)]
+    preset: PresetArg,
+}
+
 /// Arguments of `layers`.
 #[derive(ClapArgs, Debug)]
 #[command(
@@ -176,36 +208,76 @@ impl LayersArgs {
     foilpress layers art.png --reserved --inks white,gold,black\n  \
     foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
     foilpress layers decal.pdf --page 1 --white alpha\n  \
-    foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n\n\
+    foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n  \
+    foilpress plan layers white.png gold.png black.png      (the plan alone; nothing is written or sent)\n\n\
     In layers dark is ink; on a transparent ground, what is drawn is ink. Art drawn at 600 dpi is printed as drawn."
 )]
 pub struct Args {
     #[command(flatten)]
-    layers: LayersArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the art keeps its shape [default: what the files say]
-    #[arg(long)]
-    size: Option<Size>,
+    work: Work,
     #[command(flatten)]
-    piece: PieceArgs,
+    result: ResultArgs,
     #[command(flatten)]
-    preset: PresetArg,
+    deliver: DeliverArgs,
+}
+
+/// Arguments of `plan layers`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    args_override_self = true,
+    after_help = "Examples:\n  \
+    foilpress plan layers white.png gold.png black.png --passes white=3\n  \
+    foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to lay beside the machine)\n  \
+    foilpress plan layers art.svg --json\n\n\
+    The options are those of `foilpress layers`."
+)]
+pub struct PlanArgs {
+    #[command(flatten)]
+    work: Work,
+    #[command(flatten)]
+    shown: Shown,
+}
+
+impl Work {
+    /// Reads the art, composes it, and hands what is to be printed and its layout to `then`.
+    fn with<T>(
+        &self,
+        observer: &dyn Observer,
+        then: impl FnOnce(&Job<'_>, &Layout) -> Result<T>,
+    ) -> Result<T> {
+        let library = self.layers.library()?;
+        let layout = self.layout.layout(observer)?;
+        let (options, settings) = (self.layers.options(self.size, &layout)?, self.layers.settings()?);
+        let art = layers::open(&self.layers.art, &options, observer)?;
+        let composed = layers::compose(&art, &settings, &library, observer)?;
+        let job = Job {
+            name: &art.name,
+            piece: &composed.piece,
+            allowed: settings.inks,
+            library: &library,
+            report: Some((
+                "art",
+                json!({ "composed": composed.report, "suggestions": composed.suggestions }),
+            )),
+            advice: words(&composed),
+        };
+        then(&job, &layout)
+    }
 }
 
 /// Runs `layers`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let library = args.layers.library()?;
-    let (options, settings) = (args.layers.options(args.size)?, args.layers.settings()?);
-    let art = layers::open(&args.layers.art, &options, observer)?;
-    let composed = layers::compose(&art, &settings, &library, observer)?;
-    let job = Job {
-        name: &art.name,
-        piece: &composed.piece,
-        allowed: settings.inks,
-        library: &library,
-        report: Some(("art", json!({ "composed": composed.report, "suggestions": composed.suggestions }))),
-        advice: words(&composed),
-    };
-    piece::print(&job, &args.piece, observer)
+    let Args { work, result, deliver } = args;
+    work.with(observer, |job, layout| piece::print_on(job, layout, &work.media, result, deliver, observer))
+}
+
+/// Runs `plan layers`.
+pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
+    let page = args.shown.stage()?;
+    args.work.with(observer, |job, layout| {
+        let piece::Prepared { sheet, plan, .. } = piece::prepare(job, layout, &args.work.media, observer)?;
+        args.shown.show(page, (&plan, &sheet), job.report.clone(), &job.advice)
+    })
 }
 
 /// What was laid and what the art needs, in words.

@@ -127,7 +127,7 @@ pub fn profiles() -> Result<PathBuf> {
 }
 
 /// The profile of this name, or the default one if there is one.
-fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
+pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
     let folder = match (profiles(), name) {
         (Ok(folder), _) => folder,
         // Without a place for settings there are none.

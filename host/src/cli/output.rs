@@ -10,10 +10,8 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use crate::scratch::{self, Scratch};
 use anyhow::{Context, Result, bail};
-use tempfile::TempDir;
-
-static STAGED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// What the user is told when the program is interrupted.
 static FAREWELL: Mutex<Option<String>> = Mutex::new(None);
@@ -102,7 +100,7 @@ impl Kind {
 pub struct Staged {
     target: PathBuf,
     inside: PathBuf,
-    folder: TempDir,
+    folder: Scratch,
 }
 
 impl Staged {
@@ -165,14 +163,11 @@ impl Staged {
         if !parent.is_dir() {
             bail!("cannot write {}: there is no folder {}", target.display(), parent.display());
         }
-        // Under one lock, so that an interruption finds either nothing or a folder it knows of.
-        let mut list = staged();
-        let folder = tempfile::Builder::new().prefix(".foilpress-").tempdir_in(parent).map_err(|error| {
+        let folder = Scratch::beside(parent).map_err(|error| {
             // Its own words name the staging folder, which says nothing to the user.
             let reason = error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
             anyhow::anyhow!("cannot write in {}: {reason}", parent.display())
         })?;
-        list.push(folder.path().to_path_buf());
         Ok(Staged { inside: folder.path().join(name), target, folder })
     }
 
@@ -190,7 +185,7 @@ impl Staged {
     /// Moves what was written to its own name, replacing what was there.
     pub fn commit(self) -> Result<()> {
         // Held to the end: an interruption waits until old and new have changed places.
-        let mut list = staged();
+        let mut folders = scratch::folders();
         let mut old = self.inside.clone().into_os_string();
         old.push(".replaced");
         let old = PathBuf::from(old);
@@ -201,8 +196,7 @@ impl Staged {
         if let Err(error) = fs::rename(&self.inside, &self.target) {
             // The old folder goes back; if even that fails it is still in the staging folder, which stays.
             if old.exists() && fs::rename(&old, &self.target).is_err() {
-                list.retain(|path| path != self.folder.path());
-                let kept = self.folder.keep();
+                let kept = self.folder.keep(&mut folders);
                 bail!(
                     "cannot write {}: {error}; what was there is in {}",
                     self.target.display(),
@@ -211,13 +205,9 @@ impl Staged {
             }
             return Err(error).with_context(|| format!("cannot write {}", self.target.display()));
         }
-        list.retain(|path| path != self.folder.path());
+        folders.retain(|path| path != self.folder.path());
         Ok(())
     }
-}
-
-fn staged() -> std::sync::MutexGuard<'static, Vec<PathBuf>> {
-    STAGED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A document's name as the name of a file: names come from documents, which are not to choose where we write.
@@ -238,14 +228,15 @@ pub fn file_name(name: &str) -> String {
 /// Waits for ever if the program is being stopped. Called before it ends by itself with a failure, which may be no
 /// more than the staging folder that is taken away under its hands.
 pub fn yield_to_interrupt() {
-    drop(staged());
+    drop(scratch::folders());
 }
 
-/// Removes what is staged when the program is told to stop, which then ends with exit code 130.
+/// Removes what is staged, and every other temporary folder, when the program is told to stop, which then ends with exit
+/// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
         // Never released: nothing new is staged, and nothing is moved to its place, from here on.
-        let paths = staged();
+        let paths = scratch::folders();
         for path in paths.iter() {
             // A stage may still be writing into the folder; a second try catches what it added meanwhile.
             for _ in 0..3 {

@@ -21,12 +21,12 @@ use crate::layout::{self, Laid, Layout};
 use crate::observe::Observer;
 use crate::pipeline;
 use crate::preview::inks::{Ground, save_pass, save_sheet, thumbnail};
-use crate::separate::{self, Severity};
+use crate::separate::{self, Separation, Severity};
 use crate::sheet::{Piece, Sheet};
 use crate::simulate::{self, Printout};
 
 /// Pixels of the longer side of the sheet on the plan's page.
-const THUMBNAIL: usize = 640;
+pub const THUMBNAIL: usize = 640;
 
 /// What is made of a piece, and where it goes.
 #[derive(Args, Debug)]
@@ -157,6 +157,31 @@ pub fn print(job: &Job<'_>, args: &PieceArgs, observer: &dyn Observer) -> Result
     print_on(job, &args.layout.layout(observer)?, &args.media, &args.result, &args.deliver, observer)
 }
 
+/// A piece on its page, with its passes and its plan.
+pub struct Prepared {
+    /// The page.
+    pub sheet: Sheet,
+    /// Its plan.
+    pub plan: Plan,
+    page: Page,
+    laid: Laid,
+    separation: Separation,
+}
+
+/// Lays a piece on its page and plans it.
+pub fn prepare(
+    job: &Job<'_>,
+    layout: &Layout,
+    media: &MediaArgs,
+    observer: &dyn Observer,
+) -> Result<Prepared> {
+    let page: Page = media.page(layout.paper);
+    let layout::Arranged { sheet, laid } = layout::arrange(job.piece, layout, observer)?;
+    let separation = pipeline::separate_page(&sheet, &laid, job.library, observer)?;
+    let plan = Plan::new(&Subject::new(job.name, &sheet, &laid, &separation, &page), job.library);
+    Ok(Prepared { sheet, plan, page, laid, separation })
+}
+
 /// The same on a layout that was decided elsewhere.
 pub fn print_on(
     job: &Job<'_>,
@@ -167,9 +192,7 @@ pub fn print_on(
     observer: &dyn Observer,
 ) -> Result<()> {
     let places = Places::new(result.target(job.name), deliver.file())?;
-    let page: Page = media.page(layout.paper);
-    let layout::Arranged { sheet, laid } = layout::arrange(job.piece, layout, observer)?;
-    let separation = separate::separate(&sheet, job.library.rules(), observer)?;
+    let Prepared { sheet, plan, page, laid, separation } = prepare(job, layout, media, observer)?;
     if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
         bail!("this must not be printed: {}", check.with_stacks());
     }
@@ -179,7 +202,6 @@ pub fn print_on(
     if let Some(difference) = simulate::difference(&sheet, &printed) {
         bail!("the simulated sheet is not the one that was sent: {difference}");
     }
-    let plan = Plan::new(&Subject::new(job.name, &sheet, &laid, &separation, &page), job.library);
 
     let folder = places.create()?;
     write_job(folder, &bytes, &plan, &printed, &printout, &laid, result.background.unwrap_or_default())?;

@@ -5,13 +5,14 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use clap::Args as ClapArgs;
+use clap::{ArgMatches, Args as ClapArgs, Command, FromArgMatches};
 use inks::Library;
 use protocol::rgl::Page;
 
 use super::output::Staged;
 use super::print::Work;
-use crate::job::page;
+use super::{layers, piece};
+use crate::job;
 use crate::job::plan::{Plan, Subject};
 use crate::layout::Laid;
 use crate::observe::Observer;
@@ -21,23 +22,74 @@ use crate::separate::{self, Pass, Planned};
 use crate::sheet::Sheet;
 use crate::simulate;
 
-/// Arguments of `plan`.
+/// Arguments of `plan`: a job or a document, or the sub-command for art.
+#[derive(Debug)]
+pub enum Args {
+    /// `plan DOC`
+    Document(Document),
+    /// `plan layers ART…`
+    Layers(layers::PlanArgs),
+}
+
+// Deriving would ask for DOC even where there is a sub-command.
+impl FromArgMatches for Args {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Args, clap::Error> {
+        match matches.subcommand() {
+            Some((LAYERS, matches)) => layers::PlanArgs::from_arg_matches(matches).map(Args::Layers),
+            _ => Document::from_arg_matches(matches).map(Args::Document),
+        }
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Args::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl ClapArgs for Args {
+    fn augment_args(command: Command) -> Command {
+        let layers = layers::PlanArgs::augment_args(Command::new(LAYERS))
+            .about("The plan of spot-colour art; takes the options of `layers`");
+        Document::augment_args(command)
+            .mut_arg("html", |html| html.alias("page"))
+            .subcommand_negates_reqs(true)
+            .args_conflicts_with_subcommands(true)
+            .subcommand(layers)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Args::augment_args(command)
+    }
+}
+
+/// The sub-command for art.
+const LAYERS: &str = "layers";
+
+/// Arguments of `plan DOC`.
 #[derive(ClapArgs, Debug)]
 #[command(
     args_override_self = true,
     after_help = "Examples:\n  \
     foilpress plan job.rgl\n  \
     foilpress plan sample:leaf --size 80mm --repeat 2x3 --gap 2mm\n  \
-    foilpress plan job.rgl --page plan.html              (one page to print and lay beside the machine)\n  \
+    foilpress plan layers white.png gold.png --passes white=3\n  \
+    foilpress plan job.rgl --html plan.html              (one page to print and lay beside the machine)\n  \
     foilpress plan job.rgl --json\n\n\
     A job is planned from its bytes; the options of page, inks and materials are for documents."
 )]
-pub struct Args {
+pub struct Document {
     #[command(flatten)]
     work: Work,
+    #[command(flatten)]
+    shown: Shown,
+}
+
+/// How a plan is shown.
+#[derive(ClapArgs, Debug)]
+pub struct Shown {
     /// Also write the plan as a page (HTML, whole in itself) into this file
     #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
+    html: Option<PathBuf>,
     /// Colour of the ground in the page's picture: #204080, black, white, clear
     #[arg(long, value_name = "COLOUR")]
     background: Option<Ground>,
@@ -46,9 +98,44 @@ pub struct Args {
     json: bool,
 }
 
+impl Shown {
+    /// Prepares the page before the work, so that a wrong place is told early.
+    pub fn stage(&self) -> Result<Option<Staged>> {
+        self.html.as_deref().map(Staged::file).transpose()
+    }
+
+    /// Shows a plan and writes its page, if that is wanted. `report` is more for programs, under a name of its own,
+    /// `advice` more for people.
+    pub fn show(
+        &self,
+        page: Option<Staged>,
+        (plan, sheet): (&Plan, &Sheet),
+        report: Option<(&str, serde_json::Value)>,
+        advice: &str,
+    ) -> Result<()> {
+        if let Some(staged) = page {
+            let picture = thumbnail(sheet, self.background.unwrap_or_default(), piece::THUMBNAIL);
+            piece::write(staged.path(), job::page::html(plan, &picture)?.as_bytes())?;
+            staged.commit()?;
+        }
+        if !self.json {
+            return super::show(&format!("{plan}{advice}"));
+        }
+        let mut json = serde_json::to_value(plan)?;
+        if let Some((name, value)) = report {
+            json[name] = value;
+        }
+        super::show(&format!("{}\n", serde_json::to_string_pretty(&json)?))
+    }
+}
+
 /// Runs `plan`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let staged = args.page.as_deref().map(Staged::file).transpose()?;
+    let args = match args {
+        Args::Document(args) => args,
+        Args::Layers(args) => return layers::plan(args, observer),
+    };
+    let page = args.shown.stage()?;
     let path = Path::new(&args.work.document.document);
     let (plan, sheet) = if is_job(path) {
         of_job(path, &args.work.inks.library()?, observer)?
@@ -56,16 +143,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let done = args.work.print(observer)?;
         (done.plan, done.print.printed)
     };
-    if let Some(staged) = staged {
-        let picture = thumbnail(&sheet, args.background.unwrap_or_default(), 640);
-        super::piece::write(staged.path(), page::html(&plan, &picture)?.as_bytes())?;
-        staged.commit()?;
-    }
-    if args.json {
-        super::show(&format!("{}\n", serde_json::to_string_pretty(&plan)?))
-    } else {
-        super::show(&plan.to_string())
-    }
+    args.shown.show(page, (&plan, &sheet), None, "")
 }
 
 /// Whether a file begins like a job. All jobs begin with an escape; no document's file does.

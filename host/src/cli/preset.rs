@@ -3,7 +3,7 @@
 //! A preset is a table of long options. It is applied before the arguments are read, as if its options had been typed first:
 //! so every option of a command can be in it, is checked by the same rules, and gives way to what is typed.
 
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::PathBuf;
 
@@ -136,8 +136,8 @@ fn takes_preset(command: &clap::Command) -> bool {
 }
 
 /// Why a command would not take these options, in clap's words; `None` if it would.
-fn refusal(command: &str, words: &[String]) -> Option<String> {
-    let typed = ["foilpress", command].into_iter().map(str::to_owned).chain(words.iter().cloned());
+fn refusal(command: &[&str], words: &[String]) -> Option<String> {
+    let typed = ["foilpress"].iter().chain(command).map(|&name| name.to_owned()).chain(words.iter().cloned());
     // What the command works on is not a preset's business: any name will do.
     match super::Args::command().try_get_matches_from(typed.chain(["document".to_owned()])) {
         Ok(_) => None,
@@ -157,7 +157,8 @@ pub fn run(args: &Args) -> Result<()> {
                 .filter(|command| takes_preset(command))
                 .map(clap::Command::get_name)
                 .collect();
-            let refusals: Vec<Option<String>> = able.iter().map(|command| refusal(command, &words)).collect();
+            let refusals: Vec<Option<String>> =
+                able.iter().map(|&command| refusal(&[command], &words)).collect();
             if words.iter().any(|word| word.starts_with("--preset")) {
                 bail!("a preset cannot name another one");
             }
@@ -217,9 +218,17 @@ pub fn run(args: &Args) -> Result<()> {
 pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
     let program = super::Args::command();
     let place = args.iter().skip(1).position(|arg| !arg.to_string_lossy().starts_with('-')).map(|at| at + 1);
-    let Some(place) = place else { return Ok(args) };
-    let able = program.get_subcommands().find(|command| OsStr::new(command.get_name()) == args[place]);
-    let Some(command) = able.filter(|command| takes_preset(command)) else { return Ok(args) };
+    let Some(mut place) = place else { return Ok(args) };
+    let Some(mut command) = program.find_subcommand(&args[place]) else { return Ok(args) };
+    let mut path = vec![command.get_name()];
+    // `plan layers` takes the options of the inner command.
+    while let Some(inner) = args.get(place + 1).and_then(|word| command.find_subcommand(word)) {
+        (command, place) = (inner, place + 1);
+        path.push(command.get_name());
+    }
+    if !takes_preset(command) {
+        return Ok(args);
+    }
     let typed = &args[place + 1..];
     let end = typed.iter().position(|arg| arg == "--").unwrap_or(typed.len());
     let named = typed[..end].iter().enumerate().find_map(|(at, arg)| {
@@ -237,7 +246,7 @@ pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
                 format!("preset `{name}` is in use (`foilpress preset use none` ends that)")
             })?;
             let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
-            let fits = refusal(command.get_name(), &words).is_none();
+            let fits = refusal(&path, &words).is_none();
             if !quiet {
                 let what =
                     if fits { words.join(" ") } else { "does not fit this command and is left out".into() };
@@ -280,7 +289,7 @@ mod tests {
     fn what_is_typed_counts_more_than_a_preset() {
         let words: Vec<String> =
             ["--media=film", "--media=thick", "--mirror", "--mirror"].map(str::to_owned).to_vec();
-        assert_eq!(refusal("print", &words), None);
-        assert!(refusal("print", &["--meda=film".to_owned()]).is_some());
+        assert_eq!(refusal(&["print"], &words), None);
+        assert!(refusal(&["print"], &["--meda=film".to_owned()]).is_some());
     }
 }

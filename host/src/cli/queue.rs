@@ -10,13 +10,13 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
+use crate::layout::Profile;
 use crate::observe::Observer;
-use crate::queue::backend::{self, Call, Exit};
+use crate::queue::call::{Call, Exit};
 use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
 use crate::queue::options::{self, Choices};
-use crate::queue::{filter, ppd, uri};
-use crate::send::find;
+use crate::queue::{backend, filter, listing, ppd, uri};
 
 /// Arguments of `queue`.
 #[derive(ClapArgs, Debug)]
@@ -34,7 +34,7 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Make a queue, so that every application can print (as root)
+    /// Make a queue, so that every application can print, or change one (as root)
     Install(Install),
     /// Remove a queue (as root)
     Remove(Remove),
@@ -53,6 +53,9 @@ struct Install {
     /// Where it leads: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE
     #[arg(long, value_name = "WHERE", value_parser = uri::of)]
     to: String,
+    /// Profile of the machine (`foilpress profile`), or its file [default: the one named `default`, if there is one]
+    #[arg(long, value_name = "NAME|FILE")]
+    profile: Option<String>,
 }
 
 /// Arguments of `queue remove`.
@@ -76,11 +79,9 @@ fn queue_name(name: &str) -> Result<String, String> {
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.command {
         Command::Install(args) => install(args, observer),
-        Command::Remove(args) => ours(&args.name)
-            .and_then(|()| system("lpadmin", &["-x", &args.name]))
-            .map(|_| observer.note(&format!("{} is no queue any more", args.name))),
+        Command::Remove(args) => remove(args, observer),
         Command::List => list(),
-        Command::Ppd => super::show(&ppd::description()),
+        Command::Ppd => super::show(&ppd::description(&Profile::default())),
     }
 }
 
@@ -90,12 +91,33 @@ fn system(program: &str, arguments: &[&str]) -> Result<String> {
         format!("cannot start {program}; is CUPS installed (Debian: apt install cups ghostscript)?")
     })?;
     if !output.status.success() {
-        bail!("{program}: {}", String::from_utf8_lossy(&output.stderr).trim());
+        let said = String::from_utf8_lossy(&output.stderr);
+        let said = said.trim();
+        if ["Forbidden", "Unauthorized", "Not authorized"].iter().any(|word| said.contains(word)) {
+            bail!("{} ({program}: {said})", as_root());
+        }
+        if ["Unable to connect", "Scheduler is not running"].iter().any(|words| said.contains(words)) {
+            bail!(
+                "the print system does not answer; is it running (Debian: sudo service cups start)? ({program}: {said})"
+            );
+        }
+        bail!("{program}: {said}");
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
+fn as_root() -> String {
+    "only root may change queues; the same command with sudo does it".into()
+}
+
+/// Where a package puts the program.
+const PACKAGED: &str = "/usr/bin/foilpress";
+
 fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
+    let profile = match args.profile.as_deref().filter(|name| name.ends_with(".toml")) {
+        Some(file) => Profile::load(Path::new(file))?,
+        None => super::layout::profile(args.profile.as_deref(), observer)?,
+    };
     let places = Places::usual(Path::new("/"));
     if !places.programs.is_dir() {
         bail!(
@@ -103,11 +125,11 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             places.programs.display()
         );
     }
+    // Before anything is written: without an answer there will be no queue.
+    queues()?;
     let mut program = std::env::current_exe().context("cannot find this program")?;
-    let as_root = || "only root may make queues; the same command with sudo does it".to_owned();
     // A package has put its own files there, which stay.
-    let packaged = Path::new("/usr/bin/foilpress");
-    if program != packaged && !install::is_roots(&program).with_context(as_root)? {
+    if program != Path::new(PACKAGED) && !install::is_roots(&program).with_context(as_root)? {
         install::copy_program(&program, &places.program).with_context(as_root)?;
         observer.note(&format!(
             "{} is not root's, so the print system gets a copy: {}; after an update, install the queue again",
@@ -124,8 +146,13 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             observer.note(&format!("wrote {}", file.path.display()));
         }
     }
-    let description = places.descriptions.join(install::DESCRIPTION);
-    let description = description.to_str().context("the path of the printer description is no text")?;
+    // A queue's own description knows its machine.
+    let mut description = tempfile::NamedTempFile::new().context("cannot write the printer description")?;
+    description
+        .write_all(ppd::description(&profile).as_bytes())
+        .context("cannot write the printer description")?;
+    let description =
+        description.path().to_str().context("the folder for temporary files has no name in text")?;
     // A job that fails is not begun again by itself, and one lost sheet is not to stop the others.
     system(
         "lpadmin",
@@ -144,6 +171,20 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
         ],
     )?;
     observer.note(&format!("{} is a queue now: lp -d {} file.pdf", args.name, args.name));
+    Ok(())
+}
+
+fn remove(args: &Remove, observer: &dyn Observer) -> Result<()> {
+    ours(&args.name)?;
+    system("lpadmin", &["-x", &args.name])?;
+    observer.note(&format!("{} is no queue any more", args.name));
+    let left = queues()?.into_iter().any(|(_, device)| uri::parse(&device).is_ok());
+    if !left && !Path::new(PACKAGED).exists() {
+        // What was written for the first queue goes with the last; the package's files are the package's.
+        for file in Places::usual(Path::new("/")).remove().with_context(as_root)? {
+            observer.note(&format!("removed {}", file.display()));
+        }
+    }
     Ok(())
 }
 
@@ -201,7 +242,10 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// The backend: without arguments a list of devices, otherwise a job.
 pub fn backend(args: &Conventional) -> ExitCode {
     if args.arguments.is_empty() {
-        return devices();
+        return match super::show(&listing::devices()) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(_) => ExitCode::from(Exit::Failed as u8),
+        };
     }
     let messages = Messages::new(io::stderr());
     // The print system asks a job to end by SIGTERM.
@@ -216,44 +260,6 @@ pub fn backend(args: &Conventional) -> ExitCode {
         }
     };
     ExitCode::from(exit as u8)
-}
-
-/// The bridges, and printers at cables of their own.
-fn devices() -> ExitCode {
-    let mut lines = Vec::new();
-    for address in find::survey().bridges.iter().filter_map(|bridge| bridge.addresses.first()) {
-        let about = format!("ALPS MD-5500 through a Foilpress bridge ({address})");
-        lines.extend(backend::device(
-            &address.to_string(),
-            "ALPS MD-5500",
-            &about,
-            "MFG:ALPS;MDL:MD-5500;CMD:RGL;",
-        ));
-    }
-    for number in 0..8 {
-        let device = PathBuf::from(format!("/dev/usb/lp{number}"));
-        let id = std::fs::read_to_string(format!("/sys/class/usbmisc/lp{number}/device/ieee1284_id"));
-        if let Ok(id) = id
-            && device.exists()
-            && super::bridge::is_alps(&id)
-        {
-            let about = format!("ALPS MD-5500 at a cable ({})", device.display());
-            lines.extend(backend::device(
-                &format!("raw:{}", device.display()),
-                "ALPS MD-5500",
-                &about,
-                id.trim(),
-            ));
-        }
-    }
-    if lines.is_empty() {
-        lines.push(backend::NO_DEVICE.into());
-    }
-    let text: String = lines.into_iter().map(|line| line + "\n").collect();
-    match super::show(&text) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(_) => ExitCode::from(Exit::Failed as u8),
-    }
 }
 
 /// The filter: `job user title copies options [file]`, jobs to standard output.

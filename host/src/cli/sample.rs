@@ -10,6 +10,10 @@ use crate::sample::{SAMPLES, Sample};
 
 /// The samples, or one of them as a folder of texture maps.
 #[derive(clap::Args, Debug)]
+#[command(after_help = "Examples:\n  \
+    foilpress sample list\n  \
+    foilpress sample leaf -o my-leaf                     (an ordinary texture folder, to look at and to change)\n  \
+    foilpress print sample:leaf                          (prints it without writing it)")]
 pub struct Args {
     /// `list`, or the name of a sample
     name: String,

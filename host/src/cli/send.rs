@@ -1,6 +1,5 @@
 //! `foilpress send`, and what `print`, `resume` and `cancel` share with it: a job on its way to a printer.
 
-use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -17,7 +16,7 @@ use crate::send::finish::{self, Sheet, await_sheet};
 use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
 use crate::send::raw::RawError;
 use crate::send::session::{Outcome, Session};
-use crate::send::{self, Address, Checked, Destination, Event, find, streams, words};
+use crate::send::{self, Address, Checked, Destination, Event, Wish, streams, words};
 
 /// Arguments of `send`.
 #[derive(ClapArgs, Debug)]
@@ -244,16 +243,9 @@ fn converse(
     let outcome = match session.outcome() {
         Some(outcome) => outcome,
         None => {
-            // Once the bridge is known, it is that one, whatever its port is called when it comes back.
-            let known = Cell::new(job.entry.record.bridge);
-            let mut watch = |event: Event<'_>| {
-                if let Event::Connected(bridge) = &event {
-                    known.set(Some(bridge.serial));
-                }
-                reporter.tell(&event);
-            };
-            let mut open = || find::open(address, known.get());
-            send::run(session, &mut open, &mut |record| job.save(record), &mut watch).with_context(|| {
+            let mut save = |record: &_| job.save(record);
+            let mut watch = |event: Event<'_>| reporter.tell(&event);
+            send::run_at(session, address, &mut save, &mut watch, &mut || Wish::GoOn).with_context(|| {
                 format!(
                     "job {number:08x} ({}) is kept; `foilpress resume {number:08x}` goes on with it",
                     job.entry.name

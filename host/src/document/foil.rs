@@ -188,7 +188,8 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
 
     let channels = index.maps.len();
     source.observer.begin("reading", channels as u64);
-    let mut data = vec![0u16; index.width * index.height * channels];
+    // Maps are read one by one before room for all of them is taken: the description alone allocates nothing.
+    let mut data = Vec::new();
     for (channel, name) in index.maps.iter().enumerate() {
         let at = path.join(name);
         let bytes = source.read(&at, MOST_BYTES)?;
@@ -200,6 +201,7 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
             ),
             None => "expected weights as 16-bit grey".into(),
             Some(weights) => {
+                data.resize(index.width * index.height * channels, 0);
                 for (out, &w) in data.chunks_exact_mut(channels).zip(weights) {
                     out[channel] = w;
                 }

@@ -5,12 +5,13 @@
 //! ([`super::names`]) or named in [`SETTINGS`]. All maps are brought to the size of the base colour. Nothing is taken
 //! silently: the notes say which encoding was assumed, what was resized, what was left out.
 
-use std::path::{Path, PathBuf};
+mod files;
+mod settings;
 
-use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 use super::error::DocumentError;
-use super::names::{self, Role};
+use super::names::Role;
 use super::picture::Picture;
 use super::relief;
 use super::source::{MOST_BYTES, Source};
@@ -19,229 +20,9 @@ use super::texture::{Field, Plane, same_shape};
 use super::{ColourSpace, Content, Document, Options, stem};
 use crate::brdf::Space;
 
-/// The optional settings file of a folder.
-pub const SETTINGS: &str = "material.toml";
-
-/// The most directory entries looked at.
-const MOST_FILES: usize = 10_000;
-
-/// Which numbers the maps hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Workflow {
-    /// Base colour, roughness, metallic.
-    MetallicRoughness,
-    /// Diffuse colour, specular colour, glossiness.
-    SpecularGlossiness,
-}
-
-/// What `material.toml` may say. Everything is optional; unknown keys are errors.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Settings {
-    /// What to call the document.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
-    /// Width and height on paper in millimetres.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub size_mm: Option<[f64; 2]>,
-    /// Encoding of the colour maps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub colour_space: Option<ColourSpace>,
-    /// Which numbers the maps hold.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub workflow: Option<Workflow>,
-    /// Roughness where there is no map, 0 to 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub roughness: Option<f32>,
-    /// Metallic where there is no map, 0 to 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub metallic: Option<f32>,
-    /// Which files to read, where names do not tell.
-    #[serde(default, skip_serializing_if = "MapNames::is_empty")]
-    pub maps: MapNames,
-}
-
-/// The `[maps]` of `material.toml`: file names within the folder.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the names are the roles of `names::Role`")]
-pub struct MapNames {
-    #[serde(alias = "base_colour", alias = "diffuse", skip_serializing_if = "Option::is_none")]
-    pub base_color: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub roughness: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub metallic: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub occlusion_roughness_metallic: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub specular: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub glossiness: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub normal: Option<String>,
-}
-
-impl MapNames {
-    fn is_empty(&self) -> bool {
-        *self == MapNames::default()
-    }
-
-    fn named(&self) -> impl Iterator<Item = (Role, &str)> {
-        [
-            (Role::BaseColor, &self.base_color),
-            (Role::Roughness, &self.roughness),
-            (Role::Metallic, &self.metallic),
-            (Role::Packed, &self.occlusion_roughness_metallic),
-            (Role::Specular, &self.specular),
-            (Role::Glossiness, &self.glossiness),
-            (Role::Normal, &self.normal),
-        ]
-        .into_iter()
-        .filter_map(|(role, name)| Some((role, name.as_deref()?)))
-    }
-}
-
-/// The files of a folder that play a role, with what is needed to complain about them.
-struct Files {
-    folder: PathBuf,
-    seen: Vec<String>,
-    by_role: Vec<(Role, String)>,
-}
-
-impl Files {
-    fn find(folder: &Path, settings: &Settings, source: &mut Source<'_>) -> Result<Files, DocumentError> {
-        let io = |source| DocumentError::Io { path: folder.to_path_buf(), attempt: "list", source };
-        let (mut seen, mut foreign) = (Vec::new(), Vec::new());
-        for entry in std::fs::read_dir(folder).map_err(io)?.take(MOST_FILES) {
-            let name = entry.map_err(io)?.file_name().to_string_lossy().into_owned();
-            if name.starts_with('.') {
-                continue;
-            }
-            if is_picture(&name) {
-                seen.push(name);
-            } else if is_foreign_picture(&name) {
-                foreign.push(name);
-            }
-        }
-        seen.sort();
-        if !foreign.is_empty() {
-            foreign.sort();
-            source.note(format!(
-                "not read: {}; save maps as PNG, JPEG, TIFF, OpenEXR or Radiance HDR",
-                super::error::list(&foreign)
-            ));
-        }
-        let stems: Vec<&str> =
-            seen.iter().map(|name| name.rsplit_once('.').map_or(&name[..], |(s, _)| s)).collect();
-        let roles = names::roles(&stems);
-        let mut files = Files { folder: folder.to_path_buf(), seen: seen.clone(), by_role: Vec::new() };
-        for (role, name) in settings.maps.named() {
-            if Path::new(name).components().count() != 1 || name.contains(['/', '\\']) || name == ".." {
-                return Err(DocumentError::Settings {
-                    path: folder.join(SETTINGS),
-                    problem: format!("maps: `{name}` must be the name of a file in the same folder"),
-                });
-            }
-            files.by_role.push((role, name.to_string()));
-        }
-        for (name, role) in seen.iter().zip(roles) {
-            if let Some(role) = role
-                && settings.maps.named().all(|(named, _)| named != role)
-            {
-                files.by_role.push((role, name.clone()));
-            }
-        }
-        files.choose_normal(source);
-        Ok(files)
-    }
-
-    /// Two handednesses of one normal map are the same map to us.
-    fn choose_normal(&mut self, source: &mut Source<'_>) {
-        let normals = self.all(Role::Normal);
-        if normals.len() == 2 {
-            let direct = |name: &str| {
-                let name = name.to_ascii_lowercase();
-                name.contains("dx") || name.contains("directx")
-            };
-            let drop = match (direct(&normals[0]), direct(&normals[1])) {
-                (true, false) => normals[0].clone(),
-                (false, true) => normals[1].clone(),
-                _ => return,
-            };
-            self.by_role.retain(|(_, name)| *name != drop);
-            source.note(format!("{drop}: the same normals again in the other convention; not read"));
-        }
-    }
-
-    fn all(&self, role: Role) -> Vec<String> {
-        self.by_role.iter().filter(|(r, _)| *r == role).map(|(_, name)| name.clone()).collect()
-    }
-
-    fn error(&self, problem: String) -> DocumentError {
-        DocumentError::Maps { folder: self.folder.clone(), problem, seen: self.seen.clone() }
-    }
-
-    /// The one file of a role, if there is one.
-    fn one(&self, role: Role) -> Result<Option<String>, DocumentError> {
-        match &self.all(role)[..] {
-            [] => Ok(None),
-            [name] => Ok(Some(name.clone())),
-            several => Err(self.error(format!(
-                "{} could each be the {} map; name one in [maps] of {SETTINGS}",
-                several.join(" and "),
-                role.name()
-            ))),
-        }
-    }
-}
-
-fn is_picture(name: &str) -> bool {
-    has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe"])
-}
-
-/// Pictures by their name that no decoder here reads.
-fn is_foreign_picture(name: &str) -> bool {
-    has_extension(
-        name,
-        &["tga", "webp", "bmp", "gif", "dds", "psd", "ktx2", "avif", "heic", "jxl", "jp2", "svg", "tx"],
-    )
-}
-
-fn has_extension(name: &str, kinds: &[&str]) -> bool {
-    name.rsplit_once('.').is_some_and(|(_, kind)| kinds.contains(&kind.to_ascii_lowercase().as_str()))
-}
-
-/// Reads `material.toml`, if the folder has one.
-fn settings(folder: &Path, source: &mut Source<'_>) -> Result<Settings, DocumentError> {
-    let path = folder.join(SETTINGS);
-    if !path.is_file() {
-        return Ok(Settings::default());
-    }
-    let text = source.read_text(&path)?;
-    let wrong = |problem: String| DocumentError::Settings { path: path.clone(), problem };
-    let settings: Settings = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-    if let Some(size) = settings.size_mm {
-        check_size_mm(size).map_err(wrong)?;
-    }
-    for (key, value) in [("roughness", settings.roughness), ("metallic", settings.metallic)] {
-        if let Some(value) = value
-            && !(0.0..=1.0).contains(&value)
-        {
-            return Err(wrong(format!("{key} = {value}: expected a number from 0 to 1")));
-        }
-    }
-    Ok(settings)
-}
-
-/// Whether a size can be meant: from a dot to 10 metres.
-pub(super) fn check_size_mm(size: [f64; 2]) -> Result<(), String> {
-    match size.iter().find(|mm| !(0.04..=10_000.0).contains(*mm)) {
-        Some(mm) => Err(format!("size_mm: {mm} is no length on paper; expected 0.04 to 10000 millimetres")),
-        None => Ok(()),
-    }
-}
+use files::Files;
+pub(super) use settings::check_size_mm;
+pub use settings::{MapNames, SETTINGS, Settings, Workflow};
 
 struct Reader<'a, 'b> {
     files: Files,
@@ -331,7 +112,7 @@ pub(super) fn open(
     space: Space,
     mut source: Source<'_>,
 ) -> Result<Document, DocumentError> {
-    let settings = settings(folder, &mut source)?;
+    let settings = settings::read(folder, &mut source)?;
     let files = Files::find(folder, &settings, &mut source)?;
     let Some(base_name) = files.one(Role::BaseColor)? else {
         return Err(files.error(format!(

@@ -1,20 +1,24 @@
 //! Every reader against files nobody would send in good faith.
 //!
-//! Starting from a good file of each kind: cut short anywhere, bytes changed anywhere. Whatever comes, the answer is a
-//! document or an error that names the file; a panic or an endless loop fails the test.
+//! Starting from good documents of every kind, one file of which is [damaged](crate::damage). Whatever comes, the answer is a document or an error that names the file; a panic or an endless loop fails the test.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use base64::Engine;
 use proptest::prelude::*;
 
 use super::*;
+use crate::brdf::Table;
+use crate::damage::{damages, spoilt};
 use crate::observe::Silent;
+use crate::weights::{WeightMaps, quantise};
 
-/// A file of one kind, and how to open it: the name within a folder, or the folder itself.
-struct Kind {
-    file: &'static str,
-    bytes: Vec<u8>,
-    whole_folder: bool,
+/// A good document: its files, which one is what is opened (the folder if none), and which one is to be damaged.
+#[derive(Clone, Debug)]
+struct Victim {
+    files: Vec<(&'static str, Vec<u8>)>,
+    opened: Option<&'static str>,
+    damaged: &'static str,
 }
 
 fn encoded(format: image::ImageFormat) -> Vec<u8> {
@@ -30,21 +34,83 @@ fn encoded(format: image::ImageFormat) -> Vec<u8> {
     bytes.into_inner()
 }
 
-fn kinds() -> Vec<Kind> {
-    use image::ImageFormat::*;
-    let picture = |file, format| Kind { file, bytes: encoded(format), whole_folder: true };
-    let single = |file, bytes| Kind { file, bytes, whole_folder: false };
+/// A folder of maps whose base colour is one picture.
+fn folder(picture: &'static str, format: image::ImageFormat) -> Victim {
+    let grey = image::GrayImage::from_fn(9, 7, |x, y| image::Luma([(20 * x + y) as u8]));
+    let mut roughness = std::io::Cursor::new(Vec::new());
+    grey.write_to(&mut roughness, image::ImageFormat::Png).unwrap();
+    let files = vec![
+        (picture, encoded(format)),
+        ("roughness.png", roughness.into_inner()),
+        ("nor.png", encoded(image::ImageFormat::Png)),
+        (
+            "material.toml",
+            b"size_mm = [10, 20]\ncolour_space = \"linear\"\nmetallic = 0.5\n[maps]\nnormal = \"nor.png\"\n"
+                .to_vec(),
+        ),
+    ];
+    Victim { files, opened: None, damaged: picture }
+}
+
+/// A factored document as this program writes it.
+fn factored(damaged: &'static str) -> Victim {
+    let space = Space::half_angle(5);
+    let mut bases = Table::new(space.columns());
+    for basis in 0..2 {
+        bases.push(&(0..space.columns()).map(|j| (basis * 7 + j) as f64 / 20.0).collect::<Vec<f64>>());
+    }
+    let mut data = vec![0; 4 * 3 * 2];
+    for (pixel, weights) in data.chunks_exact_mut(2).enumerate() {
+        quantise(&[pixel as f64, 11.0 - pixel as f64], weights);
+    }
+    let maps = WeightMaps::new(4, 3, 2, data).unwrap();
+    let scratch = tempfile::tempdir().unwrap();
+    let path = scratch.path().join("a.foil");
+    foil::write(&crate::factor::Factored { space, bases, maps }, "a", Some((30.0, 20.0)), &path).unwrap();
+    let names = ["document.toml", "bases.csv", "weights-00.png", "weights-01.png"];
+    let files = names.map(|name| (name, std::fs::read(path.join(name)).unwrap())).to_vec();
+    Victim { files, opened: None, damaged }
+}
+
+fn gltf(image: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"images":[{image}],"textures":[{{"source":0}}],
+        "buffers":[{{"byteLength":BYTES}}],"bufferViews":[{{"buffer":0,"byteLength":BYTES}}],
+        "materials":[{{"name":"one","pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}},"metallicFactor":0.25,
+        "roughnessFactor":0.5}},"normalTexture":{{"index":0,"scale":0.5}},"extensions":{{
+        "KHR_materials_ior":{{"ior":1.4}}}}}}]}}"#
+    )
+}
+
+fn glb() -> Vec<u8> {
+    let png = encoded(image::ImageFormat::Png);
+    let mut text =
+        gltf(r#"{"bufferView":0,"mimeType":"image/png"}"#).replace("BYTES", &png.len().to_string());
+    text.extend(std::iter::repeat_n(' ', text.len().next_multiple_of(4) - text.len()));
+    let mut data = png;
+    data.resize(data.len().next_multiple_of(4), 0);
     let mut glb = b"glTF\x02\0\0\0".to_vec();
-    let json = br#"{"asset":{"version":"2.0"},"images":[{"bufferView":0,"mimeType":"image/png"}],"textures":[{"source":0}],"buffers":[{"byteLength":8}],"bufferViews":[{"buffer":0,"byteLength":8}],"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}]}"#;
-    let mut text = json.to_vec();
-    text.resize(text.len().next_multiple_of(4), b' ');
-    glb.extend((36 + text.len() as u32).to_le_bytes());
-    glb.extend((text.len() as u32).to_le_bytes());
-    glb.extend(b"JSON");
-    glb.extend(&text);
-    glb.extend(8u32.to_le_bytes());
-    glb.extend(b"BIN\0");
-    glb.extend([1u8; 8]);
+    glb.extend((28 + text.len() as u32 + data.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", text.as_bytes()), (b"BIN\0", &data)] {
+        glb.extend((chunk.len() as u32).to_le_bytes());
+        glb.extend(kind);
+        glb.extend(chunk);
+    }
+    glb
+}
+
+fn victims() -> Vec<Victim> {
+    use image::ImageFormat::*;
+    let single = |file, bytes| Victim { files: vec![(file, bytes)], opened: Some(file), damaged: file };
+    let png = encoded(Png);
+    let uri = base64::engine::general_purpose::STANDARD.encode(&png);
+    let inline = gltf(&format!(r#"{{"uri":"data:image/png;base64,{uri}"}}"#)).replace("BYTES", "8");
+    let outside = gltf(r#"{"uri":"map%20one.png"}"#).replace("BYTES", "8");
+    let beside = |damaged| Victim {
+        files: vec![("a.gltf", outside.clone().into_bytes()), ("map one.png", png.clone())],
+        opened: Some("a.gltf"),
+        damaged,
+    };
     let mut merl: Vec<u8> = [3i32, 30, 4].iter().flat_map(|d| d.to_le_bytes()).collect();
     merl.extend((0..3 * 360).flat_map(|i| f64::from(i).to_le_bytes()));
     let bsdf = rgl::tests::tensor_file(&[
@@ -56,98 +122,101 @@ fn kinds() -> Vec<Kind> {
         ("rgb", vec![1, 2, 3, 2, 2], vec![0.5; 24]),
     ]);
     vec![
-        picture("albedo.png", Png),
-        picture("albedo.jpg", Jpeg),
-        picture("albedo.tif", Tiff),
-        picture("albedo.hdr", Hdr),
-        picture("albedo.exr", OpenExr),
-        Kind {
-            file: "material.toml",
-            bytes: b"size_mm = [10, 20]\ncolour_space = \"linear\"\n[maps]\nnormal = \"n.png\"\n".to_vec(),
-            whole_folder: true,
-        },
-        Kind {
-            file: "document.toml",
-            bytes: b"format = 1\nname = \"a\"\nwidth = 2\nheight = 2\nsamples = 4\nbases = \"bases.csv\"\nmaps = [\"w.png\"]\n".to_vec(),
-            whole_folder: true,
-        },
+        folder("albedo.png", Png),
+        folder("albedo.jpg", Jpeg),
+        folder("albedo.tif", Tiff),
+        folder("albedo.hdr", Hdr),
+        folder("albedo.exr", OpenExr),
+        Victim { damaged: "roughness.png", ..folder("albedo.png", Png) },
+        Victim { damaged: "nor.png", ..folder("albedo.png", Png) },
+        Victim { damaged: "material.toml", ..folder("albedo.png", Png) },
+        factored("document.toml"),
+        factored("bases.csv"),
+        factored("weights-00.png"),
         single("a.csv", b"theta_h_deg,r,g,b\n0,1,1,1\n45,0.5,0.5,0.5\n90,0,0,0\n".to_vec()),
         single("a.binary", merl),
         single("a.bsdf", bsdf),
-        single("a.gltf", json.to_vec()),
-        single("a.glb", glb),
+        single("inline.gltf", inline.into_bytes()),
+        beside("a.gltf"),
+        beside("map one.png"),
+        single("a.glb", glb()),
     ]
 }
 
-/// Opens a file of some bytes; the answer must name the file, or be a document that can be read to its end.
-fn survive(kind: &Kind, bytes: &[u8]) {
-    let folder = tempfile::tempdir().unwrap();
-    if kind.whole_folder {
-        std::fs::write(folder.path().join("roughness.png"), encoded(image::ImageFormat::Png)).unwrap();
+impl Victim {
+    fn bytes(&self) -> &[u8] {
+        let (_, bytes) = self.files.iter().find(|(name, _)| *name == self.damaged).unwrap();
+        bytes
     }
-    let file = folder.path().join(kind.file);
-    std::fs::write(&file, bytes).unwrap();
-    let spec: PathBuf = if kind.whole_folder { folder.path().into() } else { file };
-    match open(spec.to_str().unwrap(), &Options::default(), &Silent) {
-        Ok(document) => {
-            let materials = document.materials();
-            let mut row = vec![0.0; materials.space().columns()];
-            for pixel in 0..(materials.width() * materials.height()).min(1000) {
-                materials.reflectance(pixel, &mut row);
-                assert!(row.iter().all(|v| v.is_finite() && *v >= 0.0), "{}", kind.file);
-            }
+
+    /// Puts the files, one of them with other bytes, into a folder and opens them.
+    fn open_with(&self, folder: &Path, bytes: &[u8]) -> Result<Document, DocumentError> {
+        for (name, good) in &self.files {
+            let bytes = if *name == self.damaged { bytes } else { good };
+            std::fs::write(folder.join(name), bytes).unwrap();
         }
-        Err(error) => {
-            let text = error.to_string();
-            let named = folder.path().file_name().is_some_and(|name| text.contains(&*name.to_string_lossy()));
-            assert!(named, "{}: {text}", kind.file);
+        let spec = self.opened.map_or_else(|| folder.to_path_buf(), |name| folder.join(name));
+        open(spec.to_str().unwrap(), &Options::default(), &Silent)
+    }
+
+    /// The answer must name the file, or be a document that can be read to its end.
+    fn survive(&self, bytes: &[u8]) {
+        let folder = tempfile::tempdir().unwrap();
+        match self.open_with(folder.path(), bytes) {
+            Ok(document) => {
+                let materials = document.materials();
+                let mut row = vec![0.0; materials.space().columns()];
+                for pixel in 0..(materials.width() * materials.height()).min(1000) {
+                    materials.reflectance(pixel, &mut row);
+                    assert!(row.iter().all(|v| v.is_finite() && *v >= 0.0), "{}", self.damaged);
+                }
+            }
+            Err(error) => {
+                let text = error.to_string();
+                let folder = folder.path().file_name().unwrap().to_string_lossy();
+                assert!(text.contains(&*folder), "{}: {text}", self.damaged);
+            }
         }
     }
 }
 
 #[test]
 fn the_good_files_are_good() {
-    for kind in
-        kinds().iter().filter(|kind| !kind.whole_folder && kind.file != "a.gltf" && kind.file != "a.glb")
-    {
+    for victim in victims() {
         let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join(kind.file);
-        std::fs::write(&file, &kind.bytes).unwrap();
-        open(file.to_str().unwrap(), &Options::default(), &Silent).unwrap();
+        if let Err(error) = victim.open_with(folder.path(), victim.bytes()) {
+            panic!("{}: {error}", victim.damaged);
+        }
     }
 }
 
 #[test]
 fn files_cut_short_anywhere_are_answered() {
-    for kind in kinds() {
-        let step = (kind.bytes.len() / 60).max(1);
-        for length in (0..kind.bytes.len()).step_by(step) {
-            survive(&kind, &kind.bytes[..length]);
+    for victim in victims() {
+        let bytes = victim.bytes();
+        let step = (bytes.len() / 60).max(1);
+        for length in (0..bytes.len()).step_by(step) {
+            victim.survive(&bytes[..length]);
         }
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(1000))]
     #[test]
-    fn changed_bytes_are_answered(
-        which in 0usize..12,
-        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
-        near_start in any::<bool>(),
+    fn damaged_files_are_answered(
+        which in prop::sample::select(victims()).no_shrink(),
+        damages in damages(),
     ) {
-        let kind = &kinds()[which];
-        let mut bytes = kind.bytes.clone();
-        // Headers hold the sizes: half of the damage goes there.
-        let reach = if near_start { bytes.len().min(64) } else { bytes.len() };
-        for (at, value) in changes {
-            bytes[at.index(reach)] = value;
-        }
-        survive(kind, &bytes);
+        which.survive(&spoilt(which.damaged, which.bytes(), &damages));
     }
 
     #[test]
-    fn noise_under_any_name_is_answered(which in 0usize..12, bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        survive(&kinds()[which], &bytes);
+    fn noise_under_any_name_is_answered(
+        which in prop::sample::select(victims()).no_shrink(),
+        bytes in prop::collection::vec(any::<u8>(), 0..200),
+    ) {
+        which.survive(&bytes);
     }
 }
 

@@ -8,7 +8,7 @@
 //! become gloss, larger shapes are lost. Sign conventions (+Y up or down) do not matter to a variance, and z
 //! is taken from x and y, so maps with two channels are read too.
 //! Cost: a few additions a pixel whatever the window (running sums). Limits: isotropic; the mean slope is dropped.
-//! Source: the widening rule of the input format notes; linear filtering of slope moments in rendering (LEAN).
+//! Source: filtering of slope moments in rendering, as in Olano & Baker 2010 (LEAN mapping).
 
 use rayon::prelude::*;
 

@@ -25,7 +25,6 @@ mod tests;
 mod weigh;
 
 use std::fmt;
-use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
@@ -114,8 +113,6 @@ pub struct Report {
     pub uncovered: f64,
     /// For each basis its distance from the hull of the document's materials, in the document's spread.
     pub excursion: Vec<f64>,
-    /// Time taken, in seconds.
-    pub seconds: f64,
 }
 
 impl fmt::Display for Report {
@@ -197,7 +194,6 @@ pub fn factor(
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Factoring, FactorError> {
-    let started = Instant::now();
     check(document, settings)?;
     let sample = Sample::draw(document, settings.seed)?;
     let (pca, bases) = learn(&sample, settings, observer);
@@ -217,7 +213,6 @@ pub fn factor(
         max: errors.max,
         uncovered: errors.uncovered,
         excursion,
-        seconds: started.elapsed().as_secs_f64(),
     };
     Ok(Factoring { factored: Factored { space: document.space().clone(), bases: table, maps }, report })
 }

@@ -90,10 +90,10 @@ fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Ma
     let best = mixer.best(&candidates.priced, &target)?;
     let mut weights = best.weights.clone();
     // The price has decided which stacks; among them the distance alone counts.
-    let unpruned = mixer.polish(&candidates.free, &target, &mut weights)?.distance;
+    let unpruned = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?.distance;
     let mut distance = unpruned;
     while prune(&mut weights) {
-        distance = mixer.polish(&candidates.free, &target, &mut weights)?.distance;
+        distance = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?.distance;
     }
     let mut shares = vec![0; weights.len()];
     quantise(&weights, &mut shares);

@@ -3,7 +3,7 @@
 use inks::{InkSet, Library, Stack};
 
 use crate::brdf::{Space, Table};
-use crate::solve::mixture::LAYER_PRICE;
+use crate::solve::hull::LAYER_PRICE;
 use crate::solve::{Hull, MixtureError};
 
 /// What the printer can print: stacks and their curves. Only stacks of inks that are at hand.

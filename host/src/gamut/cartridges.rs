@@ -106,7 +106,7 @@ fn solve_all(
             }
             let mut a = vec![0.0; allowed.len()];
             mixer.tangent(&hull, target, &mut a)?;
-            let fit = mixer.refine_to(&hull, target, &mut a, 1e-8)?;
+            let fit = mixer.refine(&hull, target, &mut a, 1e-8)?;
             let mut weights = vec![0.0; candidates.len()];
             allowed.iter().zip(&a).for_each(|(&k, &w)| weights[k] = w);
             Ok(Solved { weights, distance: fit.distance })

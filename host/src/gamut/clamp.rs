@@ -96,7 +96,7 @@ pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, Ga
         hull.target(row)
             .and_then(|target| {
                 mixer.tangent(hull, &target, &mut weights)?;
-                mixer.refine_to(hull, &target, &mut weights, ENOUGH)
+                mixer.refine(hull, &target, &mut weights, ENOUGH)
             })
             .map_err(|source| GamutError::Mixture { what: format!("sampled pixel {i}"), source })?;
         printed.push(&candidates.reflectance(weights.iter().copied()));
@@ -152,11 +152,11 @@ impl Walker {
         if !self.started {
             self.mixer.tangent(hull, &self.target, &mut self.start)?;
         }
-        let fit = self.mixer.refine_to(hull, &self.target, &mut self.start, ENOUGH)?;
+        let fit = self.mixer.refine(hull, &self.target, &mut self.start, ENOUGH)?;
         self.weights.copy_from_slice(&self.start);
         let mut distance = fit.distance;
         if prune(&mut self.weights) {
-            distance = self.mixer.polish_to(hull, &self.target, &mut self.weights, ENOUGH)?.distance;
+            distance = self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?.distance;
             // Whatever has become small now is not worth another round.
             prune(&mut self.weights);
         }

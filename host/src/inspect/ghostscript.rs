@@ -17,10 +17,10 @@ use protocol::ink::Ink;
 use protocol::rgl::{Command, Compression, Fault, PaperCode, Resolution, Step, parse};
 use protocol::{packbits, paper};
 
-use super::{Inspected, Inspection, PassReport, Setup, StreamError, measure, mode_name};
+use super::{Inspected, PassReport, Setup, measure, mode_name};
 use crate::observe::Observer;
 use crate::separate::Pass;
-use crate::simulate::{Canvas, words};
+use crate::simulate::Canvas;
 
 const ESC: u8 = 0x1b;
 const SUB: u8 = 0x1a;
@@ -152,19 +152,7 @@ pub(super) fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
     };
     reader.close(at);
     observer.end();
-    let inspection = Inspection {
-        bytes: stream.len() as u64,
-        dialect: Some("Ghostscript"),
-        complete: fault.is_none(),
-        setup: reader.setup,
-        passes: reader.reports,
-        error: fault.map(|(fault, offset)| StreamError {
-            offset: offset as u64,
-            fault: fault.number(),
-            words: words(fault),
-        }),
-    };
-    Inspected { inspection, passes: reader.passes }
+    Inspected::of(stream, Some("Ghostscript"), reader.setup, (reader.reports, reader.passes), fault)
 }
 
 /// Declares something once.

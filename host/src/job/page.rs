@@ -72,7 +72,14 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         "<h2>Load</h2>\n<table><tr><th></th><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
          <th class=\"n\">From pass</th><th class=\"n\">Ribbon*</th></tr>"
     )?;
-    for cartridge in &plan.cartridges {
+    let (now, later) = plan.loaded();
+    for (place, cartridge) in now.iter().chain(later).enumerate() {
+        if place == now.len() {
+            writeln!(
+                page,
+                "<tr><td colspan=\"6\">The machine holds no more; these have no place:</td></tr>"
+            )?;
+        }
         writeln!(
             page,
             "<tr><td><span class=\"box\"></span></td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
@@ -84,9 +91,21 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
             ribbon::length(cartridge.ribbon_mm_estimated)
         )?;
     }
+    writeln!(page, "</table>")?;
+    if !plan.changes.is_empty() {
+        writeln!(page, "<p>The machine would stop in the middle of the sheet:</p>\n<ul>")?;
+        for change in &plan.changes {
+            writeln!(
+                page,
+                "<li>before pass <b>{}</b>, to have {} changed for <b>{}</b></li>",
+                change.before_pass, change.take_out, change.put_in
+            )?;
+        }
+        writeln!(page, "</ul>")?;
+    }
     writeln!(
         page,
-        "</table>\n<p><small>A cartridge that is not loaded: the machine stops before its pass, asks for it, and goes on \
+        "<p><small>A cartridge that is not loaded: the machine stops before its pass, asks for it, and goes on \
          when it is in.</small></p>\n<h2>Passes</h2>\n<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
          <th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>"
     )?;

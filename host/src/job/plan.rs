@@ -10,11 +10,12 @@ use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Page;
 use serde::Serialize;
 
+use super::loading;
 use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
 use crate::preview::Area;
-use crate::separate::{Certainty, Check, Pass as Dots, Planned, Separation, Severity};
+use crate::separate::{Certainty, Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation, Severity};
 use crate::sheet::Sheet;
 use crate::sheet::colours::colours;
 
@@ -51,6 +52,8 @@ pub struct Plan {
     pub cut: Option<Cut>,
     /// The cartridges to load, in the order of first use.
     pub cartridges: Vec<Cartridge>,
+    /// What to change on the way, when there are more than the machine holds.
+    pub changes: Vec<Change>,
     /// The passes, first printed (lowest) first.
     pub passes: Vec<Pass>,
     /// Time in seconds, an estimate.
@@ -76,6 +79,17 @@ pub struct Cartridge {
     pub first_pass: usize,
     /// Ribbon it gives in all passes, in millimetres, an estimate.
     pub ribbon_mm_estimated: f64,
+}
+
+/// A cartridge to change in the course of the job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Change {
+    /// The pass before which the machine stops and asks, from 1.
+    pub before_pass: usize,
+    /// The ink of the cartridge to take out.
+    pub take_out: &'static str,
+    /// The ink of the one to put in.
+    pub put_in: &'static str,
 }
 
 /// A pass.
@@ -176,9 +190,10 @@ impl Plan {
             pieces: laid.grid,
             cut: laid.cut,
             cartridges: cartridges(subject.planned, &passes, library),
+            changes: changes(subject.planned),
             seconds_estimated: passes.iter().map(|pass| pass.estimate.seconds).sum(),
             passes,
-            stacks: shares(sheet, &laid.pieces, library),
+            stacks: shares(sheet, laid, library),
             checks: checks(subject),
         }
     }
@@ -213,16 +228,19 @@ fn cartridges(planned: &[Planned], passes: &[Pass], library: &Library) -> Vec<Ca
     inks.into_iter().map(cartridge).collect()
 }
 
+fn changes(planned: &[Planned]) -> Vec<Change> {
+    let inks: Vec<Ink> = planned.iter().map(|pass| pass.ink).collect();
+    let named = |change: loading::Change| Change {
+        before_pass: change.before_pass,
+        take_out: change.out.name(),
+        put_in: change.wanted.name(),
+    };
+    loading::loading(&inks).1.into_iter().map(named).collect()
+}
+
 /// The stacks on the pieces; what marks take stands in the passes only.
-fn shares(sheet: &Sheet, pieces: &[Area], library: &Library) -> Vec<Share> {
-    let mut census = [0u64; 256];
-    for piece in pieces {
-        for row in sheet.index().chunks_exact(sheet.width()).skip(piece.top).take(piece.length) {
-            for &stack in &row[piece.left..][..piece.width] {
-                census[usize::from(stack)] += 1;
-            }
-        }
-    }
+fn shares(sheet: &Sheet, laid: &Laid, library: &Library) -> Vec<Share> {
+    let census = laid.census(sheet);
     let area = census.iter().sum::<u64>().max(1);
     let mut stacks: Vec<Share> = sheet
         .stacks()
@@ -288,6 +306,23 @@ impl Plan {
     }
 }
 
+impl Plan {
+    /// The cartridges to load before the first pass, and those that the machine has no place for then.
+    pub fn loaded(&self) -> (&[Cartridge], &[Cartridge]) {
+        self.cartridges.split_at(self.cartridges.len().min(MOST_CARTRIDGES))
+    }
+}
+
+impl fmt::Display for Cartridge {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:<22} {}, barcode {:<2}  wanted from pass {}",
+            self.sold_as, self.part, self.barcode, self.first_pass
+        )
+    }
+}
+
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (width, height) = self.size_mm;
@@ -308,13 +343,16 @@ impl fmt::Display for Plan {
             self.media,
             if self.curl_correction { "on" } else { "off" }
         )?;
-        writeln!(f, "\nLoad {} cartridge{}:", self.cartridges.len(), plural(self.cartridges.len()))?;
-        for cartridge in &self.cartridges {
-            writeln!(
-                f,
-                "    {:<22} {}, barcode {:<2}  wanted from pass {}",
-                cartridge.sold_as, cartridge.part, cartridge.barcode, cartridge.first_pass
-            )?;
+        let (now, later) = self.loaded();
+        writeln!(f, "\nLoad {} cartridge{}:", now.len(), plural(now.len()))?;
+        now.iter().try_for_each(|cartridge| writeln!(f, "    {cartridge}"))?;
+        if !later.is_empty() {
+            writeln!(f, "The machine holds no more. These have no place:")?;
+            later.iter().try_for_each(|cartridge| writeln!(f, "    {cartridge}"))?;
+            writeln!(f, "It would stop in the middle of the sheet:")?;
+            for Change { before_pass, take_out, put_in } in &self.changes {
+                writeln!(f, "    before pass {before_pass}, to have {take_out} changed for {put_in}")?;
+            }
         }
         writeln!(
             f,

@@ -21,7 +21,7 @@ use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 use rayon::prelude::*;
 
-use super::raster::{self, Density, io, wrong};
+use super::raster::{self, Density, Unstated, io, wrong};
 use super::{Artwork, LayersError, Options, bits, reserved};
 use crate::brdf::{Space, Table};
 use crate::document::{Materials, SAMPLES};
@@ -74,43 +74,53 @@ pub(super) fn read(path: &Path) -> Result<Pixels, LayersError> {
     if deep {
         notes.push(format!("{}: 16 bits a channel are read as 8", path.display()));
     }
+    let grey = !decoded.image.color().has_color();
     let mut rgba = decoded.image.into_rgba8().into_raw();
     if let Some(profile) = decoded.profile {
-        notes.extend(to_srgb(path, &profile, &mut rgba)?);
+        notes.extend(to_srgb(path, &profile, grey, &mut rgba)?);
     }
     Ok(Pixels { path: path.to_path_buf(), width, height, density: decoded.density, rgba, notes })
 }
 
-/// Applies an embedded profile; says so if it changed anything.
-fn to_srgb(path: &Path, profile: &[u8], rgba: &mut [u8]) -> Result<Option<String>, LayersError> {
+/// Applies an embedded profile; says so if it changed anything. `grey` is a picture whose file has grey values only.
+pub(super) fn to_srgb(
+    path: &Path,
+    profile: &[u8],
+    grey: bool,
+    rgba: &mut [u8],
+) -> Result<Option<String>, LayersError> {
     let Ok(profile) = ColorProfile::new_from_slice(profile) else {
         return Ok(Some(format!("{}: its colour profile is damaged; read as sRGB", path.display())));
     };
-    match profile.color_space {
-        DataColorSpace::Rgb => {}
-        DataColorSpace::Gray => {
-            return Ok(Some(format!("{}: its grey profile is read as sRGB's", path.display())));
-        }
+    let of_grey = match profile.color_space {
+        DataColorSpace::Rgb => false,
+        DataColorSpace::Gray if grey => true,
         other => {
             return Err(wrong(
                 path,
                 format!(
-                    "its colours are {other:?}; convert the picture to sRGB, or save the inks' plates as a TIFF"
+                    "its colour profile is for {other:?}, which its pixels are not; convert the picture to sRGB"
                 ),
             ));
         }
-    }
+    };
     let srgb = ColorProfile::new_srgb();
     let bad =
         |error| wrong(path, format!("its colour profile cannot be applied ({error}); convert it to sRGB"));
+    let layout = if of_grey { Layout::GrayAlpha } else { Layout::Rgba };
     let transform = profile
-        .create_transform_8bit(Layout::Rgba, &srgb, Layout::Rgba, TransformOptions::default())
+        .create_transform_8bit(layout, &srgb, Layout::Rgba, TransformOptions::default())
         .map_err(bad)?;
     let mut changed = false;
     let mut line = vec![0; 4 << 12];
+    let mut greys = Vec::new();
     for pixels in rgba.chunks_mut(4 << 12) {
         let line = &mut line[..pixels.len()];
-        transform.transform(pixels, line).map_err(bad)?;
+        if of_grey {
+            greys.clear();
+            greys.extend(pixels.as_chunks::<4>().0.iter().flat_map(|&[v, _, _, alpha]| [v, alpha]));
+        }
+        transform.transform(if of_grey { &greys } else { &*pixels }, line).map_err(bad)?;
         changed |= pixels != line;
         pixels.copy_from_slice(line);
     }
@@ -118,48 +128,70 @@ fn to_srgb(path: &Path, profile: &[u8], rgba: &mut [u8]) -> Result<Option<String
 }
 
 /// Art from one picture: reserved colours as layers if asked for, all else as colour.
-pub(super) fn artwork(name: &str, pixels: Pixels, options: &Options) -> Result<Artwork, LayersError> {
-    let size = (pixels.width, pixels.height);
-    let sides = (f64::from(size.0), f64::from(size.1));
-    let dots = raster::dots(&pixels.path, sides, pixels.density, options.size, options.dpi)?;
-    let Pixels { path, mut rgba, mut notes, .. } = pixels;
+pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, LayersError> {
+    let sides = (f64::from(pixels.width), f64::from(pixels.height));
+    let unstated = if options.reserved { Unstated::IsDots } else { Unstated::Fills };
+    let dots = raster::dots(&pixels.path, sides, pixels.density, unstated, options, &mut pixels.notes)?;
+    Ok(artwork_of(name, pixels, dots, options))
+}
+
+/// The same at a size that is known.
+pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
+    let Pixels { path, width, height, mut rgba, notes, .. } = pixels;
+    let size = (width, height);
     let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
-    let opaque = transparent.then(|| plane_of(&rgba, size, dots, |p| p[3] > 0));
+    let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 0));
     rgba.par_chunks_exact_mut(4).for_each(|p| {
         let alpha = u32::from(p[3]);
         for v in &mut p[..3] {
             *v = ((u32::from(*v) * alpha + 255 * (255 - alpha) + 127) / 255) as u8;
         }
     });
-    let drawn = plane_of(&rgba, size, dots, |p| p[..3] != [255; 3]);
     let mut rgb = rgba;
     // In place: three bytes of a pixel never lie after its four.
     for at in 0..rgb.len() / 4 {
         rgb.copy_within(4 * at..4 * at + 3, 3 * at);
     }
     rgb.truncate(rgb.len() / 4 * 3);
-    let mut layers = Vec::new();
+    let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
+    let mut art = flat(name, &file, size, dots, rgb, options);
+    art.opaque = opaque;
+    art.notes.splice(..0, notes);
+    art
+}
+
+/// Art from pixels without transparency, three bytes each. `file` is what notes call it.
+pub(super) fn flat(
+    name: &str,
+    file: &str,
+    size: (u32, u32),
+    dots: (usize, usize),
+    mut rgb: Vec<u8>,
+    options: &Options,
+) -> Artwork {
+    let drawn = plane_of::<3>(&rgb, size, dots, |p| *p != [255; 3]);
+    let (mut layers, mut notes) = (Vec::new(), Vec::new());
     if options.reserved {
         let found = reserved::take(&mut rgb, size, dots, options);
-        let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
-        notes.extend(found.notes(&file));
+        notes.extend(found.notes(file));
         layers = found.layers;
     }
     let colour = rgb.par_iter().any(|&v| v < 255).then(|| {
         let full = Colour { width: size.0 as usize, height: size.1 as usize, rgb };
         full.averaged(dots)
     });
-    Ok(Artwork { name: name.into(), width: dots.0, length: dots.1, layers, colour, drawn, opaque, notes })
+    let (width, length) = dots;
+    Artwork { name: name.into(), width, length, layers, colour, drawn, opaque: None, notes }
 }
 
-/// The dots whose pixel is so.
-fn plane_of(
-    rgba: &[u8],
+/// The dots whose pixel, of `N` bytes, is so.
+fn plane_of<const N: usize>(
+    pixels: &[u8],
     size: (u32, u32),
     dots: (usize, usize),
-    is: impl Fn(&[u8; 4]) -> bool + Sync,
+    is: impl Fn(&[u8; N]) -> bool + Sync,
 ) -> Plane {
-    let bytes: Vec<u8> = rgba.as_chunks::<4>().0.par_iter().map(|pixel| u8::from(is(pixel))).collect();
+    let bytes: Vec<u8> = pixels.as_chunks::<N>().0.par_iter().map(|pixel| u8::from(is(pixel))).collect();
     bits::from_bytes(dots.0, &raster::nearest(bytes, size, dots), |byte| byte > 0)
 }
 

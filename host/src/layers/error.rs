@@ -43,19 +43,41 @@ pub enum LayersError {
         /// What may have been meant.
         suggestion: Option<&'static str>,
     },
-    /// No file says how large it is, nor does the user.
+    /// No file says how large it is, nor does the user, and drawn for the printer it would be larger than the page.
     #[error(
-        "{}: {width} x {height} pixels, and nothing says how large that is; \
-         give --dpi 600 for {:.1} x {:.1} mm, or a --size",
-        path.display(), 25.4 * f64::from(*width) / 600.0, 25.4 * f64::from(*height) / 600.0
+        "{} says no resolution; its {} x {} pixels at 600 dpi would be {:.1} x {:.1} mm, and the page has room for {:.1} x \
+         {:.1} mm; give its true resolution, such as --dpi 1200, or --size {}mm for the largest that fits",
+        path.display(), pixels.0, pixels.1, size_mm.0, size_mm.1, room_mm.0, room_mm.1, below(*fits_mm)
     )]
     NoSize {
         /// The file.
         path: PathBuf,
-        /// Pixels across.
-        width: u32,
-        /// Pixels down.
-        height: u32,
+        /// Pixels across and down.
+        pixels: (u32, u32),
+        /// Its width and height at 600 dpi, in mm.
+        size_mm: (f64, f64),
+        /// Width and height that the page has room for, in mm.
+        room_mm: (f64, f64),
+        /// The width at which it fits, in mm.
+        fits_mm: f64,
+    },
+    /// As large as a file says it is, it is larger than the page.
+    #[error(
+        "{} says {}, so it is {:.1} x {:.1} mm, and the page has room for {:.1} x {:.1} mm; give --size {}mm for the largest \
+         that fits, --dpi if the file is wrong, a larger --paper, or --crop to cut",
+        path.display(), resolution(*says), size_mm.0, size_mm.1, room_mm.0, room_mm.1, below(*fits_mm)
+    )]
+    Beyond {
+        /// The file.
+        path: PathBuf,
+        /// Pixels in an inch across and down, as it says.
+        says: (f64, f64),
+        /// Its width and height, in mm.
+        size_mm: (f64, f64),
+        /// Width and height that the page has room for, in mm.
+        room_mm: (f64, f64),
+        /// The width at which it fits, in mm.
+        fits_mm: f64,
     },
     /// Two layers are not of one size.
     #[error(
@@ -75,7 +97,7 @@ pub enum LayersError {
     /// More dots than any sheet has.
     #[error(
         "the art is {width_mm:.1} x {height_mm:.1} mm; the largest page prints {most_width_mm:.1} x {most_height_mm:.1} mm; \
-         give a smaller --size"
+         give --size {}mm for the largest that fits", below(*fits_mm)
     )]
     TooLarge {
         /// Its width in mm.
@@ -86,6 +108,8 @@ pub enum LayersError {
         most_width_mm: f64,
         /// The most in mm.
         most_height_mm: f64,
+        /// The width at which it fits the page, in mm.
+        fits_mm: f64,
     },
     /// Less than a dot.
     #[error(
@@ -110,16 +134,6 @@ pub enum LayersError {
         option: &'static str,
         /// What is wrong, and what to do.
         problem: String,
-    },
-    /// More inks than places in the machine.
-    #[error(
-        "the art needs {} cartridges ({}), the machine holds {}; leave some out with --inks",
-        inks.len(), inks.iter().map(|ink| ink.name()).collect::<Vec<_>>().join(", "),
-        crate::separate::MOST_CARTRIDGES
-    )]
-    Cartridges {
-        /// The inks.
-        inks: Vec<Ink>,
     },
     /// More layers than a dot can hold, or more passes than a sheet survives.
     #[error(
@@ -155,4 +169,14 @@ pub enum LayersError {
 
 fn hint(suggestion: &Option<&'static str>) -> String {
     suggestion.map_or(String::new(), |s| format!(", did you mean `{s}`?"))
+}
+
+/// A length in mm with one decimal, never longer than it is.
+fn below(mm: f64) -> f64 {
+    (10.0 * mm).floor() / 10.0
+}
+
+/// Pixels in an inch, in words.
+pub(super) fn resolution((x, y): (f64, f64)) -> String {
+    if (x - y).abs() < 0.5 { format!("{x:.0} dpi") } else { format!("{x:.0} x {y:.0} dpi") }
 }

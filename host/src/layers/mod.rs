@@ -5,22 +5,24 @@
 //! Method: [`open`] reads whatever holds the art into [`Artwork`], one plane for each layer at 600 dpi and, for plain
 //! pictures, their colours. [`compose`](compose()) adds white and finish, halftones what has tones, and makes every
 //! combination of layers that occurs a stack, in an order the ink library's rules decide unless the art does.
-//! Cost: a page in three layers about a second; see the parts. Limits: 16 layers, 7 inks, the largest page.
+//! Cost: a page in three layers about a second; see the parts. Limits: 16 layers, the largest page.
 //! Nothing is guessed in silence: what was decided on the user's behalf is among [`Artwork::notes`].
 
 mod bits;
+mod cmyk;
 mod colour;
 pub mod compose;
 mod distance;
 pub mod error;
 pub mod names;
 mod order;
-mod pdf;
+pub mod pdf;
 pub mod raster;
 pub mod reserved;
 mod svg;
 mod tiff;
 pub mod white;
+mod window;
 
 use std::path::{Path, PathBuf};
 
@@ -36,8 +38,12 @@ pub use colour::Colour;
 pub use compose::{Accept, Composed, Finish, Order, Report, Settings, Suggestion, compose};
 pub use error::LayersError;
 pub use white::White;
+pub use window::Window;
 
-use raster::{Coverage, Scan};
+use raster::{Coverage, Scan, Unstated};
+
+/// Endings of the names of pictures.
+const PICTURES: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm"];
 
 /// Coverage from which a dot is ink.
 const THRESHOLD: u8 = 128;
@@ -61,6 +67,35 @@ pub struct Options {
     pub halftone: InkSet,
     /// The inks that reserved colours may call for.
     pub inks: InkSet,
+    /// What the page has room for: art without a size of its own fits it.
+    pub room: Room,
+}
+
+/// What a page has room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Dots across.
+    pub width: usize,
+    /// Dots down.
+    pub length: usize,
+    /// Whether art may be larger, because the page cuts it.
+    pub cut: bool,
+}
+
+impl Default for Room {
+    /// The largest page, which does not cut.
+    fn default() -> Room {
+        let (width, length) = protocol::paper::LARGEST;
+        Room { width: width.into(), length: length.into(), cut: false }
+    }
+}
+
+impl Options {
+    /// The same for art that knows its size better than in pixels: what is too large for the page is the layout's
+    /// business, which says what would be cut.
+    fn sized(&self) -> Options {
+        Options { room: Room { cut: true, ..self.room }, ..self.clone() }
+    }
 }
 
 impl Default for Options {
@@ -73,6 +108,7 @@ impl Default for Options {
             page: 1,
             halftone: InkSet::EMPTY,
             inks: InkSet::default().with(Ink::White),
+            room: Room::default(),
         }
     }
 }
@@ -150,25 +186,46 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
     Ok(art)
 }
 
-/// Art from a picture in memory: sRGB with opacity, four bytes a pixel, row by row from the top.
+/// Whether a path is clearly art for [`open`], by its name: a drawing or a page, a picture named after an ink, a folder of
+/// such pictures. For those who were given it and expected something else.
+pub fn is_art(path: &Path) -> bool {
+    if path.is_dir() {
+        return pictures_in(path)
+            .is_ok_and(|files| files.iter().all(|file| names::ink(&stem(file)).is_some()));
+    }
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    ["svg", "pdf", "ps", "eps"].contains(&extension.as_str())
+        || PICTURES.contains(&extension.as_str()) && names::ink(&stem(path)).is_some()
+}
+
+/// Art from a page in memory, drawn at `dpi` pixels an inch: sRGB without transparency, three bytes a pixel, row by
+/// row from the top.
 ///
 /// # Errors
-/// As [`open`]; `rgba` of another size than `size`.
-pub fn picture(
+/// `rgb` of another size than `size`, or sides of no or more than 65535 dots.
+pub fn page(
     name: &str,
     size: (usize, usize),
-    rgba: Vec<u8>,
+    dpi: u16,
+    rgb: Vec<u8>,
     options: &Options,
 ) -> Result<Artwork, LayersError> {
-    let path = PathBuf::from(name);
-    let (Ok(width), Ok(height)) = (u32::try_from(size.0), u32::try_from(size.1)) else {
-        return Err(raster::wrong(&path, "it is too large"));
-    };
-    if Some(rgba.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(4)) {
-        return Err(raster::wrong(&path, "it has another number of pixels than its sides say"));
+    let problem = || raster::wrong(Path::new(name), format!("{} x {} pixels are no page", size.0, size.1));
+    if Some(rgb.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(3)) {
+        return Err(problem());
     }
-    let pixels = colour::Pixels { path, width, height, density: None, rgba, notes: Vec::new() };
-    colour::artwork(name, pixels, options)
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
+    let dots = page_dots(size, dpi.into()).ok_or_else(problem)?;
+    Ok(colour::flat(name, name, (side(size.0)?, side(size.1)?), dots, rgb, options))
+}
+
+/// The dots of a page of so many pixels.
+fn page_dots(pixels: (usize, usize), dpi: f64) -> Option<(usize, usize)> {
+    let side = |pixels: usize| {
+        let dots = (pixels as f64 * 600.0 / dpi).round();
+        (1.0..=65535.0).contains(&dots).then_some(dots as usize)
+    };
+    Some((side(pixels.0)?, side(pixels.1)?))
 }
 
 fn one(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
@@ -190,6 +247,11 @@ fn one(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwor
     if !options.reserved && names::ink(&stem(file)).is_some() {
         return named_files(&stem(file), &[file.to_path_buf()], options, observer);
     }
+    if start.starts_with(b"\xff\xd8")
+        && let Some(art) = cmyk::jpeg(file, options)?
+    {
+        return Ok(art);
+    }
     let picture = colour::read(file)?;
     let mut art = colour::artwork(&stem(file), picture, options)?;
     if let Some(known) = names::closest(&stem(file)).filter(|_| !options.reserved) {
@@ -209,9 +271,8 @@ fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, LayersError> {
     for entry in std::fs::read_dir(folder).map_err(&listed)? {
         let path = entry.map_err(&listed)?.path();
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        let picture = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm"];
         let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if extension.is_some_and(|e| picture.contains(&e.as_str())) && !hidden && path.is_file() {
+        if extension.is_some_and(|e| PICTURES.contains(&e.as_str())) && !hidden && path.is_file() {
             files.push(path);
         }
     }
@@ -249,6 +310,7 @@ fn named_files(
     observer.begin("reading layers", files.len() as u64);
     let mut first: Option<First> = None;
     let mut art: Option<Artwork> = None;
+    let mut notes = Vec::new();
     // Two at a time: both cores work and no more than two layers are in memory as bytes.
     for (files, named) in files.chunks(2).zip(named.chunks(2)) {
         let scans: Vec<_> = files.par_iter().map(|file| raster::scan(file)).collect();
@@ -256,7 +318,7 @@ fn named_files(
             let scan = scan?;
             let dots = match &first {
                 Some(first) => first.fits(&scan, options)?,
-                None => first.insert(First::new(&scan, options)?).dots,
+                None => first.insert(First::new(&scan, options, &mut notes)?).dots,
             };
             let file =
                 scan.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
@@ -266,7 +328,9 @@ fn named_files(
     }
     observer.end();
     // There is a file, so there is art.
-    art.ok_or_else(|| LayersError::Nothing { reason: "no file was given".into() })
+    let mut art = art.ok_or_else(|| LayersError::Nothing { reason: "no file was given".into() })?;
+    art.notes.splice(0..0, notes);
+    Ok(art)
 }
 
 /// The first of several layers: the others must be of its size.
@@ -279,14 +343,14 @@ struct First {
 }
 
 impl First {
-    fn new(scan: &Scan, options: &Options) -> Result<First, LayersError> {
+    fn new(scan: &Scan, options: &Options, notes: &mut Vec<String>) -> Result<First, LayersError> {
         let sides = (f64::from(scan.width), f64::from(scan.height));
         Ok(First {
             path: scan.path.clone(),
             pixels: (scan.width, scan.height),
             density: scan.density,
             size: scan.size(),
-            dots: raster::dots(&scan.path, sides, scan.density, options.size, options.dpi)?,
+            dots: raster::dots(&scan.path, sides, scan.density, Unstated::IsDots, options, notes)?,
         })
     }
 
@@ -378,17 +442,17 @@ fn layer(
             "{name}: drawn in several colours on a transparent ground; ink is where it is dark, its light parts are left out"
         )),
     }
-    if (width, length) != (scan.width as usize, scan.height as usize) {
-        notes.push(format!(
-            "{name}: {} become {width} x {length} dots; at 600 dpi edges would be exactly as drawn",
-            scan.size()
-        ));
-    }
     let toned = plate && named.ink.kind() == Kind::Process && has_tones(&scan.coverage);
     if toned {
         notes.push(format!("{name}: the plate has tones, so it is printed as dots"));
     }
     let tones = toned || options.halftone.contains(named.ink);
+    if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
+        notes.push(format!(
+            "{name}: {} become {width} x {length} dots; at 600 dpi edges would be exactly as drawn",
+            scan.size()
+        ));
+    }
     if !tones && let Some(note) = neither(name, &scan.coverage) {
         notes.push(note);
     }

@@ -14,11 +14,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
+use protocol::ink::Kind;
 
-use super::raster::{self, wrong};
-use super::{Artwork, LayersError, Options, colour, names};
+use super::raster::{self, Unstated, wrong};
+use super::{Artwork, LayersError, Options, Window, colour, names};
 use crate::observe::Observer;
+use crate::scratch::Scratch;
 
 /// Resolution of the first look.
 const LOOK: f64 = 36.0;
@@ -30,7 +31,7 @@ const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
 
 /// Reads a page.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
-    let folder = tempfile::tempdir().map_err(raster::io(path, "make a folder for its plates"))?;
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
     observer.begin("reading the page", 2);
     let art = match page(path, options, &folder, observer) {
         Err(LayersError::Program { .. }) if is_pdf(path)? => poppler(path, options, &folder),
@@ -49,19 +50,20 @@ fn is_pdf(path: &Path) -> Result<bool, LayersError> {
 fn page(
     path: &Path,
     options: &Options,
-    folder: &TempDir,
+    folder: &Scratch,
     observer: &dyn Observer,
 ) -> Result<Artwork, LayersError> {
     let look = folder.path().join("look.tif");
     ghostscript(path, options.page, "tiffsep", (LOOK, LOOK), &look)?;
-    let missing = || wrong(path, format!("there is no page {}", options.page));
+    let missing = || wrong(path, format!("there is no page {}, or the file is damaged", options.page));
     let (width, height) = image::image_dimensions(&look).map_err(|_| missing())?;
     observer.advance(1);
     let size = (f64::from(width), f64::from(height));
-    let dots = raster::dots(path, size, Some((LOOK, LOOK)), options.size, options.dpi)?;
+    let mut notes = Vec::new();
+    let look_density = Some((LOOK, LOOK));
+    let dots = raster::dots(path, size, look_density, Unstated::IsDots, &options.sized(), &mut notes)?;
     let density = (LOOK * dots.0 as f64 / size.0, LOOK * dots.1 as f64 / size.1);
     // The page's true size is less than a pixel of the look away; what is rendered decides.
-    let mut notes = Vec::new();
     let mut plates = Vec::new();
     for (name, file) in files(&look, folder)? {
         // Plates of other pages are there, too, and blank. A page paints every pixel it touches, so none is missed.
@@ -73,35 +75,158 @@ fn page(
         }
     }
     let name = super::stem(path);
-    // What is rendered is as many dots as it is pixels.
-    let rendered = Options { size: None, dpi: Some(600.0), ..options.clone() };
     if plates.is_empty() {
         let picture = folder.path().join("page.png");
         ghostscript(path, options.page, "pngalpha", density, &picture)?;
-        let mut art = colour::artwork(&name, colour::read(&picture)?, &rendered)?;
+        let picture = colour::read(&picture)?;
+        let dots = (picture.width as usize, picture.height as usize);
+        let mut art = colour::artwork_of(&name, picture, dots, options);
         art.notes.retain(|note| !note.contains("colour profile"));
         art.notes.append(&mut notes);
         return Ok(art);
     }
     let full = folder.path().join("page.tif");
     ghostscript(path, options.page, "tiffsep", density, &full)?;
-    let mut art: Option<Artwork> = None;
-    for (plate, file) in files(&full, folder)? {
-        let process = PROCESS.contains(&plate.as_str()).then(|| names::ink(&plate)).flatten();
-        let spot = plates.iter().find(|(name, _)| *name == plate).map(|&(_, named)| named);
-        let Some(named) = spot.or(process) else { continue };
-        let scan = raster::scan(&file)?;
-        let dots = (scan.width as usize, scan.height as usize);
-        art.get_or_insert_with(|| Artwork::blank(&name, dots)).add(scan, &plate, named, true, &rendered);
-    }
-    let mut art =
-        art.ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
+    let mut art = of_plates(&name, &full, folder, &plates, options)?
+        .ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
     art.notes.append(&mut notes);
     Ok(art)
 }
 
+/// The art of a separated page: its process plates, and those of `spots`.
+fn of_plates(
+    name: &str,
+    page: &Path,
+    folder: &Scratch,
+    spots: &[(String, names::Named)],
+    options: &Options,
+) -> Result<Option<Artwork>, LayersError> {
+    let mut art: Option<Artwork> = None;
+    for (plate, file) in files(page, folder)? {
+        let process = PROCESS.contains(&plate.as_str()).then(|| names::ink(&plate)).flatten();
+        let spot = spots.iter().find(|(name, _)| *name == plate).map(|&(_, named)| named);
+        let Some(named) = spot.or(process) else { continue };
+        let scan = raster::scan(&file)?;
+        let dots = (scan.width as usize, scan.height as usize);
+        art.get_or_insert_with(|| Artwork::blank(name, dots)).add(scan, &plate, named, true, options);
+    }
+    Ok(art)
+}
+
+/// The names of the plates of each page that name inks and have a dot. Without a page there is no list.
+///
+/// # Errors
+/// As [`open`](super::open): a document that Ghostscript cannot read, or no Ghostscript.
+pub fn spots(path: &Path) -> Result<Vec<Vec<String>>, LayersError> {
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
+    let look = folder.path().join("look%d.tif");
+    run_ghostscript(path, &["-sCompression=lzw".into()], "tiffsep", (LOOK, LOOK), &look, &[])?;
+    let mut pages = Vec::new();
+    loop {
+        let page = folder.path().join(format!("look{}.tif", pages.len() + 1));
+        if !page.exists() {
+            return Ok(pages);
+        }
+        let mut spots = Vec::new();
+        for (name, file) in files(&page, &folder)? {
+            // A colour that names a process ink is drawn by its process colours all the same.
+            let spot = names::ink(&name).is_some_and(|named| named.ink.kind() != Kind::Process);
+            if spot && raster::scan(&file)?.coverage.iter().any(|&c| c > 0) {
+                spots.push(name);
+            }
+        }
+        pages.push(spots);
+    }
+}
+
+/// A page as plates: those of spot colours that name inks, and those of the process inks for all else.
+pub struct Separated {
+    /// Pixels across and down.
+    pub size: (usize, usize),
+    dpi: f64,
+    plates: Vec<(String, names::Named, Vec<u8>)>,
+}
+
+/// Separates a page so that these names have plates of their own; whatever else it has is in the process plates, spot colours
+/// that name no ink among them. Drawn at `dpi` pixels an inch.
+///
+/// # Errors
+/// As [`open`](super::open).
+pub fn separated(path: &Path, page: usize, names: &[String], dpi: f64) -> Result<Separated, LayersError> {
+    let folder = Scratch::new().map_err(raster::io(path, "make a folder for its plates"))?;
+    let full = folder.path().join("page.tif");
+    // Only colours it is told of become plates of their own; it draws all others by their process colours.
+    let list: String = names.iter().map(|name| format!("({}) cvn ", escaped(name))).collect();
+    let before = [
+        format!("-dFirstPage={page}"),
+        format!("-dLastPage={page}"),
+        format!("-dMaxSeparations={}", PROCESS.len() + names.len()),
+    ];
+    let told = ["-c".to_owned(), format!("<</SeparationColorNames[{list}]>>setpagedevice")];
+    run_ghostscript(path, &before, "tiffsep", (dpi, dpi), &full, &told)?;
+    let (width, height) =
+        image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
+    let size = (width as usize, height as usize);
+    let mut plates = Vec::new();
+    for (plate, file) in files(&full, &folder)? {
+        let wanted = PROCESS.contains(&plate.as_str()) || names.contains(&plate);
+        let Some(named) = names::ink(&plate).filter(|_| wanted) else { continue };
+        let scan = raster::scan(&file)?;
+        if (scan.width, scan.height) != (width, height) {
+            return Err(wrong(path, format!("plate {plate} of page {page} has another size than the page")));
+        }
+        plates.push((plate, named, scan.coverage));
+    }
+    Ok(Separated { size, dpi, plates })
+}
+
+impl Separated {
+    /// The smallest rectangle around everything drawn, in pixels.
+    pub fn bounds(&self) -> Option<Window> {
+        let plates = self.plates.iter();
+        plates
+            .filter_map(|(.., coverage)| Window::around(coverage, self.size.0, 1, 0))
+            .reduce(|all, window| all.join(&window))
+    }
+
+    /// The part of the page in a window as art, a layer for each plate.
+    ///
+    /// # Errors
+    /// A window of no dots.
+    pub fn art(&self, name: &str, window: &Window, options: &Options) -> Result<Artwork, LayersError> {
+        let path = Path::new(name);
+        let empty = || wrong(path, "nothing of it is in the window");
+        let dots = super::page_dots((window.width, window.height), self.dpi).ok_or_else(empty)?;
+        let mut art = Artwork::blank(name, dots);
+        for (plate, named, coverage) in &self.plates {
+            let scan = raster::Scan {
+                path: path.to_path_buf(),
+                // No page has more pixels than u32 holds: they were read from a TIFF.
+                width: window.width as u32,
+                height: window.height as u32,
+                density: None,
+                coverage: window.cut(coverage, self.size.0, 1),
+                by: raster::Coverage::Dark,
+            };
+            art.add(scan, plate, *named, true, options);
+        }
+        Ok(art)
+    }
+}
+
+/// A name as PostScript writes it between parentheses.
+fn escaped(name: &str) -> String {
+    name.bytes()
+        .map(|byte| match byte {
+            b'(' | b')' | b'\\' => format!("\\{}", char::from(byte)),
+            b' '..=b'~' => char::from(byte).to_string(),
+            _ => format!("\\{byte:03o}"),
+        })
+        .collect()
+}
+
 /// The plates beside a separated page: `page(Gold Foil).tif`.
-fn files(page: &Path, folder: &TempDir) -> Result<Vec<(String, PathBuf)>, LayersError> {
+fn files(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
     let stem = super::stem(page);
     let mut plates = Vec::new();
     for entry in std::fs::read_dir(folder.path()).map_err(raster::io(page, "list its plates"))? {
@@ -123,15 +248,29 @@ fn ghostscript(
     density: (f64, f64),
     to: &Path,
 ) -> Result<(), LayersError> {
+    let only = ["-dUseCropBox".into(), format!("-dFirstPage={page}"), format!("-dLastPage={page}")];
+    run_ghostscript(path, &only, device, density, to, &[])
+}
+
+/// Ghostscript on a document; `told` stands right before it.
+fn run_ghostscript(
+    path: &Path,
+    options: &[String],
+    device: &str,
+    density: (f64, f64),
+    to: &Path,
+    told: &[String],
+) -> Result<(), LayersError> {
     let file = std::path::absolute(path).map_err(raster::io(path, "find it"))?;
     let mut command = Command::new("gs");
     command
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dUseCropBox", "-sstdout=%stderr"])
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
         .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
-        .args([format!("-dFirstPage={page}"), format!("-dLastPage={page}")])
+        .args(options)
         .arg(format!("-r{:.4}x{:.4}", density.0, density.1))
         .arg(format!("-sDEVICE={device}"))
         .arg(format!("-sOutputFile={}", to.display()))
+        .args(told)
         .arg("-f")
         .arg(file);
     let missing = LayersError::Program {
@@ -143,7 +282,7 @@ fn ghostscript(
 }
 
 /// A PDF's page as a picture, where there is no Ghostscript.
-fn poppler(path: &Path, options: &Options, folder: &TempDir) -> Result<Artwork, LayersError> {
+fn poppler(path: &Path, options: &Options, folder: &Scratch) -> Result<Artwork, LayersError> {
     let to = folder.path().join("page");
     let file = std::path::absolute(path).map_err(raster::io(path, "find it"))?;
     let mut command = Command::new("pdftocairo");
@@ -158,7 +297,8 @@ fn poppler(path: &Path, options: &Options, folder: &TempDir) -> Result<Artwork, 
         install: "install it (Debian: apt install ghostscript), or Poppler (poppler-utils), or export the page as PNG",
     };
     run(path, command, missing)?;
-    let mut art = colour::artwork(&super::stem(path), colour::read(&to.with_extension("png"))?, options)?;
+    let mut art =
+        colour::artwork(&super::stem(path), colour::read(&to.with_extension("png"))?, &options.sized())?;
     art.notes.push(format!(
         "{}: read by Poppler, which knows no spot plates; install Ghostscript to have them as inks",
         path.display()

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 use image::imageops::FilterType;
 use image::{DynamicImage, GrayImage, ImageDecoder, ImageFormat};
 
-use super::LayersError;
+use super::error::resolution;
+use super::{LayersError, Options};
 use crate::job::placement::Size;
 
 /// The most pixels of a picture: a page at 1200 dpi.
@@ -82,11 +83,7 @@ impl Scan {
     /// In words.
     pub fn size(&self) -> String {
         let pixels = format!("{} x {} pixels", self.width, self.height);
-        match self.density {
-            Some((x, y)) if (x - y).abs() < 0.5 => format!("{pixels} at {x:.0} dpi"),
-            Some((x, y)) => format!("{pixels} at {x:.0} x {y:.0} dpi"),
-            None => pixels,
-        }
+        self.density.map_or(pixels.clone(), |density| format!("{pixels} at {}", resolution(density)))
     }
 }
 
@@ -230,11 +227,8 @@ pub(super) fn decode(path: &Path, mut file: impl Read) -> Result<Decoded, Layers
             format!("expected a PNG, TIFF, JPEG, PNM, SVG, PDF or PostScript file, found {found}"),
         ));
     };
-    if format == ImageFormat::Jpeg && jpeg_channels(&bytes) == Some(4) {
-        return Err(wrong(
-            path,
-            "the picture is CMYK, whose colours a JPEG does not settle; convert it to sRGB, or save its plates as a TIFF",
-        ));
+    if format == ImageFormat::Jpeg && jpeg_frame(&bytes).is_some_and(|(channels, ..)| channels == 4) {
+        return Err(wrong(path, "the picture is CMYK, which is four layers, not one; convert it to grey"));
     }
     let bad = |error: image::ImageError| wrong(path, format!("cannot decode the picture: {error}"));
     let mut reader = image::ImageReader::with_format(Cursor::new(&bytes[..]), format);
@@ -252,7 +246,7 @@ pub(super) fn decode(path: &Path, mut file: impl Read) -> Result<Decoded, Layers
 }
 
 /// What a file says of its resolution.
-fn density(bytes: &[u8], format: ImageFormat) -> Option<Density> {
+pub(super) fn density(bytes: &[u8], format: ImageFormat) -> Option<Density> {
     match format {
         ImageFormat::Png => {
             let decoder = png::Decoder::new(Cursor::new(bytes));
@@ -265,14 +259,15 @@ fn density(bytes: &[u8], format: ImageFormat) -> Option<Density> {
     .filter(plausible)
 }
 
-/// How many channels a JPEG has: said in the first of its frame headers.
-fn jpeg_channels(bytes: &[u8]) -> Option<u8> {
+/// Channels, height and width of a JPEG: said in the first of its frame headers.
+pub(super) fn jpeg_frame(bytes: &[u8]) -> Option<(u8, u16, u16)> {
     let mut rest = bytes.strip_prefix(b"\xff\xd8")?;
     loop {
         let (&[0xff, marker, high, low], body) = rest.split_first_chunk::<4>()? else { return None };
         // C4, C8 and CC are tables, all others of this row are frames.
         if (0xc0..=0xcf).contains(&marker) && ![0xc4, 0xc8, 0xcc].contains(&marker) {
-            return body.get(5).copied();
+            let &[_, h, e, w, i, channels] = body.first_chunk()?;
+            return Some((channels, u16::from_be_bytes([h, e]), u16::from_be_bytes([w, i])));
         }
         rest = body.get(usize::from(u16::from_be_bytes([high, low])).checked_sub(2)?..)?;
     }
@@ -290,29 +285,80 @@ fn jfif_density(bytes: &[u8]) -> Option<Density> {
     Some((number(3) * inch, number(5) * inch))
 }
 
-/// Dots of 600 dpi that so many pixels fill: as the user says, else as the file says.
+/// What to do with a picture that says no resolution.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Unstated {
+    /// Plain colour has no size of its own: as large as the room allows.
+    Fills,
+    /// Layers of ink are drawn for the printer: a pixel is a dot.
+    IsDots,
+}
+
+/// Dots of 600 dpi that so many pixels fill: as the user says, else as the file says, else as `unstated` says, which is noted.
 pub(super) fn dots(
     path: &Path,
-    pixels: (f64, f64),
+    (width, height): (f64, f64),
     density: Option<Density>,
-    size: Option<Size>,
-    dpi: Option<f64>,
+    unstated: Unstated,
+    options: &Options,
+    notes: &mut Vec<String>,
 ) -> Result<(usize, usize), LayersError> {
-    let (width, height) = pixels;
-    let own = dpi.map(|dpi| (dpi, dpi)).or(density);
+    let Options { size, dpi, room, .. } = *options;
     let inch = |(x, y): Density| (25.4 * width / x, 25.4 * height / y);
-    let own_mm = own.map(inch);
-    let aspect = own_mm.map_or(height / width, |(width, height)| height / width);
-    let (width_mm, height_mm) = match (size, own_mm) {
-        (Some(Size { width, height: None }), _) => (width, width * aspect),
-        (Some(Size { width, height: Some(height) }), _) => {
-            let width = width.min(height / aspect);
-            (width, width * aspect)
+    let room_mm = (room.width as f64 * MM, room.length as f64 * MM);
+    let own = dpi.map(|dpi| (dpi, dpi)).or(density).map(inch);
+    let aspect = own.map_or(height / width, |(width, height)| height / width);
+    let within = |width: f64, height: f64| {
+        let width = width.min(height / aspect);
+        (width, width * aspect)
+    };
+    // Half a dot of grace, as in the layout.
+    let fits = |(width, height): (f64, f64)| width < room_mm.0 + MM / 2.0 && height < room_mm.1 + MM / 2.0;
+    let fitting = within(room_mm.0, room_mm.1);
+    let (width_mm, height_mm) = match (size, own, unstated) {
+        (Some(Size { width, height: None }), ..) => (width, width * aspect),
+        (Some(Size { width, height: Some(height) }), ..) => within(width, height),
+        (None, Some(own), _) => {
+            if let (None, Some(says), false) = (dpi, density, room.cut || fits(own)) {
+                return Err(LayersError::Beyond {
+                    path: path.to_path_buf(),
+                    says,
+                    size_mm: own,
+                    room_mm,
+                    fits_mm: fitting.0,
+                });
+            }
+            own
         }
-        (None, Some(own)) => own,
-        (None, None) => {
-            let (width, height) = (width as u32, height as u32);
-            return Err(LayersError::NoSize { path: path.to_path_buf(), width, height });
+        (None, None, Unstated::Fills) => {
+            notes.push(format!(
+                "{} says no resolution: printed as large as the page allows, {:.1} x {:.1} mm ({:.0} dpi); --size or --dpi \
+                 makes it another size",
+                path.display(),
+                fitting.0,
+                fitting.1,
+                25.4 * width / fitting.0
+            ));
+            fitting
+        }
+        (None, None, Unstated::IsDots) => {
+            let drawn = inch((600.0, 600.0));
+            if !room.cut && !fits(drawn) {
+                return Err(LayersError::NoSize {
+                    path: path.to_path_buf(),
+                    pixels: (width as u32, height as u32),
+                    size_mm: drawn,
+                    room_mm,
+                    fits_mm: fitting.0,
+                });
+            }
+            notes.push(format!(
+                "{} says no resolution: taken as drawn at 600 dpi, {:.1} x {:.1} mm; --size or --dpi makes it another size",
+                path.display(),
+                drawn.0,
+                drawn.1
+            ));
+            drawn
         }
     };
     let (across, down) = ((width_mm / MM).round(), (height_mm / MM).round());
@@ -323,7 +369,13 @@ pub(super) fn dots(
     let most = (f64::from(most.0.max(most.1)), f64::from(most.1));
     if across > most.0 || down > most.1 {
         let (most_width_mm, most_height_mm) = (most.0 * MM, most.1 * MM);
-        return Err(LayersError::TooLarge { width_mm, height_mm, most_width_mm, most_height_mm });
+        return Err(LayersError::TooLarge {
+            width_mm,
+            height_mm,
+            most_width_mm,
+            most_height_mm,
+            fits_mm: fitting.0,
+        });
     }
     Ok((across as usize, down as usize))
 }

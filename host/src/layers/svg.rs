@@ -11,10 +11,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::{self, roxmltree};
+use resvg::usvg::{self, fontdb, roxmltree};
 
 use super::colour::{self, Pixels};
-use super::raster::{self, Gather, Scan, wrong};
+use super::raster::{self, Gather, Scan, Unstated, wrong};
 use super::{Artwork, LayersError, Options, names};
 use crate::observe::Observer;
 
@@ -54,7 +54,7 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         ..usvg::Options::default()
     };
     if text.contains("<text") {
-        Arc::make_mut(&mut usual.fontdb).load_system_fonts();
+        load_fonts(path, Arc::make_mut(&mut usual.fontdb))?;
         notes.push(format!(
             "{}: text is drawn with this computer's fonts; turn it into paths to have it as designed",
             path.display()
@@ -63,20 +63,19 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let tree =
         usvg::Tree::from_str(&text, &usual).map_err(|error| wrong(path, format!("no drawing: {error}")))?;
     let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
-    let dots = raster::dots(path, size, Some((UNITS, UNITS)), options.size, options.dpi)?;
+    let dots =
+        raster::dots(path, size, Some((UNITS, UNITS)), Unstated::IsDots, &options.sized(), &mut notes)?;
     let scale = Transform::from_scale((dots.0 as f64 / size.0) as f32, (dots.1 as f64 / size.1) as f32);
     let canvas =
         || Pixmap::new(dots.0 as u32, dots.1 as u32).ok_or_else(|| wrong(path, "the drawing is too large"));
     let (width, height) = (dots.0 as u32, dots.1 as u32);
-    // From here on a pixel is a dot.
-    let options = &Options { size: None, dpi: Some(600.0), ..options.clone() };
 
     if groups.is_empty() {
         let mut pixmap = canvas()?;
         resvg::render(&tree, scale, &mut pixmap.as_mut());
         let rgba = straight(pixmap);
         let pixels = Pixels { path: path.to_path_buf(), width, height, density: None, rgba, notes };
-        return colour::artwork(&super::stem(path), pixels, options);
+        return Ok(colour::artwork_of(&super::stem(path), pixels, dots, options));
     }
     observer.begin("rendering layers", groups.len() as u64);
     let mut art = Artwork::blank(&super::stem(path), dots);
@@ -112,6 +111,28 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     observer.end();
     art.notes.append(&mut notes);
     Ok(art)
+}
+
+/// This computer's fonts. The renderer leaves out text of a family that is not there, unless the usual one is: so there must
+/// be a usual one.
+fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersError> {
+    fonts.load_system_fonts();
+    let usual = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
+    if fonts.query(&usual).is_some() {
+        return Ok(());
+    }
+    // A face that is neither bold nor slanted reads best in place of any other; of several always the same.
+    let plain = |face: &fontdb::FaceInfo| {
+        face.style == fontdb::Style::Normal && face.weight == fontdb::Weight::NORMAL && !face.monospaced
+    };
+    let named = |face: &fontdb::FaceInfo| Some((!plain(face), face.families.first()?.0.clone()));
+    match fonts.faces().filter_map(named).min() {
+        Some((_, family)) => {
+            fonts.set_serif_family(family);
+            Ok(())
+        }
+        None => Err(wrong(path, "it has text, and this computer has no fonts; turn the text into paths")),
+    }
 }
 
 /// The topmost groups that name an ink, and the drawing with an identifier on each of them.

@@ -136,7 +136,7 @@ fn what_is_drawn_on_transparent_ground_is_ink_whatever_its_colour() {
 }
 
 #[test]
-fn sizes_come_from_the_file_or_the_user_and_are_never_guessed() {
+fn sizes_come_from_the_user_or_the_file_and_a_layer_without_one_is_of_dots() {
     let bench = Bench::new();
     let dims = |xppu, unit| Some(png::PixelDimensions { xppu, yppu: xppu, unit });
     let save = |name: &str, dims: Option<png::PixelDimensions>| {
@@ -145,8 +145,16 @@ fn sizes_come_from_the_file_or_the_user_and_are_never_guessed() {
         bench.png(name, (4, 2), kind.0, kind.1, &data, |encoder| encoder.set_pixel_dims(dims))
     };
     let unsized_ = save("k.png", None);
-    assert!(refused(std::slice::from_ref(&unsized_)).contains("--dpi 600 for 0.2 x 0.1 mm"));
-    assert!(refused(&[save("c.png", dims(1, png::Unit::Unspecified))]).contains("nothing says how large"));
+    for name in [unsized_.clone(), save("c.png", dims(1, png::Unit::Unspecified))] {
+        let art = read(&[name], &Options::default());
+        assert_eq!((art.width, art.length), (4, 2));
+        assert!(art.notes[0].contains("taken as drawn at 600 dpi, 0.2 x 0.1 mm"), "{:?}", art.notes);
+    }
+    let narrow = Options { room: Room { width: 3, length: 9, cut: false }, ..Options::default() };
+    let said = open(std::slice::from_ref(&unsized_), &narrow, &Silent).unwrap_err().to_string();
+    assert!(said.contains("4 x 2 pixels at 600 dpi would be 0.2 x 0.1 mm") && said.contains("--size 0.1mm"));
+    let cut = Options { room: Room { cut: true, ..narrow.room }, ..Options::default() };
+    assert_eq!(read(std::slice::from_ref(&unsized_), &cut).width, 4);
     let dots = |path: &PathBuf, options: Options| {
         let art = read(std::slice::from_ref(path), &options);
         (art.width, art.length, extent(&art.layers[0]))
@@ -161,6 +169,44 @@ fn sizes_come_from_the_file_or_the_user_and_are_never_guessed() {
     let huge =
         open(&[half], &Options { size: Some("900mm".parse().unwrap()), ..Options::default() }, &Silent);
     assert!(huge.unwrap_err().to_string().contains("the largest page prints"));
+}
+
+#[test]
+fn a_photograph_without_a_resolution_fills_the_page_and_one_with_it_is_believed() {
+    let bench = Bench::new();
+    let photo = |name: &str, size: (u32, u32), dpi: Option<f64>| {
+        let data = vec![100; (size.0 * size.1) as usize];
+        let per_metre = dpi.map(|dpi| (dpi / 0.0254).round() as u32);
+        bench.png(name, size, png::ColorType::Grayscale, png::BitDepth::Eight, &data, |encoder| {
+            let unit = png::Unit::Meter;
+            encoder.set_pixel_dims(per_metre.map(|xppu| png::PixelDimensions { xppu, yppu: xppu, unit }));
+        })
+    };
+    // A page of 100 x 80 mm.
+    let room = Room { width: 2362, length: 1890, cut: false };
+    let options = |reserved| Options { room, reserved, ..Options::default() };
+    for (size, wanted) in [((40, 20), (2362, 1181)), ((20, 40), (945, 1890)), ((236, 189), (2360, 1890))] {
+        let art = read(&[photo("holiday.png", size, None)], &options(false));
+        assert!(
+            art.width.abs_diff(wanted.0) <= 1 && art.length.abs_diff(wanted.1) <= 1,
+            "{size:?}: {} x {}",
+            art.width,
+            art.length
+        );
+        assert!(art.width <= room.width && art.length <= room.length);
+        assert!(art.notes[0].contains("as large as the page allows"), "{:?}", art.notes);
+    }
+    // What stands for inks is drawn in dots.
+    let art = read(&[photo("holiday.png", (40, 20), None)], &options(true));
+    assert_eq!((art.width, art.length), (40, 20));
+    let art = read(&[photo("small.png", (72, 36), Some(72.0))], &options(false));
+    assert_eq!((art.width, art.length), (600, 300));
+    let said = open(&[photo("large.png", (720, 360), Some(72.0))], &options(false), &Silent)
+        .unwrap_err()
+        .to_string();
+    for words in ["large.png says 72 dpi", "254.0 x 127.0 mm", "room for 100.0 x 80.0 mm", "--size 99.9mm"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
 }
 
 #[test]
@@ -378,6 +424,25 @@ fn a_drawings_layers_lie_where_they_are_drawn() {
 }
 
 #[test]
+fn text_is_drawn_even_if_its_font_is_missing_and_refused_without_any() {
+    let bench = Bench::new();
+    let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="25.4mm" height="12.7mm" viewBox="0 0 600 300">
+        <g id="black"><text x="50" y="200" font-family="No Such Family" font-size="150">HHH</text></g></svg>"##;
+    let found = open(&[bench.write("art.svg", svg)], &Options::default(), &Silent);
+    let mut fonts = resvg::usvg::fontdb::Database::new();
+    fonts.load_system_fonts();
+    if fonts.is_empty() {
+        assert!(found.unwrap_err().to_string().contains("this computer has no fonts"));
+        return;
+    }
+    // Three letters in a row, as high as capitals are: two thirds of their size or so, on the line.
+    let (left, top, right, bottom, dots) = extent(&found.unwrap().layers[0]);
+    assert!((50..80).contains(&left) && right - left > 150, "{left} to {right}");
+    assert!((70..130).contains(&top) && (195..205).contains(&bottom), "{top} to {bottom}");
+    assert!(dots > 3000, "{dots} dots");
+}
+
+#[test]
 fn a_drawing_without_layers_is_a_picture_with_exact_edges() {
     let bench = Bench::new();
     let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="2.54mm" height="2.54mm" viewBox="0 0 60 60">
@@ -405,6 +470,8 @@ showpage
 
 fn ghostscript() -> bool {
     let there = std::process::Command::new("gs").arg("--version").output().is_ok();
+    let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
+    assert!(there || !required, "there is no Ghostscript here; `cargo xtask test` installs it");
     if !there {
         println!("skipped: there is no Ghostscript here");
     }
@@ -454,6 +521,68 @@ fn a_pages_ground_stays_transparent_and_its_white_does_not() {
     assert!(third.unwrap_err().to_string().contains("there is no page 3"));
     let broken = bench.write("broken.pdf", "%PDF-1.4\nno page at all");
     assert!(open(&[broken], &Options::default(), &Silent).is_err());
+}
+
+#[test]
+fn sixteen_bits_and_grey_with_transparency_are_read_as_they_are() {
+    let bench = Bench::new();
+    let big = |values: &[u16]| values.iter().flat_map(|v| v.to_be_bytes()).collect::<Vec<u8>>();
+    let sixteen = png::BitDepth::Sixteen;
+    // A layer: half black is the limit, to the last bit of 8.
+    let data = big(&[0, 0x7fff, 0x8000, 0xffff]);
+    let file = bench.png("white.png", (4, 1), png::ColorType::Grayscale, sixteen, &data, |_| ());
+    assert_eq!(extent(&read(&[file], &Options::default()).layers[0]), (0, 0, 1, 0, 2));
+    // A picture: 225,160,0 and half of it on nothing.
+    let data = big(&[0xe1e1, 0xa0a0, 0, 0xffff, 0, 0, 0, 0]);
+    let file = bench.png("art.png", (2, 1), png::ColorType::Rgba, sixteen, &data, |_| ());
+    let art = read(&[file], &Options { reserved: true, ..Options::default() });
+    assert_eq!((art.layers[0].ink, extent(&art.layers[0])), (Ink::MetallicGold, (0, 0, 0, 0, 1)));
+    assert_eq!(art.opaque.map(|plane| plane.dots()), Some(1));
+    let file = bench.png(
+        "black.png",
+        (3, 1),
+        png::ColorType::GrayscaleAlpha,
+        png::BitDepth::Eight,
+        &[0, 255, 0, 0, 255, 0],
+        |_| (),
+    );
+    assert_eq!(extent(&read(&[file], &Options::default()).layers[0]), (0, 0, 0, 0, 1));
+}
+
+/// A picture of one colour with a profile, and the colour it is read as.
+fn with_profile(profile: &moxcms::ColorProfile, kind: png::ColorType, pixel: &[u8]) -> [u8; 3] {
+    let bench = Bench::new();
+    let mut info = png::Info::with_size(4, 1);
+    info.color_type = kind;
+    info.icc_profile = Some(profile.encode().unwrap().into());
+    info.pixel_dims = Some(png::PixelDimensions { xppu: 11_811, yppu: 11_811, unit: png::Unit::Meter });
+    let file = bench.path("photo.png");
+    let encoder = png::Encoder::with_info(fs::File::create(&file).unwrap(), info).unwrap();
+    encoder.write_header().unwrap().write_image_data(&pixel.repeat(4)).unwrap();
+    let art = read(&[file], &Options::default());
+    assert!(art.notes.iter().any(|note| note.contains("profile was applied")), "{:?}", art.notes);
+    art.colour.unwrap().rgb[..3].try_into().unwrap()
+}
+
+#[test]
+fn profiles_of_colour_and_grey_pictures_are_honoured() {
+    // Display P3 to sRGB through XYZ, written out: linear light, the two matrices, sRGB's curve for both.
+    let decode = |v: f64| if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+    let code = |v: f64| if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+    // The product of CSS Color 4's matrices from linear Display P3 to linear sRGB.
+    let matrix = [[1.2249, -0.2247, 0.0], [-0.0420, 1.0419, 0.0], [-0.0197, -0.0786, 1.0979]];
+    let p3 = [180u8, 120, 60];
+    let light = p3.map(|v| decode(f64::from(v) / 255.0));
+    let found = with_profile(&moxcms::ColorProfile::new_display_p3(), png::ColorType::Rgb, &p3);
+    for (row, found) in matrix.iter().zip(found) {
+        let wanted = 255.0 * code(row.iter().zip(light).map(|(m, v)| m * v).sum::<f64>());
+        assert!((wanted - f64::from(found)).abs() < 1.5, "{found}, not {wanted}");
+    }
+    // Grey of gamma 1.0 is light itself.
+    let linear = moxcms::ColorProfile::new_gray_with_gamma(1.0);
+    let found = with_profile(&linear, png::ColorType::Grayscale, &[64]);
+    let wanted = 255.0 * code(64.0 / 255.0);
+    assert!(found.iter().all(|&v| (f64::from(v) - wanted).abs() < 1.5), "{found:?}, not {wanted}");
 }
 
 #[test]

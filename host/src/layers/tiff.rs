@@ -14,14 +14,15 @@ use std::path::Path;
 
 use ::tiff::decoder::{Decoder, DecodingResult, Limits};
 use ::tiff::tags::Tag;
-use protocol::ink::Ink;
 
+use super::cmyk::PLATES;
 use super::colour::{self, Pixels};
-use super::raster::{self, Coverage, Density, Scan, wrong};
-use super::{Artwork, LayersError, Options, names};
+use super::raster::{self, Coverage, Density, Scan, Unstated, wrong};
+use super::{Artwork, LayersError, Options, cmyk, names};
 
 const INK_SET: Tag = Tag::Unknown(332);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);
+const PROFILE: Tag = Tag::Unknown(34675);
 const PHOTOMETRIC: u16 = 262;
 const INK_NAMES: u16 = 333;
 
@@ -107,20 +108,29 @@ pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, L
     let (width, height) = decoder.dimensions().map_err(|error| wrong(path, format!("damaged: {error}")))?;
     raster::check_size(path, width, height)?;
     let density = density_of(&mut decoder);
+    let profile = decoder.find_tag(PROFILE).ok().flatten().and_then(|value| value.into_u8_vec().ok());
     drop(decoder);
     set_photometric(&mut bytes);
     let planes = planes(path, &bytes, samples, width as usize * height as usize)?;
 
-    let dots = raster::dots(path, (f64::from(width), f64::from(height)), density, options.size, options.dpi)?;
+    if base == 4 {
+        notes.push(cmyk::note(path, profile.is_some()));
+    }
+    let spots = channels[base..].iter().any(|channel| channel.ink.is_some());
+    let unstated = if spots { Unstated::IsDots } else { Unstated::Fills };
+    let sides = (f64::from(width), f64::from(height));
+    let dots = raster::dots(path, sides, density, unstated, options, &mut notes)?;
     let mut art = if photometric == SEPARATED {
         Artwork::blank(&super::stem(path), dots)
     } else {
         let colour = |c: usize| &planes[if base == 3 { c } else { 0 }];
-        let rgba =
+        let mut rgba: Vec<u8> =
             (0..planes[0].len()).flat_map(|at| [colour(0)[at], colour(1)[at], colour(2)[at], 255]).collect();
-        let path = path.to_path_buf();
-        let pixels = Pixels { path, width, height, density, rgba, notes: Vec::new() };
-        colour::artwork(&super::stem(&pixels.path.clone()), pixels, options)?
+        if let Some(profile) = profile {
+            notes.extend(colour::to_srgb(path, &profile, base == 1, &mut rgba)?);
+        }
+        let pixels = Pixels { path: path.to_path_buf(), width, height, density, rgba, notes: Vec::new() };
+        colour::artwork_of(&super::stem(path), pixels, dots, options)
     };
     for (channel, plane) in channels.into_iter().zip(planes) {
         let Some(named) = channel.ink else { continue };
@@ -142,13 +152,12 @@ fn channels(
     photometric: u16,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Channel>, LayersError> {
-    const PROCESS: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];
     let mut channels = Vec::new();
     for at in 0..samples {
         if at < base {
-            let ink = PROCESS.get(at).filter(|_| photometric == SEPARATED);
+            let ink = PLATES.get(at).filter(|_| photometric == SEPARATED);
+            let name = ink.map_or_else(String::new, |&ink| cmyk::plate_of(ink));
             let ink = ink.map(|&ink| names::Named { place: None, ink });
-            let name = ink.map_or_else(String::new, |named| format!("the {} plate", named.ink.name()));
             channels.push(Channel { name, ink, inverted: false });
             continue;
         }

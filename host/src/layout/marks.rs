@@ -4,8 +4,13 @@
 //! the middle of each side, printed by every pass on the same place, so that a pass that is off shows beside the others.
 //! Where the printable area leaves no room a tick becomes shorter; what cannot be drawn is counted.
 
-use super::Rect;
+use inks::Stack;
+use protocol::ink::Ink;
+
+use super::block::{Block, Rect};
 use super::length::Mm;
+use super::{Layout, LayoutError};
+use crate::separate;
 
 /// From the block to a mark, in millimetres.
 const AWAY: f64 = 1.5;
@@ -122,4 +127,73 @@ pub(super) fn registration(block: Rect, room: Rect, ticks: bool) -> (Vec<Mark>, 
         .collect();
     let missing = places.len() - marks.len();
     (marks, missing)
+}
+/// The ink in use that shows best on most grounds.
+fn best(inks: &[Ink]) -> Option<Ink> {
+    const ORDER: [Ink; 13] = [
+        Ink::Black,
+        Ink::MetallicSilver,
+        Ink::MetallicGold,
+        Ink::MetallicCyan,
+        Ink::MetallicMagenta,
+        Ink::Magenta,
+        Ink::Cyan,
+        Ink::White,
+        Ink::Yellow,
+        Ink::SilverFoil,
+        Ink::GoldFoil,
+        Ink::Finish,
+        Ink::Primer,
+    ];
+    ORDER.into_iter().find(|ink| inks.contains(ink))
+}
+
+/// Chosen inks in the order of the passes they join, those the piece does not have where they customarily go.
+fn in_order(chosen: &[Ink], in_use: &[Ink]) -> Vec<Ink> {
+    let mut stacks: Vec<Stack> = chosen.iter().map(|&ink| Stack::new([ink])).collect();
+    stacks.push(Stack::new(in_use));
+    let mut order: Vec<Ink> = Vec::new();
+    for ink in separate::passes_of(&stacks) {
+        if chosen.contains(&ink) && !order.contains(&ink) {
+            order.push(ink);
+        }
+    }
+    order
+}
+
+/// The marks, each with the number of its stack, which is added to `stacks`; and how many had no room. `in_use` are the
+/// inks of the piece in the order of passes.
+pub(super) fn marks_of(
+    layout: &Layout,
+    in_use: &[Ink],
+    block: &Block,
+    stacks: &mut Vec<Stack>,
+) -> Result<(Vec<(Mark, u8)>, usize), LayoutError> {
+    let (ticks, crosses) = match &layout.mark_inks[..] {
+        [] => (best(in_use).into_iter().collect(), in_use.to_vec()),
+        chosen => {
+            let chosen = in_order(chosen, in_use);
+            (chosen.clone(), chosen)
+        }
+    };
+    let mut number = |inks: Vec<Ink>| -> Result<u8, LayoutError> {
+        let stack = Stack::new(inks);
+        let at = stacks.iter().position(|known| *known == stack).unwrap_or_else(|| {
+            stacks.push(stack);
+            stacks.len() - 1
+        });
+        u8::try_from(at).map_err(|_| LayoutError::Stacks)
+    };
+    let (mut all, mut left_out) = (Vec::new(), 0);
+    let mut add = |(marks, missing): (Vec<Mark>, usize), stack: u8| {
+        all.extend(marks.into_iter().map(|mark| (mark, stack)));
+        left_out += missing;
+    };
+    if layout.crop_marks {
+        add(crop(block.place, &block.columns, &block.rows, block.room), number(ticks)?);
+    }
+    if layout.registration_marks {
+        add(registration(block.place, block.room, layout.crop_marks), number(crosses)?);
+    }
+    Ok((all, left_out))
 }

@@ -76,8 +76,15 @@ pub fn read(text: &str) -> Result<Paper, String> {
     let Ok(Point(width, length)) = text.parse() else {
         return Err(format!("the papers are {}, or the size of a sheet such as 120x180mm", names.join(", ")));
     };
-    let custom = |top: i64| (width.dots() - i64::from(LEFT) - RIGHT, length.dots() - top - BOTTOM);
-    let (across, along) = custom(Paper::Custom { width: 0, length: 0 }.top().into());
+    custom(width, length)
+}
+
+/// A sheet of a size of its own.
+///
+/// Errors, in words: one that the machine cannot take.
+pub fn custom(width: Mm, length: Mm) -> Result<Paper, String> {
+    let inner = |top: i64| (width.dots() - i64::from(LEFT) - RIGHT, length.dots() - top - BOTTOM);
+    let (across, along) = inner(Paper::Custom { width: 0, length: 0 }.top().into());
     let (most, longest) = (i64::from(LARGEST.0), i64::from(LARGEST.1));
     if across < LEAST || along < LEAST {
         return Err(format!(
@@ -98,6 +105,21 @@ pub fn read(text: &str) -> Result<Paper, String> {
     }
     // Within `LARGEST`, which is u16.
     Ok(Paper::Custom { width: across as u16, length: along as u16 })
+}
+
+/// Margins of a custom sheet: left, top, right, bottom.
+pub fn custom_margins() -> [Mm; 4] {
+    let top = i64::from(Paper::Custom { width: 0, length: 0 }.top());
+    [i64::from(LEFT), top, RIGHT, BOTTOM].map(Mm::of_dots)
+}
+
+/// The smallest and the largest custom sheet.
+pub fn custom_range() -> (Point, Point) {
+    let [left, top, right, bottom] = custom_margins();
+    let (across, down) = (left.0 + right.0, top.0 + bottom.0);
+    let sheet =
+        |width: i64, length: i64| Point(Mm(Mm::of_dots(width).0 + across), Mm(Mm::of_dots(length).0 + down));
+    (sheet(LEAST, LEAST), sheet(LARGEST.0.into(), LARGEST.1.into()))
 }
 
 #[cfg(test)]

@@ -220,3 +220,16 @@ fn without_anything_asked_the_page_is_the_piece_in_its_middle() {
     let whole = solid(4740, 100, "K");
     assert_eq!(arrange(&whole, &layout, &Silent).unwrap().laid.area.left, 0);
 }
+
+#[test]
+fn what_is_too_large_is_told_what_fits_and_what_is_beside_the_page_is_told_to_move() {
+    let layout = Layout::centred(Paper::Custom { width: 2362, length: 1181 });
+    let said = check(4724, 1181, &layout).unwrap_err().to_string();
+    // 100 x 50 mm: half of 200 x 50 is 100 x 25.
+    assert!(
+        said.contains("make it smaller (99.9 x 24.9 mm fits)") || said.contains("(100.0 x 25.0 mm fits)"),
+        "{said}"
+    );
+    let beside = Layout { position: Position::FromPrintable(dots(-1, 0)), ..layout };
+    assert!(check(100, 100, &beside).unwrap_err().to_string().contains("here; move it, take"));
+}

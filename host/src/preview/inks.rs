@@ -1,18 +1,18 @@
 //! The dots as ink on a ground of any colour: all together, and each pass by itself.
 //!
 //! Method: a palette. Every stack gets the colour of its layers upon the ground (transparent inks tint, the others hide), and
-//! the dots stay what they are, a pixel each. Cost: one look at each dot. Limits: colours to tell inks apart by, not a proof:
-//! gloss and metal do not show. For light there is [`super::flat()`].
+//! the dots stay what they are, a pixel each. Clear inks hardly show together with others, as on paper; in the picture of
+//! their own pass they are labelled with a colour. Cost: one look at each dot. Limits: no proof: gloss and metal do not show.
+//! For light there is [`super::flat()`].
 
 use std::path::Path;
 use std::str::FromStr;
 
 use image::RgbImage;
-use inks::Stack;
 
 use super::Area;
 use crate::separate::Pass;
-use crate::sheet::colours::upon;
+use crate::sheet::colours::{label, upon};
 use crate::sheet::picture::{FileError, Kind, write_png};
 use crate::sheet::{Sheet, picture};
 
@@ -68,7 +68,7 @@ pub fn save_sheet(sheet: &Sheet, area: Area, ground: Ground, path: &Path) -> Res
 /// # Panics
 /// When the area leaves the plane: a bug of the caller, never a matter of input.
 pub fn save_pass(pass: &Pass, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
-    let palette = [ground.0, upon(&Stack::new([pass.ink]), ground.0)];
+    let palette = [ground.0, label(pass.ink, ground.0)];
     let plane = &pass.plane;
     let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
     let dots: Vec<u8> = rows

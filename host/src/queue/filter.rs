@@ -1,33 +1,43 @@
 //! The filter: pages in, jobs in the printer's language out, one for each sheet.
 //!
 //! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this machine cannot print on.
-//! Method: a PDF is drawn by Ghostscript, row by row through a pipe; of each page the printable area is kept, and
-//! becomes art as if it were a picture given to `foilpress layers`: black is solid black, reserved colours are inks of
-//! their own if wanted, everything else is halftoned in process inks. What lies on the margins is told in millimetres.
-//! Cost: the printable area at four bytes a pixel, and what [`layers`] costs.
-//! Limits: sheets of the known papers, upright. Transparency is gone when a page has been drawn, so white cannot follow it.
+//! Method: a PDF is drawn by Ghostscript; each page becomes art as if it were a picture given to `foilpress layers`: black
+//! is solid black, reserved colours are inks of their own if wanted, everything else is halftoned in process inks. A page
+//! with spot colours that name inks is separated instead, and its plates are layers. The art is laid where the page has it,
+//! or where the user wants it, on a sheet of the page's size; what lies on the margins is told in millimetres.
+//! Cost: the page at three bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one more
+//! drawing of all pages at a low resolution.
+//! Limits: documents of 1 GB, sheets the machine takes, upright. Transparency is gone when a page has been drawn, so
+//! white cannot follow it. On a separated page the choice of inks leaves plates out, it does not mix them anew.
 
+mod drawing;
+mod press;
+
+use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
 
-use inks::{InkSet, Library};
+use inks::Library;
+use memchr::memmem;
 use protocol::ink::Ink;
-use protocol::paper::{LEFT, Paper};
-use protocol::rgl::Page;
+use protocol::paper::Paper;
+use tempfile::NamedTempFile;
 
-use super::options::{Choices, NoChoice};
-use super::ppd;
+use super::options::{Choices, NoChoice, Spots};
 use super::raster::{self, RasterError};
-use crate::job::stream::{self, StreamError};
-use crate::layers::{self, LayersError};
+use crate::job::stream::StreamError;
+use crate::layers::{self, LayersError, Window};
+use crate::layout::LayoutError;
 use crate::observe::Observer;
-use crate::separate::{self, SeparateError, Severity};
-use crate::sheet::{Sheet, SheetError};
-use crate::simulate::Stock;
+use crate::separate::SeparateError;
+use crate::sheet::SheetError;
+use drawing::Drawing;
+use press::Press;
 
-/// Pixels that differ from white by less than this are paper when margins are looked at.
-const FAINT: u8 = 8;
+pub use press::Place;
+
+/// The largest document.
+const LARGEST: u64 = 1 << 30;
 
 /// Why a document is not printed.
 #[derive(Debug, thiserror::Error)]
@@ -58,11 +68,8 @@ pub enum FilterError {
     /// Raster pages.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// A page of no known size.
-    #[error(
-        "page {page} is {width:.0} x {length:.0} mm, which is none of the papers {}; choose one in the print dialog",
-        ppd::papers()
-    )]
+    /// A page of a size that does not go in.
+    #[error("page {page} is {width:.0} x {length:.0} mm: {problem}; choose a paper in the print dialog")]
     Paper {
         /// Page, from 1.
         page: usize,
@@ -70,7 +77,27 @@ pub enum FilterError {
         width: f64,
         /// Its length in mm.
         length: f64,
+        /// Why it does not go in.
+        problem: String,
     },
+    /// Foil without consent.
+    #[error(
+        "page {page} asks for {}: the codes of the foils are inferred and were never seen on hardware, so they are \
+         printed only when asked for: -o FoilpressFoils=On",
+        .ink.name()
+    )]
+    Foil {
+        /// Page, from 1.
+        page: usize,
+        /// The foil.
+        ink: Ink,
+    },
+    /// The document.
+    #[error("the document is larger than 1 GB; print fewer pages at once")]
+    TooLarge,
+    /// The plates of a document.
+    #[error("cannot read the document's spot colours: {0}")]
+    Plates(#[source] LayersError),
     /// The art.
     #[error("page {page}: {source}")]
     Layers {
@@ -78,6 +105,14 @@ pub enum FilterError {
         page: usize,
         /// What is the matter.
         source: LayersError,
+    },
+    /// Its place on the sheet.
+    #[error("page {page}: {source}")]
+    Layout {
+        /// Page, from 1.
+        page: usize,
+        /// What is the matter.
+        source: LayoutError,
     },
     /// The rules of the inks.
     #[error("page {page} must not be printed: {why}")]
@@ -106,7 +141,7 @@ fn io_error(what: &'static str) -> impl FnOnce(io::Error) -> FilterError {
 ///
 /// `document` is read from its start; `file` is where it can be read again, if it is a file. Returns the number of jobs.
 pub fn run(
-    mut document: impl Read + Send + 'static,
+    mut document: impl Read,
     file: Option<&Path>,
     choices: &Choices,
     library: &Library,
@@ -117,29 +152,12 @@ pub fn run(
     document.read_exact(&mut head).map_err(io_error("read the document"))?;
     let mut press = Press { choices, library, out, observer, jobs: 0 };
     if head == raster::SYNC {
-        let mut reader = raster::Reader::behind_sync(BufReader::with_capacity(1 << 16, document));
-        let mut number = 0;
-        while let Some(page) = reader.next_page()? {
-            number += 1;
-            let size = (page.width, page.height, page.dpi);
-            let job = press.page(number, size, &mut |row| Ok(reader.row(row)?))?;
-            for _ in 0..page.copies {
-                press.write(&job)?;
-            }
-        }
+        pictures(document, &mut press)?;
     } else if head.starts_with(b"%PDF") || head.starts_with(b"%!") {
-        let whole = io::Cursor::new(head).chain(document);
-        let mut drawing = Drawing::begin(whole, file, choices.dpi)?;
-        let mut number = 0;
-        while let Some((width, height)) = drawing.next_page()? {
-            number += 1;
-            let job = press.page(number, (width, height, choices.dpi), &mut |row| {
-                row.resize(3 * width, 0);
-                drawing.pages.read_exact(row).map_err(io_error("read what Ghostscript draws"))
-            })?;
-            press.write(&job)?;
+        match file {
+            Some(path) => pages(path, &mut press)?,
+            None => pages(spooled(&mut head.chain(document))?.path(), &mut press)?,
         }
-        drawing.end()?;
     } else {
         return Err(FilterError::Kind);
     }
@@ -147,246 +165,117 @@ pub fn run(
     Ok(press.jobs)
 }
 
-/// Ghostscript at work.
-struct Drawing {
-    child: Child,
-    pages: BufReader<std::process::ChildStdout>,
-    complaints: std::thread::JoinHandle<String>,
+/// A document as a file, which Ghostscript would make of it, too.
+fn spooled(document: &mut dyn Read) -> Result<NamedTempFile, FilterError> {
+    let mut file = NamedTempFile::new().map_err(io_error("keep the document"))?;
+    let length =
+        io::copy(&mut document.take(LARGEST + 1), &mut file).map_err(io_error("keep the document"))?;
+    if length > LARGEST { Err(FilterError::TooLarge) } else { Ok(file) }
 }
 
-impl Drawing {
-    fn begin(
-        document: impl Read + Send + 'static,
-        file: Option<&Path>,
-        dpi: u16,
-    ) -> Result<Drawing, FilterError> {
-        let mut command = Command::new("gs");
-        command
-            .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dNOINTERPOLATE", "-sDEVICE=ppmraw"])
-            .arg(format!("-r{dpi}"))
-            .args(["-sstdout=%stderr", "-sOutputFile=%stdout", "-f"])
-            .stdin(if file.is_some() { Stdio::null() } else { Stdio::piped() })
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        match file {
-            Some(path) => command.arg(path),
-            None => command.arg("-"),
-        };
-        let mut child = command.spawn().map_err(FilterError::NoGhostscript)?;
-        if let Some(mut input) = child.stdin.take() {
-            let mut document = document;
-            // It says itself what it misses when the document is cut short.
-            std::thread::spawn(move || io::copy(&mut document, &mut input));
+/// Pictures of pages, from the print system.
+fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterError> {
+    let mut reader = raster::Reader::behind_sync(BufReader::with_capacity(1 << 16, document));
+    let (mut number, mut row) = (0, Vec::new());
+    while let Some(page) = reader.next_page()? {
+        number += 1;
+        let size = (page.width, page.height);
+        let paper = press::paper(number, size, page.dpi, press.choices)?;
+        let mut rgb = Vec::with_capacity(3 * page.width * page.height);
+        for _ in 0..page.height {
+            reader.row(&mut row)?;
+            rgb.extend_from_slice(&row);
         }
-        let (Some(pages), Some(mut words)) = (child.stdout.take(), child.stderr.take()) else {
-            return Err(FilterError::Ghostscript("its pipes cannot be had".into()));
-        };
-        let complaints = std::thread::spawn(move || {
-            let mut text = String::new();
-            let mut bytes = Vec::new();
-            // Only the beginning is shown, but all is taken so that it never waits.
-            if words.read_to_end(&mut bytes).is_ok() {
-                text = String::from_utf8_lossy(&bytes).lines().take(3).collect::<Vec<_>>().join("; ");
-            }
-            text
-        });
-        Ok(Drawing { child, pages: BufReader::with_capacity(1 << 18, pages), complaints })
-    }
-
-    /// Width and height of the next page in pixels.
-    fn next_page(&mut self) -> Result<Option<(usize, usize)>, FilterError> {
-        let read = io_error("read what Ghostscript draws");
-        let mut byte = [0];
-        if self.pages.read(&mut byte).map_err(read)? == 0 {
-            return Ok(None);
-        }
-        // `P6`, then width, height and depth apart by white space or comment lines, then one byte of white space.
-        let mut numbers = Vec::new();
-        let (mut word, mut comment, mut length) = (String::new(), false, 0);
-        word.push(char::from(byte[0]));
-        while numbers.len() < 4 {
-            self.pages.read_exact(&mut byte).map_err(io_error("read what Ghostscript draws"))?;
-            length += 1;
-            match byte[0] {
-                b'\n' if comment => comment = false,
-                _ if comment => {}
-                b'#' => comment = true,
-                b if b.is_ascii_whitespace() && word.is_empty() => {}
-                b if b.is_ascii_whitespace() => numbers.push(std::mem::take(&mut word)),
-                b => word.push(char::from(b)),
-            }
-            if length > 4096 {
-                break;
-            }
-        }
-        let number = |at: usize| numbers.get(at).and_then(|word| word.parse::<usize>().ok());
-        match (numbers.first().map(String::as_str), number(1), number(2), number(3)) {
-            // The same bound as for raster pages.
-            (Some("P6"), Some(w @ 1..=9000), Some(h @ 1..=9000), Some(255)) => Ok(Some((w, h))),
-            (Some("P6"), Some(w), Some(h), Some(255)) => {
-                Err(FilterError::Ghostscript(format!("a page of {w} x {h} pixels is larger than any sheet")))
-            }
-            _ => Err(FilterError::Ghostscript("it gave something that is no picture".into())),
+        // Of a PDF the print system has turned the pages itself.
+        let job = picture(number, paper, (size, page.dpi), &rgb, press.choices.mirror, press)?;
+        for _ in 0..page.copies {
+            press.write(&job)?;
         }
     }
-
-    fn end(mut self) -> Result<(), FilterError> {
-        let status = self.child.wait().map_err(io_error("wait for Ghostscript"))?;
-        let words = self.complaints.join().unwrap_or_default();
-        if status.success() { Ok(()) } else { Err(FilterError::Ghostscript(words)) }
-    }
+    Ok(())
 }
 
-/// What makes jobs of pages.
-struct Press<'a> {
-    choices: &'a Choices,
-    library: &'a Library,
-    out: &'a mut dyn Write,
-    observer: &'a dyn Observer,
-    jobs: usize,
-}
-
-impl Press<'_> {
-    fn write(&mut self, job: &[u8]) -> Result<(), FilterError> {
-        if !job.is_empty() {
-            self.out.write_all(job).map_err(io_error("write the job"))?;
-            self.jobs += 1;
-        }
-        Ok(())
+/// The pages of a PDF or PostScript file.
+fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
+    let dpi = press.choices.dpi;
+    let spots = match press.choices.spots {
+        Spots::None => Vec::new(),
+        _ if !may_have_spots(path)? => Vec::new(),
+        _ => layers::pdf::spots(path).map_err(FilterError::Plates)?,
+    };
+    if spots.iter().all(Vec::is_empty) {
+        return drawn(path, None, press);
     }
-
-    /// The job of a page, which gives its rows one after the other; empty if nothing is on it.
-    fn page(
-        &mut self,
-        number: usize,
-        (width, height, dpi): (usize, usize, u16),
-        next_row: &mut dyn FnMut(&mut Vec<u8>) -> Result<(), FilterError>,
-    ) -> Result<Vec<u8>, FilterError> {
-        let points = |pixels: usize| pixels as f64 * 72.0 / f64::from(dpi);
-        let paper = ppd::paper_of(points(width), points(height)).ok_or(FilterError::Paper {
-            page: number,
-            width: points(width) * 25.4 / 72.0,
-            length: points(height) * 25.4 / 72.0,
-        })?;
-        let (rgba, beyond) = printable(paper, (width, height, dpi), next_row)?;
-        if let Some(text) = beyond.words() {
-            self.observer
-                .note(&format!("page {number}: {text} lies on the margins, where this machine cannot print"));
+    for (number, plates) in (1..).zip(&spots) {
+        if plates.is_empty() {
+            drawn(path, Some(number), press)?;
+            continue;
         }
+        press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |source| FilterError::Layers { page: number, source };
-        let choices = self.choices;
-        // Black text is to be solid, whatever else is on the page.
-        let mut spots = InkSet::EMPTY;
-        if choices.colours.contains(Ink::Black) {
-            spots = spots.with(Ink::Black);
+        let page = layers::pdf::separated(path, number, plates, dpi.into()).map_err(in_page)?;
+        let paper = press::paper(number, page.size, dpi, press.choices)?;
+        if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
+            let art =
+                page.art(&format!("page {number}"), &view.window, &press.options(dpi)).map_err(in_page)?;
+            let job = press.job(number, paper, &art, &view, false)?;
+            press.write(&job)?;
         }
-        if choices.spots {
-            spots = layers::Options::default().inks;
-        } else if choices.white == layers::White::Reserved {
-            spots = spots.with(Ink::White);
-        }
-        let options = layers::Options {
-            dpi: Some(f64::from(dpi)),
-            reserved: !spots.is_empty(),
-            inks: spots,
-            ..layers::Options::default()
-        };
-        let (across, down) = (usize::from(paper.width()), usize::from(paper.length()));
-        let size = (across * usize::from(dpi) / 600, down * usize::from(dpi) / 600);
-        let name = format!("page {number}");
-        let art = layers::picture(&name, size, rgba, &options).map_err(in_page)?;
-        if art.drawn.dots() == 0 {
-            self.observer.note(&format!("page {number} is blank; no sheet is made of it"));
-            return Ok(Vec::new());
-        }
-        let inks = InkSet::of(spots.iter().chain(choices.colours.iter()).chain([Ink::White, Ink::Finish]));
-        let settings = layers::Settings {
-            inks,
-            white: (choices.white != layers::White::None || !choices.spots).then_some(choices.white),
-            finish: Some(choices.finish),
-            ..layers::Settings::default()
-        };
-        let composed = layers::compose(&art, &settings, self.library, self.observer).map_err(in_page)?;
-        for suggestion in &composed.suggestions {
-            self.observer.note(&format!("page {number}: {}", suggestion.text));
-        }
-        let sheet = Sheet::new(paper, composed.piece.stacks().to_vec(), composed.piece.index().to_vec())?;
-        let separation = separate::separate(&sheet, self.library.rules(), self.observer)?;
-        if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
-            return Err(FilterError::Refused { page: number, why: check.with_stacks() });
-        }
-        let page =
-            Page { media: choices.media, curl_correction: choices.curl_correction, ..Page::plain(paper) };
-        let mut job = Vec::new();
-        stream::write_job(page, None, &separation.passes, &mut job, self.observer)?;
-        Ok(job)
     }
+    Ok(())
 }
 
-/// How far art reaches onto the margins, in pixels.
-#[derive(Default)]
-struct Beyond {
-    sides: [usize; 4],
-    dpi: u16,
-}
-
-impl Beyond {
-    fn words(&self) -> Option<String> {
-        let mm = |pixels: usize| pixels as f64 * 25.4 / f64::from(self.dpi);
-        let said: Vec<String> = ["left", "top", "right", "bottom"]
-            .iter()
-            .zip(self.sides)
-            .filter(|(_, pixels)| *pixels > 0)
-            .map(|(side, pixels)| format!("{:.1} mm at the {side}", mm(pixels).max(0.1)))
-            .collect();
-        (!said.is_empty()).then(|| said.join(", "))
+/// Pages as Ghostscript draws them, or one of them.
+fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), FilterError> {
+    let dpi = press.choices.dpi;
+    let mut drawing = Drawing::begin(path, only, dpi)?;
+    let mut number = only.unwrap_or(1);
+    while let Some(size) = drawing.next_page()? {
+        let paper = press::paper(number, size, dpi, press.choices)?;
+        let job = picture(number, paper, (size, dpi), &drawing.pixels(size)?, false, press)?;
+        press.write(&job)?;
+        number += 1;
     }
+    drawing.end()
 }
 
-/// The printable area of a page, opaque, four bytes a pixel, and what lies beyond it. A page that is a little smaller
-/// than its paper is paper there.
-fn printable(
+/// The job of a page that is a picture; empty if nothing is on it.
+fn picture(
+    number: usize,
     paper: Paper,
-    (width, height, dpi): (usize, usize, u16),
-    next_row: &mut dyn FnMut(&mut Vec<u8>) -> Result<(), FilterError>,
-) -> Result<(Vec<u8>, Beyond), FilterError> {
-    let scaled = |dots: u16| usize::from(dots) * usize::from(dpi) / 600;
-    let (left, top) = (scaled(LEFT), scaled(paper.top()));
-    let (across, down) = (scaled(paper.width()), scaled(paper.length()));
-    // A page of another standard's size is as wide as its paper within 2 mm: what differs is at the right and below.
-    debug_assert!(left + across <= scaled(Stock::of(paper).width));
-    let mut rgba = vec![255; 4 * across * down];
-    let mut beyond = Beyond { dpi, ..Beyond::default() };
-    let drawn = |row: &[u8]| row.iter().any(|&v| v < 255 - FAINT);
-    let mut row = Vec::new();
-    for y in 0..height {
-        next_row(&mut row)?;
-        if y < top {
-            if beyond.sides[1] == 0 && drawn(&row) {
-                beyond.sides[1] = top - y;
-            }
-            continue;
+    (size, dpi): ((usize, usize), u16),
+    rgb: &[u8],
+    mirrored: bool,
+    press: &Press<'_>,
+) -> Result<Vec<u8>, FilterError> {
+    let drawn = Window::around(rgb, size.0, 3, 255);
+    let Some(view) = press.view(number, paper, (size, dpi), drawn, mirrored) else { return Ok(Vec::new()) };
+    let (window, name) = (&view.window, format!("page {number}"));
+    let rgb = window.cut(rgb, size.0, 3);
+    let art = layers::page(&name, (window.width, window.height), dpi, rgb, &press.options(dpi))
+        .map_err(|source| FilterError::Layers { page: number, source })?;
+    press.job(number, paper, &art, &view, mirrored)
+}
+
+/// Whether a document may have spot colours: it is a program, or their words are in it, or parts of it are packed.
+fn may_have_spots(path: &Path) -> Result<bool, FilterError> {
+    const WORDS: [&[u8]; 3] = [b"/Separation", b"/DeviceN", b"/ObjStm"];
+    const LONGEST: usize = 11;
+    let mut file = File::open(path).map_err(io_error("read the document"))?.take(LARGEST);
+    let mut piece = Vec::new();
+    loop {
+        // A word may lie across two pieces.
+        piece.drain(..piece.len().saturating_sub(LONGEST - 1));
+        let before = piece.len();
+        (&mut file).take(1 << 20).read_to_end(&mut piece).map_err(io_error("read the document"))?;
+        let program = before == 0 && piece.starts_with(b"%!");
+        if program || WORDS.iter().any(|word| memmem::find(&piece, word).is_some()) {
+            return Ok(true);
         }
-        if y - top >= down {
-            if drawn(&row) {
-                beyond.sides[3] = y - top - down + 1;
-            }
-            continue;
-        }
-        let inside = 3 * left.min(width)..3 * (left + across).min(width);
-        let (before, behind) = (&row[..inside.start], &row[inside.end..]);
-        if let Some(at) = before.iter().position(|&v| v < 255 - FAINT) {
-            beyond.sides[0] = beyond.sides[0].max(left - at / 3);
-        }
-        if let Some(at) = behind.iter().rposition(|&v| v < 255 - FAINT) {
-            beyond.sides[2] = beyond.sides[2].max(at / 3 + 1);
-        }
-        let out = &mut rgba[4 * across * (y - top)..][..4 * across];
-        for (out, pixel) in out.as_chunks_mut::<4>().0.iter_mut().zip(row[inside].as_chunks::<3>().0) {
-            out[..3].copy_from_slice(pixel);
+        if piece.len() == before {
+            return Ok(false);
         }
     }
-    Ok((rgba, beyond))
 }
 
 #[cfg(test)]
@@ -394,7 +283,6 @@ mod tests {
     use super::*;
     use crate::inspect::{inspect, sheets};
     use crate::observe::Silent;
-    use std::cell::RefCell;
     use std::sync::Mutex;
 
     /// Keeps what is told.
@@ -502,6 +390,24 @@ mod tests {
     }
 
     #[test]
+    fn a_page_that_comes_as_a_picture_is_mirrored_about_its_middle_and_moved_where_it_is_wanted() {
+        let place = |options: &str| {
+            let choices = Choices::read(&super::super::options::parse(options), None).unwrap();
+            let (job, _) = filtered(raster(600, &[[1000, 500, 1400, 800]]), &choices);
+            let bounds = inspect(&job, &Silent).inspection.passes[0].bounds.unwrap();
+            assert_eq!((bounds.width, bounds.height), (400, 300));
+            (bounds.x, bounds.y)
+        };
+        assert_eq!(place(""), (920, 429));
+        // What is 920 dots from the left of 2202 is as far from the right.
+        assert_eq!(place("MirrorPrint=True"), (2202 - 920 - 400, 429));
+        // An inch and two from the corner of the sheet.
+        assert_eq!(place("FoilpressPosition=1x2in"), (600 - 80, 1200 - 71));
+        assert_eq!(place("FoilpressPosition=Centre"), ((2202 - 400) / 2, (3082 - 300) / 2));
+        assert_eq!(place("FoilpressPosition=1x2in mirror=true"), (600 - 80, 1200 - 71));
+    }
+
+    #[test]
     fn what_lies_on_the_margins_is_told_in_millimetres() {
         let usual = Choices::read(&[], None).unwrap();
         // 71 rows at the top, 80 dots at the left; 2 mm are 47 dots.
@@ -516,19 +422,28 @@ mod tests {
     }
 
     #[test]
-    fn a_page_of_no_known_paper_is_refused_with_its_size() {
-        let read = RefCell::new(0);
+    fn a_page_that_does_not_go_in_is_refused_with_its_size() {
         let usual = Choices::read(&[], None).unwrap();
-        let library = Library::builtin();
-        let mut press =
-            Press { choices: &usual, library: &library, out: &mut io::sink(), observer: &Silent, jobs: 0 };
-        let page = press.page(3, (1200, 1200, 600), &mut |_| {
-            *read.borrow_mut() += 1;
-            Ok(())
-        });
-        let error = page.unwrap_err().to_string();
-        assert!(error.contains("page 3 is 51 x 51 mm") && error.contains("Postcard"), "{error}");
-        assert_eq!(*read.borrow(), 0);
+        let error = press::paper(3, (7016, 4961), 600, &usual).unwrap_err().to_string();
+        assert!(error.contains("page 3 is 297 x 210 mm") && error.contains("215.9 x 355.6 mm"), "{error}");
+    }
+
+    #[test]
+    fn spot_colours_are_suspected_wherever_their_words_begin() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("document");
+        let suspected = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            may_have_spots(&path).unwrap()
+        };
+        assert!(suspected(b"%!PS"));
+        assert!(!suspected(b"%PDF-1.4 /DeviceRGB /DeviceCMYK /Separa tion"));
+        // Before, across and after the border of two pieces.
+        for at in (1 << 20) - 14..(1 << 20) + 3 {
+            let mut bytes = vec![b' '; 3 << 20];
+            bytes[at..at + 11].copy_from_slice(b"/Separation");
+            assert!(suspected(&bytes), "{at}");
+        }
     }
 
     #[test]

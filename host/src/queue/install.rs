@@ -10,6 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::ppd;
+use crate::layout::Profile;
 
 /// Where a print system keeps its things.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -62,8 +63,26 @@ impl Places {
             file(self.programs.join("backend/foilpress"), start("cups-backend"), true),
             file(self.programs.join("filter/foilpress"), start("cups-filter"), true),
             file(self.types.join("foilpress.types"), ppd::TYPES.into(), false),
-            file(self.descriptions.join(DESCRIPTION), ppd::description(), false),
+            file(self.descriptions.join(DESCRIPTION), ppd::description(&Profile::default()), false),
         ]
+    }
+
+    /// Removes what [`files`](Places::files) names and the copy of the program; gives what was there.
+    pub fn remove(&self) -> io::Result<Vec<PathBuf>> {
+        let mut removed = Vec::new();
+        let files = self.files(&self.program).into_iter().map(|file| file.path);
+        for path in files.chain([self.program.clone()]) {
+            match fs::remove_file(&path) {
+                Ok(()) => removed.push(path),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        }
+        // Only ours, and only when nothing else is in them.
+        for folder in [Some(self.descriptions.as_path()), self.program.parent()].into_iter().flatten() {
+            let _ = fs::remove_dir(folder);
+        }
+        Ok(removed)
     }
 }
 
@@ -150,5 +169,9 @@ mod tests {
         assert!(files.iter().all(|file| !put(file).unwrap()));
         let said = std::process::Command::new(&files[0].path).args(["1", "a b"]).output().unwrap();
         assert_eq!(String::from_utf8(said.stdout).unwrap(), "cups-backend|1|a b|");
+        let gone = places.remove().unwrap();
+        assert_eq!(gone, files.iter().map(|file| file.path.clone()).collect::<Vec<_>>());
+        assert!(places.programs.join("backend").is_dir(), "folders of the print system stay");
+        assert!(!places.descriptions.exists() && places.remove().unwrap().is_empty());
     }
 }

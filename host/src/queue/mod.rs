@@ -10,8 +10,10 @@
 //! Source: the man pages backend(7) and filter(7), and the specifications of PPD and PWG raster files.
 
 pub mod backend;
+pub mod call;
 pub mod filter;
 pub mod install;
+pub mod listing;
 pub mod messages;
 pub mod options;
 pub mod ppd;

@@ -7,7 +7,10 @@ use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::rgl::Media;
 
+use super::filter::Place;
+use super::ppd;
 use crate::layers::{Finish, White};
+use crate::layout::{Point, Profile};
 
 /// One option of the dialog.
 pub struct DialogOption {
@@ -17,6 +20,19 @@ pub struct DialogOption {
     pub text: &'static str,
     /// Keywords and texts of the choices; the first is the default.
     pub choices: Vec<(String, String)>,
+    /// Name and text of a value of one's own, if there can be one.
+    pub custom: Option<(&'static str, &'static str)>,
+}
+
+/// Which colours are inks of their own.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Spots {
+    /// Spot colours of the document that name inks.
+    Named,
+    /// The vendor's reserved colours, too.
+    Reserved,
+    /// None: everything becomes process inks.
+    None,
 }
 
 /// What the user chose.
@@ -28,14 +44,24 @@ pub struct Choices {
     pub curl_correction: bool,
     /// The inks of pictures' colours.
     pub colours: InkSet,
-    /// Whether the vendor's reserved colours stand for inks of their own.
-    pub spots: bool,
+    /// Which colours are inks of their own.
+    pub spots: Spots,
+    /// Whether foils may be printed.
+    pub foils: bool,
     /// Where white is laid.
     pub white: White,
     /// Where finish is laid.
     pub finish: Finish,
     /// Pixels an inch the page is drawn at.
     pub dpi: u16,
+    /// Where what is drawn goes on its sheet.
+    pub place: Place,
+    /// Whether pages are turned left to right.
+    pub mirror: bool,
+    /// Whether a sheet of a size of its own is meant, and not the paper that is nearly as large.
+    pub custom_paper: bool,
+    /// The queue's machine.
+    pub profile: Profile,
 }
 
 const INKS: [(&str, &str); 3] = [
@@ -44,10 +70,22 @@ const INKS: [(&str, &str); 3] = [
     ("NoBlack", "Cyan, magenta, yellow"),
 ];
 
-const SPOTS: [(&str, &str); 2] = [("Off", "None"), ("Reserved", "The vendor's reserved colours")];
+const SPOTS: [(&str, &str, Spots); 3] = [
+    ("Named", "Spot colours named after inks", Spots::Named),
+    ("Reserved", "These and the vendor's reserved colours", Spots::Reserved),
+    ("Off", "None, everything in process inks", Spots::None),
+];
+
+const FOILS: [(&str, &str, bool); 2] =
+    [("Off", "Never", false), ("On", "Where the page names them (never tried)", true)];
+
+const PLACE: [(&str, &str, Place); 2] = [
+    ("Page", "Where the page has it", Place::Page),
+    ("Centre", "What is drawn in the middle of the sheet", Place::Centre),
+];
 
 const WHITE: [(&str, &str, White); 5] = [
-    ("None", "None", White::None),
+    ("None", "Only what the page names", White::None),
     ("Under", "Under every ink", White::Under),
     ("Reserved", "Where the page has the reserved white 230,230,230", White::Reserved),
     ("Opaque", "Where the page is not pure white", White::Opaque),
@@ -55,7 +93,7 @@ const WHITE: [(&str, &str, White); 5] = [
 ];
 
 const FINISH: [(&str, &str, Finish); 3] = [
-    ("None", "None", Finish::None),
+    ("None", "Only what the page names", Finish::None),
     ("Artwork", "On what is drawn", Finish::Artwork),
     ("All", "On the whole page", Finish::All),
 ];
@@ -82,15 +120,19 @@ fn texts<'a>(rows: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<(String, Str
 
 /// All options, in the order of the dialog.
 pub fn all() -> Vec<DialogOption> {
-    let option = |keyword, text, choices| DialogOption { keyword, text, choices };
+    let option = |keyword, text, choices| DialogOption { keyword, text, choices, custom: None };
+    let mut place = option("FoilpressPosition", "Position", texts(PLACE.iter().map(|row| (row.0, row.1))));
+    place.custom = Some(("Corner", "Top left corner of what is drawn, such as 20x30mm"));
     vec![
         option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
         option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
-        option("FoilpressSpots", "Spot inks", texts(SPOTS.into_iter())),
+        option("FoilpressSpots", "Spot inks", texts(SPOTS.iter().map(|row| (row.0, row.1)))),
+        option("FoilpressFoils", "Foils", texts(FOILS.iter().map(|row| (row.0, row.1)))),
         option("FoilpressWhite", "White", texts(WHITE.iter().map(|row| (row.0, row.1)))),
         option("FoilpressFinish", "Glossy finish", texts(FINISH.iter().map(|row| (row.0, row.1)))),
         option("FoilpressQuality", "Quality", texts(QUALITY.iter().map(|row| (row.0, row.1)))),
         option("FoilpressCurl", "Curl correction", texts(CURL.iter().map(|row| (row.0, row.1)))),
+        place,
     ]
 }
 
@@ -112,24 +154,31 @@ impl Choices {
     /// # Errors
     /// A value in the job's options that is no choice. Defaults that are none are passed over.
     pub fn read(options: &[(String, String)], description: Option<&str>) -> Result<Choices, NoChoice> {
-        let mut numbers = [0; 7];
+        // The last one counts, as in the print system.
+        let asked = |keyword: &str| {
+            options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(keyword)).map(|(_, value)| value)
+        };
+        let mut numbers = [0; 9];
+        let mut corner = None;
         for (number, option) in numbers.iter_mut().zip(all()) {
             let find = |value: &str| option.choices.iter().position(|c| c.0.eq_ignore_ascii_case(value));
-            // The last one counts, as in the print system.
-            let asked = options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(option.keyword));
-            *number = match asked {
-                Some((_, value)) => find(value).ok_or_else(|| NoChoice {
-                    option: option.keyword,
-                    found: value.clone(),
-                    known: option.choices.iter().map(|c| c.0.as_str()).collect::<Vec<_>>().join(", "),
-                })?,
-                None => {
-                    description.and_then(|text| default_of(text, option.keyword)).and_then(find).unwrap_or(0)
-                }
+            let usual =
+                description.and_then(|text| default_of(text, option.keyword)).and_then(find).unwrap_or(0);
+            let Some(value) = asked(option.keyword) else {
+                *number = usual;
+                continue;
             };
+            match find(value) {
+                Some(choice) => *number = choice,
+                None if option.custom.is_some() => corner = Some(read_corner(&option, value)?),
+                None => return Err(option.no_choice(value)),
+            }
         }
-        let [media, inks, spots, white, finish, quality, curl] = numbers;
+        let [media, inks, spots, foils, white, finish, quality, curl, place] = numbers;
         let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
+        let is_custom = |keyword: &str| {
+            asked(keyword).is_some_and(|value| value.to_ascii_lowercase().starts_with("custom."))
+        };
         Ok(Choices {
             media: Media::all().nth(media).unwrap_or_default(),
             curl_correction: CURL[curl].2,
@@ -138,12 +187,36 @@ impl Choices {
                 1 => InkSet::of([Ink::Black]),
                 _ => InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow]),
             },
-            spots: spots == 1,
+            spots: SPOTS[spots].2,
+            foils: FOILS[foils].2,
             white: WHITE[white].2,
             finish: FINISH[finish].2,
             dpi: QUALITY[quality].2,
+            place: corner.map_or(PLACE[place].2, Place::At),
+            mirror: ["MirrorPrint", "mirror"]
+                .into_iter()
+                .any(|keyword| asked(keyword).is_some_and(|value| value.eq_ignore_ascii_case("true"))),
+            custom_paper: ["PageSize", "media"].into_iter().any(is_custom),
+            profile: description.map_or_else(Profile::default, ppd::profile_in),
         })
     }
+}
+
+impl DialogOption {
+    fn no_choice(&self, found: &str) -> NoChoice {
+        let mut known: Vec<&str> = self.choices.iter().map(|choice| choice.0.as_str()).collect();
+        known.extend(self.custom.map(|(_, words)| words));
+        NoChoice { option: self.keyword, found: found.into(), known: known.join(", ") }
+    }
+}
+
+/// A place as dialogs write it, `Custom.20x30mm`, or as people do.
+fn read_corner(option: &DialogOption, value: &str) -> Result<Point, NoChoice> {
+    let bare = match value.get(..7) {
+        Some(head) if head.eq_ignore_ascii_case("custom.") => &value[7..],
+        _ => value,
+    };
+    bare.parse().map_err(|_| option.no_choice(value))
 }
 
 /// `*DefaultKEYWORD: value` in a printer description.
@@ -220,7 +293,7 @@ mod tests {
         let usual = Choices::read(&[], None).unwrap();
         assert_eq!(
             (usual.media, usual.white, usual.dpi, usual.spots),
-            (Media::Plain, White::None, 600, false)
+            (Media::Plain, White::None, 600, Spots::Named)
         );
         let description =
             "*DefaultMediaType: GlossyPaper\n*DefaultFoilpressWhite: Under\n*DefaultFoilpressCurl: Nonsense";
@@ -233,6 +306,18 @@ mod tests {
             [pair("FoilpressWhite", "Opaque"), pair("mediatype", "cardboard"), pair("FoilpressCurl", "off")];
         let job = Choices::read(&job, Some(description)).unwrap();
         assert_eq!((job.media, job.white, job.curl_correction), (Media::Cardboard, White::Opaque, false));
+    }
+
+    #[test]
+    fn a_position_is_read_as_dialogs_and_as_people_write_it() {
+        let place = |value: &str| Choices::read(&[pair("FoilpressPosition", value)], None).map(|c| c.place);
+        let at = Ok(Place::At("20x30mm".parse().unwrap()));
+        assert_eq!(place("Custom.20x30mm"), at);
+        assert_eq!(place("20x30mm"), at);
+        assert_eq!(place("centre"), Ok(Place::Centre));
+        assert_eq!(Choices::read(&[], None).unwrap().place, Place::Page);
+        let error = place("left").unwrap_err().to_string();
+        assert!(error.contains("Centre") && error.contains("20x30mm"), "{error}");
     }
 
     #[test]

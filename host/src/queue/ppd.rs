@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use protocol::paper::{LEFT, Paper};
 
 use super::options;
+use crate::layout::{self, Mm, Point, Profile};
 use crate::simulate::Stock;
 
 /// What the filter makes.
@@ -18,6 +19,10 @@ pub const JOB_TYPE: &str = "application/vnd.foilpress-rgl";
 pub const TYPES: &str = "\
 # Jobs for ALPS MD printers: they begin with the command that selects the printer's language, or with a reset before it.\n\
 application/vnd.foilpress-rgl rgl string(0,<1B258041>) string(0,<1B651B258041>)\n";
+
+/// What a queue's description says of its machine.
+const OFFSET: &str = "FoilpressOffset";
+const FEED: &str = "FoilpressFeed";
 
 /// Papers and what dialogs call them.
 const PAPERS: [(Paper, &str, &str); 6] = [
@@ -52,23 +57,25 @@ fn sheet(paper: Paper) -> (String, String) {
     (width.into(), length.into())
 }
 
-/// The paper whose sheet has this size in points, within 2 mm.
-pub fn paper_of(width: f64, length: f64) -> Option<Paper> {
-    const NEAR: f64 = 2.0 * 72.0 / 25.4;
-    PAPERS.into_iter().map(|(paper, ..)| paper).find(|&paper| {
-        let stock = Stock::of(paper);
-        let at = |dots: u16| f64::from(dots) * 72.0 / 600.0;
-        (at(stock.width) - width).abs() < NEAR && (at(stock.length) - length).abs() < NEAR
-    })
+/// The paper of a sheet of so many millimetres: a known one that is as large within 2 mm, unless a sheet of its own size is
+/// meant; otherwise that.
+///
+/// # Errors
+/// In words: a sheet that the machine cannot take.
+pub fn paper_of(width: f64, length: f64, custom: bool) -> Result<Paper, String> {
+    const NEAR: f64 = 2.0;
+    let known = PAPERS.into_iter().map(|(paper, ..)| paper).find(|&paper| {
+        let (across, down) = layout::paper::sheet_mm(paper);
+        (across - width).abs() < NEAR && (down - length).abs() < NEAR
+    });
+    match known {
+        Some(paper) if !custom => Ok(paper),
+        _ => layout::paper::custom(Mm(width), Mm(length)),
+    }
 }
 
-/// Names of the papers, for messages.
-pub fn papers() -> String {
-    PAPERS.map(|(_, name, _)| name).join(", ")
-}
-
-/// The printer description.
-pub fn description() -> String {
+/// The printer description, for a machine as its profile says.
+pub fn description(profile: &Profile) -> String {
     let mut text = format!(
         "*PPD-Adobe: \"4.3\"\n\
          *FormatVersion: \"4.3\"\n\
@@ -100,9 +107,12 @@ pub fn description() -> String {
          *Resolution 600dpi/600 dpi: \"\"\n",
         version = env!("CARGO_PKG_VERSION"),
     );
+    let [x, y] = profile.offset_mm;
+    // Writing to a string does not fail, here and below.
+    let _ = writeln!(text, "*{OFFSET}: \"{x} {y}\"\n*{FEED}: \"{}\"", profile.feed);
     papers_into(&mut text);
     for option in options::all() {
-        // The first choice is the default; writing to a string does not fail.
+        // The first choice is the default.
         let (keyword, first) = (option.keyword, &option.choices[0].0);
         let _ = write!(
             text,
@@ -113,6 +123,13 @@ pub fn description() -> String {
             let _ = writeln!(text, "*{keyword} {choice}/{}: \"\"", translation(words));
         }
         let _ = writeln!(text, "*CloseUI: *{keyword}");
+        if let Some((name, words)) = option.custom {
+            let _ = write!(
+                text,
+                "*Custom{keyword} True: \"\"\n*ParamCustom{keyword} {name}/{}: 1 string 0 40\n",
+                translation(words)
+            );
+        }
     }
     text.push_str(
         "\n*OpenUI *MirrorPrint/Mirror, for what is seen from behind: Boolean\n\
@@ -162,11 +179,58 @@ fn papers_into(text: &mut String) {
             points(top)
         );
     }
+    custom_papers_into(text);
     text.push_str("\n*DefaultPaperDimension: A4\n");
     for (paper, name, words) in PAPERS {
         let (width, length) = sheet(paper);
         let _ = writeln!(text, "*PaperDimension {name}/{words}: \"{width} {length}\"");
     }
+}
+
+/// Sheets of sizes of their own.
+fn custom_papers_into(text: &mut String) {
+    let (Point(narrowest, shortest), Point(widest, longest)) = layout::paper::custom_range();
+    // Inwards to a hundredth of a point, so that what is declared goes in.
+    let least = |side: Mm| (side.0 * 7200.0 / 25.4).ceil() / 100.0;
+    let most = |side: Mm| (side.0 * 7200.0 / 25.4).floor() / 100.0;
+    let [left, top, right, bottom] =
+        layout::paper::custom_margins().map(|margin| points(margin.dots() as f64));
+    let _ = write!(
+        text,
+        "\n*VariablePaperSize: True\n*MaxMediaWidth: \"{}\"\n*MaxMediaHeight: \"{}\"\n\
+         *HWMargins: {left} {bottom} {right} {top}\n\
+         *NonUIOrderDependency: 10 AnySetup *CustomPageSize True\n\
+         *CustomPageSize True: \"pop pop pop <</PageSize[5 -2 roll]/ImagingBBox null>>setpagedevice\"\n\
+         *ParamCustomPageSize Width: 1 points {} {}\n\
+         *ParamCustomPageSize Height: 2 points {} {}\n\
+         *ParamCustomPageSize WidthOffset: 3 points 0 0\n\
+         *ParamCustomPageSize HeightOffset: 4 points 0 0\n\
+         *ParamCustomPageSize Orientation: 5 int 0 0\n",
+        most(widest),
+        most(longest),
+        least(narrowest),
+        most(widest),
+        least(shortest),
+        most(longest)
+    );
+}
+
+/// The machine of a printer description, as far as it says; nonsense is passed over.
+pub fn profile_in(description: &str) -> Profile {
+    let numbers = |keyword: &str| -> Option<Vec<f64>> {
+        let value = description
+            .lines()
+            .find_map(|line| line.strip_prefix('*')?.strip_prefix(keyword)?.strip_prefix(':'))?;
+        value.trim().trim_matches('"').split_whitespace().map(|number| number.parse().ok()).collect()
+    };
+    let mut profile = Profile::default();
+    if let Some(&[x, y]) = numbers(OFFSET).as_deref() {
+        profile.offset_mm = [x, y];
+    }
+    if let Some(&[feed]) = numbers(FEED).as_deref() {
+        profile.feed = feed;
+    }
+    if profile.problem().is_some() { Profile::default() } else { profile }
 }
 
 #[cfg(test)]
@@ -175,13 +239,51 @@ mod tests {
 
     #[test]
     fn a_page_of_points_is_the_paper_it_was_declared_as() {
+        let mm = |points: f64| points * 25.4 / 72.0;
         for (paper, ..) in PAPERS {
             let (width, length) = sheet(paper);
-            assert_eq!(paper_of(width.parse().unwrap(), length.parse().unwrap()), Some(paper));
+            let (width, length) = (mm(width.parse().unwrap()), mm(length.parse().unwrap()));
+            assert_eq!(paper_of(width, length, false), Ok(paper));
         }
-        assert_eq!(paper_of(595.276, 841.89), Some(Paper::A4));
-        assert_eq!(paper_of(842.0, 595.0), None, "A4 on its side does not go in");
-        assert_eq!(paper_of(f64::NAN, 842.0), None);
+        assert_eq!(paper_of(mm(595.276), mm(841.89), false), Ok(Paper::A4));
+        assert!(paper_of(297.0, 210.0, false).is_err(), "A4 on its side does not go in");
+        assert!(paper_of(f64::NAN, 297.0, false).is_err());
+    }
+
+    #[test]
+    fn a_sheet_of_its_own_size_is_that_and_not_the_paper_that_is_nearly_as_large() {
+        let custom = |width, length| paper_of(width, length, true);
+        assert_eq!(paper_of(101.0, 149.0, false), Ok(Paper::Postcard));
+        // Margins of A4: 80 dots left and right, 284 at the top, 360 at the bottom.
+        let dots = |mm: f64| (mm * 600.0 / 25.4).round() as u16;
+        let expected = Paper::Custom { width: dots(101.0) - 160, length: dots(149.0) - 644 };
+        assert_eq!(custom(101.0, 149.0), Ok(expected));
+        assert_eq!(paper_of(120.0, 180.0, false), custom(120.0, 180.0));
+    }
+
+    #[test]
+    fn the_largest_and_the_smallest_declared_sheet_go_in() {
+        let text = description(&Profile::default());
+        let range = |name: &str| -> [f64; 2] {
+            let line =
+                text.lines().find_map(|line| line.strip_prefix(&format!("*ParamCustomPageSize {name}: ")));
+            let mut numbers =
+                line.unwrap().split(' ').skip(2).map(|n| n.parse::<f64>().unwrap() * 25.4 / 72.0);
+            [numbers.next().unwrap(), numbers.next().unwrap()]
+        };
+        let (widths, lengths) = (range("Width"), range("Height"));
+        for at in 0..2 {
+            assert!(paper_of(widths[at], lengths[at], true).is_ok(), "{} x {}", widths[at], lengths[at]);
+        }
+        assert!(widths[1] > 215.5 && lengths[1] > 355.0 && widths[0] < 20.0 && lengths[0] < 40.0);
+    }
+
+    #[test]
+    fn a_machine_is_in_the_description_of_its_queue() {
+        let machine = Profile { offset_mm: [0.25, -1.5], feed: 1.0015 };
+        assert_eq!(profile_in(&description(&machine)), machine);
+        assert_eq!(profile_in("*FoilpressOffset: \"99 0\"\n"), Profile::default());
+        assert_eq!(profile_in("*FoilpressOffset: \"\"\n*FoilpressFeed: x\n"), Profile::default());
     }
 
     #[test]
@@ -192,7 +294,7 @@ mod tests {
     #[test]
     fn the_margins_are_those_measured_on_paper() {
         // A4 on hardware: left 3.39 mm, top 12.03 mm, right 3.41 mm, bottom 15.23 mm.
-        let text = description();
+        let text = description(&Profile::default());
         let line = text.lines().find_map(|line| line.strip_prefix("*ImageableArea A4/A4: ")).unwrap();
         let area: Vec<f64> = line.trim_matches('"').split(' ').map(|n| n.parse().unwrap()).collect();
         let mm = |points: f64| points * 25.4 / 72.0;
@@ -205,7 +307,7 @@ mod tests {
 
     #[test]
     fn a_line_of_the_description_is_never_too_long() {
-        for line in description().lines() {
+        for line in description(&Profile::default()).lines() {
             assert!(line.len() <= 255, "{line}");
         }
     }

@@ -14,6 +14,7 @@ pub mod journal;
 pub mod log;
 pub mod query;
 pub mod raw;
+mod record;
 mod run;
 pub mod session;
 pub mod status;
@@ -24,7 +25,7 @@ pub mod wiring;
 pub mod words;
 
 pub use address::{Address, Destination, NoDestination, OpenError};
-pub use run::{Event, RunError, Wish, run, run_while};
+pub use run::{Event, RunError, Wish, run, run_at, run_while};
 
 use protocol::ink::Ink;
 

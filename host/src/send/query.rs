@@ -29,6 +29,22 @@ pub enum Reply {
     Stopped(Fault),
 }
 
+impl Reply {
+    /// A device ID as text: what follows the two bytes of its length.
+    pub fn device_id(&self) -> Option<String> {
+        let Reply::Bytes(bytes) = self else { return None };
+        let printable = |byte: &&u8| byte.is_ascii_graphic() || **byte == b' ';
+        Some(bytes.get(2..)?.iter().filter(printable).map(|&byte| char::from(byte)).collect())
+    }
+}
+
+/// Whether a device ID names the maker of these printers.
+pub fn is_alps(id: &str) -> bool {
+    id.split(';').filter_map(|field| field.split_once(':')).any(|(key, value)| {
+        (key.trim().ends_with("MANUFACTURER") || key.trim().ends_with("MFG")) && value.trim() == "ALPS"
+    })
+}
+
 /// Why a question got no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum QueryError {
@@ -144,6 +160,14 @@ impl<'t> Query<'t> {
             Heard::Answer(request, reply) if request == number => Some(reply),
             _ => None,
         })
+    }
+
+    /// What the printer says it is. Nothing if it cannot be asked now: one that takes no bytes is not, nor one at work.
+    pub fn device_id(&mut self, patience: Duration, printer: Duration) -> Option<String> {
+        match self.lines(patience) {
+            Ok((_, None)) => self.printer(Ask::DeviceId, printer).ok()?.device_id(),
+            _ => None,
+        }
     }
 
     /// Sets the port's outputs (Data1..Data8; nStrobe, nAutoFd, nInit, nSelectIn from bit 0) and reads the inputs when they
@@ -321,4 +345,25 @@ fn heard(message: &[u8]) -> Option<Heard> {
         }
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_printers_own_device_id_is_known_and_anothers_is_not() {
+        assert!(is_alps("MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER"));
+        assert!(!is_alps("MFG:Hewlett-Packard;MDL:LaserJet;COMMENT:not ALPS"));
+    }
+
+    #[test]
+    fn the_length_of_a_device_id_is_no_part_of_its_text() {
+        // 75 bytes: the second byte of the length is a letter.
+        let id = "MANUFACTURER:ALPS   ;COMMAND SET:RGL;MODEL:MD-5500_T-03   ;CLASS:PRINTER;";
+        let reply = Reply::Bytes([&[0, b'K'], id.as_bytes()].concat());
+        assert_eq!(reply.device_id().as_deref(), Some(id));
+        assert_eq!(Reply::Bytes(vec![0]).device_id(), None);
+        assert_eq!(Reply::Silent.device_id(), None);
+    }
 }

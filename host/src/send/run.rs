@@ -3,11 +3,13 @@
 //! The first link has to come at once, so that a wrong name is told; after that the bridge may be away for as long as it
 //! likes: it prints what it holds, and the job goes on where it stands when the cable is back.
 
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use protocol::link::message::{Fault, Progress};
 
-use super::address::OpenError;
+use super::address::{Address, OpenError};
+use super::find;
 use super::session::{Bridge, Outcome, Record, Session, SessionError};
 use super::transport::Transport;
 
@@ -104,6 +106,25 @@ pub fn run_while<E: std::error::Error>(
             None => return Err(RunError::NoAnswer(0)),
         }
     }
+}
+
+/// [`run_while`] with the bridge at an address. Once a bridge has introduced itself it is that one, whatever its port is
+/// called when it comes back.
+pub fn run_at<E: std::error::Error>(
+    session: &mut Session<'_>,
+    address: &Address,
+    save: &mut dyn FnMut(&Record) -> Result<(), E>,
+    watch: &mut dyn FnMut(Event<'_>),
+    wish: &mut dyn FnMut() -> Wish,
+) -> Result<Outcome, RunError<E>> {
+    let known = Cell::new(session.record().bridge);
+    let mut watch = |event: Event<'_>| {
+        if let Event::Connected(bridge) = &event {
+            known.set(Some(bridge.serial));
+        }
+        watch(event);
+    };
+    run_while(session, &mut || find::open(address, known.get()), save, &mut watch, wish)
 }
 
 /// Opens the link again, however long that takes; `None` when the caller wishes to be let go.

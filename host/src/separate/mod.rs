@@ -4,8 +4,7 @@
 //! Method: the shortest list of inks in which every stack in use finds its layers in order (`order`), one plane for
 //! each (`pack`), the rules on stacks and pages as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
-//! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_CARTRIDGES`] inks,
-//! [`MOST_LAYERS`] layers.
+//! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_LAYERS`] layers.
 
 pub mod files;
 mod order;
@@ -25,7 +24,7 @@ pub use inks::{Certainty, Severity};
 pub use order::place as customary;
 pub use rules::Check;
 
-/// Places for cartridges in the machine.
+/// Cartridges the machine holds.
 pub const MOST_CARTRIDGES: usize = 7;
 
 /// Most passes over one sheet. The longest job known on hardware had 7.
@@ -77,7 +76,7 @@ pub struct Planned {
 pub struct Plan {
     /// The passes, first printed (lowest) first.
     pub passes: Vec<Planned>,
-    /// The cartridges to load, in the order of their first use; [`MOST_CARTRIDGES`] at most.
+    /// The cartridges, in the order of their first use.
     pub cartridges: Vec<Ink>,
     /// Whether it is certain that fewer passes cannot do.
     pub fewest: bool,
@@ -98,19 +97,23 @@ pub struct Separation {
     pub checks: Vec<Check>,
 }
 
+impl Separation {
+    /// Takes back what the checks say of stacks without a dot on the pieces: marks are cut off. What must not be printed
+    /// stays so wherever it is.
+    pub fn spare_marks(&mut self, on_pieces: impl Fn(&Stack) -> bool) {
+        self.checks.retain_mut(|check| {
+            let all = check.stacks.len();
+            if check.severity != Severity::Error {
+                check.stacks.retain(&on_pieces);
+            }
+            all == 0 || !check.stacks.is_empty()
+        });
+    }
+}
+
 /// Why a sheet cannot be separated, or passes make no sheet.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SeparateError {
-    /// More inks than places.
-    #[error(
-        "the sheet needs {} cartridges ({}), the machine holds {MOST_CARTRIDGES}; \
-         allow fewer inks when mapping the document",
-        inks.len(), names(inks)
-    )]
-    Cartridges {
-        /// The inks.
-        inks: Vec<Ink>,
-    },
     /// A stack is too high.
     #[error("stack `{stack}` has {} layers; at most {MOST_LAYERS} can be printed", stack.layers().len())]
     Layers {
@@ -186,7 +189,9 @@ pub fn check(sheet: &Sheet, passes: &[Planned], order: &[Rule]) -> Vec<Check> {
 /// Separates a sheet into passes. Only stacks that occur on a dot count. `order` are the ink library's rules on the
 /// order of layers ([`inks::Library::rules`]).
 ///
-/// Errors: more than [`MOST_CARTRIDGES`] inks, [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
+/// More than [`MOST_CARTRIDGES`] inks are planned, with a check that forbids to send them.
+///
+/// Errors: more than [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
 pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
@@ -194,11 +199,6 @@ pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Resul
         sheet.stacks().iter().enumerate().filter(|(q, _)| census[*q] > 0 || *q == 0).collect();
     if let Some((_, stack)) = used.iter().find(|(_, stack)| stack.layers().len() > MOST_LAYERS) {
         return Err(SeparateError::Layers { stack: (*stack).clone() });
-    }
-    let all = Ink::ALL.into_iter();
-    let inks: Vec<Ink> = all.filter(|ink| used.iter().any(|(_, s)| s.layers().contains(ink))).collect();
-    if inks.len() > MOST_CARTRIDGES {
-        return Err(SeparateError::Cartridges { inks });
     }
     let order::Order { inks, shortest } =
         order::order(&used.iter().map(|(_, stack)| stack.layers()).collect::<Vec<_>>());
@@ -367,11 +367,19 @@ mod tests {
     }
 
     #[test]
-    fn more_than_the_machine_holds_is_refused() {
+    fn more_than_the_machine_holds_is_planned_and_must_not_be_printed() {
         let inks = ["substrate", "K", "C", "M", "Y", "MG", "MM", "MC", "MS"];
-        assert!(separate(&page(&inks[..8]), &[], &Silent).is_ok());
-        let error = separate(&page(&inks), &[], &Silent).unwrap_err().to_string();
-        assert!(error.contains("8 cartridges (black, cyan") && error.contains("holds 7"), "{error}");
+        let seven = separate(&page(&inks[..8]), &[], &Silent).unwrap();
+        assert!(seven.checks.iter().all(|check| check.severity != Severity::Error));
+        let separation = separate(&page(&inks), &[], &Silent).unwrap();
+        assert_eq!((separation.passes.len(), separation.plan.cartridges.len()), (8, 8));
+        let check = &separation.checks[0];
+        assert_eq!((check.rule.as_str(), check.severity), ("cartridges", Severity::Error));
+        assert!(check.text.contains("8 cartridges") && check.text.contains("holds 7"), "{check}");
+    }
+
+    #[test]
+    fn more_layers_or_passes_than_a_sheet_takes_are_refused() {
         let high = format!("C{}", "+C".repeat(16));
         assert!(matches!(
             separate(&page(&["substrate", &high]), &[], &Silent),

@@ -6,7 +6,8 @@
 //! table of conditions on what only the page knows: how small the dots are, how much an ink covers, what is used.
 //! `check` tries each. Nothing here changes the passes. Cost: negligible, except that rules on cluster size look at
 //! the whole page once for each ink concerned.
-//! Source: the notes on the machine, sections 9 and 14; the 2009 paper, section 4.2.
+//! Source: the vendor's guides, what owners have reported, the open driver's habits, and section 4.2 of the 2009 paper; each
+//! rule's certainty says which.
 
 use std::cmp::Reverse;
 use std::fmt;
@@ -15,7 +16,7 @@ use inks::{Certainty, Rule, Severity, Stack};
 use protocol::ink::Kind;
 use serde::Serialize;
 
-use super::Plan;
+use super::{MOST_CARTRIDGES, Plan};
 use crate::halftone::metrics::smallest_clusters;
 use crate::sheet::Sheet;
 
@@ -217,6 +218,26 @@ pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, order: &[Rule]) 
             let PageRule { severity, certainty, .. } = *rule;
             checks.push(Check { rule: rule.name.into(), severity, certainty, text, stacks });
         }
+    }
+    if plan.cartridges.len() > MOST_CARTRIDGES {
+        let dots = |ink| plan.passes.iter().filter(|pass| pass.ink == ink).map(|pass| pass.dots).sum::<u64>();
+        let least = plan.cartridges.iter().copied().min_by_key(|&ink| dots(ink));
+        checks.push(Check {
+            rule: "cartridges".into(),
+            severity: Severity::Error,
+            certainty: Certainty::Vendor,
+            text: format!(
+                "{} cartridges, and the machine holds {MOST_CARTRIDGES}: one would have to be changed in the middle of the \
+                 sheet, and how long the machine holds it then is not known, so no such job is sent; leave out an ink{}",
+                plan.cartridges.len(),
+                least.map_or_else(String::new, |ink| format!(
+                    ", {} has the fewest dots ({})",
+                    ink.name(),
+                    dots(ink)
+                ))
+            ),
+            stacks: Vec::new(),
+        });
     }
     checks.sort_by_key(|check| Reverse(check.severity));
     checks

@@ -30,17 +30,41 @@ fn tint(ink: Ink) -> [f64; 3] {
     }
 }
 
+/// How an ink looks in a print, 0..=1, sRGB: as its label, but for the clear ones, which have no colour of their own. By the ink
+/// library's model finish takes a tenth of the light that what lies beneath it gives back, primer a thirtieth, nearly the
+/// same of all colours.
+fn seen(ink: Ink) -> [f64; 3] {
+    match ink.kind() {
+        Kind::Finish => [0.955; 3],
+        Kind::Primer => [0.985; 3],
+        _ => tint(ink),
+    }
+}
+
 /// Nearly white paper, 0..=1.
 const PAPER: [f64; 3] = [0.99, 0.99, 0.98];
 
 /// How a stack looks on a screen upon a ground of this colour, both sRGB. Transparent inks tint what is below them, the
 /// others hide it. Stacks that look alike have the same colour.
 pub fn upon(stack: &Stack, ground: [u8; 3]) -> [u8; 3] {
-    // Within 0..=255: tints and grounds are.
-    look(stack, ground.map(|c| f64::from(c) / 255.0)).map(|c| c.round() as u8)
+    bytes(look(stack, fractions(ground), seen))
 }
 
-fn look(stack: &Stack, ground: [f64; 3]) -> [f64; 3] {
+/// The same for one ink to be seen by itself: clear ones are labelled with a colour that they do not have.
+pub fn label(ink: Ink, ground: [u8; 3]) -> [u8; 3] {
+    bytes(look(&Stack::new([ink]), fractions(ground), tint))
+}
+
+fn fractions(colour: [u8; 3]) -> [f64; 3] {
+    colour.map(|c| f64::from(c) / 255.0)
+}
+
+fn bytes(colour: [f64; 3]) -> [u8; 3] {
+    // Within 0..=255: tints and grounds are.
+    colour.map(|c| c.round() as u8)
+}
+
+fn look(stack: &Stack, ground: [f64; 3], tint: impl Fn(Ink) -> [f64; 3]) -> [f64; 3] {
     let mut colour = ground;
     for &ink in stack.layers() {
         let tint = tint(ink);
@@ -67,7 +91,7 @@ pub fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
     let mut free = vec![f64::INFINITY; grid.len()];
     let mut taken: Vec<[f64; 3]> = Vec::with_capacity(stacks.len());
     for stack in stacks {
-        let wanted = look(stack, PAPER).map(f64::round);
+        let wanted = look(stack, PAPER, tint).map(f64::round);
         let nearest = taken.iter().map(|&other| distance(wanted, other)).fold(f64::INFINITY, f64::min);
         let mut far = FAR;
         let colour = loop {
@@ -93,6 +117,26 @@ pub fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use inks::Library;
+
+    #[test]
+    fn clear_inks_change_a_print_as_the_model_says() {
+        let library = Library::builtin();
+        // At a raking half angle there is no gloss left, only the light from beneath.
+        let beneath = |stack: &str| {
+            let entry = library.entry(&stack.parse().unwrap()).unwrap();
+            entry.curve_at(&[1.2]).rgb()[0]
+        };
+        let light = |v: u8| f64::from(crate::document::picture::decode_srgb(f32::from(v) / 255.0));
+        for clear in ["F", "P"] {
+            let (film, bare) = (beneath(clear), beneath("substrate"));
+            let shown = upon(&clear.parse().unwrap(), [255; 3]);
+            for c in 0..3 {
+                let (shown, modelled) = (light(shown[c]), film[c] / bare[c]);
+                assert!((shown - modelled).abs() < 0.03, "{clear}: {shown}, the model says {modelled}");
+            }
+        }
+    }
 
     #[test]
     fn colours_differ_and_plain_inks_look_like_themselves() {

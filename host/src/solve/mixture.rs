@@ -14,15 +14,12 @@
 //! times the target; there the gap bounds the error, elsewhere several starts are the only assurance.
 //! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
 
-use crate::brdf::{Space, Table};
-
 use super::gram::{Gram, inner_products};
+use super::hull::{DARKEST, Hull, MixtureError, Target};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
 use super::vector::{add_scaled, dot};
 
-/// Price of one layer of ink, in units of squared distance: what a tie is decided by.
-pub const LAYER_PRICE: f64 = 1e-6;
 /// Relative drop of the objective below which the search ends.
 const DROP: f64 = 1e-12;
 /// Steps taken at most; ten times what the slowest of a thousand random problems needs.
@@ -31,66 +28,8 @@ const MOST_STEPS: u32 = 100;
 const MOST_HALVINGS: u32 = 30;
 /// Stacks that may join the mixture in one step.
 const MOST_JOINING: usize = 12;
-/// Darkest radiance told apart from black, relative to the brightest of any stack.
-const DARKEST: f64 = 1e-12;
 /// Two starts agree when their distances differ by less than this.
 const AGREEMENT: f64 = 1e-6;
-
-/// Why there is no mixture.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum MixtureError {
-    /// There is nothing to mix.
-    #[error("there is no stack to mix from")]
-    NoStacks,
-    /// The stacks or the target are in another tabulation.
-    #[error("{what} has {found} columns where the space has {expected}")]
-    Columns {
-        /// What was given.
-        what: &'static str,
-        /// Columns of the space.
-        expected: usize,
-        /// Columns found.
-        found: usize,
-    },
-    /// As many prices as stacks are needed.
-    #[error("{stacks} stacks need as many prices and weights, not {found}")]
-    Length {
-        /// Stacks.
-        stacks: usize,
-        /// Numbers given.
-        found: usize,
-    },
-    /// A reflectance is not a number, infinite or negative.
-    #[error("{what}, column {column}: a reflectance of {value} is not a finite number of 0 or more")]
-    Value {
-        /// What was given.
-        what: &'static str,
-        /// The column.
-        column: usize,
-        /// The value.
-        value: f64,
-    },
-    /// The numbers are so large or small that products of them overflow.
-    #[error(transparent)]
-    Simplex(#[from] SimplexError),
-}
-
-/// The stacks as the metric sees them: reflected radiance, weights of the columns, prices.
-#[derive(Clone, Debug)]
-pub struct Hull {
-    radiance: Vec<f64>,
-    weight: Vec<f64>,
-    rows: Table,
-    price: Vec<f64>,
-    darkest: f64,
-}
-
-/// A target as the metric sees it.
-#[derive(Clone, Debug, Default)]
-pub struct Target {
-    radiance: Vec<f64>,
-    root: Vec<f64>,
-}
 
 /// What is known of a mixture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,20 +44,6 @@ pub struct Fit {
     pub convex: bool,
 }
 
-impl Target {
-    /// Integral of the cube root of the target's radiance over the metric's measure, all channels.
-    pub fn brightness(&self, hull: &Hull) -> f64 {
-        self.root.iter().zip(&hull.weight).map(|(root, w)| root * w * w).sum()
-    }
-}
-
-impl Fit {
-    /// A distance no mixture can be below, by the gap (a bound where [`Fit::convex`]).
-    pub fn at_least(&self) -> f64 {
-        (self.distance * self.distance - self.gap).max(0.0).sqrt()
-    }
-}
-
 /// The best mixture over several starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Best {
@@ -130,127 +55,6 @@ pub struct Best {
     pub starts: usize,
     /// How many of them reached the same distance, within 1e-6.
     pub agreeing: usize,
-}
-
-impl Hull {
-    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared
-    /// distance: [`LAYER_PRICE`] times its layers, or 0.
-    pub fn new(space: &Space, curves: &Table, price: &[f64]) -> Result<Hull, MixtureError> {
-        let m = space.columns();
-        if curves.is_empty() {
-            return Err(MixtureError::NoStacks);
-        }
-        if curves.columns() != m {
-            return Err(MixtureError::Columns { what: "a stack", expected: m, found: curves.columns() });
-        }
-        if price.len() != curves.len() {
-            return Err(MixtureError::Length { stacks: curves.len(), found: price.len() });
-        }
-        let mut rows = Table::new(m);
-        let mut brightest = 0.0f64;
-        let mut radiance = vec![0.0; m];
-        for row in curves.rows() {
-            for (j, (&f, c)) in row.iter().zip(space.radiance()).enumerate() {
-                if !(f.is_finite() && f >= 0.0) {
-                    return Err(MixtureError::Value { what: "a stack", column: j, value: f });
-                }
-                radiance[j] = f * c;
-                brightest = brightest.max(radiance[j]);
-            }
-            rows.push(&radiance);
-        }
-        let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
-        Ok(Hull {
-            radiance: space.radiance().to_vec(),
-            weight: space.weight().to_vec(),
-            rows,
-            price: price.to_vec(),
-            darkest: darkest.max(f64::MIN_POSITIVE),
-        })
-    }
-
-    /// The hull of some of the stacks.
-    pub fn subset(&self, stacks: &[usize]) -> Hull {
-        let mut rows = Table::new(self.rows.columns());
-        stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
-        let price = stacks.iter().map(|&k| self.price[k]).collect();
-        Hull { radiance: self.radiance.clone(), weight: self.weight.clone(), rows, price, ..*self }
-    }
-
-    /// Number of stacks.
-    pub fn len(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Never: a hull has at least one stack.
-    pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    /// Number of columns.
-    pub fn columns(&self) -> usize {
-        self.rows.columns()
-    }
-
-    /// A target from a row of reflectance (1/sr). Values below 0 count as 0.
-    pub fn target(&self, reflectance: &[f64]) -> Result<Target, MixtureError> {
-        let mut target = Target::default();
-        self.aim(reflectance.iter().copied(), &mut target)?;
-        Ok(target)
-    }
-
-    /// The same into an existing target, without allocating when it has been used before.
-    pub fn aim(
-        &self,
-        reflectance: impl ExactSizeIterator<Item = f64>,
-        target: &mut Target,
-    ) -> Result<(), MixtureError> {
-        let m = self.columns();
-        if reflectance.len() != m {
-            return Err(MixtureError::Columns { what: "the target", expected: m, found: reflectance.len() });
-        }
-        target.radiance.clear();
-        target
-            .radiance
-            .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
-        target.root.clear();
-        target.root.resize(m, 0.0);
-        for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
-            // Zero and what is too small for the root are black.
-            let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));
-            *root = t * r * r;
-        }
-        match target.radiance.iter().position(|t| !t.is_finite()) {
-            Some(column) => {
-                Err(MixtureError::Value { what: "the target", column, value: target.radiance[column] })
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// The distance d of a mixture to a target.
-    pub fn distance(&self, weights: &[f64], target: &Target) -> f64 {
-        let mut mix = vec![0.0; self.columns()];
-        self.mix(weights, &mut mix);
-        let mut sum = 0.0;
-        for ((w, &f), root) in self.weight.iter().zip(&mix).zip(&target.root) {
-            let f = f.max(self.darkest);
-            let r = inverse_cbrt(f);
-            let d = w * (f * r * r - root);
-            sum += d * d;
-        }
-        sum.sqrt()
-    }
-
-    /// Reflected radiance of a mixture.
-    fn mix(&self, weights: &[f64], out: &mut [f64]) {
-        out.fill(0.0);
-        for (k, &w) in weights.iter().enumerate() {
-            if w != 0.0 {
-                add_scaled(out, w, self.rows.row(k));
-            }
-        }
-    }
 }
 
 /// The solver of equation 1 and its workspace. One for each thread.
@@ -346,7 +150,7 @@ impl Mixer {
 
         let mut results = Vec::with_capacity(starts.len());
         for mut a in starts {
-            let fit = self.refine(hull, target, &mut a)?;
+            let fit = self.refine(hull, target, &mut a, 0.0)?;
             let value = fit.distance * fit.distance + dot(&hull.price, &a);
             results.push((value, fit, a));
         }
@@ -398,36 +202,27 @@ impl Mixer {
         Ok(())
     }
 
-    /// Refines a start to the minimum. `a` is the start, a point of the simplex, and receives the weights.
-    pub fn refine(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::All, 0.0)
-    }
-
-    /// The same, ending when the gap (in squared distance) is at most `gap`: for a picture's worth of targets.
-    pub fn refine_to(
+    /// Refines a start until the gap (in squared distance) is at most `enough`; 0: as far as it goes. `a` is the start, a
+    /// point of the simplex, and receives the weights.
+    pub fn refine(
         &mut self,
         hull: &Hull,
         target: &Target,
         a: &mut [f64],
-        gap: f64,
+        enough: f64,
     ) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::All, gap)
+        self.descend(hull, target, a, Reach::All, enough)
     }
 
-    /// The best mixture of the stacks that have weight in `a`. The gap is over these stacks alone.
-    pub fn polish(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::Support, 0.0)
-    }
-
-    /// The same, ending when the gap (in squared distance) is at most `gap`.
-    pub fn polish_to(
+    /// The same with the stacks alone that have weight in `a`; the gap is over these.
+    pub fn polish(
         &mut self,
         hull: &Hull,
         target: &Target,
         a: &mut [f64],
-        gap: f64,
+        enough: f64,
     ) -> Result<Fit, MixtureError> {
-        self.descend(hull, target, a, Reach::Support, gap)
+        self.descend(hull, target, a, Reach::Support, enough)
     }
 
     fn descend(

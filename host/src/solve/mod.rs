@@ -4,11 +4,13 @@
 //! sequence of such quadratics.
 
 pub mod gram;
+pub mod hull;
 pub mod mixture;
 pub mod root;
 pub mod simplex;
 pub mod vector;
 
 pub use gram::{Gram, GramError};
-pub use mixture::{Best, Fit, Hull, Mixer, MixtureError, Target};
+pub use hull::{Hull, MixtureError, Target};
+pub use mixture::{Best, Fit, Mixer};
 pub use simplex::{Certificate, Simplex, SimplexError};

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each file of tests uses its own part")]
 
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -33,6 +34,15 @@ impl Bench {
         command.env("FOILPRESS_CONFIG", self.home.path().join("config"));
         command.env("FOILPRESS_JOBS", self.home.path().join("jobs"));
         command
+    }
+
+    /// Runs to the end with this typed.
+    pub fn answered(&self, args: &str, typed: &str) -> Output {
+        let mut command = self.command(args);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program starts");
+        child.stdin.take().expect("piped").write_all(typed.as_bytes()).expect("it listens");
+        child.wait_with_output().expect("it ends")
     }
 
     /// Runs to the end.

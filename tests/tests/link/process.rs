@@ -1,136 +1,30 @@
 //! Real processes, a real socket, a real journal: the sender is killed with SIGKILL again and again.
 
-use crate::model::{Planes, is_a_whole_job, memory, seeded};
-use bridge::engine::{Engine, Identity, Outcome as Done, Task};
+use crate::model::{Planes, is_a_whole_job, seeded};
+use foilpress::job::stream::write_job;
 use foilpress::observe::Silent;
 use foilpress::send::journal::{Journal, NewJob};
 use foilpress::send::query::{Query, QueryError, Reply};
 use foilpress::send::session::{Outcome, Phase, Session};
 use foilpress::send::status::Status;
-use foilpress::send::transport::{Socket, Transport, pair};
+use foilpress::send::transport::{Transport, pair};
 use foilpress::send::{self, Address, streams};
-use foilpress::simulate::{Carousel, Lever, Printer, STATUS_LENGTH, Trouble};
+use foilpress::separate::{Pass, Plane};
+use foilpress_tests::served::{Bridge, Port};
 use protocol::ink::Ink;
-use protocol::link::frame::{MAX, Reader};
-use protocol::link::message::{Answer, Ask, Fault, JobKind, JobState, Lines};
+use protocol::link::message::{Ask, JobKind, JobState, Lines};
+use protocol::paper::Paper;
+use protocol::rgl::Page;
 use rand::RngExt;
-use std::io::{BufRead as _, BufReader, Read as _};
-use std::os::unix::net::UnixListener;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::OnceLock;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Says in the child what it is to send.
 const ROLE: &str = "FOILPRESS_TEST_SENDER";
-
-/// What a test sees of its bridge and does to it.
-#[derive(Default)]
-struct Board {
-    printed: Mutex<Vec<u8>>,
-    /// The printer is busy once it has taken something: the job stays open for as long as a test needs.
-    busy: AtomicBool,
-    stop: AtomicBool,
-    /// Its power goes, and its memory with it.
-    forget: AtomicBool,
-    /// The printer is switched off.
-    printer_off: AtomicBool,
-    /// The printer's cover is open.
-    open_cover: AtomicBool,
-    /// How often the printer was reset.
-    resets: AtomicUsize,
-}
-
-impl Board {
-    fn is(flag: &AtomicBool) -> bool {
-        flag.load(Ordering::Relaxed)
-    }
-}
-
-/// A bridge on a local socket that prints at most `rate` bytes a millisecond, with room for bands of `band` bytes.
-fn bridge_at(path: &Path, rate: usize, band: usize, board: &Board) {
-    let listener = UnixListener::bind(path).unwrap();
-    listener.set_nonblocking(true).unwrap();
-    let switched_on =
-        |boot| Engine::new(memory(8192, 4096, band), Identity { boot, serial: 7, firmware: "test" });
-    let mut engine = switched_on(1);
-    let mut reader = Reader::new();
-    let mut link: Option<Socket<_>> = None;
-    let mut buffer = [0; 4096];
-    while !Board::is(&board.stop) {
-        if board.forget.swap(false, Ordering::Relaxed) {
-            engine = switched_on(2);
-            reader.reset();
-            link = None;
-        }
-        if let Ok((socket, _)) = listener.accept() {
-            socket.set_nonblocking(false).unwrap();
-            engine.link_lost();
-            reader.reset();
-            link = Some(Socket::new(socket));
-        }
-        let received = match &mut link {
-            Some(link) => link.receive(&mut buffer, Duration::from_millis(1)),
-            None => {
-                std::thread::sleep(Duration::from_millis(1));
-                Ok(0)
-            }
-        };
-        match received {
-            Ok(count) => engine.receive(&mut reader, &buffer[..count]),
-            Err(_) => link = None,
-        }
-        if let Some(task) = engine.task() {
-            // What the board would do at the port.
-            let status = status(Board::is(&board.open_cover));
-            board.resets.fetch_add(usize::from(task == Task::Initialise), Ordering::Relaxed);
-            engine.done(match task {
-                Task::PrinterStatus => Done::Answer(Answer::Bytes(&status)),
-                Task::DeviceId => Done::Answer(Answer::OneWay),
-                _ => Done::Done,
-            });
-        }
-        for _ in 0..50 {
-            engine.work();
-        }
-        let off = Board::is(&board.printer_off);
-        let fault = off.then_some(Fault::PowerOff);
-        engine.port(if off { Lines(0) } else { Lines::IDLE }, fault);
-        let bytes = engine.output();
-        let mut printed = board.printed.lock().unwrap();
-        let busy = off || Board::is(&board.busy) && !printed.is_empty();
-        let count = if busy { 0 } else { bytes.len().min(rate) };
-        printed.extend_from_slice(&bytes[..count]);
-        drop(printed);
-        engine.consumed(count);
-        let mut frame = [0; MAX];
-        loop {
-            let length = engine.transmit(&mut frame);
-            if length == 0 {
-                break;
-            }
-            let mut sent = 0;
-            while let Some(open) = &mut link
-                && sent < length
-            {
-                match open.send(&frame[sent..length]) {
-                    Ok(count) => sent += count,
-                    Err(_) => link = None,
-                }
-            }
-        }
-    }
-}
-
-/// The answer of a printer with white in it.
-fn status(open_cover: bool) -> [u8; STATUS_LENGTH] {
-    let mut printer = Printer::new(Carousel::new(&[Ink::White.into()]).unwrap(), Lever::Manual);
-    if open_cover {
-        printer.strike(Trouble::CoverOpen);
-    }
-    printer.status()
-}
 
 /// Goes on with the only job in the journal.
 fn resume(folder: &Path, cancel: bool) -> Outcome {
@@ -163,34 +57,29 @@ fn spawn(folder: &Path) -> Child {
         .unwrap()
 }
 
+/// The largest of some.
+fn random_job(seed: u64) -> Vec<u8> {
+    let mut random = seeded(seed);
+    (0..20).map(|_| Planes::random(&mut random).printed()).max_by_key(Vec::len).unwrap()
+}
+
 /// A bridge, and a folder with a journal.
 struct Bench {
     folder: tempfile::TempDir,
-    board: Arc<Board>,
-    thread: Option<std::thread::JoinHandle<()>>,
+    bridge: Bridge,
     job: Vec<u8>,
 }
 
 impl Bench {
+    /// A random job, and a printer that takes so many bytes a millisecond.
     fn new(seed: u64, rate: usize) -> Bench {
-        Bench::with_band(seed, rate, 40_000)
+        Bench::with(random_job(seed), Port::new(&[Ink::White], rate))
     }
 
-    fn with_band(seed: u64, rate: usize, band: usize) -> Bench {
+    fn with(job: Vec<u8>, port: Port) -> Bench {
         let folder = tempfile::tempdir().unwrap();
-        let socket = folder.path().join("bridge");
-        let board = Arc::<Board>::default();
-        let thread = {
-            let (socket, board) = (socket.clone(), board.clone());
-            std::thread::spawn(move || bridge_at(&socket, rate, band, &board))
-        };
-        while !socket.exists() {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        // The largest of some random jobs.
-        let mut random = seeded(seed);
-        let job = (0..20).map(|_| Planes::random(&mut random).printed()).max_by_key(Vec::len).unwrap();
-        Bench { folder, board, thread: Some(thread), job }
+        let bridge = Bridge::on_unix(&folder.path().join("bridge"), port).unwrap();
+        Bench { folder, bridge, job }
     }
 
     /// Puts the job into the journal.
@@ -220,7 +109,7 @@ impl Bench {
     }
 
     fn printed(&self) -> Vec<u8> {
-        self.board.printed.lock().unwrap().clone()
+        self.bridge.printed()
     }
 
     fn until_it_prints(&self) {
@@ -239,7 +128,7 @@ impl Bench {
     }
 
     fn keep_busy(&self, busy: bool) {
-        self.board.busy.store(busy, Ordering::Relaxed);
+        self.bridge.port.busy.store(busy, Ordering::Relaxed);
     }
 
     /// The program itself, with the job in a file beside the journal.
@@ -250,10 +139,28 @@ impl Bench {
             .args(args.replace("BRIDGE", &self.address().to_string()).split_whitespace())
             .current_dir(self.folder.path())
             .env("FOILPRESS_JOBS", self.jobs())
+            .env("FOILPRESS_CONFIG", self.folder.path().join("config"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
         command
+    }
+
+    /// Runs with this typed; exit code and everything that was said.
+    fn answered(&self, args: &str, typed: &str) -> (Option<i32>, String) {
+        let mut command = self.program(args);
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        child.stdin.take().unwrap().write_all(typed.as_bytes()).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        (output.status.code(), said)
+    }
+
+    /// How many whole sheets the printer has taken; nothing else may have come.
+    fn sheets(&self) -> usize {
+        let printed = self.printed();
+        assert!(printed.chunks(self.job.len()).all(|sheet| sheet == self.job), "other bytes at the port");
+        printed.len() / self.job.len()
     }
 
     fn says(&self, code: i32, args: &str) -> String {
@@ -261,15 +168,6 @@ impl Bench {
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(code), "{args}: {said}");
         said
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        self.board.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }
 
@@ -292,7 +190,7 @@ fn program() -> &'static Path {
 #[test]
 fn the_program_sends_pass_streams_and_waits_for_the_sheet() {
     let bench = Bench::new(8, 100);
-    bench.board.open_cover.store(true, Ordering::Relaxed);
+    bench.bridge.port.open_cover.store(true, Ordering::Relaxed);
     let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     let mut heard = |word: &str| {
@@ -301,7 +199,7 @@ fn the_program_sends_pass_streams_and_waits_for_the_sheet() {
     heard("as pass streams, 1/");
     heard("the printer has taken all");
     heard("the cover is open");
-    bench.board.open_cover.store(false, Ordering::Relaxed);
+    bench.bridge.port.open_cover.store(false, Ordering::Relaxed);
     heard("the sheet is out");
     assert!(child.wait().unwrap().success());
     assert!(bench.printed() == bench.job, "other bytes at the port");
@@ -312,7 +210,7 @@ fn the_program_sends_pass_streams_and_waits_for_the_sheet() {
 
 #[test]
 fn a_bridge_without_memory_for_the_page_gets_the_job_as_it_is() {
-    let bench = Bench::with_band(8, 1000, 100);
+    let bench = Bench::with(random_job(8), Port::new(&[Ink::White], 1000).with_band(100));
     let said = bench.says(0, "send job.rgl --to BRIDGE");
     assert!(said.contains("byte for byte") && said.contains("the sheet is out"), "{said}");
     assert!(bench.printed() == bench.job, "other bytes at the port");
@@ -324,7 +222,7 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
     bench.keep_busy(true);
     let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
     bench.until_it_prints();
-    bench.board.forget.store(true, Ordering::Relaxed);
+    bench.bridge.port.forget.store(true, Ordering::Relaxed);
     let mut said = String::new();
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(1));
@@ -335,7 +233,7 @@ fn after_a_bridge_has_forgotten_nothing_is_sent_before_the_printer_was_reset() {
     assert!(said.contains("not sent") && said.contains("bridge reset --to unix:"), "{said}");
     assert_eq!(bench.printed(), printed, "something was sent all the same");
     bench.says(0, "bridge reset --to BRIDGE");
-    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 1);
+    assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 1);
     bench.keep_busy(false);
     bench.says(0, "send job.rgl --to BRIDGE");
     assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
@@ -347,7 +245,7 @@ fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_
     bench.keep_busy(true);
     let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
     bench.until_it_prints();
-    bench.board.printer_off.store(true, Ordering::Relaxed);
+    bench.bridge.port.off.store(true, Ordering::Relaxed);
     let mut said = String::new();
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(1));
@@ -360,11 +258,11 @@ fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     assert!(lines.any(|line| line.contains("+5 V absent")));
     assert_eq!(bench.printed(), printed, "bytes for a printer that is off");
-    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 0);
-    bench.board.printer_off.store(false, Ordering::Relaxed);
+    assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 0);
+    bench.bridge.port.off.store(false, Ordering::Relaxed);
     let rest: Vec<String> = lines.collect();
     assert!(child.wait().unwrap().success(), "{rest:?}");
-    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 1);
+    assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 1);
     assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
 }
 
@@ -376,7 +274,7 @@ fn a_reset_is_refused_while_a_job_is_open() {
     assert!(said.contains("is printing job"), "{said}");
     bench.keep_busy(false);
     assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
-    assert_eq!(bench.board.resets.load(Ordering::Relaxed), 0);
+    assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 0);
     assert!(bench.printed() == bench.job, "other bytes at the port");
 }
 
@@ -423,7 +321,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 #[test]
 fn between_jobs_the_printer_itself_is_asked() {
     let bench = Bench::new(1, 100);
-    bench.board.open_cover.store(true, Ordering::Relaxed);
+    bench.bridge.port.open_cover.store(true, Ordering::Relaxed);
     let mut link = bench.address().open().unwrap();
     let mut query = Query::new(&mut *link, PATIENCE).unwrap();
     assert_eq!((query.bridge().serial, query.bridge().firmware.as_str()), (7, "test"));
@@ -460,4 +358,46 @@ fn silence_and_rubbish_are_no_bridge() {
     drop(there);
     let answer = Query::new(&mut here, Duration::from_millis(300)).map(|_| ());
     assert!(matches!(answer, Err(QueryError::Link(_))));
+}
+
+/// White and cyan, at a printer that has the cyan cassette and no other.
+fn two_passes() -> Bench {
+    let plane = Plane { width: 64, length: 20, stride: 8, bits: vec![0x5a; 160] };
+    let passes = [Ink::White, Ink::Cyan].map(|ink| Pass { ink, plane: plane.clone() });
+    let page = Page::plain(Paper::Custom { width: 64, length: 20 });
+    let mut job = Vec::new();
+    write_job(page, None, &passes, &mut job, &Silent).unwrap();
+    Bench::with(job, Port::new(&[Ink::Cyan], usize::MAX))
+}
+
+#[test]
+fn copies_are_printed_one_by_one_and_what_is_not_loaded_is_named_first() {
+    let bench = two_passes();
+    let (code, said) = bench.answered("send job.rgl --to BRIDGE --copies 2", "\n");
+    assert_eq!((code, bench.sheets()), (Some(0), 2), "{said}");
+    assert!(said.contains("Not in the printer: white (MDC-SCWH, barcode 16)."), "{said}");
+    assert!(said.contains("Sheet 1 of 2 is sent"), "{said}");
+}
+
+#[test]
+fn a_copy_nobody_pressed_enter_for_waits_on_disk_and_is_counted_when_it_is_printed() {
+    let bench = two_passes();
+    let (code, said) = bench.answered("send job.rgl --to BRIDGE --copies 3", "");
+    assert_eq!((code, bench.sheets()), (Some(1), 1), "{said}");
+    assert!(said.contains("1 of 3 sheets are sent"), "{said}");
+    let passes = |count: usize| {
+        let (_, said) = bench.answered("ledger", "");
+        let word = if count == 1 { "1 pass".to_owned() } else { format!("{count} passes") };
+        assert!(
+            said.lines().any(|line| line.starts_with("white") && line.contains(&word)),
+            "{count}: {said}"
+        );
+    };
+    passes(1);
+    for sheet in 2..=3 {
+        let (code, said) = bench.answered("resume", "");
+        assert_eq!((code, bench.sheets()), (Some(0), sheet), "{said}");
+        passes(sheet);
+    }
+    assert!(bench.answered("resume", "").1.contains("no job waits"));
 }

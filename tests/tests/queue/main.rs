@@ -6,10 +6,12 @@ mod model;
 
 mod bridge;
 mod server;
+mod system;
 
 use bridge::Bridge;
 use foilpress::inspect::{inspect, sheets};
 use foilpress::job::stream::write_job;
+use foilpress::layout::Profile;
 use foilpress::observe::Silent;
 use foilpress::separate::{Pass, Plane};
 use foilpress::simulate::{Setup, print};
@@ -43,14 +45,19 @@ fn job(seed: u64, inks: &[Ink], rows: usize) -> Vec<u8> {
     bytes
 }
 
-/// A document of one A4 page for each text of drawing commands, with their table of places as a PDF has it.
+/// A document of one A4 page for each text of drawing commands.
 fn pdf(pages: &[&str]) -> Vec<u8> {
+    document((595, 842), "", pages)
+}
+
+/// A document of pages of a size in points, with what they draw with, and the table of places a PDF has.
+fn document((width, length): (u32, u32), resources: &str, pages: &[&str]) -> Vec<u8> {
     let mut objects = vec!["<</Type/Catalog/Pages 2 0 R>>".to_owned()];
     let kids: Vec<String> = (0..pages.len()).map(|i| format!("{} 0 R", 3 + 2 * i)).collect();
     objects.push(format!("<</Type/Pages/Kids[{}]/Count {}>>", kids.join(" "), pages.len()));
     for (i, drawing) in pages.iter().enumerate() {
         objects.push(format!(
-            "<</Type/Page/Parent 2 0 R/MediaBox[0 0 595 842]/Resources<<>>/Contents {} 0 R>>",
+            "<</Type/Page/Parent 2 0 R/MediaBox[0 0 {width} {length}]/Resources<<{resources}>>/Contents {} 0 R>>",
             4 + 2 * i
         ));
         objects.push(format!("<</Length {}>>\nstream\n{drawing}\nendstream", drawing.len()));
@@ -192,6 +199,140 @@ fn a_picture_comes_out_in_its_colours_where_they_are() {
         assert_eq!(share(ink, true, true), 0.0, "{} on bare paper", ink.name());
     }
     assert_eq!(share(Ink::White, true, true), 0.0);
+}
+
+/// A sheet of 4 x 4 inches in points, and as the print system is asked for it.
+const CARD: (u32, u32) = (288, 288);
+const CARD_MEDIA: &str = "media=Custom.4x4in";
+
+/// Where a rectangle of a page lies on its sheet: from points, counted from the lower left, to dots from the corner of
+/// the printable area.
+fn on_card([left, bottom, right, top]: [i64; 4]) -> [usize; 4] {
+    let dots = |points: i64| points * 600 / 72;
+    [
+        dots(left) - 80,
+        dots(i64::from(CARD.1) - top) - 284,
+        dots(right) - 80,
+        dots(i64::from(CARD.1) - bottom) - 284,
+    ]
+    .map(|side| side as usize)
+}
+
+#[test]
+fn spot_colours_that_name_inks_are_printed_in_them_and_others_in_process_inks() {
+    let server = server!();
+    let bridge = Bridge::start(FAST);
+    server.queue("Alps", &bridge.uri());
+    let tint = |cmyk: &str| format!("<</FunctionType 2/Domain[0 1]/C0[0 0 0 0]/C1[{cmyk}]/N 1>>");
+    let spaces = format!(
+        "/ColorSpace<</Au[/Separation/Gold/DeviceCMYK {}]/Wh[/Separation/Spot#20White/DeviceCMYK {}]\
+         /Pa[/Separation/PANTONE#20Red#20032/DeviceCMYK {}]>>",
+        tint("0 .2 .8 .1"),
+        tint(".1 0 0 0"),
+        tint("0 1 0 0")
+    );
+    let art =
+        "/Wh cs 1 scn 40 100 120 60 re f /Au cs 1 scn 60 110 40 40 re f /Pa cs 1 scn 170 100 30 60 re f";
+    let file = server.path("files/spots.pdf");
+    // The second page has none, and the third one of a foil, which is never printed unasked.
+    let foil = spaces.replace("/Gold/", "/Gold#20Foil/");
+    fs::write(&file, document(CARD, &spaces, &[art, "0 g 60 110 40 40 re f"])).unwrap();
+    let file = file.to_str().unwrap();
+    let job = server.print(&["-d", "Alps", "-o", CARD_MEDIA, file]);
+    assert_eq!(server.wait_for_job(job), "completed");
+    let sheets = printed(&bridge);
+    assert_eq!(sheets.len(), 2);
+    let inks: Vec<Ink> = sheets[0].iter().map(|pass| pass.ink).collect();
+    assert_eq!(inks.len(), 3, "{inks:?}");
+    for (ink, place) in [(Ink::MetallicGold, [60, 110, 100, 150]), (Ink::Magenta, [170, 100, 200, 160])] {
+        let (sides, dots) = extent(&sheets[0], ink);
+        assert!(near(sides, on_card(place)), "{}: {sides:?}, not {:?}", ink.name(), on_card(place));
+        assert_eq!(dots, ((sides[2] - sides[0]) * (sides[3] - sides[1])) as u64, "{} is solid", ink.name());
+    }
+    // Gold is drawn over white, which a page knocks out.
+    let (sides, _) = extent(&sheets[0], Ink::White);
+    assert!(near(sides, on_card([40, 100, 160, 160])), "{sides:?}");
+    assert_eq!(sheets[1].iter().map(|pass| pass.ink).collect::<Vec<_>>(), [Ink::Black]);
+
+    let wanted = server.path("files/foil.pdf");
+    fs::write(&wanted, document(CARD, &foil, &[art])).unwrap();
+    let before = bridge.printed().len();
+    let wanted = wanted.to_str().unwrap();
+    let refused = server.print(&["-d", "Alps", "-o", CARD_MEDIA, wanted]);
+    assert_ne!(server.wait_for_job(refused), "completed");
+    assert!(server.log().contains("-o FoilpressFoils=On"), "{}", server.log());
+    assert_eq!(bridge.printed().len(), before);
+    server.say("cupsenable", &["Alps"]);
+    let asked = server.print(&["-d", "Alps", "-o", CARD_MEDIA, "-o", "FoilpressFoils=On", wanted]);
+    assert_eq!(server.wait_for_job(asked), "completed");
+    let bytes = bridge.printed().split_off(before);
+    let foil = inspect(&bytes, &Silent).passes;
+    assert!(foil.iter().any(|pass| pass.ink == Ink::GoldFoil));
+}
+
+#[test]
+fn a_sheet_of_any_size_is_printed_where_the_user_wants_it_by_a_machine_that_is_not_exact() {
+    let server = server!();
+    let bridge = Bridge::start(FAST);
+    server.queue("Alps", &bridge.uri());
+    let machine = Profile { offset_mm: [0.508, -0.254], feed: 1.0 };
+    server.queue_of("Off", &bridge.uri(), &machine);
+    let file = server.path("files/mark.pdf");
+    let mark = [60, 110, 100, 180];
+    fs::write(&file, document(CARD, "", &["0 g 60 110 40 70 re f"])).unwrap();
+    let mut seen = 0;
+    let mut extent_with = |queue: &str, options: &[&str]| {
+        let mut arguments = vec!["-d", queue, "-o", CARD_MEDIA];
+        options.iter().for_each(|option| arguments.extend(["-o", option]));
+        arguments.push(file.to_str().unwrap());
+        let job = server.print(&arguments);
+        assert_eq!(server.wait_for_job(job), "completed", "{}", server.log());
+        let bytes = bridge.printed().split_off(seen);
+        seen += bytes.len();
+        let sheet = inspect(&bytes, &Silent);
+        assert_eq!(sheet.inspection.setup.paper, Some("custom"));
+        let plane = &sheet.passes[0].plane;
+        // 4 inches less the margins.
+        assert_eq!((plane.width, plane.length), (2400 - 160, 2400 - 644));
+        extent(&sheet.passes, Ink::Black).0
+    };
+    let place = on_card(mark);
+    let found = extent_with("Alps", &[]);
+    assert!(near(found, place), "{found:?}, not {place:?}");
+
+    let found = extent_with("Alps", &["MirrorPrint=True"]);
+    let mirrored = on_card([i64::from(CARD.0) - mark[2], mark[1], i64::from(CARD.0) - mark[0], mark[3]]);
+    assert!(near(found, mirrored), "{found:?}, not {mirrored:?}");
+
+    // 10 x 25 mm from the corner of the sheet.
+    let found = extent_with("Alps", &["FoilpressPosition=Custom.10x25mm"]);
+    let (left, top) = (236 - 80, 591 - 284);
+    let moved = [left, top, left + place[2] - place[0], top + place[3] - place[1]];
+    assert!(near(found, moved), "{found:?}, not {moved:?}");
+
+    // This machine prints half a millimetre too far right and a quarter too high: 12 and 6 dots.
+    let found = extent_with("Off", &[]);
+    let corrected = [place[0] - 12, place[1] + 6, place[2] - 12, place[3] + 6];
+    assert!(near(found, corrected), "{found:?}, not {corrected:?}");
+}
+
+#[test]
+fn a_printer_of_another_maker_gets_no_byte_and_stops_the_queue() {
+    let server = server!();
+    let bridge = Bridge::start(FAST);
+    *bridge.port.maker.lock().unwrap() = Some("Hewlett-Packard");
+    server.queue("Alps", &bridge.uri());
+    let file = server.path("files/job.rgl");
+    let bytes = job(11, &[Ink::Cyan], 30);
+    fs::write(&file, &bytes).unwrap();
+    let job = server.print(&["-d", "Alps", file.to_str().unwrap()]);
+    server.wait_for("the queue to stop", |server| server.state("Alps").contains("disabled"));
+    assert!(server.state("Alps").contains("it is no ALPS: MFG:Hewlett-Packard"), "{}", server.state("Alps"));
+    assert!(bridge.printed().is_empty());
+    *bridge.port.maker.lock().unwrap() = Some("ALPS");
+    server.say("cupsenable", &["Alps"]);
+    assert_eq!(server.wait_for_job(job), "completed");
+    assert!(bridge.printed() == bytes);
 }
 
 #[test]

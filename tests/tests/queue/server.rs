@@ -1,6 +1,8 @@
 //! A print server of its own: configuration, spool and programs in a temporary folder, on loopback, no system service.
 
+use foilpress::layout::Profile;
 use foilpress::queue::install::{DESCRIPTION, Places, put};
+use foilpress::queue::ppd;
 use std::fs;
 use std::net::{TcpListener, TcpStream};
 use std::os::unix::fs::{PermissionsExt as _, symlink};
@@ -10,7 +12,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// Longer than anything here takes on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(240);
 
 pub struct Server {
     folder: TempDir,
@@ -164,6 +166,12 @@ impl Server {
     pub fn queue(&self, name: &str, uri: &str) {
         let description = self.path("files").join(DESCRIPTION);
         self.say("lpadmin", &["-p", name, "-v", uri, "-P", description.to_str().unwrap(), "-E"]);
+    }
+
+    /// The same for a machine that prints beside its place.
+    pub fn queue_of(&self, name: &str, uri: &str, profile: &Profile) {
+        fs::write(self.path("files").join(DESCRIPTION), ppd::description(profile)).unwrap();
+        self.queue(name, uri);
     }
 
     /// Prints a file, returns the number of the job.

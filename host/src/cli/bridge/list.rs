@@ -6,9 +6,10 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 use serde_json::json;
 
-use super::{Found, is_alps, is_forbidden, newer_firmware, permission};
+use super::{Found, is_forbidden, newer_firmware, permission};
 use crate::flash::{drive, usb};
 use crate::send::find::{self, Candidate};
+use crate::send::query::is_alps;
 
 /// Arguments of `bridge list`.
 #[derive(ClapArgs, Debug)]

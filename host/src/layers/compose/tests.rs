@@ -164,9 +164,6 @@ fn what_cannot_be_is_said() {
     assert!(notes.iter().any(|note| note.contains("cyan: left out")), "{notes:?}");
     assert!(refused(&art(&[(Black, &["."])]), &with(|_| ())).contains("nothing to print"));
     assert!(refused(&art(&[(GoldFoil, &["#"])]), &Settings::default()).contains("--inks +gold-foil"));
-    let rows: &[&str] = &["#"];
-    let eight: Vec<_> = Ink::ALL.into_iter().take(8).map(|ink| (ink, rows)).collect();
-    assert!(refused(&art(&eight), &with(|_| ())).contains("needs 8 cartridges"));
     let often = with(|s| s.passes = vec![(Black, 9), (Cyan, 9)]);
     assert!(refused(&two, &often).contains("18 layers"));
 }

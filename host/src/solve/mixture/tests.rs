@@ -6,7 +6,9 @@ use inks::{Curve, InkSet, Library};
 use proptest::prelude::*;
 use protocol::ink::Ink;
 
+use super::super::hull::LAYER_PRICE;
 use super::*;
+use crate::brdf::{Space, Table};
 use crate::gamut::Printable;
 
 fn library(space: &Space) -> Table {
@@ -127,7 +129,9 @@ proptest! {
         a.iter_mut().for_each(|w| *w /= sum);
         let target = hull.target(&mixture(&curves, &a)).unwrap();
         let best = Mixer::new().best(&hull, &target).unwrap();
-        prop_assert!(best.fit.distance < 1e-11, "{:?}", best.fit);
+        // What the last steps can still win is lost in rounding: of squared distance, some 1e-16.
+        prop_assert!(best.fit.distance < 1e-7, "{:?}", best.fit);
+        prop_assert!(best.fit.distance.powi(2) <= best.fit.gap + 1e-20, "{:?}", best.fit);
     }
 
     /// Whatever the target: feasible, no vertex and no random mixture is nearer, and where E is convex the gap
@@ -179,11 +183,11 @@ proptest! {
         let mut a: Vec<f64> = start[..56].to_vec();
         let sum: f64 = a.iter().sum();
         a.iter_mut().for_each(|w| *w /= sum);
-        let fit = mixer.refine_to(&hull, &target, &mut a, 1e-5).unwrap();
+        let fit = mixer.refine(&hull, &target, &mut a, 1e-5).unwrap();
         prop_assert!(fit.gap <= 1e-5);
         let excess = fit.distance.powi(2) - best.fit.distance.powi(2);
         prop_assert!(!fit.convex || excess <= fit.gap + 1e-12, "{fit:?} {excess}");
-        let exact = mixer.refine(&hull, &target, &mut a).unwrap();
+        let exact = mixer.refine(&hull, &target, &mut a, 0.0).unwrap();
         prop_assert!((exact.distance - best.fit.distance).abs() < 1e-6, "{exact:?} {:?}", best.fit);
     }
 }
@@ -291,7 +295,7 @@ fn polishing_stays_on_the_support() {
     let target = hull.target(curves.row(31)).unwrap();
     let mut a = vec![0.0; 57];
     (a[1], a[8]) = (0.9, 0.1);
-    let fit = Mixer::new().polish(&hull, &target, &mut a).unwrap();
+    let fit = Mixer::new().polish(&hull, &target, &mut a, 0.0).unwrap();
     assert!(a.iter().enumerate().all(|(k, &w)| w == 0.0 || k == 1 || k == 8));
     // One unknown is left: compare with a fine scan of it.
     let scan = (0..=100_000)
@@ -335,5 +339,5 @@ fn bad_numbers_are_named() {
     assert!(hull.target(&target).is_err());
     assert!(matches!(hull.target(&[1.0; 11]), Err(MixtureError::Columns { expected: 12, found: 11, .. })));
     let target = hull.target(&[1.0; 12]).unwrap();
-    assert!(Mixer::new().refine(&hull, &target, &mut [1.0, 0.0]).is_err());
+    assert!(Mixer::new().refine(&hull, &target, &mut [1.0, 0.0], 0.0).is_err());
 }

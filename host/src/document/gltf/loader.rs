@@ -1,0 +1,195 @@
+//! The pictures of a glTF file: wherever they are stored, and whether they lie on each other.
+//!
+//! Pictures come from data URIs, from buffers, or from files in the same folder or below; no path leads out.
+
+use std::path::{Component, Path, PathBuf};
+
+use ::gltf::json;
+use base64::Engine;
+use percent_encoding::percent_decode_str;
+
+use crate::document::picture::Picture;
+use crate::document::source::{MOST_BYTES, Source};
+use crate::document::texture::Field;
+use crate::document::{ColourSpace, DocumentError};
+
+/// Where a map lies on the surface: offset, rotation, scale, set of coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Placement {
+    offset: [f32; 2],
+    rotation: f32,
+    scale: [f32; 2],
+    pub(super) coordinates: u32,
+}
+
+impl Placement {
+    fn of(info: &json::texture::Info) -> Placement {
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        Placement {
+            offset: transform.map_or([0.0; 2], |t| t.offset.0),
+            rotation: transform.map_or(0.0, |t| t.rotation.0),
+            scale: transform.map_or([1.0; 2], |t| t.scale.0),
+            coordinates: transform.and_then(|t| t.tex_coord).unwrap_or(info.tex_coord),
+        }
+    }
+
+    fn is_plain(&self) -> bool {
+        self.offset == [0.0; 2] && self.rotation == 0.0 && self.scale == [1.0; 2]
+    }
+}
+
+/// A decoded texture and how to call it.
+pub(super) struct Loaded {
+    pub(super) name: String,
+    pub(super) picture: Picture,
+}
+
+pub(super) struct Loader<'a, 's> {
+    pub(super) root: &'a json::Root,
+    pub(super) blob: Option<Vec<u8>>,
+    pub(super) path: &'a Path,
+    pub(super) source: &'a mut Source<'s>,
+    /// That of the first map read; the others must share it.
+    pub(super) placement: Option<Placement>,
+}
+
+impl<'a> Loader<'a, '_> {
+    pub(super) fn wrong(&self, field: &str, problem: String) -> DocumentError {
+        DocumentError::Field { path: self.path.to_path_buf(), field: field.into(), problem }
+    }
+
+    /// The picture of a map that must lie where the others do.
+    pub(super) fn load(&mut self, info: &json::texture::Info, field: &str) -> Result<Loaded, DocumentError> {
+        let placement = Placement::of(info);
+        match self.placement {
+            None => {
+                if !placement.is_plain() {
+                    self.source.note(format!(
+                        "{}: the texture is printed as it is stored, without its texture transform",
+                        self.path.display()
+                    ));
+                }
+                self.placement = Some(placement);
+            }
+            Some(first) if first != placement => {
+                let problem =
+                    "placed on the surface otherwise than the material's other maps, which a flat print \
+                               cannot follow; bake the maps to one set of coordinates"
+                        .into();
+                return Err(self.wrong(field, problem));
+            }
+            Some(_) => {}
+        }
+        self.texture(info.index.value(), field)
+    }
+
+    pub(super) fn texture(&mut self, index: usize, field: &str) -> Result<Loaded, DocumentError> {
+        let Some(texture) = self.root.textures.get(index) else {
+            return Err(self.wrong(field, format!("texture {index} does not exist")));
+        };
+        let number = texture.source.value();
+        let Some(image) = self.root.images.get(number) else {
+            return Err(self.wrong(field, format!("image {number} does not exist")));
+        };
+        let (name, bytes) = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => self.resource(uri, field, &format!("image {number}"))?,
+            (None, Some(view)) => {
+                let name = PathBuf::from(format!("{} image {number}", self.path.display()));
+                (name, self.view(view.value(), field)?)
+            }
+            (None, None) => {
+                return Err(self.wrong(field, format!("image {number} has neither uri nor bufferView")));
+            }
+        };
+        let picture = Picture::decode(&bytes, &name, self.source)?;
+        self.source.observer.advance(1);
+        let name = name.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        Ok(Loaded { name, picture })
+    }
+
+    /// The bytes a buffer view covers.
+    fn view(&mut self, index: usize, field: &str) -> Result<Vec<u8>, DocumentError> {
+        let Some(view) = self.root.buffer_views.get(index) else {
+            return Err(self.wrong(field, format!("bufferView {index} does not exist")));
+        };
+        let number = view.buffer.value();
+        let Some(buffer) = self.root.buffers.get(number) else {
+            return Err(self.wrong(field, format!("buffer {number} does not exist")));
+        };
+        let external;
+        let data: &[u8] = match &buffer.uri {
+            Some(uri) => {
+                external = self.resource(uri, field, &format!("buffer {number}"))?.1;
+                &external
+            }
+            None => match &self.blob {
+                Some(blob) if number == 0 => blob,
+                _ => {
+                    return Err(
+                        self.wrong(field, format!("buffer {number} has no uri and the file no data chunk"))
+                    );
+                }
+            },
+        };
+        let start = view.byte_offset.map_or(0, |offset| offset.0);
+        let end = start.checked_add(view.byte_length.0).filter(|&end| end <= data.len() as u64);
+        let Some(end) = end else {
+            let problem = format!(
+                "bufferView {index} asks for {} bytes at {start}, buffer {number} has {}",
+                view.byte_length.0,
+                data.len()
+            );
+            return Err(self.wrong(field, problem));
+        };
+        Ok(data[start as usize..end as usize].to_vec())
+    }
+
+    /// What a URI stands for: data, or a file in the folder of the document or below.
+    fn resource(&mut self, uri: &str, field: &str, label: &str) -> Result<(PathBuf, Vec<u8>), DocumentError> {
+        if let Some(data) = uri.strip_prefix("data:") {
+            let encoded =
+                data.split_once(',').filter(|(kind, _)| kind.ends_with(";base64")).map(|(_, data)| data);
+            let Some(encoded) = encoded else {
+                return Err(self.wrong(field, format!("{label}: expected a data URI in base64")));
+            };
+            let bytes = base64::engine::general_purpose::STANDARD
+                .decode(encoded)
+                .map_err(|error| self.wrong(field, format!("{label}: the data URI is damaged: {error}")))?;
+            return Ok((PathBuf::from(format!("{} {label}", self.path.display())), bytes));
+        }
+        let file = percent_decode_str(uri).decode_utf8_lossy();
+        let within =
+            Path::new(&*file).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        if !within || file.contains([':', '\\', '\0']) || file.is_empty() {
+            return Err(self.wrong(
+                field,
+                format!("{label}: `{uri}` is not a file in the document's folder or below, and nothing else is read"),
+            ));
+        }
+        let path = self.path.parent().unwrap_or(Path::new("")).join(&*file);
+        let bytes = self.source.read(&path, MOST_BYTES)?;
+        Ok((path, bytes))
+    }
+
+    pub(super) fn colour(
+        &mut self,
+        info: Option<&json::texture::Info>,
+        factor: [f32; 3],
+        space: ColourSpace,
+        field: &str,
+    ) -> Result<[Field; 3], DocumentError> {
+        let Some(info) = info else { return Ok(factor.map(Field::Constant)) };
+        let Loaded { name, picture } = self.load(info, field)?;
+        let how = if space == ColourSpace::Srgb { "sRGB" } else { "linear" };
+        self.source.note(format!("{name}: {field} read as {how}"));
+        if picture.has_foreign_profile() {
+            self.source.note(format!("{name}: its colour profile is not applied"));
+        }
+        Ok(coloured(&picture, factor, space))
+    }
+}
+
+pub(super) fn coloured(picture: &Picture, factor: [f32; 3], space: ColourSpace) -> [Field; 3] {
+    let [r, g, b] = picture.linear(space);
+    [Field::Map(r).times(factor[0]), Field::Map(g).times(factor[1]), Field::Map(b).times(factor[2])]
+}

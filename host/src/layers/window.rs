@@ -1,0 +1,120 @@
+//! A rectangle of a picture's pixels: what is drawn of it, or what is to be printed of it.
+
+use rayon::prelude::*;
+
+/// A rectangle in pixels.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Window {
+    /// Of its first column.
+    pub left: usize,
+    /// Of its first row.
+    pub top: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Window {
+    /// The smallest window around the pixels that have a byte other than `ground`. Pixels are `bytes` long, rows `width`
+    /// pixels.
+    pub fn around(pixels: &[u8], width: usize, bytes: usize, ground: u8) -> Option<Window> {
+        let drawn = |&byte: &u8| byte != ground;
+        // For each row with something on it: its number, and the first and last byte of that.
+        let [top, bottom, first, last] = pixels
+            .par_chunks_exact((width * bytes).max(1))
+            .enumerate()
+            .filter_map(|(y, row)| {
+                // Mostly there is nothing, and that is seen fastest a word at a time.
+                let (head, words, tail) = (row.as_chunks::<16>().0, [ground; 16], row.as_chunks::<16>().1);
+                if head.iter().all(|word| *word == words) && !tail.iter().any(drawn) {
+                    return None;
+                }
+                Some([y, y, row.iter().position(drawn)?, row.iter().rposition(drawn)?])
+            })
+            .reduce_with(|a, b| [a[0].min(b[0]), a[1].max(b[1]), a[2].min(b[2]), a[3].max(b[3])])?;
+        let (left, right) = (first / bytes, last / bytes);
+        Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
+    }
+
+    /// The smallest window around two.
+    pub fn join(&self, other: &Window) -> Window {
+        let (left, top) = (self.left.min(other.left), self.top.min(other.top));
+        let right = (self.left + self.width).max(other.left + other.width);
+        let bottom = (self.top + self.height).max(other.top + other.height);
+        Window { left, top, width: right - left, height: bottom - top }
+    }
+
+    /// What two have in common.
+    pub fn meet(&self, other: &Window) -> Option<Window> {
+        let (left, top) = (self.left.max(other.left), self.top.max(other.top));
+        let right = (self.left + self.width).min(other.left + other.width);
+        let bottom = (self.top + self.height).min(other.top + other.height);
+        (left < right && top < bottom).then(|| Window {
+            left,
+            top,
+            width: right - left,
+            height: bottom - top,
+        })
+    }
+
+    /// The part of a picture in the window, which lies on it. Pixels are `bytes` long, rows `width` pixels.
+    pub fn cut(&self, pixels: &[u8], width: usize, bytes: usize) -> Vec<u8> {
+        let mut cut = Vec::with_capacity(bytes * self.width * self.height);
+        for row in pixels.chunks_exact((width * bytes).max(1)).skip(self.top).take(self.height) {
+            cut.extend_from_slice(&row[bytes * self.left..bytes * (self.left + self.width)]);
+        }
+        cut
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_pixel_is_in_what_windows_have_in_common_if_it_is_in_both(sides: [(u8, u8, u8, u8); 2], at: (u8, u8)) {
+            let [a, b] = sides.map(|(left, top, width, height)| Window {
+                left: usize::from(left / 4),
+                top: usize::from(top / 4),
+                width: usize::from(width / 4),
+                height: usize::from(height / 4),
+            });
+            let at = (usize::from(at.0 / 2), usize::from(at.1 / 2));
+            let has = |window: &Window| {
+                (window.left..window.left + window.width).contains(&at.0)
+                    && (window.top..window.top + window.height).contains(&at.1)
+            };
+            prop_assert_eq!(a.meet(&b).is_some_and(|both| has(&both)), has(&a) && has(&b));
+            prop_assert!(!has(&a) && !has(&b) || has(&a.join(&b)));
+        }
+
+        #[test]
+        fn what_is_drawn_lies_in_its_window_and_touches_all_its_sides(
+            width in 1usize..40,
+            drawn in prop::collection::vec((0usize..40, 0usize..9, 0usize..3), 0..6),
+        ) {
+            let mut pixels = vec![255u8; 3 * width * 9];
+            let drawn: Vec<_> = drawn.into_iter().map(|(x, y, c)| (x % width, y, c)).collect();
+            for (x, y, c) in &drawn {
+                pixels[3 * (y * width + x) + c] = 254;
+            }
+            let window = Window::around(&pixels, width, 3, 255);
+            prop_assert_eq!(window.is_none(), drawn.is_empty());
+            if let Some(window) = window {
+                let xs = || drawn.iter().map(|pixel| pixel.0);
+                let ys = || drawn.iter().map(|pixel| pixel.1);
+                prop_assert_eq!((window.left, window.left + window.width - 1), (xs().min().unwrap(), xs().max().unwrap()));
+                prop_assert_eq!((window.top, window.top + window.height - 1), (ys().min().unwrap(), ys().max().unwrap()));
+                let cut = window.cut(&pixels, width, 3);
+                prop_assert_eq!(cut.len(), 3 * window.width * window.height);
+                prop_assert_eq!(
+                    cut.iter().filter(|&&byte| byte == 254).count(),
+                    pixels.iter().filter(|&&byte| byte == 254).count()
+                );
+            }
+        }
+    }
+}

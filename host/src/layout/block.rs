@@ -1,0 +1,181 @@
+//! Where the pieces go: columns and rows in the room a machine has, and what lies beyond it.
+
+use protocol::paper::LEFT;
+
+use super::{Layout, LayoutError, MOST_REPEATS, Mm, Point, Position, Repeat};
+
+/// A rectangle on the ideal page: dots from the corner of the printable area, `right` and `bottom` one past the last.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Rect {
+    pub left: i64,
+    pub top: i64,
+    pub right: i64,
+    pub bottom: i64,
+}
+
+impl Rect {
+    pub fn width(&self) -> i64 {
+        self.right - self.left
+    }
+
+    pub fn length(&self) -> i64 {
+        self.bottom - self.top
+    }
+
+    pub fn meet(&self, other: Rect) -> Rect {
+        Rect {
+            left: self.left.max(other.left),
+            top: self.top.max(other.top),
+            right: self.right.min(other.right),
+            bottom: self.bottom.min(other.bottom),
+        }
+    }
+
+    pub fn contains(&self, x: i64, y: i64) -> bool {
+        (self.left..self.right).contains(&x) && (self.top..self.bottom).contains(&y)
+    }
+}
+
+/// What lies beyond the printable area, in millimetres on each side.
+#[derive(Clone, Copy, PartialEq, Debug, Default, serde::Serialize)]
+pub struct Cut {
+    /// At the left.
+    pub left: f64,
+    /// At the top.
+    pub top: f64,
+    /// At the right.
+    pub right: f64,
+    /// At the bottom.
+    pub bottom: f64,
+}
+
+impl Cut {
+    fn of(block: Rect, room: Rect) -> Option<Cut> {
+        let beyond = |dots: i64| Mm::of_dots(dots.max(0)).0;
+        let cut = Cut {
+            left: beyond(room.left - block.left),
+            top: beyond(room.top - block.top),
+            right: beyond(block.right - room.right),
+            bottom: beyond(block.bottom - room.bottom),
+        };
+        (cut != Cut::default()).then_some(cut)
+    }
+}
+
+impl std::fmt::Display for Cut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let sides = [("left", self.left), ("top", self.top), ("right", self.right), ("bottom", self.bottom)];
+        let said: Vec<String> = sides
+            .iter()
+            .filter(|(_, mm)| *mm > 0.0)
+            // A single dot is not nothing.
+            .map(|(side, mm)| format!("{:.1} mm at the {side}", mm.max(0.1)))
+            .collect();
+        f.write_str(&said.join(", "))
+    }
+}
+
+/// All pieces on the ideal page.
+pub(super) struct Block {
+    /// What the machine can print on.
+    pub room: Rect,
+    /// All pieces and what is between them.
+    pub place: Rect,
+    pub grid: (u16, u16),
+    /// First and one past the last dot of each column of pieces, and of each row.
+    pub columns: Vec<(i64, i64)>,
+    pub rows: Vec<(i64, i64)>,
+    pub cut: Option<Cut>,
+}
+
+impl Block {
+    pub fn of(size: (usize, usize), layout: &Layout) -> Result<Block, LayoutError> {
+        if let Some(problem) = layout.profile.problem() {
+            return Err(LayoutError::Setting(format!("machine profile: {problem}")));
+        }
+        let gap = (layout.gap.0.dots(), layout.gap.1.dots());
+        if gap.0 < 0 || gap.1 < 0 {
+            return Err(LayoutError::Setting("the gap between pieces cannot be negative".into()));
+        }
+        let room = layout.room();
+        // Pieces are held in memory: their sides are far below the limits of i64.
+        let size = (size.0 as i64, size.1 as i64);
+        let grid = grid(layout, size, gap, room)?;
+        let extent = |count: u16, side: i64, gap: i64| i64::from(count) * (side + gap) - gap;
+        let (width, length) = (extent(grid.0, size.0, gap.0), extent(grid.1, size.1, gap.1));
+        let (left, top) = corner(layout, (width, length), room);
+        let place = Rect { left, top, right: left + width, bottom: top + length };
+        let cut = Cut::of(place, room);
+        if let (Some(cut), false) = (cut, layout.cut) {
+            return Err(LayoutError::Beyond {
+                cut,
+                width: Mm::of_dots(width).0,
+                length: Mm::of_dots(length).0,
+                paper: layout.paper.name(),
+                most_width: Mm::of_dots(room.width()).0,
+                most_length: Mm::of_dots(room.length()).0,
+            });
+        }
+        let spans = |count: u16, start: i64, side: i64, gap: i64| -> Vec<(i64, i64)> {
+            (0..i64::from(count)).map(|i| start + i * (side + gap)).map(|at| (at, at + side)).collect()
+        };
+        let columns = spans(grid.0, left, size.0, gap.0);
+        let rows = spans(grid.1, top, size.1, gap.1);
+        Ok(Block { room, place, grid, columns, rows, cut })
+    }
+}
+
+/// Columns and rows.
+fn grid(layout: &Layout, size: (i64, i64), gap: (i64, i64), room: Rect) -> Result<(u16, u16), LayoutError> {
+    match layout.repeat {
+        Repeat::Grid(columns, rows) => {
+            if !(1..=MOST_REPEATS).contains(&columns) || !(1..=MOST_REPEATS).contains(&rows) {
+                let words = format!("{columns} x {rows} pieces; each is 1 to {MOST_REPEATS}");
+                return Err(LayoutError::Setting(words));
+            }
+            Ok((columns, rows))
+        }
+        Repeat::Fill => {
+            let start = match layout.position {
+                Position::Centred => (room.left, room.top),
+                _ => corner(layout, (0, 0), room),
+            };
+            let count = |room: i64, side: i64, gap: i64| {
+                ((room + gap) / (side + gap)).clamp(0, i64::from(MOST_REPEATS)) as u16
+            };
+            let (columns, rows) =
+                (count(room.right - start.0, size.0, gap.0), count(room.bottom - start.1, size.1, gap.1));
+            if columns == 0 || rows == 0 {
+                return Err(LayoutError::FillsNothing {
+                    width: Mm::of_dots(size.0).0,
+                    length: Mm::of_dots(size.1).0,
+                    paper: layout.paper.name(),
+                    most_width: Mm::of_dots(room.width()).0,
+                    most_length: Mm::of_dots(room.length()).0,
+                });
+            }
+            Ok((columns, rows))
+        }
+    }
+}
+
+/// The top left corner of a block of this size.
+fn corner(layout: &Layout, (width, length): (i64, i64), room: Rect) -> (i64, i64) {
+    match layout.position {
+        Position::FromEdge(Point(x, y)) => {
+            (x.dots() - i64::from(LEFT), y.dots() - i64::from(layout.paper.top()))
+        }
+        Position::FromPrintable(Point(x, y)) => (x.dots(), y.dots()),
+        Position::Centred => {
+            // In the middle of the paper's own area, as far as the machine reaches.
+            let middle = |most: u16, size: i64, low: i64, high: i64| {
+                let at = (i64::from(most) - size).div_euclid(2);
+                if size <= high - low { at.clamp(low, high - size) } else { at }
+            };
+            (
+                middle(layout.paper.width(), width, room.left, room.right),
+                middle(layout.paper.length(), length, room.top, room.bottom),
+            )
+        }
+    }
+}

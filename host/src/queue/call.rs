@@ -1,0 +1,137 @@
+//! The conversation with the print system: how a backend is called, and what its exit tells.
+//!
+//! Source: backend(7).
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::{options, uri};
+use crate::send::Destination;
+use crate::send::journal::{Journal, JournalError};
+
+/// What the print system is to do next. The numbers are its own.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub enum Exit {
+    /// The job is printed.
+    Ok = 0,
+    /// It failed; the queue's own policy decides.
+    Failed = 1,
+    /// It is held until somebody releases it.
+    Hold = 3,
+    /// The queue stops until the administrator has acted.
+    Stop = 4,
+    /// The job makes no sense and is cancelled.
+    Cancel = 5,
+}
+
+/// A call of the print system: `URI job user title copies options [file]`.
+#[derive(Clone, Debug)]
+pub struct Call {
+    /// What the user calls the job.
+    pub title: String,
+    /// The job's identity, the same when it is started again.
+    pub identity: String,
+    /// How often it is printed; 1 when filters have seen to it.
+    pub copies: u32,
+    /// The file; standard input without one.
+    pub file: Option<PathBuf>,
+    /// Where the queue leads.
+    pub to: Destination,
+    /// Folder for what has to outlive the process.
+    pub journal: PathBuf,
+    /// Whether another printer of a class may do the job.
+    pub in_class: bool,
+}
+
+/// Why a call cannot be understood.
+#[derive(Debug, thiserror::Error)]
+pub enum CallError {
+    /// Too few or too many arguments.
+    #[error(
+        "expected job-id user title copies options [file], found {0} arguments; this is for the print system to call"
+    )]
+    Arguments(usize),
+    /// No URI.
+    #[error("DEVICE_URI is not set; this is for the print system to call")]
+    NoUri,
+    /// No destination.
+    #[error(transparent)]
+    Uri(#[from] uri::UriError),
+    /// No folder for the journal.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+}
+
+/// A name that is safe as one of a file.
+fn file_name(text: &str) -> String {
+    text.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(64).collect()
+}
+
+impl Call {
+    /// Reads a call from its arguments (without the program's name) and the environment.
+    pub fn read(arguments: &[OsString], var: &dyn Fn(&str) -> Option<OsString>) -> Result<Call, CallError> {
+        let (job, title, copies, options, file) = match arguments {
+            [job, _user, title, copies, options] => (job, title, copies, options, None),
+            [job, _user, title, copies, options, file] => {
+                (job, title, copies, options, Some(PathBuf::from(file)))
+            }
+            other => return Err(CallError::Arguments(other.len())),
+        };
+        let text = |name: &str| var(name).map(|value| value.to_string_lossy().into_owned());
+        let to = uri::parse(&text("DEVICE_URI").ok_or(CallError::NoUri)?)?;
+        let options = options::parse(&options.to_string_lossy());
+        let uuid = options.iter().find(|(name, _)| name == "job-uuid").map(|(_, value)| value.as_str());
+        // Without an identity of its own the job's number and title have to do.
+        let identity = match uuid.map(|uuid| file_name(uuid.strip_prefix("urn:uuid:").unwrap_or(uuid))) {
+            Some(uuid) if !uuid.is_empty() => uuid,
+            _ => format!("job-{}-{}", file_name(&job.to_string_lossy()), file_name(&title.to_string_lossy())),
+        };
+        let queue = file_name(&text("PRINTER").unwrap_or_default());
+        let folder = match (var("FOILPRESS_JOBS"), var("CUPS_CACHEDIR")) {
+            (Some(jobs), _) => PathBuf::from(jobs),
+            (None, Some(cache)) => Path::new(&cache).join("foilpress"),
+            (None, None) => Journal::of_user()?.folder().join("queues"),
+        };
+        Ok(Call {
+            title: title.to_string_lossy().into_owned(),
+            identity,
+            copies: match file {
+                Some(_) => copies.to_string_lossy().parse().unwrap_or(1).clamp(1, 1000),
+                None => 1,
+            },
+            file,
+            to,
+            journal: folder.join(if queue.is_empty() { "queue" } else { &queue }),
+            in_class: var("CLASS").is_some_and(|class| !class.is_empty()),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_call_is_read_as_the_print_system_makes_it() {
+        let arguments = |list: &[&str]| list.iter().map(OsString::from).collect::<Vec<_>>();
+        let environment = |name: &str| -> Option<OsString> {
+            Some(match name {
+                "DEVICE_URI" => "foilpress:/serial/dev/ttyACM0".into(),
+                "PRINTER" => "Alps".into(),
+                "CUPS_CACHEDIR" => "/var/cache/cups".into(),
+                _ => return None,
+            })
+        };
+        let options = "media=A4 job-uuid=urn:uuid:0f0e-/../x copies=3";
+        let call = Call::read(&arguments(&["7", "me", "My title", "3", options, "/spool/d7"]), &environment)
+            .unwrap();
+        assert_eq!((call.identity.as_str(), call.copies, call.in_class), ("0f0e-x", 3, false));
+        assert_eq!(call.journal, Path::new("/var/cache/cups/foilpress/Alps"));
+        // On standard input the filters have made the copies.
+        let call = Call::read(&arguments(&["7", "me", "../t", "3", ""]), &environment).unwrap();
+        assert_eq!((call.identity.as_str(), call.copies), ("job-7-t", 1));
+        assert!(matches!(Call::read(&arguments(&["7"]), &environment), Err(CallError::Arguments(1))));
+        assert!(matches!(Call::read(&arguments(&["7", "", "", "", ""]), &|_| None), Err(CallError::NoUri)));
+    }
+}

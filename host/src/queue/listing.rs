@@ -1,0 +1,56 @@
+//! What the backend lists: the bridges at this computer, and printers at cables of their own.
+//!
+//! Source: backend(7).
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::uri;
+use crate::send::find;
+use crate::send::query::is_alps;
+
+/// What is said when no device is there, so that the backend is known to be.
+const NO_DEVICE: &str = "network foilpress \"Unknown\" \"ALPS MD-5500 through a Foilpress bridge\"";
+/// The device ID a bridge's printer is listed with: listing asks no printer.
+const ID: &str = "MFG:ALPS;MDL:MD-5500;CMD:RGL;";
+
+/// A line for every device there is; one line if there is none.
+pub fn devices() -> String {
+    let survey = find::survey();
+    let bridges = survey.bridges.iter().filter_map(|bridge| bridge.addresses.first()).map(|address| {
+        device(&address.to_string(), &format!("ALPS MD-5500 through a Foilpress bridge ({address})"), ID)
+    });
+    let cables = (0..8).filter_map(|number| {
+        let device = PathBuf::from(format!("/dev/usb/lp{number}"));
+        let id = fs::read_to_string(format!("/sys/class/usbmisc/lp{number}/device/ieee1284_id")).ok()?;
+        (device.exists() && is_alps(&id)).then(|| at_cable(&device, &id))
+    });
+    // What cannot be named by a URI cannot be listed.
+    let lines: String = bridges.chain(cables).flatten().collect();
+    if lines.is_empty() { format!("{NO_DEVICE}\n") } else { lines }
+}
+
+fn at_cable(path: &Path, id: &str) -> Result<String, uri::UriError> {
+    let path = path.display();
+    device(&format!("raw:{path}"), &format!("ALPS MD-5500 at a cable ({path})"), id.trim())
+}
+
+fn device(address: &str, about: &str, id: &str) -> Result<String, uri::UriError> {
+    let plain = |text: &str| text.replace(['"', '\n'], " ");
+    Ok(format!("direct {} \"ALPS MD-5500\" \"{}\" \"{}\"\n", uri::of(address)?, plain(about), plain(id)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_is_a_line_whatever_it_says_of_itself() {
+        let line = at_cable(Path::new("/dev/usb/lp0"), "MFG:ALPS;DES:\"MD\"\n;\n").unwrap();
+        assert_eq!(
+            line,
+            "direct foilpress:/raw/dev/usb/lp0 \"ALPS MD-5500\" \"ALPS MD-5500 at a cable (/dev/usb/lp0)\" \
+             \"MFG:ALPS;DES: MD  ;\"\n"
+        );
+    }
+}

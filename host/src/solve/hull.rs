@@ -1,0 +1,204 @@
+//! The two sides of equation 1 as the metric sees them: the stacks that can be mixed, and a target.
+//!
+//! Problem: the metric compares cube roots of reflected radiance, weighted by column; tables hold reflectance.
+//! Method: both are brought to radiance once, targets to their cube roots too, and checked, so that the solver
+//! ([`super::mixture`]) meets only finite numbers of 0 or more.
+//! Cost: one multiplication a number and one cube root a column of a target. Limits: what is darker than
+//! a trillionth of the brightest stack is as dark as that, since the cube root has no slope at 0.
+//! Source: the appendix of the 2009 paper.
+
+use crate::brdf::{Space, Table};
+
+use super::root::inverse_cbrt;
+use super::simplex::SimplexError;
+use super::vector::add_scaled;
+
+/// Price of one layer of ink, in units of squared distance: what a tie is decided by.
+pub const LAYER_PRICE: f64 = 1e-6;
+
+/// Darkest radiance told apart from black, relative to the brightest of any stack.
+pub(super) const DARKEST: f64 = 1e-12;
+
+/// Why there is no mixture.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MixtureError {
+    /// There is nothing to mix.
+    #[error("there is no stack to mix from")]
+    NoStacks,
+    /// The stacks or the target are in another tabulation.
+    #[error("{what} has {found} columns where the space has {expected}")]
+    Columns {
+        /// What was given.
+        what: &'static str,
+        /// Columns of the space.
+        expected: usize,
+        /// Columns found.
+        found: usize,
+    },
+    /// As many prices as stacks are needed.
+    #[error("{stacks} stacks need as many prices and weights, not {found}")]
+    Length {
+        /// Stacks.
+        stacks: usize,
+        /// Numbers given.
+        found: usize,
+    },
+    /// A reflectance is not a number, infinite or negative.
+    #[error("{what}, column {column}: a reflectance of {value} is not a finite number of 0 or more")]
+    Value {
+        /// What was given.
+        what: &'static str,
+        /// The column.
+        column: usize,
+        /// The value.
+        value: f64,
+    },
+    /// The numbers are so large or small that products of them overflow.
+    #[error(transparent)]
+    Simplex(#[from] SimplexError),
+}
+
+/// The stacks as the metric sees them: reflected radiance, weights of the columns, prices.
+#[derive(Clone, Debug)]
+pub struct Hull {
+    radiance: Vec<f64>,
+    pub(super) weight: Vec<f64>,
+    pub(super) rows: Table,
+    pub(super) price: Vec<f64>,
+    pub(super) darkest: f64,
+}
+
+/// A target as the metric sees it.
+#[derive(Clone, Debug, Default)]
+pub struct Target {
+    pub(super) radiance: Vec<f64>,
+    pub(super) root: Vec<f64>,
+}
+
+impl Target {
+    /// Integral of the cube root of the target's radiance over the metric's measure, all channels.
+    pub fn brightness(&self, hull: &Hull) -> f64 {
+        self.root.iter().zip(&hull.weight).map(|(root, w)| root * w * w).sum()
+    }
+}
+
+impl Hull {
+    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared
+    /// distance: [`LAYER_PRICE`] times its layers, or 0.
+    pub fn new(space: &Space, curves: &Table, price: &[f64]) -> Result<Hull, MixtureError> {
+        let m = space.columns();
+        if curves.is_empty() {
+            return Err(MixtureError::NoStacks);
+        }
+        if curves.columns() != m {
+            return Err(MixtureError::Columns { what: "a stack", expected: m, found: curves.columns() });
+        }
+        if price.len() != curves.len() {
+            return Err(MixtureError::Length { stacks: curves.len(), found: price.len() });
+        }
+        let mut rows = Table::new(m);
+        let mut brightest = 0.0f64;
+        let mut radiance = vec![0.0; m];
+        for row in curves.rows() {
+            for (j, (&f, c)) in row.iter().zip(space.radiance()).enumerate() {
+                if !(f.is_finite() && f >= 0.0) {
+                    return Err(MixtureError::Value { what: "a stack", column: j, value: f });
+                }
+                radiance[j] = f * c;
+                brightest = brightest.max(radiance[j]);
+            }
+            rows.push(&radiance);
+        }
+        let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
+        Ok(Hull {
+            radiance: space.radiance().to_vec(),
+            weight: space.weight().to_vec(),
+            rows,
+            price: price.to_vec(),
+            darkest: darkest.max(f64::MIN_POSITIVE),
+        })
+    }
+
+    /// The hull of some of the stacks.
+    pub fn subset(&self, stacks: &[usize]) -> Hull {
+        let mut rows = Table::new(self.rows.columns());
+        stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
+        let price = stacks.iter().map(|&k| self.price[k]).collect();
+        Hull { radiance: self.radiance.clone(), weight: self.weight.clone(), rows, price, ..*self }
+    }
+
+    /// Number of stacks.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Never: a hull has at least one stack.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.rows.columns()
+    }
+
+    /// A target from a row of reflectance (1/sr). Values below 0 count as 0.
+    pub fn target(&self, reflectance: &[f64]) -> Result<Target, MixtureError> {
+        let mut target = Target::default();
+        self.aim(reflectance.iter().copied(), &mut target)?;
+        Ok(target)
+    }
+
+    /// The same into an existing target, without allocating when it has been used before.
+    pub fn aim(
+        &self,
+        reflectance: impl ExactSizeIterator<Item = f64>,
+        target: &mut Target,
+    ) -> Result<(), MixtureError> {
+        let m = self.columns();
+        if reflectance.len() != m {
+            return Err(MixtureError::Columns { what: "the target", expected: m, found: reflectance.len() });
+        }
+        target.radiance.clear();
+        target
+            .radiance
+            .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
+        target.root.clear();
+        target.root.resize(m, 0.0);
+        for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
+            // Zero and what is too small for the root are black.
+            let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));
+            *root = t * r * r;
+        }
+        match target.radiance.iter().position(|t| !t.is_finite()) {
+            Some(column) => {
+                Err(MixtureError::Value { what: "the target", column, value: target.radiance[column] })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The distance d of a mixture to a target.
+    pub fn distance(&self, weights: &[f64], target: &Target) -> f64 {
+        let mut mix = vec![0.0; self.columns()];
+        self.mix(weights, &mut mix);
+        let mut sum = 0.0;
+        for ((w, &f), root) in self.weight.iter().zip(&mix).zip(&target.root) {
+            let f = f.max(self.darkest);
+            let r = inverse_cbrt(f);
+            let d = w * (f * r * r - root);
+            sum += d * d;
+        }
+        sum.sqrt()
+    }
+
+    /// Reflected radiance of a mixture.
+    pub(super) fn mix(&self, weights: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        for (k, &w) in weights.iter().enumerate() {
+            if w != 0.0 {
+                add_scaled(out, w, self.rows.row(k));
+            }
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! A bridge on a socket: the engine that runs on the board, and a printer whose pace and troubles a test decides.
+
+use std::io;
+use std::net::{SocketAddr, TcpListener};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use bridge::engine::{Engine, Identity, Memory, Outcome, Task};
+use foilpress::send::transport::{Socket, Transport};
+use foilpress::simulate::{Carousel, Cassette, Lever, Printer, STATUS_LENGTH, Trouble};
+use protocol::ink::Ink;
+use protocol::link::frame::{MAX, Reader};
+use protocol::link::message::{Answer, Fault, Lines};
+
+/// What a test sees of the printer and does to it and the bridge.
+pub struct Port {
+    /// Everything that crossed it.
+    pub printed: Mutex<Vec<u8>>,
+    /// Bytes the printer takes in a millisecond at most.
+    pub rate: AtomicUsize,
+    /// The printer is busy once it has taken something: the job stays open for as long as a test needs.
+    pub busy: AtomicBool,
+    /// There is paper.
+    pub paper: AtomicBool,
+    /// The printer is switched off.
+    pub off: AtomicBool,
+    /// The printer's cover is open.
+    pub open_cover: AtomicBool,
+    /// The maker its device ID names; none for a port that does not talk back.
+    pub maker: Mutex<Option<&'static str>>,
+    /// How often the printer was reset.
+    pub resets: AtomicUsize,
+    /// The bridge's power goes, and its memory with it.
+    pub forget: AtomicBool,
+    /// The cassettes that are in.
+    cassettes: Vec<Cassette>,
+    /// Bytes of memory for bands.
+    band: usize,
+    stop: AtomicBool,
+}
+
+impl Port {
+    /// A printer with these cassettes that takes so many bytes a millisecond.
+    pub fn new(cassettes: &[Ink], rate: usize) -> Port {
+        Port {
+            printed: Mutex::default(),
+            rate: rate.into(),
+            busy: false.into(),
+            paper: true.into(),
+            off: AtomicBool::new(false),
+            open_cover: false.into(),
+            maker: Mutex::default(),
+            resets: 0.into(),
+            forget: false.into(),
+            cassettes: cassettes.iter().copied().map(Cassette::from).collect(),
+            band: 40_000,
+            stop: false.into(),
+        }
+    }
+
+    /// The same at a bridge with so much memory for bands.
+    pub fn with_band(self, band: usize) -> Port {
+        Port { band, ..self }
+    }
+
+    fn status(&self) -> [u8; STATUS_LENGTH] {
+        let carousel = Carousel::new(&self.cassettes).expect("at most seven cassettes");
+        let mut printer = Printer::new(carousel, Lever::Auto);
+        if is(&self.open_cover) {
+            printer.strike(Trouble::CoverOpen);
+        }
+        printer.status()
+    }
+}
+
+/// A bridge at work until it is dropped.
+pub struct Bridge {
+    /// Its printer.
+    pub port: Arc<Port>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Bridge {
+    /// At a local socket of this name.
+    #[cfg(unix)]
+    pub fn on_unix(path: &Path, port: Port) -> io::Result<Bridge> {
+        let listener = std::os::unix::net::UnixListener::bind(path)?;
+        listener.set_nonblocking(true)?;
+        Ok(Bridge::start(port, move || {
+            let (socket, _) = listener.accept().ok()?;
+            socket.set_nonblocking(false).ok()?;
+            Some(Box::new(Socket::new(socket)))
+        }))
+    }
+
+    /// At a place on the network; says which, if any will do (`127.0.0.1:0`).
+    pub fn on_tcp(address: SocketAddr, port: Port) -> io::Result<(Bridge, SocketAddr)> {
+        let listener = TcpListener::bind(address)?;
+        let address = listener.local_addr()?;
+        listener.set_nonblocking(true)?;
+        let bridge = Bridge::start(port, move || {
+            let (socket, _) = listener.accept().ok()?;
+            socket.set_nonblocking(false).ok()?;
+            Some(Box::new(Socket::new(socket)))
+        });
+        Ok((bridge, address))
+    }
+
+    fn start(port: Port, mut accept: impl FnMut() -> Option<Box<dyn Transport>> + Send + 'static) -> Bridge {
+        let port = Arc::new(port);
+        let thread = std::thread::spawn({
+            let port = port.clone();
+            move || {
+                let (mut data, mut output, mut band) = (vec![0; 8192], vec![0; 4096], vec![0; port.band]);
+                for boot in 1.. {
+                    let memory = Memory { data: &mut data, output: &mut output, band: &mut band };
+                    let identity = Identity { boot, serial: 7, firmware: "test" };
+                    serve(Engine::new(memory, identity), &mut accept, &port);
+                    if is(&port.stop) {
+                        break;
+                    }
+                }
+            }
+        });
+        Bridge { port, thread: Some(thread) }
+    }
+
+    /// Everything that has crossed the port.
+    pub fn printed(&self) -> Vec<u8> {
+        self.port.printed.lock().expect("no test panicked with it").clone()
+    }
+}
+
+impl Drop for Bridge {
+    fn drop(&mut self) {
+        self.port.stop.store(true, Ordering::Relaxed);
+        let ended = self.thread.take().map(JoinHandle::join);
+        assert!(std::thread::panicking() || ended.is_some_and(|ended| ended.is_ok()), "the bridge panicked");
+    }
+}
+
+fn is(flag: &AtomicBool) -> bool {
+    flag.load(Ordering::Relaxed)
+}
+
+/// One life of the bridge.
+fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Transport>>, port: &Port) {
+    let (mut reader, mut buffer) = (Reader::new(), [0; 4096]);
+    let mut link: Option<Box<dyn Transport>> = None;
+    while !is(&port.stop) && !port.forget.swap(false, Ordering::Relaxed) {
+        if let Some(opened) = accept() {
+            engine.link_lost();
+            reader.reset();
+            link = Some(opened);
+        }
+        match link.as_mut().map(|link| link.receive(&mut buffer, Duration::from_millis(1))) {
+            Some(Ok(count)) => engine.receive(&mut reader, &buffer[..count]),
+            Some(Err(_)) => link = None,
+            None => std::thread::sleep(Duration::from_millis(1)),
+        }
+        if let Some(task) = engine.task() {
+            // What the board would do at the port.
+            let status = port.status();
+            port.resets.fetch_add(usize::from(task == Task::Initialise), Ordering::Relaxed);
+            let id = port.maker.lock().ok().and_then(|maker| maker.map(device_id));
+            engine.done(match (task, &id) {
+                (Task::PrinterStatus, _) => Outcome::Answer(Answer::Bytes(&status)),
+                (Task::DeviceId, Some(id)) => Outcome::Answer(Answer::Bytes(id)),
+                (Task::DeviceId, None) => Outcome::Answer(Answer::OneWay),
+                _ => Outcome::Done,
+            });
+        }
+        for _ in 0..50 {
+            engine.work();
+        }
+        let paper = is(&port.paper);
+        let off = is(&port.off);
+        if off {
+            engine.port(Lines(0), Some(Fault::PowerOff));
+        } else {
+            engine.port(Lines::IDLE, (!paper).then_some(Fault::PaperOut));
+        }
+        let bytes = engine.output();
+        let mut printed = port.printed.lock().expect("no test panicked with it");
+        let waits = off || !paper || is(&port.busy) && !printed.is_empty();
+        let count = if waits { 0 } else { bytes.len().min(port.rate.load(Ordering::Relaxed)) };
+        printed.extend_from_slice(&bytes[..count]);
+        drop(printed);
+        engine.consumed(count);
+        let mut frame = [0; MAX];
+        loop {
+            let length = engine.transmit(&mut frame);
+            if length == 0 {
+                break;
+            }
+            let mut rest = &frame[..length];
+            while let (Some(open), false) = (&mut link, rest.is_empty()) {
+                match open.send(rest) {
+                    Ok(count) => rest = &rest[count..],
+                    Err(_) => link = None,
+                }
+            }
+        }
+    }
+}
+
+/// A device ID as IEEE 1284 has it: its length, itself counted, then keys and values.
+fn device_id(maker: &str) -> Vec<u8> {
+    let text = format!("MFG:{maker};MDL:Test;CLS:PRINTER;");
+    [&[0, (text.len() + 2) as u8], text.as_bytes()].concat()
+}
