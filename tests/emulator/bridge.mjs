@@ -59,14 +59,16 @@ let crossed = [];
 const printer = new Printer(board, {
   id: [],
   onByte: (byte) => { if (paper) crossed.push(byte); },
+  // At once, so that it stands between the bytes before and behind it.
+  onReset: () => {
+    report();
+    told({ init: true });
+  },
 });
 const told = (message) => paper?.write(`${JSON.stringify(message)}\n`);
-let resets = 0;
 function report() {
   if (crossed.length) told({ bytes: Buffer.from(crossed).toString('base64') });
   crossed = [];
-  if (printer.resets !== resets) told({ init: true });
-  resets = printer.resets;
 }
 function printerConnected(socket) {
   paper = socket;

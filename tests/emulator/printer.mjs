@@ -11,8 +11,8 @@ const LOW = 0;
 
 export class Printer {
   /// `onByte` is told every byte; then neither bytes nor edges are kept here, only what they amount to.
-  constructor(board, { busyAfter = 300, work = 1000, ack = 500, id = null, negotiates = true, status = null, onByte = null } = {}) {
-    Object.assign(this, { board, busyAfter, work, ack, id, negotiates, status, onByte });
+  constructor(board, { busyAfter = 300, work = 1000, ack = 500, id = null, negotiates = true, status = null, onByte = null, onReset = null } = {}) {
+    Object.assign(this, { board, busyAfter, work, ack, id, negotiates, status, onByte, onReset });
     this.taken = [];
     this.count = 0;
     this.room = Infinity; // bytes it takes in all before it stays busy
@@ -85,7 +85,10 @@ export class Printer {
   }
 
   react(line, level) {
-    if (line === 'init' && level === 0) this.resets += 1;
+    if (line === 'init' && level === 0) {
+      this.resets += 1;
+      this.onReset?.();
+    }
     if (line === 'strobe' && level === 0 && this.phase === 'forward') this.take();
     if (this.negotiates) this.converse(line, level);
   }
