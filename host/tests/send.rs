@@ -5,8 +5,10 @@ use std::process::{Command, Output, Stdio};
 
 use foilpress::job::stream::write_job;
 use foilpress::observe::Silent;
+use foilpress::send::journal::{Journal, NewJob};
 use foilpress::separate::{Pass, Plane};
 use protocol::ink::Ink;
+use protocol::link::message::JobKind;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
 use tempfile::TempDir;
@@ -84,15 +86,30 @@ fn a_file_and_a_raw_device_get_the_job_byte_for_byte() {
 }
 
 #[test]
-fn a_job_whose_bridge_is_not_there_waits_and_can_be_cancelled_without_it() {
+fn nothing_is_queued_for_a_bridge_that_is_not_there() {
     let bench = Bench::new();
     let said = bench.says(1, "send job.rgl --to serial:/dev/no-such-port");
-    assert!(said.contains("nothing is printed yet") && said.contains("nothing is there"), "{said}");
+    assert!(said.contains("not sent") && said.contains("nothing is there"), "{said}");
+    assert!(bench.says(0, "resume --list").contains("no job"));
+}
+
+#[test]
+fn a_job_whose_bridge_is_gone_waits_and_can_be_cancelled_without_it() {
+    let bench = Bench::new();
+    let journal = Journal::at(&bench.folder.path().join("jobs")).unwrap();
+    let queued = journal.queue(NewJob {
+        name: "job.rgl",
+        to: "serial:/dev/no-such-port".into(),
+        kind: JobKind::Raw,
+        data: &bench.job,
+        port_bytes: bench.job.len() as u64,
+        passes: Vec::new(),
+    });
+    let number = format!("{:08x}", queued.unwrap().entry.record.job);
     let listed = bench.says(0, "resume --list");
-    assert!(listed.contains("job.rgl: queued, nothing printed"), "{listed}");
-    let number = listed.split_whitespace().next().unwrap();
-    assert!(said.contains(&format!("foilpress resume {number}")), "{said}");
-    bench.says(1, "resume");
+    assert!(listed.starts_with(&number) && listed.contains("job.rgl: queued, nothing printed"), "{listed}");
+    let said = bench.says(1, "resume");
+    assert!(said.contains("nothing is there"), "{said}");
     let said = bench.says(0, &format!("cancel {number}"));
     assert!(said.contains("had not taken a byte"), "{said}");
     assert!(bench.says(1, "resume").contains("no job waits"));
