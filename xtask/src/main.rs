@@ -87,7 +87,7 @@ fn main() -> ExitCode {
                 ]),
             ),
             ("tests", {
-                let mut test = cargo(&["test", "--workspace", "--locked"]);
+                let mut test = cargo(&["test", "--workspace", "--locked", "--no-fail-fast"]);
                 // The gate answers the same for the same tree; `cargo test` by itself goes on looking at new cases.
                 if std::env::var_os(PROPERTY_SEED).is_none() {
                     test.env(PROPERTY_SEED, "1");
