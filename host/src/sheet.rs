@@ -7,6 +7,7 @@ pub mod piece;
 
 use inks::Stack;
 use protocol::paper::Paper;
+use rayon::prelude::*;
 
 pub use picture::FileError;
 pub use piece::Piece;
@@ -110,13 +111,17 @@ impl Sheet {
         &self.index
     }
 
+    /// The stacks and the stack number of every dot.
+    pub fn into_parts(self) -> (Vec<Stack>, Vec<u8>) {
+        (self.stacks, self.index)
+    }
+
     /// How many dots each stack has.
     pub fn census(&self) -> Vec<u64> {
-        let mut counts = [[0u32; 256]; 4];
-        let mut total = vec![0u64; self.stacks.len()];
-        for chunk in self.index.chunks(1 << 24) {
-            counts.iter_mut().for_each(|c| c.fill(0));
-            let quads = chunk.chunks_exact(4);
+        let counted = self.index.par_chunks(1 << 20).map(|dots| {
+            // Neighbours are alike: four tables keep their counts from waiting for each other.
+            let mut counts = [[0u32; 256]; 4];
+            let quads = dots.chunks_exact(4);
             for &dot in quads.remainder() {
                 counts[0][usize::from(dot)] += 1;
             }
@@ -125,10 +130,9 @@ impl Sheet {
                     count[usize::from(dot)] += 1;
                 }
             }
-            for (i, total) in total.iter_mut().enumerate() {
-                *total += counts.iter().map(|c| u64::from(c[i])).sum::<u64>();
-            }
-        }
-        total
+            (0..self.stacks.len()).map(|i| counts.iter().map(|c| u64::from(c[i])).sum()).collect::<Vec<u64>>()
+        });
+        let none = || vec![0; self.stacks.len()];
+        counted.reduce(none, |a, b| a.into_iter().zip(b).map(|(a, b)| a + b).collect())
     }
 }

@@ -124,6 +124,12 @@ impl Space {
         }
         sum.sqrt()
     }
+
+    /// A row of reflectance in 1/sr as the metric sees it: [`Space::distance`] is the Euclidean distance of two such rows.
+    pub fn seen(&self, row: &[f64]) -> Vec<f64> {
+        let columns = row.iter().zip(self.radiance.iter().zip(&self.weight));
+        columns.map(|(&f, (&c, &weight))| weight * (f.max(0.0) * c).cbrt()).collect()
+    }
 }
 
 /// Rows of equal length in one allocation: bases, stacks, candidates. Reflectance in 1/sr unless said.
@@ -192,6 +198,9 @@ mod tests {
         let lambert = |v: f64| vec![v; space.columns()];
         let expected = (0.3f64.cbrt() - 0.1f64.cbrt()).abs() * (3.0f64 * 3.0 / 8.0).sqrt();
         let d = space.distance(&lambert(0.3), &lambert(0.1));
+        assert!((d - expected).abs() < 1e-5, "{d} {expected}");
+        let seen = space.seen(&lambert(0.3)).into_iter().zip(space.seen(&lambert(0.1)));
+        let d = seen.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
         assert!((d - expected).abs() < 1e-5, "{d} {expected}");
     }
 

@@ -162,9 +162,12 @@ impl<'a> Lattice<'a> {
         let finer = (maps.width() > width, maps.height() > height);
         let axis =
             |finer, dots, pixels| if finer { Axis::over(dots, pixels) } else { Axis::between(dots, pixels) };
-        let stretch = if width >= 4 * maps.width() && height >= 4 * maps.height() {
+        // Rounded up: an odd number of dots is none the less two dots a pixel.
+        let coarse =
+            |dots: usize| width.div_ceil(dots) >= maps.width() && height.div_ceil(dots) >= maps.height();
+        let stretch = if coarse(4) {
             16
-        } else if width >= 2 * maps.width() && height >= 2 * maps.height() {
+        } else if coarse(2) {
             4
         } else {
             1

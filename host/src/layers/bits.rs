@@ -17,10 +17,15 @@ pub(super) fn full(width: usize, length: usize) -> Plane {
 
 /// The plane of the bytes, one a dot, that `ink` is true for. `width` at least 1.
 pub(super) fn from_bytes(width: usize, bytes: &[u8], ink: impl Fn(u8) -> bool + Sync) -> Plane {
-    let mut plane = blank(width, bytes.len() / width);
-    plane.bits.par_chunks_mut(plane.stride).zip(bytes.par_chunks_exact(width)).for_each(|(bits, bytes)| {
-        for (bits, bytes) in bits.iter_mut().zip(bytes.chunks(8)) {
-            *bits = bytes.iter().zip(0..).fold(0, |bits, (&byte, at)| bits | u8::from(ink(byte)) << (7 - at));
+    from(width, bytes, |&byte| ink(byte))
+}
+
+/// The plane of the dots that `ink` is true for. `width` at least 1.
+pub(super) fn from<T: Sync>(width: usize, dots: &[T], ink: impl Fn(&T) -> bool + Sync) -> Plane {
+    let mut plane = blank(width, dots.len() / width);
+    plane.bits.par_chunks_mut(plane.stride).zip(dots.par_chunks_exact(width)).for_each(|(bits, dots)| {
+        for (bits, dots) in bits.iter_mut().zip(dots.chunks(8)) {
+            *bits = dots.iter().zip(0..).fold(0, |bits, (dot, at)| bits | u8::from(ink(dot)) << (7 - at));
         }
     });
     plane

@@ -176,7 +176,8 @@ pub(super) fn flat(
         notes.extend(found.notes(file));
         layers = found.layers;
     }
-    let colour = rgb.par_iter().any(|&v| v < 255).then(|| {
+    let white = |bytes: &[u8]| bytes.iter().fold(255, |all, byte| all & byte) == 255;
+    let colour = rgb.par_chunks(1 << 12).any(|bytes| !white(bytes)).then(|| {
         let full = Colour { width: size.0 as usize, height: size.1 as usize, rgb };
         full.averaged(dots)
     });
@@ -191,7 +192,11 @@ fn plane_of<const N: usize>(
     dots: (usize, usize),
     is: impl Fn(&[u8; N]) -> bool + Sync,
 ) -> Plane {
-    let bytes: Vec<u8> = pixels.as_chunks::<N>().0.par_iter().map(|pixel| u8::from(is(pixel))).collect();
+    let pixels = pixels.as_chunks::<N>().0;
+    if (size.0 as usize, size.1 as usize) == dots {
+        return bits::from(dots.0, pixels, is);
+    }
+    let bytes: Vec<u8> = pixels.par_iter().map(|pixel| u8::from(is(pixel))).collect();
     bits::from_bytes(dots.0, &raster::nearest(bytes, size, dots), |byte| byte > 0)
 }
 
@@ -213,8 +218,11 @@ impl Colour {
                 (if nearer { above } else { above - 1 }) as u8
             })
             .collect();
-        // Whole pixels: the first and last are shared where sides are no multiples, which no dot shows.
-        let span = |at: usize, from: usize, to: usize| at * from / to..((at + 1) * from).div_ceil(to);
+        // Whole pixels: pairs, or the first and last are shared where sides are no multiples, which no dot shows.
+        let span = |at: usize, from: usize, to: usize| match from.div_ceil(2) == to {
+            true => 2 * at..(2 * at + 2).min(from),
+            false => at * from / to..((at + 1) * from).div_ceil(to),
+        };
         let mut rgb = vec![0; to.0 * to.1 * 3];
         rgb.par_chunks_exact_mut(to.0 * 3).enumerate().for_each(|(y, row)| {
             let rows = span(y, self.height, to.1);
@@ -249,7 +257,7 @@ impl Colour {
         let (width, height) = (dots.0 as u16, dots.1 as u16);
         let place = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
         let sheet = pipeline::halftone_mix(&mix, library, &place, observer)?;
-        Ok((sheet.stacks().to_vec(), sheet.index().to_vec()))
+        Ok(sheet.into_parts())
     }
 
     /// The mixture of stacks at every pixel.
@@ -268,9 +276,11 @@ impl Colour {
         let channels = nodes.maps.channels();
         let mut data = vec![0u16; self.width * self.height * channels];
         let steps: [(usize, u32); 256] = std::array::from_fn(step);
+        let lattice = Nodes::new(&nodes.maps);
         data.par_chunks_mut(channels << 12).zip(self.rgb.par_chunks(3 << 12)).for_each(|(out, rgb)| {
+            let mut sums = vec![[0; 8]; lattice.each];
             for (out, pixel) in out.chunks_exact_mut(channels).zip(rgb.as_chunks::<3>().0) {
-                interpolate(&nodes.maps, pixel.map(|v| steps[usize::from(v)]), out);
+                lattice.between(pixel.map(|v| steps[usize::from(v)]), &mut sums, out);
             }
         });
         let maps =
@@ -286,38 +296,68 @@ fn step(value: usize) -> (usize, u32) {
     (node, ((at - node * 255) * 256).div_euclid(255) as u32)
 }
 
-/// Weights between nodes: along the edges of the cube from its lowest corner to its highest, the axis with the
-/// largest fraction first.
-fn interpolate(nodes: &WeightMaps, at: [(usize, u32); 3], out: &mut [u16]) {
-    const STRIDE: [usize; 3] = [NODES * NODES, NODES, 1];
-    let mut axes = [0, 1, 2];
-    axes.sort_unstable_by_key(|&axis| std::cmp::Reverse(at[axis].1));
-    let mut node: usize = (0..3).map(|axis| at[axis].0 * STRIDE[axis]).sum();
-    let mut sums = [0u32; 32];
-    let sums = &mut sums[..out.len().min(32)];
-    let mut last = 256;
-    for corner in 0..4 {
-        let next = if corner < 3 { at[axes[corner]].1 } else { 0 };
-        if last > next {
-            for (sum, &weight) in sums.iter_mut().zip(nodes.at(node)) {
-                *sum += (last - next) * u32::from(weight);
+/// The mixtures of the lattice's nodes, for what lies between them.
+struct Nodes {
+    /// For each node its weights, eight at a time, the rest zero.
+    lanes: Vec<[u16; 8]>,
+    /// Lanes of a node.
+    each: usize,
+    /// The largest weight of each node.
+    largest: Vec<usize>,
+}
+
+impl Nodes {
+    fn new(maps: &WeightMaps) -> Nodes {
+        let each = maps.channels().div_ceil(8);
+        let nodes = || maps.data().chunks_exact(maps.channels());
+        let lanes = nodes().flat_map(|node| {
+            (0..each).map(move |lane| {
+                std::array::from_fn(|at| node.get(8 * lane + at).copied().unwrap_or_default())
+            })
+        });
+        let largest = nodes().map(|node| (0..node.len()).max_by_key(|&at| node[at]).unwrap_or(0)).collect();
+        Nodes { lanes: lanes.collect(), each, largest }
+    }
+
+    /// The mixture between nodes: along the edges of the cube from its lowest corner to its highest, the axis with the
+    /// largest fraction first. `sums` is room for the lanes of a node.
+    #[inline]
+    fn between(&self, at: [(usize, u32); 3], sums: &mut [[u16; 8]], out: &mut [u16]) {
+        let [x, y, z] = at;
+        let mut axes = [(x.1, NODES * NODES), (y.1, NODES), (z.1, 1)];
+        for (a, b) in [(0, 1), (1, 2), (0, 1)] {
+            if axes[a].0 < axes[b].0 {
+                axes.swap(a, b);
             }
         }
-        last = next;
-        if corner < 3 {
-            node += STRIDE[axes[corner]];
+        let mut node = (x.0 * NODES + y.0) * NODES + z.0;
+        let mut nearest = (0, node);
+        let mut last = 256;
+        sums.fill([0; 8]);
+        for (next, step) in axes.into_iter().chain([(0, 0)]) {
+            let part = last - next;
+            if part == 256 {
+                return out.copy_from_slice(&self.of(node).as_flattened()[..out.len()]);
+            }
+            if part > 0 {
+                for (sums, weights) in sums.iter_mut().zip(self.of(node)) {
+                    for (sum, &weight) in sums.iter_mut().zip(weights) {
+                        *sum += ((u32::from(weight) * (part << 8)) >> 16) as u16;
+                    }
+                }
+                nearest = nearest.max((part, node));
+            }
+            (last, node) = (next, node + step);
         }
+        // What rounding down leaves, less than four units a channel, goes to the largest of the nearest node.
+        let total: u16 = sums.as_flattened().iter().sum();
+        sums.as_flattened_mut()[self.largest[nearest.1]] += ONE - total;
+        out.copy_from_slice(&sums.as_flattened()[..out.len()]);
     }
-    // What rounding down leaves, less than one unit a channel, goes to the largest.
-    let (mut total, mut largest) = (0, 0);
-    for (at, (out, &sum)) in out.iter_mut().zip(sums.iter()).enumerate() {
-        *out = (sum >> 8) as u16;
-        total += *out;
-        if sum > sums[largest] {
-            largest = at;
-        }
+
+    fn of(&self, node: usize) -> &[[u16; 8]] {
+        &self.lanes[node * self.each..][..self.each]
     }
-    out[largest] += ONE - total;
 }
 
 /// The lattice as a document: a matte for every node, red by rows of planes.
@@ -418,26 +458,31 @@ mod tests {
 
     proptest! {
         #[test]
-        fn between_nodes_weights_stay_weights(pixel: [u8; 3], seed: u32) {
+        fn between_nodes_weights_are_those_of_the_tetrahedron(pixel: [u8; 3], seed: u32, channels in 1usize..20) {
             let random = |i: usize| f64::from((i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11);
-            let mut data = vec![0; NODES * NODES * NODES * 5];
-            for (node, out) in data.chunks_exact_mut(5).enumerate() {
-                let weights: Vec<f64> = (0..5).map(|q| random(5 * node + q)).collect();
+            let mut data = vec![0; NODES * NODES * NODES * channels];
+            for (node, out) in data.chunks_exact_mut(channels).enumerate() {
+                let weights: Vec<f64> = (0..channels).map(|q| random(channels * node + q)).collect();
                 crate::weights::quantise(&weights, out);
             }
-            let nodes = WeightMaps::new(NODES * NODES, NODES, 5, data).unwrap();
-            let mut out = [0; 5];
-            interpolate(&nodes, pixel.map(|v| step(usize::from(v))), &mut out);
+            let maps = WeightMaps::new(NODES * NODES, NODES, channels, data).unwrap();
+            let (nodes, at) = (Nodes::new(&maps), pixel.map(|v| step(usize::from(v))));
+            let (mut sums, mut out) = (vec![[0; 8]; nodes.each], vec![0; channels]);
+            nodes.between(at, &mut sums, &mut out);
             prop_assert_eq!(out.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
-            // The corners around bound what is between.
-            let corner = pixel.map(|v| step(usize::from(v)).0);
-            for (q, &out) in out.iter().enumerate() {
-                let around = (0..8).map(|c| {
-                    let at = |axis: usize| corner[axis] + (c >> axis & 1);
-                    nodes.at((at(0) * NODES + at(1)) * NODES + at(2))[q]
-                });
-                let (least, most) = around.fold((u16::MAX, 0), |(l, m), w| (l.min(w), m.max(w)));
-                prop_assert!(out + 1 >= least && out <= most + 5, "{} not in {}..={}", out, least, most);
+            // The barycentric form: a corner for each axis that is at least as far along as the fraction says.
+            let mut exact = vec![0.0; channels];
+            let mut levels = vec![0, 256];
+            levels.extend(at.map(|(_, part)| part));
+            levels.sort_unstable();
+            for pair in levels.windows(2) {
+                let node = at.iter().fold(0, |node, &(n, part)| node * NODES + n + usize::from(part > pair[0]));
+                let share = f64::from(pair[1] - pair[0]) / 256.0;
+                exact.iter_mut().zip(maps.at(node)).for_each(|(sum, &w)| *sum += share * f64::from(w));
+            }
+            for (&out, &exact) in out.iter().zip(&exact) {
+                let off = f64::from(out) - exact;
+                prop_assert!(off > -4.0 && off <= 4.0 * channels as f64, "{} is not {}", out, exact);
             }
         }
 

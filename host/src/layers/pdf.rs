@@ -193,12 +193,12 @@ impl Separated {
     ///
     /// # Errors
     /// A window of no dots.
-    pub fn art(&self, name: &str, window: &Window, options: &Options) -> Result<Artwork, LayersError> {
+    pub fn art(self, name: &str, window: &Window, options: &Options) -> Result<Artwork, LayersError> {
         let path = Path::new(name);
         let empty = || wrong(path, "nothing of it is in the window");
         let dots = super::page_dots((window.width, window.height), self.dpi).ok_or_else(empty)?;
         let mut art = Artwork::blank(name, dots);
-        for (plate, named, coverage) in &self.plates {
+        for (plate, named, coverage) in self.plates {
             let scan = raster::Scan {
                 path: path.to_path_buf(),
                 // No page has more pixels than u32 holds: they were read from a TIFF.
@@ -208,7 +208,7 @@ impl Separated {
                 coverage: window.cut(coverage, self.size.0, 1),
                 by: raster::Coverage::Dark,
             };
-            art.add(scan, plate, *named, true, options);
+            art.add(scan, &plate, named, true, options);
         }
         Ok(art)
     }

@@ -187,7 +187,7 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
             rgb.extend_from_slice(&row);
         }
         // Of a PDF the print system has turned the pages itself.
-        let job = picture(number, paper, (size, page.dpi), &rgb, press.choices.mirror, press)?;
+        let job = picture(number, paper, (size, page.dpi), rgb, press.choices.mirror, press)?;
         for _ in 0..page.copies {
             press.write(&job)?;
         }
@@ -232,7 +232,7 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
     let mut number = only.unwrap_or(1);
     while let Some(size) = drawing.next_page()? {
         let paper = press::paper(number, size, dpi, press.choices)?;
-        let job = picture(number, paper, (size, dpi), &drawing.pixels(size)?, false, press)?;
+        let job = picture(number, paper, (size, dpi), drawing.pixels(size)?, false, press)?;
         press.write(&job)?;
         number += 1;
     }
@@ -244,11 +244,11 @@ fn picture(
     number: usize,
     paper: Paper,
     (size, dpi): ((usize, usize), u16),
-    rgb: &[u8],
+    rgb: Vec<u8>,
     mirrored: bool,
     press: &Press<'_>,
 ) -> Result<Vec<u8>, FilterError> {
-    let drawn = Window::around(rgb, size.0, 3, 255);
+    let drawn = Window::around(&rgb, size.0, 3, 255);
     let Some(view) = press.view(number, paper, (size, dpi), drawn, mirrored) else { return Ok(Vec::new()) };
     let (window, name) = (&view.window, format!("page {number}"));
     let rgb = window.cut(rgb, size.0, 3);

@@ -72,7 +72,11 @@ fn masks(planes: &[&Plane], at: usize) -> [usize; 8] {
         for (byte, plane) in bytes.iter_mut().zip(planes) {
             *byte = plane.bits[at];
         }
-        let dots = transpose(u64::from_le_bytes(bytes)).to_be_bytes();
+        let bytes = u64::from_le_bytes(bytes);
+        if bytes == 0 {
+            continue;
+        }
+        let dots = transpose(bytes).to_be_bytes();
         for (mask, bits) in masks.iter_mut().zip(dots) {
             *mask |= usize::from(bits) << (8 * eight);
         }
@@ -88,7 +92,12 @@ pub(crate) fn census(planes: &[&Plane], width: usize, length: usize) -> Vec<u64>
     slabs
         .fold(none, |mut counts, row| {
             for at in 0..stride {
-                for &mask in &masks(planes, row * stride + at)[..8.min(width - 8 * at)] {
+                let (masks, dots) = (masks(planes, row * stride + at), 8.min(width - 8 * at));
+                if masks.iter().fold(0, |all, mask| all | mask) == 0 {
+                    counts[0] += dots as u64;
+                    continue;
+                }
+                for &mask in &masks[..dots] {
                     counts[mask] += 1;
                 }
             }

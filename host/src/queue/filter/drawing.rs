@@ -31,6 +31,9 @@ impl Drawing {
         let (Some(pages), Some(mut words)) = (child.stdout.take(), child.stderr.take()) else {
             return Err(FilterError::Ghostscript("its pipes cannot be had".into()));
         };
+        // A page is 100 MB: through the usual 64 KB the two programs mostly wait for each other. What is refused is slower.
+        #[cfg(target_os = "linux")]
+        let _ = rustix::pipe::fcntl_setpipe_size(&pages, 1 << 20);
         let complaints = thread::spawn(move || {
             let mut bytes = Vec::new();
             // Only the beginning is shown, but all is taken so that it never waits. What cannot be read is not shown.
