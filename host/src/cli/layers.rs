@@ -229,7 +229,7 @@ pub struct Args {
     foilpress plan layers white.png gold.png black.png --passes white=3\n  \
     foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to lay beside the machine)\n  \
     foilpress plan layers art.svg --json\n\n\
-    The options are those of `foilpress layers`."
+    The options are those of `foilpress layers` that decide what is printed, not where it goes."
 )]
 pub struct PlanArgs {
     #[command(flatten)]

@@ -49,7 +49,7 @@ impl FromArgMatches for Args {
 impl ClapArgs for Args {
     fn augment_args(command: Command) -> Command {
         let layers = layers::PlanArgs::augment_args(Command::new(LAYERS))
-            .about("The plan of spot-colour art; takes the options of `layers`");
+            .about("The plan of spot-colour art; takes the options of `layers` that decide what is printed");
         Document::augment_args(command)
             .mut_arg("html", |html| html.alias("page"))
             .subcommand_negates_reqs(true)
