@@ -176,6 +176,10 @@ export class Printer {
   }
 }
 
+/// For so long after the printer's switch a byte may still come: the bridge saw it ready, and the data's setup cannot be
+/// called back. That the next byte stays away is what counts.
+const ON_ITS_WAY = 1_000;
+
 /// The shortest of every time around the strobes, and every strobe or change of data that came when it must not.
 export class Waveform {
   shortest = { setup: Infinity, strobe: Infinity, hold: Infinity, between: Infinity };
@@ -185,6 +189,7 @@ export class Waveform {
   #fallAt = null;
   #riseAt = null;
   #lastFall = null;
+  #offAt = -Infinity;
 
   #least(name, ns) {
     this.shortest[name] = Math.min(this.shortest[name], ns);
@@ -193,17 +198,19 @@ export class Waveform {
   look({ at, line, level: now }) {
     const level = this.#level;
     level[line] = now;
+    if (line === 'power' && now === 0) this.#offAt = at;
+    const onItsWay = at - this.#offAt < ON_ITS_WAY;
     if (line === 'selectIn' && now === 1) [this.#riseAt, this.#lastFall] = [null, null];
     if (level.selectIn === 1) return;
     if (line === 'data') {
       if (this.#fallAt !== null) this.wrong.push({ at, what: 'data changed under the strobe' });
-      if (level.busy) this.wrong.push({ at, what: 'data changed while busy' });
+      if (level.busy && !onItsWay) this.wrong.push({ at, what: 'data changed while busy' });
       if (this.#riseAt !== null) this.#least('hold', at - this.#riseAt);
       this.#dataAt = at;
     } else if (line === 'strobe' && now === 0) {
       this.#least('setup', at - this.#dataAt);
       if (this.#lastFall !== null) this.#least('between', at - this.#lastFall);
-      if (level.busy || level.paperOut || !level.select || !level.fault) this.wrong.push({ at, what: 'strobe while not ready', ...level });
+      if ((level.busy || level.paperOut || !level.select || !level.fault) && !onItsWay) this.wrong.push({ at, what: 'strobe while not ready', ...level });
       [this.#fallAt, this.#lastFall] = [at, at];
     } else if (line === 'strobe') {
       if (this.#fallAt !== null) this.#least('strobe', at - this.#fallAt);
