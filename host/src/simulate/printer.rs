@@ -222,7 +222,13 @@ impl Printer {
             }
             Next::Command(command, length) => {
                 let mut order = self.order;
-                if let Err(refusal) = order.accept(&command) {
+                let mut legal = order.accept(&command);
+                if self.order.is_complete() && self.finished.is_none() && legal.is_err() {
+                    // The sheet has been taken away: what is no reset behind its job begins the next one.
+                    order = Order::new();
+                    legal = order.accept(&command);
+                }
+                if let Err(refusal) = legal {
                     return self.refuse(refusal.fault, refusal.at);
                 }
                 if self.perform(&command, &order) {
@@ -372,7 +378,7 @@ impl Printer {
     pub fn status(&self) -> [u8; STATUS_LENGTH] {
         let activity = if self.job.is_some() {
             Activity::Printing
-        } else if self.finished.is_some() || !self.order.is_idle() {
+        } else if self.finished.is_some() || !(self.order.is_idle() || self.order.is_complete()) {
             Activity::Buffered
         } else {
             Activity::Idle
@@ -465,12 +471,7 @@ impl Printer {
         if self.finished.as_ref().is_some_and(|printout| printout.complete) && !self.order.is_complete() {
             return None;
         }
-        let printout = self.finished.take()?;
-        // Half a question behind the job is no byte of the next one.
-        if self.order.is_complete() && self.carry.first().is_none_or(|&first| is_question(first)) {
-            self.order = Order::new();
-        }
-        Some(printout)
+        self.finished.take()
     }
 }
 

@@ -273,6 +273,27 @@ fn a_second_job_waits_until_the_sheet_is_taken() {
 }
 
 #[test]
+fn wherever_a_piece_ends_the_next_job_prints_once_the_sheet_is_taken() {
+    let job = job(SMALL, &three());
+    let bytes = [&job[..], &status::ASK, &job].concat();
+    // Around the end of the first job, its last reset and the question behind it.
+    let last = job.len() + 3;
+    for end in job.len() - 8..=last {
+        let mut printer = loaded(&ALL_THREE);
+        let mut sheets = Vec::new();
+        for piece in [&bytes[..end], &bytes[end..last], &bytes[last..]] {
+            printer.feed(piece).unwrap_or_else(|refused| panic!("cut at {end}: {refused}"));
+            if let Some(sheet) = printer.take_printout() {
+                sheets.push(sheet);
+                printer.load(Stock::of(SMALL));
+            }
+        }
+        assert!(sheets.len() == 2 && sheets.iter().all(|sheet| sheet.passes == three()), "cut at {end}");
+        assert_eq!(printer.answers().len(), STATUS_LENGTH);
+    }
+}
+
+#[test]
 fn a_motor_error_needs_the_switch() {
     let job = job(SMALL, &three());
     let mut printer = loaded(&ALL_THREE);
