@@ -313,12 +313,26 @@ fn a_printer_that_went_in_a_job_is_reset_when_it_is_back_and_before_the_next_one
     // The host has the next one ready, and the bridge is restarted meanwhile: none of that counts as a reset.
     let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
     let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
-    rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &stream[..DATA_MAX] });
-    while rig.engine.work() {}
+    let begin = |rig: &mut Rig| {
+        rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: stream.len() as u32 });
+        rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &stream[..DATA_MAX] });
+        while rig.engine.work() {}
+    };
+    begin(&mut rig);
     for fault in [Fault::PowerOff, Fault::Error, Fault::OffLine] {
         rig.engine.port(Lines(0), Some(fault));
         assert!(rig.engine.output().is_empty() && rig.engine.task().is_none(), "{fault:?}");
+    }
+    // Restarted once more, with the next job open, and again when the reset was to be done and was not.
+    for ready in [false, true] {
+        if ready {
+            rig.engine.port(Lines::IDLE, None);
+            assert_eq!(rig.engine.task(), Some(Task::Initialise));
+        }
+        let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+        rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+        begin(&mut rig);
+        assert!(rig.engine.output().is_empty() && rig.engine.task().is_none());
     }
     rig.engine.port(Lines::IDLE, None);
     assert!(rig.engine.output().is_empty(), "bytes before the reset");

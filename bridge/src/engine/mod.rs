@@ -112,7 +112,7 @@ pub struct Checkpoint {
     pub progress: Progress,
     /// Where its early end begins, in bytes at the port, once that is decided.
     pub ends_at: Option<u32>,
-    /// Whether it is over and the printer still has to be reset behind it.
+    /// Whether the printer still has to be reset, behind this job or, if one is open, before its first byte.
     pub needs_reset: bool,
 }
 
@@ -202,9 +202,9 @@ impl<'m> Engine<'m> {
     pub fn resume(memory: Memory<'m>, identity: Identity, checkpoint: Checkpoint) -> Self {
         let mut engine = Self::new(memory, identity);
         let Checkpoint { progress, ends_at, needs_reset } = checkpoint;
+        engine.reset_when_ready = needs_reset;
         if progress.job == 0 || is_final(progress.state) {
             engine.last = progress;
-            engine.reset_when_ready = needs_reset;
             return engine;
         }
         if progress.job == LOCAL {
@@ -239,7 +239,8 @@ impl<'m> Engine<'m> {
         Checkpoint {
             progress: self.progress(),
             ends_at: self.job.as_ref().and_then(|job| job.ends_at),
-            needs_reset: self.job.is_none() && (self.needs_reset || self.reset_when_ready),
+            // What an open job needs behind it comes out again when it is worked through again.
+            needs_reset: self.reset_when_ready || self.job.is_none() && self.needs_reset,
         }
     }
 
@@ -299,8 +300,8 @@ impl<'m> Engine<'m> {
             // was pulled it is not, and the next job would be.
             self.end(JobState::Lost);
             self.reset_when_ready = true;
-        } else if self.reset_when_ready && fault.is_none() && self.assign(Task::Initialise) {
-            self.reset_when_ready = false;
+        } else if self.reset_when_ready && fault.is_none() {
+            self.assign(Task::Initialise);
         }
     }
 
@@ -318,6 +319,8 @@ impl<'m> Engine<'m> {
     pub fn done(&mut self, outcome: Outcome<'_>) {
         if self.task.take() == Some(Task::Initialise) {
             self.needs_reset = false;
+            // A printer that was not there has felt nothing of it.
+            self.reset_when_ready &= self.fault.is_some();
         }
         match outcome {
             Outcome::Done => {}
