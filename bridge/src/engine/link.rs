@@ -59,7 +59,7 @@ impl Engine<'_> {
                 // A job from before a reset whose data nobody has any more can only be given up.
                 if self.job.as_ref().is_some_and(|job| job.phase == Phase::Unknown) {
                     self.end(JobState::Lost);
-                    self.needs_reset = true;
+                    self.owes_reset = true;
                 }
                 self.between_jobs(Task::Initialise);
             }

@@ -159,10 +159,10 @@ pub struct Engine<'m> {
     task_given: bool,
     /// The number of the question the task is for.
     request: u16,
-    /// A job was ended where the printer's state is not known: it has to be reset before anything else.
+    /// The open job ends where the printer's state is not known.
     needs_reset: bool,
-    /// The same, as soon as the printer is ready: it was switched off, or the bridge was reset before the printer was.
-    reset_when_ready: bool,
+    /// A job has ended so: the printer gets no byte before it was reset, whatever is open now.
+    owes_reset: bool,
 }
 
 const NOTHING: Progress =
@@ -194,7 +194,7 @@ impl<'m> Engine<'m> {
             task_given: false,
             request: 0,
             needs_reset: false,
-            reset_when_ready: false,
+            owes_reset: false,
         }
     }
 
@@ -202,7 +202,7 @@ impl<'m> Engine<'m> {
     pub fn resume(memory: Memory<'m>, identity: Identity, checkpoint: Checkpoint) -> Self {
         let mut engine = Self::new(memory, identity);
         let Checkpoint { progress, ends_at, needs_reset } = checkpoint;
-        engine.reset_when_ready = needs_reset;
+        engine.owes_reset = needs_reset;
         if progress.job == 0 || is_final(progress.state) {
             engine.last = progress;
             return engine;
@@ -210,7 +210,7 @@ impl<'m> Engine<'m> {
         if progress.job == LOCAL {
             // What an operating system has sent to a plain printer it does not send again.
             engine.last = Progress { state: JobState::Lost, ..progress };
-            engine.needs_reset = true;
+            engine.owes_reset = true;
             engine.assign(Task::Initialise);
             return engine;
         }
@@ -240,7 +240,7 @@ impl<'m> Engine<'m> {
             progress: self.progress(),
             ends_at: self.job.as_ref().and_then(|job| job.ends_at),
             // What an open job needs behind it comes out again when it is worked through again.
-            needs_reset: self.reset_when_ready || self.job.is_none() && self.needs_reset,
+            needs_reset: self.owes_reset,
         }
     }
 
@@ -275,7 +275,7 @@ impl<'m> Engine<'m> {
     /// Bytes for the port behind the next `skip`, which are on their way already.
     pub fn output_behind(&self, skip: usize) -> &[u8] {
         // A task has the port for itself, and a printer that has to be reset gets nothing before that.
-        if self.task.is_some() || self.reset_when_ready { &[] } else { self.output.behind(skip) }
+        if self.task.is_some() || self.owes_reset { &[] } else { self.output.behind(skip) }
     }
 
     /// So many bytes of [`Engine::output`] have crossed the port.
@@ -299,8 +299,8 @@ impl<'m> Engine<'m> {
             // Switched on again the printer is a new one, and the rest of a row would be text to it. If only the cable
             // was pulled it is not, and the next job would be.
             self.end(JobState::Lost);
-            self.reset_when_ready = true;
-        } else if self.reset_when_ready && fault.is_none() {
+            self.owes_reset = true;
+        } else if self.owes_reset && fault.is_none() {
             self.assign(Task::Initialise);
         }
     }
@@ -318,9 +318,8 @@ impl<'m> Engine<'m> {
     /// What came of the task.
     pub fn done(&mut self, outcome: Outcome<'_>) {
         if self.task.take() == Some(Task::Initialise) {
-            self.needs_reset = false;
             // A printer that was not there has felt nothing of it.
-            self.reset_when_ready &= self.fault.is_some();
+            self.owes_reset &= self.fault == Some(Fault::PowerOff);
         }
         match outcome {
             Outcome::Done => {}
@@ -330,7 +329,7 @@ impl<'m> Engine<'m> {
                 self.prepare(&ToHost::Lines { request: self.request, lines, fault: lines.fault() });
             }
         }
-        if self.needs_reset {
+        if self.owes_reset && self.fault != Some(Fault::PowerOff) {
             self.assign(Task::Initialise);
         }
     }

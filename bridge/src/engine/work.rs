@@ -182,8 +182,10 @@ impl Engine<'_> {
         if let Phase::Ending(state) = job.phase
             && self.output.is_empty()
         {
+            let needs_reset = self.needs_reset;
             self.end(state);
-            if self.needs_reset {
+            if needs_reset {
+                self.owes_reset = true;
                 self.assign(Task::Initialise);
             }
         }
@@ -195,6 +197,7 @@ impl Engine<'_> {
             self.last = Progress { state, limit: progress.accepted, ..progress };
             self.last_shape = (job.length > 0).then_some((job.kind, job.length));
         }
+        self.needs_reset = false;
         self.clear();
         self.due.progress = true;
     }
