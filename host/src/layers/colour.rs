@@ -302,7 +302,7 @@ struct Nodes {
     lanes: Vec<[u16; 8]>,
     /// Lanes of a node.
     each: usize,
-    /// The largest weight of each node.
+    /// Channel of the largest weight of each node.
     largest: Vec<usize>,
 }
 
