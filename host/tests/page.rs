@@ -2,9 +2,9 @@
 
 use std::fs;
 
-use foilpress::observe::Silent;
-use foilpress::sheet::Sheet;
-use foilpress::simulate;
+use observe::Silent;
+use press::sheet::Sheet;
+use press::simulate;
 use serde_json::Value;
 
 mod common;

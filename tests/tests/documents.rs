@@ -3,14 +3,14 @@
 //! [`pipeline::print`] itself refuses a sheet that differs from the one sent; what is asserted here is asserted of
 //! what came out of the printer. Real documents stand in the folder named by `FOILPRESS_DATA`.
 
-use foilpress::document::{self, Options};
-use foilpress::gamut::{self, Intent};
-use foilpress::job::placement::Size;
-use foilpress::layout::Layout;
-use foilpress::observe::Silent;
-use foilpress::pipeline::{self, Print, Settings};
-use foilpress::{factor, sample};
+use appearance::document::{self, Options};
+use appearance::gamut::{self, Intent};
+use appearance::{factor, sample};
 use inks::{InkSet, Library, Stack};
+use observe::Silent;
+use press::job::placement::Size;
+use press::layout::Layout;
+use press::pipeline::{self, Print, Settings};
 use protocol::paper::Paper;
 use protocol::rgl::Media;
 

@@ -5,9 +5,9 @@
 
 use std::path::PathBuf;
 
-use foilpress::inspect::inspect;
-use foilpress::observe::Silent;
-use foilpress::simulate::{self, Setup};
+use observe::Silent;
+use press::inspect::inspect;
+use press::simulate::{self, Setup};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::encode::encode_into;

@@ -4,10 +4,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use foilpress::brdf::{Space, Table};
-use foilpress::observe::Silent;
-use foilpress::preview::{Probe, Radiance, sphere};
+use appearance::brdf::{Space, Table};
 use inks::Curve;
+use observe::Silent;
+use press::preview::{Probe, Radiance, sphere};
 
 /// Where the reference is, if it can run here.
 fn reference() -> Option<PathBuf> {

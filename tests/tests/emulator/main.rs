@@ -14,11 +14,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use foilpress::job::stream::write_job;
-use foilpress::observe::Silent;
-use foilpress::separate::{self, Pass, Plane};
-use foilpress::simulate::{Carousel, Cassette, Lever, Printer, Stock, Trouble, difference, print};
 use foilpress_tests::emulated::{Desk, Emulated};
+use observe::Silent;
+use press::job::stream::write_job;
+use press::separate::{self, Pass, Plane};
+use press::simulate::{Carousel, Cassette, Lever, Printer, Stock, Trouble, difference, print};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
