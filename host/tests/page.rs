@@ -2,14 +2,12 @@
 
 use std::fs;
 
-use foilpress::observe::Silent;
-use foilpress::sheet::Sheet;
-use foilpress::simulate;
+use observe::Silent;
+use press::sheet::Sheet;
+use press::simulate;
 use serde_json::Value;
 
-mod common;
-
-use common::{Bench, small_document, text};
+use testing::program::{Bench, small_document, text};
 
 const SMALL: &str = "--size 12x8mm --paper postcard";
 

@@ -3,10 +3,10 @@
 use std::fs;
 use std::process::{Command, Output, Stdio};
 
-use foilpress::job::stream::write_job;
-use foilpress::observe::Silent;
-use foilpress::send::journal::{Journal, NewJob};
-use foilpress::separate::{Pass, Plane};
+use device::send::journal::{Journal, NewJob};
+use observe::Silent;
+use press::job::stream::write_job;
+use press::separate::{Pass, Plane};
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 use protocol::paper::Paper;
@@ -32,7 +32,7 @@ impl Bench {
     }
 
     fn run(&self, args: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_foilpress"))
+        Command::new(testing::program::path())
             .args(args.split_whitespace())
             .current_dir(self.folder.path())
             .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))

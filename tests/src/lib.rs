@@ -2,4 +2,5 @@
 
 #[cfg(unix)]
 pub mod emulated;
+pub mod planes;
 pub mod served;

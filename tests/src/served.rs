@@ -9,8 +9,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use bridge::engine::{Engine, Identity, Memory, Outcome, Task};
-use foilpress::send::transport::{Socket, Transport};
-use foilpress::simulate::{Carousel, Cassette, Lever, Printer, STATUS_LENGTH, Trouble};
+use device::send::transport::{Socket, Transport};
+use press::simulate::{Carousel, Cassette, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};

@@ -1,15 +1,15 @@
 //! From a halftoned sheet through pass streams and the bridge's engine to the simulated printer.
 
+use appearance::gamut::InkMix;
+use appearance::weights::{WeightMaps, quantise};
 use bridge::engine::{Engine, Identity, Memory};
-use foilpress::gamut::InkMix;
-use foilpress::halftone::{Placement, Settings, halftone};
-use foilpress::job::stream::write_job;
-use foilpress::observe::Silent;
-use foilpress::separate::{Pass, separate};
-use foilpress::sheet::Sheet;
-use foilpress::simulate::{Carousel, Cassette, Lever, Printer, Setup, Stock, difference, print};
-use foilpress::weights::{WeightMaps, quantise};
 use inks::Stack;
+use observe::Silent;
+use press::halftone::{Placement, Settings, halftone};
+use press::job::stream::write_job;
+use press::separate::{Pass, separate};
+use press::sheet::Sheet;
+use press::simulate::{Carousel, Cassette, Lever, Printer, Setup, Stock, difference, print};
 use protocol::ink::Ink;
 use protocol::link::frame::{self, MAX, Reader};
 use protocol::link::message::{DATA_MAX, JobKind, JobState, ToBridge};

@@ -3,14 +3,14 @@
 //! [`pipeline::print`] itself refuses a sheet that differs from the one sent; what is asserted here is asserted of
 //! what came out of the printer. Real documents stand in the folder named by `FOILPRESS_DATA`.
 
-use foilpress::document::{self, Options};
-use foilpress::gamut::{self, Intent};
-use foilpress::job::placement::Size;
-use foilpress::layout::Layout;
-use foilpress::observe::Silent;
-use foilpress::pipeline::{self, Print, Settings};
-use foilpress::{factor, sample};
+use appearance::document::{self, Options};
+use appearance::gamut::{self, Intent};
+use appearance::{factor, sample};
 use inks::{InkSet, Library, Stack};
+use observe::Silent;
+use press::job::placement::Size;
+use press::layout::Layout;
+use press::pipeline::{self, Print, Settings};
 use protocol::paper::Paper;
 use protocol::rgl::Media;
 
@@ -105,11 +105,8 @@ fn a_document_prints_pixel_by_pixel() {
 
 #[test]
 fn every_real_document_prints() {
-    let Some(data) = std::env::var_os("FOILPRESS_DATA") else {
-        println!("skipped: FOILPRESS_DATA names no folder");
-        return;
-    };
-    let folder = std::path::Path::new(&data).join("svbrdf");
+    let Some(data) = testing::needs::data() else { return };
+    let folder = data.join("svbrdf");
     let documents: Vec<_> = std::fs::read_dir(&folder).expect("the real documents").flatten().collect();
     assert!(!documents.is_empty(), "{} is empty", folder.display());
     for document in documents {

@@ -7,13 +7,15 @@ use clap::Args;
 use inks::{InkSet, Library};
 use protocol::paper::Paper;
 
-use crate::document::{self, ColourSpace, Document};
-use crate::factor::{self, Method};
-use crate::gamut::{self, Intent};
-use crate::job::placement::Size;
-use crate::layers;
-use crate::layout;
-use crate::observe::Observer;
+use appearance::document::{self, ColourSpace, Document};
+use appearance::factor::{self, Method};
+use appearance::gamut::{self, Intent};
+use press::job::placement::Size;
+use press::layers;
+use press::layout;
+
+use super::choice::choice;
+use observe::Observer;
 
 /// What to read.
 #[derive(Args, Debug)]
@@ -26,7 +28,7 @@ pub struct DocumentArgs {
     #[arg(long, value_name = "NUMBER|NAME")]
     pub material: Option<String>,
     /// Encoding of the colour maps, if it is not the usual one of their file format
-    #[arg(long, value_name = "SPACE")]
+    #[arg(long, value_name = "SPACE", value_parser = choice::<ColourSpace>())]
     pub colour_space: Option<ColourSpace>,
     /// Angles each reflectance curve is sampled at, 32 to 512; 32 is enough for everything printable
     #[arg(long, default_value_t = document::SAMPLES, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(32..=512))]
@@ -67,7 +69,7 @@ pub struct FactorArgs {
     #[arg(long, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=factor::MOST_BASES as u64))]
     pub bases: Option<usize>,
     /// How bases are learnt: archetypes, or the paper's kmeans (convex hull) and sacls
-    #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes")]
+    #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes", value_parser = choice::<Method>())]
     pub method: Method,
     /// Seed of everything that is left to chance; equal seeds give equal prints
     #[arg(long, default_value_t = 1)]
@@ -133,7 +135,7 @@ impl InkArgs {
 pub struct GamutArgs {
     /// What to do with materials no ink can make: basis keeps differences (the paper), clamp keeps closest, blend is
     /// between, auto clamps unless that would make different materials look alike
-    #[arg(long, value_name = "INTENT", default_value = "auto")]
+    #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
 }
 

@@ -18,17 +18,17 @@ use clap::{Args as ClapArgs, Subcommand};
 use protocol::link::message::{Ask, Fault, JobState, Lines, Progress};
 use serde_json::json;
 
-use crate::flash::FlashError;
-use crate::flash::image::Firmware;
-use crate::observe::Observer;
-use crate::send::find;
-use crate::send::journal::JournalError;
-use crate::send::query::{Query, Reply, is_alps};
-use crate::send::session::Bridge;
-use crate::send::status::Status;
-use crate::send::transport::Transport;
-use crate::send::usb::UDEV_RULES;
-use crate::send::{Address, OpenError, RunError, words};
+use device::flash::FlashError;
+use device::flash::image::Firmware;
+use device::send::find;
+use device::send::journal::JournalError;
+use device::send::query::{Query, Reply, is_alps};
+use device::send::session::Bridge;
+use device::send::status::Status;
+use device::send::transport::Transport;
+use device::send::usb::UDEV_RULES;
+use device::send::{Address, OpenError, RunError, words};
+use observe::Observer;
 
 /// How long to wait for a bridge to answer.
 pub(super) const PATIENCE: Duration = Duration::from_secs(3);

@@ -7,16 +7,17 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, PageArgs};
+use super::choice::choice;
 use super::layout::MediaArgs;
 use super::output::{Kind, Staged};
-use crate::document::{self, ColourSpace, foil};
-use crate::gamut::files::Provenance;
-use crate::gamut::{self, Printable};
-use crate::job::placement;
-use crate::observe::Observer;
-use crate::separate::{self, Severity};
-use crate::sheet::Sheet;
-use crate::{pipeline, simulate};
+use appearance::document::{self, ColourSpace, foil};
+use appearance::gamut::files::Provenance;
+use appearance::gamut::{self, Printable};
+use observe::Observer;
+use press::job::placement;
+use press::separate::{self, Severity};
+use press::sheet::Sheet;
+use press::{pipeline, simulate};
 
 /// Arguments of `factor`.
 #[derive(ClapArgs, Debug)]
@@ -61,7 +62,7 @@ pub struct Map {
     #[arg(long, value_name = "NUMBER|NAME", requires = "document")]
     material: Option<String>,
     /// Encoding of that document's colour maps, as it was given to `factor`
-    #[arg(long, value_name = "SPACE", requires = "document")]
+    #[arg(long, value_name = "SPACE", requires = "document", value_parser = choice::<ColourSpace>())]
     colour_space: Option<ColourSpace>,
     #[command(flatten)]
     gamut: GamutArgs,

@@ -9,11 +9,11 @@ use super::args::InkArgs;
 use super::deliver::DeliverArgs;
 use super::layout::{MediaArgs, ink};
 use super::piece::{self, Job, PieceArgs, ResultArgs};
-use crate::chart;
-use crate::layout::{self, Layout};
-use crate::observe::Observer;
-use crate::separate::MOST_CARTRIDGES;
-use crate::sheet::Piece;
+use observe::Observer;
+use press::chart;
+use press::layout::{self, Layout};
+use press::separate::MOST_CARTRIDGES;
+use press::sheet::Piece;
 
 /// Arguments of `chart`.
 #[derive(ClapArgs, Debug)]

@@ -10,11 +10,11 @@ use protocol::ink::Ink;
 use protocol::link::message::Ask;
 
 use super::send;
-use crate::observe::Observer;
-use crate::send::cassettes::{self, Found};
-use crate::send::query::{Query, Reply};
-use crate::send::status::Status;
-use crate::send::{Address, Destination};
+use device::send::cassettes::{self, Found};
+use device::send::query::{Query, Reply};
+use device::send::status::Status;
+use device::send::{Address, Destination};
+use observe::Observer;
 
 /// How long to wait for a bridge, and for the printer behind it.
 const BRIDGE: Duration = Duration::from_secs(3);
@@ -52,7 +52,7 @@ impl DeliverArgs {
             None | Some(Destination::File(_)) => return Ok(()),
             Some(to) => to,
         };
-        let checked = crate::send::check(job, observer)?;
+        let checked = device::send::check(job, observer)?;
         if let Destination::Bridge(address) = to {
             super::show(&format!("{}\n", loaded(address, &checked.inks)))?;
         }
@@ -80,7 +80,7 @@ pub fn loaded(address: &Address, inks: &[Ink]) -> String {
         Ok(Reply::NotNow) => unknown("the bridge has a job under way"),
         Ok(Reply::OneWay) => unknown("the printer's port is one-way"),
         Ok(Reply::Silent) => unknown("the printer did not answer"),
-        Ok(Reply::Stopped(fault)) => unknown(&crate::send::words::fault(fault, None)),
+        Ok(Reply::Stopped(fault)) => unknown(&device::send::words::fault(fault, None)),
         Ok(Reply::Bytes(bytes)) => match Status::read(&bytes) {
             Err(error) => unknown(&error.to_string()),
             Ok(status) => match cassettes::find(&status, inks) {

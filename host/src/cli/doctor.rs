@@ -7,12 +7,12 @@ use clap::Args as ClapArgs;
 
 use super::bridge::{Found, ask, is_forbidden, permission};
 use super::resume::line;
-use crate::flash::{drive, usb};
-use crate::send::find::{self, Candidate};
-use crate::send::journal::Journal;
-use crate::send::query::is_alps;
-use crate::send::session::Phase;
-use crate::send::{Address, OpenError};
+use device::flash::{drive, usb};
+use device::send::find::{self, Candidate};
+use device::send::journal::Journal;
+use device::send::query::is_alps;
+use device::send::session::Phase;
+use device::send::{Address, OpenError};
 
 /// Arguments of `doctor`.
 #[derive(ClapArgs, Debug)]
@@ -96,7 +96,7 @@ impl<W: std::io::Write> Visit<W> {
                  meant, plug it in again",
             )?;
             let Some(closed) = board.closed.filter(|_| drives.is_empty()) else { continue };
-            self.forbidden |= closed == rusb::Error::Access;
+            self.forbidden |= board.is_forbidden();
             self.trouble(&format!(
                 "    it cannot be opened ({closed}), and its drive RPI-RP2 is not mounted"
             ))?;

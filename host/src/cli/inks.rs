@@ -9,7 +9,7 @@ use inks::{Entry, InkSet, Library, Provenance, Severity, Source, Stack};
 use serde::Serialize;
 
 use super::output::Staged;
-use crate::brdf::plot;
+use appearance::brdf::plot;
 
 /// The library of inks and stacks.
 #[derive(clap::Args, Debug)]

@@ -7,9 +7,9 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use super::output::{Kind, Staged};
-use crate::inspect::{Inspected, Inspection, inspect, sheets};
-use crate::observe::Observer;
-use crate::separate::files::{self, save_plane};
+use observe::Observer;
+use press::inspect::{Inspected, Inspection, inspect, sheets};
+use press::separate::files::{self, save_plane};
 
 /// Arguments of `inspect`.
 #[derive(ClapArgs, Debug)]

@@ -8,16 +8,17 @@ use inks::{InkSet, Library};
 use protocol::ink::Ink;
 use serde_json::json;
 
+use super::choice::choice;
 use super::deliver::DeliverArgs;
 use super::layout::{LayoutArgs, MediaArgs};
 use super::piece::{self, Job, ResultArgs};
 use super::plan::Shown;
 use super::preset::PresetArg;
-use crate::job::placement::{DOTS_PER_MM, Size};
-use crate::job::plan::grouped;
-use crate::layers::{self, Accept, Composed, Finish, Order, Room, Suggestion, White, names};
-use crate::layout::{Layout, Mm, NoLength};
-use crate::observe::Observer;
+use observe::Observer;
+use press::job::placement::{DOTS_PER_MM, Size};
+use press::job::plan::grouped;
+use press::layers::{self, Accept, Composed, Finish, Order, Room, Suggestion, White, names};
+use press::layout::{Layout, Mm, NoLength};
 
 /// What to read and how it becomes layers of ink.
 #[derive(ClapArgs, Debug)]
@@ -57,7 +58,7 @@ pub struct LayersArgs {
     #[arg(long, value_name = "INKS")]
     pub knockout: Option<String>,
     /// Where white goes [default: where the art draws it]
-    #[arg(long, value_name = "MODE")]
+    #[arg(long, value_name = "MODE", value_parser = choice::<White>())]
     pub white: Option<White>,
     /// Shrink the white by this, so that it does not show beside the colours, such as 0.1mm
     #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "spread")]
@@ -66,10 +67,10 @@ pub struct LayersArgs {
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub spread: Option<f64>,
     /// Where glossy finish goes [default: where the art draws it]
-    #[arg(long, value_name = "WHERE")]
+    #[arg(long, value_name = "WHERE", value_parser = choice::<Finish>())]
     pub finish: Option<Finish>,
     /// Suggestions of the plan to follow
-    #[arg(long, value_name = "WHAT", value_delimiter = ',')]
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
     pub accept: Vec<Accept>,
     /// Folder of an ink library of your own: its order rules and clusters count
     #[arg(long, value_name = "DIR")]

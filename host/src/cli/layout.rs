@@ -10,8 +10,8 @@ use protocol::paper::Paper;
 use protocol::rgl::{Media, Page};
 
 use crate::folders;
-use crate::layout::{self, Layout, Mm, Point, Position, Profile, Repeat};
-use crate::observe::Observer;
+use observe::Observer;
+use press::layout::{self, Layout, Mm, Point, Position, Profile, Repeat};
 
 /// The profile that is used when none is named.
 pub const DEFAULT_PROFILE: &str = "default";
@@ -304,7 +304,7 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
             super::show(&text)
         }
         ProfileCommand::Set(set) => {
-            let profile = crate::chart::calibration::profile(set.cross, set.distance);
+            let profile = press::chart::calibration::profile(set.cross, set.distance);
             if let Some(problem) = profile.problem() {
                 bail!("{problem}; measure again");
             }

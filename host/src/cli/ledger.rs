@@ -6,11 +6,11 @@ use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
 use protocol::ink::Ink;
 
-use crate::job::ribbon;
-use crate::ledger::{Event, Ledger, PassUse, totals};
-use crate::observe::Observer;
-use crate::send::Checked;
-use crate::send::journal::Journal;
+use device::ledger::{Event, Ledger, PassUse, totals};
+use device::send::Checked;
+use device::send::journal::Journal;
+use observe::Observer;
+use press::job::ribbon;
 
 /// Arguments of `ledger`.
 #[derive(ClapArgs, Debug)]

@@ -8,6 +8,7 @@ mod args;
 mod bridge;
 mod chain;
 mod chart;
+mod choice;
 mod deliver;
 mod doctor;
 mod generate;
@@ -35,11 +36,11 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 
-use crate::flash::FlashError;
-use crate::send::journal::JournalError;
-use crate::send::query::QueryError;
-use crate::send::raw::RawError;
-use crate::send::{OpenError, RunError};
+use device::flash::FlashError;
+use device::send::journal::JournalError;
+use device::send::query::QueryError;
+use device::send::raw::RawError;
+use device::send::{OpenError, RunError};
 use progress::Progress;
 
 /// The largest stream that is read: several times a page of noise in seven passes.

@@ -10,8 +10,8 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::scratch::{self, Scratch};
 use anyhow::{Context, Result, bail};
+use press::scratch::{self, Scratch};
 
 /// What the user is told when the program is interrupted.
 static FAREWELL: Mutex<Option<String>> = Mutex::new(None);

@@ -15,15 +15,15 @@ use serde_json::json;
 use super::deliver::DeliverArgs;
 use super::layout::{LayoutArgs, MediaArgs};
 use super::output::{self, Kind, Staged};
-use crate::job::page;
-use crate::job::plan::{Plan, Subject};
-use crate::layout::{self, Laid, Layout};
-use crate::observe::Observer;
-use crate::pipeline;
-use crate::preview::inks::{Ground, save_pass, save_sheet, thumbnail};
-use crate::separate::{self, Separation, Severity};
-use crate::sheet::{Piece, Sheet};
-use crate::simulate::{self, Printout};
+use observe::Observer;
+use press::job::page;
+use press::job::plan::{Plan, Subject};
+use press::layout::{self, Laid, Layout};
+use press::pipeline;
+use press::preview::inks::{Ground, save_pass, save_sheet, thumbnail};
+use press::separate::{self, Separation, Severity};
+use press::sheet::{Piece, Sheet};
+use press::simulate::{self, Printout};
 
 /// Pixels of the longer side of the sheet on the plan's page.
 pub const THUMBNAIL: usize = 640;

@@ -12,15 +12,15 @@ use protocol::rgl::Page;
 use super::output::Staged;
 use super::print::Work;
 use super::{layers, piece};
-use crate::job;
-use crate::job::plan::{Plan, Subject};
-use crate::layout::Laid;
-use crate::observe::Observer;
-use crate::preview::Area;
-use crate::preview::inks::{Ground, thumbnail};
-use crate::separate::{self, Pass, Planned};
-use crate::sheet::Sheet;
-use crate::simulate;
+use observe::Observer;
+use press::job;
+use press::job::plan::{Plan, Subject};
+use press::layout::Laid;
+use press::preview::Area;
+use press::preview::inks::{Ground, thumbnail};
+use press::separate::{self, Pass, Planned};
+use press::sheet::Sheet;
+use press::simulate;
 
 /// Arguments of `plan`: a job or a document, or the sub-command for art.
 #[derive(Debug)]
@@ -161,7 +161,7 @@ fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<(Pl
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)
         .with_context(|| format!("{}", path.display()))?;
     let sheet = printout.sheet().with_context(|| format!("{}", path.display()))?;
-    let curl = crate::inspect::inspect(&job, observer).inspection.setup.curl_correction;
+    let curl = press::inspect::inspect(&job, observer).inspection.setup.curl_correction;
     let page = Page {
         media: printout.media,
         resolution: printout.resolution,

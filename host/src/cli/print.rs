@@ -14,14 +14,14 @@ use super::deliver::DeliverArgs;
 use super::layout::{LayoutArgs, MediaArgs};
 use super::piece::{Places, ResultArgs, write, write_job};
 use super::preset::PresetArg;
-use crate::document::Document;
-use crate::job::placement::Size;
-use crate::job::plan::{Plan, Subject};
-use crate::layout::Mm;
-use crate::observe::Observer;
-use crate::pipeline::{self, Print};
-use crate::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
-use crate::separate;
+use appearance::document::Document;
+use observe::Observer;
+use press::job::placement::Size;
+use press::job::plan::{Plan, Subject};
+use press::layout::Mm;
+use press::pipeline::{self, Print};
+use press::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
+use press::separate;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::observe::Observer;
+use observe::Observer;
 
 /// Stages shorter than this leave no line behind.
 const WORTH_A_LINE: Duration = Duration::from_millis(50);

@@ -10,13 +10,13 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
-use crate::layout::Profile;
-use crate::observe::Observer;
 use crate::queue::call::{Call, Exit};
 use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
 use crate::queue::options::{self, Choices};
 use crate::queue::{backend, filter, listing, ppd, uri};
+use observe::Observer;
+use press::layout::Profile;
 
 /// Arguments of `queue`.
 #[derive(ClapArgs, Debug)]

@@ -7,11 +7,11 @@ use clap::Args as ClapArgs;
 
 use super::bridge;
 use super::send::{are_copies, go};
-use crate::observe::Observer;
-use crate::send::journal::{Entry, Journal};
-use crate::send::query::Query;
-use crate::send::session::Phase;
-use crate::send::{Address, words};
+use device::send::journal::{Entry, Journal};
+use device::send::query::Query;
+use device::send::session::Phase;
+use device::send::{Address, words};
+use observe::Observer;
 
 /// Arguments of `resume`.
 #[derive(ClapArgs, Debug)]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 
 use super::output::{Kind, Staged};
-use crate::sample::{SAMPLES, Sample};
+use appearance::sample::{SAMPLES, Sample};
 
 /// The samples, or one of them as a folder of texture maps.
 #[derive(clap::Args, Debug)]

@@ -11,12 +11,12 @@ use protocol::link::message::JobKind;
 use super::deliver::{loaded, next_sheet};
 use super::ledger;
 use super::output::{self, Staged};
-use crate::observe::Observer;
-use crate::send::finish::{self, Sheet, await_sheet};
-use crate::send::journal::{Journal, NewJob, OpenJob, PassPlace};
-use crate::send::raw::RawError;
-use crate::send::session::{Outcome, Session};
-use crate::send::{self, Address, Checked, Destination, Event, Wish, streams, words};
+use device::send::finish::{self, Sheet, await_sheet};
+use device::send::journal::{Journal, NewJob, OpenJob, PassPlace};
+use device::send::raw::RawError;
+use device::send::session::{Outcome, Session};
+use device::send::{self, Address, Checked, Destination, Event, Wish, streams, words};
+use observe::Observer;
 
 /// Arguments of `send`.
 #[derive(ClapArgs, Debug)]

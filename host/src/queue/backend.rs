@@ -2,7 +2,7 @@
 //!
 //! Problem: the print system starts jobs again after a crash of its own, retries what failed, and knows nothing of
 //! ribbons; a sheet must not be printed twice, and a job that is cancelled must leave a printer that is ready.
-//! Method: a job's sheets go one after the other through a [session](crate::send::session). Each has a journal of its own
+//! Method: a job's sheets go one after the other through a [session](device::send::session). Each has a journal of its own
 //! under the job's identity, so a process that takes over knows what was printed and goes on where the printer is. A
 //! sheet that was lost is printed again only when somebody releases the job. SIGTERM ends the sheet at the bridge.
 //! What an earlier job has left open at the bridge is ended first.
@@ -10,7 +10,7 @@
 //! Source: backend(7).
 
 mod bridge;
-mod device;
+mod raw;
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -21,9 +21,9 @@ use std::time::{Duration, Instant};
 use super::call::{Call, Exit};
 use super::messages::Messages;
 use super::uri;
-use crate::inspect::sheets;
-use crate::observe::Silent;
-use crate::send::{self, Checked, Destination};
+use device::send::{self, Checked, Destination};
+use observe::Silent;
+use press::inspect::sheets;
 
 /// The most bytes of a job: dozens of pages.
 const LARGEST: u64 = 1 << 30;
@@ -132,7 +132,7 @@ impl<W: Write + Send> Delivery<'_, W> {
         let data = &job[place.clone()];
         let whole = match &self.call.to {
             Destination::Bridge(address) => self.bridge_prints(data, checked, address, folder)?,
-            Destination::Raw(device) => self.device_prints(data, checked, device, folder)?,
+            Destination::Raw(device) => self.raw_prints(data, checked, device, folder)?,
             // A URI never leads to a file.
             Destination::File(_) => return Err(self.fail(Exit::Stop, &uri::UriError::File)),
         };
@@ -167,9 +167,9 @@ impl<W: Write + Send> Delivery<'_, W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inspect::inspect;
-    use crate::job::stream::write_job;
-    use crate::separate::{Pass, Plane};
+    use press::inspect::inspect;
+    use press::job::stream::write_job;
+    use press::separate::{Pass, Plane};
     use protocol::ink::Ink;
     use protocol::paper::Paper;
     use protocol::rgl::Page;

@@ -6,8 +6,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::{options, uri};
-use crate::send::Destination;
-use crate::send::journal::{Journal, JournalError};
+use device::send::Destination;
+use device::send::journal::{Journal, JournalError};
 
 /// What the print system is to do next. The numbers are its own.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -11,7 +11,7 @@
 //! white cannot follow it. On a separated page the choice of inks leaves plates out, it does not mix them anew.
 
 mod drawing;
-mod press;
+mod page;
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
@@ -25,16 +25,16 @@ use tempfile::NamedTempFile;
 
 use super::options::{Choices, NoChoice, Spots};
 use super::raster::{self, RasterError};
-use crate::job::stream::StreamError;
-use crate::layers::{self, LayersError, Window};
-use crate::layout::LayoutError;
-use crate::observe::Observer;
-use crate::separate::SeparateError;
-use crate::sheet::SheetError;
 use drawing::Drawing;
-use press::Press;
+use observe::Observer;
+use page::Press;
+use press::job::stream::StreamError;
+use press::layers::{self, LayersError, Window};
+use press::layout::LayoutError;
+use press::separate::SeparateError;
+use press::sheet::SheetError;
 
-pub use press::Place;
+pub use page::Place;
 
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
@@ -180,7 +180,7 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
     while let Some(page) = reader.next_page()? {
         number += 1;
         let size = (page.width, page.height);
-        let paper = press::paper(number, size, page.dpi, press.choices)?;
+        let paper = page::paper(number, size, page.dpi, press.choices)?;
         let mut rgb = Vec::with_capacity(3 * page.width * page.height);
         for _ in 0..page.height {
             reader.row(&mut row)?;
@@ -214,7 +214,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |source| FilterError::Layers { page: number, source };
         let page = layers::pdf::separated(path, number, plates, dpi.into()).map_err(in_page)?;
-        let paper = press::paper(number, page.size, dpi, press.choices)?;
+        let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
             let art =
                 page.art(&format!("page {number}"), &view.window, &press.options(dpi)).map_err(in_page)?;
@@ -231,7 +231,7 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
     let mut drawing = Drawing::begin(path, only, dpi)?;
     let mut number = only.unwrap_or(1);
     while let Some(size) = drawing.next_page()? {
-        let paper = press::paper(number, size, dpi, press.choices)?;
+        let paper = page::paper(number, size, dpi, press.choices)?;
         let job = picture(number, paper, (size, dpi), drawing.pixels(size)?, false, press)?;
         press.write(&job)?;
         number += 1;
@@ -281,8 +281,8 @@ fn may_have_spots(path: &Path) -> Result<bool, FilterError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inspect::{inspect, sheets};
-    use crate::observe::Silent;
+    use observe::Silent;
+    use press::inspect::{inspect, sheets};
     use std::sync::Mutex;
 
     /// Keeps what is told.
@@ -424,7 +424,7 @@ mod tests {
     #[test]
     fn a_page_that_does_not_go_in_is_refused_with_its_size() {
         let usual = Choices::read(&[], None).unwrap();
-        let error = press::paper(3, (7016, 4961), 600, &usual).unwrap_err().to_string();
+        let error = page::paper(3, (7016, 4961), 600, &usual).unwrap_err().to_string();
         assert!(error.contains("page 3 is 297 x 210 mm") && error.contains("215.9 x 355.6 mm"), "{error}");
     }
 

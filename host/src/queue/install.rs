@@ -10,7 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::ppd;
-use crate::layout::Profile;
+use press::layout::Profile;
 
 /// Where a print system keeps its things.
 #[derive(Clone, PartialEq, Eq, Debug)]

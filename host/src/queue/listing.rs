@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::uri;
-use crate::send::find;
-use crate::send::query::is_alps;
+use device::send::find;
+use device::send::query::is_alps;
 
 /// What is said when no device is there, so that the backend is known to be.
 const NO_DEVICE: &str = "network foilpress \"Unknown\" \"ALPS MD-5500 through a Foilpress bridge\"";

@@ -12,8 +12,8 @@ use protocol::ink::Ink;
 use protocol::link::message::Fault;
 use protocol::status::Complaint;
 
-use crate::observe::Observer;
-use crate::send::status::Status;
+use device::send::status::Status;
+use observe::Observer;
 
 /// Why a printer does not print, or soon will not.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -188,7 +188,7 @@ impl<W: Write> Messages<W> {
         if status.stale || status.cassettes.is_empty() {
             return;
         }
-        let each = |say: &dyn Fn(&crate::send::status::Cassette) -> String| {
+        let each = |say: &dyn Fn(&device::send::status::Cassette) -> String| {
             status.cassettes.iter().map(say).collect::<Vec<_>>().join(",")
         };
         // Of IPP's levels: -3 some is left, 0 none.

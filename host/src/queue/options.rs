@@ -9,8 +9,8 @@ use protocol::rgl::Media;
 
 use super::filter::Place;
 use super::ppd;
-use crate::layers::{Finish, White};
-use crate::layout::{Point, Profile};
+use press::layers::{Finish, White};
+use press::layout::{Point, Profile};
 
 /// One option of the dialog.
 pub struct DialogOption {

@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 use protocol::paper::{LEFT, Paper};
 
 use super::options;
-use crate::layout::{self, Mm, Point, Profile};
-use crate::simulate::Stock;
+use press::layout::{self, Mm, Point, Profile};
+use press::simulate::Stock;
 
 /// What the filter makes.
 pub const JOB_TYPE: &str = "application/vnd.foilpress-rgl";

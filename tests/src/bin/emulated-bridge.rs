@@ -27,8 +27,8 @@ mod unix {
     use std::sync::mpsc::{RecvTimeoutError, channel};
     use std::time::Duration;
 
-    use foilpress::simulate::{Carousel, CarouselError, Lever, Printer, Stock, Trouble};
     use foilpress_tests::emulated::Emulated;
+    use press::simulate::{Carousel, CarouselError, Lever, Printer, Stock, Trouble};
     use protocol::ink::Ink;
     use protocol::paper::Paper;
 

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::process::Stdio;
 
-use foilpress::simulate::{Cassette, Trouble};
+use press::simulate::{Cassette, Trouble};
 use serde_json::Value;
 
 use super::{Bench, INKS, job, text};

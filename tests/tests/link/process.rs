@@ -1,16 +1,16 @@
 //! Real processes, a real socket, a real journal: the sender is killed with SIGKILL again and again.
 
 use crate::model::{Planes, is_a_whole_job, seeded};
-use foilpress::job::stream::write_job;
-use foilpress::observe::Silent;
-use foilpress::send::journal::{Journal, NewJob};
-use foilpress::send::query::{Query, QueryError, Reply};
-use foilpress::send::session::{Outcome, Phase, Session};
-use foilpress::send::status::Status;
-use foilpress::send::transport::{Transport, pair};
-use foilpress::send::{self, Address, streams};
-use foilpress::separate::{Pass, Plane};
+use device::send::journal::{Journal, NewJob};
+use device::send::query::{Query, QueryError, Reply};
+use device::send::session::{Outcome, Phase, Session};
+use device::send::status::Status;
+use device::send::transport::{Transport, pair};
+use device::send::{self, Address, streams};
 use foilpress_tests::served::{Bridge, Port};
+use observe::Silent;
+use press::job::stream::write_job;
+use press::separate::{Pass, Plane};
 use protocol::ink::Ink;
 use protocol::link::message::{Ask, JobKind, JobState, Lines};
 use protocol::paper::Paper;

@@ -3,7 +3,7 @@
 
 use crate::model::{Board, Damages, Job, Mischief, chance, damage};
 use bridge::engine::{Checkpoint, Engine, Identity, Outcome as Done, Task};
-use foilpress::send::session::{Outcome, Record, Session, SessionError};
+use device::send::session::{Outcome, Record, Session, SessionError};
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};
 use rand::RngExt;

@@ -9,13 +9,13 @@ mod server;
 mod system;
 
 use bridge::Bridge;
-use foilpress::inspect::{inspect, sheets};
-use foilpress::job::stream::write_job;
-use foilpress::layout::Profile;
-use foilpress::observe::Silent;
-use foilpress::separate::{Pass, Plane};
-use foilpress::simulate::{Setup, print};
 use model::{is_a_whole_job, seeded};
+use observe::Silent;
+use press::inspect::{inspect, sheets};
+use press::job::stream::write_job;
+use press::layout::Profile;
+use press::separate::{Pass, Plane};
+use press::simulate::{Setup, print};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
@@ -109,10 +109,7 @@ fn near(found: [usize; 4], expected: [usize; 4]) -> bool {
 
 macro_rules! server {
     () => {
-        match server::missing() {
-            None => Server::start(),
-            Some(why) => return println!("{why}"),
-        }
+        if server::available() { Server::start() } else { return }
     };
 }
 
@@ -145,7 +142,7 @@ fn a_pdf_comes_out_as_the_sheets_it_draws() {
     let job = server.print(&["-d", "Alps", "-n", "2", "-o", "page-ranges=2", file.to_str().unwrap()]);
     assert_eq!(server.wait_for_job(job), "completed");
     let bytes = bridge.printed().split_off(before);
-    let copies = foilpress::inspect::sheets(&bytes);
+    let copies = press::inspect::sheets(&bytes);
     assert_eq!(copies.len(), 2);
     assert!(bytes[copies[0].clone()] == bytes[copies[1].clone()]);
 }

@@ -8,10 +8,10 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use crate::cli::output;
-use crate::flash::image::Firmware;
-use crate::flash::{self, ThisComputer};
-use crate::observe::Observer;
-use crate::send::Address;
+use device::flash::image::Firmware;
+use device::flash::{self, ThisComputer};
+use device::send::Address;
+use observe::Observer;
 
 /// Arguments of `bridge flash`.
 #[derive(ClapArgs, Debug)]

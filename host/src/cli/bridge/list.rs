@@ -7,9 +7,9 @@ use clap::Args as ClapArgs;
 use serde_json::json;
 
 use super::{Found, is_forbidden, newer_firmware, permission};
-use crate::flash::{drive, usb};
-use crate::send::find::{self, Candidate};
-use crate::send::query::is_alps;
+use device::flash::{drive, usb};
+use device::send::find::{self, Candidate};
+use device::send::query::is_alps;
 
 /// Arguments of `bridge list`.
 #[derive(ClapArgs, Debug)]

@@ -8,10 +8,10 @@ use clap::Args as ClapArgs;
 use serde_json::json;
 
 use super::{PATIENCE, only};
-use crate::flash::image::Firmware;
-use crate::send::Address;
-use crate::send::log;
-use crate::send::query::Query;
+use device::flash::image::Firmware;
+use device::send::Address;
+use device::send::log;
+use device::send::query::Query;
 
 /// A firmware's program is some megabytes.
 const LARGEST: u64 = 64 << 20;

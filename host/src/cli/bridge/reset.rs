@@ -10,10 +10,10 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use super::PATIENCE;
-use crate::observe::Observer;
-use crate::send::Address;
-use crate::send::journal::{Entry, Journal};
-use crate::send::query::Query;
+use device::send::Address;
+use device::send::journal::{Entry, Journal};
+use device::send::query::Query;
+use observe::Observer;
 
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]

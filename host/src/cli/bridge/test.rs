@@ -11,9 +11,9 @@ use serde_json::json;
 
 use super::{PATIENCE, is_open, only};
 use crate::cli::output::say_on_interrupt;
-use crate::send::Address;
-use crate::send::query::{Query, QueryError};
-use crate::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
+use device::send::Address;
+use device::send::query::{Query, QueryError};
+use device::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
 
 /// Between two looks whether the plug has been moved.
 const LOOK: Duration = Duration::from_millis(300);

@@ -10,9 +10,9 @@ use protocol::link::message::Ask;
 use serde_json::json;
 
 use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
-use crate::send::Address;
-use crate::send::query::{Query, Reply};
-use crate::send::transport::Transport;
+use device::send::Address;
+use device::send::query::{Query, Reply};
+use device::send::transport::Transport;
 
 /// Between two looks at the bridge.
 const LOOK: Duration = Duration::from_secs(1);

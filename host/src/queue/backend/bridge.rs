@@ -14,11 +14,11 @@ use protocol::status;
 use super::{Delivery, Stopped};
 use crate::queue::call::Exit;
 use crate::queue::messages::{Messages, Reason};
-use crate::send::journal::{Entry, Journal, JournalError, NewJob, OpenJob};
-use crate::send::query::{Query, Reply, is_alps};
-use crate::send::session::{Outcome, Phase, Record, Session, SessionError};
-use crate::send::status::Status;
-use crate::send::{self, Address, Checked, Destination, Event, OpenError, RunError, Wish, find, words};
+use device::send::journal::{Entry, Journal, JournalError, NewJob, OpenJob};
+use device::send::query::{Query, Reply, is_alps};
+use device::send::session::{Outcome, Phase, Record, Session, SessionError};
+use device::send::status::Status;
+use device::send::{self, Address, Checked, Destination, Event, OpenError, RunError, Wish, find, words};
 
 /// How long a cancelled job may take to come to its end; the print system kills after 30 s.
 const LAST_WORDS: Duration = Duration::from_secs(20);

@@ -1,0 +1,418 @@
+//! The factored document as a folder, read and written.
+//!
+//! `NAME.foil/` holds `document.toml` (what is there), `bases.csv` (`basis,theta_h_deg,r,g,b`, reflectance in 1/sr)
+//! and one 16-bit grey PNG of weights for each basis. Weights are stored as `round(w 65535 / 32768)` with `w` in
+//! units of 1/32768; since that scale is above one, rounding back gives every weight exactly. What is read must
+//! sum to one at every pixel, but for what rounding to 16 bits explains. Writing goes to a temporary folder that is renamed at the end.
+
+use std::collections::BTreeMap;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use inks::Curve;
+use serde::{Deserialize, Serialize};
+
+use super::error::DocumentError;
+use super::folder::check_size_mm;
+use super::picture::Picture;
+use super::source::{MOST_BYTES, Source};
+use super::surfaces::{MOST_PIXELS, check_reflectance};
+use super::{Content, Document, stem};
+use crate::brdf::{Space, Table};
+use crate::factor::Factored;
+use crate::weights::{ONE, WeightMaps, quantise};
+use observe::{Observer, Silent};
+
+/// The file that makes a folder a factored document.
+pub const INDEX: &str = "document.toml";
+
+const BASES: &str = "bases.csv";
+
+/// The version written and the only one read.
+const FORMAT: u32 = 1;
+
+/// The most bases: each is a map of its own, and no document needs more than a few dozen.
+const MOST_BASES: usize = 256;
+
+/// `document.toml`.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Index {
+    format: u32,
+    name: String,
+    width: usize,
+    height: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    size_mm: Option<[f64; 2]>,
+    /// Samples of the half angle, on the square-root grid.
+    samples: usize,
+    bases: String,
+    /// One file for each basis, in order.
+    maps: Vec<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct BasisRow {
+    basis: usize,
+    theta_h_deg: f64,
+    r: f64,
+    g: f64,
+    b: f64,
+}
+
+/// A stored weight, 0..=65535, from units of 1/[`ONE`].
+fn stored(weight: u16) -> u16 {
+    ((u32::from(weight) * 65_535 + u32::from(ONE) / 2) / u32::from(ONE)) as u16
+}
+
+/// The weight nearest to a stored one.
+fn weight(stored: u16) -> u16 {
+    ((u32::from(stored) * u32::from(ONE) + 32_767) / 65_535) as u16
+}
+
+fn io(path: &Path, attempt: &'static str) -> impl FnOnce(std::io::Error) -> DocumentError {
+    let path = path.to_path_buf();
+    move |source| DocumentError::Io { path, attempt, source }
+}
+
+/// Writes a factored document as the folder `path`, which must not exist yet. Only half-angle tabulations can be
+/// written: the file form is curves.
+pub fn write(
+    factored: &Factored,
+    name: &str,
+    size_mm: Option<(f64, f64)>,
+    path: &Path,
+) -> Result<(), DocumentError> {
+    let angles = factored.space.angles();
+    let field =
+        |problem: String| DocumentError::Field { path: path.to_path_buf(), field: "bases".into(), problem };
+    if angles.is_empty() {
+        return Err(field(
+            "a factored document on disk holds curves of the half angle, not other tabulations".into(),
+        ));
+    }
+    if factored.bases.len() != factored.maps.channels() || factored.bases.len() > MOST_BASES {
+        let (bases, maps) = (factored.bases.len(), factored.maps.channels());
+        return Err(field(format!("{bases} bases and {maps} maps; expected as many, at most {MOST_BASES}")));
+    }
+    if path.exists() {
+        let exists = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
+        return Err(io(path, "write")(exists));
+    }
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let staging =
+        tempfile::Builder::new().prefix(".foil.").tempdir_in(parent).map_err(io(parent, "write in"))?;
+    // A folder within, since a temporary folder is its owner's alone.
+    let inside = staging.path().join("document");
+    std::fs::create_dir(&inside).map_err(io(&inside, "write"))?;
+    let (width, height) = (factored.maps.width(), factored.maps.height());
+    let mut maps = Vec::new();
+    let mut row = vec![0u8; 2 * width * height];
+    for basis in 0..factored.maps.channels() {
+        let file = format!("weights-{basis:02}.png");
+        for (pixel, out) in row.chunks_exact_mut(2).enumerate() {
+            out.copy_from_slice(&stored(factored.maps.at(pixel)[basis]).to_ne_bytes());
+        }
+        let at = inside.join(&file);
+        let output = BufWriter::new(std::fs::File::create_new(&at).map_err(io(&at, "write"))?);
+        PngEncoder::new(output)
+            .write_image(&row, width as u32, height as u32, ExtendedColorType::L16)
+            .map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
+        maps.push(file);
+    }
+    let at = inside.join(BASES);
+    let mut csv = csv::Writer::from_path(&at).map_err(|error| io(&at, "write")(error.into()))?;
+    for (basis, row) in factored.bases.rows().enumerate() {
+        for (theta, value) in angles.iter().zip(row.chunks_exact(3)) {
+            csv.serialize(BasisRow {
+                basis,
+                theta_h_deg: theta.to_degrees(),
+                r: value[0],
+                g: value[1],
+                b: value[2],
+            })
+            .map_err(|error| io(&at, "write")(error.into()))?;
+        }
+    }
+    csv.flush().map_err(io(&at, "write"))?;
+    let index = Index {
+        format: FORMAT,
+        name: name.into(),
+        width,
+        height,
+        size_mm: size_mm.map(|(w, h)| [w, h]),
+        samples: angles.len(),
+        bases: BASES.into(),
+        maps,
+    };
+    let at = inside.join(INDEX);
+    let text = toml::to_string(&index).map_err(|error| io(&at, "write")(std::io::Error::other(error)))?;
+    let mut file = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
+    file.write_all(text.as_bytes()).map_err(io(&at, "write"))?;
+    std::fs::rename(&inside, path).map_err(io(path, "write"))
+}
+
+/// The weights of a pixel from its greys: those that were written, or by largest remainder those that were
+/// painted, whose greys sum to white but for a rounding of each. Otherwise the sum stays wrong, to be named.
+fn from_greys(grey: &[u16], weights: &mut [u16]) {
+    weights.iter_mut().zip(grey).for_each(|(w, &g)| *w = weight(g));
+    if weights.iter().map(|&w| u32::from(w)).sum::<u32>() == u32::from(ONE) {
+        return;
+    }
+    let sum: u32 = grey.iter().map(|&g| u32::from(g)).sum();
+    if sum.abs_diff(u32::from(u16::MAX)) as usize <= grey.len() {
+        let exact: Vec<f64> = grey.iter().map(|&g| f64::from(g)).collect();
+        quantise(&exact, weights);
+    }
+}
+
+/// Reads a factored document, nobody watching.
+pub fn read(path: &Path) -> Result<Document, DocumentError> {
+    read_watched(path, &Silent)
+}
+
+/// Reads a factored document.
+pub fn read_watched(path: &Path, observer: &dyn Observer) -> Result<Document, DocumentError> {
+    open(path, Source::new(observer))
+}
+
+pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, DocumentError> {
+    let at = path.join(INDEX);
+    let wrong = |problem: String| DocumentError::Settings { path: at.clone(), problem };
+    let text = source.read_text(&at)?;
+    let index: Index = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+    check(&index).map_err(&wrong)?;
+    let space = Space::half_angle(index.samples);
+    let bases = read_bases(&path.join(&index.bases), &index, &space, &mut source)?;
+
+    let channels = index.maps.len();
+    source.observer.begin("reading", channels as u64);
+    // Maps are read one by one before room for all of them is taken: the description alone allocates nothing.
+    let mut data = Vec::new();
+    for (channel, name) in index.maps.iter().enumerate() {
+        let at = path.join(name);
+        let bytes = source.read(&at, MOST_BYTES)?;
+        let picture = Picture::decode(&bytes, &at, &mut source)?;
+        let problem = match picture.sixteen() {
+            _ if (picture.width, picture.height) != (index.width, index.height) => format!(
+                "expected {} x {} weights, found {} x {}",
+                index.width, index.height, picture.width, picture.height
+            ),
+            None => "expected weights as 16-bit grey".into(),
+            Some(weights) => {
+                data.resize(index.width * index.height * channels, 0);
+                for (out, &w) in data.chunks_exact_mut(channels).zip(weights) {
+                    out[channel] = w;
+                }
+                source.observer.advance(1);
+                continue;
+            }
+        };
+        return Err(DocumentError::Picture { path: at, problem });
+    }
+    source.observer.end();
+    let mut grey = vec![0; channels];
+    for weights in data.chunks_exact_mut(channels) {
+        grey.copy_from_slice(weights);
+        from_greys(&grey, weights);
+    }
+    let maps = WeightMaps::new(index.width, index.height, channels, data)
+        .map_err(|source| DocumentError::Weights { path: path.to_path_buf(), source })?;
+    let (notes, digest) = source.finish();
+    Ok(Document {
+        name: if index.name.is_empty() { stem(path) } else { index.name },
+        content: Content::Factored(Factored { space, bases, maps }),
+        size_mm: index.size_mm.map(|[w, h]| (w, h)),
+        notes,
+        digest,
+    })
+}
+
+/// What `document.toml` says must be possible before anything of its size is allocated.
+fn check(index: &Index) -> Result<(), String> {
+    if index.format != FORMAT {
+        return Err(format!("format = {}: this program reads format {FORMAT}", index.format));
+    }
+    let pixels = (index.width as u64).saturating_mul(index.height as u64);
+    if pixels == 0 || pixels > MOST_PIXELS {
+        return Err(format!("{} x {} pixels: expected 1 to {MOST_PIXELS}", index.width, index.height));
+    }
+    if index.maps.is_empty() || index.maps.len() > MOST_BASES {
+        return Err(format!("maps: {} files; expected 1 to {MOST_BASES}", index.maps.len()));
+    }
+    if pixels * index.maps.len() as u64 > 1 << 30 {
+        return Err(format!("{pixels} pixels of {} weights: more than can be held", index.maps.len()));
+    }
+    if index.samples == 0 || index.samples > 4096 {
+        return Err(format!("samples = {}: expected 1 to 4096", index.samples));
+    }
+    if let Some(size) = index.size_mm {
+        check_size_mm(size)?;
+    }
+    for name in index.maps.iter().chain([&index.bases]) {
+        let plain = Path::new(name).components().eq([std::path::Component::Normal(name.as_ref())]);
+        if !plain || name.contains('\\') {
+            return Err(format!("`{name}` must be the name of a file in the same folder"));
+        }
+    }
+    Ok(())
+}
+
+fn read_bases(
+    path: &Path,
+    index: &Index,
+    space: &Space,
+    source: &mut Source<'_>,
+) -> Result<Table, DocumentError> {
+    let wrong =
+        |field: String, problem: String| DocumentError::Field { path: path.to_path_buf(), field, problem };
+    let bytes = source.read(path, 256 << 20)?;
+    let mut samples: BTreeMap<usize, (Vec<f64>, Vec<[f64; 3]>)> = BTreeMap::new();
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(&bytes[..]);
+    for row in reader.deserialize::<BasisRow>() {
+        let row = row.map_err(|error| {
+            let line = error.position().map_or(1, csv::Position::line);
+            wrong(format!("line {line}"), format!("{error}; expected the columns basis,theta_h_deg,r,g,b"))
+        })?;
+        if row.basis >= index.maps.len() {
+            let problem = format!("there are {} maps, numbered from 0", index.maps.len());
+            return Err(wrong(format!("basis {}", row.basis), problem));
+        }
+        let (theta, rgb) = samples.entry(row.basis).or_default();
+        theta.push(row.theta_h_deg.to_radians());
+        rgb.push([row.r, row.g, row.b]);
+    }
+    let mut bases = Table::new(space.columns());
+    for basis in 0..index.maps.len() {
+        let Some((theta, rgb)) = samples.remove(&basis) else {
+            return Err(wrong(format!("basis {basis}"), "no samples, but there is a map for it".into()));
+        };
+        let on_grid = theta.len() == space.angles().len()
+            && theta.iter().zip(space.angles()).all(|(a, b)| (a - b).abs() < 1e-9);
+        let row: Vec<f64> = rgb.iter().flatten().copied().collect();
+        let curve =
+            Curve::new(theta, rgb).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
+        // Samples on the very grid are taken as they stand, so that writing and reading changes nothing.
+        let row = if on_grid { row } else { space.row(&curve) };
+        check_reflectance(&row).map_err(|problem| wrong(format!("basis {basis}"), problem))?;
+        bases.push(&row);
+    }
+    Ok(bases)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::weights::quantise;
+    use proptest::prelude::*;
+
+    fn factored(width: usize, height: usize, bases: usize, seed: u32) -> Factored {
+        let value = |i: u32| {
+            let v = (i + 1).wrapping_mul(2_654_435_761).wrapping_add(seed).wrapping_mul(2_246_822_519);
+            f64::from(v ^ (v >> 13)) / f64::from(u32::MAX)
+        };
+        let space = Space::half_angle(7);
+        let mut table = Table::new(space.columns());
+        for b in 0..bases {
+            let row: Vec<f64> =
+                (0..space.columns()).map(|j| 30.0 * value((b * 64 + j) as u32).powi(3)).collect();
+            table.push(&row);
+        }
+        let mut data = vec![0; width * height * bases];
+        for (pixel, out) in data.chunks_exact_mut(bases).enumerate() {
+            let weights: Vec<f64> = (0..bases).map(|b| value((pixel * 97 + b * 7) as u32).powi(4)).collect();
+            quantise(&weights, out);
+        }
+        let maps = WeightMaps::new(width, height, bases, data).unwrap();
+        Factored { space, bases: table, maps }
+    }
+
+    #[test]
+    fn every_weight_survives_the_file() {
+        for w in 0..=ONE {
+            assert_eq!(weight(stored(w)), w);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        #[test]
+        fn reading_gives_back_what_was_written(
+            width in 1usize..9, height in 1usize..9, bases in 1usize..6, seed in any::<u32>(),
+        ) {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a.foil");
+            let original = factored(width, height, bases, seed);
+            write(&original, "a thing", Some((12.5, 30.0)), &path).unwrap();
+            let document = read(&path).unwrap();
+            prop_assert_eq!(document.name.as_str(), "a thing");
+            prop_assert_eq!(document.size_mm, Some((12.5, 30.0)));
+            prop_assert_eq!(document.as_factored(), Some(&original));
+            // Nothing but the folder is left beside it.
+            prop_assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        }
+    }
+
+    #[test]
+    fn weights_that_do_not_sum_to_one_are_refused_with_their_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.foil");
+        write(&factored(3, 2, 2, 5), "a", None, &path).unwrap();
+        std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
+        let error = read(&path).unwrap_err().to_string();
+        assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
+    }
+
+    proptest! {
+        /// Whoever paints in the maps keeps the sum of greys, not of our units.
+        #[test]
+        fn painted_greys_that_sum_to_white_are_weights(
+            mut cuts in prop::collection::vec(0u16..=u16::MAX, 1..8), off in -1i32..=1,
+        ) {
+            cuts.extend([0, u16::MAX]);
+            cuts.sort_unstable();
+            let mut grey: Vec<u16> = cuts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            grey[0] = (i32::from(grey[0]) + off).clamp(0, 65535) as u16;
+            let mut weights = vec![0; grey.len()];
+            from_greys(&grey, &mut weights);
+            prop_assert_eq!(weights.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
+            for (&w, &g) in weights.iter().zip(&grey) {
+                prop_assert!((f64::from(w) - f64::from(g) * 32768.0 / 65535.0).abs() <= 2.0);
+            }
+            // A step of 8 bits is no rounding.
+            if grey[0] < 65000 {
+                grey[0] += 257;
+                from_greys(&grey, &mut weights);
+                prop_assert!(weights.iter().map(|&w| u32::from(w)).sum::<u32>() != u32::from(ONE));
+            }
+        }
+    }
+
+    #[test]
+    fn unknown_keys_and_foreign_paths_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.foil");
+        write(&factored(2, 2, 1, 5), "a", None, &path).unwrap();
+        let text = std::fs::read_to_string(path.join(INDEX)).unwrap();
+        for (from, to, says) in [
+            ("samples", "sampels", "sampels"),
+            ("weights-00.png", "../weights-00.png", "same folder"),
+            ("width = 2", "width = 0", "0 x 2"),
+            ("width = 2", "width = 99999999999", "99999999999"),
+            ("format = 1", "format = 2", "format"),
+            ("width = 2", "width = 3", "expected 3 x 2"),
+        ] {
+            std::fs::write(path.join(INDEX), text.replace(from, to)).unwrap();
+            let error = read(&path).unwrap_err().to_string();
+            assert!(error.contains(says), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn an_existing_folder_is_not_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(write(&factored(2, 2, 1, 5), "a", None, folder.path()).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,164 @@
+//! Files made here, by hand: each workflow, each way to store a picture, each way out of the folder.
+
+use super::*;
+use crate::document::{Materials, Surface, open};
+use base64::Engine;
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use observe::Silent;
+
+fn png(width: u32, height: u32, rgb: impl Fn(u32) -> [u8; 3]) -> Vec<u8> {
+    let data: Vec<u8> = (0..width * height).flat_map(rgb).collect();
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes).write_image(&data, width, height, ExtendedColorType::Rgb8).unwrap();
+    bytes
+}
+
+fn data_uri(bytes: &[u8]) -> String {
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
+}
+
+fn surfaces(path: &Path, material: Option<&str>) -> Result<(Surfaces, Document), DocumentError> {
+    let options = Options { material: material.map(Into::into), ..Options::default() };
+    let document = open(path.to_str().unwrap(), &options, &Silent)?;
+    let Content::Surfaces(surfaces) = &document.content else { panic!("glTF gives surfaces") };
+    Ok((surfaces.clone(), document))
+}
+
+fn close(a: Surface, b: Surface) {
+    let values = |s: Surface| [s.diffuse[0], s.diffuse[1], s.diffuse[2], s.f0[0], s.f0[1], s.f0[2], s.alpha];
+    for (x, y) in values(a).into_iter().zip(values(b)) {
+        assert!((x - y).abs() < 2e-4, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn textures_and_factors_multiply_and_each_way_of_storing_them_reads_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let base = png(2, 2, |i| [255, 128, (60 * i) as u8]);
+    let orm = png(2, 2, |i| [9, 200, (80 * i) as u8]);
+    std::fs::write(folder.path().join("base colour.png"), &base).unwrap();
+    std::fs::write(folder.path().join("orm.png"), &orm).unwrap();
+    let json = |images: &str, rest: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"images":[{images}],
+            "textures":[{{"source":0}},{{"source":1}}],
+            "materials":[{{"name":"a"}},{{"name":"tin","pbrMetallicRoughness":{{
+            "baseColorFactor":[1,0.5,1,1],"roughnessFactor":0.75,"metallicFactor":0.5,
+            "baseColorTexture":{{"index":0}},"metallicRoughnessTexture":{{"index":1}}}}}}]{rest}}}"#
+        )
+    };
+    let file = folder.path().join("file.gltf");
+    std::fs::write(&file, json(r#"{"uri":"base%20colour.png"},{"uri":"./orm.png"}"#, "")).unwrap();
+    let inline = folder.path().join("inline.gltf");
+    let uris = format!(r#"{{"uri":"{}"}},{{"uri":"{}"}}"#, data_uri(&base), data_uri(&orm));
+    std::fs::write(&inline, json(&uris, "")).unwrap();
+    // The same as a binary container.
+    let views = format!(
+        r#","buffers":[{{"byteLength":{}}}],"bufferViews":[{{"buffer":0,"byteLength":{}}},
+        {{"buffer":0,"byteOffset":{},"byteLength":{}}}]"#,
+        base.len() + orm.len(),
+        base.len(),
+        base.len(),
+        orm.len()
+    );
+    let image = |view| format!(r#"{{"bufferView":{view},"mimeType":"image/png"}}"#);
+    let mut text = json(&format!("{},{}", image(0), image(1)), &views).into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let mut data = [base, orm].concat();
+    data.resize(data.len().next_multiple_of(4), 0);
+    let mut glb = b"glTF\x02\0\0\0".to_vec();
+    glb.extend((28 + text.len() as u32 + data.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(b"JSON", text), (b"BIN\0", data)] {
+        glb.extend((chunk.len() as u32).to_le_bytes());
+        glb.extend(kind);
+        glb.extend(chunk);
+    }
+    let binary = folder.path().join("binary.glb");
+    std::fs::write(&binary, glb).unwrap();
+
+    for path in [file, inline, binary] {
+        let (read, document) = surfaces(&path, Some("tin")).unwrap();
+        assert_eq!((read.width(), read.height(), &document.name[..]), (2, 2, "tin"));
+        let linear = |v: f32| ((v / 255.0 + 0.055) / 1.055).powf(2.4);
+        let colour = [1.0, 0.5 * linear(128.0), linear(180.0)];
+        let (rough, metal) = (0.75 * 200.0 / 255.0, 0.5 * 240.0 / 255.0);
+        close(read.surface(3), metallic(colour, [0.04; 3], rough, metal));
+    }
+}
+
+#[test]
+fn index_of_refraction_and_specular_factors_set_the_reflectance_of_dielectrics() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(
+        &path,
+        r#"{"asset":{"version":"2.0"},"materials":[{"pbrMetallicRoughness":{"metallicFactor":0,
+        "roughnessFactor":0.5,"baseColorFactor":[0.2,0.3,0.4,1]},"extensions":{"KHR_materials_ior":{"ior":2.0},
+        "KHR_materials_specular":{"specularFactor":0.5,"specularColorFactor":[1,0.5,0]}}}]}"#,
+    )
+    .unwrap();
+    let (read, document) = surfaces(&path, None).unwrap();
+    let f0 = [1.0 / 18.0, 1.0 / 36.0, 0.0];
+    let diffuse = [0.2 * (1.0 - f0[0]), 0.3 * (1.0 - f0[1]), 0.4];
+    close(read.surface(0), Surface { diffuse, f0, alpha: 0.25 });
+    assert_eq!(document.size_mm, Some((SWATCH_MM, SWATCH_MM)));
+}
+
+#[test]
+fn the_older_workflow_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(
+        &path,
+        r#"{"asset":{"version":"2.0"},"materials":[{"extensions":{"KHR_materials_pbrSpecularGlossiness":{
+        "diffuseFactor":[0.5,0.5,0.5,1],"specularFactor":[0.2,0.1,0.1],"glossinessFactor":0.6}}}]}"#,
+    )
+    .unwrap();
+    let expected = Surface { diffuse: [0.4; 3], f0: [0.2, 0.1, 0.1], alpha: 0.16 };
+    close(surfaces(&path, None).unwrap().0.surface(0), expected);
+}
+
+#[test]
+fn nothing_outside_the_folder_is_read_and_damage_is_named() {
+    let outer = tempfile::tempdir().unwrap();
+    let folder = outer.path().join("inner");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(outer.path().join("secret.png"), png(1, 1, |_| [0; 3])).unwrap();
+    let path = folder.join("a.gltf");
+    let image = |uri: &str| {
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"images":[{uri}],"textures":[{{"source":0}}],"materials":[{{
+            "pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}]}}"#
+        )
+    };
+    let absolute = format!(r#"{{"uri":"{}"}}"#, outer.path().join("secret.png").display());
+    for (json, says) in [
+        (image(r#"{"uri":"../secret.png"}"#), "secret.png"),
+        (image(r#"{"uri":"%2e%2e/secret.png"}"#), "not a file in the document's folder"),
+        (image(&absolute), "not a file in the document's folder"),
+        (image(r#"{"uri":"file:///etc/passwd"}"#), "not a file in the document's folder"),
+        (image(r#"{"uri":"missing.png"}"#), "missing.png"),
+        (image(r#"{"uri":"data:image/png;base64,@@"}"#), "damaged"),
+        (image(r#"{"bufferView":7,"mimeType":"image/png"}"#), "bufferView 7 does not exist"),
+        (image("{}"), "neither uri nor bufferView"),
+        (image("").replace(r#""index":0"#, r#""index":4"#), "texture 4 does not exist"),
+        (r#"{"asset":{"version":"2.0"}}"#.into(), "no material to print"),
+        ("{".into(), "glTF"),
+    ] {
+        std::fs::write(&path, &json).unwrap();
+        let error = surfaces(&path, None).unwrap_err().to_string();
+        assert!(error.contains("a.gltf") || error.contains("missing.png"), "{error}");
+        assert!(error.contains(says), "{json}: {error}");
+    }
+}
+
+#[test]
+fn several_materials_need_a_choice() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    std::fs::write(&path, r#"{"asset":{"version":"2.0"},"materials":[{"name":"tin"},{}]}"#).unwrap();
+    let error = surfaces(&path, None).unwrap_err().to_string();
+    assert!(error.contains("0 (tin), 1 (without a name)"), "{error}");
+    assert!(surfaces(&path, Some("1")).is_ok() && surfaces(&path, Some("tin")).is_ok());
+    assert!(surfaces(&path, Some("2")).is_err() && surfaces(&path, Some("lead")).is_err());
+}

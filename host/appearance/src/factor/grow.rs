@@ -1,0 +1,69 @@
+//! How many bases a document needs.
+//!
+//! Method: one basis more at a time, on a few thousand materials, until the document is reproduced to
+//! [`ENOUGH`], another basis would gain less than [`GAIN`], or [`MOST`] are in use. A new basis starts at the best
+//! of a few badly represented materials and all are refined together, so the error only falls.
+//! Cost: about that of fitting the last number once on all materials. Limits: greedy; and judged by metric
+//! archetypes whatever the method, so that methods can be compared with the same number of bases.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use observe::Observer;
+
+use super::archetypes::Fit;
+use super::hull::Hull;
+use super::kmeans::draw;
+use super::sample::Sample;
+
+/// Mean squared distances are small enough below the square of this: where differences are hard to see.
+const ENOUGH: f64 = 0.015;
+/// Share of the error one more basis has to take away.
+const GAIN: f64 = 0.05;
+/// Most bases that are chosen without being asked for: as many as the paper ever used.
+pub(super) const MOST: usize = 15;
+/// Materials that are enough to count by.
+const MATERIALS: usize = 4000;
+const TRIES: usize = 4;
+const SWEEPS: usize = 6;
+
+/// Bases as many as the document needs, fit to a part of the sample.
+pub(super) fn grow(sample: &Sample, hull: &Hull, slack: f64, seed: u64, observer: &dyn Observer) -> Vec<f32> {
+    let most = MOST.min(sample.len());
+    observer.begin("choosing how many bases", most as u64);
+    let sample = sample.thinned(MATERIALS);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut fit = refined(&sample, hull, slack, &sample.mean());
+    let mut error = fit.total().sqrt();
+    observer.advance(1);
+    while error > ENOUGH && fit.bases.len() < most * sample.columns.padded {
+        let chance: Vec<f64> = fit.distances2().iter().zip(&sample.weight).map(|(d, w)| d * w).collect();
+        let mut best: Option<(f64, Fit)> = None;
+        for _ in 0..TRIES {
+            let mut start = fit.bases.clone();
+            start.extend_from_slice(sample.row(draw(&chance, &mut random)));
+            let mut trial = Fit::new(&sample, hull, slack, &start);
+            trial.sweep();
+            let total = trial.total();
+            if best.as_ref().is_none_or(|(least, _)| total < *least) {
+                best = Some((total, trial));
+            }
+        }
+        let Some((_, mut next)) = best else { break };
+        (1..SWEEPS).for_each(|_| _ = next.sweep());
+        observer.advance(1);
+        let lower = next.total().sqrt();
+        if lower > (1.0 - GAIN) * error {
+            break;
+        }
+        (fit, error) = (next, lower);
+    }
+    observer.end();
+    fit.bases
+}
+
+fn refined<'a>(sample: &'a Sample, hull: &'a Hull, slack: f64, start: &[f32]) -> Fit<'a> {
+    let mut fit = Fit::new(sample, hull, slack, start);
+    (0..SWEEPS).for_each(|_| _ = fit.sweep());
+    fit
+}

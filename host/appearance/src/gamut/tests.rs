@@ -1,0 +1,415 @@
+//! The claims of section 4.1, figure 5's ladder, the limits, and the intents against each other.
+
+use inks::{Curve, InkSet, Library, Stack};
+use proptest::prelude::*;
+use protocol::ink::Ink;
+
+use super::*;
+use crate::brdf::{Space, Table};
+use crate::document::Surface;
+use crate::weights::quantise;
+use observe::Silent;
+
+fn space() -> Space {
+    Space::half_angle(32)
+}
+
+fn everything(space: &Space) -> Printable {
+    Printable::from_library(&Library::builtin(), &InkSet::of(Ink::ALL), space)
+}
+
+fn basis_settings() -> Settings {
+    Settings { intent: Intent::Basis, ..Settings::default() }
+}
+
+fn maps(width: usize, height: usize, channels: usize, weight: impl Fn(usize, usize) -> f64) -> WeightMaps {
+    let mut data = vec![0; width * height * channels];
+    for (pixel, out) in data.chunks_exact_mut(channels).enumerate() {
+        let weights: Vec<f64> = (0..channels).map(|c| weight(pixel, c)).collect();
+        quantise(&weights, out);
+    }
+    WeightMaps::new(width, height, channels, data).unwrap()
+}
+
+fn document(space: &Space, surfaces: &[Surface], maps: WeightMaps) -> Factored {
+    let mut bases = Table::new(space.columns());
+    surfaces.iter().for_each(|s| bases.push(&space.row(&s.curve(space.angles()))));
+    Factored { space: space.clone(), bases, maps }
+}
+
+fn surface(diffuse: [f32; 3], f0: [f32; 3], alpha: f32) -> Surface {
+    Surface { diffuse, f0, alpha }
+}
+
+/// Four materials: two printable, one glossier than any stack, one more colourful.
+fn four() -> [Surface; 4] {
+    [
+        surface([0.5, 0.4, 0.3], [0.04; 3], 0.2),
+        surface([0.02; 3], [0.4, 0.3, 0.2], 0.3),
+        surface([0.0; 3], [1.0; 3], 0.03),
+        surface([0.9, 0.0, 0.0], [0.04; 3], 0.3),
+    ]
+}
+
+fn pattern(width: usize, height: usize) -> WeightMaps {
+    maps(width, height, 4, |p, c| {
+        ((p * (7 + 3 * c) + 5 * c) % 23) as f64 * f64::from(u8::from((p + c) % 3 > 0))
+    })
+}
+
+/// Materials as surfaces, one for each pixel.
+struct Field {
+    space: Space,
+    width: usize,
+    surfaces: Vec<Surface>,
+}
+
+impl Materials for Field {
+    fn width(&self) -> usize {
+        self.width
+    }
+    fn height(&self) -> usize {
+        self.surfaces.len() / self.width
+    }
+    fn space(&self) -> &Space {
+        &self.space
+    }
+    fn reflectance(&self, pixel: usize, out: &mut [f32]) {
+        let row = self.space.row(&self.surfaces[pixel].curve(self.space.angles()));
+        out.iter_mut().zip(&row).for_each(|(out, &f)| *out = f as f32);
+    }
+}
+
+fn printed_row(mix: &InkMix, printable: &Printable, pixel: usize) -> Vec<f64> {
+    let mut shares = vec![0.0; mix.stacks.len()];
+    mix.shares(pixel, &mut shares);
+    let mut row = vec![0.0; printable.curves.columns()];
+    for (stack, share) in mix.stacks.iter().zip(&shares) {
+        if *share > 0.0 {
+            let k = printable.stacks.iter().position(|s| s == stack).unwrap();
+            row.iter_mut().zip(printable.curves.row(k)).for_each(|(row, f)| *row += share * f);
+        }
+    }
+    row
+}
+
+fn is_printable(mix: &InkMix, most: usize) {
+    mix.check().unwrap();
+    assert!(mix.inks().len() <= most, "{:?}", mix.inks());
+    let mut shares = vec![0.0; mix.stacks.len()];
+    for pixel in 0..mix.maps.width() * mix.maps.height() {
+        mix.shares(pixel, &mut shares);
+        assert!(shares.iter().all(|&s| s >= 0.0));
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Convex combinations of convex combinations are convex combinations, in exact arithmetic.
+    #[test]
+    fn weights_of_weights_are_weights(
+        a in prop::collection::vec(0.0f64..1.0, 5),
+        s in prop::collection::vec(prop::collection::vec(0.0f64..1.0, 9), 5),
+    ) {
+        let stacks: Vec<Stack> = everything(&space()).stacks[..9].to_vec();
+        let mut weights = vec![0; 5];
+        quantise(&a, &mut weights);
+        let matrix: Vec<Vec<u16>> = s.iter().map(|row| {
+            let mut out = vec![0; 9];
+            quantise(row, &mut out);
+            out
+        }).collect();
+        let mix = InkMix::new(stacks, WeightMaps::new(1, 1, 5, weights).unwrap(), matrix).unwrap();
+        let mut shares = vec![0.0; 9];
+        mix.shares(0, &mut shares);
+        prop_assert!(shares.iter().all(|&s| s >= 0.0));
+        prop_assert_eq!(shares.iter().sum::<f64>(), 1.0);
+    }
+
+    /// Section 4.1: if the bases are printable, so is every pixel, and it is printed as it is.
+    #[test]
+    fn documents_in_the_gamut_are_printed_exactly(
+        parts in prop::collection::vec(prop::collection::vec(0.1f64..1.0, 3), 4),
+        stacks in prop::collection::vec(0usize..9, 12),
+    ) {
+        let space = space();
+        let printable = everything(&space);
+        let mut bases = Table::new(space.columns());
+        for (i, part) in parts.iter().enumerate() {
+            let sum: f64 = part.iter().sum();
+            let mut row = vec![0.0; space.columns()];
+            for (part, &k) in part.iter().zip(&stacks[3 * i..]) {
+                row.iter_mut().zip(printable.curves.row(k)).for_each(|(r, f)| *r += part / sum * f);
+            }
+            bases.push(&row);
+        }
+        let document = Factored { space: space.clone(), bases, maps: pattern(6, 5) };
+        // All inks, so that none must be given up.
+        let settings = Settings { most_cartridges: 13, ..basis_settings() };
+        let mapped = map(&document, None, &printable, &settings, &Silent).unwrap();
+        is_printable(&mapped.mix, 13);
+        let mut target = vec![0f32; space.columns()];
+        for pixel in 0..30 {
+            document.reflectance(pixel, &mut target);
+            let target: Vec<f64> = target.iter().map(|&f| f64::from(f)).collect();
+            let d = space.distance(&target, &printed_row(&mapped.mix, &printable, pixel));
+            // Shares are rounded to 1/32768.
+            prop_assert!(d < 3e-4, "pixel {pixel}: {d}");
+        }
+    }
+}
+
+/// Figure 5: four materials of one colour with 100, 80, 50 and 10 % gloss, and a printer that reaches 50 %.
+fn ladder(space: &Space) -> (Printable, Vec<Curve>) {
+    let gloss = |s: f64| Curve::sampled(space.angles(), |t| [0.1 + s * 0.5 * inks::ggx::lobe(t, 0.2); 3]);
+    let mut curves = Table::new(space.columns());
+    let stacks = ["substrate", "F"].map(|s| s.parse().unwrap()).to_vec();
+    [0.0, 0.5].iter().for_each(|&s| curves.push(&space.row(&gloss(s))));
+    (Printable { stacks, curves }, [1.0, 0.8, 0.5, 0.1].map(gloss).to_vec())
+}
+
+/// The share of the gloss coat in each pixel of a four-pixel picture of the ladder.
+fn rungs(bases: &[usize], weight: impl Fn(usize, usize) -> f64, settings: &Settings) -> (Vec<f64>, Report) {
+    let space = space();
+    let (printable, curves) = ladder(&space);
+    let mut table = Table::new(space.columns());
+    bases.iter().for_each(|&i| table.push(&space.row(&curves[i])));
+    let document = Factored { space, bases: table, maps: maps(4, 1, bases.len(), weight) };
+    let mapped = map(&document, None, &printable, settings, &Silent).unwrap();
+    let mut shares = vec![0.0; mapped.mix.stacks.len()];
+    let share = |pixel| {
+        mapped.mix.shares(pixel, &mut shares);
+        shares[1]
+    };
+    ((0..4).map(share).collect(), mapped.report)
+}
+
+fn is_the_ladder(rungs: &[f64]) {
+    // The gloss coat alone is 50 %, so the ladder at half height is its share: 1, 0.8, 0.5, 0.1.
+    for (rung, expected) in rungs.iter().zip([1.0, 0.8, 0.5, 0.1]) {
+        assert!((rung - expected).abs() < 0.02, "{rungs:?}");
+    }
+}
+
+#[test]
+fn the_ladder_stays_a_ladder_when_every_rung_is_a_basis() {
+    let (rungs, report) = rungs(&[0, 1, 2, 3], |p, c| f64::from(u8::from(p == c)), &basis_settings());
+    is_the_ladder(&rungs);
+    // Not quite a half: what never falls below the lobe's own tail counts as diffuse.
+    assert!((report.gloss_scale.unwrap() - 0.5).abs() < 0.03, "{:?}", report.gloss_scale);
+}
+
+#[test]
+fn without_scaling_the_upper_rungs_are_clamped_together() {
+    let settings = Settings { gloss: Gloss::Keep, ..basis_settings() };
+    let (rungs, report) = rungs(&[0, 1, 2, 3], |p, c| f64::from(u8::from(p == c)), &settings);
+    assert!(rungs[..3].iter().all(|r| *r > 0.99) && rungs[3] < 0.25, "{rungs:?}");
+    assert_eq!(report.gloss_scale, None);
+}
+
+/// The paper's own case: the extremes are the bases, and the rungs between them keep their relative places.
+#[test]
+fn the_ladder_stays_a_ladder_when_its_ends_are_the_bases() {
+    let gloss = [1.0, 0.8, 0.5, 0.1];
+    let upper = |p: usize| (gloss[p] - 0.1) / 0.9;
+    let weight = |p: usize, c: usize| if c == 0 { upper(p) } else { 1.0 - upper(p) };
+    let (rungs, report) = rungs(&[0, 3], weight, &basis_settings());
+    assert_eq!(report.gloss_scale, None, "two bases that stay apart need no scaling");
+    for p in 0..4 {
+        let place = (rungs[p] - rungs[3]) / (rungs[0] - rungs[3]);
+        assert!((place - upper(p)).abs() < 1e-3, "{rungs:?}");
+    }
+    assert!(rungs[0] > 0.99 && rungs[3] < 0.25);
+}
+
+#[test]
+fn clamping_the_ladder_merges_it_and_the_automatic_choice_knows() {
+    let weight = |p: usize, c: usize| f64::from(u8::from(p == c));
+    let clamp = Settings { intent: Intent::Clamp, ..Settings::default() };
+    let (clamped, report) = rungs(&[0, 1, 2, 3], weight, &clamp);
+    assert!(clamped[..3].iter().all(|r| *r > 0.99), "{clamped:?}");
+    assert!(report.pixels.unwrap().merged > 0.01);
+    let (_, report) = rungs(&[0, 1, 2, 3], weight, &Settings::default());
+    assert_eq!(report.intent, Intent::Blend);
+}
+
+#[test]
+fn reports_say_what_the_mix_prints() {
+    let space = space();
+    let printable = everything(&space);
+    let document = document(&space, &four(), pattern(8, 8));
+    let mapped = map(&document, None, &printable, &basis_settings(), &Silent).unwrap();
+    is_printable(&mapped.mix, 7);
+    assert_eq!(mapped.report.bases.len(), 4);
+    let curve =
+        |stack: &Stack| printable.curves.row(printable.stacks.iter().position(|s| s == stack).unwrap());
+    for (i, basis) in mapped.report.bases.iter().enumerate() {
+        let mut row = vec![0.0; space.columns()];
+        for (stack, &share) in mapped.mix.stacks.iter().zip(&mapped.mix.matrix[i]) {
+            let w = f64::from(share) / f64::from(ONE);
+            row.iter_mut().zip(curve(stack)).for_each(|(row, f)| *row += w * f);
+        }
+        assert!(space.distance(&row, &basis.printed) < 1e-12);
+        assert!((space.distance(&row, document.bases.row(i)) - basis.unscaled_distance).abs() < 1e-12);
+        assert!((space.distance(&row, &basis.target) - basis.distance).abs() < 1e-12);
+        assert_eq!(basis.agreeing, basis.starts);
+        assert!(basis.weights.iter().all(|(_, w)| *w >= 0.004) && basis.pruning_cost >= -1e-12);
+    }
+}
+
+/// Seven cartridges do, five do, one does, and with none there is only paper; each limit costs distance.
+#[test]
+fn fewer_cartridges_are_kept_to_and_cost_distance() {
+    let space = space();
+    let printable = everything(&space);
+    let mut rng = 0.0;
+    let surfaces: Vec<Surface> = (0..12)
+        .map(|i| {
+            rng = (rng + 0.618) % 1.0;
+            let hue = |c: usize| ((i * (3 + c)) % 7) as f32 / 8.0;
+            surface(
+                [hue(0), hue(1), hue(2)],
+                [0.04 + 0.6 * hue(2), 0.04 + 0.5 * hue(0), 0.1],
+                0.05 + 0.03 * i as f32,
+            )
+        })
+        .collect();
+    let weights = maps(6, 4, 12, |p, c| f64::from(u8::from(p % 12 == c)));
+    let document = document(&space, &surfaces, weights);
+    let mut last = 0.0;
+    for most in [13, 7, 5, 1, 0] {
+        let settings = Settings { most_cartridges: most, gloss: Gloss::Keep, ..basis_settings() };
+        let Mapped { mix, report } = map(&document, None, &printable, &settings, &Silent).unwrap();
+        is_printable(&mix, most);
+        assert_eq!(report.cartridges, mix.inks());
+        let sum: f64 = report.bases.iter().map(|b| b.distance * b.distance).sum();
+        assert!(sum >= last - 1e-9, "{most}: {sum} {last}");
+        last = sum;
+        assert!(most < 7 || report.given_up.windows(2).all(|w| (w[0].after - w[1].before).abs() < 1e-12));
+    }
+}
+
+#[test]
+fn no_cartridge_and_no_substrate_is_an_error() {
+    let space = space();
+    let mut printable = everything(&space);
+    let bare = printable.stacks.remove(0);
+    assert_eq!(bare, Stack::SUBSTRATE);
+    let mut curves = Table::new(space.columns());
+    printable.curves.rows().skip(1).for_each(|row| curves.push(row));
+    printable.curves = curves;
+    let document = document(&space, &four(), pattern(4, 4));
+    let settings = Settings { most_cartridges: 0, ..basis_settings() };
+    let error = map(&document, None, &printable, &settings, &Silent).unwrap_err();
+    assert_eq!(error, GamutError::Cartridges { most: 0 });
+    // With cartridges it works, and the substrate is listed first all the same.
+    let mapped = map(&document, None, &printable, &basis_settings(), &Silent).unwrap();
+    assert_eq!(mapped.mix.stacks[0], Stack::SUBSTRATE);
+    assert!(mapped.mix.matrix.iter().all(|row| row[0] == 0));
+}
+
+fn field(space: &Space, width: usize, height: usize) -> Field {
+    let surfaces = (0..width * height)
+        .map(|p| {
+            let (u, v) = ((p % width) as f32 / width as f32, (p / width) as f32 / height as f32);
+            let rough = 0.08 + 0.3 * ((p * 7919) % 101) as f32 / 101.0;
+            surface([0.6 * u, 0.3 * v, 0.2], [0.04 + 0.5 * u * v, 0.04, 0.1 * v], rough)
+        })
+        .collect();
+    Field { space: space.clone(), width, surfaces }
+}
+
+/// Clamped pixels are each as near as eq. 1 from all starts gets, whatever their neighbours were.
+#[test]
+fn every_clamped_pixel_is_its_own_best() {
+    let space = space();
+    let printable = everything(&space);
+    let pixels = field(&space, 20, 19);
+    let document = document(&space, &four(), pattern(20, 19));
+    let settings = Settings { intent: Intent::Clamp, most_cartridges: 13, ..Settings::default() };
+    let mapped = map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap();
+    is_printable(&mapped.mix, 13);
+    let hull = crate::solve::Hull::new(&space, &printable.curves, &[0.0; 57]).unwrap();
+    let mut mixer = crate::solve::Mixer::new();
+    let mut row = vec![0f32; space.columns()];
+    for pixel in (0..380).step_by(3) {
+        pixels.reflectance(pixel, &mut row);
+        let target: Vec<f64> = row.iter().map(|&f| f64::from(f)).collect();
+        let best = mixer.best(&hull, &hull.target(&target).unwrap()).unwrap().fit.distance;
+        let d = space.distance(&target, &printed_row(&mapped.mix, &printable, pixel));
+        // Price of layers, pruning and rounding of shares.
+        assert!(d >= best - 1e-9 && d < best + 5e-4, "pixel {pixel}: {d} {best}");
+    }
+    let report = mapped.report.pixels.unwrap();
+    assert!(report.gap <= 1e-7 && report.rms <= report.max && report.p95 <= report.max, "{report:?}");
+}
+
+/// Any number of threads, the same bits.
+#[test]
+fn mapping_is_the_same_with_any_number_of_threads() {
+    let space = space();
+    let printable = everything(&space);
+    let pixels = field(&space, 40, 50);
+    let document = document(&space, &four(), pattern(40, 50));
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let settings = Settings { intent: Intent::Blend, ..Settings::default() };
+        pool.install(|| map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap())
+    };
+    let one = run(1);
+    assert_eq!(one, run(3));
+    is_printable(&one.mix, 7);
+}
+
+/// The blend is the clamped mix where that is near, and its reported part lies between none and all.
+#[test]
+fn blending_follows_the_clamped_mix_inside_the_gamut() {
+    let space = space();
+    let printable = everything(&space);
+    let inside = surface([0.5, 0.4, 0.3], [0.04; 3], 0.2);
+    let pixels = Field { space: space.clone(), width: 24, surfaces: vec![inside; 24 * 24] };
+    let document = document(&space, &four(), pattern(24, 24));
+    let run = |intent| {
+        let settings = Settings { intent, gloss: Gloss::Keep, most_cartridges: 13, ..Settings::default() };
+        map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap()
+    };
+    let (clamped, blended) = (run(Intent::Clamp), run(Intent::Blend));
+    assert!(clamped.report.pixels.unwrap().max < 0.01, "{:?}", clamped.report.pixels);
+    assert!(blended.report.pixels.unwrap().clamped > 0.999);
+    let d = space
+        .distance(&printed_row(&clamped.mix, &printable, 99), &printed_row(&blended.mix, &printable, 99));
+    assert!(d < 1e-3, "{d}");
+}
+
+#[test]
+fn what_does_not_fit_together_is_named() {
+    let space = space();
+    let printable = everything(&space);
+    let document = document(&space, &four(), pattern(4, 4));
+    let fails = |document: &Factored, materials: Option<&dyn Materials>, printable: &Printable| {
+        map(document, materials, printable, &Settings::default(), &Silent).unwrap_err()
+    };
+    let none = Printable { stacks: vec![], curves: Table::new(space.columns()) };
+    assert_eq!(fails(&document, None, &none), GamutError::NothingPrintable);
+    let mut twice = printable.clone();
+    twice.stacks[5] = twice.stacks[9].clone();
+    assert!(matches!(fails(&document, None, &twice), GamutError::Twice { .. }));
+    let mut short = printable.clone();
+    short.stacks.pop();
+    assert_eq!(fails(&document, None, &short), GamutError::Curves { stacks: 56, curves: 57 });
+    let mut other = printable.clone();
+    other.curves = everything(&Space::half_angle(8)).curves;
+    assert!(fails(&document, None, &other).to_string().contains("24 columns"));
+    let pixels = field(&space, 3, 4);
+    assert!(matches!(fails(&document, Some(&pixels), &printable), GamutError::Size { found_width: 3, .. }));
+    let mut fewer = document.clone();
+    fewer.bases = Table::new(space.columns());
+    fewer.bases.push(document.bases.row(0));
+    assert_eq!(fails(&fewer, None, &printable), GamutError::Channels { bases: 1, channels: 4 });
+    let mut bad = document.clone();
+    bad.bases.row_mut(2)[5] = f64::NAN;
+    let error = fails(&bad, None, &printable).to_string();
+    assert!(error.contains("basis 2") && error.contains("column 5"), "{error}");
+}

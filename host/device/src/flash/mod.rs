@@ -1,0 +1,289 @@
+//! New firmware for a bridge.
+//!
+//! Problem: bring a board from whatever it runs to the firmware in a file, so that it can always be tried again.
+//! Method: read and check the file; bring the bridge into its boot loader by a message of the link, or take a board that
+//! is there already; write through [PICOBOOT](picoboot) and read back, or copy to the board's [drive] where the
+//! boot loader may not be opened; wait until the bridge is back and says its version.
+//! Limits: one board in its boot loader at a time, since these cannot be told apart.
+
+pub mod drive;
+pub mod image;
+pub mod picoboot;
+#[cfg(test)]
+mod rom;
+#[cfg(test)]
+mod tests;
+pub mod usb;
+
+use std::io::{self, ErrorKind};
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::send::find::{self, Candidate};
+use crate::send::query::{Query, QueryError};
+use crate::send::session::Bridge;
+use crate::send::{Address, OpenError};
+use drive::DriveError;
+use image::Firmware;
+use observe::Observer;
+use picoboot::{Picoboot, Pipe, WriteError};
+
+/// Between two looks at what is plugged in.
+const LOOK: Duration = Duration::from_millis(250);
+/// A board needs a second or two to show itself; slow hubs and virus scanners make it more.
+const LOADER_PATIENCE: Duration = Duration::from_secs(10);
+/// Until the system has mounted the board's drive.
+const DRIVE_PATIENCE: Duration = Duration::from_secs(6);
+/// Until the bridge is back with its new firmware; a drive that is copied to in the background takes longest.
+const BACK_PATIENCE: Duration = Duration::from_secs(30);
+/// How long a bridge may take to answer.
+const ANSWER_PATIENCE: Duration = Duration::from_secs(3);
+
+/// Why a bridge does not have the new firmware.
+#[derive(Debug, thiserror::Error)]
+pub enum FlashError {
+    /// Nothing to flash.
+    #[error(
+        "no bridge and no board in its boot loader is plugged in. For a board without working firmware: hold its BOOTSEL \
+         button while plugging it in"
+    )]
+    Nothing,
+    /// Which one?
+    #[error("several bridges: choose one with --to: {}", .0.join(", "))]
+    SeveralBridges(Vec<String>),
+    /// Boards in their boot loader all look the same.
+    #[error("{0} boards are in their boot loader and cannot be told apart; unplug all but one")]
+    SeveralBoards(usize),
+    /// A board waits, but a bridge was asked for.
+    #[error("another board is in its boot loader already; flash that one first (without --to) or unplug it")]
+    AnotherBoard,
+    /// The bridge's link cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// It does not answer, or has something better to do.
+    #[error(
+        "the bridge cannot be brought into its boot loader: {0}. By hand: hold its BOOTSEL button while plugging it in"
+    )]
+    Enter(#[source] QueryError),
+    /// It prints.
+    #[error(
+        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
+    )]
+    Printing(u32),
+    /// It did not show itself.
+    #[error(
+        "the bridge was asked into its boot loader but no board came up there; plug it in again, its BOOTSEL button held, \
+         and repeat this command"
+    )]
+    NoLoader,
+    /// Neither way into the board is open.
+    #[error(
+        "the board in its boot loader cannot be opened, and its drive RPI-RP2 is not mounted; `foilpress doctor` says what to \
+         set up, or open the drive and repeat this command"
+    )]
+    Closed(#[source] io::Error),
+    /// Writing failed.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Copying failed.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// Written, but not seen again.
+    #[error(
+        "the firmware was written, but the bridge has not come back; unplug it and plug it in again, then `foilpress bridge \
+         list` shows it"
+    )]
+    NotBack,
+    /// Written, but something else runs.
+    #[error("firmware {expected} was written, but the bridge says it runs {found}; flash it again")]
+    OtherVersion {
+        /// What was written.
+        expected: String,
+        /// What runs.
+        found: String,
+    },
+}
+
+/// What flashing needs of the computer.
+pub trait Computer {
+    /// A way to a board in its boot loader.
+    type Board: Pipe;
+
+    /// The bridges that run.
+    fn bridges(&mut self) -> Vec<Candidate>;
+    /// How many boards are in their boot loader.
+    fn boards(&mut self) -> usize;
+    /// Opens the boot loader of the only board there.
+    fn open(&mut self) -> io::Result<Self::Board>;
+    /// The mounted drives of such boards.
+    fn drives(&mut self) -> Vec<PathBuf>;
+    /// Asks a bridge to go to its boot loader; tells its number.
+    fn enter(&mut self, bridge: &Candidate) -> Result<u64, FlashError>;
+    /// Who answers there, if somebody does.
+    fn greet(&mut self, candidate: &Candidate) -> Option<Bridge>;
+    /// Lets time pass.
+    fn wait(&mut self, time: Duration);
+}
+
+/// Puts `firmware`, read from `file`, onto the bridge at `to`, or onto the only board there is. Returns the bridge as it
+/// introduces itself afterwards.
+pub fn run(
+    firmware: &Firmware,
+    file: &[u8],
+    to: Option<&Address>,
+    computer: &mut impl Computer,
+    observer: &dyn Observer,
+) -> Result<Bridge, FlashError> {
+    let bridges = computer.bridges();
+    let waiting = computer.boards().max(computer.drives().len());
+    let number = match (to, waiting) {
+        (Some(_), 1..) => return Err(FlashError::AnotherBoard),
+        (None, 2..) => return Err(FlashError::SeveralBoards(waiting)),
+        (None, 1) => None,
+        (Some(address), 0) => {
+            let named = Candidate { serial_number: None, addresses: vec![address.clone()] };
+            Some(enter(&named, computer, observer)?)
+        }
+        (None, 0) => match &bridges[..] {
+            [] => return Err(FlashError::Nothing),
+            [only] => Some(enter(only, computer, observer)?),
+            several => {
+                let names = several.iter().map(|bridge| bridge.addresses[0].to_string()).collect();
+                return Err(FlashError::SeveralBridges(names));
+            }
+        },
+    };
+    write(firmware, file, computer, observer)?;
+    observer.note("waiting for the bridge to come back");
+    let known: Vec<u64> = bridges.iter().filter_map(Candidate::number).collect();
+    let expected = |found: u64| match number {
+        Some(number) => found == number,
+        None => !known.contains(&found),
+    };
+    let back = until(computer, BACK_PATIENCE, |computer| {
+        let mut bridges = computer.bridges();
+        // Other bridges are not to be disturbed.
+        bridges.retain(|bridge| bridge.number().is_none_or(&expected));
+        bridges.iter().filter_map(|bridge| computer.greet(bridge)).find(|bridge| expected(bridge.serial))
+    });
+    match back {
+        None => Err(FlashError::NotBack),
+        Some(bridge) if bridge.firmware != firmware.version() => {
+            Err(FlashError::OtherVersion { expected: firmware.version().to_owned(), found: bridge.firmware })
+        }
+        Some(bridge) => Ok(bridge),
+    }
+}
+
+/// Brings a bridge into its boot loader and waits until the board shows itself there; tells the bridge's number.
+fn enter(
+    bridge: &Candidate,
+    computer: &mut impl Computer,
+    observer: &dyn Observer,
+) -> Result<u64, FlashError> {
+    let number = computer.enter(bridge)?;
+    observer.note(&format!("bridge {number:016x} goes to its boot loader"));
+    let there = |computer: &mut _| (waiting_boards(computer) > 0).then_some(());
+    until(computer, LOADER_PATIENCE, there).ok_or(FlashError::NoLoader)?;
+    Ok(number)
+}
+
+fn waiting_boards(computer: &mut impl Computer) -> usize {
+    computer.boards().max(computer.drives().len())
+}
+
+fn write(
+    firmware: &Firmware,
+    file: &[u8],
+    computer: &mut impl Computer,
+    observer: &dyn Observer,
+) -> Result<(), FlashError> {
+    let closed = match computer.boards() {
+        // Where the USB library cannot even list the board its drive may still be there.
+        0 => io::Error::from(ErrorKind::NotFound),
+        1 => match computer.open() {
+            Ok(board) => return Ok(Picoboot::write(board, firmware.image(), observer)?),
+            Err(error) => error,
+        },
+        several => return Err(FlashError::SeveralBoards(several)),
+    };
+    match &until(computer, DRIVE_PATIENCE, |computer| {
+        Some(computer.drives()).filter(|found| !found.is_empty())
+    })
+    .unwrap_or_default()[..]
+    {
+        [] => Err(FlashError::Closed(closed)),
+        [drive] => {
+            observer.note(&format!(
+                "the boot loader cannot be opened ({closed}); using its drive, {}",
+                drive.display()
+            ));
+            Ok(drive::copy(drive, file, observer)?)
+        }
+        several => Err(FlashError::SeveralBoards(several.len())),
+    }
+}
+
+/// Looks again and again until something is found or `patience` is over.
+fn until<C: Computer, T>(
+    computer: &mut C,
+    patience: Duration,
+    mut look: impl FnMut(&mut C) -> Option<T>,
+) -> Option<T> {
+    let mut waited = Duration::ZERO;
+    loop {
+        if let Some(found) = look(computer) {
+            return Some(found);
+        }
+        if waited >= patience {
+            return None;
+        }
+        computer.wait(LOOK);
+        waited += LOOK;
+    }
+}
+
+/// The computer this program runs on.
+pub struct ThisComputer;
+
+impl Computer for ThisComputer {
+    type Board = Box<dyn Pipe>;
+
+    fn bridges(&mut self) -> Vec<Candidate> {
+        find::survey().bridges
+    }
+
+    fn boards(&mut self) -> usize {
+        usb::boards().map_or(0, |boards| boards.len())
+    }
+
+    fn open(&mut self) -> io::Result<Box<dyn Pipe>> {
+        let boards = usb::boards()?;
+        let board = boards.first().ok_or(ErrorKind::NotFound)?;
+        Ok(Box::new(usb::open(board)?))
+    }
+
+    fn drives(&mut self) -> Vec<PathBuf> {
+        drive::find()
+    }
+
+    fn enter(&mut self, bridge: &Candidate) -> Result<u64, FlashError> {
+        let (_, mut link) = bridge.open()?;
+        let mut query = Query::with_any(&mut *link, ANSWER_PATIENCE).map_err(FlashError::Enter)?;
+        let number = query.bridge().serial;
+        query.bootloader(ANSWER_PATIENCE).map(|()| number).map_err(|error| match error {
+            QueryError::JobOpen(job) => FlashError::Printing(job),
+            error => FlashError::Enter(error),
+        })
+    }
+
+    fn greet(&mut self, candidate: &Candidate) -> Option<Bridge> {
+        let (_, mut link) = candidate.open().ok()?;
+        let query = Query::with_any(&mut *link, ANSWER_PATIENCE).ok()?;
+        Some(query.bridge().clone())
+    }
+
+    fn wait(&mut self, time: Duration) {
+        std::thread::sleep(time);
+    }
+}

@@ -1,0 +1,98 @@
+//! Whether the cassettes a job wants are in the printer.
+//!
+//! Cassettes are known by their barcode; the carousel turns, so places mean nothing. What the printer says while it reports
+//! an error was true before the error, and decides nothing.
+
+use protocol::ink::Ink;
+
+use super::status::Status;
+
+/// What the printer says of the cassettes a job wants.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Found {
+    /// All are in and ready.
+    All,
+    /// Some are not.
+    Missing(Vec<Missing>),
+    /// The answer decides nothing: the printer reports an error.
+    Stale,
+}
+
+/// A cassette a job wants that is not ready.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Missing {
+    /// Its ink.
+    pub ink: Ink,
+    /// What is the matter, when it is in the machine: `backwards` or `end of ribbon`.
+    pub condition: Option<&'static str>,
+}
+
+/// Looks for the cassettes of these inks in the printer's answer.
+pub fn find(status: &Status, wanted: &[Ink]) -> Found {
+    if status.stale {
+        return Found::Stale;
+    }
+    let missing: Vec<Missing> = wanted
+        .iter()
+        .filter_map(|&ink| {
+            let mut its = status.cassettes.iter().filter(|cassette| cassette.barcode == ink.barcode());
+            if its.clone().any(|cassette| cassette.condition == "loaded") {
+                return None;
+            }
+            Some(Missing { ink, condition: its.next().map(|cassette| cassette.condition) })
+        })
+        .collect();
+    if missing.is_empty() { Found::All } else { Found::Missing(missing) }
+}
+
+impl std::fmt::Display for Missing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({}, barcode {})", self.ink.name(), self.ink.part(), self.ink.barcode())?;
+        match self.condition {
+            Some("backwards") => write!(f, ": it is in the wrong way round"),
+            Some(condition) => write!(f, ": {condition}"),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use press::simulate::{Carousel, Cassette, Condition, Lever, Printer, Trouble};
+
+    /// The answer comes from the simulated printer, whose cassettes stand in whatever places they were given.
+    fn printer(cassettes: &[Cassette]) -> Printer {
+        Printer::new(Carousel::new(cassettes).unwrap(), Lever::Auto)
+    }
+
+    fn ask(printer: &Printer, wanted: &[Ink]) -> Found {
+        find(&Status::read(&printer.status()).unwrap(), wanted)
+    }
+
+    #[test]
+    fn cassettes_are_found_by_barcode_in_any_place() {
+        let loaded = printer(&[Ink::Cyan.into(), Ink::White.into(), Ink::Black.into()]);
+        assert_eq!(ask(&loaded, &[Ink::White, Ink::Cyan]), Found::All);
+        let Found::Missing(missing) = ask(&loaded, &[Ink::White, Ink::MetallicGold]) else { panic!() };
+        assert_eq!(missing, [Missing { ink: Ink::MetallicGold, condition: None }]);
+        assert_eq!(missing[0].to_string(), "metallic-gold (MDC-METG, barcode 8)");
+    }
+
+    #[test]
+    fn a_cassette_that_cannot_print_counts_as_missing_and_says_why() {
+        let backwards = Cassette { condition: Condition::Backwards, ..Ink::White.into() };
+        let Found::Missing(missing) = ask(&printer(&[backwards]), &[Ink::White]) else { panic!() };
+        assert!(missing[0].to_string().contains("wrong way round"));
+        // Another of the same ink that is ready is enough.
+        assert_eq!(ask(&printer(&[backwards, Ink::White.into()]), &[Ink::White]), Found::All);
+    }
+
+    #[test]
+    fn nothing_is_decided_from_an_answer_with_an_error() {
+        let mut stopped = printer(&[Ink::White.into()]);
+        stopped.strike(Trouble::CoverOpen);
+        assert_eq!(ask(&stopped, &[Ink::White]), Found::Stale);
+        assert_eq!(ask(&stopped, &[Ink::Black]), Found::Stale);
+    }
+}

@@ -1,0 +1,150 @@
+//! Against a second model of the wiring: points and wires instead of bits.
+
+use super::*;
+use std::collections::BTreeSet;
+use std::convert::Infallible;
+
+/// A board, a cable and a plug as what they are: points, and wires between them. Output drivers are points 0 to 11, the
+/// plug's ends of their lines 12 to 23, the plug's ends of the inputs 24 to 28, the inputs 29 to 33, ground 34, supply 35.
+struct Wires(Vec<(usize, usize)>);
+
+const OUT: usize = 12;
+const BACK: usize = 24;
+const IN: usize = 29;
+const GROUND: usize = 34;
+const SUPPLY: usize = 35;
+
+impl Wires {
+    fn new() -> Wires {
+        let outputs = (0..12).map(|output| (output, OUT + output));
+        let inputs = (0..5).map(|input| (BACK + input, IN + input));
+        Wires(outputs.chain(inputs).collect())
+    }
+
+    fn with(fault: Fault) -> Wires {
+        let mut wires = Wires::new();
+        let swap = |wires: &mut Wires, a: usize, b: usize| {
+            let (at, to) = (wires.0[a].1, wires.0[b].1);
+            (wires.0[a].1, wires.0[b].1) = (to, at);
+        };
+        match fault {
+            // A low line has lost its driver and touches ground; a high one has lost its driver.
+            Fault::Output(output, high) => {
+                wires.0[output] = (if high { SUPPLY } else { GROUND }, OUT + output);
+            }
+            Fault::Input(input, high) => {
+                wires.0[12 + input] = (if high { SUPPLY } else { GROUND }, IN + input);
+            }
+            Fault::OutputsCrossed(a, b) => swap(&mut wires, a, b),
+            Fault::InputsCrossed(a, b) => swap(&mut wires, 12 + a, 12 + b),
+            Fault::OutputsTouch(a, b) => wires.0.push((OUT + a, OUT + b)),
+            Fault::InputsTouch(a, b) => wires.0.push((IN + a, IN + b)),
+            Fault::Touch(output, input) => wires.0.push((OUT + output, IN + input)),
+        }
+        wires
+    }
+
+    /// What the board reads: an input is low if anything low reaches it.
+    fn read(&self, plug: Option<Plug>, levels: Levels) -> Lines {
+        let plugged = plug.map(Plug::wires).into_iter().flat_map(|wires| wires.into_iter().zip(0..));
+        let mut wires = self.0.clone();
+        wires.extend(plugged.map(|(output, input): (usize, usize)| (OUT + output, BACK + input)));
+        let mut low: BTreeSet<usize> = (0..12).filter(|output| levels.0 >> output & 1 == 0).collect();
+        low.insert(GROUND);
+        loop {
+            let before = low.len();
+            for &(a, b) in &wires {
+                if a != SUPPLY && (low.contains(&a) || low.contains(&b)) {
+                    low.extend([a, b]);
+                }
+            }
+            if low.len() == before {
+                break;
+            }
+        }
+        let high = (0..5).filter(|input| !low.contains(&(IN + input)));
+        Lines(high.fold(Lines::POWER, |lines, input| lines | 1 << input))
+    }
+
+    fn seen(&self, plug: Plug) -> Seen {
+        let mut probe = |levels| Ok::<_, Infallible>(self.read(Some(plug), levels));
+        look(plug, &mut probe).unwrap()
+    }
+
+    fn judged(&self) -> Verdict {
+        judge(&Plug::ALL.map(|plug| self.seen(plug)))
+    }
+
+    fn found(&self, plug: Option<Plug>) -> Option<Plug> {
+        find(&mut |levels| Ok::<_, Infallible>(self.read(plug, levels))).unwrap()
+    }
+}
+
+#[test]
+fn good_wiring_is_called_good_in_every_position_and_no_plug_is_no_plug() {
+    let wires = Wires::new();
+    assert_eq!(wires.judged(), Verdict::Good);
+    assert_eq!(wires.found(None), None);
+    for plug in Plug::ALL {
+        assert_eq!(wires.found(Some(plug)), Some(plug));
+    }
+}
+
+#[test]
+fn every_single_fault_is_named_and_no_other() {
+    for fault in faults() {
+        let wires = Wires::with(fault);
+        assert_eq!(wires.judged(), Verdict::One(vec![fault]), "{fault}");
+    }
+}
+
+#[test]
+fn the_position_of_the_plug_is_found_whatever_single_fault_there_is() {
+    for fault in faults() {
+        let wires = Wires::with(fault);
+        assert_eq!(wires.found(None), None, "{fault}");
+        for plug in Plug::ALL {
+            assert_eq!(wires.found(Some(plug)), Some(plug), "{fault}");
+        }
+    }
+}
+
+#[test]
+fn every_line_is_tried_in_some_position() {
+    let tried: BTreeSet<usize> = Plug::ALL.iter().flat_map(|plug| plug.wires()).collect();
+    assert_eq!(tried.len(), OUTPUTS.len());
+}
+
+#[test]
+fn the_plug_is_found_without_a_strobe_or_a_reset() {
+    find(&mut |levels: Levels| {
+        assert_eq!(levels.control(), Levels::REST.control());
+        Ok::<_, Infallible>(Lines(0x1f))
+    })
+    .unwrap();
+}
+
+#[test]
+fn two_faults_at_once_name_the_lines_that_go_astray() {
+    let mut wires = Wires::with(Fault::OutputsCrossed(0, 1));
+    wires.0[12 + 4] = (GROUND, IN + 4);
+    let Verdict::Several(astray) = wires.judged() else { panic!("{:?}", wires.judged()) };
+    let first: Vec<_> = astray.iter().filter(|astray| astray.plug == Plug::First).collect();
+    let names: Vec<_> = first.iter().map(|astray| (astray.output.name, astray.found.clone())).collect();
+    assert_eq!(names, [("Data1", vec!["Busy"]), ("Data2", vec!["nAck"]), ("Data5", vec![])]);
+    assert_eq!(first[0].expected, Some("nAck"));
+}
+
+#[test]
+fn the_table_of_the_document_is_that_of_the_plug() {
+    let text = include_str!("../../../../../docs/wiring.md");
+    for (input, line) in INPUTS.iter().enumerate() {
+        let outputs = Plug::ALL.map(|plug| {
+            let output = OUTPUTS[plug.wires()[input]];
+            format!("{} ({} / {})", output.name, output.centronics, output.db25)
+        });
+        let row =
+            format!("| {} ({} / {}) | {} |", line.name, line.centronics, line.db25, outputs.join(" | "));
+        assert!(text.contains(&row), "docs/wiring.md does not have: {row}");
+    }
+}

@@ -1,0 +1,133 @@
+//! Inks side by side: the paper's figures 2 and 5, and every stack as a patch to measure.
+
+use inks::{Library, Stack};
+use protocol::ink::{Ink, Kind};
+use protocol::paper::Paper;
+
+use super::ChartError;
+use super::sketch::{LETTER, LINE, Sketch, mm};
+use crate::separate::MOST_CARTRIDGES;
+use crate::sheet::Piece;
+use observe::Observer;
+
+/// Scale of labels: letters 3.4 mm high.
+const LABEL: usize = 4;
+/// Shares along a ramp: finer than an eye sees.
+const STEPS: usize = 1024;
+
+/// The four gloss levels of figure 5, relative to the highest.
+pub const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
+/// The gloss of the two inks of figure 5.
+pub const INKS: [f64; 2] = [0.5, 0.1];
+
+/// What labels and checkerboards are printed in: black, unless the stacks fill all seven places without it.
+fn pen(stacks: &[&Stack]) -> Stack {
+    let mut inks: Vec<Ink> = stacks.iter().flat_map(|stack| stack.layers().iter().copied()).collect();
+    inks.sort_unstable();
+    inks.dedup();
+    let full = inks.len() >= MOST_CARTRIDGES && !inks.contains(&Ink::Black);
+    let pigment = |ink: &&Ink| matches!(ink.kind(), Kind::Metallic | Kind::Foil | Kind::Process);
+    let other = inks.iter().find(pigment).or(inks.first()).filter(|_| full);
+    Stack::new([other.copied().unwrap_or(Ink::Black)])
+}
+
+fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), ChartError> {
+    if a == b {
+        return Err(ChartError::Same { chart, stack: a.clone() });
+    }
+    Ok(())
+}
+
+/// Figure 2: all of `a` at the left, all of `b` at the right, 150 mm apart; below it a checkerboard to cut out and hold so
+/// that the ramp reflects it.
+pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) -> Result<Piece, ChartError> {
+    two("ramp", a, b)?;
+    let (width, strip) = (mm(150.0), mm(30.0));
+    let line = LINE * LABEL;
+    let head = line + mm(1.5);
+    let foot = head + strip + mm(1.0);
+    let board_top = foot + mm(2.0) + line + mm(10.0);
+    let square = mm(10.0);
+    let pen = pen(&[a, b]);
+    let mut sketch = Sketch::new(width, board_top + 6 * square);
+    sketch.text(0, 0, LABEL, &pen, &a.to_string());
+    sketch.text_to(width, 0, LABEL, &pen, &b.to_string());
+    let shares: Vec<f64> = (0..STEPS).map(|i| 1.0 - (i as f64 + 0.5) / STEPS as f64).collect();
+    sketch.halftone((0, head, width, strip), [a, b], &shares, library, observer)?;
+    for tenth in 0..=10 {
+        let x = (width - 6) * tenth / 10;
+        sketch.fill((x, foot, 6, if tenth % 5 == 0 { mm(3.0) } else { mm(1.5) }), &pen);
+    }
+    sketch.text(0, foot + mm(3.5), 3, &pen, "100 %");
+    sketch.text_to(width, foot + mm(3.5), 3, &pen, "0 %");
+    for row in 0..6 {
+        for column in (row % 2..width.div_ceil(square)).step_by(2) {
+            sketch.fill((column * square, board_top + row * square, square, square), &pen);
+        }
+    }
+    Ok(sketch.finish()?)
+}
+
+/// The share of the glossier ink that shows a gloss: clamped to the nearest ink, or with all levels brought between the inks
+/// so that their relative differences stay.
+pub fn ladder_shares(gloss: f64) -> [f64; 2] {
+    let [high, low] = INKS;
+    let clamped = ((gloss - low) / (high - low)).clamp(0.0, 1.0);
+    let least = GLOSS[GLOSS.len() - 1];
+    [clamped, (gloss - least) / (GLOSS[0] - least)]
+}
+
+/// Figure 5: four levels of gloss between a glossier stack and a duller one, clamped above, mapped below. Above, three of
+/// the four are the same.
+pub fn ladder(
+    glossy: &Stack,
+    dull: &Stack,
+    library: &Library,
+    observer: &dyn Observer,
+) -> Result<Piece, ChartError> {
+    two("ladder", glossy, dull)?;
+    let (patch, gap, line) = (mm(30.0), mm(4.0), LINE * LABEL);
+    let pen = pen(&[glossy, dull]);
+    let step = patch + gap;
+    let block = line + mm(1.0) + patch + mm(1.0) + line + mm(4.0);
+    let mut sketch = Sketch::new(4 * step - gap, 2 * block);
+    for (row, name) in ["clamped", "mapped"].into_iter().enumerate() {
+        let top = row * block;
+        sketch.text(0, top, LABEL, &pen, name);
+        for (column, gloss) in GLOSS.into_iter().enumerate() {
+            let place = (column * step, top + line + mm(1.0), patch, patch);
+            let share = ladder_shares(gloss)[row];
+            sketch.halftone(place, [glossy, dull], &[share], library, observer)?;
+            let label = format!("{:.0} %", 100.0 * gloss);
+            sketch.text(place.0, place.1 + patch + mm(1.0), LABEL, &pen, &label);
+        }
+    }
+    Ok(sketch.finish()?)
+}
+
+/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera.
+///
+/// Errors: more than the paper has room for.
+pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<Piece, ChartError> {
+    let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
+    let (patch, gap) = (mm(20.0), mm(4.0));
+    let cell = (patch + gap, patch + mm(1.0) + LINE * 3 + mm(3.0));
+    let columns = ((width + gap) / cell.0).max(1);
+    let most = columns * (length / cell.1);
+    let shown: Vec<&Stack> = stacks.iter().filter(|stack| !stack.layers().is_empty()).collect();
+    if shown.is_empty() || shown.len() > most {
+        return Err(ChartError::TooMany { what: "stacks", found: shown.len(), most });
+    }
+    let columns = columns.min(shown.len());
+    let pen = pen(&shown);
+    let mut sketch = Sketch::new(columns * cell.0 - gap, shown.len().div_ceil(columns) * cell.1);
+    for (i, stack) in shown.into_iter().enumerate() {
+        let (x, y) = (i % columns * cell.0, i / columns * cell.1);
+        sketch.fill((x, y, patch, patch), stack);
+        let label = stack.to_string();
+        // As large as the patch has room for.
+        let scale = (patch / (label.len() * LETTER)).clamp(1, 3);
+        sketch.text(x, y + patch + mm(1.0), scale, &pen, &label);
+    }
+    Ok(sketch.finish()?)
+}

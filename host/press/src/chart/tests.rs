@@ -1,0 +1,149 @@
+use super::*;
+use crate::layout::{Layout, Mm, Point, Profile, arrange};
+use crate::sheet::Piece;
+use inks::Library;
+use observe::Silent;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+
+fn stack(text: &str) -> Stack {
+    text.parse().unwrap()
+}
+
+/// Dots of each stack in a rectangle, by name.
+fn count(piece: &Piece, (x, y, width, length): (usize, usize, usize, usize), wanted: &str) -> usize {
+    let number = piece.stacks().iter().position(|s| *s == stack(wanted));
+    (y..y + length)
+        .map(|row| {
+            let row = &piece.index()[row * piece.width() + x..][..width];
+            row.iter().filter(|&&dot| Some(usize::from(dot)) == number).count()
+        })
+        .sum()
+}
+
+#[test]
+fn a_ramp_has_the_tone_of_its_place() {
+    let piece = ramp(&stack("MS"), &stack("MS+C"), &Library::builtin(), &Silent).unwrap();
+    let top = piece.index().chunks(piece.width()).position(|row| row.iter().all(|&dot| dot != 0)).unwrap();
+    let length = 30 * 600 / 25;
+    for tenth in 0..10 {
+        let width = piece.width() / 10;
+        let place = (tenth * width, top, width, length.min(700));
+        let share = count(&piece, place, "MS") as f64 / (width * length.min(700)) as f64;
+        let want = 0.95 - 0.1 * tenth as f64;
+        assert!((share - want).abs() < 0.01, "{tenth}: {share} {want}");
+    }
+    assert_eq!(count(&piece, (0, top, piece.width(), 700), "substrate"), 0);
+}
+
+#[test]
+fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
+    let piece = ladder(&stack("SF"), &stack("MS"), &Library::builtin(), &Silent).unwrap();
+    let (patch, gap) = (709, 94);
+    let share = |row: usize, column: usize| {
+        // In the middle of the patch, clear of its labels.
+        let block = piece.length() / 2;
+        let place = (column * (patch + gap), row * block + 80 + 24 + 2, patch, patch - 4);
+        count(&piece, place, "SF") as f64 / (patch * (patch - 4)) as f64
+    };
+    let clamped: Vec<f64> = (0..4).map(|column| share(0, column)).collect();
+    let mapped: Vec<f64> = (0..4).map(|column| share(1, column)).collect();
+    // Figure 5: inks of gloss 10 and 50 %; levels of 100, 80, 50, 10 %.
+    for (found, want) in clamped.iter().zip([1.0, 1.0, 1.0, 0.0]) {
+        assert!((found - want).abs() < 0.005, "{clamped:?}");
+    }
+    for (found, want) in mapped.iter().zip([1.0, 7.0 / 9.0, 4.0 / 9.0, 0.0]) {
+        assert!((found - want).abs() < 0.005, "{mapped:?}");
+    }
+}
+
+#[test]
+fn every_stack_has_a_patch_of_its_own_that_is_solid() {
+    let all: Vec<Stack> = ["substrate", "C", "K", "MS", "MS+C", "MS+C+F"].map(stack).to_vec();
+    let piece = stacks(&all, Paper::A4).unwrap();
+    for wanted in &all[1..] {
+        let number = piece.stacks().iter().position(|s| s == wanted).unwrap() as u8;
+        let dots = piece.index().iter().filter(|&&dot| dot == number).count();
+        // A patch of 20 x 20 mm; black also writes the labels.
+        assert!(
+            if wanted.to_string() == "K" { dots > 472 * 472 } else { dots == 472 * 472 },
+            "{wanted}: {dots}"
+        );
+    }
+    let many: Vec<Stack> = (1..200).map(|n| Stack::new(vec![Ink::White; n])).collect();
+    assert!(stacks(&many, Paper::A4).unwrap_err().to_string().contains("--inks"));
+}
+
+#[test]
+fn lines_of_a_vernier_meet_in_the_middle_and_a_dot_apart_for_each_line_from_it() {
+    let piece = registration(&[Ink::Black, Ink::White], Paper::A4).unwrap();
+    let row_of = |text: &str, from: usize| -> Vec<usize> {
+        let number = piece.stacks().iter().position(|s| *s == stack(text)).unwrap() as u8;
+        let row = &piece.index()[from * piece.width()..][..piece.width()];
+        (1..row.len()).filter(|&x| row[x] == number && row[x - 1] != number).collect()
+    };
+    // The first row that has 21 lines of white at each side; 10 rows above it the black ones.
+    let white = (0..piece.length()).find(|&y| row_of("W", y).len() == 42).unwrap();
+    let (other, first) = (row_of("W", white), row_of("K", white - 10));
+    assert_eq!(first.len(), 42);
+    for i in 0..42 {
+        assert_eq!(other[i] as i64 - first[i] as i64, (i % 21) as i64 - 10);
+    }
+    assert!(other[20] < piece.width() / 4 && other[21] > piece.width() / 4 * 3);
+    assert!(matches!(registration(&[Ink::Black], Paper::A4), Err(ChartError::OneInk)));
+    assert!(registration(&Ink::ALL, Paper::A4).is_err());
+}
+
+#[test]
+fn a_machine_that_is_measured_and_corrected_prints_the_crosses_where_they_belong() {
+    // The machine as it really is, and what a ruler finds on its calibration chart.
+    for real in
+        [Profile { offset_mm: [0.5, -0.8], feed: 1.004 }, Profile { offset_mm: [-1.0, 2.0], feed: 0.99 }]
+    {
+        let chart = calibration(Ink::Black, Paper::A4).unwrap();
+        let lands = |piece: &Piece, layout: &Layout| -> Vec<(f64, f64)> {
+            let sheet = arrange(piece, layout, &Silent).unwrap().sheet;
+            let width = sheet.width();
+            // Rows of ink 14 mm long are the level arms of the crosses.
+            let arm = 14 * 600 / 26;
+            let mut rows: Vec<usize> = Vec::new();
+            let mut column = 0;
+            for (y, row) in sheet.index().chunks(width).enumerate() {
+                if let Some(x) = (0..600).find(|&x| row[x..x + arm].iter().all(|&dot| dot != 0)) {
+                    rows.push(y);
+                    column = x;
+                }
+            }
+            let (upper, lower): (Vec<usize>, Vec<usize>) = rows.iter().partition(|&&y| y < 3000);
+            [upper, lower]
+                .iter()
+                .map(|rows| {
+                    let row = rows.iter().sum::<usize>() as f64 / rows.len() as f64 + 0.5;
+                    let x = 3.386667 + (column as f64) / 600.0 * 25.4 + 7.0 + real.offset_mm[0];
+                    (x, 12.022667 + real.offset_mm[1] + real.feed * row / 600.0 * 25.4)
+                })
+                .collect()
+        };
+        let uncorrected = Layout::centred(Paper::A4);
+        let seen = lands(&chart, &uncorrected);
+        let found =
+            calibration::profile(Point(Mm(seen[0].0), Mm(seen[0].1)), Some(Mm(seen[1].1 - seen[0].1)));
+        assert!((found.feed - real.feed).abs() < 3e-4, "{found:?}");
+        for (found, real) in found.offset_mm.iter().zip(real.offset_mm) {
+            assert!((found - real).abs() < 0.1, "{found:?} {real}");
+        }
+        let corrected = Layout { profile: found, cut: true, ..uncorrected };
+        let crosses = lands(&chart, &corrected);
+        for (cross, y) in crosses.iter().zip([30.0, 230.0]) {
+            assert!((cross.0 - 20.0).abs() < 0.1 && (cross.1 - y).abs() < 0.1, "{crosses:?}");
+        }
+    }
+}
+
+#[test]
+fn charts_refuse_what_shows_nothing() {
+    let library = Library::builtin();
+    assert!(matches!(ramp(&stack("C"), &stack("C"), &library, &Silent), Err(ChartError::Same { .. })));
+    let small = calibration(Ink::Black, Paper::Postcard).unwrap_err().to_string();
+    assert!(small.contains("postcard") && small.contains("a4"), "{small}");
+}

@@ -1,0 +1,427 @@
+//! The plan of a job, in numbers for programs and in words for the person who loads the cartridges.
+//!
+//! Dots and areas are counted; ribbon and time are estimates ([`ribbon`]) and say so wherever they are shown.
+
+use std::fmt::{self, Write as _};
+
+use inks::Library;
+use protocol::ink::{Ink, Kind};
+use protocol::paper::{LEFT, Paper};
+use protocol::rgl::Page;
+use serde::Serialize;
+
+use super::loading;
+use super::ribbon::{self, Use};
+use super::thin::thin;
+use crate::layout::{Cut, Laid, Mm, paper};
+use crate::preview::Area;
+use crate::separate::{Certainty, Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation, Severity};
+use crate::sheet::Sheet;
+use crate::sheet::colours::colours;
+
+/// Lines of foil thinner than this many dots (0.17 mm) may not stick: foil fails on screens finer than about 100 an inch,
+/// whose smaller dots are of this size.
+const FOIL_LINE: usize = 4;
+/// The share of foil in thinner lines that is worth a word: corners and rounding always have a little.
+const FOIL_SHARE: f64 = 0.01;
+
+/// What will be printed, from what, and what to think of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Plan {
+    /// Name of the document.
+    pub document: String,
+    /// Name of the paper.
+    pub paper: &'static str,
+    /// Width and length of the sheet of paper in millimetres.
+    pub sheet_mm: (f64, f64),
+    /// The printer's media type.
+    pub media: &'static str,
+    /// Whether the machine corrects the sheet's curl.
+    pub curl_correction: bool,
+    /// Width and height of one piece on paper in millimetres.
+    pub size_mm: (f64, f64),
+    /// The same in dots of 1/600 inch.
+    pub size_dots: (u16, u16),
+    /// Where the corner of the first piece lies in the printable area, in dots.
+    pub origin_dots: (u16, u16),
+    /// The same from the corner of the sheet of paper, in millimetres.
+    pub from_edge_mm: (f64, f64),
+    /// Columns and rows of pieces on the sheet.
+    pub pieces: (u16, u16),
+    /// What the layout cuts off.
+    pub cut: Option<Cut>,
+    /// The cartridges to load, in the order of first use.
+    pub cartridges: Vec<Cartridge>,
+    /// What to change on the way, when there are more than the machine holds.
+    pub changes: Vec<Change>,
+    /// The passes, first printed (lowest) first.
+    pub passes: Vec<Pass>,
+    /// Time in seconds, an estimate.
+    pub seconds_estimated: f64,
+    /// The stacks in use, most dots first; shares are of the pieces' dots.
+    pub stacks: Vec<Share>,
+    /// What the machine's rules say of the job.
+    pub checks: Vec<Check>,
+}
+
+/// A cartridge to load.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cartridge {
+    /// Name of the ink.
+    pub ink: &'static str,
+    /// What owners call it.
+    pub sold_as: String,
+    /// The vendor's part number.
+    pub part: &'static str,
+    /// The barcode on it.
+    pub barcode: u8,
+    /// The pass before which the machine fetches it for the first time, and stops to ask for it if it is not there.
+    pub first_pass: usize,
+    /// Ribbon it gives in all passes, in millimetres, an estimate.
+    pub ribbon_mm_estimated: f64,
+}
+
+/// A cartridge to change in the course of the job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Change {
+    /// The pass before which the machine stops and asks, from 1.
+    pub before_pass: usize,
+    /// The ink of the cartridge to take out.
+    pub take_out: &'static str,
+    /// The ink of the one to put in.
+    pub put_in: &'static str,
+}
+
+/// A pass.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pass {
+    /// Number, from 1.
+    pub number: usize,
+    /// Name of the ink.
+    pub ink: &'static str,
+    /// Dots with ink.
+    pub dots: u64,
+    /// Dots as a share of the pieces'.
+    pub share: f64,
+    /// Runs of the carriage, ribbon and time, estimates.
+    pub estimate: Use,
+}
+
+/// A stack and how much of the document it is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Share {
+    /// The stack, short names from the bottom.
+    pub stack: String,
+    /// The same in the words of the boxes.
+    pub words: String,
+    /// Its false colour in the separation picture, sRGB as `#rrggbb`.
+    pub colour: String,
+    /// Dots.
+    pub dots: u64,
+    /// Dots as a share of the pieces'.
+    pub share: f64,
+}
+
+/// What a plan is made from.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// Name of the document.
+    pub name: &'a str,
+    /// The page.
+    pub sheet: &'a Sheet,
+    /// Where things are on it.
+    pub laid: &'a Laid,
+    /// Its passes.
+    pub passes: &'a [Dots],
+    /// The passes in numbers and the cartridges.
+    pub planned: &'a [Planned],
+    /// What the rules say.
+    pub checks: &'a [Check],
+    /// How the page is declared to the printer.
+    pub page: &'a Page,
+}
+
+impl<'a> Subject<'a> {
+    /// A separated sheet.
+    pub fn new(
+        name: &'a str,
+        sheet: &'a Sheet,
+        laid: &'a Laid,
+        separation: &'a Separation,
+        page: &'a Page,
+    ) -> Subject<'a> {
+        let (planned, checks) = (&separation.plan.passes, &separation.checks);
+        Subject { name, sheet, laid, passes: &separation.passes, planned, checks, page }
+    }
+}
+
+impl Plan {
+    /// The plan of a page.
+    pub fn new(subject: &Subject<'_>, library: &Library) -> Plan {
+        let Subject { sheet, laid, .. } = *subject;
+        let paper = subject.page.paper;
+        let first = laid.pieces.first().copied().unwrap_or(laid.area);
+        let area: u64 = laid.pieces.iter().map(|piece| (piece.width * piece.length) as u64).sum();
+        let share = |dots: u64| dots as f64 / area.max(1) as f64;
+        let dpi = subject.page.resolution.dpi();
+        let passes: Vec<Pass> = (1..)
+            .zip(subject.planned.iter().zip(subject.passes))
+            .map(|(number, (planned, dots))| Pass {
+                number,
+                ink: planned.ink.name(),
+                dots: planned.dots,
+                share: share(planned.dots),
+                estimate: ribbon::of(&dots.plane, dpi),
+            })
+            .collect();
+        let mm = |dots: usize| Mm::of_dots(dots as i64).0;
+        // Sides of a sheet are u16.
+        let dots = |(a, b): (usize, usize)| (a as u16, b as u16);
+        Plan {
+            document: subject.name.into(),
+            paper: paper.name(),
+            sheet_mm: paper::sheet_mm(paper),
+            media: subject.page.media.name(),
+            curl_correction: subject.page.curl_correction,
+            size_mm: (mm(first.width), mm(first.length)),
+            size_dots: dots((first.width, first.length)),
+            origin_dots: dots((first.left, first.top)),
+            from_edge_mm: from_edge(paper, first),
+            pieces: laid.grid,
+            cut: laid.cut,
+            cartridges: cartridges(subject.planned, &passes, library),
+            changes: changes(subject.planned),
+            seconds_estimated: passes.iter().map(|pass| pass.estimate.seconds).sum(),
+            passes,
+            stacks: shares(sheet, laid, library),
+            checks: checks(subject),
+        }
+    }
+}
+
+/// From the corner of the paper to that of an area, in millimetres.
+fn from_edge(paper: Paper, area: Area) -> (f64, f64) {
+    (
+        Mm::of_dots(area.left as i64 + i64::from(LEFT)).0,
+        Mm::of_dots(area.top as i64 + i64::from(paper.top())).0,
+    )
+}
+
+fn cartridges(planned: &[Planned], passes: &[Pass], library: &Library) -> Vec<Cartridge> {
+    let mut inks: Vec<Ink> = Vec::new();
+    for pass in planned {
+        if !inks.contains(&pass.ink) {
+            inks.push(pass.ink);
+        }
+    }
+    let cartridge = |ink: Ink| {
+        let its = passes.iter().filter(|pass| pass.ink == ink.name());
+        Cartridge {
+            ink: ink.name(),
+            sold_as: library.cartridge(ink).map_or_else(|| ink.name().into(), |c| c.okidata.clone()),
+            part: ink.part(),
+            barcode: ink.barcode(),
+            first_pass: its.clone().next().map_or(1, |pass| pass.number),
+            ribbon_mm_estimated: its.map(|pass| pass.estimate.ribbon_mm).sum(),
+        }
+    };
+    inks.into_iter().map(cartridge).collect()
+}
+
+fn changes(planned: &[Planned]) -> Vec<Change> {
+    let inks: Vec<Ink> = planned.iter().map(|pass| pass.ink).collect();
+    let named = |change: loading::Change| Change {
+        before_pass: change.before_pass,
+        take_out: change.out.name(),
+        put_in: change.wanted.name(),
+    };
+    loading::loading(&inks).1.into_iter().map(named).collect()
+}
+
+/// The stacks on the pieces; what marks take stands in the passes only.
+fn shares(sheet: &Sheet, laid: &Laid, library: &Library) -> Vec<Share> {
+    let census = laid.census(sheet);
+    let area = census.iter().sum::<u64>().max(1);
+    let mut stacks: Vec<Share> = sheet
+        .stacks()
+        .iter()
+        .zip(census)
+        .zip(colours(sheet.stacks()))
+        .map(|((stack, dots), [r, g, b])| Share {
+            stack: stack.to_string(),
+            words: library.words(stack),
+            colour: format!("#{r:02x}{g:02x}{b:02x}"),
+            dots,
+            share: dots as f64 / area as f64,
+        })
+        .filter(|stack| stack.dots > 0)
+        .collect();
+    stacks.sort_by_key(|stack| std::cmp::Reverse(stack.dots));
+    stacks
+}
+
+/// The rules' checks and those that only the layout and the planes show, most severe first.
+fn checks(subject: &Subject<'_>) -> Vec<Check> {
+    let mut checks = subject.checks.to_vec();
+    let mut add = |rule: &str, severity, certainty, text| {
+        checks.push(Check { rule: rule.into(), severity, certainty, text, stacks: Vec::new() });
+    };
+    if let Some(cut) = &subject.laid.cut {
+        let text = format!("what lies beyond the printable area is cut off: {cut}");
+        add("cut", Severity::Warning, Certainty::Measured, text);
+    }
+    if subject.laid.marks_left_out > 0 {
+        let text = format!(
+            "{} marks had no room inside the printable area and are left out; move the print or leave it more room",
+            subject.laid.marks_left_out
+        );
+        add("marks", Severity::Note, Certainty::Measured, text);
+    }
+    let foils = subject.passes.iter().filter(|pass| pass.ink.kind() == Kind::Foil);
+    for (pass, (few, all)) in foils.map(|pass| (pass, thin(&pass.plane, FOIL_LINE))) {
+        let share = few as f64 / all.max(1) as f64;
+        if share > FOIL_SHARE {
+            let text = format!(
+                "{:.0} % of {} is in lines or dots thinner than {:.2} mm, which may not stick; make them thicker",
+                100.0 * share,
+                pass.ink.name(),
+                Mm::of_dots(FOIL_LINE as i64).0
+            );
+            add("foil-thin", Severity::Warning, Certainty::Vendor, text);
+        }
+    }
+    checks.sort_by_key(|check| std::cmp::Reverse(check.severity));
+    checks
+}
+
+impl Plan {
+    /// How the time was estimated, in a sentence for people.
+    pub const TIME_NOTE: &'static str = "an estimate: short passes were timed, full pages never were";
+    /// How the ribbon was estimated.
+    pub const RIBBON_NOTE: &'static str = "an estimate, rather too low: the ribbon runs from the first to the last dot of each band of 10 mm, however few dots";
+
+    /// Ribbon of all passes in millimetres, an estimate.
+    pub fn ribbon_mm(&self) -> f64 {
+        self.passes.iter().map(|pass| pass.estimate.ribbon_mm).sum()
+    }
+}
+
+impl Plan {
+    /// The cartridges to load before the first pass, and those that the machine has no place for then.
+    pub fn loaded(&self) -> (&[Cartridge], &[Cartridge]) {
+        self.cartridges.split_at(self.cartridges.len().min(MOST_CARTRIDGES))
+    }
+}
+
+impl fmt::Display for Cartridge {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:<22} {}, barcode {:<2}  wanted from pass {}",
+            self.sold_as, self.part, self.barcode, self.first_pass
+        )
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (width, height) = self.size_mm;
+        writeln!(
+            f,
+            "{}: {width:.1} x {height:.1} mm ({} x {} dots) on {}",
+            self.document, self.size_dots.0, self.size_dots.1, self.paper
+        )?;
+        let (columns, rows) = self.pieces;
+        if (columns, rows) != (1, 1) {
+            writeln!(f, "{columns} x {rows} times on the sheet")?;
+        }
+        writeln!(
+            f,
+            "its corner {:.1} mm from the left and {:.1} mm from the top edge of the sheet; media {}, curl correction {}",
+            self.from_edge_mm.0,
+            self.from_edge_mm.1,
+            self.media,
+            if self.curl_correction { "on" } else { "off" }
+        )?;
+        let (now, later) = self.loaded();
+        writeln!(f, "\nLoad {} cartridge{}:", now.len(), plural(now.len()))?;
+        now.iter().try_for_each(|cartridge| writeln!(f, "    {cartridge}"))?;
+        if !later.is_empty() {
+            writeln!(f, "The machine holds no more. These have no place:")?;
+            later.iter().try_for_each(|cartridge| writeln!(f, "    {cartridge}"))?;
+            writeln!(f, "It would stop in the middle of the sheet:")?;
+            for Change { before_pass, take_out, put_in } in &self.changes {
+                writeln!(f, "    before pass {before_pass}, to have {take_out} changed for {put_in}")?;
+            }
+        }
+        writeln!(
+            f,
+            "One that is not loaded: the machine stops before that pass, asks for it, and goes on when it is in."
+        )?;
+        writeln!(
+            f,
+            "\n{} pass{} over the sheet, in this order:",
+            self.passes.len(),
+            if self.passes.len() == 1 { "" } else { "es" }
+        )?;
+        for pass in &self.passes {
+            writeln!(
+                f,
+                "   {:>2}  {:<18} {:>13} dots  {:>5.1} %   ribbon ~{}",
+                pass.number,
+                pass.ink,
+                grouped(pass.dots),
+                100.0 * pass.share,
+                ribbon::length(pass.estimate.ribbon_mm)
+            )?;
+        }
+        writeln!(f, "Ribbon about {} in all ({}).", ribbon::length(self.ribbon_mm()), Plan::RIBBON_NOTE)?;
+        writeln!(f, "Time about {} ({}).", ribbon::duration(self.seconds_estimated), Plan::TIME_NOTE)?;
+        writeln!(f, "\nThe print's dots are:")?;
+        // Sorted, so that what would read 0.0 % stands together at the end.
+        let shown = self.stacks.partition_point(|stack| stack.share >= 0.0005);
+        for stack in &self.stacks[..shown] {
+            writeln!(f, "    {:>5.1} %  {:<12} {}", 100.0 * stack.share, stack.stack, stack.words)?;
+        }
+        let rest = &self.stacks[shown..];
+        if !rest.is_empty() {
+            let share: f64 = rest.iter().map(|stack| stack.share).sum();
+            writeln!(f, "    {:>5.1} %  {} other{}", 100.0 * share, rest.len(), plural(rest.len()))?;
+        }
+        if !self.checks.is_empty() {
+            writeln!(f, "\nBefore you print:")?;
+            for check in &self.checks {
+                writeln!(f, "    {check}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+/// A number with its thousands apart.
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(' ');
+        }
+        // Writing to a string does not fail.
+        let _ = write!(text, "{digit}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::grouped;
+
+    #[test]
+    fn thousands_stand_apart() {
+        assert_eq!(["0", "999", "1 000", "30 585 600"], [0, 999, 1000, 30_585_600].map(grouped)[..]);
+    }
+}

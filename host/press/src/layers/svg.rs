@@ -1,0 +1,204 @@
+//! SVG drawings: layers named after inks, or one picture.
+//!
+//! Problem: a drawing program knows layers, which SVG writes as groups with a label or an identifier.
+//! Method: the drawing is rendered at its final number of dots without anti-aliasing. Groups that are Inkscape's layers
+//! are named by their label, others by their identifier; each topmost group that names an ink is rendered by itself. A
+//! drawing without such groups is one picture, whose edges are exact, so reserved colours need no guessing.
+//! Cost: four bytes a dot while a layer is rendered. Limits: opacity, clips and filters of groups around a layer do not
+//! reach into it; animation is not run.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{self, fontdb, roxmltree};
+
+use super::colour::{self, Pixels};
+use super::raster::{self, Gather, Scan, Unstated, wrong};
+use super::{Artwork, LayersError, Options, names};
+use observe::Observer;
+
+/// The most bytes of a drawing.
+const MOST_BYTES: u64 = 1 << 28;
+
+/// Units of a drawing without units in an inch.
+const UNITS: f64 = 96.0;
+
+/// Whether a file begins as a drawing does.
+pub(super) fn is_svg(start: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(start);
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    text.starts_with("<svg") || text.starts_with('<') && text.contains("<svg")
+}
+
+/// A group that is a layer of ink.
+struct Group {
+    label: String,
+    id: String,
+    named: names::Named,
+}
+
+/// Reads a drawing.
+pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
+    let reading = raster::io(path, "read it");
+    if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
+        return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
+    }
+    let text = std::fs::read_to_string(path).map_err(&reading)?;
+    let mut notes = Vec::new();
+    let (text, groups) = groups(path, text, &mut notes)?;
+    let mut usual = usvg::Options {
+        resources_dir: path.parent().map(Path::to_path_buf),
+        shape_rendering: usvg::ShapeRendering::CrispEdges,
+        text_rendering: usvg::TextRendering::OptimizeSpeed,
+        ..usvg::Options::default()
+    };
+    if text.contains("<text") {
+        load_fonts(path, Arc::make_mut(&mut usual.fontdb))?;
+        notes.push(format!(
+            "{}: text is drawn with this computer's fonts; turn it into paths to have it as designed",
+            path.display()
+        ));
+    }
+    let tree =
+        usvg::Tree::from_str(&text, &usual).map_err(|error| wrong(path, format!("no drawing: {error}")))?;
+    let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
+    let dots =
+        raster::dots(path, size, Some((UNITS, UNITS)), Unstated::IsDots, &options.sized(), &mut notes)?;
+    let scale = Transform::from_scale((dots.0 as f64 / size.0) as f32, (dots.1 as f64 / size.1) as f32);
+    let canvas =
+        || Pixmap::new(dots.0 as u32, dots.1 as u32).ok_or_else(|| wrong(path, "the drawing is too large"));
+    let (width, height) = (dots.0 as u32, dots.1 as u32);
+
+    if groups.is_empty() {
+        let mut pixmap = canvas()?;
+        resvg::render(&tree, scale, &mut pixmap.as_mut());
+        let rgba = straight(pixmap);
+        let pixels = Pixels { path: path.to_path_buf(), width, height, density: None, rgba, notes };
+        return Ok(colour::artwork_of(&super::stem(path), pixels, dots, options));
+    }
+    observer.begin("rendering layers", groups.len() as u64);
+    let mut art = Artwork::blank(&super::stem(path), dots);
+    for group in groups {
+        let mut pixmap = canvas()?;
+        match tree.node_by_id(&group.id) {
+            Some(usvg::Node::Group(node)) => {
+                // The renderer moves a group into the corner and forgets what lies around it: both are undone.
+                let around = node.transform().invert().map(|own| node.abs_transform().pre_concat(own));
+                let corner = node.abs_layer_bounding_box();
+                let place =
+                    scale.pre_concat(around.unwrap_or_default()).pre_translate(corner.x(), corner.y());
+                let node = usvg::Node::Group(node.clone());
+                resvg::render_node(&node, place, &mut pixmap.as_mut());
+            }
+            _ => {
+                notes.push(format!(
+                    "{}: layer `{}` is hidden or empty: left out",
+                    path.display(),
+                    group.label
+                ));
+                continue;
+            }
+        }
+        let rgba = straight(pixmap);
+        let mut gather = Gather::new(rgba.len() / 4, true);
+        gather.row(&rgba, 4);
+        let (coverage, by) = gather.finish();
+        let scan = Scan { path: path.to_path_buf(), width, height, density: None, coverage, by };
+        art.add(scan, &group.label, group.named, false, options);
+        observer.advance(1);
+    }
+    observer.end();
+    art.notes.append(&mut notes);
+    Ok(art)
+}
+
+/// This computer's fonts. The renderer leaves out text of a family that is not there, unless the usual one is: so there must
+/// be a usual one.
+fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersError> {
+    fonts.load_system_fonts();
+    let usual = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
+    if fonts.query(&usual).is_some() {
+        return Ok(());
+    }
+    // A face that is neither bold nor slanted reads best in place of any other; of several always the same.
+    let plain = |face: &fontdb::FaceInfo| {
+        face.style == fontdb::Style::Normal && face.weight == fontdb::Weight::NORMAL && !face.monospaced
+    };
+    let named = |face: &fontdb::FaceInfo| Some((!plain(face), face.families.first()?.0.clone()));
+    match fonts.faces().filter_map(named).min() {
+        Some((_, family)) => {
+            fonts.set_serif_family(family);
+            Ok(())
+        }
+        None => Err(wrong(path, "it has text, and this computer has no fonts; turn the text into paths")),
+    }
+}
+
+/// The topmost groups that name an ink, and the drawing with an identifier on each of them.
+fn groups(path: &Path, text: String, notes: &mut Vec<String>) -> Result<(String, Vec<Group>), LayersError> {
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
+    let document = roxmltree::Document::parse_with_options(&text, options)
+        .map_err(|error| wrong(path, format!("no drawing: {error}")))?;
+    let mut found = Vec::new();
+    let mut missing = Vec::new();
+    let mut others = Vec::new();
+    // Depth is bounded by the parser's own limit on nesting; this walk keeps its own stack anyway.
+    let mut waiting: Vec<roxmltree::Node> = document.root_element().children().collect();
+    waiting.reverse();
+    while let Some(node) = waiting.pop() {
+        if node.tag_name().name() != "g" {
+            continue;
+        }
+        let own = |name: &str| node.attributes().find(|a| a.name() == name).map(|a| a.value());
+        let layer = own("groupmode") == Some("layer");
+        let label = own("label").or(own("data-name")).or(node.attribute("id")).unwrap_or_default();
+        match names::ink(label) {
+            Some(named) => {
+                let id = match node.attribute("id") {
+                    Some(id) => id.to_owned(),
+                    None => {
+                        let id = format!("foilpress-layer-{}", found.len());
+                        missing.push((node.range().start, id.clone()));
+                        id
+                    }
+                };
+                found.push(Group { label: label.to_owned(), id, named });
+            }
+            None => {
+                if layer {
+                    others.push(label.to_owned());
+                }
+                let children: Vec<_> = node.children().collect();
+                waiting.extend(children.into_iter().rev());
+            }
+        }
+    }
+    if !found.is_empty() {
+        for other in others {
+            super::named_part(path, &other, "layer", notes)?;
+        }
+    }
+    let mut text = text;
+    for (start, id) in missing.into_iter().rev() {
+        // After the tag's name, which ends at the first blank, slash or bracket.
+        if let Some(end) = text[start..].find(|c: char| c.is_whitespace() || c == '>' || c == '/') {
+            text.insert_str(start + end, &format!(" id=\"{id}\""));
+        }
+    }
+    Ok((text, found))
+}
+
+/// Straight alpha from the renderer's premultiplied.
+fn straight(pixmap: Pixmap) -> Vec<u8> {
+    let mut rgba = pixmap.take();
+    for pixel in rgba.as_chunks_mut::<4>().0 {
+        let alpha = u32::from(pixel[3]);
+        if alpha != 0 && alpha != 255 {
+            for v in &mut pixel[..3] {
+                *v = ((u32::from(*v) * 255 + alpha / 2) / alpha).min(255) as u8;
+            }
+        }
+    }
+    rgba
+}

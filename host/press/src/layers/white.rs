@@ -1,0 +1,191 @@
+//! Where white goes when the art does not draw it.
+//!
+//! Problem: on anything but white paper transparent inks need white beneath them, and what "beneath the art" means
+//! depends on the art: an eye's white may be pure white, a hole may be meant.
+//! Method: [`White`] names the ways owners use. A silhouette is everything that cannot be reached from outside the art
+//! through dots on which nothing is drawn, up, down, left and right: runs of such dots in each row are joined to
+//! those they touch in the next (union-find), and what is joined to the border is outside.
+//! Cost: a scan of the bits and a few bytes a run. Limits: a silhouette leaks through an outline that is not closed.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::bits;
+use crate::separate::Plane;
+
+/// Where white is laid beneath the art.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum White {
+    /// No white at all, not even where the art draws it.
+    None,
+    /// Under every dot of every ink.
+    Under,
+    /// Where the picture has the vendor's reserved white, 230,230,230.
+    Reserved,
+    /// Where the picture is neither pure white nor transparent.
+    Opaque,
+    /// Everything inside the outline, holes and the whites of eyes too.
+    Silhouette,
+    /// Where the picture is not transparent, pure white too.
+    Alpha,
+}
+
+impl fmt::Display for White {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            White::None => "none",
+            White::Under => "under",
+            White::Reserved => "reserved",
+            White::Opaque => "opaque",
+            White::Silhouette => "silhouette",
+            White::Alpha => "alpha",
+        })
+    }
+}
+
+/// A stretch of a row on which nothing is drawn.
+struct Run {
+    from: usize,
+    to: usize,
+    /// Another run of the same region; its own number at the region's root.
+    parent: u32,
+}
+
+/// Root of a region, with the way to it halved.
+fn root(runs: &mut [Run], mut at: u32) -> u32 {
+    while runs[at as usize].parent != at {
+        let up = runs[runs[at as usize].parent as usize].parent;
+        runs[at as usize].parent = up;
+        at = up;
+    }
+    at
+}
+
+/// The plane with everything inside its outlines filled.
+pub(super) fn silhouette(drawn: &Plane) -> Plane {
+    let (width, length) = (drawn.width, drawn.length);
+    // Run 0 is outside.
+    let mut runs = vec![Run { from: 0, to: 0, parent: 0 }];
+    let mut rows = Vec::with_capacity(length + 1);
+    for y in 0..length {
+        rows.push(runs.len());
+        let row = &drawn.bits[y * drawn.stride..][..drawn.stride];
+        let mut x = 0;
+        while x < width {
+            // Eight drawn dots at a time, and eight undrawn ones below.
+            if x.is_multiple_of(8) && row[x / 8] == 0xff {
+                x += 8;
+                continue;
+            }
+            if row[x / 8] & 0x80 >> (x % 8) != 0 {
+                x += 1;
+                continue;
+            }
+            let from = x;
+            while x < width {
+                if x.is_multiple_of(8) && row[x / 8] == 0 {
+                    x += 8;
+                } else if row[x / 8] & 0x80 >> (x % 8) == 0 {
+                    x += 1;
+                } else {
+                    break;
+                }
+            }
+            let to = x.min(width);
+            let number = runs.len() as u32;
+            let border = y == 0 || y + 1 == length || from == 0 || to == width;
+            runs.push(Run { from, to, parent: if border { 0 } else { number } });
+        }
+    }
+    rows.push(runs.len());
+    for y in 1..length {
+        let (mut a, mut b) = (rows[y - 1], rows[y]);
+        while a < rows[y] && b < rows[y + 1] {
+            if runs[a].from < runs[b].to && runs[b].from < runs[a].to {
+                let (p, q) = (root(&mut runs, a as u32), root(&mut runs, b as u32));
+                runs[p.max(q) as usize].parent = p.min(q);
+            }
+            if runs[a].to < runs[b].to { a += 1 } else { b += 1 }
+        }
+    }
+    let mut filled = bits::full(width, length);
+    for y in 0..length {
+        for run in rows[y]..rows[y + 1] {
+            if root(&mut runs, run as u32) == 0 {
+                clear(&mut filled.bits[y * drawn.stride..][..drawn.stride], runs[run].from, runs[run].to);
+            }
+        }
+    }
+    filled
+}
+
+fn clear(row: &mut [u8], from: usize, to: usize) {
+    let mut x = from;
+    while x < to {
+        if x.is_multiple_of(8) && x + 8 <= to {
+            row[x / 8] = 0;
+            x += 8;
+        } else {
+            row[x / 8] &= !(0x80 >> (x % 8));
+            x += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn plane(width: usize, rows: &[&str]) -> Plane {
+        bits::from_bytes(width, rows.concat().as_bytes(), |byte| byte == b'#')
+    }
+
+    /// By walking from the border step by step.
+    fn flooded(drawn: &Plane) -> Vec<bool> {
+        let (width, length) = (drawn.width, drawn.length);
+        let mut outside = vec![false; width * length];
+        let mut stack: Vec<(usize, usize)> = (0..length)
+            .flat_map(|y| (0..width).map(move |x| (x, y)))
+            .filter(|&(x, y)| x == 0 || y == 0 || x + 1 == width || y + 1 == length)
+            .collect();
+        while let Some((x, y)) = stack.pop() {
+            if outside[y * width + x] || bits::at(drawn, x, y) {
+                continue;
+            }
+            outside[y * width + x] = true;
+            let steps = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+            stack.extend(steps.into_iter().filter(|&(x, y)| x < width && y < length));
+        }
+        outside
+    }
+
+    #[test]
+    fn the_white_of_an_eye_is_inside_and_a_gap_in_the_outline_leaks() {
+        let eye = plane(7, &[".......", ".#####.", ".#...#.", ".#.#.#.", ".#...#.", ".#####.", "......."]);
+        let filled = silhouette(&eye);
+        assert!((2..5).all(|y| (1..6).all(|x| bits::at(&filled, x, y))) && filled.dots() == 25);
+        let open = plane(7, &[".......", ".##.##.", ".#...#.", ".#.#.#.", ".#...#.", ".#####.", "......."]);
+        assert_eq!(silhouette(&open), open);
+        // Outlines hold at corners: the walk outside takes no diagonal steps.
+        let diamond = plane(5, &["..#..", ".#.#.", "#...#", ".#.#.", "..#.."]);
+        assert_eq!(silhouette(&diamond).dots(), 13);
+    }
+
+    proptest! {
+        #[test]
+        fn what_cannot_be_reached_from_the_border_is_filled(
+            width in 1usize..70, length in 1usize..40, seed: u32, dense in 20u32..80
+        ) {
+            let random = |i: usize| (i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11;
+            let bytes: Vec<u8> = (0..width * length).map(|i| u8::from(random(i) % 100 < dense)).collect();
+            let drawn = bits::from_bytes(width, &bytes, |byte| byte == 1);
+            let (filled, outside) = (silhouette(&drawn), flooded(&drawn));
+            for (dot, outside) in outside.into_iter().enumerate() {
+                prop_assert_eq!(bits::at(&filled, dot % width, dot / width), !outside, "dot {}", dot);
+            }
+        }
+    }
+}

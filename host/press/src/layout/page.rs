@@ -1,0 +1,95 @@
+//! The ideal page, row by row as a machine that is a little off must be sent it.
+
+use rayon::prelude::*;
+
+use super::Layout;
+use super::block::{Block, Rect};
+use super::marks::Mark;
+use crate::preview::Area;
+use crate::sheet::Piece;
+use observe::Observer;
+
+/// The ideal page.
+pub(super) struct Page<'a> {
+    pub piece: &'a Piece,
+    pub layout: &'a Layout,
+    pub block: &'a Block,
+    pub marks: &'a [(Mark, u8)],
+}
+
+impl Page<'_> {
+    /// The dots of the sheet, row by row as they are sent.
+    pub fn render(&self, observer: &dyn Observer) -> Vec<u8> {
+        let (width, length) = (usize::from(self.layout.paper.width()), self.layout.paper.length());
+        observer.begin("layout", length.into());
+        let mut index = vec![0; width * usize::from(length)];
+        index.par_chunks_exact_mut(width).enumerate().for_each(|(sent, row)| {
+            self.row(self.layout.profile.lands_on(sent as i64), row);
+            observer.advance(1);
+        });
+        observer.end();
+        index
+    }
+
+    /// The row of the ideal page at `y`, as it must be sent.
+    fn row(&self, y: i64, row: &mut [u8]) {
+        if !(self.block.room.top..self.block.room.bottom).contains(&y) {
+            return;
+        }
+        let offset = self.layout.profile.offset().0;
+        let fits = |left: i64, right: i64| (left.max(self.block.room.left), right.min(self.block.room.right));
+        if let Some(&(top, _)) = self.block.rows.iter().find(|(top, bottom)| (*top..*bottom).contains(&y)) {
+            // Within the piece, by the line above.
+            let start = (y - top) as usize * self.piece.width();
+            let dots = &self.piece.index()[start..start + self.piece.width()];
+            for &(left, right) in &self.block.columns {
+                let (from, to) = fits(left, right);
+                if from >= to {
+                    continue;
+                }
+                // The room lies within what the offset leaves of the row.
+                let target = &mut row[(from - offset) as usize..(to - offset) as usize];
+                if self.layout.mirror {
+                    let source = &dots[(right - to) as usize..(right - from) as usize];
+                    target.iter_mut().zip(source.iter().rev()).for_each(|(dot, &source)| *dot = source);
+                } else {
+                    target.copy_from_slice(&dots[(from - left) as usize..(to - left) as usize]);
+                }
+            }
+        }
+        for (mark, stack) in self.marks {
+            if !(mark.place.top..mark.place.bottom).contains(&y) {
+                continue;
+            }
+            let (from, to) = fits(mark.place.left, mark.place.right);
+            for x in (from..to).filter(|&x| mark.covers(x, y)) {
+                row[(x - offset) as usize] = *stack;
+            }
+        }
+    }
+
+    /// A rectangle within the room, in dots of the sheet.
+    pub fn area(&self, place: Rect) -> Option<Area> {
+        if place.width() <= 0 || place.length() <= 0 {
+            return None;
+        }
+        let offset = self.layout.profile.offset().0;
+        let sent = i64::from(self.layout.paper.length());
+        // Rows land in order, so the first and the last are found by halving.
+        let first_at = |y: i64| {
+            let (mut low, mut high) = (0, sent);
+            while low < high {
+                let middle = (low + high) / 2;
+                if self.layout.profile.lands_on(middle) < y { low = middle + 1 } else { high = middle }
+            }
+            low
+        };
+        let (top, bottom) = (first_at(place.top), first_at(place.bottom));
+        (top < bottom).then(|| Area {
+            left: (place.left - offset) as usize,
+            top: top as usize,
+            width: place.width() as usize,
+            length: (bottom - top) as usize,
+        })
+    }
+}

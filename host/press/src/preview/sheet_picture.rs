@@ -1,0 +1,217 @@
+//! The target beside the simulated print, under several lights: `sheet.png`.
+//!
+//! A column for each light and three rows: target, print, and a close-up of the print's dots where they are most
+//! varied. One exposure, chosen from the target, serves every panel, so that what differs between the rows differs
+//! on paper.
+
+use image::RgbImage;
+
+use crate::sheet::Sheet;
+use observe::Observer;
+
+use super::canvas::{Canvas, FAINT, INK, Letters};
+use super::tone::Exposure;
+use super::{Area, Light, PreviewError, Radiance, Source, check_size, flat};
+
+/// The lights of the usual picture: over the middle, beside it, and low enough to show the body colour alone.
+pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
+    ("light at the eye", Light::Point([0.0, 0.0, 1.3])),
+    ("light from the left", Light::Point([-0.3, 0.2, 1.1])),
+    ("light from the right", Light::Point([0.3, -0.15, 1.1])),
+    ("raking light", Light::Point([0.0, 2.1, 1.4])),
+];
+
+const GAP: usize = 16;
+
+/// Pixels a dot is wide in the close-up.
+const MAGNIFIED: usize = 5;
+
+/// Places across and down that are looked at for the close-up.
+const PLACES: usize = 24;
+
+/// Lays target and print out under each of `lights`, panels of `longest` pixels on their longer side in the
+/// print's proportions. `title` heads the picture, `notes` stand below it, a line each.
+///
+/// # Errors
+/// As [`flat()`]; also when the whole would be larger than [`super::LONGEST_SIDE`].
+pub fn sheet_picture(
+    target: &Source,
+    print: &Source,
+    lights: &[(&str, Light)],
+    longest: usize,
+    title: &str,
+    notes: &[String],
+    observer: &dyn Observer,
+) -> Result<RgbImage, PreviewError> {
+    check_size(longest, longest)?;
+    let (width, height) = print.fit(longest);
+    let only: Vec<Light> = lights.iter().map(|l| l.1).collect();
+    let mut rows = vec![
+        ("target", flat(target, &only, width, height, observer)?),
+        ("print, simulated", flat(print, &only, width, height, observer)?),
+    ];
+    if let Some(panels) = close_up(print, &only, width, height, observer)? {
+        rows.push(("the print's dots", panels));
+    }
+    let exposure = Exposure::of(&rows[0].1);
+
+    let head = GAP + Letters::Title.height() + GAP;
+    let label = Letters::Plain.height() + 6;
+    let foot = notes.len() * (Letters::Small.height() + 3) + GAP;
+    let wide = GAP + lights.len().max(1) * (width + GAP);
+    let mut canvas = Canvas::new(wide, head + rows.len() * (label + height + GAP) + foot)?;
+    canvas.text(GAP, GAP, Letters::Title, INK, title);
+    for (r, (name, panels)) in rows.iter().enumerate() {
+        let top = head + r * (label + height + GAP);
+        for (i, (panel, (light, _))) in panels.iter().zip(lights).enumerate() {
+            let left = GAP + i * (width + GAP);
+            let room = width / Letters::Plain.width();
+            let words = if i == 0 { format!("{name} · {light}") } else { (*light).to_string() };
+            canvas.text(left, top, Letters::Plain, INK, &shortened(&words, room));
+            canvas.paste(left, top + label, panel, exposure);
+        }
+    }
+    let below = head + rows.len() * (label + height + GAP);
+    for (i, note) in notes.iter().enumerate() {
+        canvas.text(GAP, below + i * (Letters::Small.height() + 3), Letters::Small, FAINT, note);
+    }
+    Ok(canvas.finish())
+}
+
+/// The dots of a sheet, [`MAGNIFIED`] times, as `width` x `height` pixels under each of `lights`. Sources without
+/// dots, and sheets too small for a close-up to show anything new, have none.
+fn close_up(
+    print: &Source,
+    lights: &[Light],
+    width: usize,
+    height: usize,
+    observer: &dyn Observer,
+) -> Result<Option<Vec<Radiance>>, PreviewError> {
+    let &Source::Print { sheet, space, stacks, area } = print else { return Ok(None) };
+    let (across, down) = (width / MAGNIFIED, height / MAGNIFIED);
+    if across == 0 || down == 0 || area.width < 2 * across || area.length < 2 * down {
+        return Ok(None);
+    }
+    let part = most_varied(sheet, area, across, down);
+    let longest = area.width.max(area.length) as f64;
+    let x = ((part.left - area.left) as f64 + 0.5 * (across as f64 - area.width as f64)) / longest;
+    let y = (0.5 * (area.length as f64 - down as f64) - (part.top - area.top) as f64) / longest;
+    // So small a part sees every light in one direction, as bright as there.
+    let near: Vec<Light> = lights.iter().map(|light| Light::Far(light.direction(x, y))).collect();
+    let mut panels =
+        flat(&Source::Print { sheet, space, stacks, area: part }, &near, width, height, observer)?;
+    for ((panel, light), near) in panels.iter_mut().zip(lights).zip(&near) {
+        let gain = (light.at(x, y).1 / near.at(0.0, 0.0).1) as f32;
+        panel.pixels.iter_mut().for_each(|p| (0..3).for_each(|c| p[c] *= gain));
+    }
+    Ok(Some(panels))
+}
+
+/// The part of `width` x `length` dots whose stacks have the greatest entropy among evenly spread places.
+fn most_varied(sheet: &Sheet, area: Area, width: usize, length: usize) -> Area {
+    let mut best = (f64::NEG_INFINITY, area);
+    let mut counts = vec![0u32; sheet.stacks().len()];
+    for place in 0..PLACES * PLACES {
+        let left = area.left + (area.width - width) * (place % PLACES) / (PLACES - 1);
+        let top = area.top + (area.length - length) * (place / PLACES) / (PLACES - 1);
+        counts.fill(0);
+        for row in top..top + length {
+            for &dot in &sheet.index()[row * sheet.width() + left..][..width] {
+                counts[usize::from(dot)] += 1;
+            }
+        }
+        let share = |&n: &u32| f64::from(n) / (width * length) as f64;
+        let entropy: f64 = counts.iter().map(share).filter(|s| *s > 0.0).map(|s| -s * s.ln()).sum();
+        if entropy > best.0 {
+            best = (entropy, Area { left, top, width, length });
+        }
+    }
+    best.1
+}
+
+/// The text, cut to `room` letters.
+pub(super) fn shortened(text: &str, room: usize) -> String {
+    if text.chars().count() <= room {
+        return text.to_string();
+    }
+    text.chars().take(room.saturating_sub(2)).chain("..".chars()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::preview::Area;
+    use crate::sheet::Sheet;
+    use appearance::brdf::{Space, Table};
+    use inks::Stack;
+    use observe::Silent;
+    use protocol::paper::Paper;
+
+    #[test]
+    fn the_same_sheet_twice_gives_the_same_row_twice() {
+        let space = Space::half_angle(8);
+        let stacks = vec![Stack::SUBSTRATE, "MS".parse().unwrap()];
+        let index = (0..60 * 40).map(|i| u8::from(i % 60 > 30)).collect();
+        let sheet = Sheet::new(Paper::Custom { width: 60, length: 40 }, stacks, index).unwrap();
+        let mut rows = Table::new(space.columns());
+        rows.push(&vec![0.27; space.columns()]);
+        rows.push(&vec![0.05; space.columns()]);
+        let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area: Area::whole(&sheet) };
+        let notes = ["a note".to_string()];
+        let picture =
+            sheet_picture(&print, &print, &STANDARD_LIGHTS, 60, "a sheet", &notes, &Silent).unwrap();
+        assert_eq!(picture.width() as usize, GAP + 4 * (60 + GAP));
+        let first = (2 * GAP + Letters::Title.height() + Letters::Plain.height() + 6) as u32;
+        let step = (Letters::Plain.height() + 6 + 40 + GAP) as u32;
+        let mut seen = std::collections::BTreeSet::new();
+        for y in first..first + 40 {
+            for x in GAP as u32..picture.width() - GAP as u32 {
+                assert_eq!(picture.get_pixel(x, y), picture.get_pixel(x, y + step), "({x}, {y})");
+                seen.insert(picture.get_pixel(x, y).0);
+            }
+        }
+        assert!(seen.len() > 10, "only {} colours", seen.len());
+    }
+
+    #[test]
+    fn the_close_up_is_taken_where_stacks_meet() {
+        let stacks = vec![Stack::SUBSTRATE, "MS".parse().unwrap(), "C".parse().unwrap()];
+        // Bare, but for a patch of three stacks around (70, 50).
+        let index = (0..200 * 100).map(|i| (i % 200, i / 200)).map(|(x, y): (i32, i32)| {
+            if (x - 70).abs() < 9 && (y - 50).abs() < 9 { ((x + y) % 3) as u8 } else { 0 }
+        });
+        let paper = Paper::Custom { width: 200, length: 100 };
+        let sheet = Sheet::new(paper, stacks, index.collect()).unwrap();
+        let area = Area { left: 10, top: 10, width: 180, length: 80 };
+        let part = most_varied(&sheet, area, 20, 16);
+        assert!(part.left.abs_diff(60) < 8 && part.top.abs_diff(42) < 8, "{part:?}");
+        assert_eq!((part.width, part.length), (20, 16));
+    }
+
+    /// A uniform sheet looks the same through the magnifier as without it.
+    #[test]
+    fn the_close_up_is_lit_like_the_place_it_is_taken_from() {
+        let space = Space::half_angle(32);
+        let paper = Paper::Custom { width: 300, length: 200 };
+        let sheet = Sheet::new(paper, vec![Stack::SUBSTRATE], vec![0; 300 * 200]).unwrap();
+        let mut rows = Table::new(space.columns());
+        rows.push(&space.row(&inks::Curve::sampled(space.angles(), |t| [0.2 + inks::ggx::lobe(t, 0.3); 3])));
+        let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area: Area::whole(&sheet) };
+        let lights = STANDARD_LIGHTS.map(|l| l.1);
+        let (width, height) = (150, 100);
+        let panels = close_up(&print, &lights, width, height, &Silent).unwrap().unwrap();
+        let whole = flat(&print, &lights, 300, 200, &Silent).unwrap();
+        // All places are equally varied, so the first is taken: 30 x 20 dots at the top left.
+        for (panel, whole) in panels.iter().zip(&whole) {
+            let (found, expected) =
+                (panel.pixels[height / 2 * width + width / 2][0], whole.pixels[10 * 300 + 15][0]);
+            assert!((found / expected - 1.0).abs() < 0.02, "{found}, not {expected}");
+        }
+    }
+
+    #[test]
+    fn words_that_do_not_fit_are_cut() {
+        assert_eq!(shortened("light from the left", 8), "light ..");
+        assert_eq!(shortened("short", 8), "short");
+    }
+}

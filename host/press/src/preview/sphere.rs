@@ -1,0 +1,464 @@
+//! A material as a ball, seen from far away, under one far light or under a light probe.
+//!
+//! Geometry: the eye looks along -z from infinity, the ball fills the picture, x is right, y is up; the normal at
+//! (x, y) is (x, y, sqrt(1 - x^2 - y^2)).
+//! One light: `f(theta_h) cos_i`, averaged over [`SUBSAMPLES`]^2 places of a pixel. Light at the eye gives
+//! theta_h = asin r: the curve itself.
+//! Probe: the sum over texels of `f(theta_h) cos_i L dOmega` is linear in the curve, so each pixel's light is
+//! gathered once, as the weight of every sample of the curve, and all materials are that row times their own.
+//! Texels are a quadtree; a node stands for its texels where the curve and the cosine cannot change much over it.
+//! Cost: a pass over some hundreds of nodes for each pixel, whatever the number of materials.
+//! Limits: highlights narrower than a texel show the texels; 128 rows serve the sharpest foil.
+
+use inks::Curve;
+use rayon::prelude::*;
+
+use appearance::brdf::{Space, Table};
+use observe::Observer;
+
+use super::flat::bracket;
+use super::probe::{Probe, direction};
+use super::{PreviewError, Radiance, check_size};
+
+/// Places along each axis of a pixel at which coverage, and light from one direction, are taken.
+pub const SUBSAMPLES: usize = 4;
+
+/// A node is taken whole when its half vectors stay within this share of their angle to the normal. Tested to
+/// keep every pixel within 1 % of the sum over single texels, for the sharpest foil and for paper.
+const OPENING: f32 = 0.12;
+
+/// Sine of the reach of the largest nodes that may straddle the horizon of a normal.
+const HORIZON: f32 = 0.1;
+
+/// Steps of the table from the chord between normal and half vector to a place among the curve's angles.
+const STEPS: usize = 8192;
+
+/// A ball of `curve` under light from far away in direction `light` (any length), irradiance 1 where the surface
+/// faces it, as a `size` x `size` picture.
+pub fn under_light(curve: &Curve, light: [f64; 3], size: usize) -> Result<Radiance, PreviewError> {
+    check_size(size, size)?;
+    let length = light.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if !(length.is_finite() && length > 1e-9) {
+        return Err(PreviewError::Light { light: 0, problem: "its direction must be finite and not zero" });
+    }
+    let l = light.map(|v| v / length);
+    let h = half(l);
+    let mut pixels = vec![[0.0f32; 4]; size * size];
+    pixels.par_chunks_exact_mut(size).enumerate().for_each(|(y, row)| {
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let mut sum = [0.0; 4];
+            subsamples(size, x, y, |nx, ny| {
+                let n = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()];
+                let cos_i = dot(n, l).max(0.0);
+                // asin of the half chord: exact where the cosine has no digits left.
+                let theta = 2.0 * (0.5 * distance(n, h)).min(1.0).asin();
+                let f = curve.at(theta);
+                (0..3).for_each(|c| sum[c] += f[c] * cos_i);
+                sum[3] += 1.0;
+            });
+            *pixel = sum.map(|s| (s / (SUBSAMPLES * SUBSAMPLES) as f64) as f32);
+        }
+    });
+    Ok(Radiance { width: size, height: size, pixels })
+}
+
+/// Balls of `rows` (reflectance in the half-angle space `space`), each by itself under `probe`.
+pub fn under_probe(
+    space: &Space,
+    rows: &Table,
+    probe: &Probe,
+    size: usize,
+    observer: &dyn Observer,
+) -> Result<Vec<Radiance>, PreviewError> {
+    check_size(size, size)?;
+    let angles = space.angles();
+    if angles.is_empty() {
+        return Err(PreviewError::NoAngles { columns: space.columns() });
+    }
+    if rows.columns() != space.columns() {
+        return Err(PreviewError::Shape {
+            what: "columns of the materials' reflectance",
+            expected: space.columns(),
+            found: rows.columns(),
+        });
+    }
+    if rows.is_empty() {
+        return Ok(Vec::new());
+    }
+    observer.begin("lighting material balls", size as u64);
+    let tree = Tree::new(probe);
+    let places = Places::new(angles);
+    let columns = space.columns();
+    let lines: Vec<Vec<[f32; 4]>> = (0..size)
+        .into_par_iter()
+        .map_init(
+            || vec![0.0f64; columns],
+            |light, y| {
+                let mut line = vec![[0.0f32; 4]; size * rows.len()];
+                for x in 0..size {
+                    let (mut nx, mut ny, mut count) = (0.0, 0.0, 0);
+                    subsamples(size, x, y, |sx, sy| {
+                        nx += sx;
+                        ny += sy;
+                        count += 1;
+                    });
+                    if count == 0 {
+                        continue;
+                    }
+                    let (nx, ny) = (nx / f64::from(count), ny / f64::from(count));
+                    let n = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()];
+                    light.fill(0.0);
+                    tree.gather(n.map(|v| v as f32), &places, OPENING, light);
+                    let covered = f64::from(count) / (SUBSAMPLES * SUBSAMPLES) as f64;
+                    for (row, line) in rows.rows().zip(line.chunks_exact_mut(size)) {
+                        let mut sum = [0.0; 3];
+                        for (light, f) in light.chunks_exact(3).zip(row.chunks_exact(3)) {
+                            (0..3).for_each(|c| sum[c] += light[c] * f[c]);
+                        }
+                        let [r, g, b] = sum.map(|s| (s * covered) as f32);
+                        line[x] = [r, g, b, covered as f32];
+                    }
+                }
+                observer.advance(1);
+                line
+            },
+        )
+        .collect();
+    observer.end();
+    let ball = |i: usize| Radiance {
+        width: size,
+        height: size,
+        pixels: lines.iter().flat_map(|line| line[i * size..][..size].iter().copied()).collect(),
+    };
+    Ok((0..rows.len()).map(ball).collect())
+}
+
+/// Calls `inside` with every sub-sample of pixel (x, y) that lies on the ball.
+fn subsamples(size: usize, x: usize, y: usize, mut inside: impl FnMut(f64, f64)) {
+    let at =
+        |i: usize, j: usize| ((i * SUBSAMPLES + j) as f64 + 0.5) / (size * SUBSAMPLES) as f64 * 2.0 - 1.0;
+    for j in 0..SUBSAMPLES {
+        for i in 0..SUBSAMPLES {
+            let (nx, ny) = (at(x, i), -at(y, j));
+            if nx * nx + ny * ny < 1.0 {
+                inside(nx, ny);
+            }
+        }
+    }
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    dot(d, d).sqrt()
+}
+
+/// The half vector of a unit direction and the eye; any normal across the view for light from straight behind.
+fn half(l: [f64; 3]) -> [f64; 3] {
+    let h = [l[0], l[1], l[2] + 1.0];
+    let length = dot(h, h).sqrt();
+    if length < 1e-6 { [1.0, 0.0, 0.0] } else { h.map(|v| v / length) }
+}
+
+/// From the chord between normal and half vector to a fractional place among the curve's angles.
+struct Places {
+    table: Vec<f32>,
+}
+
+impl Places {
+    fn new(angles: &[f64]) -> Places {
+        // Chord / sqrt 2 = sqrt(1 - cos theta_h): even steps of it are dense where curves are steep.
+        let place = |step: usize| {
+            let chord = std::f64::consts::SQRT_2 * step as f64 / STEPS as f64;
+            let (i, _, s) = bracket(angles, 2.0 * (0.5 * chord).min(1.0).asin());
+            (i as f64 + s) as f32
+        };
+        Places { table: (0..=STEPS).map(place).collect() }
+    }
+
+    /// The sample below and how far it is to the next; the next exists wherever that is above 0.
+    fn at(&self, chord: f32) -> (usize, f32) {
+        let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
+        let (k, s) = (step as usize, step.fract());
+        let place = self.table[k] + s * (self.table[k + 1] - self.table[k]);
+        (place as usize, place.fract())
+    }
+}
+
+/// Texels of a probe and groups of them.
+struct Node {
+    /// Unit direction of the light, weighted by radiance.
+    towards: [f32; 3],
+    /// Its half vector with the eye.
+    half: [f32; 3],
+    /// Sum of radiance times solid angle.
+    light: [f32; 3],
+    /// Greatest sine of the angle between `towards` and the node's corners.
+    reach: f32,
+    /// Greatest distance between `half` and the half vectors at the corners; 0 for single texels.
+    spread: f32,
+    /// The node after this one's descendants.
+    next: u32,
+}
+
+/// A quadtree of nodes, each followed by its descendants.
+struct Tree {
+    nodes: Vec<Node>,
+}
+
+impl Tree {
+    fn new(probe: &Probe) -> Tree {
+        let mut tree = Tree { nodes: Vec::with_capacity(probe.rgb().len() * 4 / 3 + 64) };
+        tree.add(probe, [0, probe.width()], [0, probe.height()]);
+        tree
+    }
+
+    /// Adds the texels of columns `x` and rows `y` (start, end) and everything below; recursion halves the
+    /// longer side each time, so its depth is the logarithm of the number of texels.
+    fn add(&mut self, probe: &Probe, x: [usize; 2], y: [usize; 2]) {
+        let (mut light, mut mean, mut total) = ([0.0f64; 3], [0.0f64; 3], 0.0);
+        for row in y[0]..y[1] {
+            let omega = probe.solid_angle(row);
+            for column in x[0]..x[1] {
+                let texel = probe.rgb()[row * probe.width() + column].map(f64::from);
+                let d = probe.direction(column, row);
+                // Black texels count a little: a dark node still needs a direction.
+                let weight = omega * (texel.iter().sum::<f64>() + 1e-9);
+                total += weight;
+                for c in 0..3 {
+                    light[c] += omega * texel[c];
+                    mean[c] += weight * d[c];
+                }
+            }
+        }
+        let single = x[1] - x[0] == 1 && y[1] - y[0] == 1;
+        let length = dot(mean, mean).sqrt();
+        // Directions that cancel leave none; such a node is always opened, so any will do.
+        let scattered = length < 0.3 * total;
+        let towards = if length > 1e-12 * total { mean.map(|v| v / length) } else { [0.0, 1.0, 0.0] };
+        let h = half(towards);
+        let (mut reach, mut spread) = (0.0f64, 0.0f64);
+        if !single {
+            for j in 0..=4 {
+                for i in 0..=4 {
+                    let part = |r: [usize; 2], k: usize, n: usize| {
+                        (r[0] as f64 + (r[1] - r[0]) as f64 * k as f64 / 4.0) / n as f64
+                    };
+                    let d = direction(part(x, i, probe.width()), part(y, j, probe.height()));
+                    reach = reach.max(distance(d, towards));
+                    spread = spread.max(distance(half(d), h));
+                }
+            }
+            if scattered {
+                (reach, spread) = (2.0, 2.0);
+            }
+        }
+        let here = self.nodes.len();
+        self.nodes.push(Node {
+            towards: towards.map(|v| v as f32),
+            half: h.map(|v| v as f32),
+            light: light.map(|v| v as f32),
+            reach: reach as f32,
+            spread: spread as f32,
+            next: 0,
+        });
+        if !single {
+            let middle = |r: [usize; 2]| r[0] + (r[1] - r[0]) / 2;
+            if x[1] - x[0] >= y[1] - y[0] {
+                let m = middle(x);
+                self.add(probe, [x[0], m], y);
+                self.add(probe, [m, x[1]], y);
+            } else {
+                let m = middle(y);
+                self.add(probe, x, [y[0], m]);
+                self.add(probe, x, [m, y[1]]);
+            }
+        }
+        self.nodes[here].next = self.nodes.len() as u32;
+    }
+
+    /// Adds the light on normal `n` to the samples of a curve, `light[3 * sample + channel]`.
+    fn gather(&self, n: [f32; 3], places: &Places, opening: f32, light: &mut [f64]) {
+        let mut i = 0;
+        while let Some(node) = self.nodes.get(i) {
+            let cos_i = n[0] * node.towards[0] + n[1] * node.towards[1] + n[2] * node.towards[2];
+            if cos_i <= -node.reach {
+                i = node.next as usize;
+                continue;
+            }
+            let d = [n[0] - node.half[0], n[1] - node.half[1], n[2] - node.half[2]];
+            let chord = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+            // Across the horizon the cosine has a kink, which only small nodes may straddle.
+            let horizon = cos_i > node.reach || node.reach < HORIZON;
+            if node.spread > 0.0 && !(horizon && node.spread <= opening * chord) {
+                i += 1;
+                continue;
+            }
+            if cos_i > 0.0 {
+                let (k, s) = places.at(chord);
+                let near = f64::from(cos_i * (1.0 - s));
+                let far = f64::from(cos_i * s);
+                for c in 0..3 {
+                    light[3 * k + c] += near * f64::from(node.light[c]);
+                }
+                if far > 0.0 {
+                    for c in 0..3 {
+                        light[3 * k + 3 + c] += far * f64::from(node.light[c]);
+                    }
+                }
+            }
+            i = node.next as usize;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use observe::Silent;
+    use std::f64::consts::PI;
+
+    fn lobe(diffuse: f64, f0: f64, alpha: f64) -> impl Fn(f64) -> [f64; 3] {
+        move |t| {
+            let specular = f0 * inks::ggx::lobe(t, alpha);
+            [diffuse / PI + specular, 0.8 * diffuse / PI + specular, 0.3 * diffuse / PI + 0.7 * specular]
+        }
+    }
+
+    fn table(space: &Space, curves: &[&dyn Fn(f64) -> [f64; 3]]) -> Table {
+        let mut rows = Table::new(space.columns());
+        curves.iter().for_each(|f| rows.push(&space.row(&Curve::sampled(space.angles(), f))));
+        rows
+    }
+
+    /// `f(asin r) cos(asin r)`, averaged over a pixel by a much finer rule than the renderer's.
+    #[test]
+    fn a_ball_lit_from_the_eye_shows_its_curve() {
+        let (size, fine) = (48, 24);
+        let f = lobe(0.3, 0.5, 0.3);
+        let grid: Vec<f64> = (0..=2000).map(|i| PI / 2.0 * f64::from(i) / 2000.0).collect();
+        let ball = under_light(&Curve::sampled(&grid, &f), [0.0, 0.0, 3.0], size).unwrap();
+        for (i, pixel) in ball.pixels.iter().enumerate().filter(|(_, p)| p[3] == 1.0) {
+            let mut expected = 0.0;
+            for k in 0..fine * fine {
+                let at = |p: usize, s: usize| {
+                    (p as f64 + (s as f64 + 0.5) / fine as f64) / size as f64 * 2.0 - 1.0
+                };
+                let r = at(i % size, k % fine).hypot(at(i / size, k / fine)).min(1.0);
+                expected += f(r.asin())[0] * r.asin().cos() / (fine * fine) as f64;
+            }
+            let found = f64::from(pixel[0]);
+            // At the rim the curve's own slope has no bound; 0.001 is a hundredth of what the ball reflects there.
+            assert!(
+                (found - expected).abs() < 0.001 + 0.005 * expected,
+                "pixel {i}: {found}, not {expected}"
+            );
+        }
+    }
+
+    /// The mean of `cos theta` over the disc is 2/3.
+    #[test]
+    fn a_lambertian_ball_lit_from_the_eye_reflects_two_thirds() {
+        let white = Curve::sampled(&[0.0, PI / 2.0], |_| [1.0 / PI; 3]);
+        let ball = under_light(&white, [0.0, 0.0, 1.0], 200).unwrap();
+        let sum = |c: usize| ball.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>();
+        assert!((sum(0) / sum(3) * PI - 2.0 / 3.0).abs() < 1e-4);
+        assert!((sum(3) / 40_000.0 - PI / 4.0).abs() < 1e-3, "coverage of the disc");
+    }
+
+    #[test]
+    fn the_highlight_lies_where_the_normal_halves_light_and_eye() {
+        let size = 201;
+        let shiny = Curve::sampled(
+            &(0..400).map(|i| f64::from(i) * 0.0039).collect::<Vec<_>>(),
+            lobe(0.0, 0.8, 0.05),
+        );
+        // 60 degrees to the upper left: the half vector is 30 degrees off the eye, at r = 1/2.
+        let (side, front) = (60f64.to_radians().sin() / 2f64.sqrt(), 60f64.to_radians().cos());
+        let ball = under_light(&shiny, [-side, side, front], size).unwrap();
+        let (at, _) = ball.pixels.iter().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0])).unwrap();
+        let (x, y) = (at % size, at / size);
+        let expected = 100.0 - 100.5 * 0.5 / 2f64.sqrt();
+        assert!((x as f64 - expected).abs() <= 1.0 && (y as f64 - expected).abs() <= 1.0, "({x}, {y})");
+    }
+
+    #[test]
+    fn a_lambertian_in_a_furnace_reflects_its_albedo() {
+        let space = Space::half_angle(16);
+        let rows = table(&space, &[&|_| [0.5 / PI, 0.2 / PI, 1.0 / PI]]);
+        let ball = &under_probe(&space, &rows, &Probe::constant(2.0), 24, &Silent).unwrap()[0];
+        for p in ball.pixels.iter().filter(|p| p[3] == 1.0) {
+            for (found, albedo) in p.iter().zip([0.5, 0.2, 1.0]) {
+                assert!((found / (2.0 * albedo) - 1.0).abs() < 5e-3, "{found} for {albedo}");
+            }
+        }
+    }
+
+    /// The reflection integral texel by texel, with arc cosines and the curve itself.
+    fn texel_by_texel(curve: &Curve, probe: &Probe, n: [f64; 3]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for y in 0..probe.height() {
+            for x in 0..probe.width() {
+                let l = probe.direction(x, y);
+                let cos_i = dot(n, l);
+                if cos_i <= 0.0 {
+                    continue;
+                }
+                let h = [l[0], l[1], l[2] + 1.0];
+                let f = curve.at((dot(n, h) / dot(h, h).sqrt()).clamp(-1.0, 1.0).acos());
+                let light = probe.rgb()[y * probe.width() + x];
+                (0..3).for_each(|c| sum[c] += f[c] * cos_i * f64::from(light[c]) * probe.solid_angle(y));
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn groups_of_texels_light_a_ball_like_the_texels_themselves() {
+        let size = 23;
+        let space = Space::half_angle(32);
+        let rows = table(&space, &[&lobe(0.01, 0.9, 0.045), &lobe(0.1, 0.5, 0.27), &lobe(0.8, 0.04, 0.28)]);
+        let probe = Probe::studio(64);
+        let balls = under_probe(&space, &rows, &probe, size, &Silent).unwrap();
+        for (ball, row) in balls.iter().zip(rows.rows()) {
+            let curve = space.curve(row);
+            for (i, p) in ball.pixels.iter().enumerate().filter(|(_, p)| p[3] == 1.0) {
+                let at = |k: usize| (k as f64 + 0.5) / size as f64 * 2.0 - 1.0;
+                let (nx, ny) = (at(i % size), -at(i / size));
+                let expected = texel_by_texel(&curve, &probe, [nx, ny, (1.0 - nx * nx - ny * ny).sqrt()]);
+                for c in 0..3 {
+                    let relative = f64::from(p[c]) / expected[c] - 1.0;
+                    assert!(relative.abs() < 0.01, "pixel {i}: {} is {} of it too much", p[c], relative);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn balls_do_not_depend_on_the_number_of_threads() {
+        let space = Space::half_angle(8);
+        let rows = table(&space, &[&lobe(0.2, 0.3, 0.1), &lobe(0.7, 0.04, 0.3)]);
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| under_probe(&space, &rows, &Probe::studio(16), 20, &Silent).unwrap())
+        };
+        assert_eq!(with(1), with(3));
+    }
+
+    #[test]
+    fn other_tabulations_and_rows_are_refused() {
+        let bare = Space::tabulated(&[1.0], &[1.0]).unwrap();
+        let error = under_probe(&bare, &Table::new(3), &Probe::constant(1.0), 8, &Silent).unwrap_err();
+        assert!(matches!(error, PreviewError::NoAngles { columns: 3 }), "{error}");
+        let space = Space::half_angle(4);
+        let error = under_probe(&space, &Table::new(3), &Probe::constant(1.0), 8, &Silent).unwrap_err();
+        assert!(matches!(error, PreviewError::Shape { expected: 12, found: 3, .. }), "{error}");
+        assert!(matches!(
+            under_light(&Curve::sampled(&[0.0], |_| [1.0; 3]), [0.0, f64::NAN, 1.0], 8),
+            Err(PreviewError::Light { .. })
+        ));
+    }
+}

@@ -1,0 +1,95 @@
+//! Named values on the command line for enums of the library crates, which know no command line.
+
+use appearance::document::ColourSpace;
+use appearance::factor::Method;
+use appearance::gamut::Intent;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use press::layers::{Accept, Finish, White};
+
+/// An enum whose values have names on the command line.
+pub trait Choice: Copy + Send + Sync + 'static {
+    /// Each value with its name and a line of help, which may be empty.
+    const ALL: &'static [(Self, &'static str, &'static str)];
+}
+
+/// Reads a value by its name. Help and completion list the names.
+pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
+    let names = T::ALL.iter().map(|(_, name, help)| {
+        let name = PossibleValue::new(name);
+        if help.is_empty() { name } else { name.help(help) }
+    });
+    PossibleValuesParser::new(names).try_map(|name| {
+        T::ALL.iter().find(|(_, known, _)| *known == name).map(|(value, ..)| *value).ok_or("unknown name")
+    })
+}
+
+impl Choice for ColourSpace {
+    const ALL: &'static [(ColourSpace, &'static str, &'static str)] = &[
+        (ColourSpace::Srgb, "srgb", "The transfer curve of IEC 61966-2-1"),
+        (ColourSpace::Linear, "linear", "Proportional to reflectance"),
+    ];
+}
+
+impl Choice for Method {
+    const ALL: &'static [(Method, &'static str, &'static str)] = &[
+        (
+            Method::Archetypes,
+            "archetypes",
+            "Corners of the document, fitted in the metric; prints best and reproduces the document nearly as well as any",
+        ),
+        (
+            Method::Kmeans,
+            "kmeans",
+            "The paper's convex-hull k-means: real materials, robust, but inside the corners",
+        ),
+        (
+            Method::Sacls,
+            "sacls",
+            "The paper's sparse alternating constrained least squares: bases may be far from any real material",
+        ),
+    ];
+}
+
+impl Choice for Intent {
+    const ALL: &'static [(Intent, &'static str, &'static str)] = &[
+        (
+            Intent::Auto,
+            "auto",
+            "Clamp, unless that merges more than 1 % of pairs of materials that differ; then blend",
+        ),
+        (Intent::Basis, "basis", "Map the bases and keep the weights: relative differences survive"),
+        (
+            Intent::Clamp,
+            "clamp",
+            "Map each pixel by itself: lowest error, but differences outside the gamut are lost",
+        ),
+        (Intent::Blend, "blend", "Clamp where the result is near, use the mapped bases where it is not"),
+    ];
+}
+
+impl Choice for White {
+    const ALL: &'static [(White, &'static str, &'static str)] = &[
+        (White::None, "none", "No white at all, not even where the art draws it"),
+        (White::Under, "under", "Under every dot of every ink"),
+        (White::Reserved, "reserved", "Where the picture has the vendor's reserved white, 230,230,230"),
+        (White::Opaque, "opaque", "Where the picture is neither pure white nor transparent"),
+        (White::Silhouette, "silhouette", "Everything inside the outline, including holes"),
+        (White::Alpha, "alpha", "Where the picture is not transparent, including pure white"),
+    ];
+}
+
+impl Choice for Finish {
+    const ALL: &'static [(Finish, &'static str, &'static str)] = &[
+        (Finish::Artwork, "artwork", "On everything that is drawn"),
+        (Finish::All, "all", "On the whole rectangle of the artwork"),
+        (Finish::None, "none", "Nowhere, not even where the artwork draws it"),
+    ];
+}
+
+impl Choice for Accept {
+    const ALL: &'static [(Accept, &'static str, &'static str)] = &[
+        (Accept::FoilUndercoat, "foil-undercoat", "Solid cyan, magenta, yellow and black beneath every foil"),
+        (Accept::EvenWhite, "even-white", "Primer, finish, primer between black and the white on it"),
+        (Accept::WhiteThrice, "white-thrice", "Three layers of white where there is one"),
+    ];
+}

@@ -1,0 +1,234 @@
+//! From the art of a page to a job: inks as the user chose them, the place on the sheet, passes, bytes.
+
+use std::io::Write;
+
+use inks::{InkSet, Library};
+use protocol::ink::{Ink, Kind};
+use protocol::paper::{LEFT, Paper};
+use protocol::rgl::Page;
+
+use super::{FilterError, io_error};
+use crate::queue::options::{Choices, Spots};
+use crate::queue::ppd;
+use observe::Observer;
+use press::layers::{self, Artwork, Window};
+use press::layout::{self, Cut, Layout, Mm, Point, Position};
+use press::pipeline;
+use press::separate::{self, Severity};
+
+/// What makes jobs of pages.
+pub(super) struct Press<'a> {
+    pub choices: &'a Choices,
+    pub library: &'a Library,
+    pub out: &'a mut dyn Write,
+    pub observer: &'a dyn Observer,
+    /// Jobs written.
+    pub jobs: usize,
+}
+
+impl Press<'_> {
+    /// Writes a job; one of no bytes is none.
+    pub(super) fn write(&mut self, job: &[u8]) -> Result<(), FilterError> {
+        if !job.is_empty() {
+            self.out.write_all(job).map_err(io_error("write the job"))?;
+            self.jobs += 1;
+        }
+        Ok(())
+    }
+
+    /// How a page is read, drawn at so many pixels an inch.
+    pub(super) fn options(&self, dpi: u16) -> layers::Options {
+        let choices = self.choices;
+        // Black text is to be solid, whatever else is on the page.
+        let mut reserved = InkSet::EMPTY;
+        if choices.colours.contains(Ink::Black) {
+            reserved = reserved.with(Ink::Black);
+        }
+        if choices.spots == Spots::Reserved {
+            reserved = layers::Options::default().inks;
+        } else if choices.white == layers::White::Reserved {
+            reserved = reserved.with(Ink::White);
+        }
+        layers::Options {
+            dpi: Some(dpi.into()),
+            reserved: !reserved.is_empty(),
+            inks: reserved,
+            ..layers::Options::default()
+        }
+    }
+
+    /// How its layers become stacks.
+    fn settings(&self) -> layers::Settings {
+        let choices = self.choices;
+        let spots = Ink::ALL.into_iter().filter(|ink| match ink.kind() {
+            Kind::Process => choices.colours.contains(*ink),
+            Kind::Foil => choices.foils,
+            _ => true,
+        });
+        layers::Settings {
+            inks: InkSet::of(spots),
+            // What the page itself draws in white or finish is printed whatever is chosen.
+            white: Some(choices.white).filter(|&white| white != layers::White::None),
+            finish: Some(choices.finish).filter(|&finish| finish != layers::Finish::None),
+            ..layers::Settings::default()
+        }
+    }
+
+    /// What of a page is printed, and where. `drawn` is the window around everything on it; none if it is blank, which is
+    /// told.
+    pub(super) fn view(
+        &self,
+        number: usize,
+        paper: Paper,
+        (size, dpi): ((usize, usize), u16),
+        drawn: Option<Window>,
+        mirrored: bool,
+    ) -> Option<View> {
+        let Some(drawn) = drawn else {
+            self.observer.note(&format!("page {number} is blank; no sheet is made of it"));
+            return None;
+        };
+        // A page is turned about its middle, not what is drawn on it.
+        let whole = mirrored || self.choices.finish == layers::Finish::All;
+        let view = View::of(self.choices.place, paper, (size, dpi), drawn, whole);
+        if view.is_none() {
+            self.observer.note(&format!(
+                "all that page {number} has lies on the margins, where this machine cannot print; no sheet is made of it"
+            ));
+        }
+        view
+    }
+
+    /// The job of a page's art. `mirrored` turns it left to right.
+    pub(super) fn job(
+        &self,
+        number: usize,
+        paper: Paper,
+        art: &Artwork,
+        view: &View,
+        mirrored: bool,
+    ) -> Result<Vec<u8>, FilterError> {
+        let settings = self.settings();
+        let foil = art.layers.iter().map(|layer| layer.ink).find(|ink| ink.kind() == Kind::Foil);
+        if let Some(ink) = foil.filter(|&ink| !settings.inks.contains(ink)) {
+            return Err(FilterError::Foil { page: number, ink });
+        }
+        let composed = layers::compose(art, &settings, self.library, self.observer)
+            .map_err(|source| FilterError::Layers { page: number, source })?;
+        for suggestion in &composed.suggestions {
+            self.observer.note(&format!("page {number}: {}", suggestion.text));
+        }
+        let layout = Layout {
+            position: view.position,
+            mirror: mirrored,
+            cut: true,
+            profile: self.choices.profile,
+            ..Layout::centred(paper)
+        };
+        let arranged = layout::arrange(&composed.piece, &layout, self.observer)
+            .map_err(|source| FilterError::Layout { page: number, source })?;
+        // What a page has on its margins was left out before; what is moved there is cut off now.
+        let moved = !matches!(self.choices.place, Place::Page);
+        if let Some(cut) = view.beyond.or(arranged.laid.cut.filter(|_| moved)) {
+            self.observer
+                .note(&format!("page {number}: {cut} lies on the margins, where this machine cannot print"));
+        }
+        let separation = separate::separate(&arranged.sheet, self.library.rules(), self.observer)?;
+        if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
+            return Err(FilterError::Refused { page: number, why: check.with_stacks() });
+        }
+        let (media, curl_correction) = (self.choices.media, self.choices.curl_correction);
+        let page = Page { media, curl_correction, ..Page::plain(paper) };
+        Ok(pipeline::job_on(page, &separation.passes, &settings.inks, self.observer)?)
+    }
+}
+
+/// The paper of a page of so many pixels.
+pub(super) fn paper(
+    page: usize,
+    (width, height): (usize, usize),
+    dpi: u16,
+    choices: &Choices,
+) -> Result<Paper, FilterError> {
+    let mm = |pixels: usize| pixels as f64 * 25.4 / f64::from(dpi);
+    ppd::paper_of(mm(width), mm(height), choices.custom_paper).map_err(|problem| FilterError::Paper {
+        page,
+        width: mm(width),
+        length: mm(height),
+        problem,
+    })
+}
+
+/// Where what is drawn goes on its sheet.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Place {
+    /// Where the page has it.
+    Page,
+    /// In the middle of the printable area.
+    Centre,
+    /// Its top left corner this far from the corner of the sheet.
+    At(Point),
+}
+
+/// What of a page is printed, and where.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct View {
+    /// The part of the page, in its pixels.
+    pub window: Window,
+    position: Position,
+    /// What is left out on the margins.
+    beyond: Option<Cut>,
+}
+
+impl View {
+    /// `whole` asks for all that can be printed, also where nothing is drawn.
+    fn of(
+        place: Place,
+        paper: Paper,
+        (size, dpi): ((usize, usize), u16),
+        drawn: Window,
+        whole: bool,
+    ) -> Option<View> {
+        let pixels = |dots: u16| usize::from(dots) * usize::from(dpi) / 600;
+        let (across, down) = (pixels(paper.width()), pixels(paper.length()));
+        let position = match place {
+            Place::Page => {
+                // A page that is a little smaller than its paper is paper there.
+                let (left, top) = (pixels(LEFT), pixels(paper.top()));
+                let (width, height) =
+                    (across.min(size.0.saturating_sub(left)), down.min(size.1.saturating_sub(top)));
+                let mm = |pixels: usize| pixels as f64 * 25.4 / f64::from(dpi);
+                let beyond = Cut {
+                    left: mm(left.saturating_sub(drawn.left)),
+                    top: mm(top.saturating_sub(drawn.top)),
+                    right: mm((drawn.left + drawn.width).saturating_sub(left + width)),
+                    bottom: mm((drawn.top + drawn.height).saturating_sub(top + height)),
+                };
+                let room = Window { left, top, width, height };
+                let seen = drawn.meet(&room)?;
+                // What is bare costs as much time as what is drawn.
+                let window = if whole { room } else { seen };
+                let dots = |pixels: usize| Mm::of_dots((pixels * 600 / usize::from(dpi)) as i64);
+                return Some(View {
+                    window,
+                    position: Position::FromPrintable(Point(
+                        dots(window.left - left),
+                        dots(window.top - top),
+                    )),
+                    beyond: (beyond != Cut::default()).then_some(beyond),
+                });
+            }
+            Place::Centre => Position::Centred,
+            Place::At(corner) => Position::FromEdge(corner),
+        };
+        // No more than the sheet holds can be halftoned.
+        let window = Window { width: drawn.width.min(across), height: drawn.height.min(down), ..drawn };
+        let over = |found: usize, most: usize| (found - most) as f64 * 25.4 / f64::from(dpi);
+        let beyond = Cut {
+            right: over(drawn.width, window.width),
+            bottom: over(drawn.height, window.height),
+            ..Cut::default()
+        };
+        Some(View { window, position, beyond: (beyond != Cut::default()).then_some(beyond) })
+    }
+}

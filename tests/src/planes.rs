@@ -1,0 +1,48 @@
+//! Eight clustered planes, as the halftone makes them.
+
+use appearance::gamut::InkMix;
+use appearance::weights::{ONE, WeightMaps, quantise};
+use inks::Stack;
+use observe::Silent;
+use press::halftone::{Placement, Settings, halftone};
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+use std::sync::OnceLock;
+
+/// Dots across an A4 page.
+pub const WIDTH: u16 = 4800;
+/// Its rows.
+pub const ROWS: u16 = 6372;
+
+/// The planes of a whole A4 page, made once.
+pub fn planes() -> &'static [Vec<u8>] {
+    static PLANES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    PLANES.get_or_init(|| clustered((1200, 1593), (190.0, 230.0), Paper::A4))
+}
+
+/// Eight stacks of one ink and the bare paper over a whole page, smooth weights given by `size` pixels that turn once in
+/// about 2 pi `scale` of them, clusters of at least 8 dots.
+pub fn clustered((width, height): (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<Vec<u8>> {
+    let count = 9;
+    let mut data = vec![0; width * height * count];
+    for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
+        let (x, y) = ((pixel % width) as f64 / scale.0, (pixel / width) as f64 / scale.1);
+        let weights: Vec<f64> = (0..count)
+            .map(|i| 1.05 + (x * (1.0 + i as f64 * 0.3) + y * (2.0 - i as f64 * 0.2)).sin())
+            .collect();
+        quantise(&weights, out);
+    }
+    let stacks =
+        std::iter::once(Stack::SUBSTRATE).chain(Ink::ALL[..8].iter().map(|&ink| Stack::new(vec![ink])));
+    let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { ONE } else { 0 }).collect()).collect();
+    let maps = WeightMaps::new(width, height, count, data).expect("quantised");
+    let mix = InkMix { stacks: stacks.collect(), maps, matrix };
+    let page = Placement { paper, x: 0, y: 0, width: paper.width(), height: paper.length() };
+    let sheet = halftone(&mix, &page, &Settings::uniform(count, 8), &Silent).expect("a page");
+    (1..9u8)
+        .map(|ink| {
+            let dots = sheet.index().chunks_exact(8);
+            dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect()
+        })
+        .collect()
+}
