@@ -101,16 +101,17 @@ fn the_commonest_errors() {
         "send half.rgl --to raw:port",
         "send chart/job.rgl --to raw:port",
         "send chart/job.rgl --to nowhere",
-        "send chart/job.rgl --to serial:/dev/no-such-port --yes",
+        "send chart/job.rgl --to serial:/dev/no-such-port",
         "bridge status --to serial:/dev/no-such-port",
         "resume",
         "cancel",
         "ledger new purple",
         "inks show X+Y",
-        "separate tile",
-        "encode notes.txt",
+        "separate tile -o tile.passes",
+        "encode notes.txt -o job.rgl",
     ] {
-        let output = bench.run(args);
+        // Progress says how long a stage took.
+        let output = bench.run(&format!("--quiet {args}"));
         let code = output.status.code().expect("it ends by itself");
         let said = text(&output.stderr);
         assert!(!said.contains("panicked"), "{args}: {said}");
