@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use foilpress_tests::served::{Bridge, Port};
+use observe::Silent;
 use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
@@ -85,9 +86,9 @@ fn copy(from: &Path, to: &Path) {
         let entry = entry.unwrap();
         let target = to.join(entry.file_name());
         if entry.file_type().unwrap().is_dir() {
-            copy(&entry.path(), &target)
+            copy(&entry.path(), &target);
         } else {
-            drop(fs::copy(entry.path(), target).unwrap())
+            fs::copy(entry.path(), target).unwrap();
         }
     }
 }
@@ -192,8 +193,9 @@ impl Desk {
         assert!(failed.is_empty(), "{} of {ran} commands failed:\n{}", failed.len(), failed.join("\n"));
         // What was printed on the way was whole jobs, one after the other.
         let printed = self.bridge.printed();
-        if !printed.is_empty() {
-            press::inspect::sheets(&printed).expect("the bytes at the port are whole jobs");
+        for sheet in press::inspect::sheets(&printed) {
+            let found = press::inspect::inspect(&printed[sheet], &Silent).inspection;
+            assert!(found.error.is_none() && found.complete, "at the port: {:?}", found.error);
         }
     }
 }
