@@ -1,7 +1,7 @@
-//! The inks: one cassette each, with the two numbers the machine knows it by.
+//! The inks: one cartridge each, with the two numbers the machine knows it by.
 //!
-//! The *ink code* stands in the ink-select command of a job; the *barcode* is printed on the cassette and
-//! stands in the cassette list and in the printer's status. They are different numbers.
+//! The *ink code* stands in the ink-select command of a job; the *barcode* is printed on the cartridge and
+//! stands in the cartridge list and in the printer's status. They are different numbers.
 //! Sources: streams of the established open driver (codes of process inks, metallics, white, finish, primer),
 //! observation on hardware (black, cyan, magenta, yellow, white, finish, primer), vendor driver data
 //! (barcodes, the foils' codes, which no captured stream confirms).
@@ -124,12 +124,12 @@ impl Ink {
         self.row().code
     }
 
-    /// The number on the cassette, in the cassette list and in the printer's status.
+    /// The number on the cartridge, in the cartridge list and in the printer's status.
     pub fn barcode(self) -> u8 {
         self.row().barcode
     }
 
-    /// The vendor's part number of the cassette.
+    /// The vendor's part number of the cartridge.
     pub fn part(self) -> &'static str {
         self.row().part
     }
@@ -144,7 +144,7 @@ impl Ink {
         TABLE.iter().find(|row| row.code == code).map(|row| row.ink)
     }
 
-    /// The ink on the cassette with this barcode.
+    /// The ink on the cartridge with this barcode.
     pub fn from_barcode(barcode: u8) -> Option<Ink> {
         TABLE.iter().find(|row| row.barcode == barcode).map(|row| row.ink)
     }

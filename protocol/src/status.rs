@@ -1,4 +1,4 @@
-//! The printer's answer to the status question: 38 bytes about its state, its cassettes and its errors.
+//! The printer's answer to the status question: 38 bytes about its state, its cartridges and its errors.
 //!
 //! ```text
 //! 02 80 length(2) state { entry(3) } errors(5) 03        length = 33, nine entries
@@ -13,7 +13,7 @@ use crate::ink::Ink;
 /// Length of an answer.
 pub const LENGTH: usize = 38;
 
-/// Cassette places: four above, four below, and the one on the carriage.
+/// Cartridge places: four above, four below, and the one on the carriage.
 pub const PLACES: usize = 9;
 
 /// An answer.
@@ -33,7 +33,7 @@ pub struct NotAStatus;
 pub enum Place {
     /// Nothing.
     Empty,
-    /// A cassette with this barcode.
+    /// A cartridge with this barcode.
     Loaded(u8),
     /// One whose ribbon is in backwards.
     Backwards(u8),
@@ -46,7 +46,7 @@ pub enum Place {
 pub enum Complaint {
     /// A motor: which one is in the bits.
     Motor {
-        /// 80 cassette changer, 40 carriage, 20 bail arm, 10 line feed, 08 feeder, 04 anti-curl.
+        /// 80 cartridge changer, 40 carriage, 20 bail arm, 10 line feed, 08 feeder, 04 anti-curl.
         units: u8,
     },
     /// The cover is open.
@@ -72,15 +72,15 @@ pub enum Complaint {
     RibbonEnd,
     /// A ribbon is torn.
     RibbonBreak,
-    /// Two cassettes for one place.
+    /// Two cartridges for one place.
     PlaceOccupied,
-    /// A pass needs a cassette that is not loaded.
-    WrongCassette {
-        /// The barcode of the cassette wanted.
+    /// A pass needs a cartridge that is not loaded.
+    WrongCartridge {
+        /// The barcode of the cartridge wanted.
         wanted: u8,
     },
-    /// Something about the cassettes that is not known.
-    Cassette,
+    /// Something about the cartridges that is not known.
+    Cartridge,
 }
 
 impl Status {
@@ -123,7 +123,7 @@ impl Status {
         self.state & 0x01 != 0
     }
 
-    /// The places: upper 1 to 4, lower 1 to 4, carriage. The carousel turns, so a cassette is found by its
+    /// The places: upper 1 to 4, lower 1 to 4, carriage. The carousel turns, so a cartridge is found by its
     /// barcode and not by its place.
     pub fn places(&self) -> [Place; PLACES] {
         self.entries.map(|entry| match (entry, entry & 0x3f) {
@@ -135,7 +135,7 @@ impl Status {
         })
     }
 
-    /// Whether a cassette of this ink can be printed with; `None` while the printer is in error and does not say.
+    /// Whether a cartridge of this ink can be printed with; `None` while the printer is in error and does not say.
     pub fn has(&self, ink: Ink) -> Option<bool> {
         (!self.in_error()).then(|| self.places().contains(&Place::Loaded(ink.barcode())))
     }
@@ -144,10 +144,10 @@ impl Status {
     pub fn complaints(&self) -> impl Iterator<Item = Complaint> + use<> {
         let [e0, e1, e2, e3, e4] = if self.in_error() { self.errors } else { [0; 5] };
         let manual = e2 & 0x40 != 0;
-        let cassette = match (e3 & 7) >> 1 {
+        let cartridge = match (e3 & 7) >> 1 {
             2 => Complaint::PlaceOccupied,
-            3 => Complaint::WrongCassette { wanted: e3 >> 3 },
-            _ => Complaint::Cassette,
+            3 => Complaint::WrongCartridge { wanted: e3 >> 3 },
+            _ => Complaint::Cartridge,
         };
         [
             (e0 & 0x80 != 0, Complaint::Motor { units: e4 }),
@@ -159,7 +159,7 @@ impl Status {
             (e1 & 0x40 != 0, Complaint::Jam { at_exit: e2 & 0x08 != 0 }),
             (e1 & 0x20 != 0, Complaint::RibbonEnd),
             (e1 & 0x02 != 0, Complaint::RibbonBreak),
-            (e1 & 0x10 != 0, cassette),
+            (e1 & 0x10 != 0, cartridge),
         ]
         .into_iter()
         .filter_map(|(is, complaint)| is.then_some(complaint))
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cassettes_of_an_idle_printer_are_found_by_their_barcodes() {
+    fn the_cartridges_of_an_idle_printer_are_found_by_their_barcodes() {
         let status = Status::parse(&IDLE).unwrap();
         assert!(!status.off_line() && !status.in_error() && !status.printing() && !status.has_data());
         for (ink, there) in [(Ink::Cyan, true), (Ink::Magenta, true), (Ink::Black, true), (Ink::White, false)]
@@ -203,7 +203,7 @@ mod tests {
         // In the order of the recordings: a missing white, a sheet too short, a jam at the exit, the changer.
         let mismatch = with(0xc9, [0x00, 0x10, 0x00, 0x86, 0x00]);
         let complaints: Vec<_> = mismatch.complaints().collect();
-        assert_eq!(complaints, [Complaint::WrongCassette { wanted: Ink::White.barcode() }]);
+        assert_eq!(complaints, [Complaint::WrongCartridge { wanted: Ink::White.barcode() }]);
         assert_eq!(mismatch.has(Ink::Cyan), None, "stale entries");
         assert!(with(0xc0, [0, 0x80, 0x80, 0, 0]).complaints().eq([Complaint::WrongSize { manual: false }]));
         let jam = with(0xd9, [0, 0xc0, 0x08, 0, 0]);

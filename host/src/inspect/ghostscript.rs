@@ -178,7 +178,7 @@ impl Reader {
             (Setup, Command::Length(rows)) if setup.length == 0 && rows > 0 => setup.length = rows,
             (Setup, Command::Mode(mode)) => once(&mut setup.mode, mode_name(mode))?,
             (Setup, Command::CurlCorrection(on)) => once(&mut setup.curl_correction, on)?,
-            (Setup, Command::Cassettes(list)) => {
+            (Setup, Command::Cartridges(list)) => {
                 once(&mut setup.cassettes, list.inks().iter().map(|ink| ink.name()).collect())?;
             }
             (Setup, Command::RasterStart) => self.start()?,

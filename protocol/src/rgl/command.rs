@@ -199,7 +199,7 @@ pub enum Mode {
     BlackRaster,
     /// One ink-select and its rows for each pass.
     ColourPlane,
-    /// The same, with a cassette list in the setup.
+    /// The same, with a cartridge list in the setup.
     MultiPlane,
 }
 
@@ -228,25 +228,25 @@ pub enum Compression {
     Packed,
 }
 
-/// The most cassettes the machine holds.
-pub const MAX_CASSETTES: usize = 7;
+/// The most cartridges the machine holds.
+pub const MAX_CARTRIDGES: usize = 7;
 
-/// The cassette list of a setup: one to seven.
+/// The cartridge list of a setup: one to seven.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cassettes {
-    inks: [Ink; MAX_CASSETTES],
+pub struct Cartridges {
+    inks: [Ink; MAX_CARTRIDGES],
     count: u8,
 }
 
-impl Cassettes {
+impl Cartridges {
     /// A list, if it has one to seven entries.
-    pub fn new(inks: &[Ink]) -> Option<Cassettes> {
-        if inks.is_empty() || inks.len() > MAX_CASSETTES {
+    pub fn new(inks: &[Ink]) -> Option<Cartridges> {
+        if inks.is_empty() || inks.len() > MAX_CARTRIDGES {
             return None;
         }
-        let mut list = [inks[0]; MAX_CASSETTES];
+        let mut list = [inks[0]; MAX_CARTRIDGES];
         list[..inks.len()].copy_from_slice(inks);
-        Some(Cassettes { inks: list, count: inks.len() as u8 })
+        Some(Cartridges { inks: list, count: inks.len() as u8 })
     }
 
     /// The inks in the order of the list.
@@ -276,8 +276,8 @@ pub enum Command<'a> {
     LineFeed(i8),
     /// Print-head drive adjustment, -50 to 50. Read only: never tried on hardware.
     HeadDrive(i8),
-    /// Cassette list.
-    Cassettes(Cassettes),
+    /// Cartridge list.
+    Cartridges(Cartridges),
     /// Shift to the right in dots.
     ShiftX(u16),
     /// Shift downwards in rows.

@@ -37,8 +37,8 @@ pub fn encode_into(command: &Command<'_>, out: &mut [u8]) -> Result<usize, Fault
         Command::Skip(0) => Err(Fault::ZeroSkip),
         Command::LineFeed(by) => put(out, &adjust(by as u8, b'L'), &[]),
         Command::HeadDrive(by) => put(out, &adjust(by as u8, b'V'), &[]),
-        Command::Cassettes(list) => {
-            let mut barcodes = [0; super::command::MAX_CASSETTES];
+        Command::Cartridges(list) => {
+            let mut barcodes = [0; super::command::MAX_CARTRIDGES];
             for (place, ink) in barcodes.iter_mut().zip(list.inks()) {
                 *place = ink.barcode();
             }

@@ -27,8 +27,8 @@ pub enum Fault {
     InkCode = 10,
     /// The last-pass flag is neither 00 nor 80.
     LastPassFlag = 11,
-    /// A cassette list of none or more than seven.
-    CassetteCount = 12,
+    /// A cartridge list of none or more than seven.
+    CartridgeCount = 12,
     /// A barcode of no known ink.
     Barcode = 13,
     /// An adjustment of 0 or out of its range.
@@ -56,15 +56,15 @@ pub enum Fault {
     MissingCurl = 39,
     /// A setup without transfer mode.
     MissingMode = 40,
-    /// multiPlane without a cassette list.
-    MissingCassettes = 41,
-    /// A cassette list in a mode that has none.
-    UnexpectedCassettes = 42,
+    /// multiPlane without a cartridge list.
+    MissingCartridges = 41,
+    /// A cartridge list in a mode that has none.
+    UnexpectedCartridges = 42,
     /// A page of no dots, or beyond what the machine takes.
     PageSize = 43,
     /// Raster data end, or a row comes, before any pass.
     NoPass = 44,
-    /// A pass selects an ink that is not in the cassette list.
+    /// A pass selects an ink that is not in the cartridge list.
     InkNotInList = 45,
     /// Another pass without a back-feed before it.
     MissingBackFeed = 46,
@@ -112,8 +112,8 @@ pub enum Fault {
     NoPasses = 97,
     /// More passes than [`MAX_PASSES`](super::order::MAX_PASSES).
     TooManyPasses = 98,
-    /// More than seven different cassettes.
-    TooManyCassettes = 99,
+    /// More than seven different cartridges.
+    TooManyCartridges = 99,
     /// An ink other than cyan, magenta, yellow and black at another resolution than 600 dpi.
     SpotResolution = 100,
     /// A foil without the user's explicit consent.

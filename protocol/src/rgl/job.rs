@@ -68,8 +68,8 @@ impl JobWriter {
             put(Command::Paper(PaperCode::of(page.paper)))?;
             put(Command::Length(page.length()))?;
             put(Command::Width(page.width()))?;
-            if let Some(list) = self.setup.cassettes() {
-                put(Command::Cassettes(list))?;
+            if let Some(list) = self.setup.cartridges() {
+                put(Command::Cartridges(list))?;
             }
             if shift_x > 0 {
                 put(Command::ShiftX(shift_x))?;
@@ -187,7 +187,7 @@ impl JobWriter {
 
     /// Ends the job early in a way the machine knows, so that the sheet is ejected and the next job starts clean:
     /// when the current pass was not announced as the last, an empty pass of the same ink is, which needs no other
-    /// cassette. Gives no bytes when the job has not begun or has ended. `out` needs [`COMMAND_ROOM`].
+    /// cartridge. Gives no bytes when the job has not begun or has ended. `out` needs [`COMMAND_ROOM`].
     pub fn cancel(&mut self, out: &mut [u8]) -> Result<usize, Fault> {
         if self.order.is_idle() || self.order.is_complete() {
             return Ok(0);
@@ -252,7 +252,7 @@ fn trim(row: &[u8]) -> &[u8] {
 mod tests {
     extern crate std;
 
-    use super::super::command::{Cassettes, Resolution};
+    use super::super::command::{Cartridges, Resolution};
     use super::super::parse::{Step, parse};
     use super::super::setup::Page;
     use super::*;
@@ -340,11 +340,11 @@ mod tests {
     }
 
     #[test]
-    fn five_cassettes_make_multi_plane_and_repeats_do_not() {
+    fn five_cartridges_make_multi_plane_and_repeats_do_not() {
         let five = [&CMYK[..], &[Ink::Finish]].concat();
         assert_eq!(a4(&five).mode(), Mode::MultiPlane);
         let bytes = stream(a4(&five), 1, &vec![vec![]; 5]).unwrap();
-        assert!(commands(&bytes).contains(&Command::Cassettes(Cassettes::new(&five).unwrap())));
+        assert!(commands(&bytes).contains(&Command::Cartridges(Cartridges::new(&five).unwrap())));
         let seven_of_four =
             [Ink::Black, Ink::Primer, Ink::Finish, Ink::Primer, Ink::White, Ink::White, Ink::White];
         assert_eq!(a4(&seven_of_four).mode(), Mode::ColourPlane);

@@ -18,7 +18,7 @@ pub mod parse;
 pub mod setup;
 pub mod track;
 
-pub use command::{Cassettes, Command, Compression, Media, Mode, PaperCode, Resolution};
+pub use command::{Cartridges, Command, Compression, Media, Mode, PaperCode, Resolution};
 pub use ending::Ending;
 pub use fault::{Fault, Refusal};
 pub use job::JobWriter;

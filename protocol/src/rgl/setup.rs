@@ -1,10 +1,10 @@
 //! What a job may be, before its first byte.
 //!
 //! [`JobSetup::new`] is where what must never be sent is refused: inks other than cyan, magenta, yellow and black at
-//! another resolution than 600 dpi, foils without consent, more than seven cassettes, a page larger than the machine
+//! another resolution than 600 dpi, foils without consent, more than seven cartridges, a page larger than the machine
 //! takes. A value of this type is the proof.
 
-use super::command::{Cassettes, MAX_CASSETTES, Media, Mode, Resolution};
+use super::command::{Cartridges, MAX_CARTRIDGES, Media, Mode, Resolution};
 use super::fault::Fault;
 use super::order::MAX_PASSES;
 use crate::ink::{Ink, Kind};
@@ -68,16 +68,16 @@ impl Page {
 pub struct JobSetup {
     page: Page,
     mode: Mode,
-    cassettes: Option<Cassettes>,
+    cartridges: Option<Cartridges>,
     inks: [Ink; MAX_PASSES],
     passes: u8,
 }
 
 impl JobSetup {
-    /// A job of these passes, first printed first. Up to four cassettes the mode is colourPlane, from five to seven
+    /// A job of these passes, first printed first. Up to four cartridges the mode is colourPlane, from five to seven
     /// multiPlane with a list of them in the order of first use; an ink in several passes counts once.
     ///
-    /// Errors: [`Fault::NoPasses`], [`Fault::TooManyPasses`], [`Fault::TooManyCassettes`], [`Fault::SpotResolution`],
+    /// Errors: [`Fault::NoPasses`], [`Fault::TooManyPasses`], [`Fault::TooManyCartridges`], [`Fault::SpotResolution`],
     /// [`Fault::FoilWithoutConsent`], [`Fault::PageSize`].
     pub fn new(page: Page, passes: &[Ink], foil: Option<FoilConsent>) -> Result<JobSetup, Fault> {
         if passes.is_empty() {
@@ -93,21 +93,21 @@ impl JobSetup {
         if foil.is_none() && passes.iter().any(|ink| ink.kind() == Kind::Foil) {
             return Err(Fault::FoilWithoutConsent);
         }
-        let mut cassettes = [passes[0]; MAX_CASSETTES];
+        let mut cartridges = [passes[0]; MAX_CARTRIDGES];
         let mut count = 0;
         for ink in passes {
-            if !cassettes[..count].contains(ink) {
-                *cassettes.get_mut(count).ok_or(Fault::TooManyCassettes)? = *ink;
+            if !cartridges[..count].contains(ink) {
+                *cartridges.get_mut(count).ok_or(Fault::TooManyCartridges)? = *ink;
                 count += 1;
             }
         }
-        let (mode, cassettes) = match count {
+        let (mode, cartridges) = match count {
             0..=4 => (Mode::ColourPlane, None),
-            _ => (Mode::MultiPlane, Cassettes::new(&cassettes[..count])),
+            _ => (Mode::MultiPlane, Cartridges::new(&cartridges[..count])),
         };
         let mut inks = [passes[0]; MAX_PASSES];
         inks[..passes.len()].copy_from_slice(passes);
-        Ok(JobSetup { page, mode, cassettes, inks, passes: passes.len() as u8 })
+        Ok(JobSetup { page, mode, cartridges, inks, passes: passes.len() as u8 })
     }
 
     /// A job of one plane of black in the mode made for that.
@@ -116,7 +116,7 @@ impl JobSetup {
     pub fn black_raster(page: Page) -> Result<JobSetup, Fault> {
         check_page(&page)?;
         let inks = [Ink::Black; MAX_PASSES];
-        Ok(JobSetup { page, mode: Mode::BlackRaster, cassettes: None, inks, passes: 1 })
+        Ok(JobSetup { page, mode: Mode::BlackRaster, cartridges: None, inks, passes: 1 })
     }
 
     /// The page.
@@ -129,9 +129,9 @@ impl JobSetup {
         &self.inks[..usize::from(self.passes)]
     }
 
-    /// The cassette list, in the mode that has one.
-    pub fn cassettes(&self) -> Option<Cassettes> {
-        self.cassettes
+    /// The cartridge list, in the mode that has one.
+    pub fn cartridges(&self) -> Option<Cartridges> {
+        self.cartridges
     }
 
     /// The transfer mode.
@@ -168,7 +168,7 @@ mod tests {
             assert!(JobSetup::new(plain, &[foil], Some(FoilConsent::given_by_the_user())).is_ok());
         }
         assert_eq!(why(plain, &[], None), Fault::NoPasses);
-        assert_eq!(why(plain, &Ink::ALL[..8], None), Fault::TooManyCassettes);
+        assert_eq!(why(plain, &Ink::ALL[..8], None), Fault::TooManyCartridges);
         assert_eq!(why(plain, &[Ink::Black; 33], None), Fault::TooManyPasses);
         let custom = |width, length| Page::plain(Paper::Custom { width, length });
         for page in
