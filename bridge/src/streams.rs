@@ -32,10 +32,7 @@ enum Stage {
     /// Reading a band.
     Read,
     /// Writing rows `next..end` of the band.
-    Rows {
-        next: u16,
-        end: u16,
-    },
+    Rows { next: u16, end: u16 },
     /// Writing so many blank rows.
     Blank(u16),
     /// The job is complete.
@@ -184,8 +181,8 @@ impl<'m> Streams<'m> {
                 if band_bytes(header.columns()) > self.band.len() {
                     return Err(DefectKind::TooLarge);
                 }
-                let writer =
-                    JobWriter::new(*header.setup(), header.rows()).map_err(|_| DefectKind::Forbidden)?;
+                let writer = JobWriter::new(header.setup().clone(), header.rows())
+                    .map_err(|_| DefectKind::Forbidden)?;
                 self.writer = Some(writer);
                 self.decoder.resize(header.columns(), header.rows());
                 self.stride = stride(header.columns());

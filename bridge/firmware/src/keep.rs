@@ -16,8 +16,10 @@
 //!
 //! *The bytes survive.* The linker puts the section `.uninit` between `.bss` and the stack. The startup code writes
 //! `.bss` and `.data` only (cortex-m-rt without its features `zero-init-ram` and `paint-stack`, neither of which is on).
-//! The boot ROM and the second-stage boot loader use the end of the memory, which is the stack's. Should the stack ever
-//! grow into the section (it has more than 100 KB), that is memory corruption here as anywhere; there is no guard.
+//! On the way to this program the boot ROM and the second-stage boot loader use the end of the memory only, which is the
+//! stack's. What anything else has overwritten, such as a debugger, the checksums of image and slots find. Should the
+//! stack ever grow into the section (it has more than 100 KB), that is memory corruption here as anywhere; there is no
+//! guard.
 //!
 //! *The bytes may be read.* To the compiler a static without an initial value is uninitialised, and reading it is
 //! undefined whatever the hardware holds. So every access goes through [`kept`], whose empty assembly block stands for
@@ -136,7 +138,7 @@ impl Keeper {
             return (keeper, None);
         }
         // SAFETY: initialised by `kept`; only the keeper uses the slots.
-        let slots = unsafe { (&raw const (*kept()).slots).read_volatile() };
+        let slots = unsafe { (&raw const (*kept()).slots).read() };
         let found = slots.iter().filter_map(read).max_by_key(|&(number, ..)| number);
         let Some((number, place, mut checkpoint)) = found else { return (keeper, None) };
         (keeper.number, keeper.place) = (number, place);

@@ -184,6 +184,8 @@ const NOTHING: Progress =
 
 impl<'m> Engine<'m> {
     /// An engine without a job.
+    // Inlined into both of its callers it takes 2.5 KB more flash.
+    #[inline(never)]
     pub fn new(memory: Memory<'m>, identity: Identity) -> Self {
         Engine {
             identity,

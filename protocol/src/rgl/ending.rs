@@ -179,10 +179,13 @@ mod tests {
         let (mut out, mut bytes) = ([0; 200], vec![]);
         let mut add = |length: Result<usize, _>, out: &[u8]| bytes.extend_from_slice(&out[..length.unwrap()]);
         add(writer.begin(&mut out), &out);
-        for pass in 0..inks.len().max(1) {
+        for pass in rows.iter().take(inks.len().max(1)) {
             add(writer.next_pass(&mut out), &out);
-            for (y, &dots) in rows[pass].iter().enumerate() {
-                add(writer.row(&[u8::from(dots) * 0x55, 1, y as u8][..if dots { 3 } else { 0 }], &mut out), &out);
+            for (y, &dots) in pass.iter().enumerate() {
+                add(
+                    writer.row(&[u8::from(dots) * 0x55, 1, y as u8][..if dots { 3 } else { 0 }], &mut out),
+                    &out,
+                );
             }
         }
         add(writer.end(&mut out), &out);
@@ -263,11 +266,14 @@ mod tests {
             let (mut next, mut seen) = (0, vec![]);
             for (at, &byte) in job.iter().enumerate() {
                 let can_end = track.follow(&[byte]).is_some();
-                if all[next].1 != at + 1 {
-                    prop_assert!(!can_end, "inside a command, at byte {}", at);
+                let (command, end) = &all[next];
+                if *end != at + 1 {
+                    // The 00 behind the resolution command counts as a command of its own, for other drivers leave it out.
+                    let stray = matches!(command, Command::Resolution(_)) && *end == at + 2;
+                    prop_assert_eq!(can_end, stray, "inside a command, at byte {}", at);
                     continue;
                 }
-                seen.push(all[next].0);
+                seen.push(*command);
                 next += 1;
                 let expected = expected(&seen);
                 prop_assert_eq!(can_end, expected.is_some());
@@ -285,7 +291,8 @@ mod tests {
     #[test]
     fn the_longest_ending_fills_its_room() {
         let mut ending = Ending::new();
-        for event in [Event::Select, Event::RasterStart, Event::InkSelect { ink: 1, last: false }, Event::Row] {
+        for event in [Event::Select, Event::RasterStart, Event::InkSelect { ink: 1, last: false }, Event::Row]
+        {
             ending.follow(event);
         }
         assert_eq!(ending.bytes().len(), MAX_ENDING);
@@ -294,7 +301,8 @@ mod tests {
     #[test]
     fn a_sheet_that_is_out_is_not_ejected_again_and_the_next_job_begins_with_another() {
         let mut ending = Ending::new();
-        for event in [Event::Select, Event::RasterStart, Event::InkSelect { ink: 1, last: false }, Event::Row] {
+        for event in [Event::Select, Event::RasterStart, Event::InkSelect { ink: 1, last: false }, Event::Row]
+        {
             ending.follow(event);
         }
         ending.follow(Event::FormFeed);

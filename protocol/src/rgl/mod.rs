@@ -5,8 +5,8 @@
 //! [`setup`] allows. [`ending`] is how a job ends early, and [`track`] follows a stream that was made elsewhere, so that
 //! it can be ended too. Nothing here does input or output: slices in, slices out.
 //!
-//! Commands can be encoded one by one for tests and tools; what a printer gets must come from
-//! [`job::JobWriter`], which cannot be made to write a job that harms the machine.
+//! Commands can be encoded one by one for tests and tools. What a printer gets must come from [`job::JobWriter`], which
+//! cannot write a job that harms the printer.
 
 pub mod command;
 pub mod encode;

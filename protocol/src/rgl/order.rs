@@ -7,8 +7,8 @@
 //! pass   = ink-select rows                  the last one says so
 //! rows   = { [compression] [skip] row }
 //! ```
-//! [`Order`] is the state machine: the writer asks it before it writes, the reader after it has parsed. It keeps a
-//! few dozen bytes and never looks at anything twice.
+//! [`Order`] is the state machine. The writer asks it before it writes, the reader after it has parsed. It keeps a few
+//! dozen bytes and reads everything once.
 
 use super::command::{Cartridges, Command, Compression, MAX_CARTRIDGES, Mode, PaperCode, Resolution};
 use super::fault::{Fault, Refusal};
@@ -16,7 +16,7 @@ use super::parse::ROW_HEAD;
 use crate::ink::Ink;
 use crate::{packbits, paper};
 
-/// The most passes in a job. The machine's own limit is not known; seven cartridges with repeats stay far below.
+/// The most passes in a job. The printer's own limit is not known; seven cartridges with repeats stay far below.
 pub const MAX_PASSES: usize = 32;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,14 +1,15 @@
 //! Bytes as commands: the exact inverse of [`encode_into`](super::encode::encode_into).
 //!
-//! [`parse`] looks at the start of a slice and gives one command, or how many bytes it has to see. It keeps no
-//! state, so a stream may arrive in any pieces: a verdict once given does not change when more bytes follow.
+//! [`parse`] reads the start of a slice and returns one command, or how many bytes it needs. It keeps no state, so a
+//! stream may arrive in any portions: more bytes never change a result once given.
 
 use super::command::{Cartridges, Command, Compression, MAX_CARTRIDGES, Media, Mode, PaperCode, Resolution};
 use super::encode::{ESC, FF, LAST, MOST_DRIVE, SUB};
 use super::fault::{Fault, Refusal};
 use crate::ink::Ink;
+use heapless::Vec;
 
-/// What stands at the start of a slice.
+/// What is at the start of a slice.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Step<'a> {
     /// A command and its length in bytes.
@@ -19,7 +20,7 @@ pub enum Step<'a> {
 
 /// Reads the command at the start of `bytes`.
 ///
-/// Errors: the fault and its position in `bytes`; the position is 0 when it is the command itself that is unknown.
+/// Errors: the fault and its position in `bytes`. The position is 0 if the command itself is unknown.
 pub fn parse(bytes: &[u8]) -> Result<Step<'_>, Refusal> {
     let unknown = Err(Refusal::new(Fault::UnknownCommand, 0));
     match *bytes {
@@ -114,11 +115,12 @@ fn page(value: [u8; 2], letter: u8, bytes: &[u8]) -> Result<Step<'_>, Refusal> {
             let Some(barcodes) = bytes.get(6..6 + count) else {
                 return Ok(Step::More(6 + count));
             };
-            let mut inks = [Ink::Black; MAX_CARTRIDGES];
-            for (i, (ink, &barcode)) in inks.iter_mut().zip(barcodes).enumerate() {
-                *ink = Ink::from_barcode(barcode).ok_or(Refusal::new(Fault::Barcode, 6 + i))?;
+            let mut inks = Vec::<Ink, MAX_CARTRIDGES>::new();
+            for (i, &barcode) in barcodes.iter().enumerate() {
+                let ink = Ink::from_barcode(barcode).ok_or(Refusal::new(Fault::Barcode, 6 + i))?;
+                inks.push(ink).map_err(|_| Refusal::new(Fault::CartridgeCount, 3))?;
             }
-            let list = Cartridges::new(&inks[..count]).ok_or(Refusal::new(Fault::CartridgeCount, 3))?;
+            let list = Cartridges::new(&inks).ok_or(Refusal::new(Fault::CartridgeCount, 3))?;
             return done(Command::Cartridges(list), 6 + count);
         }
         _ => return Err(Refusal::new(Fault::UnknownCommand, 0)),
