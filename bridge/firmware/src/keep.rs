@@ -94,7 +94,8 @@ fn wake(image: u32) -> bool {
     let kept = kept();
     critical_section::with(|_| {
         // SAFETY: fields of the static, initialised by `kept`.
-        let (left, written) = unsafe { ((&raw const (*kept).image).read(), (&raw const (*kept).written).read()) };
+        let (left, written) =
+            unsafe { ((&raw const (*kept).image).read(), (&raw const (*kept).written).read()) };
         let known = left == image && written[0] == !written[1];
         if !known {
             // SAFETY: the same fields, and the slots, which no `Keeper` uses yet.

@@ -147,7 +147,7 @@ impl Canvas {
                 let shift = if column.is_multiple_of(2) { 4 } else { 0 };
                 let mut at = row * 4 * stride + left + column / 2;
                 for from in [12, 8, 4, 0] {
-                    rows[at] |= ((dots >> from & 15) as u8) << shift;
+                    rows[at] |= (((dots >> from & 15) << shift) & 0xff) as u8;
                     at += stride;
                 }
             }
