@@ -16,7 +16,7 @@ use crate::rule::{Rule, Severity};
 use crate::set::InkSet;
 use crate::stack::Stack;
 
-/// A cassette as it is sold.
+/// A cartridge as it is sold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cartridge {
     /// The ink in it; its code, barcode and part number are those of [`Ink`].

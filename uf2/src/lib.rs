@@ -12,6 +12,8 @@
 //! format's extensions; the linker and the usual tools write none of these for the RP2040.
 //! Source: Microsoft's description of UF2; RP2040 data sheet, 2.8.1.3.1 (checksum) and 2.8.4 (UF2).
 
+#![forbid(unsafe_code)]
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 

@@ -60,7 +60,7 @@ impl Timing {
             hold_ns: ns(self.hold),
             settle_ns: ns(self.settle),
             handshake: Handshake::Busy,
-            patience_s: (Self::PATIENCE_MS / 1000) as u16,
+            patience_s: u16::try_from(Self::PATIENCE_MS / 1000).unwrap_or(u16::MAX),
             heed: Lines::ALL,
         }
     }

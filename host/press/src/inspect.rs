@@ -316,7 +316,7 @@ fn setup(order: &Order) -> Setup {
         curl_correction: declared.curl,
         built_in_gloss: declared.gloss,
         mode: declared.mode.map(mode_name),
-        cassettes: declared.cassettes.map(|list| list.inks().iter().map(|ink| ink.name()).collect()),
+        cassettes: declared.cartridges.map(|list| list.inks().iter().map(|ink| ink.name()).collect()),
     }
 }
 

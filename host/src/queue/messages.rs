@@ -83,7 +83,7 @@ impl Reason {
             Complaint::WrongSize { .. } => Reason::MediaNeeded,
             Complaint::Jam { .. } => Reason::MediaJam,
             Complaint::RibbonEnd | Complaint::RibbonBreak => Reason::SupplyEmpty,
-            Complaint::WrongCassette { .. } => Reason::SupplyMissing,
+            Complaint::WrongCartridge { .. } => Reason::SupplyMissing,
             _ => Reason::Other,
         }
     }

@@ -104,13 +104,13 @@ fn words(complaint: Complaint) -> String {
         Complaint::RibbonEnd => "a ribbon is at its end; put in a fresh cassette".into(),
         Complaint::RibbonBreak => "a ribbon is torn; take the cassette out and look".into(),
         Complaint::PlaceOccupied => "a cassette holder is occupied; take a cassette out".into(),
-        Complaint::WrongCassette { wanted } => match Ink::from_barcode(wanted) {
+        Complaint::WrongCartridge { wanted } => match Ink::from_barcode(wanted) {
             Some(ink) => {
                 format!("it wants the {} cassette ({}, barcode {wanted}); put it in", ink.name(), ink.part())
             }
             None => format!("it wants a cassette with barcode {wanted}"),
         },
-        Complaint::Cassette => "it reports a fault of a cassette".into(),
+        Complaint::Cartridge => "it reports a fault of a cassette".into(),
     }
 }
 

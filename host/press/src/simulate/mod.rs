@@ -19,7 +19,7 @@ mod words;
 #[cfg(test)]
 mod tests;
 
-use protocol::rgl::command::MAX_CASSETTES;
+use protocol::rgl::command::MAX_CARTRIDGES;
 use protocol::rgl::{Command, Fault, Step, parse};
 
 use observe::Observer;
@@ -68,7 +68,7 @@ pub fn print(job: &[u8], setup: &Setup, observer: &dyn Observer) -> Result<Print
     const CHUNK: usize = 1 << 18;
     // A job that wants more than go in is refused where it asks for the eighth.
     let cassettes =
-        setup.cassettes.clone().unwrap_or_else(|| wanted(job).into_iter().take(MAX_CASSETTES).collect());
+        setup.cassettes.clone().unwrap_or_else(|| wanted(job).into_iter().take(MAX_CARTRIDGES).collect());
     let mut printer = Printer::new(Carousel::new(&cassettes)?, setup.lever);
     if let Some(stock) = setup.stock.or_else(|| declared_stock(job)) {
         printer.load(stock);

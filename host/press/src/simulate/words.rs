@@ -18,7 +18,7 @@ pub fn words(fault: Fault) -> &'static str {
         Fault::CompressionCode => "rows are neither plain (00) nor PackBits (02)",
         Fault::InkCode => "no ink is known for sure by this code",
         Fault::LastPassFlag => "the last-pass flag is neither 00 nor 80",
-        Fault::CassetteCount => "a cassette list has one to seven entries",
+        Fault::CartridgeCount => "a cassette list has one to seven entries",
         Fault::Barcode => "no ink is known by this barcode",
         Fault::Adjustment => "this adjustment is 0 or out of its range",
         Fault::ZeroShift => "a shift of 0 is not written",
@@ -32,8 +32,8 @@ pub fn words(fault: Fault) -> &'static str {
         Fault::MissingWidth => "the setup has no page width",
         Fault::MissingCurl => "the setup does not say whether curl is corrected",
         Fault::MissingMode => "the setup has no transfer mode",
-        Fault::MissingCassettes => "transfer mode 08 needs a cassette list",
-        Fault::UnexpectedCassettes => "a cassette list belongs to transfer mode 08 only",
+        Fault::MissingCartridges => "transfer mode 08 needs a cassette list",
+        Fault::UnexpectedCartridges => "a cassette list belongs to transfer mode 08 only",
         Fault::PageSize => {
             "the page has no dots or is larger than the machine takes (4940 x 7760 at 600 dpi)"
         }
@@ -61,7 +61,7 @@ pub fn words(fault: Fault) -> &'static str {
         Fault::NoRoom => "the output buffer is too small",
         Fault::NoPasses => "the job has no passes",
         Fault::TooManyPasses => "the job has more than 32 passes",
-        Fault::TooManyCassettes => "the job needs more than seven cassettes, and the printer holds seven",
+        Fault::TooManyCartridges => "the job needs more than seven cassettes, and the printer holds seven",
         Fault::SpotResolution => {
             "only cyan, magenta, yellow and black print at other resolutions than 600 dpi; use 600 dpi or drop the other inks"
         }
