@@ -65,7 +65,8 @@ impl Rig {
             self.tick();
             assert!(self.now - before < 100 * S, "no packet is wanted any more");
         }
-        self.intake.receive(bytes, &mut self.engine, self.now);
+        self.intake.buffer()[..bytes.len()].copy_from_slice(bytes);
+        self.intake.receive(bytes.len(), &mut self.engine, self.now);
         (self.now - before) / 1000
     }
 
@@ -130,9 +131,8 @@ proptest! {
 fn a_packet_is_held_while_a_job_of_the_link_is_open_and_no_other_is_wanted() {
     let mut rig = Rig::new();
     let mut reader = Reader::new();
-    let words = b"plain text";
     rig.engine.receive(&mut reader, &framed(&ToBridge::Begin { job: 5, kind: JobKind::Raw, length: 4 }));
-    rig.intake.receive(words, &mut rig.engine, rig.now);
+    rig.packet(b"plain text");
     assert_eq!(rig.intake.next(), Next::Time(1000));
     rig.pass(3 * S);
     assert!(!rig.wants() && rig.printed.is_empty());

@@ -57,6 +57,9 @@ bind_interrupts!(struct Interrupts {
 #[used]
 static PROGRAM: [EntryAddr; 2] = [rp_program_name!(c"foilpress-bridge"), rp_cargo_version!()];
 
+// The library counts time in µs, and a tick is one: converted they would be divided, by a processor that cannot.
+const _: () = assert!(embassy_time::TICK_HZ == 1_000_000);
+
 const FLASH_BYTES: usize = 2 * 1024 * 1024;
 
 /// 64 rows of 9880 dots, as `protocol::runs::band_bytes` counts them.
@@ -165,7 +168,7 @@ async fn main(spawner: Spawner) {
 async fn work(shared: &'static Shared) {
     loop {
         let Turn { more, wake_port } =
-            shared.engine(|engine| turn::work(engine, || Instant::now().as_micros()));
+            shared.engine(|engine| turn::work(engine, || Instant::now().as_ticks()));
         if wake_port {
             shared.wake(Side::Port);
         }

@@ -48,7 +48,7 @@ pub fn driver(strobe: Strobe, keeper: Keeper) -> PicoDriver {
 
 impl Clock for Pico {
     fn now_us(&self) -> u64 {
-        Instant::now().as_micros()
+        Instant::now().as_ticks()
     }
 }
 
@@ -138,7 +138,7 @@ pub async fn serve(shared: &'static Shared, driver: &'static mut PicoDriver) -> 
         if pause_us == 0 {
             yield_now().await;
         } else {
-            let pause = Timer::after(Duration::from_micros(pause_us.into()));
+            let pause = Timer::after(Duration::from_ticks(pause_us.into()));
             select3(pause, shared.wait(Side::Port), SENT.wait()).await;
         }
     }

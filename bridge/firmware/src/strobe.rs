@@ -3,10 +3,11 @@
 //! Problem: a byte every 2.42 µs, each with setup, strobe and hold times that are never too short, no strobe while the
 //! printer is busy or in trouble, and an exact count of what has crossed the port whenever it stops.
 //!
-//! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data, and looks at
-//! Busy, PError, Select and nFault together until all are well, three ticks before the strobe. Behind
-//! every strobe it pushes a word; a DMA channel takes these words away, and its counter *is* the number of bytes that
-//! have crossed. It leaves them as marks in memory that outlives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is not counted and can be taken back.
+//! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data. Then it looks at
+//! Busy, PError, Select and nFault together until all are well, and strobes three ticks later. Behind every strobe it
+//! pushes a word. A DMA channel takes these words away, and its counter *is* the number of bytes that have crossed. The
+//! words stay as marks in memory that survives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is
+//! not counted and can be taken back.
 //!
 //! One tick is an eighth of the longest time asked for and of one clock cycle more:
 //!
@@ -19,11 +20,11 @@
 //!
 //! A byte takes 24 ticks when the printer is quick enough: 2.42 µs with the default timing.
 //!
-//! Two buffers take turns, the interrupt of the DMA channel starting the second when the first is through, so the
-//! printer never waits for a task to be scheduled.
+//! Two buffers take turns. The interrupt of the DMA channel starts the second when the first is through, so the
+//! printer never waits for a task to be scheduled. The library keeps the books of the two ([`TwoBuffers`]).
 //!
-//! Limits: the handshake is Busy, and all four status lines are heeded. For others, and for everything else the
-//! port can do, there is [`bridge::port::Port`] on the same pins.
+//! Limits: the handshake is Busy, and all four status lines are heeded. For other handshakes, and for everything else the
+//! port can do, the library's [`Port`](bridge::port::Port) works the same pins.
 
 use crate::keep::{self, MARKS};
 use crate::pins;

@@ -1,8 +1,8 @@
 //! The lamp and the watchdog.
 //!
-//! The watchdog is fed only if the task at the port has been round its loop since the last time; if it hangs, or any
-//! task keeps the processor, the board restarts after eight seconds. While it is in reset nOE is high by its
-//! resistor and the printer sees nothing.
+//! The watchdog is fed only if the task at the port has gone round its loop since the last time. If that task hangs, or
+//! another one keeps the processor, the board restarts after eight seconds. During the reset a resistor holds nOE high,
+//! so the printer sees nothing of it. The library decides what the lamp shows ([`bridge::lamp`]).
 
 use crate::pins;
 use crate::shared::Shared;

@@ -80,49 +80,44 @@ pub enum Event {
 /// until then.
 #[derive(Default)]
 pub struct TwoBuffers {
-    /// Bytes left in each buffer in use, oldest first.
-    left: heapless::Deque<u32, 2>,
+    /// Bytes in each buffer that have not been sent.
+    left: [u32; 2],
+    /// The buffer to fill next: the older one, if both are in use.
     next: usize,
 }
 
 impl TwoBuffers {
     /// Two empty buffers.
     pub const fn new() -> Self {
-        TwoBuffers { left: heapless::Deque::new(), next: 0 }
+        TwoBuffers { left: [0; 2], next: 0 }
     }
 
     /// The buffer to fill next, 0 or 1, if it is free.
     pub fn free(&self) -> Option<usize> {
-        (!self.left.is_full()).then_some(self.next)
+        (self.left[self.next] == 0).then_some(self.next)
     }
 
     /// Records that the buffer [`free`](Self::free) has named was filled with `count` bytes, at least one.
     pub fn fill(&mut self, count: u32) {
-        if self.left.push_back(count).is_ok() {
-            self.next ^= 1;
-        }
+        self.left[self.next] = count;
+        self.next ^= 1;
     }
 
     /// Records that `count` more bytes have been sent.
-    pub fn empty(&mut self, mut count: u32) {
-        while let Some(oldest) = self.left.front_mut() {
-            let part = count.min(*oldest);
-            (*oldest, count) = (*oldest - part, count - part);
-            if *oldest > 0 {
-                return;
-            }
-            self.left.pop_front();
-        }
+    pub fn empty(&mut self, count: u32) {
+        let older = count.min(self.left[self.next]);
+        self.left[self.next] -= older;
+        self.left[self.next ^ 1] -= count - older;
     }
 
     /// Bytes in both buffers that have not been sent.
     pub fn in_flight(&self) -> u32 {
-        self.left.iter().sum()
+        self.left[0] + self.left[1]
     }
 
     /// Forgets what is in the buffers.
     pub fn clear(&mut self) {
-        self.left.clear();
+        self.left = [0; 2];
     }
 }
 

@@ -38,8 +38,8 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use heapless::Vec;
 use protocol::link::message::{Answer, Fault, Handshake, JobState, Lines, PortSettings};
 
-/// Room for an answer of the printer: device IDs are some hundred bytes long.
-pub const ANSWER_ROOM: usize = 512;
+/// What a printer has sent. Device IDs are some hundred bytes long.
+type Text = Vec<u8, 512>;
 
 /// Between two looks at the lines.
 const TICK_US: u32 = 1000;
@@ -61,6 +61,14 @@ enum Owner {
     WiringTest,
 }
 
+/// What the printer is to send.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Reverse {
+    DeviceId,
+    /// What it has to say, which is the answer to a question.
+    Answer,
+}
+
 /// The driver of a board `B` and of the port on its pins.
 pub struct Driver<B, D, O, I, A, T> {
     board: B,
@@ -76,7 +84,6 @@ pub struct Driver<B, D, O, I, A, T> {
     stop: Option<Fault>,
     introduction: Introduction,
     question: Option<StatusQuestion>,
-    answer: Vec<u8, ANSWER_ROOM>,
     /// Job and state that were last written to the log.
     logged: Option<(u32, JobState)>,
 }
@@ -105,7 +112,6 @@ where
             stop: None,
             introduction: Introduction::Waiting,
             question: None,
-            answer: Vec::new(),
             logged: None,
         };
         driver.release_pins();
@@ -121,8 +127,9 @@ where
         } else if let Some(task) = engine.task() {
             self.perform(task, engine, id);
         }
-        self.look(engine);
-        self.introduce(engine, id);
+        let now_us = self.board.now_us();
+        self.look(engine, now_us);
+        self.introduce(engine, id, now_us);
         if self.owner == Owner::WiringTest && !engine.output().is_empty() {
             self.release_pins();
         }
@@ -210,8 +217,7 @@ where
     }
 
     /// Reads the lines and tells the engine. If that ends a job, what is in flight is taken back.
-    fn look(&mut self, engine: &mut Engine<'_>) {
-        let now_us = self.board.now_us();
+    fn look(&mut self, engine: &mut Engine<'_>, now_us: u64) {
         let lines = self.board.lines();
         let heeded = lines.heeding(self.heed);
         let fault = match self.supply.fault(heeded, now_us) {
@@ -229,18 +235,19 @@ where
     }
 
     /// Asks a printer that has been switched on for its device ID, when it is time.
-    fn introduce(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId) {
+    fn introduce(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId, now_us: u64) {
         let lines = self.board.lines().heeding(self.heed);
         let free = self.owner != Owner::WiringTest && engine.is_idle();
-        match self.introduction.look(lines, free, self.board.now_us()) {
+        match self.introduction.look(lines, free, now_us) {
             Action::Nothing => {}
             Action::Forget => id.forget(),
             Action::Ask => {
                 self.take_pins(engine);
+                let mut text = Text::new();
                 // An ID that breaks off is of use all the same.
-                let told = matches!(self.read_device_id(), Ok(_) | Err(ReverseError::Silent(_)))
-                    && id.learn(&self.answer);
-                self.board.log(if told { Event::DeviceId(self.answer.len()) } else { Event::NoDeviceId });
+                let error = self.read(Reverse::DeviceId, &mut text);
+                let told = matches!(error, None | Some(ReverseError::Silent(_))) && id.learn(&text);
+                self.board.log(if told { Event::DeviceId(text.len()) } else { Event::NoDeviceId });
                 self.release_pins();
             }
         }
@@ -274,20 +281,20 @@ where
     /// Performs a task of the engine, or begins to.
     fn perform(&mut self, task: Task, engine: &mut Engine<'_>, id: &mut DeviceId) {
         self.take_pins(engine);
+        let mut text = Text::new();
         let outcome = match task {
             Task::Configure(settings) => match self.configure(&settings) {
                 Ok(()) => Outcome::Done,
                 Err(BadSettings) => Outcome::BadSettings,
             },
             Task::DeviceId => {
-                let result = self.read_device_id();
-                if result.is_ok() {
-                    id.learn(&self.answer);
+                let error = self.read(Reverse::DeviceId, &mut text);
+                if error.is_none() {
+                    id.learn(&text);
                 }
-                Outcome::Answer(self.reply(result.err()))
+                Outcome::Answer(self.reply(&text, error))
             }
             Task::PrinterStatus => {
-                self.answer.clear();
                 self.question = Some(StatusQuestion::new(self.board.now_us()));
                 return self.go_on_asking(engine);
             }
@@ -327,6 +334,7 @@ where
     /// Takes the next step of the status question, if it is due.
     fn go_on_asking(&mut self, engine: &mut Engine<'_>) {
         let Some(mut question) = self.question.take() else { return };
+        let mut text = Text::new();
         let now_us = self.board.now_us();
         let ended = match question.step(now_us) {
             Step::Write(bytes) => {
@@ -334,8 +342,10 @@ where
                 question.written(written, self.board.now_us())
             }
             Step::Read => {
-                let result = self.read(Port::read);
-                question.read(result, self.board.now_us())
+                // Shorter than the text may be.
+                let _ = text.extend_from_slice(question.so_far());
+                let error = self.read(Reverse::Answer, &mut text);
+                question.read(&text, error, self.board.now_us())
             }
             Step::Wait => None,
             Step::Over(ended) => Some(ended),
@@ -345,8 +355,8 @@ where
                 self.question = Some(question);
                 return;
             }
-            Some(Ended::Answered) => self.reply(None),
-            Some(Ended::Failed(error)) => self.reply(Some(error)),
+            Some(Ended::Answered) => Answer::Bytes(&text),
+            Some(Ended::Failed(error)) => self.reply(&[], Some(error)),
             Some(Ended::Stopped(fault)) => Answer::Stopped(fault),
             Some(Ended::Silent) => Answer::Silent,
         };
@@ -354,33 +364,30 @@ where
         self.release_pins();
     }
 
-    fn read_device_id(&mut self) -> Result<usize, ReverseError> {
-        self.answer.clear();
-        self.read(Port::device_id)
-    }
-
-    /// Appends to the answer what the printer sends.
-    fn read(
-        &mut self,
-        direction: fn(&mut Port<D, O, I, A, T>, &mut [u8]) -> Result<usize, ReverseError>,
-    ) -> Result<usize, ReverseError> {
-        let have = self.answer.len();
+    /// Appends to the text what the printer sends of this, as far as it fits. Returns what has gone wrong.
+    fn read(&mut self, what: Reverse, text: &mut Text) -> Option<ReverseError> {
+        let have = text.len();
         // To its capacity, which always succeeds.
-        let _ = self.answer.resize(ANSWER_ROOM, 0);
-        let result = direction(&mut self.port, &mut self.answer[have..]);
+        let _ = text.resize(text.capacity(), 0);
+        let room = &mut text[have..];
+        let result = match what {
+            Reverse::DeviceId => self.port.device_id(room),
+            Reverse::Answer => self.port.read(room),
+        };
         let fresh = match result {
             Ok(fresh) | Err(ReverseError::Silent(fresh)) => fresh,
             Err(_) => 0,
         };
-        self.answer.truncate(have + fresh);
-        result
+        text.truncate(have + fresh);
+        result.err()
     }
 
-    /// What to tell the engine of the bytes in the answer, or of the error that ended them.
-    fn reply(&mut self, error: Option<ReverseError>) -> Answer<'_> {
+    /// What to tell the engine of what was read.
+    fn reply<'t>(&mut self, text: &'t [u8], error: Option<ReverseError>) -> Answer<'t> {
         match error {
-            None | Some(ReverseError::Silent(_)) if self.answer.is_empty() => Answer::Silent,
-            None | Some(ReverseError::Silent(_)) => Answer::Bytes(&self.answer),
+            None | Some(ReverseError::Silent(_)) if text.is_empty() => Answer::Silent,
+            // Device IDs that break off are of use all the same.
+            None | Some(ReverseError::Silent(_)) => Answer::Bytes(text),
             Some(ReverseError::OneWay | ReverseError::Refused) => Answer::OneWay,
             Some(ReverseError::NotIdle) => match self.board.lines().heeding(self.heed).fault() {
                 Some(fault) => Answer::Stopped(fault),

@@ -11,6 +11,7 @@
 //! A printer that shows a fault before it has taken both bytes is left with half a question.
 
 use crate::port::{ReverseError, Stop, Written};
+use heapless::Vec;
 use protocol::link::message::Fault;
 
 /// The question.
@@ -27,19 +28,14 @@ pub(crate) const PAUSE_US: u64 = 10_000;
 
 /// A status question under way.
 pub(crate) struct StatusQuestion {
-    phase: Phase,
-    /// Attempts left in this phase.
+    /// Bytes of the question that the printer has taken. With all of them taken, the answer is read.
+    taken: usize,
+    /// Attempts left to put the question, or to read the answer.
     left: u32,
     /// When the next attempt is due.
     due_us: u64,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Phase {
-    /// The printer has taken so many bytes of the question.
-    Put(usize),
-    /// The printer has the question, and so many bytes of the answer have come.
-    Read(usize),
+    /// What has come of an answer that is not complete.
+    so_far: Vec<u8, { STATUS_LENGTH - 1 }>,
 }
 
 /// What is to be done now.
@@ -71,7 +67,7 @@ pub(crate) enum Outcome {
 impl StatusQuestion {
     /// A question that is to be put at `now_us`.
     pub(crate) fn new(now_us: u64) -> Self {
-        StatusQuestion { phase: Phase::Put(0), left: ATTEMPTS, due_us: now_us }
+        StatusQuestion { taken: 0, left: ATTEMPTS, due_us: now_us, so_far: Vec::new() }
     }
 
     /// For how many µs there is nothing to do.
@@ -82,41 +78,50 @@ impl StatusQuestion {
 
     /// What is to be done at `now_us`.
     pub(crate) fn step(&self, now_us: u64) -> Step {
-        match self.phase {
-            _ if now_us < self.due_us => Step::Wait,
-            _ if self.left == 0 => Step::Over(Outcome::Silent),
-            Phase::Put(count) => Step::Write(&STATUS[count..]),
-            Phase::Read(_) => Step::Read,
+        if now_us < self.due_us {
+            Step::Wait
+        } else if self.left == 0 {
+            Step::Over(Outcome::Silent)
+        } else if self.taken < STATUS.len() {
+            Step::Write(&STATUS[self.taken..])
+        } else {
+            Step::Read
         }
+    }
+
+    /// What has come of the answer so far.
+    pub(crate) fn so_far(&self) -> &[u8] {
+        &self.so_far
     }
 
     /// The bytes of [`Step::Write`] were offered to the printer; the attempt ended at `now_us`. Returns the end of the
     /// question, if this is it.
     pub(crate) fn written(&mut self, written: Written, now_us: u64) -> Option<Outcome> {
-        let Phase::Put(count) = self.phase else { return None };
+        self.taken += written.count;
         self.due_us = now_us + PAUSE_US;
-        match written.stop {
-            None => (self.phase, self.left) = (Phase::Read(0), ATTEMPTS),
-            Some(Stop::Busy) => (self.phase, self.left) = (Phase::Put(count + written.count), self.left - 1),
+        self.left = match written.stop {
+            None => ATTEMPTS,
+            Some(Stop::Busy) => self.left - 1,
             Some(Stop::Fault(fault)) => return Some(Outcome::Stopped(fault)),
-        }
+        };
         None
     }
 
-    /// Reading gave this; the attempt ended at `now_us`. Returns the end of the question, if this is it.
-    pub(crate) fn read(&mut self, result: Result<usize, ReverseError>, now_us: u64) -> Option<Outcome> {
-        let Phase::Read(have) = self.phase else { return None };
-        let fresh = match result {
-            Ok(fresh) => fresh,
-            // The printer is at work on the question.
-            Err(ReverseError::NotIdle) => 0,
-            Err(ReverseError::Silent(fresh)) if have + fresh > 0 => return Some(Outcome::Answered),
-            Err(error) => return Some(Outcome::Failed(error)),
-        };
-        (self.phase, self.left, self.due_us) = (Phase::Read(have + fresh), self.left - 1, now_us + PAUSE_US);
-        if have + fresh >= STATUS_LENGTH {
+    /// By now this much of the answer has come, what had come before included, and reading ended so; the attempt ended at
+    /// `now_us`. Returns the end of the question, if this is it.
+    pub(crate) fn read(&mut self, come: &[u8], error: Option<ReverseError>, now_us: u64) -> Option<Outcome> {
+        match error {
+            // Without a byte the printer is at work on the question.
+            None | Some(ReverseError::NotIdle) => {}
+            Some(ReverseError::Silent(_)) if !come.is_empty() => return Some(Outcome::Answered),
+            Some(error) => return Some(Outcome::Failed(error)),
+        }
+        self.so_far.clear();
+        // What does not fit is complete.
+        if self.so_far.extend_from_slice(come).is_err() {
             return Some(Outcome::Answered);
         }
+        (self.left, self.due_us) = (self.left - 1, now_us + PAUSE_US);
         // Behind the last attempt to read there is nothing to wait for.
         (self.left == 0).then_some(Outcome::Silent)
     }
@@ -165,7 +170,8 @@ mod tests {
         #[test]
         fn every_question_comes_to_an_end(reactions in reactions(), took_us in 0u64..45_000) {
             let (mut now, mut question) = (7u64, StatusQuestion::new(7));
-            let (mut put, mut have, mut attempts) = (Vec::new(), 0usize, 0u64);
+            let (mut put, mut attempts) = (Vec::new(), 0u64);
+            let mut come = Vec::new();
             let mut reactions = reactions.into_iter().chain(core::iter::repeat(Reaction::Works));
             let ended = loop {
                 match question.step(now) {
@@ -205,16 +211,17 @@ mod tests {
                         };
                         now += took_us;
                         let stops = matches!(result, Err(ReverseError::Silent(_)));
+                        prop_assert_eq!(question.so_far(), &come[..]);
                         if let Ok(count) | Err(ReverseError::Silent(count)) = result {
-                            have += count;
+                            come.resize(come.len() + count, come.len() as u8);
                         }
-                        match question.read(result, now) {
+                        match question.read(&come, result.err(), now) {
                             Some(Outcome::Answered) => {
-                                prop_assert!(have >= STATUS_LENGTH || stops && have > 0);
+                                prop_assert!(come.len() >= STATUS_LENGTH || stops && !come.is_empty());
                                 break Outcome::Answered;
                             }
                             Some(ended) => break ended,
-                            None => prop_assert!(have < STATUS_LENGTH && !stops),
+                            None => prop_assert!(come.len() < STATUS_LENGTH && !stops),
                         }
                     }
                 }
@@ -222,8 +229,8 @@ mod tests {
             prop_assert!(attempts <= 400);
             prop_assert!(now <= 7 + 400 * (10_000 + took_us), "{} µs", now);
             match ended {
-                Outcome::Answered => prop_assert!(have > 0),
-                Outcome::Silent => prop_assert!(have < STATUS_LENGTH && attempts >= 200),
+                Outcome::Answered => prop_assert!(!come.is_empty()),
+                Outcome::Silent => prop_assert!(come.len() < STATUS_LENGTH && attempts >= 200),
                 Outcome::Stopped(fault) => prop_assert_eq!(fault, Fault::PaperOut),
                 Outcome::Failed(error) => prop_assert!(matches!(error, ReverseError::OneWay | ReverseError::Silent(0))),
             }
@@ -256,7 +263,7 @@ mod tests {
             assert_eq!(question.step(now), Step::Wait);
             now += 10_000;
             assert_eq!(question.step(now), Step::Read);
-            let ended = question.read(Ok(0), now);
+            let ended = question.read(&[], None, now);
             assert_eq!(ended, (attempt == 200).then_some(Outcome::Silent));
         }
         assert_eq!(now, 2_000_000);
@@ -265,11 +272,11 @@ mod tests {
     #[test]
     fn one_byte_alone_is_no_answer() {
         let (mut question, mut now) = (taken(), 10_000);
-        assert_eq!(question.read(Ok(1), now), None);
+        assert_eq!(question.read(&[6], None, now), None);
         let ended = loop {
             now += 10_000;
             assert_eq!(question.step(now), Step::Read);
-            if let Some(ended) = question.read(Ok(0), now) {
+            if let Some(ended) = question.read(&[6], None, now) {
                 break ended;
             }
         };
@@ -279,19 +286,20 @@ mod tests {
     #[test]
     fn an_answer_may_come_in_pieces_and_is_complete_with_its_last_byte() {
         let mut question = taken();
-        for count in [1, 0, 20, 16] {
-            assert_eq!(question.read(Ok(count), 0), None);
+        for count in [1, 1, 21, 37] {
+            assert_eq!(question.read(&[7; 38][..count], None, 0), None);
+            assert_eq!(question.so_far(), &[7; 38][..count]);
         }
-        assert_eq!(question.read(Ok(1), 0), Some(Outcome::Answered));
+        assert_eq!(question.read(&[7; 38], None, 0), Some(Outcome::Answered));
     }
 
     #[test]
     fn bytes_that_came_before_the_printer_stopped_are_an_answer() {
-        assert_eq!(taken().read(Err(ReverseError::Silent(3)), 0), Some(Outcome::Answered));
+        let stopped = |come, error| taken().read(come, Some(error), 0);
+        assert_eq!(stopped(&[1, 2, 3], ReverseError::Silent(3)), Some(Outcome::Answered));
+        // All of them in earlier attempts.
+        assert_eq!(stopped(&[1, 2, 3], ReverseError::Silent(0)), Some(Outcome::Answered));
         let nothing = ReverseError::Silent(0);
-        assert_eq!(taken().read(Err(nothing), 0), Some(Outcome::Failed(nothing)));
-        let mut question = taken();
-        assert_eq!(question.read(Ok(20), 0), None);
-        assert_eq!(question.read(Err(nothing), 0), Some(Outcome::Answered));
+        assert_eq!(stopped(&[], nothing), Some(Outcome::Failed(nothing)));
     }
 }

@@ -13,7 +13,6 @@
 //! A job that breaks off is brought to a legal end or, if it was never in the printer's language, left as it is.
 
 use crate::engine::Engine;
-use heapless::Vec;
 
 /// The most bytes of a packet.
 pub const PACKET: usize = 64;
@@ -47,9 +46,10 @@ pub enum Next {
 
 /// What becomes of the bytes of a printer interface.
 pub struct Intake {
-    /// The packet in hand, and how much of it the engine has taken.
-    packet: Vec<u8, PACKET>,
-    taken: usize,
+    /// The packet in hand, or the last one.
+    packet: [u8; PACKET],
+    /// What of it the engine has not taken.
+    left: core::ops::Range<usize>,
     /// When the packet in hand is offered again, or else when the next check is due.
     due_us: u64,
     /// Checks since the last packet at which the job only waited.
@@ -59,7 +59,7 @@ pub struct Intake {
 impl Intake {
     /// Nothing has come.
     pub const fn new() -> Self {
-        Intake { packet: Vec::new(), taken: 0, due_us: 0, waited: 0 }
+        Intake { packet: [0; PACKET], left: 0..0, due_us: 0, waited: 0 }
     }
 
     /// The host has configured the interface.
@@ -70,15 +70,18 @@ impl Intake {
 
     /// What to wait for. Then one of the following, and this again.
     pub fn next(&self) -> Next {
-        if self.taken < self.packet.len() { Next::Time(self.due_us) } else { Next::Packet(self.due_us) }
+        if self.left.is_empty() { Next::Packet(self.due_us) } else { Next::Time(self.due_us) }
     }
 
-    /// A packet of at most [`PACKET`] bytes has come. Only when [`Intake::next`] allows one.
-    pub fn receive(&mut self, packet: &[u8], engine: &mut Engine<'_>, now_us: u64) {
-        self.drop_packet(now_us);
+    /// Where to put the next packet. Only when [`Intake::next`] allows one.
+    pub fn buffer(&mut self) -> &mut [u8; PACKET] {
+        &mut self.packet
+    }
+
+    /// A packet of so many bytes has come to the [buffer](Intake::buffer).
+    pub fn receive(&mut self, count: usize, engine: &mut Engine<'_>, now_us: u64) {
         self.waited = 0;
-        // No endpoint gives more.
-        let _ = self.packet.extend_from_slice(&packet[..packet.len().min(PACKET)]);
+        self.left = 0..count.min(PACKET);
         self.offer(engine, now_us);
     }
 
@@ -93,7 +96,7 @@ impl Intake {
 
     /// The time that [`Intake::next`] has named has come.
     pub fn wake(&mut self, engine: &mut Engine<'_>, now_us: u64) {
-        if self.taken < self.packet.len() {
+        if !self.left.is_empty() {
             return self.offer(engine, now_us);
         }
         self.due_us = now_us + CHECK_US;
@@ -113,21 +116,20 @@ impl Intake {
 
     /// Offers the packet in hand for as long as the engine takes some of it.
     fn offer(&mut self, engine: &mut Engine<'_>, now_us: u64) {
-        while self.taken < self.packet.len() {
-            let count = engine.local(&self.packet[self.taken..]);
+        while !self.left.is_empty() {
+            let count = engine.local(&self.packet[self.left.clone()]);
             if count == 0 {
                 self.due_us = now_us + AGAIN_US;
                 return;
             }
-            self.taken += count;
+            self.left.start += count;
         }
         self.drop_packet(now_us);
     }
 
     /// Forgets the packet in hand.
     fn drop_packet(&mut self, now_us: u64) {
-        self.packet.clear();
-        self.taken = 0;
+        self.left = 0..0;
         self.due_us = now_us + CHECK_US;
     }
 }

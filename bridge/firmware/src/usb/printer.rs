@@ -95,17 +95,16 @@ enum Came {
 /// Takes what an operating system prints.
 #[embassy_executor::task]
 pub async fn run(shared: &'static Shared, mut endpoint: BulkOut, _silent: BulkIn) -> ! {
-    let mut packet = [0; PACKET as usize];
     let mut intake = Intake::new();
-    let now_us = || Instant::now().as_micros();
+    let now_us = || Instant::now().as_ticks();
     loop {
         endpoint.wait_enabled().await;
         intake.connect(now_us());
         loop {
             let came = match intake.next() {
                 Next::Packet(until_us) => {
-                    let time = Timer::at(Instant::from_micros(until_us));
-                    match select3(endpoint.read(&mut packet), shared.printer_end.wait(), time).await {
+                    let time = Timer::at(Instant::from_ticks(until_us));
+                    match select3(endpoint.read(intake.buffer()), shared.printer_end.wait(), time).await {
                         Either3::First(Ok(count)) => Came::Packet(count),
                         Either3::First(Err(_)) => Came::Nothing,
                         Either3::Second(end) => Came::End(end),
@@ -113,7 +112,7 @@ pub async fn run(shared: &'static Shared, mut endpoint: BulkOut, _silent: BulkIn
                     }
                 }
                 Next::Time(at_us) => {
-                    let time = Timer::at(Instant::from_micros(at_us));
+                    let time = Timer::at(Instant::from_ticks(at_us));
                     match select(time, shared.printer_end.wait()).await {
                         Either::First(()) => Came::Time,
                         Either::Second(end) => Came::End(end),
@@ -121,7 +120,7 @@ pub async fn run(shared: &'static Shared, mut endpoint: BulkOut, _silent: BulkIn
                 }
             };
             shared.engine(|engine| match came {
-                Came::Packet(count) => intake.receive(&packet[..count], engine, now_us()),
+                Came::Packet(count) => intake.receive(count, engine, now_us()),
                 Came::End(end) => intake.end(end, engine, now_us()),
                 Came::Time => intake.wake(engine, now_us()),
                 Came::Nothing => intake.end(End::Gone, engine, now_us()),
