@@ -1,12 +1,12 @@
 //! The engine's work in turns, between which others may run.
 //!
 //! A slice of the engine's work takes up to 0.4 ms on the microcontroller, and a page is millions of them; the link has to be
-//! answered within 5 ms meanwhile. So the engine works for [`TURN_US`] and for the slice under way, and then others run.
+//! answered within 5 ms meanwhile. So the engine works for 0.2 ms and for the slice under way, and then others run.
 
 use crate::engine::Engine;
 
 /// The length of a turn, in µs. The sender has bytes for ten times as long.
-pub const TURN_US: u64 = 200;
+const TURN_US: u64 = 200;
 
 /// What came of a turn.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

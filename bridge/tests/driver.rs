@@ -49,7 +49,7 @@ fn settings(handshake: Handshake, timing: Timing) -> PortSettings {
     PortSettings { handshake, ..timing.settings() }
 }
 
-/// Lets a host send its job; `at_each_turn` is done now and then.
+/// Lets a host send its job, and does something else now and then.
 fn converse(bench: &mut Bench<'_>, job: &Job, mut now_and_then: impl FnMut(&mut Bench<'_>)) -> JobState {
     let mut host = Host::new(job);
     for round in 0..20_000 {

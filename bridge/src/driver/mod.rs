@@ -145,11 +145,6 @@ where
         }
     }
 
-    /// The board, to look at.
-    pub fn board(&self) -> &B {
-        &self.board
-    }
-
     /// Reports to the engine what the sender has sent.
     fn count(&mut self, engine: &mut Engine<'_>) {
         let sent = self.board.sent();

@@ -16,7 +16,7 @@ use std::rc::Rc;
 use std::vec::Vec;
 
 /// Bytes in each of the sender's buffers.
-pub const CHUNK: usize = 1024;
+const CHUNK: usize = 1024;
 
 /// The clock whose cycles the sender counts.
 const CLOCK_HZ: u32 = 125_000_000;

@@ -13,7 +13,7 @@ mod check;
 mod peripheral;
 mod pins;
 
-pub use board::{CHUNK, SimulatedBoard};
+pub use board::SimulatedBoard;
 pub use check::{Violation, check};
 pub use peripheral::{Pause, Peripheral, Response};
 pub use pins::{AckLine, DataLines, DelayLine, InLine, OutLine};
