@@ -5,14 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use clap::Args;
 use inks::{InkSet, Library};
-use protocol::paper::Paper;
 
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
-use press::job::placement::Size;
 use press::layers;
-use press::layout;
 
 use super::choice::choice;
 use observe::Observer;
@@ -144,16 +141,4 @@ impl GamutArgs {
     pub fn settings(&self, seed: u64) -> gamut::Settings {
         gamut::Settings { intent: self.intent, seed, ..gamut::Settings::default() }
     }
-}
-
-/// Where and how large.
-#[derive(Args, Debug)]
-pub struct PageArgs {
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape and is centred
-    /// [default: the document's own size, else as large as the page allows]
-    #[arg(long)]
-    pub size: Option<Size>,
-    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
-    #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
-    pub paper: Paper,
 }

@@ -10,15 +10,16 @@ use serde_json::json;
 
 use super::choice::choice;
 use super::deliver::DeliverArgs;
+use super::job::{Artwork, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
-use super::piece::{self, Job, ResultArgs};
-use super::plan::Shown;
 use super::preset::PresetArg;
+use super::shown::Shown;
 use observe::Observer;
-use press::job::placement::{DOTS_PER_MM, Size};
 use press::job::plan::grouped;
 use press::layers::{self, Accept, Composed, Finish, Order, Room, Suggestion, White, names};
-use press::layout::{Layout, Mm, NoLength};
+use press::layout::{Layout, Mm, NoLength, Size};
+use press::pipeline;
+use press::sheet::DOTS_PER_MM;
 
 /// What to read and how it becomes layers of ink.
 #[derive(ClapArgs, Debug)]
@@ -228,7 +229,7 @@ pub struct Args {
     args_override_self = true,
     after_help = "Examples:\n  \
     foilpress plan layers white.png gold.png black.png --passes white=3\n  \
-    foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to lay beside the machine)\n  \
+    foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to lay beside the printer)\n  \
     foilpress plan layers art.svg --json\n\n\
     The options are those of `foilpress layers` that decide what is printed, not where it goes."
 )]
@@ -244,40 +245,37 @@ impl Work {
     fn with<T>(
         &self,
         observer: &dyn Observer,
-        then: impl FnOnce(&Job<'_>, &Layout) -> Result<T>,
+        then: impl FnOnce(&Artwork<'_>, &Layout) -> Result<T>,
     ) -> Result<T> {
         let library = self.layers.library()?;
         let layout = self.layout.layout(observer)?;
         let (options, settings) = (self.layers.options(self.size, &layout)?, self.layers.settings()?);
         let art = layers::open(&self.layers.art, &options, observer)?;
         let composed = layers::compose(&art, &settings, &library, observer)?;
-        let job = Job {
+        let artwork = Artwork {
             name: &art.name,
-            piece: &composed.piece,
+            dots: &composed.dots,
             allowed: settings.inks,
             library: &library,
-            report: Some((
-                "art",
-                json!({ "composed": composed.report, "suggestions": composed.suggestions }),
-            )),
+            report: json!({ "art": { "composed": composed.report, "suggestions": composed.suggestions } }),
             advice: words(&composed),
         };
-        then(&job, &layout)
+        then(&artwork, &layout)
     }
 }
 
 /// Runs `layers`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let Args { work, result, deliver } = args;
-    work.with(observer, |job, layout| piece::print_on(job, layout, &work.media, result, deliver, observer))
+    work.with(observer, |artwork, layout| artwork.print(layout, &work.media, result, deliver, observer))
 }
 
 /// Runs `plan layers`.
 pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
     let page = args.shown.stage()?;
-    args.work.with(observer, |job, layout| {
-        let piece::Prepared { sheet, plan, .. } = piece::prepare(job, layout, &args.work.media, observer)?;
-        args.shown.show(page, (&plan, &sheet), job.report.clone(), &job.advice)
+    args.work.with(observer, |artwork, layout| {
+        let draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
+        args.shown.show(page, (&draft.plan, &draft.sheet), &artwork.report, &artwork.advice)
     })
 }
 

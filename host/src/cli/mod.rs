@@ -4,6 +4,7 @@
 //! 1 failed, 2 wrong usage, 130 interrupted. Results go to standard output, everything else to standard error; a
 //! closed pipe is success.
 
+mod advice;
 mod args;
 mod bridge;
 mod chain;
@@ -14,11 +15,11 @@ mod doctor;
 mod generate;
 mod inks;
 mod inspect;
+mod job;
 mod layers;
 mod layout;
 mod ledger;
 mod output;
-mod piece;
 mod plan;
 mod preset;
 mod print;
@@ -27,6 +28,7 @@ mod queue;
 mod resume;
 mod sample;
 mod send;
+mod shown;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -58,7 +60,7 @@ const LARGEST_JOB: u64 = 256 << 20;
         foilpress inks show MS+C\n  \
         foilpress inspect job.rgl --passes passes/\n  \
         foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
-        The chain, step by step: factor, map, halftone, separate, encode, simulate.\n\
+        The chain, step by step: factor, map, halftone, layout, separate, encode, simulate.\n\
         Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 )]
 struct Args {
@@ -91,9 +93,11 @@ enum Command {
     Factor(chain::Factor),
     /// Fit basis materials (or every pixel) to mixtures of printable stacks
     Map(chain::Map),
-    /// Choose one stack for every dot of the page
+    /// Choose one stack for every dot of a document
     Halftone(chain::Halftone),
-    /// Split a sheet into one-bit passes, one ink each
+    /// Lay dots on a page: position, copies, marks, mirror, profile
+    Layout(chain::Layout),
+    /// Split a page into one-bit passes, one ink each
     Separate(chain::Separate),
     /// Write passes as a job in the printer's language
     Encode(chain::Encode),
@@ -148,7 +152,8 @@ pub fn main() -> ExitCode {
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             output::yield_to_interrupt();
-            let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
+            let advice = advice::of(&error).map_or_else(String::new, |advice| format!("; {advice}"));
+            let _ = writeln!(io::stderr(), "foilpress: {}{advice}", chain(&error));
             if bridge::is_forbidden(&error) {
                 let _ = write!(io::stderr(), "\n{}", bridge::permission());
             }
@@ -171,6 +176,7 @@ fn run(args: Args) -> Result<()> {
         Command::Factor(args) => args.run(observer),
         Command::Map(args) => args.run(observer),
         Command::Halftone(args) => args.run(observer),
+        Command::Layout(args) => args.run(observer),
         Command::Separate(args) => args.run(observer),
         Command::Encode(args) => args.run(observer),
         Command::Simulate(args) => args.run(observer),

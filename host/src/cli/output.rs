@@ -31,6 +31,8 @@ pub enum Kind {
     /// Mixtures of stacks.
     Mix,
     /// One stack for every dot.
+    Dots,
+    /// The same on a page.
     Sheet,
     /// One-bit passes.
     Passes,
@@ -47,6 +49,7 @@ impl Kind {
             Kind::Print => Some("report.json"),
             Kind::Foil => Some("document.toml"),
             Kind::Mix => Some("mix.toml"),
+            Kind::Dots => Some("dots.toml"),
             Kind::Sheet => Some("sheet.toml"),
             Kind::Passes => Some("passes.toml"),
             Kind::Pictures | Kind::Maps => None,
@@ -65,7 +68,8 @@ impl Kind {
                 }
                 Kind::Foil => name == "bases.csv" || (name.starts_with("weights-") && picture(name)),
                 Kind::Mix => name.starts_with("weights-") && picture(name),
-                Kind::Sheet => name == "separation.png",
+                Kind::Dots => name == "separation.png",
+                Kind::Sheet => ["separation.png", "layout.toml"].contains(&name),
                 Kind::Passes | Kind::Pictures => {
                     name.starts_with(|c: char| c.is_ascii_digit()) && name.contains('-') && picture(name)
                 }

@@ -12,7 +12,7 @@ use clap::{Args as ClapArgs, CommandFactory as _, Subcommand};
 use serde::{Deserialize, Serialize};
 
 use crate::folders;
-use press::sheet::picture::{read_toml, write_toml};
+use press::files::{read_toml, write_toml};
 
 /// `--preset`, for commands whose options can be kept under a name.
 #[derive(ClapArgs, Debug)]

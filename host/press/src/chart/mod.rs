@@ -1,8 +1,8 @@
-//! Charts: pieces made by the program itself, to look at inks, to measure them, and to measure the machine.
+//! Charts: dot maps made by the program itself, to look at inks, to measure them, and to measure the printer.
 //!
 //! [`ramp`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
-//! [`registration()`] shows how far passes are apart, [`calibration()`] where the machine begins and how far it feeds. Each gives
-//! a [`Piece`](crate::sheet::Piece) that goes the way of every other print.
+//! [`registration()`] shows how far passes are apart, [`calibration()`] where the printer starts and how far it feeds. Each gives
+//! a [`DotMap`](crate::sheet::DotMap) that is laid out and printed like any other.
 
 pub mod calibration;
 pub mod registration;
@@ -19,7 +19,7 @@ use crate::halftone::HalftoneError;
 use crate::sheet::SheetError;
 use appearance::weights::WeightError;
 
-/// Why there is no chart.
+/// Why a chart cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ChartError {
     /// Nothing to show a difference of.
@@ -31,10 +31,10 @@ pub enum ChartError {
         stack: Stack,
     },
     /// Too few inks.
-    #[error("registration is between passes: at least two inks are needed")]
+    #[error("registration compares passes, so at least two inks are needed")]
     OneInk,
     /// More than a chart shows.
-    #[error("{found} {what}; at most {most} have room on this paper, choose fewer with --inks")]
+    #[error("{found} {what}: this paper has room for {most}; choose fewer inks")]
     TooMany {
         /// What.
         what: &'static str,
@@ -45,7 +45,7 @@ pub enum ChartError {
     },
     /// The paper is too small.
     #[error(
-        "the {chart} chart needs {width:.0} x {length:.0} mm to print on, and {paper} has less; take a4 or letter"
+        "the {chart} chart needs a printable area of {width:.0} x {length:.0} mm, and {paper} has less; choose a4 or letter"
     )]
     Paper {
         /// Name of the chart.
@@ -60,10 +60,10 @@ pub enum ChartError {
     /// A ramp without places. A bug if it is ever seen.
     #[error(transparent)]
     Weights(#[from] WeightError),
-    /// The halftone refused.
+    /// Halftoning.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),
-    /// What was drawn is no piece. A bug if it is ever seen.
+    /// What was drawn is no dot map. A bug if it is ever seen.
     #[error(transparent)]
     Sheet(#[from] SheetError),
 }

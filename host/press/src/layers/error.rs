@@ -162,7 +162,7 @@ pub enum LayersError {
     /// Halftoning.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),
-    /// The stacks make no piece.
+    /// The stacks do not make a dot map.
     #[error(transparent)]
     Sheet(#[from] SheetError),
 }

@@ -1,13 +1,12 @@
-//! A sheet as the fewest ordered one-bit passes, and what the printer thinks of them.
+//! A sheet as the fewest ordered one-bit passes, and what the rules say of them.
 //!
 //! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
-//! Method: the shortest list of inks in which every stack in use finds its layers in order (`order`), one plane for
-//! each (`pack`), the rules on stacks and pages as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
+//! Method: the shortest list of inks in which every stack in use finds its layers in order (`sheet::order`), one plane
+//! for each (`pack`), the rules on stacks and pages as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
 //! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_LAYERS`] layers.
 
 pub mod files;
-mod order;
 pub(crate) mod pack;
 pub mod rules;
 
@@ -17,14 +16,13 @@ use inks::{Rule, Stack};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
-use crate::sheet::{Sheet, SheetError};
+use crate::sheet::{Sheet, SheetError, order};
 use observe::Observer;
 
 pub use inks::{Certainty, Severity};
-pub use order::place as customary;
 pub use rules::Check;
 
-/// Cartridges the machine holds.
+/// Cartridges the printer holds.
 pub const MOST_CARTRIDGES: usize = 7;
 
 /// Most passes over one sheet. The longest job known on hardware had 7.
@@ -71,7 +69,7 @@ pub struct Planned {
     pub dots: u64,
 }
 
-/// What is printed in which order, and what must be in the machine.
+/// What is printed in which order, and what must be in the printer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
     /// The passes, first printed (lowest) first.
@@ -98,13 +96,13 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// Takes back what the checks say of stacks without a dot on the pieces: marks are cut off. What must not be printed
+    /// Takes back what the checks say of stacks without a dot on the copies: marks are cut off. What must not be printed
     /// stays so wherever it is.
-    pub fn spare_marks(&mut self, on_pieces: impl Fn(&Stack) -> bool) {
+    pub(crate) fn spare_marks(&mut self, on_copies: impl Fn(&Stack) -> bool) {
         self.checks.retain_mut(|check| {
             let all = check.stacks.len();
             if check.severity != Severity::Error {
-                check.stacks.retain(&on_pieces);
+                check.stacks.retain(&on_copies);
             }
             all == 0 || !check.stacks.is_empty()
         });
@@ -155,7 +153,7 @@ pub enum SeparateError {
         length: usize,
     },
     /// The inks on a dot are none of the stacks.
-    #[error("the passes put `{stack}` on dot ({x}, {y}), which is none of the sheet's {stacks} stacks")]
+    #[error("the passes put `{stack}` on dot ({x}, {y}); none of the sheet's {stacks} stacks is like that")]
     Unknown {
         /// Column.
         x: usize,
@@ -175,24 +173,19 @@ fn names(inks: &[Ink]) -> String {
     inks.iter().map(|ink| ink.name()).collect::<Vec<_>>().join(", ")
 }
 
-/// The passes that lay down all of these stacks, lowest first: what [`separate`] does when all are in use.
-pub fn passes_of(stacks: &[Stack]) -> Vec<Ink> {
-    order::order(&stacks.iter().map(Stack::layers).collect::<Vec<_>>()).inks
-}
-
 /// What the rules on stacks and pages say of a sheet that is printed in these passes, most severe first.
-pub fn check(sheet: &Sheet, passes: &[Planned], order: &[Rule]) -> Vec<Check> {
+pub fn check(sheet: &Sheet, passes: &[Planned], rules: &[Rule]) -> Vec<Check> {
     let plan = Plan { passes: passes.to_vec(), cartridges: Vec::new(), fewest: false };
-    rules::check(sheet, &sheet.census(), &plan, order)
+    rules::check(sheet, &sheet.census(), &plan, rules)
 }
 
-/// Separates a sheet into passes. Only stacks that occur on a dot count. `order` are the ink library's rules on the
+/// Separates a sheet into passes. Only stacks that occur on a dot count. `rules` are the ink library's rules on the
 /// order of layers ([`inks::Library::rules`]).
 ///
 /// More than [`MOST_CARTRIDGES`] inks are planned, with a check that forbids to send them.
 ///
 /// Errors: more than [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
-pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
+pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
     let used: Vec<(usize, &Stack)> =
@@ -225,7 +218,7 @@ pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Resul
     let plan = Plan { passes: planned, cartridges, fewest: shortest };
     let (planes, checks) = rayon::join(
         || pack::pack(sheet.width(), sheet.index(), &passes_of, inks.len()),
-        || rules::check(sheet, &census, &plan, order),
+        || rules::check(sheet, &census, &plan, rules),
     );
     observer.advance(1);
     observer.end();
