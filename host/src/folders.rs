@@ -1,15 +1,15 @@
-//! Where the user's own files are: profiles of machines and presets.
+//! Where the user's own files are: calibration profiles and presets.
 
 use std::path::{Path, PathBuf};
 
 /// There is no place for the user's files.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no folder for your settings: set HOME, or FOILPRESS_CONFIG to a folder of your choice")]
+#[error("there is no folder for your settings; set HOME, or set FOILPRESS_CONFIG to a folder")]
 pub struct NoFolder;
 
-/// A name that is no file's.
+/// A name that cannot be the name of a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no name; use letters, digits, - and _, 64 at most")]
+#[error("`{0}` is not a valid name; use at most 64 letters, digits, - and _")]
 pub struct NoName(String);
 
 /// The folder of settings: `FOILPRESS_CONFIG`, or `foilpress` where the system keeps programs' settings.

@@ -94,7 +94,7 @@ pub enum PrintError {
     #[error("this must not be printed: {0}")]
     Refused(String),
     /// The simulated printer.
-    #[error("the simulated printer did not print the job: {0}")]
+    #[error("the simulated printer did not print the job")]
     Simulate(#[from] SimulateError),
     /// The simulated sheet.
     #[error(transparent)]

@@ -20,17 +20,17 @@ use observe::Observer;
 /// What to read.
 #[derive(Args, Debug)]
 pub struct DocumentArgs {
-    /// A folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .csv), a .foil folder, or
-    /// sample:NAME
+    /// Document: a folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .csv), a .foil
+    /// folder, or sample:NAME
     #[arg(value_name = "DOC")]
     pub document: String,
-    /// Which material of a glTF file, by number (from 0) or name
+    /// Material of a glTF file, by number (from 0) or name [default: the only one]
     #[arg(long, value_name = "NUMBER|NAME")]
     pub material: Option<String>,
-    /// Encoding of the colour maps, if it is not the usual one of their file format
+    /// Encoding of the colour maps [default: the usual one of their file format]
     #[arg(long, value_name = "SPACE", value_parser = choice::<ColourSpace>())]
     pub colour_space: Option<ColourSpace>,
-    /// Angles each reflectance curve is sampled at, 32 to 512; 32 is enough for everything printable
+    /// Number of angles at which each reflectance curve is sampled, 32 to 512; 32 is enough for anything printable
     #[arg(long, default_value_t = document::SAMPLES, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(32..=512))]
     pub samples: usize,
 }
@@ -68,10 +68,10 @@ pub struct FactorArgs {
     /// Number of bases [default: as many as the document needs]
     #[arg(long, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=factor::MOST_BASES as u64))]
     pub bases: Option<usize>,
-    /// How bases are learnt: archetypes, or the paper's kmeans (convex hull) and sacls
+    /// Method that finds the bases: archetypes, or the paper's kmeans (convex hull) and sacls
     #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes", value_parser = choice::<Method>())]
     pub method: Method,
-    /// Seed of everything that is left to chance; equal seeds give equal prints
+    /// Seed of all random choices; equal seeds give equal prints
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }
@@ -91,11 +91,11 @@ impl FactorArgs {
 /// What to print with.
 #[derive(Args, Debug)]
 pub struct InkArgs {
-    /// Inks at hand: names and the groups process, metallic, clear, foil, default, all, joined by commas; a leading
-    /// - takes one away from the default [default: all but the foils]
+    /// Inks to print with: names and the groups process, metallic, clear, foil, default, all, separated by commas; a
+    /// leading - removes one from the default [default: all but the foils]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub inks: Option<String>,
-    /// Folder of an ink library of your own, such as one you measured
+    /// Folder of your own ink library, such as one you measured [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
 }
@@ -105,7 +105,7 @@ impl InkArgs {
     pub fn at_hand(&self) -> Result<(InkSet, Library)> {
         let (set, library) = (self.set()?, self.library()?);
         if library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty()) {
-            bail!("--inks: there is no stack of {set} alone; `foilpress inks list` shows what goes together");
+            bail!("--inks: the library has no stack made only of {set}; `foilpress inks list` shows the stacks it has");
         }
         Ok((set, library))
     }
@@ -133,8 +133,8 @@ impl InkArgs {
 /// How to fit materials to the inks.
 #[derive(Args, Debug)]
 pub struct GamutArgs {
-    /// What to do with materials no ink can make: basis keeps differences (the paper), clamp keeps closest, blend is
-    /// between, auto clamps unless that would make different materials look alike
+    /// How to treat materials that no ink can make: basis keeps their differences (the paper's way), clamp keeps each
+    /// one as close as possible, blend lies between, auto clamps unless that would make different materials look alike
     #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
 }
@@ -149,11 +149,11 @@ impl GamutArgs {
 /// Where and how large.
 #[derive(Args, Debug)]
 pub struct PageArgs {
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape and is centred
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions and is centred
     /// [default: the document's own size, else as large as the page allows]
     #[arg(long)]
     pub size: Option<Size>,
-    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     pub paper: Paper,
 }

@@ -39,13 +39,13 @@ const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress bridge list\n  \
-    foilpress bridge status                              (the only bridge there is)\n  \
+    foilpress bridge status                              (the only bridge)\n  \
     foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
-    foilpress bridge status --watch                      (until Ctrl-C)\n  \
+    foilpress bridge status --watch                      (refreshed until Ctrl-C)\n  \
     foilpress bridge test                                (the wiring, with a loop-back plug)\n  \
-    foilpress bridge log                                 (what the firmware has noted)\n  \
+    foilpress bridge log                                 (the log of the firmware)\n  \
     foilpress bridge flash                               (new firmware, or the first one on a new board)\n  \
-    foilpress bridge reset                               (after a sheet was lost)")]
+    foilpress bridge reset                               (after a sheet has been lost)")]
 pub struct Args {
     #[command(subcommand)]
     command: Command,
@@ -53,30 +53,32 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// The bridges on USB, with firmware and printer
+    /// List the bridges on USB with their firmware and printer
     List(list::Args),
-    /// Put firmware on a bridge, or on a new board
+    /// Install firmware on a bridge or on a new board
     Flash(flash::Args),
-    /// The bridge, its job, the port's lines, and the printer's own answer when no job is open
+    /// Show a bridge, its job, the lines of its port, and the printer's own status
+    ///
+    /// The printer is asked only while no job is open.
     Status(StatusArgs),
-    /// Try the wiring with a loop-back plug, or walk through the lines for a meter
+    /// Test the wiring with a loop-back plug, or step through the lines for a meter
     Test(test::Args),
-    /// What the firmware has noted, also before its last restart
+    /// Show the log of the firmware, including entries from before its last restart
     Log(log::Args),
-    /// Reset the printer through the bridge, after a bridge has lost its memory in the middle of a sheet
+    /// Reset the printer through the bridge, after the bridge has lost its memory in the middle of a sheet
     Reset(reset::Args),
 }
 
 /// Arguments of `bridge status`.
 #[derive(ClapArgs, Debug)]
 struct StatusArgs {
-    /// Where the bridge is [default: the only one there is]
+    /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Again and again, in place; with --json an object on a line whenever something has changed
+    /// Refresh until interrupted; with --json, print one object on a line whenever something changes
     #[arg(long)]
     watch: bool,
 }
@@ -120,7 +122,7 @@ pub fn is_forbidden(error: &anyhow::Error) -> bool {
 /// What gives the permission.
 pub fn permission() -> String {
     if !cfg!(target_os = "linux") {
-        return "close other programs that may use it, and unplug it and plug it in again\n".into();
+        return "Close other programs that may use the bridge, then unplug it and plug it in again.\n".into();
     }
     let rules: String = UDEV_RULES.lines().filter(|line| !line.starts_with('#') && !line.is_empty()).fold(
         String::new(),
@@ -131,7 +133,7 @@ pub fn permission() -> String {
         },
     );
     format!(
-        "Allow it once, and plug the bridge in again:\n\n\
+        "Give permission once with these commands, then unplug the bridge and plug it in again:\n\n\
          sudo tee /etc/udev/rules.d/70-foilpress.rules <<'END'\n{rules}END\n\
          sudo udevadm control --reload && sudo udevadm trigger\n"
     )
@@ -144,11 +146,14 @@ pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> R
     let mut query = Query::new(&mut *link, PATIENCE).context("not sent")?;
     match query.device_id(PATIENCE, PRINTER_PATIENCE) {
         Some(id) if !is_alps(&id) && force => {
-            observer.note(&format!("the printer says it is no ALPS: {id}"));
+            observer.note(&format!("the device does not identify itself as an ALPS printer: {id}"));
             Ok(())
         }
         Some(id) if !is_alps(&id) => {
-            bail!("not sent: the printer says it is no ALPS: {id}; to go on all the same: --force")
+            bail!(
+                "not sent: the device does not identify itself as an ALPS printer: {id}; check where the cable leads, or pass \
+                 --force to send anyway"
+            )
         }
         _ => Ok(()),
     }
@@ -197,7 +202,7 @@ pub fn newer_firmware(bridge: &Bridge) -> Option<String> {
     let ours = Firmware::embedded()?.ok()?;
     (ours.version() != bridge.firmware).then(|| {
         format!(
-            "this program came with firmware {}; `foilpress bridge flash` puts it on the bridge",
+            "this program includes firmware {}; `foilpress bridge flash` installs it on the bridge",
             ours.version()
         )
     })
@@ -274,7 +279,7 @@ impl Found {
         if let Some(id) = self.device_id() {
             writeln!(out, "device ID: {id}")?;
             if !is_alps(&id) {
-                writeln!(out, "    this is no ALPS printer")?;
+                writeln!(out, "    it does not identify itself as an ALPS printer")?;
             }
         }
         match &self.status {
@@ -282,10 +287,10 @@ impl Found {
                 Ok(status) => write!(out, "{status}")?,
                 Err(error) => writeln!(out, "{error}")?,
             },
-            Reply::NotNow => writeln!(out, "printer: not asked, a job is open")?,
+            Reply::NotNow => writeln!(out, "printer: not asked, because a job is open")?,
             Reply::OneWay => writeln!(out, "printer: its port is one-way, so it cannot be asked")?,
             Reply::Silent => writeln!(out, "printer: did not answer in time")?,
-            Reply::Stopped(_) => writeln!(out, "printer: takes no question at the moment")?,
+            Reply::Stopped(_) => writeln!(out, "printer: cannot be asked at the moment")?,
         }
         Ok(())
     }

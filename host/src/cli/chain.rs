@@ -52,23 +52,23 @@ impl Factor {
     after_help = "Example:\n  foilpress map my-material.foil --intent basis --inks process,MS -o my-material.mix"
 )]
 pub struct Map {
-    /// A folder made by `factor`
+    /// Folder written by `factor`
     #[arg(value_name = "DOC.foil")]
     factored: PathBuf,
-    /// The document it was made from, so that clamp and blend see its own pixels instead of the bases' mixtures
+    /// Document that was factored, so that clamp and blend use its own pixels instead of mixtures of the bases
     #[arg(long, value_name = "DOC")]
     document: Option<String>,
-    /// Which material of that document, as it was given to `factor`
+    /// Material of that document, as given to `factor`
     #[arg(long, value_name = "NUMBER|NAME", requires = "document")]
     material: Option<String>,
-    /// Encoding of that document's colour maps, as it was given to `factor`
+    /// Encoding of that document's colour maps, as given to `factor`
     #[arg(long, value_name = "SPACE", requires = "document", value_parser = choice::<ColourSpace>())]
     colour_space: Option<ColourSpace>,
     #[command(flatten)]
     gamut: GamutArgs,
     #[command(flatten)]
     inks: InkArgs,
-    /// Seed of the sample of pixels that cartridges are chosen by
+    /// Seed of the random sample of pixels by which cartridges are chosen
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder to write: weight maps over stacks as pictures, mix.toml
@@ -114,15 +114,15 @@ impl Map {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress halftone my-material.mix --size 120x90mm -o my-material.sheet")]
 pub struct Halftone {
-    /// A folder made by `map`
+    /// Folder written by `map`
     #[arg(value_name = "DOC.mix")]
     mix: PathBuf,
     #[command(flatten)]
     page: PageArgs,
-    /// Folder of an ink library of your own: its minimum clusters count
+    /// Folder of your own ink library; its minimum clusters apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
-    /// Folder to write: one stack for every dot as a picture, sheet.toml
+    /// Folder to write: a picture with one stack for every dot, sheet.toml
     #[arg(short, long, value_name = "DOC.sheet")]
     output: PathBuf,
 }
@@ -145,10 +145,10 @@ impl Halftone {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress separate my-material.sheet -o my-material.passes")]
 pub struct Separate {
-    /// A folder made by `halftone` or `simulate`
+    /// Folder written by `halftone` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
-    /// Folder of an ink library of your own: its order rules count
+    /// Folder of your own ink library; its order rules apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
     /// Folder to write: a one-bit picture for each pass, passes.toml
@@ -179,12 +179,12 @@ impl Separate {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress encode my-material.passes -o job.rgl")]
 pub struct Encode {
-    /// A folder made by `separate`
+    /// Folder written by `separate`
     #[arg(value_name = "DOC.passes")]
     passes: PathBuf,
     #[command(flatten)]
     media: MediaArgs,
-    /// Yes, print foil: its codes were never seen on hardware, and it needs process ink beneath it
+    /// Allow foil; its ink codes have never been seen on hardware, and it needs process ink beneath it
     #[arg(long)]
     foil: bool,
     /// File to write
@@ -208,10 +208,10 @@ impl Encode {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress simulate job.rgl -o printed.sheet")]
 pub struct Simulate {
-    /// A job in the printer's language
+    /// Job in the printer's language
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
-    /// Folder to write: the sheet the simulated printer made
+    /// Folder to write: the sheet that the simulated printer made
     #[arg(short, long, value_name = "SHEET")]
     output: PathBuf,
 }

@@ -15,7 +15,7 @@ const PROGRAM: &str = "/usr/bin/foilpress";
 /// Arguments of `generate`.
 #[derive(ClapArgs, Debug)]
 pub struct Args {
-    /// Folder that stands for the root of the file system
+    /// Folder that takes the place of the root of the file system
     #[arg(value_name = "DIR")]
     root: PathBuf,
 }
@@ -25,7 +25,7 @@ pub fn run(args: &Args) -> Result<()> {
     let command = super::Args::command();
     let folder = |path: &str| -> Result<PathBuf> {
         let folder = args.root.join(path);
-        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
         Ok(folder)
     };
     clap_mangen::generate_to(command.clone(), folder("usr/share/man/man1")?)

@@ -1,4 +1,4 @@
-//! `foilpress inks`: what the library knows, and what is wrong with one.
+//! `foilpress inks`: list, show and check the inks and stacks of a library.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -15,7 +15,7 @@ use appearance::brdf::plot;
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress inks list --inks process,metallic-silver\n  \
-    foilpress inks show MS+C --figures                   (what its curve rests on)\n  \
+    foilpress inks show MS+C --figures                   (with the figures behind its curve)\n  \
     foilpress inks check my-library/                     (before it is used with --library)")]
 pub struct Args {
     #[command(subcommand)]
@@ -24,36 +24,36 @@ pub struct Args {
 
 #[derive(clap::Subcommand, Debug)]
 enum What {
-    /// List the stacks: layers, peak reflectance and where the curve comes from.
+    /// List the stacks with their layers, their peak reflectance and the origin of their curves
     List {
-        /// A folder with a `library.toml`; without it the built-in library, which is modelled, not measured.
+        /// Folder of an ink library, with its `library.toml` [default: the built-in library, which is modelled, not measured]
         #[arg(long, value_name = "DIR")]
         library: Option<PathBuf>,
-        /// Only stacks that need no ink but these, such as `process,metallic-silver,finish`, `all` or
-        /// `-metallic`. Foils are left out unless they or `all` are named. Without it every stack is listed.
+        /// List only stacks made of these inks, such as `process,metallic-silver,finish`, `all` or `-metallic`; foils are
+        /// left out unless they or `all` are named [default: list every stack]
         #[arg(long, value_name = "INKS", allow_hyphen_values = true)]
         inks: Option<InkSet>,
-        /// As JSON.
+        /// Print JSON
         #[arg(long)]
         json: bool,
     },
-    /// Show one stack: cartridges, cautions, figures, and the curve as a plot.
+    /// Show one stack with its cartridges, cautions and figures, and a plot of its curve
     Show {
-        /// Layers from the bottom up, such as `MS+C+F`, `metallic-silver+cyan` or `substrate`.
+        /// Stack: inks from the bottom up, such as `MS+C+F`, `metallic-silver+cyan` or `substrate`
         stack: String,
-        /// A folder with a `library.toml`; without it the built-in library.
+        /// Folder of an ink library, with its `library.toml` [default: the built-in library]
         #[arg(long, value_name = "DIR")]
         library: Option<PathBuf>,
-        /// List every figure the curve rests on.
+        /// List every figure that the curve is based on
         #[arg(long)]
         figures: bool,
-        /// Also write the plot to this SVG file.
+        /// Also write the plot to this SVG file
         #[arg(long, value_name = "FILE.svg")]
         plot: Option<PathBuf>,
     },
-    /// Check a library's folder and list every problem with its file, line and field.
+    /// Check the folder of a library and list every problem with its file, line and field
     Check {
-        /// The folder with `library.toml`.
+        /// Folder with `library.toml`
         dir: PathBuf,
     },
 }
@@ -109,7 +109,7 @@ fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
     };
     if let Some(other) = library.entries().iter().find(|entry| sorted(&entry.stack) == sorted(&stack)) {
         bail!(
-            "stack {stack} is not in the library, but {} is: the first layer lies at the bottom",
+            "stack {stack} is not in the library, but {} is; name the inks from the bottom up",
             other.stack
         );
     }
@@ -121,7 +121,7 @@ fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
         .max_by(|a, b| a.0.total_cmp(&b.0));
     match near {
         Some((_, near)) => bail!(
-            "stack {stack} is not in the library; the nearest is {near}, `foilpress inks list` shows all of them"
+            "stack {stack} is not in the library; the nearest is {near}; `foilpress inks list` shows every stack"
         ),
         None => bail!("stack {stack} is not in the library"),
     }
@@ -201,7 +201,7 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
             let count = |source| parameters.iter().filter(|p| p.source == source).count();
             lines.push(format!("curve     modelled, not measured: {model}"));
             lines.push(format!(
-                "rests on  {} figures: {} measured, {} from literature, {} from formulas, {} guesses",
+                "based on  {} figures: {} measured, {} from literature, {} from formulas, {} guesses",
                 parameters.len(),
                 count(Source::Measured),
                 count(Source::Literature),
@@ -226,10 +226,10 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
             inks::gloss::units(lobes)
         ));
     }
-    lines.push(format!("cluster   {} dots of 1/600 inch or more", library.minimum_cluster(stack)));
+    lines.push(format!("cluster   at least {} dots of 1/600 inch", library.minimum_cluster(stack)));
     for (place, &ink) in stack.layers().iter().enumerate() {
         lines.push(String::new());
-        let at = if place == 0 { "first, lowest" } else { "above" };
+        let at = if place == 0 { "bottom" } else { "above" };
         match library.cartridge(ink) {
             Some(cartridge) => {
                 lines.push(format!(
@@ -239,7 +239,7 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
                     cartridge.alps
                 ));
                 lines.push(format!(
-                    "  cartridge {}, barcode {}, ink code {:02x}, clusters of {} dots",
+                    "  cartridge {}, barcode {}, ink code {:02x}, minimum cluster {} dots",
                     ink.part(),
                     ink.barcode(),
                     ink.code(),
@@ -252,7 +252,7 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
                         .map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
                 );
             }
-            None => lines.push(format!("{at}: {}, of which the library has no cartridge", ink.name())),
+            None => lines.push(format!("{at}: {}, for which the library has no cartridge", ink.name())),
         }
     }
     let broken = library.broken_rules(stack);

@@ -16,7 +16,7 @@ use press::scratch::{self, Scratch};
 /// What the user is told when the program is interrupted.
 static FAREWELL: Mutex<Option<String>> = Mutex::new(None);
 
-/// From now on an interruption is not without consequences: says which.
+/// Sets what the user is told if the program is interrupted from now on.
 pub fn say_on_interrupt(text: &str) {
     *FAREWELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_owned());
 }
@@ -76,7 +76,7 @@ impl Kind {
     }
 
     /// The first entry of a folder that this program did not write, if there is one.
-    fn stranger(self, folder: &Path) -> io::Result<Option<PathBuf>> {
+    fn foreign_entry(self, folder: &Path) -> io::Result<Option<PathBuf>> {
         let (mut entries, mut marked) = (0, self.marker().is_none());
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
@@ -86,8 +86,8 @@ impl Kind {
             if !known || entry.file_type()?.is_dir() != passes {
                 return Ok(Some(entry.path()));
             }
-            if passes && let Some(stranger) = Kind::Passes.stranger(&entry.path())? {
-                return Ok(Some(stranger));
+            if passes && let Some(foreign) = Kind::Passes.foreign_entry(&entry.path())? {
+                return Ok(Some(foreign));
             }
             marked |= self.marker().is_some_and(|marker| name == marker);
             entries += 1;
@@ -117,24 +117,24 @@ impl Staged {
         })
     }
 
-    /// Prepares to write the folder `target`. Fails early if it cannot be written or holds what is not ours.
+    /// Prepares to write the folder `target`. Fails early if it cannot be written or holds anything this program did not write.
     pub fn folder(target: &Path, kind: Kind) -> Result<Staged> {
         Staged::new(target, |target, found| {
             if !found.is_dir() {
                 bail!("{} is a file; name a folder to write", target.display());
             }
-            let stranger =
-                kind.stranger(target).with_context(|| format!("cannot look into {}", target.display()))?;
-            match stranger {
+            let foreign =
+                kind.foreign_entry(target).with_context(|| format!("cannot read {}", target.display()))?;
+            match foreign {
                 None => Ok(()),
-                Some(stranger) if stranger == target => bail!(
-                    "{} exists and is no result of this command; choose another place with -o",
+                Some(foreign) if foreign == target => bail!(
+                    "{} exists and was not written by this command; choose another place with -o",
                     target.display()
                 ),
-                Some(stranger) => bail!(
+                Some(foreign) => bail!(
                     "{} exists and holds {}, which this command did not write; choose another place with -o",
                     target.display(),
-                    stranger.strip_prefix(target).unwrap_or(&stranger).display()
+                    foreign.strip_prefix(target).unwrap_or(&foreign).display()
                 ),
             }
         })
@@ -145,13 +145,13 @@ impl Staged {
         let linked = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());
         let target = if linked {
             fs::canonicalize(target)
-                .with_context(|| format!("{} is a link that leads nowhere", target.display()))?
+                .with_context(|| format!("{} is a broken link", target.display()))?
         } else {
             target.to_path_buf()
         };
         let name = target
             .file_name()
-            .with_context(|| format!("{} names no file or folder to write", target.display()))?
+            .with_context(|| format!("{} does not name a file or folder to write", target.display()))?
             .to_owned();
         if let Ok(found) = fs::metadata(&target) {
             check(&target, &found)?;
@@ -198,7 +198,7 @@ impl Staged {
             if old.exists() && fs::rename(&old, &self.target).is_err() {
                 let kept = self.folder.keep(&mut folders);
                 bail!(
-                    "cannot write {}: {error}; what was there is in {}",
+                    "cannot write {}: {error}; the previous contents are in {}",
                     self.target.display(),
                     kept.display()
                 );
@@ -247,7 +247,7 @@ pub fn remove_on_interrupt() -> Result<()> {
             }
         }
         let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
-        let text = farewell.as_deref().unwrap_or("nothing half-written is left");
+        let text = farewell.as_deref().unwrap_or("nothing unfinished is left behind");
         let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; {text}");
         std::process::exit(130);
     })

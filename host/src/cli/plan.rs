@@ -49,7 +49,7 @@ impl FromArgMatches for Args {
 impl ClapArgs for Args {
     fn augment_args(command: Command) -> Command {
         let layers = layers::PlanArgs::augment_args(Command::new(LAYERS))
-            .about("The plan of spot-colour art; takes the options of `layers` that decide what is printed");
+            .about("Show the plan of spot-colour artwork");
         Document::augment_args(command)
             .mut_arg("html", |html| html.alias("page"))
             .subcommand_negates_reqs(true)
@@ -73,9 +73,9 @@ const LAYERS: &str = "layers";
     foilpress plan job.rgl\n  \
     foilpress plan sample:leaf --size 80mm --repeat 2x3 --gap 2mm\n  \
     foilpress plan layers white.png gold.png --passes white=3\n  \
-    foilpress plan job.rgl --html plan.html              (one page to print and lay beside the machine)\n  \
+    foilpress plan job.rgl --html plan.html              (one page to print and keep beside the printer)\n  \
     foilpress plan job.rgl --json\n\n\
-    A job is planned from its bytes; the options of page, inks and materials are for documents."
+    A job is planned from its bytes; the options for page, inks and materials apply only to documents."
 )]
 pub struct Document {
     #[command(flatten)]
@@ -87,13 +87,13 @@ pub struct Document {
 /// How a plan is shown.
 #[derive(ClapArgs, Debug)]
 pub struct Shown {
-    /// Also write the plan as a page (HTML, whole in itself) into this file
+    /// Also write the plan as a self-contained HTML page to this file
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
-    /// Colour of the ground in the page's picture: #204080, black, white, clear
+    /// Background colour of the page's picture: black, white, clear, or a value such as #204080
     #[arg(long, value_name = "COLOUR")]
     background: Option<Ground>,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }

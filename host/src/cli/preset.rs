@@ -1,4 +1,4 @@
-//! `foilpress preset`: options under a name.
+//! `foilpress preset`: named sets of options.
 //!
 //! A preset is a table of long options. It is applied before the arguments are read, as if its options had been typed first:
 //! so every option of a command can be in it, is checked by the same rules, and gives way to what is typed.
@@ -17,7 +17,10 @@ use press::sheet::picture::{read_toml, write_toml};
 /// `--preset`, for commands whose options can be kept under a name.
 #[derive(ClapArgs, Debug)]
 pub struct PresetArg {
-    /// Options kept under this name by `foilpress preset save`; what is typed counts more
+    /// Load a preset; options given here override it
+    ///
+    /// `foilpress preset save` makes a preset. Without --preset the one chosen by `foilpress preset use` applies, if there is
+    /// one and its options fit the command.
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
 }
@@ -27,7 +30,7 @@ pub struct PresetArg {
 #[command(after_help = "Examples:\n  \
     foilpress preset save decal --media film --mirror --paper postcard\n  \
     foilpress print sample:leaf --preset decal --size 60mm\n  \
-    foilpress preset use decal         (from now on without being named)\n  \
+    foilpress preset use decal         (apply it from now on without naming it)\n  \
     foilpress preset use none\n  \
     foilpress preset list")]
 pub struct Args {
@@ -37,19 +40,19 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Keep options under a name, replacing what had it
+    /// Save options under a name, replacing any preset of that name
     Save {
-        /// The name
+        /// Name of the preset
         name: String,
-        /// The options, as they would be typed
+        /// Options to save, by their long names, as they would be typed
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "OPTIONS")]
         options: Vec<String>,
     },
-    /// The presets there are, and which is in use
+    /// List the presets and show which one is in use
     List,
-    /// Use a preset wherever it fits without naming it; `none` ends that
+    /// Apply a preset to every command that it fits, without naming it; `none` stops that
     Use {
-        /// Its name, or none
+        /// Name of the preset, or none
         name: String,
     },
 }
@@ -69,7 +72,7 @@ impl Preset {
         while let Some(word) = words.next() {
             let Some(name) = word.strip_prefix("--").filter(|name| !name.is_empty()) else {
                 bail!(
-                    "`{word}` is no option; a preset holds options by their long names, such as --media film"
+                    "`{word}` is not an option; a preset takes options by their long names, such as --media film"
                 );
             };
             let (name, value) = match name.split_once('=') {
@@ -78,7 +81,7 @@ impl Preset {
             };
             let value = value.map_or(toml::Value::Boolean(true), toml::Value::String);
             if options.insert(name.to_owned(), value).is_some() {
-                bail!("--{name} comes twice");
+                bail!("--{name} is given twice");
             }
         }
         Ok(Preset { options })
@@ -94,7 +97,7 @@ impl Preset {
                 toml::Value::String(text) => words.push(format!("--{name}={text}")),
                 toml::Value::Integer(number) => words.push(format!("--{name}={number}")),
                 toml::Value::Float(number) => words.push(format!("--{name}={number}")),
-                _ => bail!("option {name}: a text, a number, true or false is expected"),
+                _ => bail!("option {name}: expected text, a number, true or false"),
             }
         }
         Ok(words)
@@ -106,7 +109,7 @@ impl Preset {
         if !path.is_file() {
             let known = folders::names(&folder).unwrap_or_default();
             bail!(
-                "there is no preset `{name}`{}; `foilpress preset save {name} OPTIONS` makes it",
+                "there is no preset `{name}`{}; `foilpress preset save {name} OPTIONS` creates it",
                 if known.is_empty() { String::new() } else { format!(" (there are: {})", known.join(", ")) }
             );
         }
@@ -160,14 +163,14 @@ pub fn run(args: &Args) -> Result<()> {
             let refusals: Vec<Option<String>> =
                 able.iter().map(|&command| refusal(&[command], &words)).collect();
             if words.iter().any(|word| word.starts_with("--preset")) {
-                bail!("a preset cannot name another one");
+                bail!("a preset cannot load another preset");
             }
             if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
-                bail!("no command takes these options together: {}", first.trim_start_matches("error: "));
+                bail!("no command accepts these options together: {}", first.trim_start_matches("error: "));
             }
             let folder = presets()?;
             let path = folders::file(&folder, name)?;
-            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+            std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
             write_toml(&path, &preset)?;
             let fits: Vec<&str> = able
                 .into_iter()
@@ -190,7 +193,7 @@ pub fn run(args: &Args) -> Result<()> {
             }
             if names.is_empty() {
                 text = format!(
-                    "no presets in {}; `foilpress preset save NAME OPTIONS` makes one\n",
+                    "no presets in {}; `foilpress preset save NAME OPTIONS` creates one\n",
                     folder.display()
                 );
             }
@@ -209,7 +212,7 @@ pub fn run(args: &Args) -> Result<()> {
             let words = Preset::load(name)?.words()?.join(" ");
             std::fs::write(&path, format!("{name}\n"))
                 .with_context(|| format!("cannot write {}", path.display()))?;
-            super::show(&format!("from now on: {words}\n"))
+            super::show(&format!("applied from now on: {words}\n"))
         }
     }
 }
@@ -243,13 +246,13 @@ pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
         (Some(name), _) => Preset::load(name)?.words().with_context(|| format!("preset `{name}`"))?,
         (None, Some(name)) => {
             let words = Preset::load(&name).and_then(|preset| preset.words()).with_context(|| {
-                format!("preset `{name}` is in use (`foilpress preset use none` ends that)")
+                format!("preset `{name}` is in use (`foilpress preset use none` stops that)")
             })?;
             let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
             let fits = refusal(&path, &words).is_none();
             if !quiet {
                 let what =
-                    if fits { words.join(" ") } else { "does not fit this command and is left out".into() };
+                    if fits { words.join(" ") } else { "does not fit this command and is ignored".into() };
                 let _ = writeln!(std::io::stderr(), "note: preset `{name}`: {what}");
             }
             if !fits {
@@ -286,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_counts_more_than_a_preset() {
+    fn typed_options_override_a_preset() {
         let words: Vec<String> =
             ["--media=film", "--media=thick", "--mirror", "--mirror"].map(str::to_owned).to_vec();
         assert_eq!(refusal(&["print"], &words), None);

@@ -49,11 +49,11 @@ pub struct Call {
 pub enum CallError {
     /// Too few or too many arguments.
     #[error(
-        "expected job-id user title copies options [file], found {0} arguments; this is for the print system to call"
+        "expected job-id user title copies options [file], found {0} arguments; only the print system calls this"
     )]
     Arguments(usize),
     /// No URI.
-    #[error("DEVICE_URI is not set; this is for the print system to call")]
+    #[error("DEVICE_URI is not set; only the print system calls this")]
     NoUri,
     /// No destination.
     #[error(transparent)]

@@ -96,10 +96,10 @@ pub enum FilterError {
     #[error("the document is larger than 1 GB; print fewer pages at once")]
     TooLarge,
     /// The plates of a document.
-    #[error("cannot read the document's spot colours: {0}")]
+    #[error("cannot read the document's spot colours")]
     Plates(#[source] LayersError),
     /// The art.
-    #[error("page {page}: {source}")]
+    #[error("page {page} cannot be printed")]
     Layers {
         /// Page, from 1.
         page: usize,
@@ -107,7 +107,7 @@ pub enum FilterError {
         source: LayersError,
     },
     /// Its place on the sheet.
-    #[error("page {page}: {source}")]
+    #[error("page {page} cannot be laid on its sheet")]
     Layout {
         /// Page, from 1.
         page: usize,

@@ -32,7 +32,7 @@ pub fn devices() -> String {
 
 fn at_cable(path: &Path, id: &str) -> Result<String, uri::UriError> {
     let path = path.display();
-    device(&format!("raw:{path}"), &format!("ALPS MD-5500 at a cable ({path})"), id.trim())
+    device(&format!("raw:{path}"), &format!("ALPS MD-5500 on a parallel cable ({path})"), id.trim())
 }
 
 fn device(address: &str, about: &str, id: &str) -> Result<String, uri::UriError> {
@@ -49,7 +49,7 @@ mod tests {
         let line = at_cable(Path::new("/dev/usb/lp0"), "MFG:ALPS;DES:\"MD\"\n;\n").unwrap();
         assert_eq!(
             line,
-            "direct foilpress:/raw/dev/usb/lp0 \"ALPS MD-5500\" \"ALPS MD-5500 at a cable (/dev/usb/lp0)\" \
+            "direct foilpress:/raw/dev/usb/lp0 \"ALPS MD-5500\" \"ALPS MD-5500 on a parallel cable (/dev/usb/lp0)\" \
              \"MFG:ALPS;DES: MD  ;\"\n"
         );
     }

@@ -1,7 +1,7 @@
-//! What the print system is told: lines on standard error that begin with a keyword.
+//! Messages to the print system: lines on standard error that begin with a keyword.
 //!
 //! `STATE:` lines add and remove reasons of the printer's state, `ATTR:` lines set attributes, `INFO:` and `ERROR:` lines
-//! are what people read beside the printer's name, `PAGE:` lines count sheets. Only changes are told. Reasons are keywords
+//! are what people read beside the printer's name, `PAGE:` lines count sheets. Only changes are reported. Reasons are keywords
 //! of IPP where there is one, so that print dialogs show them in the user's language.
 
 use std::collections::BTreeSet;
@@ -32,7 +32,7 @@ pub enum Reason {
     CoverOpen,
     /// A ribbon is at its end.
     SupplyEmpty,
-    /// A cassette is wanted that is not loaded.
+    /// A cartridge is needed that is not loaded.
     SupplyMissing,
     /// Something else that needs the operator.
     Other,
@@ -183,7 +183,7 @@ impl<W: Write> Messages<W> {
         }
     }
 
-    /// The cassettes the printer has found. It does not know how much is left on them, so nothing is said of that.
+    /// The cartridges the printer has found. It does not know how much ribbon is left, so no amount is reported.
     pub fn cassettes(&self, status: &Status) {
         if status.stale || status.cassettes.is_empty() {
             return;
@@ -199,7 +199,7 @@ impl<W: Write> Messages<W> {
             &format!(
                 "marker-names={} marker-types={} marker-colors={} marker-levels={}",
                 each(&|c| ink(c.barcode)
-                    .map_or_else(|| format!("cassette-{}", c.barcode), |ink| ink.name().into())),
+                    .map_or_else(|| format!("cartridge-{}", c.barcode), |ink| ink.name().into())),
                 each(&|_| "ribbonWax".into()),
                 each(&|c| ink(c.barcode).map_or("none", colour).into()),
                 each(&|c| level(c.condition).into()),

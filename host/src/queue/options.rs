@@ -1,4 +1,4 @@
-//! The options of the print dialog: one table for the printer description that declares them and the filter that obeys.
+//! The options of the print dialog: one table for the printer description that declares them and the filter that applies them.
 //!
 //! Option strings of the print system are `name=value` apart by blanks, values in quotes or with backslashes where
 //! they hold blanks; a bare `name` means true and `noname` false.
@@ -40,7 +40,7 @@ pub enum Spots {
 pub struct Choices {
     /// What the paper is made of.
     pub media: Media,
-    /// Whether the machine corrects the sheet's curl.
+    /// Whether the printer corrects the sheet's curl.
     pub curl_correction: bool,
     /// The inks of pictures' colours.
     pub colours: InkSet,
@@ -60,7 +60,7 @@ pub struct Choices {
     pub mirror: bool,
     /// Whether a sheet of a size of its own is meant, and not the paper that is nearly as large.
     pub custom_paper: bool,
-    /// The queue's machine.
+    /// Calibration profile of the queue's printer.
     pub profile: Profile,
 }
 
@@ -72,20 +72,20 @@ const INKS: [(&str, &str); 3] = [
 
 const SPOTS: [(&str, &str, Spots); 3] = [
     ("Named", "Spot colours named after inks", Spots::Named),
-    ("Reserved", "These and the vendor's reserved colours", Spots::Reserved),
-    ("Off", "None, everything in process inks", Spots::None),
+    ("Reserved", "Spot colours named after inks, and the vendor's reserved colours", Spots::Reserved),
+    ("Off", "None (everything in process inks)", Spots::None),
 ];
 
 const FOILS: [(&str, &str, bool); 2] =
-    [("Off", "Never", false), ("On", "Where the page names them (never tried)", true)];
+    [("Off", "Never", false), ("On", "Where the page names them (untested)", true)];
 
 const PLACE: [(&str, &str, Place); 2] = [
-    ("Page", "Where the page has it", Place::Page),
-    ("Centre", "What is drawn in the middle of the sheet", Place::Centre),
+    ("Page", "As on the page", Place::Page),
+    ("Centre", "Drawing centred on the sheet", Place::Centre),
 ];
 
 const WHITE: [(&str, &str, White); 5] = [
-    ("None", "Only what the page names", White::None),
+    ("None", "Only where the page names it", White::None),
     ("Under", "Under every ink", White::Under),
     ("Reserved", "Where the page has the reserved white 230,230,230", White::Reserved),
     ("Opaque", "Where the page is not pure white", White::Opaque),
@@ -93,13 +93,13 @@ const WHITE: [(&str, &str, White); 5] = [
 ];
 
 const FINISH: [(&str, &str, Finish); 3] = [
-    ("None", "Only what the page names", Finish::None),
-    ("Artwork", "On what is drawn", Finish::Artwork),
+    ("None", "Only where the page names it", Finish::None),
+    ("Artwork", "On everything drawn", Finish::Artwork),
     ("All", "On the whole page", Finish::All),
 ];
 
 const QUALITY: [(&str, &str, u16); 2] =
-    [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (drawn at 300 dpi)", 300)];
+    [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (rendered at 300 dpi)", 300)];
 
 const CURL: [(&str, &str, bool); 2] = [("On", "On (paper)", true), ("Off", "Off (decal film)", false)];
 
@@ -122,7 +122,7 @@ fn texts<'a>(rows: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<(String, Str
 pub fn all() -> Vec<DialogOption> {
     let option = |keyword, text, choices| DialogOption { keyword, text, choices, custom: None };
     let mut place = option("FoilpressPosition", "Position", texts(PLACE.iter().map(|row| (row.0, row.1))));
-    place.custom = Some(("Corner", "Top left corner of what is drawn, such as 20x30mm"));
+    place.custom = Some(("Corner", "Top left corner of the drawing, such as 20x30mm"));
     vec![
         option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
         option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
@@ -136,9 +136,9 @@ pub fn all() -> Vec<DialogOption> {
     ]
 }
 
-/// An option whose value is no choice of it.
+/// An option with a value that is not one of its choices.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("{option}: `{found}` is no choice; there are {known}")]
+#[error("{option}: `{found}` is not a choice; the choices are {known}")]
 pub struct NoChoice {
     /// The option.
     pub option: &'static str,
@@ -149,10 +149,10 @@ pub struct NoChoice {
 }
 
 impl Choices {
-    /// The choices of a job: by its options, else by the defaults of the printer description, else the usual ones.
+    /// The choices of a job: its options override the defaults of the printer description, which override the first choices.
     ///
     /// # Errors
-    /// A value in the job's options that is no choice. Defaults that are none are passed over.
+    /// A value in the job's options that is not a choice. Such a value among the defaults is ignored.
     pub fn read(options: &[(String, String)], description: Option<&str>) -> Result<Choices, NoChoice> {
         // The last one counts, as in the print system.
         let asked = |keyword: &str| {
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn the_job_counts_more_than_the_queue_and_the_queue_more_than_the_usual() {
+    fn the_job_overrides_the_queue_and_the_queue_overrides_the_defaults() {
         let usual = Choices::read(&[], None).unwrap();
         assert_eq!(
             (usual.media, usual.white, usual.dpi, usual.spots),
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_choice_is_answered_with_those_there_are() {
+    fn a_value_that_is_not_a_choice_is_answered_with_the_choices() {
         let error = Choices::read(&[pair("FoilpressWhite", "Beneath")], None).unwrap_err().to_string();
         assert!(
             error.contains("FoilpressWhite") && error.contains("Beneath") && error.contains("Silhouette"),

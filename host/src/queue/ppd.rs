@@ -1,4 +1,4 @@
-//! The printer description: papers with the margins the machine enforces, and the [`options`] of the
+//! The printer description: papers with the margins the printer enforces, and the [`options`] of the
 //! dialog, as a PPD file, which is what print systems of this kind understand.
 //!
 //! Source: the PPD specification 4.3 and the print system's extensions to it (`cupsFilter2`, `cupsManualCopies`). The
@@ -20,7 +20,7 @@ pub const TYPES: &str = "\
 # Jobs for ALPS MD printers: they begin with the command that selects the printer's language, or with a reset before it.\n\
 application/vnd.foilpress-rgl rgl string(0,<1B258041>) string(0,<1B651B258041>)\n";
 
-/// What a queue's description says of its machine.
+/// Keywords for the calibration profile of the queue's printer.
 const OFFSET: &str = "FoilpressOffset";
 const FEED: &str = "FoilpressFeed";
 
@@ -61,7 +61,7 @@ fn sheet(paper: Paper) -> (String, String) {
 /// meant; otherwise that.
 ///
 /// # Errors
-/// In words: a sheet that the machine cannot take.
+/// In words: why the printer cannot take the sheet.
 pub fn paper_of(width: f64, length: f64, custom: bool) -> Result<Paper, String> {
     const NEAR: f64 = 2.0;
     let known = PAPERS.into_iter().map(|(paper, ..)| paper).find(|&paper| {
@@ -74,7 +74,7 @@ pub fn paper_of(width: f64, length: f64, custom: bool) -> Result<Paper, String> 
     }
 }
 
-/// The printer description, for a machine as its profile says.
+/// The printer description, for a printer with this calibration profile.
 pub fn description(profile: &Profile) -> String {
     let mut text = format!(
         "*PPD-Adobe: \"4.3\"\n\
@@ -132,7 +132,7 @@ pub fn description(profile: &Profile) -> String {
         }
     }
     text.push_str(
-        "\n*OpenUI *MirrorPrint/Mirror, for what is seen from behind: Boolean\n\
+        "\n*OpenUI *MirrorPrint/Mirror (for prints seen from behind): Boolean\n\
          *OrderDependency: 20 AnySetup *MirrorPrint\n\
          *DefaultMirrorPrint: False\n\
          *MirrorPrint False/No: \"\"\n\
@@ -215,7 +215,7 @@ fn custom_papers_into(text: &mut String) {
     );
 }
 
-/// The machine of a printer description, as far as it says; nonsense is passed over.
+/// The calibration profile in a printer description; values out of range are ignored.
 pub fn profile_in(description: &str) -> Profile {
     let numbers = |keyword: &str| -> Option<Vec<f64>> {
         let value = description

@@ -11,16 +11,16 @@ use std::io::{self, Read};
 pub const SYNC: [u8; 4] = *b"RaS2";
 const HEADER: usize = 1796;
 
-/// Why a stream is no page this printer can print.
+/// Why a stream cannot be printed.
 #[derive(Debug, thiserror::Error)]
 pub enum RasterError {
     /// It cannot be read, or ends too early.
     #[error("the raster stream ends in the middle of a page, or cannot be read")]
     Io(#[from] io::Error),
     /// It does not begin as one.
-    #[error("this is no PWG raster stream")]
+    #[error("this is not a PWG raster stream")]
     Sync,
-    /// A header field has a value that is not taken.
+    /// A header field has a value that is not supported.
     #[error("page {page}: {field} is {found}; expected {expected}")]
     Field {
         /// Page, from 1.
@@ -33,7 +33,7 @@ pub enum RasterError {
         expected: &'static str,
     },
     /// A row has more pixels than the page is wide, or a page more rows.
-    #[error("page {page}, row {row}: damaged")]
+    #[error("page {page}, row {row}: the raster stream has more pixels or rows than its header declares")]
     Damaged {
         /// Page, from 1.
         page: usize,
@@ -119,7 +119,7 @@ impl<R: Read> Reader<R> {
             return Err(wrong(
                 "cupsWidth x cupsHeight",
                 format!("{width} x {height}"),
-                "the pixels of a sheet",
+                "the pixel size of a sheet",
             ));
         }
         let (bits, pixel, space, order) = (number(384), number(388), number(400), number(396));
@@ -141,7 +141,7 @@ impl<R: Read> Reader<R> {
         }
         let line = (width * pixel).div_ceil(8);
         if number(392) != line {
-            return Err(wrong("cupsBytesPerLine", number(392).to_string(), "that of the page's pixels"));
+            return Err(wrong("cupsBytesPerLine", number(392).to_string(), "the bytes of one row of pixels"));
         }
         let (width, height, line) = (width as usize, height as usize, line as usize);
         Ok(Page { width, height, dpi, copies: number(340).clamp(1, 1000), colours, line })

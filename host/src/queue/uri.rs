@@ -15,14 +15,14 @@ pub const SCHEME: &str = "foilpress";
 const UNSAFE: &AsciiSet =
     &CONTROLS.add(b' ').add(b'"').add(b'#').add(b'%').add(b'<').add(b'>').add(b'?').add(b'\\').add(b'`');
 
-/// A text that is no device URI of ours.
+/// A text that is not a device URI of this program.
 #[derive(Debug, thiserror::Error)]
 pub enum UriError {
     /// Another scheme, or no kind and place.
-    #[error("`{0}` is no device of this program; expected foilpress:/serial/dev/ttyACM0 or the like")]
+    #[error("`{0}` is not a device of this program; expected one such as foilpress:/serial/dev/ttyACM0")]
     Form(String),
     /// A file.
-    #[error("a queue cannot print into a file; `foilpress print --to file:…` does")]
+    #[error("a queue cannot print to a file; `foilpress print --to file:…` can")]
     File,
     /// No destination.
     #[error(transparent)]

@@ -22,12 +22,11 @@ const LONGEST_STRING: usize = 120;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImageError {
     /// Damaged, or for another board.
-    #[error("not flashed: {0}")]
+    #[error("not flashed: the file is no usable firmware image")]
     Damaged(#[from] Uf2Error),
     /// A whole program for the board, but another one.
     #[error(
-        "not flashed: this is {}, not the bridge's firmware; to put it on the board all the same, copy the file to the \
-         board's drive", named(.0)
+        "not flashed: this is {}, not the bridge's firmware; to install it anyway, copy the file to the board's drive", named(.0)
     )]
     OtherProgram(Option<String>),
 }

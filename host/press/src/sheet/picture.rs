@@ -16,7 +16,7 @@ const MOST_TEXT: u64 = 1 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The system refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be read or written", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -32,7 +32,7 @@ pub enum FileError {
         problem: String,
     },
     /// A picture is no PNG, or damaged.
-    #[error("{}: {source}; write it again from its source", path.display())]
+    #[error("{}: the picture is damaged; write it again from its source", path.display())]
     Png {
         /// The file.
         path: PathBuf,

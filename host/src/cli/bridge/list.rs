@@ -14,10 +14,10 @@ use device::send::query::is_alps;
 /// Arguments of `bridge list`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress bridge list\n  foilpress bridge list --json\n\n\
-    Each bridge is listed once with all its addresses; any of them can stand after --to. Serial ports of other devices \
-    are listed but not spoken to.")]
+    Each bridge is listed once with all its addresses; --to takes any of them. Serial ports of other devices are listed, \
+    but nothing is sent to them.")]
 pub struct Args {
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
@@ -51,18 +51,18 @@ pub fn run(args: &Args) -> Result<()> {
         if boards > 0 {
             writeln!(
                 out,
-                "{boards} in the boot loader, without firmware: `foilpress bridge flash` puts it on"
+                "{boards} in the boot loader, without firmware; `foilpress bridge flash` installs it"
             )?;
         }
         for port in &survey.others {
-            writeln!(out, "{}: {}, another device; not asked", port.address, port.product)?;
+            writeln!(out, "{}: {} (another device, not asked)", port.address, port.product)?;
         }
         if asked.iter().any(|(_, found)| found.as_ref().is_err_and(is_forbidden)) {
             write!(out, "\n{}", permission())?;
         }
     }
     if asked.is_empty() && boards == 0 {
-        bail!("no bridge on USB; plug it in, or see `foilpress doctor`");
+        bail!("no bridge found on USB; plug it in, or run `foilpress doctor`");
     }
     Ok(())
 }
@@ -82,7 +82,7 @@ fn ways(candidate: &Candidate) -> String {
 fn write(out: &mut impl std::io::Write, candidate: &Candidate, found: &Result<Found>) -> Result<()> {
     match found {
         Err(error) => {
-            writeln!(out, "bridge {}", candidate.serial_number.as_deref().unwrap_or("without a number"))?;
+            writeln!(out, "bridge {}", candidate.serial_number.as_deref().unwrap_or("without a serial number"))?;
             writeln!(out, "    {}\n    {}", ways(candidate), super::super::chain(error))?;
         }
         Ok(found) => {
@@ -96,9 +96,9 @@ fn write(out: &mut impl std::io::Write, candidate: &Candidate, found: &Result<Fo
             writeln!(out, "    {}", ways(candidate))?;
             match (found.device_id(), found.fault) {
                 (Some(id), _) if is_alps(&id) => writeln!(out, "    printer: {id}")?,
-                (Some(id), _) => writeln!(out, "    printer: {id} (no ALPS)")?,
+                (Some(id), _) => writeln!(out, "    printer: {id} (not an ALPS printer)")?,
                 (None, Some(fault)) => writeln!(out, "    {}", super::words::fault(fault, None))?,
-                (None, None) => writeln!(out, "    printer: does not tell what it is")?,
+                (None, None) => writeln!(out, "    printer: does not identify itself")?,
             }
             if let Some(newer) = newer_firmware(&found.bridge) {
                 writeln!(out, "    {newer}")?;

@@ -15,8 +15,8 @@ use device::send::Address;
 use device::send::query::{Query, QueryError};
 use device::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
 
-/// Between two looks whether the plug has been moved.
-const LOOK: Duration = Duration::from_millis(300);
+/// Time between two checks whether the plug has been moved.
+const POLL: Duration = Duration::from_millis(300);
 
 /// How long a line of the pattern is held: time to read a meter.
 const HOLD: Duration = Duration::from_secs(3);
@@ -24,17 +24,18 @@ const HOLD: Duration = Duration::from_secs(3);
 /// Arguments of `bridge test`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress bridge test\n  foilpress bridge test --pattern\n\n\
-    The loop-back plug takes the printer's place at the end of the cable; docs/wiring.md says how to make it. It has three \
-    positions, and the test waits until it has been in each. --pattern needs no plug: it holds one output after the \
-    other at its other level for three seconds each. Never with a printer: to it either is printing.")]
+    The loop-back plug goes on the end of the cable in place of the printer; docs/wiring.md says how to make one. It has three \
+    positions, and the test waits until it has been in each. --pattern needs no plug: it holds one output after the other at \
+    its opposite level for three seconds each. Never run this command with a printer connected: a printer would take the \
+    signals for a job.")]
 pub struct Args {
-    /// Where the bridge is [default: the only one there is]
+    /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// Walk through the outputs slowly, for a meter or a scope
+    /// Step through the outputs slowly, for a meter or an oscilloscope
     #[arg(long)]
     pattern: bool,
-    /// As JSON
+    /// Print JSON
     #[arg(long, conflicts_with = "pattern")]
     json: bool,
 }
@@ -79,18 +80,18 @@ fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
             _ => {
                 if asked.replace(next) != Some(next) {
                     eprintln!(
-                        "put the loop-back plug in position {} (in the printer's place)",
+                        "put the loop-back plug in position {} (in place of the printer)",
                         next.number()
                     );
                 }
-                sleep(LOOK);
+                sleep(POLL);
             }
         }
     }
     probe(Levels::REST)?;
     if seen.is_empty() {
         bail!(
-            "no loop-back plug answers: it goes in the printer's place; docs/wiring.md says how to make it"
+            "no loop-back plug answers; connect it in place of the printer (docs/wiring.md says how to make one)"
         );
     }
     let verdict = wiring::judge(&seen);
@@ -108,9 +109,9 @@ fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
     } else {
         match &verdict {
             Verdict::Good if tried.len() == Plug::ALL.len() => {
-                writeln!(out, "the wiring is good: all outputs and inputs do what they should")?;
+                writeln!(out, "the wiring is good: all outputs and inputs work")?;
             }
-            Verdict::Good => writeln!(out, "good so far; not tried: the other positions of the plug")?,
+            Verdict::Good => writeln!(out, "good so far; the other positions of the plug were not tried")?,
             Verdict::One(faults) => {
                 for (i, fault) in faults.iter().enumerate() {
                     writeln!(out, "{}{fault}", if i > 0 { "or: " } else { "" })?;
@@ -125,7 +126,7 @@ fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
         }
     }
     if verdict != Verdict::Good {
-        bail!("the wiring is not good");
+        bail!("the wiring is faulty");
     }
     Ok(())
 }
@@ -134,7 +135,7 @@ fn walk(query: &mut Query<'_>) -> Result<()> {
     let (lines, _) = query.lines(PATIENCE)?;
     // Inputs rest high; whatever is switched on at the other end holds one of them low.
     if lines.high(Lines::POWER) && lines.0 & 0x1f != 0x1f {
-        bail!("something that is switched on is connected; take the cable off the printer first");
+        bail!("a device that is switched on is connected; take the cable off the printer first");
     }
     say_on_interrupt("the lines stay as they are until the next job begins");
     let mut out = std::io::stdout().lock();
@@ -148,6 +149,6 @@ fn walk(query: &mut Query<'_>) -> Result<()> {
         sleep(HOLD);
     }
     probe(query, Levels::REST)?;
-    writeln!(out, "all at rest again")?;
+    writeln!(out, "all lines at rest again")?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `foilpress bridge status --watch`: the same again and again, until it is interrupted.
+//! `foilpress bridge status --watch`: the status, refreshed until the program is interrupted.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::thread::sleep;
@@ -10,14 +10,15 @@ use protocol::link::message::Ask;
 use serde_json::json;
 
 use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
+use crate::cli::chain;
 use device::send::Address;
 use device::send::query::{Query, Reply};
 use device::send::transport::Transport;
 
-/// Between two looks at the bridge.
-const LOOK: Duration = Duration::from_secs(1);
+/// Time between two questions to the bridge.
+const POLL: Duration = Duration::from_secs(1);
 
-/// Between two questions to the printer, which is asked between jobs only.
+/// Time between two questions to the printer, which is asked only between jobs.
 const ASK: Duration = Duration::from_secs(5);
 
 /// Rows a text takes on a terminal that is so many columns wide.
@@ -64,14 +65,14 @@ impl Screen {
 
     fn show_loss(&mut self, address: &Address, error: &anyhow::Error) -> Result<()> {
         Ok(self.show(if self.json {
-            format!("{}\n", json!({ "address": address.to_string(), "lost": format!("{error:#}") }))
+            format!("{}\n", json!({ "address": address.to_string(), "lost": chain(error) }))
         } else {
-            format!("{address}: {error:#}; looking again\n")
+            format!("{address}: {}; trying again\n", chain(error))
         })?)
     }
 }
 
-/// Shows how bridge and printer are, for ever. A bridge that goes away is waited for, once it has been there.
+/// Shows bridge and printer for ever. Waits for a bridge that goes away, once it has been connected.
 pub fn run(address: &Address, json: bool) -> Result<()> {
     let mut screen =
         Screen { json, terminal: std::io::stdout().is_terminal() && !json, shown: String::new() };
@@ -88,7 +89,7 @@ pub fn run(address: &Address, json: bool) -> Result<()> {
             Err(error) => return Err(error),
             Ok(never) => match never {},
         }
-        sleep(LOOK);
+        sleep(POLL);
     }
 }
 
@@ -124,7 +125,7 @@ fn follow(
             (None, false) => {}
         }
         screen.show_found(&found)?;
-        sleep(LOOK);
+        sleep(POLL);
         found.progress = query.ask_progress(PATIENCE)?;
         (found.lines, found.fault) = query.lines(PATIENCE)?;
     }
