@@ -105,7 +105,9 @@ impl InkArgs {
     pub fn at_hand(&self) -> Result<(InkSet, Library)> {
         let (set, library) = (self.set()?, self.library()?);
         if library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty()) {
-            bail!("--inks: the library has no stack made only of {set}; `foilpress inks list` shows the stacks it has");
+            bail!(
+                "--inks: the library has no stack made only of {set}; `foilpress inks list` shows the stacks it has"
+            );
         }
         Ok((set, library))
     }

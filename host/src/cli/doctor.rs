@@ -5,8 +5,10 @@ use std::path::Path;
 use anyhow::{Error, Result, bail};
 use clap::Args as ClapArgs;
 
-use super::bridge::{Found, ask, is_forbidden, permission};
+use super::bridge::{Found, ask};
+use super::permission;
 use super::resume::line;
+use super::stdio::chain;
 use device::flash::{drive, usb};
 use device::send::find::{self, Candidate};
 use device::send::journal::Journal;
@@ -62,8 +64,8 @@ impl<W: std::io::Write> Visit<W> {
     }
 
     fn failure(&mut self, error: &Error) -> Result<()> {
-        self.forbidden |= is_forbidden(error);
-        self.trouble(&super::chain(error))
+        self.forbidden |= permission::is_missing(error);
+        self.trouble(&chain(error))
     }
 
     fn journal(&mut self) -> Result<()> {
@@ -73,7 +75,11 @@ impl<W: std::io::Write> Visit<W> {
                 writeln!(self.out, "jobs are kept in {}", journal.folder().display())?;
                 for entry in journal.entries()? {
                     if !matches!(entry.record.phase, Phase::Ended(_)) {
-                        writeln!(self.out, "    unfinished (`foilpress resume` continues it): {}", line(&entry))?;
+                        writeln!(
+                            self.out,
+                            "    unfinished (`foilpress resume` continues it): {}",
+                            line(&entry)
+                        )?;
                     }
                 }
                 Ok(())
@@ -156,7 +162,7 @@ impl<W: std::io::Write> Visit<W> {
 
     fn end(mut self) -> Result<()> {
         if self.forbidden {
-            write!(self.out, "\n{}", permission())?;
+            write!(self.out, "\n{}", permission::how_to_give())?;
         }
         if self.troubles > 0 {
             bail!("problems that prevent printing: {}", self.troubles);

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use clap::{Args as ClapArgs, CommandFactory as _};
+use clap::Args as ClapArgs;
 use clap_complete::Shell;
 
 use crate::queue::install::{Places, put};
@@ -20,9 +20,8 @@ pub struct Args {
     root: PathBuf,
 }
 
-/// Runs `generate`.
-pub fn run(args: &Args) -> Result<()> {
-    let command = super::Args::command();
+/// Runs `generate` for the command line `command`.
+pub fn run(args: &Args, command: &clap::Command) -> Result<()> {
     let folder = |path: &str| -> Result<PathBuf> {
         let folder = args.root.join(path);
         fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;

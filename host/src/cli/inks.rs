@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use inks::{Entry, InkSet, Library, Provenance, Severity, Source, Stack};
+use protocol::ink::Ink;
 use serde::Serialize;
 
 use super::output::Staged;
+use super::stdio::{closed_pipe, show};
 use appearance::brdf::plot;
 
 /// The library of inks and stacks.
@@ -66,7 +68,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
             let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
             let library = open(library.as_deref())?;
             let entry = find(&library, &stack)?;
-            let mut text = show(&library, entry, figures);
+            let mut text = describe(&library, entry, figures);
             text.push_str(&plot::terminal(&entry.curve, colour));
             if let Some(file) = &plot {
                 let title =
@@ -81,9 +83,9 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         }
         What::Check { dir } => check(&dir),
     };
-    match super::show(&text) {
+    match show(&text) {
         // A reader that has seen enough, such as `head`, is no failure.
-        Err(error) if !super::closed_pipe(&error) => Err(error),
+        Err(error) if !closed_pipe(&error) => Err(error),
         _ => verdict,
     }
 }
@@ -193,9 +195,38 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
     Ok(text)
 }
 
-fn show(library: &Library, entry: &Entry, figures: bool) -> String {
+/// A stack in words: its curve, its cartridges, and the rules it breaks.
+fn describe(library: &Library, entry: &Entry, figures: bool) -> String {
     let stack = &entry.stack;
     let mut lines = vec![format!("{stack}: {}", library.words(stack))];
+    lines.extend(curve_lines(entry));
+    lines.push(format!("cluster   at least {} dots of 1/600 inch", library.minimum_cluster(stack)));
+    for (place, &ink) in stack.layers().iter().enumerate() {
+        lines.push(String::new());
+        lines.extend(layer_lines(library, ink, if place == 0 { "bottom" } else { "above" }));
+    }
+    let broken = library.broken_rules(stack);
+    if !broken.is_empty() {
+        lines.push(String::new());
+        lines.extend(
+            broken.iter().map(|rule| format!("{}: {} ({})", rule.severity, rule.says, rule.certainty)),
+        );
+    }
+    if figures && let Provenance::Modelled { parameters, .. } = &entry.provenance {
+        lines.push(String::new());
+        for parameter in parameters {
+            let value = parameter.value.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+            lines.push(format!("  {:<32} {value:<22} {}", parameter.name, parameter.source));
+        }
+    }
+    lines.push(String::new());
+    lines.push("reflectance in 1/sr over the half angle:".into());
+    lines.join("\n") + "\n"
+}
+
+/// The origin of a stack's curve and, if it is modelled, the lobes it is made of.
+fn curve_lines(entry: &Entry) -> Vec<String> {
+    let mut lines = Vec::new();
     match &entry.provenance {
         Provenance::Modelled { model, parameters } => {
             let count = |source| parameters.iter().filter(|p| p.source == source).count();
@@ -219,59 +250,33 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
         for lobe in &lobes.lobes {
             lines.push(format!("lobe      F0 {}, alpha {:.3}", rgb(lobe.f0), lobe.alpha));
         }
-    }
-    if let Some(lobes) = &entry.lobes {
         lines.push(format!(
             "gloss     {:.0} units at 60 degrees, as a gloss meter would read the model",
             inks::gloss::units(lobes)
         ));
     }
-    lines.push(format!("cluster   at least {} dots of 1/600 inch", library.minimum_cluster(stack)));
-    for (place, &ink) in stack.layers().iter().enumerate() {
-        lines.push(String::new());
-        let at = if place == 0 { "bottom" } else { "above" };
-        match library.cartridge(ink) {
-            Some(cartridge) => {
-                lines.push(format!(
-                    "{at}: {} ({}), sold by ALPS as {}",
-                    cartridge.okidata,
-                    ink.short(),
-                    cartridge.alps
-                ));
-                lines.push(format!(
-                    "  cartridge {}, barcode {}, ink code {:02x}, minimum cluster {} dots",
-                    ink.part(),
-                    ink.barcode(),
-                    ink.code(),
-                    cartridge.minimum_cluster.get()
-                ));
-                lines.extend(
-                    cartridge
-                        .cautions
-                        .iter()
-                        .map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
-                );
-            }
-            None => lines.push(format!("{at}: {}, for which the library has no cartridge", ink.name())),
-        }
-    }
-    let broken = library.broken_rules(stack);
-    if !broken.is_empty() {
-        lines.push(String::new());
-        lines.extend(
-            broken.iter().map(|rule| format!("{}: {} ({})", rule.severity, rule.says, rule.certainty)),
-        );
-    }
-    if figures && let Provenance::Modelled { parameters, .. } = &entry.provenance {
-        lines.push(String::new());
-        for parameter in parameters {
-            let value = parameter.value.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-            lines.push(format!("  {:<32} {value:<22} {}", parameter.name, parameter.source));
-        }
-    }
-    lines.push(String::new());
-    lines.push("reflectance in 1/sr over the half angle:".into());
-    lines.join("\n") + "\n"
+    lines
+}
+
+/// One layer of a stack: its cartridge and the cautions about it.
+fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
+    let Some(cartridge) = library.cartridge(ink) else {
+        return vec![format!("{place}: {}, for which the library has no cartridge", ink.name())];
+    };
+    let mut lines = vec![
+        format!("{place}: {} ({}), sold by ALPS as {}", cartridge.okidata, ink.short(), cartridge.alps),
+        format!(
+            "  cartridge {}, barcode {}, ink code {:02x}, minimum cluster {} dots",
+            ink.part(),
+            ink.barcode(),
+            ink.code(),
+            cartridge.minimum_cluster.get()
+        ),
+    ];
+    lines.extend(
+        cartridge.cautions.iter().map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
+    );
+    lines
 }
 
 fn check(dir: &Path) -> (String, anyhow::Result<()>) {
@@ -313,9 +318,7 @@ mod tests {
     #[test]
     fn sets_of_inks_are_arguments() {
         let What::List { inks: Some(inks), .. } = parse("list --inks -metallic").unwrap() else { panic!() };
-        assert!(
-            !inks.contains(protocol::ink::Ink::MetallicSilver) && inks.contains(protocol::ink::Ink::Finish)
-        );
+        assert!(!inks.contains(Ink::MetallicSilver) && inks.contains(Ink::Finish));
         let error = parse("list --inks finnish").err().unwrap();
         assert!(error.to_string().contains("did you mean `finish`?"), "{error}");
     }
@@ -345,7 +348,7 @@ mod tests {
     #[test]
     fn a_foil_stack_is_shown_with_its_cartridges_and_its_trouble() {
         let library = Library::builtin();
-        let text = show(&library, find(&library, "SF+C").unwrap(), true);
+        let text = describe(&library, find(&library, "SF+C").unwrap(), true);
         for word in [
             "Flash Silver",
             "MDC-FMES",

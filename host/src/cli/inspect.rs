@@ -7,6 +7,7 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use super::output::{Kind, Staged};
+use super::stdio::read_job;
 use observe::Observer;
 use press::inspect::{Inspected, Inspection, inspect, sheets};
 use press::separate::files::{self, save_plane};
@@ -32,7 +33,7 @@ pub struct Args {
 
 /// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let job = super::read_job(&args.job)?;
+    let job = read_job(&args.job)?;
     let places = sheets(&job);
     let several = places.len() > 1;
     let mut out = std::io::stdout().lock();

@@ -18,6 +18,7 @@ mod layers;
 mod layout;
 mod ledger;
 mod output;
+mod permission;
 mod piece;
 mod plan;
 mod preset;
@@ -27,25 +28,16 @@ mod queue;
 mod resume;
 mod sample;
 mod send;
+mod stdio;
 
-use std::fs::File;
-use std::io::{self, Read as _, Write as _};
-use std::path::Path;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
-use clap::{Parser, Subcommand};
+use anyhow::Result;
+use clap::{CommandFactory as _, Parser, Subcommand};
 
-use device::flash::FlashError;
-use device::send::journal::JournalError;
-use device::send::query::QueryError;
-use device::send::raw::RawError;
-use device::send::{OpenError, RunError};
-use observe::with_causes;
 use progress::Progress;
-
-/// The largest stream that is read: several times a page of noise in seven passes.
-const LARGEST_JOB: u64 = 256 << 20;
+use stdio::{chain, closed_pipe, read_job, show};
 
 /// Print materials instead of colours on the ALPS MD-5500 (Oki DP-5000).
 #[derive(Parser)]
@@ -139,7 +131,7 @@ enum Command {
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
-    let args = match preset::expand(std::env::args_os().collect()) {
+    let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
         Ok(args) => Args::parse_from(args),
         Err(error) => {
             let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
@@ -158,8 +150,8 @@ pub fn main() -> ExitCode {
         Err(error) => {
             output::yield_to_interrupt();
             let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
-            if bridge::is_forbidden(&error) {
-                let _ = write!(io::stderr(), "\n{}", bridge::permission());
+            if permission::is_missing(&error) {
+                let _ = write!(io::stderr(), "\n{}", permission::how_to_give());
             }
             ExitCode::FAILURE
         }
@@ -173,7 +165,7 @@ fn run(args: Args) -> Result<()> {
         Command::Layers(args) => layers::run(&args, observer),
         Command::Plan(args) => plan::run(&args, observer),
         Command::Chart(args) => chart::run(&args, observer),
-        Command::Preset(args) => preset::run(&args),
+        Command::Preset(args) => preset::run(&args, &Args::command()),
         Command::Ledger(args) => ledger::run(&args),
         Command::Papers(args) => layout::papers(&args),
         Command::Profile(args) => layout::profile_command(&args),
@@ -190,48 +182,10 @@ fn run(args: Args) -> Result<()> {
         Command::Bridge(args) => bridge::run(&args, observer),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
-        Command::Generate(args) => generate::run(&args),
+        Command::Generate(args) => generate::run(&args, &Args::command()),
         Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),
         // Done before anything else; see `main`.
         Command::CupsBackend(_) | Command::CupsFilter(_) => Ok(()),
     }
-}
-
-/// An error with its causes.
-fn chain(error: &anyhow::Error) -> String {
-    with_causes(error.as_ref())
-}
-
-/// Writes to standard output, where results go.
-fn show(text: &str) -> Result<()> {
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot write to standard output")
-}
-
-/// Reads a job whole.
-fn read_job(path: &Path) -> Result<Vec<u8>> {
-    let cannot = || format!("cannot read {}", path.display());
-    let file = File::open(path).with_context(cannot)?;
-    let mut job = Vec::new();
-    file.take(LARGEST_JOB + 1).read_to_end(&mut job).with_context(cannot)?;
-    if job.len() as u64 > LARGEST_JOB {
-        bail!("{} is larger than {} MB, too large for a job", path.display(), LARGEST_JOB >> 20);
-    }
-    Ok(job)
-}
-
-/// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`. A printer or a bridge that went
-/// away is something else.
-fn closed_pipe(error: &anyhow::Error) -> bool {
-    let device = error.chain().any(|cause| {
-        cause.is::<RawError>()
-            || cause.is::<QueryError>()
-            || cause.is::<OpenError>()
-            || cause.is::<FlashError>()
-            || cause.is::<RunError<JournalError>>()
-    });
-    !device
-        && error.chain().any(|cause| {
-            cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
-        })
 }

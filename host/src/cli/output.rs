@@ -144,8 +144,7 @@ impl Staged {
         // Behind a link stands what is meant; the link itself stays.
         let linked = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());
         let target = if linked {
-            fs::canonicalize(target)
-                .with_context(|| format!("{} is a broken link", target.display()))?
+            fs::canonicalize(target).with_context(|| format!("{} is a broken link", target.display()))?
         } else {
             target.to_path_buf()
         };

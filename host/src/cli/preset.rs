@@ -8,9 +8,10 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-use clap::{Args as ClapArgs, CommandFactory as _, Subcommand};
+use clap::{Args as ClapArgs, Subcommand};
 use serde::{Deserialize, Serialize};
 
+use super::stdio::show;
 use crate::folders;
 use press::sheet::picture::{read_toml, write_toml};
 
@@ -139,87 +140,89 @@ fn takes_preset(command: &clap::Command) -> bool {
 }
 
 /// Why a command would not take these options, in clap's words; `None` if it would.
-fn refusal(command: &[&str], words: &[String]) -> Option<String> {
+fn refusal(program: &clap::Command, command: &[&str], words: &[String]) -> Option<String> {
     let typed = ["foilpress"].iter().chain(command).map(|&name| name.to_owned()).chain(words.iter().cloned());
     // What the command works on is not a preset's business: any name will do.
-    match super::Args::command().try_get_matches_from(typed.chain(["document".to_owned()])) {
+    match program.clone().try_get_matches_from(typed.chain(["document".to_owned()])) {
         Ok(_) => None,
         // The first line says what is wrong, the others how to get help.
         Err(error) => Some(error.to_string().lines().next().unwrap_or_default().to_owned()),
     }
 }
 
-/// Runs `preset`.
-pub fn run(args: &Args) -> Result<()> {
+/// Runs `preset`. `program` is the whole command line, whose commands decide which options fit.
+pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
     match &args.command {
-        Command::Save { name, options } => {
-            let preset = Preset::of_words(options)?;
-            let (words, program) = (preset.words()?, super::Args::command());
-            let able: Vec<&str> = program
-                .get_subcommands()
-                .filter(|command| takes_preset(command))
-                .map(clap::Command::get_name)
-                .collect();
-            let refusals: Vec<Option<String>> =
-                able.iter().map(|&command| refusal(&[command], &words)).collect();
-            if words.iter().any(|word| word.starts_with("--preset")) {
-                bail!("a preset cannot load another preset");
-            }
-            if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
-                bail!("no command accepts these options together: {}", first.trim_start_matches("error: "));
-            }
-            let folder = presets()?;
-            let path = folders::file(&folder, name)?;
-            std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
-            write_toml(&path, &preset)?;
-            let fits: Vec<&str> = able
-                .into_iter()
-                .zip(&refusals)
-                .filter(|(_, refusal)| refusal.is_none())
-                .map(|(name, _)| name)
-                .collect();
-            super::show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
-        }
-        Command::List => {
-            let folder = presets()?;
-            let names =
-                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
-            let used = in_use();
-            let mut text = String::new();
-            for name in &names {
-                let words = Preset::load(name)?.words()?.join(" ");
-                let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
-                text.push_str(&format!("{name:<16} {words}{used}\n"));
-            }
-            if names.is_empty() {
-                text = format!(
-                    "no presets in {}; `foilpress preset save NAME OPTIONS` creates one\n",
-                    folder.display()
-                );
-            }
-            super::show(&text)
-        }
-        Command::Use { name } => {
-            let path = marker()?;
-            if name == "none" {
-                return match std::fs::remove_file(&path) {
-                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                        Err(error).with_context(|| format!("cannot remove {}", path.display()))
-                    }
-                    _ => super::show("no preset is in use\n"),
-                };
-            }
-            let words = Preset::load(name)?.words()?.join(" ");
-            std::fs::write(&path, format!("{name}\n"))
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            super::show(&format!("applied from now on: {words}\n"))
-        }
+        Command::Save { name, options } => save(name, options, program),
+        Command::List => list(),
+        Command::Use { name } => apply(name),
     }
 }
 
+fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
+    let preset = Preset::of_words(options)?;
+    let words = preset.words()?;
+    let able: Vec<&str> = program
+        .get_subcommands()
+        .filter(|command| takes_preset(command))
+        .map(clap::Command::get_name)
+        .collect();
+    let refusals: Vec<Option<String>> =
+        able.iter().map(|&command| refusal(program, &[command], &words)).collect();
+    if words.iter().any(|word| word.starts_with("--preset")) {
+        bail!("a preset cannot load another preset");
+    }
+    if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
+        bail!("no command accepts these options together: {}", first.trim_start_matches("error: "));
+    }
+    let folder = presets()?;
+    let path = folders::file(&folder, name)?;
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    write_toml(&path, &preset)?;
+    let fits: Vec<&str> = able
+        .into_iter()
+        .zip(&refusals)
+        .filter(|(_, refusal)| refusal.is_none())
+        .map(|(name, _)| name)
+        .collect();
+    show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
+}
+
+fn list() -> Result<()> {
+    let folder = presets()?;
+    let names = folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let used = in_use();
+    let mut text = String::new();
+    for name in &names {
+        let words = Preset::load(name)?.words()?.join(" ");
+        let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
+        text.push_str(&format!("{name:<16} {words}{used}\n"));
+    }
+    if names.is_empty() {
+        text =
+            format!("no presets in {}; `foilpress preset save NAME OPTIONS` creates one\n", folder.display());
+    }
+    show(&text)
+}
+
+/// Applies a preset from now on, or none.
+fn apply(name: &str) -> Result<()> {
+    let path = marker()?;
+    if name == "none" {
+        return match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("cannot remove {}", path.display()))
+            }
+            _ => show("no preset is in use\n"),
+        };
+    }
+    let words = Preset::load(name)?.words()?.join(" ");
+    std::fs::write(&path, format!("{name}\n")).with_context(|| format!("cannot write {}", path.display()))?;
+    show(&format!("applied from now on: {words}\n"))
+}
+
 /// The arguments with the options of a preset put in, if one is named or in use.
-pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
-    let program = super::Args::command();
+pub fn expand(args: Vec<OsString>, program: &clap::Command) -> Result<Vec<OsString>> {
     let place = args.iter().skip(1).position(|arg| !arg.to_string_lossy().starts_with('-')).map(|at| at + 1);
     let Some(mut place) = place else { return Ok(args) };
     let Some(mut command) = program.find_subcommand(&args[place]) else { return Ok(args) };
@@ -249,7 +252,7 @@ pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
                 format!("preset `{name}` is in use (`foilpress preset use none` stops that)")
             })?;
             let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
-            let fits = refusal(&path, &words).is_none();
+            let fits = refusal(program, &path, &words).is_none();
             if !quiet {
                 let what =
                     if fits { words.join(" ") } else { "does not fit this command and is ignored".into() };
@@ -271,6 +274,7 @@ pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory as _;
 
     #[test]
     fn options_come_back_as_they_were_typed() {
@@ -292,7 +296,8 @@ mod tests {
     fn typed_options_override_a_preset() {
         let words: Vec<String> =
             ["--media=film", "--media=thick", "--mirror", "--mirror"].map(str::to_owned).to_vec();
-        assert_eq!(refusal(&["print"], &words), None);
-        assert!(refusal(&["print"], &["--meda=film".to_owned()]).is_some());
+        let program = crate::cli::Args::command();
+        assert_eq!(refusal(&program, &["print"], &words), None);
+        assert!(refusal(&program, &["print"], &["--meda=film".to_owned()]).is_some());
     }
 }

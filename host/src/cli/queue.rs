@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
+use super::stdio::{chain, show};
 use crate::queue::call::{Call, Exit};
 use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
@@ -73,7 +74,11 @@ fn queue_name(name: &str) -> Result<String, String> {
         && name.len() <= 127
         && !name.starts_with('-')
         && name.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c));
-    if fits { Ok(name.into()) } else { Err("a queue name consists of letters, digits, -, _ and ., and does not begin with -".into()) }
+    if fits {
+        Ok(name.into())
+    } else {
+        Err("a queue name consists of letters, digits, -, _ and ., and does not begin with -".into())
+    }
 }
 
 /// Runs `queue`.
@@ -82,7 +87,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::Install(args) => install(args, observer),
         Command::Remove(args) => remove(args, observer),
         Command::List => list(),
-        Command::Ppd => super::show(&ppd::description(&Profile::default())),
+        Command::Ppd => show(&ppd::description(&Profile::default())),
     }
 }
 
@@ -207,7 +212,9 @@ fn ours(name: &str) -> Result<()> {
     match queues()?.iter().find(|(queue, _)| queue == name) {
         None => bail!("there is no queue {name}; `foilpress queue list` shows the queues"),
         Some((_, device)) if uri::parse(device).is_err() => {
-            bail!("queue {name} leads to {device}, which does not belong to this program; `lpadmin -x {name}` removes it")
+            bail!(
+                "queue {name} leads to {device}, which does not belong to this program; `lpadmin -x {name}` removes it"
+            )
         }
         Some(_) => Ok(()),
     }
@@ -243,7 +250,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// The backend: without arguments a list of devices, otherwise a job.
 pub fn backend(args: &Conventional) -> ExitCode {
     if args.arguments.is_empty() {
-        return match super::show(&listing::devices()) {
+        return match show(&listing::devices()) {
             Ok(()) => ExitCode::SUCCESS,
             Err(_) => ExitCode::from(Exit::Failed as u8),
         };
@@ -273,7 +280,7 @@ pub fn filter(args: &Conventional) -> ExitCode {
         }
         Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
-            messages.error(&super::chain(&error));
+            messages.error(&chain(&error));
             ExitCode::FAILURE
         }
     }

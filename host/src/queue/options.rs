@@ -8,9 +8,13 @@ use protocol::ink::Ink;
 use protocol::rgl::Media;
 
 use super::filter::Place;
-use super::ppd;
 use press::layers::{Finish, White};
 use press::layout::{Point, Profile};
+
+/// Keywords for the calibration profile of the queue's printer in its description.
+pub const OFFSET: &str = "FoilpressOffset";
+/// See [`OFFSET`].
+pub const FEED: &str = "FoilpressFeed";
 
 /// One option of the dialog.
 pub struct DialogOption {
@@ -79,10 +83,8 @@ const SPOTS: [(&str, &str, Spots); 3] = [
 const FOILS: [(&str, &str, bool); 2] =
     [("Off", "Never", false), ("On", "Where the page names them (untested)", true)];
 
-const PLACE: [(&str, &str, Place); 2] = [
-    ("Page", "As on the page", Place::Page),
-    ("Centre", "Drawing centred on the sheet", Place::Centre),
-];
+const PLACE: [(&str, &str, Place); 2] =
+    [("Page", "As on the page", Place::Page), ("Centre", "Drawing centred on the sheet", Place::Centre)];
 
 const WHITE: [(&str, &str, White); 5] = [
     ("None", "Only where the page names it", White::None),
@@ -197,7 +199,7 @@ impl Choices {
                 .into_iter()
                 .any(|keyword| asked(keyword).is_some_and(|value| value.eq_ignore_ascii_case("true"))),
             custom_paper: ["PageSize", "media"].into_iter().any(is_custom),
-            profile: description.map_or_else(Profile::default, ppd::profile_in),
+            profile: description.map_or_else(Profile::default, profile_in),
         })
     }
 }
@@ -224,6 +226,24 @@ fn default_of<'a>(description: &'a str, keyword: &str) -> Option<&'a str> {
     description.lines().find_map(|line| {
         Some(line.strip_prefix("*Default")?.strip_prefix(keyword)?.strip_prefix(':')?.trim())
     })
+}
+
+/// The calibration profile in a printer description; values out of range are ignored.
+pub fn profile_in(description: &str) -> Profile {
+    let numbers = |keyword: &str| -> Option<Vec<f64>> {
+        let value = description
+            .lines()
+            .find_map(|line| line.strip_prefix('*')?.strip_prefix(keyword)?.strip_prefix(':'))?;
+        value.trim().trim_matches('"').split_whitespace().map(|number| number.parse().ok()).collect()
+    };
+    let mut profile = Profile::default();
+    if let Some(&[x, y]) = numbers(OFFSET).as_deref() {
+        profile.offset_mm = [x, y];
+    }
+    if let Some(&[feed]) = numbers(FEED).as_deref() {
+        profile.feed = feed;
+    }
+    if profile.problem().is_some() { Profile::default() } else { profile }
 }
 
 /// Reads an option string of the print system.

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use protocol::paper::{LEFT, Paper};
 
-use super::options;
+use super::options::{self, FEED, OFFSET};
 use press::layout::{self, Mm, Point, Profile};
 use press::simulate::Stock;
 
@@ -19,10 +19,6 @@ pub const JOB_TYPE: &str = "application/vnd.foilpress-rgl";
 pub const TYPES: &str = "\
 # Jobs for ALPS MD printers: they begin with the command that selects the printer's language, or with a reset before it.\n\
 application/vnd.foilpress-rgl rgl string(0,<1B258041>) string(0,<1B651B258041>)\n";
-
-/// Keywords for the calibration profile of the queue's printer.
-const OFFSET: &str = "FoilpressOffset";
-const FEED: &str = "FoilpressFeed";
 
 /// Papers and what dialogs call them.
 const PAPERS: [(Paper, &str, &str); 6] = [
@@ -215,27 +211,10 @@ fn custom_papers_into(text: &mut String) {
     );
 }
 
-/// The calibration profile in a printer description; values out of range are ignored.
-pub fn profile_in(description: &str) -> Profile {
-    let numbers = |keyword: &str| -> Option<Vec<f64>> {
-        let value = description
-            .lines()
-            .find_map(|line| line.strip_prefix('*')?.strip_prefix(keyword)?.strip_prefix(':'))?;
-        value.trim().trim_matches('"').split_whitespace().map(|number| number.parse().ok()).collect()
-    };
-    let mut profile = Profile::default();
-    if let Some(&[x, y]) = numbers(OFFSET).as_deref() {
-        profile.offset_mm = [x, y];
-    }
-    if let Some(&[feed]) = numbers(FEED).as_deref() {
-        profile.feed = feed;
-    }
-    if profile.problem().is_some() { Profile::default() } else { profile }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::queue::options::profile_in;
 
     #[test]
     fn a_page_of_points_is_the_paper_it_was_declared_as() {

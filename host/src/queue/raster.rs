@@ -17,9 +17,6 @@ pub enum RasterError {
     /// It cannot be read, or ends too early.
     #[error("the raster stream ends in the middle of a page, or cannot be read")]
     Io(#[from] io::Error),
-    /// It does not begin as one.
-    #[error("this is not a PWG raster stream")]
-    Sync,
     /// A header field has a value that is not supported.
     #[error("page {page}: {field} is {found}; expected {expected}")]
     Field {

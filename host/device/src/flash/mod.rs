@@ -55,7 +55,9 @@ pub enum FlashError {
     #[error("{0} boards are in their boot loader and cannot be told apart; unplug all but one")]
     SeveralBoards(usize),
     /// A board waits, but a bridge was asked for.
-    #[error("another board is already in its boot loader; flash that one first, without naming a bridge, or unplug it")]
+    #[error(
+        "another board is already in its boot loader; flash that one first, without naming a bridge, or unplug it"
+    )]
     AnotherBoard,
     /// The bridge's link cannot be opened.
     #[error(transparent)]

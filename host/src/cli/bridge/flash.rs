@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use crate::cli::output;
+use crate::cli::stdio::show;
 use device::flash::image::Firmware;
 use device::flash::{self, FlashError, ThisComputer};
 use device::send::Address;
@@ -50,12 +51,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         "the board is unchanged or waits in its boot loader; run the same command again, and if the board is not found, hold its \
          BOOTSEL button while plugging it in",
     );
-    let bridge = flash::run(&firmware, &file, args.to.as_ref(), &mut ThisComputer, observer).map_err(|error| {
-        let which = matches!(error, FlashError::SeveralBridges(_));
-        let error = anyhow::Error::from(error);
-        if which { error.context("choose a bridge with --to") } else { error }
-    })?;
-    super::super::show(&format!("bridge {:016x} runs firmware {}\n", bridge.serial, bridge.firmware))
+    let bridge =
+        flash::run(&firmware, &file, args.to.as_ref(), &mut ThisComputer, observer).map_err(|error| {
+            let which = matches!(error, FlashError::SeveralBridges(_));
+            let error = anyhow::Error::from(error);
+            if which { error.context("choose a bridge with --to") } else { error }
+        })?;
+    show(&format!("bridge {:016x} runs firmware {}\n", bridge.serial, bridge.firmware))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args as ClapArgs;
 use serde_json::json;
 
-use super::{PATIENCE, only};
+use super::found::{PATIENCE, only};
 use device::flash::image::Firmware;
 use device::send::Address;
 use device::send::log;

@@ -9,7 +9,7 @@ use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
-use super::PATIENCE;
+use super::found::{PATIENCE, only};
 use device::send::Address;
 use device::send::journal::{Entry, Journal};
 use device::send::query::Query;
@@ -41,11 +41,11 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let address = match &args.to {
         Some(address) => address.clone(),
-        None => super::only()?,
+        None => only()?,
     };
     let mut link = address.open()?;
     reset(&mut Query::new(&mut *link, PATIENCE)?, &journal)?;
-    crate::cli::show("the printer has been reset; if a sheet is still in it, take it out\n")
+    crate::cli::stdio::show("the printer has been reset; if a sheet is still in it, take it out\n")
 }
 
 fn reset(query: &mut Query<'_>, journal: &Journal) -> Result<()> {

@@ -9,7 +9,7 @@ use clap::Args as ClapArgs;
 use protocol::link::message::Lines;
 use serde_json::json;
 
-use super::{PATIENCE, is_open, only};
+use super::found::{PATIENCE, is_open, only};
 use crate::cli::output::say_on_interrupt;
 use device::send::Address;
 use device::send::query::{Query, QueryError};
@@ -60,23 +60,39 @@ fn probe(query: &mut Query<'_>, levels: Levels) -> Result<Lines, QueryError> {
 }
 
 fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
-    // Whoever is asked to move the plug has to be there.
-    let someone = std::io::stderr().is_terminal();
-    let mut probe = |levels| probe(query, levels);
+    let seen = try_positions(&mut |levels| probe(query, levels))?;
+    probe(query, Levels::REST)?;
+    if seen.is_empty() {
+        bail!(
+            "no loop-back plug answers; connect it in place of the printer (docs/wiring.md says how to make one)"
+        );
+    }
+    let tried: Vec<u8> = seen.iter().map(|seen| seen.plug.number()).collect();
+    let verdict = wiring::judge(&seen);
+    report(&verdict, &tried, json)?;
+    if verdict != Verdict::Good {
+        bail!("the wiring is faulty");
+    }
+    Ok(())
+}
+
+/// Tries the plug in each of its positions. Where nobody is there to move it, only in the one it is in.
+fn try_positions(probe: &mut dyn FnMut(Levels) -> Result<Lines, QueryError>) -> Result<Vec<Seen>> {
+    let attended = std::io::stderr().is_terminal();
     let mut seen: Vec<Seen> = Vec::new();
     let mut asked = None;
     while let Some(next) = Plug::ALL.into_iter().find(|plug| seen.iter().all(|seen| seen.plug != *plug)) {
-        match wiring::find(&mut probe)? {
+        match wiring::find(probe)? {
             Some(plug) if seen.iter().all(|seen| seen.plug != plug) => {
-                let look = wiring::look(plug, &mut probe)?;
-                // Moved meanwhile?
-                if wiring::find(&mut probe)? == Some(plug) {
-                    let words = if look.is_good() { "as it should be" } else { "not as it should be" };
+                let found = wiring::look(plug, probe)?;
+                // Only if the plug was not moved meanwhile.
+                if wiring::find(probe)? == Some(plug) {
+                    let words = if found.is_good() { "good" } else { "faulty" };
                     eprintln!("position {}: {words}", plug.number());
-                    seen.push(look);
+                    seen.push(found);
                 }
             }
-            _ if !someone => break,
+            _ if !attended => break,
             _ => {
                 if asked.replace(next) != Some(next) {
                     eprintln!(
@@ -88,45 +104,37 @@ fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
             }
         }
     }
-    probe(Levels::REST)?;
-    if seen.is_empty() {
-        bail!(
-            "no loop-back plug answers; connect it in place of the printer (docs/wiring.md says how to make one)"
-        );
-    }
-    let verdict = wiring::judge(&seen);
+    Ok(seen)
+}
+
+fn report(verdict: &Verdict, tried: &[u8], json: bool) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    let tried: Vec<u8> = seen.iter().map(|seen| seen.plug.number()).collect();
     if json {
-        let (faults, astray) = match &verdict {
+        let (faults, astray) = match verdict {
             Verdict::Good => (vec![], vec![]),
             Verdict::One(faults) => (faults.iter().map(ToString::to_string).collect(), vec![]),
             Verdict::Several(astray) => (vec![], astray.clone()),
         };
-        let good = verdict == Verdict::Good;
+        let good = *verdict == Verdict::Good;
         let all = json!({ "good": good, "positions": tried, "one_of": faults, "astray": astray });
-        writeln!(out, "{}", serde_json::to_string_pretty(&all)?)?;
-    } else {
-        match &verdict {
-            Verdict::Good if tried.len() == Plug::ALL.len() => {
-                writeln!(out, "the wiring is good: all outputs and inputs work")?;
-            }
-            Verdict::Good => writeln!(out, "good so far; the other positions of the plug were not tried")?,
-            Verdict::One(faults) => {
-                for (i, fault) in faults.iter().enumerate() {
-                    writeln!(out, "{}{fault}", if i > 0 { "or: " } else { "" })?;
-                }
-            }
-            Verdict::Several(astray) => {
-                writeln!(out, "more than one fault:")?;
-                for astray in astray {
-                    writeln!(out, "  {astray}")?;
-                }
+        return Ok(writeln!(out, "{}", serde_json::to_string_pretty(&all)?)?);
+    }
+    match verdict {
+        Verdict::Good if tried.len() == Plug::ALL.len() => {
+            writeln!(out, "the wiring is good: all outputs and inputs work")?;
+        }
+        Verdict::Good => writeln!(out, "good so far; the other positions of the plug were not tried")?,
+        Verdict::One(faults) => {
+            for (i, fault) in faults.iter().enumerate() {
+                writeln!(out, "{}{fault}", if i > 0 { "or: " } else { "" })?;
             }
         }
-    }
-    if verdict != Verdict::Good {
-        bail!("the wiring is faulty");
+        Verdict::Several(astray) => {
+            writeln!(out, "more than one fault:")?;
+            for astray in astray {
+                writeln!(out, "  {astray}")?;
+            }
+        }
     }
     Ok(())
 }

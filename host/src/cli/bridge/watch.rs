@@ -9,8 +9,8 @@ use console::Term;
 use protocol::link::message::Ask;
 use serde_json::json;
 
-use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
-use crate::cli::chain;
+use super::found::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
+use crate::cli::stdio::chain;
 use device::send::Address;
 use device::send::query::{Query, Reply};
 use device::send::transport::Transport;
