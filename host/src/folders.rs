@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// There is no place for the user's files.
+/// There is no folder for the user's files.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("there is no folder for your settings; set HOME, or set FOILPRESS_CONFIG to a folder")]
 pub struct NoFolder;
@@ -26,7 +26,7 @@ pub fn config() -> Result<PathBuf, NoFolder> {
     var("FOILPRESS_CONFIG").or_else(|| system.map(|system| system.join("foilpress"))).ok_or(NoFolder)
 }
 
-/// `NAME.toml` in a folder. A name leads to no other folder.
+/// The path of `NAME.toml` in a folder. A name cannot lead to another folder.
 pub fn file(folder: &Path, name: &str) -> Result<PathBuf, NoName> {
     const LONGEST: usize = 64;
     let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';

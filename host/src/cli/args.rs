@@ -36,7 +36,7 @@ pub struct DocumentArgs {
 }
 
 impl DocumentArgs {
-    /// Opens the document; what the reader decided it tells the observer itself.
+    /// Opens the document. The reader notes to the observer what it had to assume.
     pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
         let options = document::Options {
             material: self.material.clone(),
@@ -47,13 +47,13 @@ impl DocumentArgs {
             Ok(document) => document,
             Err(error) if layers::is_art(Path::new(&self.document)) => {
                 return Err(anyhow::Error::new(error).context(format!(
-                    "{0} is art, not a material: `foilpress layers {0}` prints it, `foilpress plan layers {0}` plans it",
+                    "{0} is artwork, not a document of materials: `foilpress layers {0}` prints it, `foilpress plan layers {0}` plans it",
                     self.document
                 )));
             }
             Err(error) => return Err(error.into()),
         };
-        // A name may come from anybody's file, and is shown on the terminal.
+        // The name may come from a file of unknown origin, and it is shown on the terminal.
         document.name.retain(|c| !c.is_control());
         if document.name.trim().is_empty() {
             document.name = "document".into();
@@ -62,7 +62,7 @@ impl DocumentArgs {
     }
 }
 
-/// How to take the document apart.
+/// How to factor the document.
 #[derive(Args, Debug)]
 pub struct FactorArgs {
     /// Number of bases [default: as many as the document needs]
@@ -101,7 +101,7 @@ pub struct InkArgs {
 }
 
 impl InkArgs {
-    /// The inks at hand and the library, which has a stack of them.
+    /// The inks to print with and the library, which has at least one stack of them.
     pub fn at_hand(&self) -> Result<(InkSet, Library)> {
         let (set, library) = (self.set()?, self.library()?);
         if library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty()) {
@@ -132,7 +132,7 @@ impl InkArgs {
     }
 }
 
-/// How to fit materials to the inks.
+/// How to map materials to the inks.
 #[derive(Args, Debug)]
 pub struct GamutArgs {
     /// How to treat materials that no ink can make: basis keeps their differences (the paper's way), clamp keeps each

@@ -31,7 +31,7 @@ struct Visit<W> {
     out: W,
     /// Number of problems that prevent printing.
     troubles: usize,
-    /// Something is there that may not be used.
+    /// Whether a permission is missing.
     forbidden: bool,
 }
 
@@ -87,7 +87,7 @@ impl<W: std::io::Write> Visit<W> {
         }
     }
 
-    /// Boards in their boot loader; how many.
+    /// Reports boards in their boot loader; returns how many there are.
     fn boards(&mut self) -> Result<usize> {
         let found = match usb::boards() {
             Ok(found) => found,
@@ -124,7 +124,7 @@ impl<W: std::io::Write> Visit<W> {
             Err(error) => return self.failure(&error),
             Ok(found) => self.answers(&found)?,
         }
-        // It can be spoken to; but the owner may mean to use one of its other addresses.
+        // The bridge answers on one address; the user may want to use another.
         for address in bridge.addresses.iter().filter(|_| bridge.addresses.len() > 1) {
             if let Err(error @ OpenError::Forbidden(_)) = address.open() {
                 self.failure(&error.into())?;

@@ -1,4 +1,4 @@
-//! `foilpress generate`: what a package needs beside the program, as a tree of files. Not for people; no help shows it.
+//! `foilpress generate`: the files a package needs besides the program, as a tree. For packaging only, so help hides it.
 
 use std::fs;
 use std::path::{Path, PathBuf};

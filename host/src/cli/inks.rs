@@ -84,7 +84,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         What::Check { dir } => check(&dir),
     };
     match show(&text) {
-        // A reader that has seen enough, such as `head`, is no failure.
+        // A reader that closes the pipe early, such as `head`, is not a failure.
         Err(error) if !closed_pipe(&error) => Err(error),
         _ => verdict,
     }
@@ -98,7 +98,7 @@ fn open(folder: Option<&Path>) -> anyhow::Result<Library> {
     }
 }
 
-/// The entry of a stack given in words; suggests one when there is none.
+/// The entry of a stack given as text. Suggests another when the library lacks it.
 fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
     let stack: Stack = text.parse()?;
     if let Some(entry) = library.entry(&stack) {

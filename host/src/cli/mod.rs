@@ -1,7 +1,7 @@
 //! The command line: one file for each subcommand.
 //!
-//! Arguments are typed here and in the subcommands' files; the stages see only settings. Exit codes: 0 done,
-//! 1 failed, 2 wrong usage, 130 interrupted. Results go to standard output, everything else to standard error; a
+//! Arguments are defined here and in the subcommands' files; the stages see only settings. Exit codes: 0 success,
+//! 1 failure, 2 usage error, 130 interrupted. Results go to standard output, everything else to standard error; a
 //! closed pipe is success.
 
 mod args;
@@ -185,7 +185,7 @@ fn run(args: Args) -> Result<()> {
         Command::Generate(args) => generate::run(&args, &Args::command()),
         Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),
-        // Done before anything else; see `main`.
+        // `main` has run these already.
         Command::CupsBackend(_) | Command::CupsFilter(_) => Ok(()),
     }
 }

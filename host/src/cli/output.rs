@@ -1,9 +1,8 @@
 //! Outputs appear whole or not at all.
 //!
-//! Everything is written to a hidden staging folder beside its destination and moved there at the end. If the
-//! program fails the folder goes with it; if it is stopped, [`remove_on_interrupt`] sees to that. What stood at the
-//! destination is replaced only if this program wrote all of it: a file by a file, a folder by a folder of the same
-//! [`Kind`], nothing else.
+//! Everything is written to a hidden staging folder beside its destination and moved there at the end. The folder is removed
+//! when the program fails, and by [`remove_on_interrupt`] when it is stopped. Existing output is replaced only if this program
+//! wrote all of it: a file by a file, a folder by a folder of the same [`Kind`].
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -21,7 +20,7 @@ pub fn say_on_interrupt(text: &str) {
     *FAREWELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_owned());
 }
 
-/// What a folder of ours is, which says what may be in it.
+/// The kind of a folder this program writes, which decides what may be in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The result of `print`.
@@ -53,7 +52,7 @@ impl Kind {
         }
     }
 
-    /// Whether a file of that name can be one this program wrote.
+    /// Whether this program writes files of that name.
     fn writes(self, name: &str) -> bool {
         let picture = |name: &str| name.ends_with(".png");
         self.marker() == Some(name)
@@ -141,7 +140,7 @@ impl Staged {
     }
 
     fn new(target: &Path, check: impl FnOnce(&Path, &fs::Metadata) -> Result<()>) -> Result<Staged> {
-        // Behind a link stands what is meant; the link itself stays.
+        // A link is followed: its target is replaced, and the link stays.
         let linked = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());
         let target = if linked {
             fs::canonicalize(target).with_context(|| format!("{} is a broken link", target.display()))?
@@ -163,19 +162,19 @@ impl Staged {
             bail!("cannot write {}: there is no folder {}", target.display(), parent.display());
         }
         let folder = Scratch::beside(parent).map_err(|error| {
-            // Its own words name the staging folder, which says nothing to the user.
+            // The error's own text names the staging folder, which means nothing to the user.
             let reason = error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
             anyhow::anyhow!("cannot write in {}: {reason}", parent.display())
         })?;
         Ok(Staged { inside: folder.path().join(name), target, folder })
     }
 
-    /// Where to write; nothing is there yet.
+    /// Where to write; nothing exists there yet.
     pub fn path(&self) -> &Path {
         &self.inside
     }
 
-    /// Where to write, as a folder that is there.
+    /// Where to write, as a folder that was created.
     pub fn create(&self) -> Result<&Path> {
         fs::create_dir(&self.inside).with_context(|| format!("cannot write {}", self.target.display()))?;
         Ok(&self.inside)
@@ -183,7 +182,7 @@ impl Staged {
 
     /// Moves what was written to its own name, replacing what was there.
     pub fn commit(self) -> Result<()> {
-        // Held to the end: an interruption waits until old and new have changed places.
+        // Held to the end, so that an interruption waits until the new output has replaced the old.
         let mut folders = scratch::folders();
         let mut old = self.inside.clone().into_os_string();
         old.push(".replaced");
@@ -209,7 +208,7 @@ impl Staged {
     }
 }
 
-/// A document's name as the name of a file: names come from documents, which are not to choose where we write.
+/// A document's name as a file name. Names come from documents, which must not decide where this program writes.
 pub fn file_name(name: &str) -> String {
     const LONGEST: usize = 80;
     let plain: String = name
@@ -224,8 +223,8 @@ pub fn file_name(name: &str) -> String {
     if cut == 0 { "document".into() } else { plain[..cut].to_owned() }
 }
 
-/// Waits for ever if the program is being stopped. Called before it ends by itself with a failure, which may be no
-/// more than the staging folder that is taken away under its hands.
+/// Waits for ever if the program is being stopped. Called before the program ends with a failure, which may only be that the
+/// staging folder was removed while it was in use.
 pub fn yield_to_interrupt() {
     drop(scratch::folders());
 }
@@ -234,7 +233,7 @@ pub fn yield_to_interrupt() {
 /// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
-        // Never released: nothing new is staged, and nothing is moved to its place, from here on.
+        // Never released, so that from here on nothing new is staged and nothing is moved to its destination.
         let paths = scratch::folders();
         for path in paths.iter() {
             // A stage may still be writing into the folder; a second try catches what it added meanwhile.

@@ -1,7 +1,7 @@
 //! `foilpress preset`: named sets of options.
 //!
-//! A preset is a table of long options. It is applied before the arguments are read, as if its options had been typed first:
-//! so every option of a command can be in it, is checked by the same rules, and gives way to what is typed.
+//! A preset is a table of long options. It is applied before the arguments are parsed, as if its options had been typed first:
+//! so it can hold any option of a command, its options are checked by the same rules, and typed options override it.
 
 use std::ffi::OsString;
 use std::io::Write as _;
@@ -15,7 +15,7 @@ use super::stdio::show;
 use crate::folders;
 use press::sheet::picture::{read_toml, write_toml};
 
-/// `--preset`, for commands whose options can be kept under a name.
+/// `--preset`, for commands whose options a preset can hold.
 #[derive(ClapArgs, Debug)]
 pub struct PresetArg {
     /// Load a preset; options given here override it
@@ -58,7 +58,7 @@ enum Command {
     },
 }
 
-/// A preset as it is kept.
+/// A preset as it is saved.
 #[derive(Serialize, Deserialize, Debug, PartialEq)]
 #[serde(deny_unknown_fields)]
 struct Preset {
@@ -142,7 +142,7 @@ fn takes_preset(command: &clap::Command) -> bool {
 /// Why a command would not take these options, in clap's words; `None` if it would.
 fn refusal(program: &clap::Command, command: &[&str], words: &[String]) -> Option<String> {
     let typed = ["foilpress"].iter().chain(command).map(|&name| name.to_owned()).chain(words.iter().cloned());
-    // What the command works on is not a preset's business: any name will do.
+    // A preset holds no file names, so any name of a document will do.
     match program.clone().try_get_matches_from(typed.chain(["document".to_owned()])) {
         Ok(_) => None,
         // The first line says what is wrong, the others how to get help.
@@ -221,7 +221,7 @@ fn apply(name: &str) -> Result<()> {
     show(&format!("applied from now on: {words}\n"))
 }
 
-/// The arguments with the options of a preset put in, if one is named or in use.
+/// The arguments with the options of a preset inserted, if one is named or in use.
 pub fn expand(args: Vec<OsString>, program: &clap::Command) -> Result<Vec<OsString>> {
     let place = args.iter().skip(1).position(|arg| !arg.to_string_lossy().starts_with('-')).map(|at| at + 1);
     let Some(mut place) = place else { return Ok(args) };

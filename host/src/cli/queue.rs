@@ -68,7 +68,7 @@ struct Remove {
     name: String,
 }
 
-/// What the print system takes as a name.
+/// Checks that the print system accepts a name for a queue.
 fn queue_name(name: &str) -> Result<String, String> {
     let fits = !name.is_empty()
         && name.len() <= 127
@@ -91,7 +91,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
 }
 
-/// Starts a program of the print system and gives what it says.
+/// Runs a program of the print system and returns its output.
 fn system(program: &str, arguments: &[&str]) -> Result<String> {
     let output = Process::new(program).args(arguments).env("LC_ALL", "C").output().with_context(|| {
         format!("cannot start {program}; is CUPS installed (Debian: apt install cups ghostscript)?")
@@ -131,10 +131,10 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             places.programs.display()
         );
     }
-    // Before anything is written: without an answer there will be no queue.
+    // Asked before anything is written: if the print system does not answer, no queue can be installed.
     queues()?;
     let mut program = std::env::current_exe().context("cannot find this program")?;
-    // A package has put its own files there, which stay.
+    // A package has installed its own files, which stay.
     if program != Path::new(PACKAGED) && !install::is_roots(&program).with_context(as_root)? {
         install::copy_program(&program, &places.program).with_context(as_root)?;
         observer.note(&format!(
@@ -152,14 +152,14 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             observer.note(&format!("wrote {}", file.path.display()));
         }
     }
-    // A queue's own description knows its machine.
+    // The description of a queue holds the calibration profile of its printer.
     let mut description = tempfile::NamedTempFile::new().context("cannot write the printer description")?;
     description
         .write_all(ppd::description(&profile).as_bytes())
         .context("cannot write the printer description")?;
     let description =
         description.path().to_str().context("the path of the folder for temporary files is not UTF-8")?;
-    // A job that fails is not begun again by itself, and one lost sheet is not to stop the others.
+    // A failed job is not repeated automatically, and one lost sheet must not stop the jobs after it.
     system(
         "lpadmin",
         &[
@@ -186,7 +186,7 @@ fn remove(args: &Remove, observer: &dyn Observer) -> Result<()> {
     observer.note(&format!("queue {} is removed", args.name));
     let left = queues()?.into_iter().any(|(_, device)| uri::parse(&device).is_ok());
     if !left && !Path::new(PACKAGED).exists() {
-        // What was written for the first queue goes with the last; the package's files are the package's.
+        // Files written for the first queue are removed with the last; the files of a package are left to it.
         for file in Places::usual(Path::new("/")).remove().with_context(as_root)? {
             observer.note(&format!("removed {}", file.display()));
         }
@@ -196,7 +196,7 @@ fn remove(args: &Remove, observer: &dyn Observer) -> Result<()> {
 
 /// Names and devices of all queues.
 fn queues() -> Result<Vec<(String, String)>> {
-    // Without any queue the program fails, which is no error here.
+    // The program fails when there is no queue at all, which is not an error here.
     let text = match system("lpstat", &["-v"]) {
         Err(error) if error.to_string().contains("No destinations") => String::new(),
         other => other?,
@@ -237,14 +237,14 @@ fn list() -> Result<()> {
     Ok(())
 }
 
-/// Arguments the print system gives; they are not for people.
+/// Arguments passed by the print system, not by people.
 #[derive(ClapArgs, Debug)]
 pub struct Conventional {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
 }
 
-/// Set by a signal that asks to end.
+/// Set by the signal that asks the program to end.
 static STOP: AtomicBool = AtomicBool::new(false);
 
 /// The backend: without arguments a list of devices, otherwise a job.

@@ -1,4 +1,4 @@
-//! `foilpress sample`: what can be printed before there is a document.
+//! `foilpress sample`: built-in documents, to try the program with.
 
 use std::io::Write;
 use std::path::PathBuf;

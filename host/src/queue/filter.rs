@@ -34,8 +34,6 @@ use press::layout::LayoutError;
 use press::separate::SeparateError;
 use press::sheet::SheetError;
 
-pub use page::Place;
-
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
 

@@ -1,13 +1,12 @@
 //! The options of the print dialog: one table for the printer description that declares them and the filter that applies them.
 //!
-//! Option strings of the print system are `name=value` apart by blanks, values in quotes or with backslashes where
-//! they hold blanks; a bare `name` means true and `noname` false.
+//! Option strings of the print system are pairs `name=value`, separated by blanks; a value with blanks is quoted or has
+//! backslashes; a bare `name` means true and `noname` false.
 
 use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::rgl::Media;
 
-use super::filter::Place;
 use press::layers::{Finish, White};
 use press::layout::{Point, Profile};
 
@@ -20,15 +19,15 @@ pub const FEED: &str = "FoilpressFeed";
 pub struct DialogOption {
     /// Its keyword.
     pub keyword: &'static str,
-    /// What people read.
+    /// The text in the dialog.
     pub text: &'static str,
     /// Keywords and texts of the choices; the first is the default.
     pub choices: Vec<(String, String)>,
-    /// Name and text of a value of one's own, if there can be one.
+    /// Name and text of a custom value, if the option takes one.
     pub custom: Option<(&'static str, &'static str)>,
 }
 
-/// Which colours are inks of their own.
+/// Which colours print in inks of their own.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Spots {
     /// Spot colours of the document that name inks.
@@ -37,6 +36,17 @@ pub enum Spots {
     Reserved,
     /// None: everything becomes process inks.
     None,
+}
+
+/// Where the drawing goes on its sheet.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Place {
+    /// Where the page has it.
+    Page,
+    /// In the middle of the printable area.
+    Centre,
+    /// With its top left corner this far from the corner of the sheet.
+    At(Point),
 }
 
 /// What the user chose.
@@ -52,17 +62,17 @@ pub struct Choices {
     pub spots: Spots,
     /// Whether foils may be printed.
     pub foils: bool,
-    /// Where white is laid.
+    /// Where white is printed.
     pub white: White,
-    /// Where finish is laid.
+    /// Where finish is printed.
     pub finish: Finish,
-    /// Pixels an inch the page is drawn at.
+    /// Resolution at which the page is rendered, in pixels per inch.
     pub dpi: u16,
-    /// Where what is drawn goes on its sheet.
+    /// Where the drawing goes on its sheet.
     pub place: Place,
-    /// Whether pages are turned left to right.
+    /// Whether pages are mirrored left to right.
     pub mirror: bool,
-    /// Whether a sheet of a size of its own is meant, and not the paper that is nearly as large.
+    /// Whether the sheet has a custom size, rather than that of the paper nearest to it.
     pub custom_paper: bool,
     /// Calibration profile of the queue's printer.
     pub profile: Profile,
@@ -156,7 +166,7 @@ impl Choices {
     /// # Errors
     /// A value in the job's options that is not a choice. Such a value among the defaults is ignored.
     pub fn read(options: &[(String, String)], description: Option<&str>) -> Result<Choices, NoChoice> {
-        // The last one counts, as in the print system.
+        // The last one wins, as in the print system.
         let asked = |keyword: &str| {
             options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(keyword)).map(|(_, value)| value)
         };
@@ -212,7 +222,7 @@ impl DialogOption {
     }
 }
 
-/// A place as dialogs write it, `Custom.20x30mm`, or as people do.
+/// A position as dialogs write it, `Custom.20x30mm`, or as people do, `20x30mm`.
 fn read_corner(option: &DialogOption, value: &str) -> Result<Point, NoChoice> {
     let bare = match value.get(..7) {
         Some(head) if head.eq_ignore_ascii_case("custom.") => &value[7..],

@@ -1,8 +1,8 @@
 //! The printer description: papers with the margins the printer enforces, and the [`options`] of the
-//! dialog, as a PPD file, which is what print systems of this kind understand.
+//! dialog, as a PPD file.
 //!
 //! Source: the PPD specification 4.3 and the print system's extensions to it (`cupsFilter2`, `cupsManualCopies`). The
-//! numbers come from the tables the jobs are made by, so that dialog and job cannot differ.
+//! numbers come from the tables that jobs are made from, so that dialog and job cannot differ.
 
 use std::fmt::Write as _;
 
@@ -12,15 +12,15 @@ use super::options::{self, FEED, OFFSET};
 use press::layout::{self, Mm, Point, Profile};
 use press::simulate::Stock;
 
-/// What the filter makes.
+/// The type of the filter's output.
 pub const JOB_TYPE: &str = "application/vnd.foilpress-rgl";
 
-/// How the print system knows a file of that type by its first bytes.
+/// How the print system recognises a file of that type by its first bytes.
 pub const TYPES: &str = "\
 # Jobs for ALPS MD printers: they begin with the command that selects the printer's language, or with a reset before it.\n\
 application/vnd.foilpress-rgl rgl string(0,<1B258041>) string(0,<1B651B258041>)\n";
 
-/// Papers and what dialogs call them.
+/// Papers and their names in dialogs.
 const PAPERS: [(Paper, &str, &str); 6] = [
     (Paper::A4, "A4", "A4"),
     (Paper::Letter, "Letter", "US Letter"),
@@ -30,13 +30,13 @@ const PAPERS: [(Paper, &str, &str); 6] = [
     (Paper::Postcard, "Postcard", "Postcard (100 x 148 mm)"),
 ];
 
-/// 1/600 inch as points, as short as it is exact to a thousandth.
+/// Converts 1/600 inch to points: the shortest text that is exact to a thousandth.
 fn points(dots: f64) -> String {
     let text = format!("{:.3}", dots * 72.0 / 600.0);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The size of a sheet in points. Known sizes have the numbers everybody gives them.
+/// The size of a sheet in points. Known sizes have their customary numbers.
 fn sheet(paper: Paper) -> (String, String) {
     let (width, length) = match paper {
         Paper::A4 => ("595", "842"),
@@ -53,8 +53,8 @@ fn sheet(paper: Paper) -> (String, String) {
     (width.into(), length.into())
 }
 
-/// The paper of a sheet of so many millimetres: a known one that is as large within 2 mm, unless a sheet of its own size is
-/// meant; otherwise that.
+/// The paper of a sheet of this size in millimetres: a known paper that agrees within 2 mm, unless the size is `custom`;
+/// otherwise a sheet of exactly this size.
 ///
 /// # Errors
 /// In words: why the printer cannot take the sheet.
@@ -139,7 +139,7 @@ pub fn description(profile: &Profile) -> String {
     text
 }
 
-/// A text as a PPD holds it: a colon would end it.
+/// A text for a PPD file, where a colon would end it.
 fn translation(text: &str) -> String {
     text.replace(':', ",").replace('…', "...")
 }
@@ -161,7 +161,7 @@ fn papers_into(text: &mut String) {
     text.push_str("\n*DefaultImageableArea: A4\n");
     for (paper, name, words) in PAPERS {
         let (_, length) = sheet(paper);
-        // Points count from the lower left corner, the machine from the upper left.
+        // Points count from the lower left corner, the printer from the upper left.
         let length: f64 = length.parse::<f64>().unwrap_or_default() * 600.0 / 72.0;
         let (left, right) = (f64::from(LEFT), f64::from(LEFT + paper.width()));
         let top = length - f64::from(paper.top());
@@ -183,10 +183,10 @@ fn papers_into(text: &mut String) {
     }
 }
 
-/// Sheets of sizes of their own.
+/// Sheets of custom sizes.
 fn custom_papers_into(text: &mut String) {
     let (Point(narrowest, shortest), Point(widest, longest)) = layout::paper::custom_range();
-    // Inwards to a hundredth of a point, so that what is declared goes in.
+    // Rounded inwards to a hundredth of a point, so that the printer accepts every declared size.
     let least = |side: Mm| (side.0 * 7200.0 / 25.4).ceil() / 100.0;
     let most = |side: Mm| (side.0 * 7200.0 / 25.4).floor() / 100.0;
     let [left, top, right, bottom] =

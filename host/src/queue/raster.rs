@@ -1,4 +1,4 @@
-//! Pages of PWG raster, the form in which print systems hand over pictures of pages.
+//! Pages of PWG raster, the format in which print systems pass on pictures of pages.
 //!
 //! Method: header and rows are read as they come; a row is unpacked into red, green and blue. Grey and black-and-white
 //! pages become colours of equal parts.
@@ -26,7 +26,7 @@ pub enum RasterError {
         field: &'static str,
         /// Its value.
         found: String,
-        /// What is taken.
+        /// What is supported.
         expected: &'static str,
     },
     /// A row has more pixels than the page is wide, or a page more rows.
@@ -49,16 +49,16 @@ enum Colours {
     Bits,
 }
 
-/// A page's header, as much of it as matters.
+/// The parts of a page's header that are used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Page {
     /// Pixels across.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Pixels an inch, both ways.
+    /// Pixels per inch in both directions.
     pub dpi: u16,
-    /// How often it is wanted, at least 1.
+    /// Number of copies, at least 1.
     pub copies: u32,
     colours: Colours,
     line: usize,
@@ -70,7 +70,7 @@ pub struct Reader<R> {
     number: usize,
     page: Option<Page>,
     row: usize,
-    /// How often the row in `line` still counts.
+    /// How often the row in `line` is still to be repeated.
     repeat: usize,
     line: Vec<u8>,
 }
@@ -81,7 +81,7 @@ impl<R: Read> Reader<R> {
         Reader { input, number: 0, page: None, row: 0, repeat: 0, line: Vec::new() }
     }
 
-    /// The next page; `None` at the end. Rows of the page before that were not read are passed over.
+    /// The next page; `None` at the end. Unread rows of the page before are skipped.
     pub fn next_page(&mut self) -> Result<Option<Page>, RasterError> {
         let mut scratch = Vec::new();
         while self.page.is_some_and(|page| self.row < page.height) {
@@ -174,7 +174,7 @@ impl<R: Read> Reader<R> {
         Ok(byte[0])
     }
 
-    /// Runs of pixels: so many times one, or so many one by one; 128 is paper to the end of the row.
+    /// Unpacks runs of pixels: one pixel repeated, or several pixels as they are; 128 is paper to the end of the row.
     fn unpack(&mut self, page: &Page) -> Result<(), RasterError> {
         let pixel = if page.colours == Colours::Rgb { 3 } else { 1 };
         let paper = if matches!(page.colours, Colours::Black | Colours::Bits) { 0 } else { 255 };

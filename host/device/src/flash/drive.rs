@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use observe::Observer;
 
-/// The file that says what board a drive belongs to, and what is in it for an RP2040.
+/// The file that names the board of a drive, and its entry for an RP2040.
 const INFO: &str = "INFO_UF2.TXT";
 const BOARD: &str = "RPI-RP2";
 const NAME: &str = "foilpress-bridge.uf2";
@@ -105,7 +105,7 @@ fn mounted() -> Vec<PathBuf> {
     Vec::new()
 }
 
-/// Copies the file to the drive, down to the board.
+/// Copies the file to the drive and makes sure that the board has it.
 pub fn copy(drive: &Path, file: &[u8], observer: &dyn Observer) -> Result<(), DriveError> {
     observer.begin("copying the firmware to the drive", file.len() as u64);
     let mut written = 0;

@@ -30,13 +30,13 @@ use picoboot::{Picoboot, Pipe, WriteError};
 
 /// Time between two checks of what is plugged in.
 const POLL: Duration = Duration::from_millis(250);
-/// A board needs a second or two to show itself; slow hubs and virus scanners make it more.
+/// Time for a board to appear: a second or two, more with slow hubs and virus scanners.
 const LOADER_PATIENCE: Duration = Duration::from_secs(10);
-/// Until the system has mounted the board's drive.
+/// Time for the system to mount the board's drive.
 const DRIVE_PATIENCE: Duration = Duration::from_secs(6);
-/// Until the bridge is back with its new firmware; a drive that is copied to in the background takes longest.
+/// Time for the bridge to come back with its new firmware; longest when its drive is written in the background.
 const BACK_PATIENCE: Duration = Duration::from_secs(30);
-/// How long a bridge may take to answer.
+/// Time for a bridge to answer.
 const ANSWER_PATIENCE: Duration = Duration::from_secs(3);
 
 /// Why a bridge does not have the new firmware.
@@ -125,8 +125,8 @@ pub trait Computer {
     fn wait(&mut self, time: Duration);
 }
 
-/// Puts `firmware`, read from `file`, onto the bridge at `to`, or onto the only board there is. Returns the bridge as it
-/// introduces itself afterwards.
+/// Installs `firmware`, read from `file`, on the bridge at `to`, or on the only board. Returns the bridge as it introduces
+/// itself afterwards.
 pub fn run(
     firmware: &Firmware,
     file: &[u8],
@@ -162,7 +162,7 @@ pub fn run(
     };
     let back = until(computer, BACK_PATIENCE, |computer| {
         let mut bridges = computer.bridges();
-        // Other bridges are not to be disturbed.
+        // Other bridges are left alone.
         bridges.retain(|bridge| bridge.number().is_none_or(&expected));
         bridges.iter().filter_map(|bridge| computer.greet(bridge)).find(|bridge| expected(bridge.serial))
     });
@@ -199,7 +199,7 @@ fn write(
     observer: &dyn Observer,
 ) -> Result<(), FlashError> {
     let closed = match computer.boards() {
-        // Where the USB library cannot even list the board its drive may still be there.
+        // Even if the USB library cannot list the board, its drive may be mounted.
         0 => io::Error::from(ErrorKind::NotFound),
         1 => match computer.open() {
             Ok(board) => return Ok(Picoboot::write(board, firmware.image(), observer)?),

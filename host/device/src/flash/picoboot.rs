@@ -29,10 +29,10 @@ pub trait Pipe {
     /// Receives one transfer of at most the buffer's length.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// What came of the last command (GET_COMMAND_STATUS).
+    /// The result of the last command (GET_COMMAND_STATUS).
     fn status(&mut self) -> io::Result<[u8; 16]>;
 
-    /// Brings the interface back to its beginning (INTERFACE_RESET), stalled endpoints included.
+    /// Resets the interface (INTERFACE_RESET), including stalled endpoints.
     fn reset(&mut self) -> io::Result<()>;
 }
 
@@ -95,7 +95,7 @@ impl Command {
     }
 }
 
-/// Why the board does not have the new firmware. It is in its boot loader, or can be brought there, and flashing can be repeated.
+/// Why the board does not have the new firmware. It is in its boot loader or can enter it again, so flashing can be repeated.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The board was unplugged or does not answer.
@@ -164,7 +164,7 @@ impl<P: Pipe> Picoboot<P> {
         let mut board = Picoboot { pipe, token: 0 };
         let result = board.write_all(image, observer);
         if result.is_err() {
-            // So that the drive can be used instead. If the board is gone, so is what it was told.
+            // Gives the drive back, so that it can be used instead. A board that has gone forgets the lock by itself.
             let _ = board.pipe.reset();
             let _ = board.command(Command::Exclusive, 0, &[0], Data::None);
         }
@@ -179,7 +179,7 @@ impl<P: Pipe> Picoboot<P> {
         let sectors: Vec<u32> = image.sectors().into_iter().collect();
         let steps = sectors.len() as u64;
         observer.begin("writing the firmware", steps);
-        // First the one that makes the board start the old program.
+        // First the sector without which the board does not start the old program.
         self.erase(FLASH.start)?;
         for &sector in &sectors {
             let bytes = contents(image, sector);

@@ -63,7 +63,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 fn read(path: &Path) -> Result<Vec<u8>> {
     let cannot = || format!("cannot read {}", path.display());
     let mut file = Vec::new();
-    // One more than can be right, which the reader then refuses.
+    // One byte more than the largest valid file, so that the reader refuses a larger one.
     let most = uf2::LARGEST_FILE as u64 + 1;
     File::open(path).with_context(cannot)?.take(most).read_to_end(&mut file).with_context(cannot)?;
     Ok(file)

@@ -27,7 +27,7 @@ pub fn only() -> Result<Address> {
     Ok(address.clone())
 }
 
-/// What a bridge does, in words.
+/// What a bridge is doing, in words.
 pub fn doing(progress: &Progress) -> String {
     let job = progress.job;
     match progress.state {
@@ -44,7 +44,7 @@ pub fn doing(progress: &Progress) -> String {
     }
 }
 
-/// Whether a job is under way.
+/// Whether a job is open.
 pub fn is_open(progress: &Progress) -> bool {
     matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling)
 }
@@ -84,7 +84,7 @@ pub struct Found {
     pub progress: Progress,
     /// The lines of its port.
     pub lines: Lines,
-    /// What the lines mean.
+    /// The fault that the lines show.
     pub fault: Option<Fault>,
     /// The printer's device ID.
     pub device_id: Reply,
@@ -116,7 +116,7 @@ impl Found {
         Ok(Found { bridge: query.bridge().clone(), progress, lines, fault, device_id, status })
     }
 
-    /// For programs.
+    /// As JSON.
     pub fn json(&self) -> serde_json::Value {
         json!({
             "bridge": self.bridge,
@@ -133,12 +133,12 @@ impl Found {
         })
     }
 
-    /// The printer's device ID, if it told it.
+    /// The printer's device ID, if it sent one.
     pub fn device_id(&self) -> Option<String> {
         self.device_id.device_id()
     }
 
-    /// In words.
+    /// Writes it in words.
     pub fn write(&self, out: &mut impl std::io::Write) -> Result<()> {
         writeln!(out, "bridge {:016x}, firmware {}", self.bridge.serial, self.bridge.firmware)?;
         if let Some(newer) = newer_firmware(&self.bridge) {

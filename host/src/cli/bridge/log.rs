@@ -1,4 +1,4 @@
-//! `foilpress bridge log`: what the firmware has noted, in words.
+//! `foilpress bridge log`: the log of the firmware, decoded.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use device::send::Address;
 use device::send::log;
 use device::send::query::Query;
 
-/// A firmware's program is some megabytes.
+/// The ELF file of the firmware has a few megabytes.
 const LARGEST: u64 = 64 << 20;
 
 /// Arguments of `bridge log`.
@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<()> {
     for entry in &log.entries {
         write!(out, "{:>12}  {:<5}  {}", entry.time, entry.level.unwrap_or(""), entry.text)?;
         match &entry.place {
-            // Where it happened is of use if something went wrong.
+            // The place in the source helps only with warnings and errors.
             Some(place) if matches!(entry.level, Some("error" | "warn")) => writeln!(out, "  ({place})")?,
             _ => writeln!(out)?,
         }

@@ -1,8 +1,8 @@
 //! `foilpress bridge reset`, and the check whether a printer still waits for the rest of a sheet that was lost.
 //!
-//! Half a job followed by another is text to the printer. A bridge that knows of the half resets the printer by itself. One
-//! that has lost its memory does not; then nothing is sent until the printer has been reset: by the bridge, which pulls
-//! the port's nInit line, or by its own switch.
+//! A printer that has received half a job takes the next one for the rest of it and prints it as text. A bridge that knows
+//! about the half resets the printer by itself. One that has lost its memory does not; then nothing is sent until the printer
+//! has been reset: by the bridge, which pulls the port's nInit line, or with its own power switch.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 
@@ -83,7 +83,7 @@ pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Obser
     Ok(())
 }
 
-/// Asks a person; where there is none the answer is no.
+/// Asks the user; without a terminal the answer is no.
 fn agreed(question: &str) -> Result<bool> {
     if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
         return Ok(false);

@@ -1,4 +1,4 @@
-//! `foilpress bridge test`: the wiring, by a loop-back plug or by a meter.
+//! `foilpress bridge test`: test the wiring with a loop-back plug or a meter.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::thread::sleep;
@@ -18,7 +18,7 @@ use device::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
 /// Time between two checks whether the plug has been moved.
 const POLL: Duration = Duration::from_millis(300);
 
-/// How long a line of the pattern is held: time to read a meter.
+/// How long each line of the pattern is held: time enough to read a meter.
 const HOLD: Duration = Duration::from_secs(3);
 
 /// Arguments of `bridge test`.
@@ -76,7 +76,7 @@ fn test(query: &mut Query<'_>, json: bool) -> Result<()> {
     Ok(())
 }
 
-/// Tries the plug in each of its positions. Where nobody is there to move it, only in the one it is in.
+/// Tests the plug in each of its positions; without a terminal, only in its present one, since nobody can be asked to move it.
 fn try_positions(probe: &mut dyn FnMut(Levels) -> Result<Lines, QueryError>) -> Result<Vec<Seen>> {
     let attended = std::io::stderr().is_terminal();
     let mut seen: Vec<Seen> = Vec::new();
@@ -141,7 +141,7 @@ fn report(verdict: &Verdict, tried: &[u8], json: bool) -> Result<()> {
 
 fn walk(query: &mut Query<'_>) -> Result<()> {
     let (lines, _) = query.lines(PATIENCE)?;
-    // Inputs rest high; whatever is switched on at the other end holds one of them low.
+    // Inputs rest high; a device that is switched on at the other end holds one of them low.
     if lines.high(Lines::POWER) && lines.0 & 0x1f != 0x1f {
         bail!("a device that is switched on is connected; take the cable off the printer first");
     }

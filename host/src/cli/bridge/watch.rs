@@ -21,7 +21,7 @@ const POLL: Duration = Duration::from_secs(1);
 /// Time between two questions to the printer, which is asked only between jobs.
 const ASK: Duration = Duration::from_secs(5);
 
-/// Rows a text takes on a terminal that is so many columns wide.
+/// Rows that a text takes on a terminal with so many columns.
 fn rows(text: &str, columns: usize) -> usize {
     text.lines().map(|line| line.chars().count().div_ceil(columns.max(1)).max(1)).sum()
 }
@@ -30,19 +30,19 @@ fn rows(text: &str, columns: usize) -> usize {
 struct Screen {
     json: bool,
     terminal: bool,
-    /// What was shown last, and on how many lines.
+    /// The text that was shown last.
     shown: String,
 }
 
 impl Screen {
-    /// Shows a text in place of the last one; where that cannot be, under it if it is another one.
+    /// Shows a text in place of the last one. Without a terminal it is added below, if it differs.
     fn show(&mut self, text: String) -> std::io::Result<()> {
         if text == self.shown {
             return Ok(());
         }
         let mut out = std::io::stdout().lock();
         if self.terminal && !self.shown.is_empty() {
-            // Up to the first line, and everything below it away.
+            // Moves up to the first line and erases everything below.
             let columns = usize::from(Term::stdout().size().1);
             write!(out, "\x1b[{}F\x1b[J", rows(&self.shown, columns))?;
         } else if !self.json && !self.shown.is_empty() {
@@ -93,7 +93,7 @@ pub fn run(address: &Address, json: bool) -> Result<()> {
     }
 }
 
-/// Follows one connection to its end, which is an error; one of standard output's is an [`std::io::Error`].
+/// Follows one connection until it fails. An error of standard output is an [`std::io::Error`].
 fn follow(
     link: &mut dyn Transport,
     screen: &mut Screen,
