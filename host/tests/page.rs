@@ -7,9 +7,7 @@ use press::sheet::Sheet;
 use press::simulate;
 use serde_json::Value;
 
-mod common;
-
-use common::{Bench, small_document, text};
+use testing::program::{Bench, small_document, text};
 
 const SMALL: &str = "--size 12x8mm --paper postcard";
 
