@@ -5,9 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 
-mod common;
-
-use common::{Bench, entries, small_document, text};
+use testing::program::{Bench, entries, small_document, text};
 
 /// As small a print as there is.
 const SMALL: &str = "--size 2x2mm --paper postcard";
@@ -114,7 +112,7 @@ fn files_that_only_claim_to_be_large_are_answered_within_bounds_of_memory() {
     let bench = Bench::new();
     let within = |command: &str, name: &str| {
         let mut shell = std::process::Command::new("sh");
-        let program = env!("CARGO_BIN_EXE_foilpress");
+        let program = testing::program::path().display();
         shell.args(["-c", &format!("ulimit -v 2000000; exec {program} {command}")]);
         shell.env("FOILPRESS_CONFIG", bench.path("config")).env("FOILPRESS_JOBS", bench.path("jobs"));
         let output = shell.current_dir(bench.path("")).stdin(Stdio::null()).output().unwrap();

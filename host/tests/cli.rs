@@ -4,9 +4,7 @@ use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-mod common;
-
-use common::{Bench, entries, small_document};
+use testing::program::{Bench, entries, small_document};
 
 #[test]
 fn a_folder_becomes_a_print_with_everything_in_it() {

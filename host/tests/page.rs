@@ -7,9 +7,7 @@ use press::sheet::Sheet;
 use press::simulate;
 use serde_json::Value;
 
-mod common;
-
-use common::{Bench, small_document, text};
+use testing::program::{Bench, small_document, text};
 
 const SMALL: &str = "--size 12x8mm --paper postcard";
 
@@ -162,7 +160,7 @@ fn a_preset_stands_for_its_options_and_gives_way_to_what_is_typed() {
     bench.done("preset use none");
     assert!(bench.refused(1, "print tile --preset crad").contains("card"));
     assert!(bench.refused(1, "preset save bad --media foo").contains("the media are paper, thick, film"));
-    assert!(bench.refused(1, "preset save ../x --mirror").contains("is no name"));
+    assert!(bench.refused(1, "preset save ../x --mirror").contains("is not a valid name"));
     assert!(!bench.entries().contains(&"x.toml".to_string()));
 }
 

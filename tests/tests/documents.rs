@@ -125,11 +125,8 @@ fn a_document_prints_pixel_by_pixel() {
 
 #[test]
 fn every_real_document_prints() {
-    let Some(data) = std::env::var_os("FOILPRESS_DATA") else {
-        println!("skipped: FOILPRESS_DATA names no folder");
-        return;
-    };
-    let folder = std::path::Path::new(&data).join("svbrdf");
+    let Some(data) = testing::needs::data() else { return };
+    let folder = data.join("svbrdf");
     let documents: Vec<_> = std::fs::read_dir(&folder).expect("the real documents").flatten().collect();
     assert!(!documents.is_empty(), "{} is empty", folder.display());
     for document in documents {

@@ -13,7 +13,7 @@ const MOST_TEXT: u64 = 1 << 20;
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The system refused; it says why.
-    #[error("{}", path.display())]
+    #[error("{}: cannot be read or written", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -29,7 +29,7 @@ pub enum FileError {
         problem: String,
     },
     /// A picture is no PNG, or damaged.
-    #[error("{}: the picture is damaged or no PNG; write it again from its source", path.display())]
+    #[error("{}: the picture is damaged; write it again from its source", path.display())]
     Png {
         /// The file.
         path: PathBuf,

@@ -62,16 +62,16 @@ impl Factor {
     after_help = "Example:\n  foilpress map my-material.foil --intent basis --inks process,MS -o my-material.mix"
 )]
 pub struct Map {
-    /// A folder made by `factor`
+    /// Folder written by `factor`
     #[arg(value_name = "DOC.foil")]
     factored: PathBuf,
-    /// The document it was made from, so that clamp and blend see its own pixels instead of mixtures of the bases
+    /// Document that was factored, so that clamp and blend use its own pixels instead of mixtures of the bases
     #[arg(long, value_name = "DOC")]
     document: Option<String>,
-    /// Which material of that document, as it was given to `factor`
+    /// Material of that document, as given to `factor`
     #[arg(long, value_name = "NUMBER|NAME", requires = "document")]
     material: Option<String>,
-    /// Encoding of that document's colour maps, as it was given to `factor`
+    /// Encoding of that document's colour maps, as given to `factor`
     #[arg(long, value_name = "SPACE", requires = "document", value_parser = choice::<ColourSpace>())]
     colour_space: Option<ColourSpace>,
     #[command(flatten)]
@@ -124,17 +124,17 @@ impl Map {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress halftone my-material.mix --size 120x90mm -o my-material.dots")]
 pub struct Halftone {
-    /// A folder made by `map`
+    /// Folder written by `map`
     #[arg(value_name = "DOC.mix")]
     mix: PathBuf,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
     /// [default: the document's own size, else as large as a4 allows]
     #[arg(long)]
     size: Option<Size>,
-    /// Folder of your own ink library, for its minimum clusters
+    /// Folder of your own ink library; its minimum clusters apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
-    /// Folder to write: one stack for every dot as a picture, dots.toml [default: DOC.dots in the current folder]
+    /// Folder to write: a picture with one stack for every dot, dots.toml [default: DOC.dots in the current folder]
     #[arg(short, long, value_name = "DOC.dots")]
     output: Option<PathBuf>,
 }
@@ -187,10 +187,10 @@ impl Layout {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress separate my-material.sheet -o my-material.passes")]
 pub struct Separate {
-    /// A folder made by `layout` or `simulate`
+    /// Folder written by `layout` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
-    /// Folder of your own ink library, for its rules on the order of layers
+    /// Folder of your own ink library; its order rules apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
     /// Folder to write: a one-bit picture for each pass, passes.toml [default: DOC.passes in the current folder]
@@ -221,12 +221,12 @@ impl Separate {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress encode my-material.passes -o job.rgl")]
 pub struct Encode {
-    /// A folder made by `separate`
+    /// Folder written by `separate`
     #[arg(value_name = "DOC.passes")]
     passes: PathBuf,
     #[command(flatten)]
     media: MediaArgs,
-    /// Allow foil: its ink codes were never confirmed on hardware, and it needs process ink beneath it
+    /// Allow foil; its ink codes have never been seen on hardware, and it needs process ink beneath it
     #[arg(long)]
     foil: bool,
     /// File to write [default: DOC.rgl in the current folder]
@@ -251,10 +251,10 @@ impl Encode {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress simulate job.rgl -o printed.sheet")]
 pub struct Simulate {
-    /// A job in the printer's language
+    /// Job in the printer's language
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
-    /// Folder to write: the sheet as the simulated printer printed it
+    /// Folder to write: the sheet that the simulated printer made
     #[arg(short, long, value_name = "SHEET")]
     output: PathBuf,
 }

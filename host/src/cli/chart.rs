@@ -34,21 +34,22 @@ pub struct Args {
 enum Chart {
     /// Print a halftoned ramp from one stack to another, with a checkerboard to hold so that the ramp reflects it
     Ramp(Ramp),
-    /// Print four levels of gloss between a glossy and a dull stack: clamped, and mapped to keep their differences
+    /// Print four levels of gloss between a glossy and a dull stack, both clamped and with their differences kept
     Ladder(Ladder),
-    /// Print a labelled patch of every stack that a choice of inks can make
+    /// Print a labelled patch of every stack that the chosen inks can make
     Stacks(Stacks),
-    /// Print verniers that show how far passes are apart, between the first ink and the others
+    /// Print verniers between the first ink and each other ink, to measure how far apart passes land
     Registration(Registration),
-    /// Print two crosses to measure with a ruler: the printer's offset and feed (for `foilpress profile set`)
+    /// Print two crosses to measure with a ruler, for `foilpress profile set`: where this printer prints and how far it
+    /// feeds
     Calibration(Calibration),
 }
 
 #[derive(ClapArgs, Debug)]
 struct Ramp {
-    /// The stack on the left: short or long ink names joined by +, lowest first, such as MS or MS+C
+    /// Stack on the left: short or long names of inks joined by +, from the bottom, such as MS or MS+C
     first: Stack,
-    /// The stack on the right
+    /// Stack on the right
     second: Stack,
     #[command(flatten)]
     step: StepArgs,
@@ -57,7 +58,7 @@ struct Ramp {
 /// What charts between two stacks share.
 #[derive(ClapArgs, Debug)]
 struct StepArgs {
-    /// Folder of your own ink library
+    /// Folder of your own ink library [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<std::path::PathBuf>,
     #[command(flatten)]
@@ -66,10 +67,10 @@ struct StepArgs {
 
 #[derive(ClapArgs, Debug)]
 struct Ladder {
-    /// The glossier stack: short or long ink names joined by +, lowest first
+    /// Glossier stack: short or long names of inks joined by +, from the bottom
     #[arg(default_value = "MS+F", requires = "dull")]
     glossy: Stack,
-    /// The duller stack
+    /// Duller stack
     #[arg(default_value = "MS")]
     dull: Stack,
     #[command(flatten)]
@@ -86,7 +87,7 @@ struct Stacks {
 
 #[derive(ClapArgs, Debug)]
 struct Registration {
-    /// Inks separated by commas; the first is compared with each of the others
+    /// Inks, separated by commas; the first is compared with each of the others
     #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = ink)]
     inks: Vec<Ink>,
     #[command(flatten)]
@@ -95,7 +96,7 @@ struct Registration {
 
 #[derive(ClapArgs, Debug)]
 struct Calibration {
-    /// The ink to print with
+    /// Ink to print with
     #[arg(long, default_value = "black", value_parser = ink)]
     ink: Ink,
     #[command(flatten)]
@@ -105,7 +106,7 @@ struct Calibration {
 /// Charts of the whole printable area have no layout but their paper, and measure the printer as it is.
 #[derive(ClapArgs, Debug)]
 struct WholePage {
-    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     paper: protocol::paper::Paper,
     #[command(flatten)]

@@ -41,10 +41,12 @@ pub struct JobArgs {
 /// Where results go and how they look.
 #[derive(Args, Debug)]
 pub struct ResultArgs {
-    /// Background colour of the previews: #204080, black, white, clear
+    /// Background colour of the previews: black, white, clear, or a value such as #204080
     #[arg(long, value_name = "COLOUR")]
     pub background: Option<Ground>,
     /// Folder to write [default: NAME.print in the current folder]
+    ///
+    /// A folder that this command wrote before is replaced; any other folder is left alone and reported as an error.
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
     /// Print the report as JSON instead of the plan in words

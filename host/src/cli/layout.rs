@@ -20,37 +20,38 @@ pub const DEFAULT_PROFILE: &str = "default";
 /// How things lie on the page.
 #[derive(Args, Debug)]
 pub struct LayoutArgs {
-    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     pub paper: Paper,
-    /// Top left corner of the print, such as 20x30mm: across, then down [default: centred]
+    /// Position of the top left corner, across and down, such as 20x30mm [default: centred]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
     pub at: Option<Point>,
-    /// What --at is measured from
+    /// Edge that --at is measured from
     #[arg(long, value_name = "WHERE", default_value = "edge", requires = "at")]
     pub from: From,
-    /// Repeat the print in columns and rows, such as 3x4, or as often as it fits: fill
+    /// Print several copies on the sheet in a grid, such as 3x4; fill prints as many as fit
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = repeat)]
     pub repeat: Repeat,
-    /// Space between repeats: 2mm, or across and down 2x5mm
+    /// Space between repeats, such as 2mm, or across and down, such as 2x5mm
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = gap)]
     pub gap: Point,
-    /// Mirror the print left to right, for water-slide decals applied face down and window decals seen from inside
+    /// Mirror the print left to right, for water-slide decals applied face down or window decals seen from inside
     #[arg(long)]
     pub mirror: bool,
-    /// Print ticks that show where to cut
+    /// Print crop marks: ticks that show where to cut
     #[arg(long)]
     pub crop_marks: bool,
-    /// Print a cross at each side in every pass, to see whether passes align
+    /// Print a cross in every pass at each side, to see whether the passes line up
     #[arg(long)]
     pub registration_marks: bool,
-    /// Inks of the marks, separated by commas [default: of the inks in use, the most visible for ticks, all for crosses]
+    /// Inks of the marks, separated by commas [default: of the inks in use, the one that shows best for ticks and all of
+    /// them for crosses]
     #[arg(long, value_name = "INKS")]
     pub mark_ink: Option<InkSet>,
-    /// Cut off what lies beyond the printable area instead of reporting an error
+    /// Cut off what lies beyond the printable area [default: an error]
     #[arg(long)]
     pub crop: bool,
-    /// Printer calibration profile (`foilpress profile`) [default: the one named `default`, if there is one]
+    /// Calibration profile of the printer (`foilpress profile`) [default: the profile named `default`, if it exists]
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
 }
@@ -164,11 +165,11 @@ pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
 /// What the sheet is made of.
 #[derive(Args, Debug)]
 pub struct MediaArgs {
-    /// What the sheet is made of: paper, thick (card), film (decal film: curl correction off), or one of the printer's
-    /// own media types, such as plain, cardboard, glossy-paper
+    /// Material of the sheet: paper, thick (card), film (decal film; curl correction off), or one of the printer's own
+    /// media types such as plain, cardboard, glossy-paper
     #[arg(long, default_value = "paper", value_parser = handling)]
     pub media: Handling,
-    /// Whether the printer corrects the curl of the sheet [default: on for all but film]
+    /// Curl correction of the printer [default: off for film, on for everything else]
     #[arg(long, value_name = "on|off")]
     pub curl: Option<Curl>,
 }
@@ -176,9 +177,9 @@ pub struct MediaArgs {
 /// Curl correction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Curl {
-    /// Corrected
+    /// The printer corrects the curl of the sheet
     On,
-    /// Left alone
+    /// The printer leaves the sheet as it is, so that decals stay on their film
     Off,
 }
 
@@ -256,7 +257,7 @@ pub struct ProfileArgs {
 enum ProfileCommand {
     /// List the profiles
     List,
-    /// Make a profile from what was measured on the calibration chart; `default` is used unless --profile names another
+    /// Save measurements of the calibration chart as a profile; the profile `default` is used whenever none is named
     Set(SetProfile),
 }
 
@@ -264,10 +265,10 @@ enum ProfileCommand {
 struct SetProfile {
     /// Name of the profile
     name: String,
-    /// Centre of the upper cross, from the left and top edges of the sheet
+    /// Centre of the first cross, measured from the left and top edges of the sheet
     #[arg(long, value_name = "X,Y")]
     cross: Point,
-    /// Distance from the upper cross to the lower one [default: not measured; the feed is taken as exact]
+    /// Distance from the first cross to the one below it [default: not measured; the feed is taken as exact]
     #[arg(long, value_name = "LENGTH")]
     distance: Option<Mm>,
 }

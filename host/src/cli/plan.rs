@@ -47,7 +47,7 @@ impl FromArgMatches for Args {
 impl ClapArgs for Args {
     fn augment_args(command: Command) -> Command {
         let layers = layers::PlanArgs::augment_args(Command::new(LAYERS))
-            .about("Plan spot-colour art; takes the options of `layers` that decide what is printed");
+            .about("Show the plan of spot-colour artwork");
         Document::augment_args(command)
             .mut_arg("html", |html| html.alias("page"))
             .subcommand_negates_reqs(true)
@@ -71,9 +71,9 @@ const LAYERS: &str = "layers";
     foilpress plan job.rgl\n  \
     foilpress plan sample:leaf --size 80mm --repeat 2x3 --gap 2mm\n  \
     foilpress plan layers white.png gold.png --passes white=3\n  \
-    foilpress plan job.rgl --html plan.html              (one page to print and lay beside the printer)\n  \
+    foilpress plan job.rgl --html plan.html              (one page to print and keep beside the printer)\n  \
     foilpress plan job.rgl --json\n\n\
-    A job is planned from its bytes; the options of page, inks and materials are for documents."
+    A job is planned from its bytes; the options for page, inks and materials apply only to documents."
 )]
 pub struct Document {
     #[command(flatten)]

@@ -33,7 +33,7 @@ const EYE: f64 = 0.5;
 pub struct Work {
     #[command(flatten)]
     pub document: DocumentArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
     /// [default: the document's own size, else as large as the page allows]
     #[arg(long)]
     pub size: Option<Size>,
@@ -112,7 +112,7 @@ impl Work {
 pub struct Args {
     #[command(flatten)]
     work: Work,
-    /// Light probe (.hdr) for the balls in materials.png [default: a soft studio]
+    /// Light probe (.hdr) that lights the spheres in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     #[command(flatten)]

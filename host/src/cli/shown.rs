@@ -16,10 +16,10 @@ use press::sheet::Sheet;
 /// How a plan is shown.
 #[derive(Args, Debug)]
 pub struct Shown {
-    /// Also write the plan as a single HTML page to this file
+    /// Also write the plan as a self-contained HTML page to this file
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
-    /// Background colour of the page's picture: #204080, black, white, clear
+    /// Background colour of the page's picture: black, white, clear, or a value such as #204080
     #[arg(long, value_name = "COLOUR")]
     background: Option<Ground>,
     /// Print JSON

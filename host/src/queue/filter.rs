@@ -31,8 +31,6 @@ use page::Press;
 use press::layers::{self, LayersError, Window};
 use press::pipeline::JobError;
 
-pub use page::Place;
-
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
 
@@ -93,10 +91,10 @@ pub enum FilterError {
     #[error("the document is larger than 1 GB; print fewer pages at once")]
     TooLarge,
     /// The plates of a document.
-    #[error("cannot read the document's spot colours: {0}")]
+    #[error("cannot read the document's spot colours")]
     Plates(#[source] LayersError),
     /// The art.
-    #[error("page {page}: {source}")]
+    #[error("page {page} cannot be printed")]
     Layers {
         /// Page, from 1.
         page: usize,
@@ -104,7 +102,7 @@ pub enum FilterError {
         source: LayersError,
     },
     /// Its job.
-    #[error("page {page}: {source}")]
+    #[error("page {page} cannot be printed")]
     Job {
         /// Page, from 1.
         page: usize,

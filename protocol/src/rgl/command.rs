@@ -1,5 +1,7 @@
 //! The commands, by meaning. Values that only exist in a few kinds are types, so that a code this project must not
 //! send (dye-sub media and paper, inks without a sure code) has no value to stand for it.
+//!
+//! The command table: `docs/rgl.md`, sections "Setup", "Passes", "Rows", "End of a job", "Resolution" and "Media".
 
 use crate::ink::Ink;
 use crate::paper::Paper;

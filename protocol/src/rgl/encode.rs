@@ -1,4 +1,6 @@
 //! One command as bytes.
+//!
+//! The bytes of each command: `docs/rgl.md`, sections "Setup", "Passes", "Rows" and "End of a job".
 
 use super::command::{Command, Compression};
 use super::fault::Fault;

@@ -1,4 +1,6 @@
 //! What can be wrong with a stream or with a job that was asked for.
+//!
+//! What the strict reader refuses: `docs/rgl.md`, section "What is never sent".
 
 /// A fault. The numbers are part of what tools and the link report: append only, never renumber.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]

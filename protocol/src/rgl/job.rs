@@ -4,6 +4,8 @@
 //! code serves a workstation and a microcontroller. What must never be sent has been refused by
 //! [`JobSetup`] before, and every command passes through [`Order`] before it is written, so an
 //! illegal job cannot come out.
+//!
+//! The rule for each row: `docs/rgl.md`, section "Rows"; an early end: section "End of a job".
 
 use super::command::{Command, Compression, Mode, PaperCode};
 use super::encode::encode_into;

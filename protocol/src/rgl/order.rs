@@ -9,6 +9,8 @@
 //! ```
 //! [`Order`] is the state machine: the writer asks it before it writes, the reader after it has parsed. It keeps a
 //! few dozen bytes and never looks at anything twice.
+//!
+//! The order and its sources: `docs/rgl.md`, sections "Order of a job" and "Setup".
 
 use super::command::{Cassettes, Command, Compression, MAX_CASSETTES, Mode, PaperCode, Resolution};
 use super::fault::{Fault, Refusal};

@@ -2,6 +2,8 @@
 //!
 //! [`parse`] looks at the start of a slice and gives one command, or how many bytes it has to see. It keeps no
 //! state, so a stream may arrive in any pieces: a verdict once given does not change when more bytes follow.
+//!
+//! The bytes of each command: `docs/rgl.md`, sections "Setup", "Passes", "Rows" and "End of a job".
 
 use super::command::{Cassettes, Command, Compression, MAX_CASSETTES, Media, Mode, PaperCode, Resolution};
 use super::encode::{ESC, FF, LAST, MOST_DRIVE, SUB};

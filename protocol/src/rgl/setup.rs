@@ -3,6 +3,8 @@
 //! [`JobSetup::new`] is where what must never be sent is refused: inks other than cyan, magenta, yellow and black at
 //! another resolution than 600 dpi, foils without consent, more than seven cassettes, a page larger than the machine
 //! takes. A value of this type is the proof.
+//!
+//! What is refused and why: `docs/rgl.md`, section "What is never sent"; the choice of mode: section "Transfer modes".
 
 use super::command::{Cassettes, MAX_CASSETTES, Media, Mode, Resolution};
 use super::fault::Fault;

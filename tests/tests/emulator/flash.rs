@@ -231,7 +231,7 @@ impl Bench {
     fn new() -> Option<Bench> {
         let (image, program) = super::parts()?;
         let Some(usbfs) = std::env::var_os("FOILPRESS_USBFS") else {
-            println!("skipped: there is no umockdev");
+            testing::needs::Need::Usb.skip("`cargo xtask emulator` found no umockdev");
             return None;
         };
         let folder = tempfile::tempdir().unwrap();

@@ -12,7 +12,7 @@ use appearance::gamut::GamutError;
 #[derive(Debug, thiserror::Error)]
 pub enum LayersError {
     /// The system refused.
-    #[error("{}: cannot {attempt}: {source}", path.display())]
+    #[error("{}: cannot {attempt}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -157,7 +157,7 @@ pub enum LayersError {
         install: &'static str,
     },
     /// Fitting colours to the process inks.
-    #[error("fitting colours to the process inks: {0}")]
+    #[error("cannot fit the colours to the process inks")]
     Gamut(#[from] GamutError),
     /// Halftoning.
     #[error(transparent)]

@@ -7,7 +7,7 @@ use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 
 use super::{FilterError, io_error};
-use crate::queue::options::{Choices, Spots};
+use crate::queue::options::{Choices, Place, Spots};
 use crate::queue::ppd;
 use observe::Observer;
 use press::job::Handling;
@@ -159,17 +159,6 @@ pub(super) fn paper(
         length: mm(height),
         problem,
     })
-}
-
-/// Where what is drawn goes on its sheet.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Place {
-    /// Where the page has it.
-    Page,
-    /// In the middle of the printable area.
-    Centre,
-    /// Its top left corner this far from the corner of the sheet.
-    At(Point),
 }
 
 /// What of a page is printed, and where.

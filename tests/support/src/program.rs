@@ -1,12 +1,36 @@
 //! The program in a folder of its own, and a small document for it.
-#![allow(dead_code, reason = "each file of tests uses its own part")]
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
 
 use tempfile::TempDir;
+
+/// The program: cargo's own for an integration test of its package, else built now, beside the running test.
+///
+/// # Panics
+/// When it cannot be built.
+pub fn path() -> &'static Path {
+    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAM.get_or_init(|| {
+        if let Some(program) = std::env::var_os("CARGO_BIN_EXE_foilpress") {
+            return program.into();
+        }
+        let test = std::env::current_exe().expect("a test has a file");
+        let folder = test.parent().and_then(Path::parent).expect("cargo keeps tests two folders down");
+        let mut build = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+        build.args(["build", "--quiet", "--locked", "--package", "foilpress", "--bin", "foilpress"]);
+        if folder.ends_with("release") {
+            build.arg("--release");
+        }
+        build.arg("--target-dir").arg(folder.parent().expect("target"));
+        assert!(build.status().is_ok_and(|status| status.success()), "the program can be built");
+        folder.join("foilpress")
+    })
+}
 
 /// A fresh folder to run the program in.
 pub struct Bench {
@@ -16,7 +40,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    #[allow(clippy::new_without_default, reason = "a test's helper")]
+    /// An empty one.
+    #[expect(clippy::new_without_default, reason = "a test's helper")]
     pub fn new() -> Bench {
         let folder = || tempfile::tempdir().expect("a temporary folder");
         Bench { folder: folder(), home: folder() }
@@ -29,8 +54,13 @@ impl Bench {
 
     /// The program with these arguments, split at spaces.
     pub fn command(&self, args: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_foilpress"));
-        command.args(args.split_whitespace()).current_dir(self.folder.path()).stdin(Stdio::null());
+        self.command_of(args.split_whitespace())
+    }
+
+    /// The program with these arguments.
+    pub fn command_of(&self, args: impl IntoIterator<Item = impl AsRef<OsStr>>) -> Command {
+        let mut command = Command::new(path());
+        command.args(args).current_dir(self.folder.path()).stdin(Stdio::null());
         command.env("FOILPRESS_CONFIG", self.home.path().join("config"));
         command.env("FOILPRESS_JOBS", self.home.path().join("jobs"));
         command

@@ -1,7 +1,6 @@
 //! What has to hold whatever the bytes: each target's `check` panics if it does not.
 //!
 //! The fuzzer calls one of these; the project's ordinary tests call all of them with the corpora.
-#![allow(dead_code)]
 
 pub mod engine;
 pub mod frame;
