@@ -78,10 +78,7 @@ fn an_owners_rule_keeps_a_stack_from_being_printed() {
     bench.done("layout tile.dots --paper postcard -o tile.sheet");
     bench.done("separate tile.sheet -o tile.passes");
     let said = bench.refused(1, "separate tile.sheet --library mine -o other.passes");
-    assert!(
-        said.contains("must not be printed: yellow peels (stacks: ") && said.contains("M+Y"),
-        "{said}"
-    );
+    assert!(said.contains("must not be printed: yellow peels (stacks: ") && said.contains("M+Y"), "{said}");
     assert!(!bench.entries().contains(&"other.passes".to_string()));
     // With the rule known from the start, no such stack is chosen.
     bench.done("map tile.foil --inks process --library mine -o kept.mix");

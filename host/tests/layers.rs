@@ -165,7 +165,8 @@ fn more_cartridges_than_the_machine_holds_are_planned_and_not_sent() {
     let page = fs::read_to_string(bench.path("plan.html")).unwrap();
     for text in [words, page] {
         assert!(
-            text.contains("The printer holds no more") && text.contains("white, which has the fewest dots (25)"),
+            text.contains("The printer holds no more")
+                && text.contains("white, which has the fewest dots (25)"),
             "{text}"
         );
     }

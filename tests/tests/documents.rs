@@ -33,8 +33,8 @@ fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
         size: Some(Size { width: 80.0, height: Some(80.0) }),
     };
     let (layout, library) = (Layout::centred(Paper::Postcard), Library::builtin());
-    let halftoned = halftoned(&document, &library, &settings, &layout, &Silent)
-        .unwrap_or_else(|e| panic!("{spec}: {e}"));
+    let halftoned =
+        halftoned(&document, &library, &settings, &layout, &Silent).unwrap_or_else(|e| panic!("{spec}: {e}"));
     let request = Request {
         name: &document.name,
         dots: &halftoned.dots,

@@ -17,7 +17,7 @@
 
 pub mod document;
 
-use inks::{InkSet, Library};
+use inks::{InkSet, Library, Severity};
 use protocol::ink::Kind;
 use protocol::paper::Paper;
 use protocol::rgl::{FoilConsent, Page};
@@ -26,7 +26,7 @@ use crate::job::Handling;
 use crate::job::plan::{Plan, Subject};
 use crate::job::stream::{self, StreamError};
 use crate::layout::{self, Arranged, Laid, Layout, LayoutError};
-use crate::separate::{self, Pass, SeparateError, Separation, Severity};
+use crate::separate::{self, Pass, SeparateError, Separation};
 use crate::sheet::{DotMap, Sheet};
 use crate::simulate::{self, Difference, Printout, PrintoutError, SimulateError};
 use observe::Observer;

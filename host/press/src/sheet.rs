@@ -5,9 +5,9 @@
 
 mod area;
 pub(crate) mod clusters;
-pub mod colours;
+pub(crate) mod colours;
 mod dots;
-pub mod files;
+pub(crate) mod files;
 pub(crate) mod order;
 pub(crate) mod picture;
 

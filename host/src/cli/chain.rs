@@ -17,7 +17,7 @@ use appearance::gamut::{self, Printable};
 use observe::Observer;
 use press::layout::{self, Size};
 use press::pipeline::{self, document as stages};
-use press::separate::{self, Severity};
+use press::separate;
 use press::sheet::DotMap;
 use press::{halftone, simulate};
 use protocol::paper::Paper;
@@ -208,8 +208,8 @@ impl Separate {
         pipeline::permit(&separation)?;
         for check in &separation.checks {
             match check.severity {
-                Severity::Note => observer.note(&check.text),
-                Severity::Warning | Severity::Error => observer.note(&check.to_string()),
+                inks::Severity::Note => observer.note(&check.text),
+                inks::Severity::Warning | inks::Severity::Error => observer.note(&check.to_string()),
             }
         }
         separate::files::save(&separation, staged.create()?)?;

@@ -13,9 +13,9 @@ use crate::layout::{Mm, Point, Profile};
 use crate::sheet::DotMap;
 
 /// Where the middle of the first cross belongs, in millimetres from the left and the top edge of the sheet.
-pub const CROSS: (f64, f64) = (20.0, 30.0);
+const CROSS: (f64, f64) = (20.0, 30.0);
 /// From the first cross to the second, in millimetres.
-pub const DISTANCE: f64 = 200.0;
+const DISTANCE: f64 = 200.0;
 /// The top margin of the papers that are long enough, in millimetres.
 const TOP: f64 = 284.0 * 25.4 / 600.0;
 

@@ -5,9 +5,9 @@
 //! a [`DotMap`](crate::sheet::DotMap) that is laid out and printed like any other.
 
 pub mod calibration;
-pub mod registration;
+mod registration;
 mod sketch;
-pub mod steps;
+mod steps;
 
 pub use calibration::calibration;
 pub use registration::registration;

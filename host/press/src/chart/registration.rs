@@ -15,9 +15,9 @@ use crate::layout::Mm;
 use crate::sheet::DotMap;
 
 /// From line to line in the first ink, in dots.
-pub const PITCH: usize = 24;
+const PITCH: usize = 24;
 /// Lines on each side of the middle: the dots that can be read.
-pub const REACH: usize = 10;
+const REACH: usize = 10;
 /// Width of a line in dots.
 const WIDTH: usize = 8;
 /// Length of a line in dots.

@@ -16,9 +16,9 @@ const LABEL: usize = 4;
 const STEPS: usize = 1024;
 
 /// The four gloss levels of figure 5, relative to the highest.
-pub const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
+const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
 /// The gloss of the two inks of figure 5.
-pub const INKS: [f64; 2] = [0.5, 0.1];
+const INKS: [f64; 2] = [0.5, 0.1];
 
 /// What labels and checkerboards are printed in: black, unless the stacks fill all seven places without it.
 fn pen(stacks: &[&Stack]) -> Stack {
@@ -70,7 +70,7 @@ pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) ->
 
 /// The share of the glossier ink that shows a gloss: clamped to the nearest ink, or with all levels brought between the inks
 /// so that their relative differences stay.
-pub fn ladder_shares(gloss: f64) -> [f64; 2] {
+fn ladder_shares(gloss: f64) -> [f64; 2] {
     let [high, low] = INKS;
     let clamped = ((gloss - low) / (high - low)).clamp(0.0, 1.0);
     let least = GLOSS[GLOSS.len() - 1];

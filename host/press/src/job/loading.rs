@@ -10,7 +10,7 @@ use crate::separate::MOST_CARTRIDGES;
 
 /// A cartridge to replace in the course of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Change {
+pub(super) struct Change {
     /// The pass before which the printer pauses and asks, from 1.
     pub before_pass: usize,
     /// The one to take out.
@@ -20,7 +20,7 @@ pub struct Change {
 }
 
 /// The cartridges to load before the first pass, in the order of their first use, and the changes on the way.
-pub fn loading(passes: &[Ink]) -> (Vec<Ink>, Vec<Change>) {
+pub(super) fn loading(passes: &[Ink]) -> (Vec<Ink>, Vec<Change>) {
     let mut loaded: Vec<Ink> = Vec::new();
     for &ink in passes {
         if loaded.len() < MOST_CARTRIDGES && !loaded.contains(&ink) {

@@ -1,7 +1,7 @@
 //! The plan of a job in words, in figures and as a page, and the bytes of a job.
 
 pub(crate) mod fault;
-pub mod loading;
+mod loading;
 pub mod page;
 pub mod plan;
 pub mod ribbon;

@@ -70,6 +70,14 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         ribbon::duration(plan.seconds_estimated),
         Plan::TIME_NOTE
     )?;
+    write_cartridges(plan, page)?;
+    write_passes(plan, page)?;
+    write_checks(plan, page)?;
+    writeln!(page, "</body></html>")
+}
+
+/// What to load, and what to replace on the way.
+fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
         "<h2>Load</h2>\n<table><tr><th></th><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
@@ -106,6 +114,11 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         }
         writeln!(page, "</ul>")?;
     }
+    Ok(())
+}
+
+/// The passes and what they use.
+fn write_passes(plan: &Plan, page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
         "<p><small>If a cartridge is missing, the printer pauses before that pass and continues once it is \
@@ -125,6 +138,11 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         )?;
     }
     writeln!(page, "</table>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
+    Ok(())
+}
+
+/// What the rules say.
+fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
     if !plan.checks.is_empty() {
         writeln!(page, "<h2>Before you print</h2>\n<ul>")?;
         for check in &plan.checks {
@@ -132,7 +150,7 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         }
         writeln!(page, "</ul>")?;
     }
-    writeln!(page, "</body></html>")
+    Ok(())
 }
 
 #[cfg(test)]

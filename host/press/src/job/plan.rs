@@ -4,7 +4,7 @@
 
 use std::fmt::{self, Write as _};
 
-use inks::Library;
+use inks::{Certainty, Library, Severity};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Page;
@@ -14,7 +14,7 @@ use super::loading;
 use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
-use crate::separate::{Certainty, Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation, Severity};
+use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
 use crate::sheet::colours::colours;
 use crate::sheet::{Area, Sheet};
 

@@ -12,7 +12,7 @@ use crate::layout::Mm;
 use crate::separate::Plane;
 
 /// Rows the head prints at once at 600 dpi.
-pub const BAND: usize = 240;
+const BAND: usize = 240;
 /// Changing the cartridge and pulling back the sheet.
 const PASS_SECONDS: f64 = 5.0;
 /// One run of the carriage.
@@ -68,7 +68,7 @@ fn ends(row: &[u8]) -> Option<(usize, usize)> {
 }
 
 /// A duration in a fitting unit: `40 s`, `6 min`, `1 h 20 min`.
-pub fn duration(seconds: f64) -> String {
+pub(super) fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match minutes {
         _ if seconds < 90.0 => format!("{seconds:.0} s"),

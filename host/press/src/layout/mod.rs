@@ -232,7 +232,7 @@ fn smaller(width: f64, length: f64, most_width: f64, most_length: f64) -> String
 ///
 /// # Errors
 /// Those of [`arrange`] that follow from sizes.
-pub fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutError> {
+pub(crate) fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutError> {
     Block::of((width, length), layout).map(|_| ())
 }
 

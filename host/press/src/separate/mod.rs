@@ -2,34 +2,33 @@
 //!
 //! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
 //! Method: the shortest list of inks in which every stack in use finds its layers in order (`sheet::order`), one plane
-//! for each (`pack`), the rules on stacks and pages as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
+//! for each (`pack`), the rules on stacks and pages as checks (`rules`). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
-//! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_LAYERS`] layers.
+//! Cost: one pass over the dots for all planes. Limits: `MOST_PASSES` passes, `MOST_LAYERS` layers.
 
 pub mod files;
 pub(crate) mod pack;
-pub mod rules;
+mod rules;
 
 use std::collections::HashMap;
 
-use inks::{Rule, Stack};
+use inks::{Rule, Severity, Stack};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
 use crate::sheet::{Sheet, SheetError, order};
 use observe::Observer;
 
-pub use inks::{Certainty, Severity};
 pub use rules::Check;
 
 /// Cartridges the printer holds.
 pub const MOST_CARTRIDGES: usize = 7;
 
 /// Most passes over one sheet. The longest job known on hardware had 7.
-pub const MOST_PASSES: usize = 16;
+pub(crate) const MOST_PASSES: usize = 16;
 
 /// Most layers in a stack.
-pub const MOST_LAYERS: usize = 16;
+pub(crate) const MOST_LAYERS: usize = 16;
 
 /// One bit for each dot of the printable area, 8 dots to a byte, most significant bit left, 1 = ink.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -184,7 +183,8 @@ pub fn check(sheet: &Sheet, passes: &[Planned], rules: &[Rule]) -> Vec<Check> {
 ///
 /// More than [`MOST_CARTRIDGES`] inks are planned, with a check that forbids to send them.
 ///
-/// Errors: more than [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
+/// # Errors
+/// More than `MOST_PASSES` passes or `MOST_LAYERS` layers.
 pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
@@ -234,7 +234,8 @@ pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Resul
 /// The sheet that passes print: each dot has the inks of the passes that have it, lowest first. `stacks` are the
 /// stacks to expect, numbered as the sheet will number them.
 ///
-/// Errors: planes of another size than the paper, more than [`MOST_PASSES`], a dot with inks that are no stack.
+/// # Errors
+/// Planes of another size than the paper, more than `MOST_PASSES`, a dot with inks that are no stack.
 pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet, SeparateError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     if passes.len() > MOST_PASSES {

@@ -181,7 +181,7 @@ impl Sheet {
         write_toml(&folder.join(SHEET), &text)
     }
 
-    /// Writes an area of the sheet in false colours, one for each stack ([`colours()`]), a pixel a dot.
+    /// Writes an area of the sheet in false colours, one for each stack, a pixel a dot.
     ///
     /// # Errors
     /// What the system refuses.
