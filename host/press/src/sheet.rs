@@ -15,7 +15,8 @@ use inks::Stack;
 use protocol::paper::Paper;
 
 pub use area::Area;
-pub use dots::DotMap;
+pub(crate) use dots::check_stacks;
+pub use dots::{DotMap, SheetError};
 
 /// Dots in a millimetre at 600 dpi, the resolution of every dot map and sheet.
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
@@ -25,54 +26,6 @@ pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
 pub struct Sheet {
     paper: Paper,
     dots: DotMap,
-}
-
-/// Why numbers are not a sheet.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SheetError {
-    /// There are no dots, or the index does not fill the rectangle.
-    #[error("a map of {width} x {length} dots needs {} values, not {found}", width.saturating_mul(*length))]
-    Size {
-        /// Dots across.
-        width: usize,
-        /// Rows.
-        length: usize,
-        /// Values given.
-        found: usize,
-    },
-    /// The first stack must be the substrate, stacks must differ, and there can be 256 at most.
-    #[error("stack {index} (`{stack}`): the substrate comes first, then at most 255 different stacks")]
-    Stacks {
-        /// Position in the list.
-        index: usize,
-        /// The stack.
-        stack: Stack,
-    },
-    /// A dot names a stack that is not in the list.
-    #[error("dot ({x}, {y}) has stack number {stack}, but there are only {stacks}")]
-    Index {
-        /// Column.
-        x: usize,
-        /// Row.
-        y: usize,
-        /// The number found.
-        stack: u8,
-        /// How many stacks there are.
-        stacks: usize,
-    },
-}
-
-/// Whether a dot map can have these stacks: the substrate first, at most 256, all different.
-pub(crate) fn check_stacks(stacks: &[Stack]) -> Result<(), SheetError> {
-    for (i, stack) in stacks.iter().enumerate() {
-        if (i == 0) != stack.layers().is_empty() || i > 255 || stacks[..i].contains(stack) {
-            return Err(SheetError::Stacks { index: i, stack: stack.clone() });
-        }
-    }
-    if stacks.is_empty() {
-        return Err(SheetError::Stacks { index: 0, stack: Stack::SUBSTRATE });
-    }
-    Ok(())
 }
 
 impl Sheet {

@@ -262,7 +262,7 @@ pub struct Simulate {
 impl Simulate {
     /// The printer's language → the sheet that comes out.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let job = super::read_job(&self.job)?;
+        let job = super::stdio::read_job(&self.job)?;
         let staged = Staged::folder(&self.output, Kind::Sheet)?;
         let printout = simulate::print(&job, &simulate::Setup::default(), observer)
             .with_context(|| format!("{}", self.job.display()))?;

@@ -165,9 +165,9 @@ impl Made {
         let target = places.target.clone();
         places.commit(&bytes)?;
         if result.json {
-            super::show(&format!("{report}\n"))?;
+            super::stdio::show(&format!("{report}\n"))?;
         } else {
-            super::show(&format!(
+            super::stdio::show(&format!(
                 "{plan}{advice}\nThe simulated printer made exactly this sheet. See {}; {} is the plan on one page.\n",
                 target.join(picture).display(),
                 target.join("plan.html").display()

@@ -223,7 +223,7 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
     use std::fmt::Write as _;
     let table: Vec<_> = layout::paper::table().collect();
     if args.json {
-        return super::show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
+        return super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
     }
     let mut text =
         String::from("            sheet, mm        printable, mm    margins: left, top, right, bottom\n");
@@ -238,7 +238,7 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
         )?;
     }
     text.push_str("Any other size: --paper 120x180mm, for example, with the margins of a4.\n");
-    super::show(&text)
+    super::stdio::show(&text)
 }
 
 /// Arguments of `profile`.
@@ -292,7 +292,7 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
                     folder.display()
                 );
             }
-            super::show(&text)
+            super::stdio::show(&text)
         }
         ProfileCommand::Set(set) => {
             let profile = press::chart::calibration::profile(set.cross, set.distance);
@@ -303,7 +303,7 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             profile.save(&path)?;
             let Profile { offset_mm: [x, y], feed } = profile;
-            super::show(&format!("{}: offset {x:.2}, {y:.2} mm, feed {feed:.4}\n", path.display()))
+            super::stdio::show(&format!("{}: offset {x:.2}, {y:.2} mm, feed {feed:.4}\n", path.display()))
         }
     }
 }

@@ -110,7 +110,7 @@ fn is_job(path: &Path) -> bool {
 
 /// The plan of a job from its bytes, and the sheet it prints.
 fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<(Plan, Sheet)> {
-    let job = super::read_job(path)?;
+    let job = super::stdio::read_job(path)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)
         .with_context(|| format!("{}", path.display()))?;
     let sheet = printout.sheet().with_context(|| format!("{}", path.display()))?;

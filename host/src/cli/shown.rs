@@ -48,7 +48,7 @@ impl Shown {
             staged.commit()?;
         }
         if !self.json {
-            return super::show(&format!("{plan}{advice}"));
+            return super::stdio::show(&format!("{plan}{advice}"));
         }
         let mut json = serde_json::to_value(plan)?;
         if let Value::Object(more) = more {
@@ -56,6 +56,6 @@ impl Shown {
                 json[name] = value.clone();
             }
         }
-        super::show(&format!("{}\n", serde_json::to_string_pretty(&json)?))
+        super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&json)?))
     }
 }

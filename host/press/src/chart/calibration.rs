@@ -7,7 +7,7 @@ use inks::Stack;
 use protocol::ink::Ink;
 use protocol::paper::{LEFT, Paper};
 
-use super::ChartError;
+use super::error::ChartError;
 use super::sketch::{Sketch, mm};
 use crate::layout::{Mm, Point, Profile};
 use crate::sheet::DotMap;

@@ -9,7 +9,7 @@ use inks::Stack;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
-use super::ChartError;
+use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::layout::Mm;
 use crate::sheet::DotMap;

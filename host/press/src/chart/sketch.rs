@@ -9,7 +9,7 @@ use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, 
 use embedded_graphics::text::{Baseline, Text};
 use inks::{Library, Stack};
 
-use super::ChartError;
+use super::error::ChartError;
 use crate::halftone::{self, halftone};
 use crate::layout::Mm;
 use crate::sheet::{DotMap, SheetError};

@@ -4,7 +4,7 @@ use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
-use super::ChartError;
+use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::separate::MOST_CARTRIDGES;
 use crate::sheet::DotMap;

@@ -1,7 +1,7 @@
 use super::*;
 use crate::layout::{Layout, Mm, Point, Profile, arrange};
 use crate::sheet::DotMap;
-use inks::Library;
+use inks::{Library, Stack};
 use observe::Silent;
 use protocol::ink::Ink;
 use protocol::paper::Paper;

@@ -7,9 +7,10 @@
 use inks::Stack;
 use protocol::ink::Ink;
 
-use super::block::{Block, Rect};
+use super::block::Block;
 use super::length::Mm;
-use super::{Layout, LayoutError};
+use super::rect::Rect;
+use super::settings::{Layout, LayoutError};
 use crate::sheet::order::passes_of;
 
 /// From the block to a mark, in millimetres.

@@ -2,9 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::Layout;
-use super::block::{Block, Rect};
+use super::block::Block;
 use super::marks::Mark;
+use super::rect::Rect;
+use super::settings::Layout;
 use crate::sheet::{Area, DotMap};
 use observe::Observer;
 

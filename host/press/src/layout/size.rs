@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use protocol::paper::LARGEST;
 
-use super::Layout;
+use super::settings::Layout;
 use crate::sheet::DOTS_PER_MM;
 
 /// A size on paper as typed: `120x90mm`, `12x9cm`, `5x4in`, or only the width, `120mm`.

@@ -1,6 +1,8 @@
 use super::*;
 use observe::Silent;
 use proptest::prelude::*;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
 
 fn random(width: usize, length: usize, stacks: u8, seed: u32) -> DotMap {
     let random = |i: usize| ((i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 9) % u32::from(stacks);

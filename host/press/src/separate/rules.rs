@@ -16,7 +16,7 @@ use inks::{Certainty, Rule, Severity, Stack};
 use protocol::ink::Kind;
 use serde::Serialize;
 
-use super::{MOST_CARTRIDGES, Plan};
+use super::passes::{MOST_CARTRIDGES, Plan};
 use crate::sheet::Sheet;
 use crate::sheet::clusters::smallest_clusters;
 

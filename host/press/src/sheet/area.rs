@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::DotMap;
+use super::dots::DotMap;
 
 /// A rectangle of dots, counted from the top left corner of what it lies on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
