@@ -201,7 +201,8 @@ fn every_description_refuses_keys_it_does_not_know() {
     small_document(&bench.path("tile"));
     bench.done("factor tile -o t.foil -q");
     bench.done("map t.foil -o t.mix -q");
-    bench.done(&format!("halftone t.mix {SMALL} -o t.sheet -q"));
+    bench.done("halftone t.mix --size 2x2mm -o t.dots -q");
+    bench.done("layout t.dots --paper postcard -o t.sheet -q");
     bench.done("separate t.sheet -o t.passes -q");
     fs::create_dir(bench.path("lib")).unwrap();
     fs::write(bench.path("lib/library.toml"), "format = 1\nbased_on = \"built-in\"\n").unwrap();
@@ -210,7 +211,9 @@ fn every_description_refuses_keys_it_does_not_know() {
     for (file, command) in [
         ("tile/material.toml", format!("print tile {SMALL}")),
         ("t.foil/document.toml", "map t.foil -o x.mix".into()),
-        ("t.mix/mix.toml", format!("halftone t.mix {SMALL} -o x.sheet")),
+        ("t.mix/mix.toml", "halftone t.mix --size 2x2mm -o x.dots".into()),
+        ("t.dots/dots.toml", "layout t.dots --paper postcard -o x.sheet".into()),
+        ("t.sheet/layout.toml", "separate t.sheet -o x.passes".into()),
         ("t.sheet/sheet.toml", "separate t.sheet -o x.passes".into()),
         ("t.passes/passes.toml", "encode t.passes -o x.rgl".into()),
         ("lib/library.toml", format!("print sample:ladder {SMALL} --library lib")),

@@ -101,7 +101,7 @@ fn the_plan_of_art_is_that_of_its_print_and_writes_nothing_else() {
     assert!(suggestions.is_empty(), "white is laid three times: {suggestions:?}");
     assert_eq!(own.as_object_mut().unwrap().remove("art").as_ref(), Some(&report["art"]));
     assert_eq!(own, report["plan"]);
-    assert_eq!(plan["pieces"], serde_json::json!([2, 3]));
+    assert_eq!(plan["copies"], serde_json::json!([2, 3]));
     let words = bench.done(&format!("plan layers {options} --html plan.html"));
     assert!(words.contains("From the art, lowest first"), "{words}");
     let page = fs::read_to_string(bench.path("plan.html")).unwrap();
@@ -165,12 +165,13 @@ fn more_cartridges_than_the_machine_holds_are_planned_and_not_sent() {
     let page = fs::read_to_string(bench.path("plan.html")).unwrap();
     for text in [words, page] {
         assert!(
-            text.contains("The machine holds no more") && text.contains("white has the fewest dots (25)"),
+            text.contains("The printer holds no more")
+                && text.contains("white, which has the fewest dots (25)"),
             "{text}"
         );
     }
     let said = bench.refused(1, &format!("layers {art} --paper postcard --to file:job.rgl"));
-    assert!(said.contains("8 cartridges, and the machine holds 7"), "{said}");
+    assert!(said.contains("8 cartridges and the printer holds 7"), "{said}");
     assert!(!bench.path("job.rgl").exists() && !bench.entries().iter().any(|name| name.ends_with(".print")));
 }
 

@@ -23,7 +23,7 @@ pub struct Curve {
 #[derive(Debug, thiserror::Error)]
 pub enum CurveError {
     /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be read or written", path.display())]
     Io {
         /// The file.
         path: PathBuf,

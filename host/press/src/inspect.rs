@@ -16,8 +16,9 @@ use protocol::ink::Ink;
 use protocol::rgl::{Command, Compression, Fault, Mode, Order, Step, parse};
 use serde::Serialize;
 
+use crate::job::fault::words;
 use crate::separate::{Pass, Plane};
-use crate::simulate::{Canvas, words};
+use crate::simulate::Canvas;
 use observe::Observer;
 
 /// A stream in figures. Offsets are in bytes from its start; dots and rows at the job's resolution.

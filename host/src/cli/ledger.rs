@@ -15,22 +15,22 @@ use press::job::ribbon;
 /// Arguments of `ledger`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress ledger                   (what has gone of each ribbon so far, failed jobs counted too)\n  \
-    foilpress ledger new white         (a fresh cartridge of white is in)\n  \
+    foilpress ledger                   (ribbon used so far, including failed jobs)\n  \
+    foilpress ledger new white         (a new white cartridge is loaded)\n  \
     foilpress ledger --json")]
 pub struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Note that a fresh cartridge of an ink is in: its count begins anew
+    /// Record a new cartridge of an ink and restart its count
     New {
-        /// The ink
+        /// Ink of the cartridge
         #[arg(value_parser = super::layout::ink)]
         ink: Ink,
     },

@@ -1,4 +1,4 @@
-//! `foilpress sample`: what can be printed before there is a document.
+//! `foilpress sample`: built-in documents, to try the program with.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -12,12 +12,12 @@ use appearance::sample::{SAMPLES, Sample};
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress sample list\n  \
-    foilpress sample leaf -o my-leaf                     (an ordinary texture folder, to look at and to change)\n  \
+    foilpress sample leaf -o my-leaf                     (writes an ordinary texture folder, to look at and to change)\n  \
     foilpress print sample:leaf                          (prints it without writing it)")]
 pub struct Args {
     /// `list`, or the name of a sample
     name: String,
-    /// Where to write the sample's folder [default: the sample's name]
+    /// Folder to write [default: the name of the sample]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -27,7 +27,7 @@ pub fn run(args: Args) -> Result<()> {
     let mut out = std::io::stdout().lock();
     if args.name == "list" {
         if args.output.is_some() {
-            bail!("`sample list` writes no files; name a sample to go with -o");
+            bail!("`sample list` writes no files; name a sample to use -o");
         }
         for sample in SAMPLES {
             writeln!(out, "{:<8} {}", sample.name, sample.about)?;

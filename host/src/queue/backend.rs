@@ -76,7 +76,10 @@ impl<W: Write + Send> Delivery<'_, W> {
             .zip(&places)
             .map(|(number, place)| {
                 send::check(&job[place.clone()], &Silent).map_err(|error| {
-                    self.fail(Exit::Cancel, &format!("sheet {number} of {}: {error}", places.len()))
+                    self.fail(
+                        Exit::Cancel,
+                        &format!("sheet {number} of {}: {}", places.len(), observe::with_causes(&error)),
+                    )
                 })
             })
             .collect::<Result<_, _>>()?;

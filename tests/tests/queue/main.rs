@@ -394,7 +394,7 @@ fn what_is_no_job_never_reaches_the_printer() {
     let job = server.print(&["-d", "Alps", "-o", "raw", file.to_str().unwrap()]);
     assert_eq!(server.wait_for_job(job), "canceled");
     assert!(bridge.printed().is_empty());
-    assert!(server.log().contains("not one whole job"), "{}", server.log());
+    assert!(server.log().contains("not one complete job"), "{}", server.log());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::weights::WeightError;
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
     /// The system could not read or write a file.
-    #[error("{}: cannot {attempt}: {source}", path.display())]
+    #[error("{}: cannot {attempt}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -105,7 +105,7 @@ pub enum DocumentError {
     #[error(transparent)]
     Curve(#[from] CurveError),
     /// Weight maps are wrong.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: the weight maps cannot be used", path.display())]
     Weights {
         /// The document.
         path: PathBuf,

@@ -184,7 +184,7 @@ pub enum FactorError {
         value: f32,
     },
     /// The weights are no weight maps: a bug, reported instead of printed.
-    #[error("the weights found are no partition of unity: {0}")]
+    #[error("the weights found are not a partition of unity")]
     Weights(#[from] WeightError),
 }
 

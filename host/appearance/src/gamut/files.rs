@@ -29,7 +29,7 @@ const MOST_WEIGHTS: usize = 1 << 29;
 #[derive(Debug, thiserror::Error)]
 pub enum MixFileError {
     /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be read or written", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -57,7 +57,7 @@ pub enum MixFileError {
         height: usize,
     },
     /// The weight maps do not fit together.
-    #[error("weight maps in {}: {source}", path.display())]
+    #[error("{}: the weight maps cannot be used", path.display())]
     Weights {
         /// The folder.
         path: PathBuf,
@@ -65,7 +65,7 @@ pub enum MixFileError {
         source: WeightError,
     },
     /// Stacks and matrix do not fit together.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: the mixtures cannot be used", path.display())]
     Mix {
         /// The file.
         path: PathBuf,
@@ -270,7 +270,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.contains(from), "{text}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
-        load(folder.path()).unwrap_err().to_string()
+        observe::with_causes(&load(folder.path()).unwrap_err())
     }
 
     #[test]
@@ -325,7 +325,7 @@ mod tests {
         }
         std::fs::copy(folder.path().join("weights-000.png"), &path).unwrap();
         let error = load(folder.path()).unwrap_err();
-        assert!(error.to_string().contains("pixel (0, 0)"), "{error}");
+        assert!(observe::with_causes(&error).contains("pixel (0, 0)"), "{error}");
         std::fs::remove_file(&path).unwrap();
         assert!(matches!(load(folder.path()), Err(MixFileError::Io { .. })));
     }

@@ -224,7 +224,7 @@ pub enum GamutError {
         most: usize,
     },
     /// Eq. 1 could not be solved.
-    #[error("{what}: {source}")]
+    #[error("{what} cannot be fitted")]
     Mixture {
         /// Which target: a basis or a pixel.
         what: String,

@@ -410,6 +410,6 @@ fn what_does_not_fit_together_is_named() {
     assert_eq!(fails(&fewer, None, &printable), GamutError::Channels { bases: 1, channels: 4 });
     let mut bad = document.clone();
     bad.bases.row_mut(2)[5] = f64::NAN;
-    let error = fails(&bad, None, &printable).to_string();
+    let error = observe::with_causes(&fails(&bad, None, &printable));
     assert!(error.contains("basis 2") && error.contains("column 5"), "{error}");
 }

@@ -18,13 +18,11 @@ use image::DynamicImage;
 use inks::{InkSet, Library, Stack};
 use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
 use protocol::ink::{Ink, Kind};
-use protocol::paper::Paper;
 use rayon::prelude::*;
 
 use super::raster::{self, Density, Unstated, io, wrong};
 use super::{Artwork, LayersError, Options, bits, reserved};
-use crate::halftone::Placement;
-use crate::pipeline;
+use crate::halftone::{self, halftone};
 use crate::separate::Plane;
 use appearance::brdf::{Space, Table};
 use appearance::document::{Materials, SAMPLES};
@@ -257,9 +255,8 @@ impl Colour {
         let mix = self.mix(inks, library, observer)?;
         // Art is refused before if it is larger than any page.
         let (width, height) = (dots.0 as u16, dots.1 as u16);
-        let place = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-        let sheet = pipeline::halftone_mix(&mix, library, &place, observer)?;
-        Ok(sheet.into_parts())
+        let settings = halftone::Settings::from_library(&mix.stacks, library);
+        Ok(halftone(&mix, (width, height), &settings, observer)?.into_parts())
     }
 
     /// The mixture of stacks at every pixel.

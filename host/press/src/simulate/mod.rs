@@ -14,7 +14,6 @@ mod compose;
 mod printer;
 mod printout;
 mod status;
-mod words;
 
 #[cfg(test)]
 mod tests;
@@ -24,12 +23,12 @@ use protocol::rgl::{Command, Fault, Step, parse};
 
 use observe::Observer;
 
+pub use crate::layout::paper::Stock;
 pub(crate) use canvas::Canvas;
 pub use carousel::{Carousel, CarouselError, Cassette, Condition, PLACES};
-pub use printer::{Printer, Refused, Stock};
+pub use printer::{Printer, Refused};
 pub use printout::{Difference, Printout, PrintoutError, difference};
 pub use status::{Lever, STATUS_LENGTH, Trouble};
-pub use words::words;
 
 /// What is in the printer before the job comes.
 #[derive(Clone, Debug, Default)]

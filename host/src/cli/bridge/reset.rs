@@ -1,15 +1,15 @@
-//! `foilpress bridge reset`, and the look whether a printer still waits for the rest of a sheet that was lost.
+//! `foilpress bridge reset`, and the check whether a printer still waits for the rest of a sheet that was lost.
 //!
-//! Half a job followed by another is text to the printer. A bridge that knows of the half resets the printer by itself. One
-//! that has lost its memory does not; then nothing is sent until the printer has been reset: by the bridge, which pulls
-//! the port's nInit line, or by its own switch.
+//! A printer that has received half a job takes the next one for the rest of it and prints it as text. A bridge that knows
+//! about the half resets the printer by itself. One that has lost its memory does not; then nothing is sent until the printer
+//! has been reset: by the bridge, which pulls the port's nInit line, or with its own power switch.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 
 use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
-use super::PATIENCE;
+use super::found::{PATIENCE, only};
 use device::send::Address;
 use device::send::journal::{Entry, Journal};
 use device::send::query::Query;
@@ -18,16 +18,17 @@ use observe::Observer;
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress bridge reset                        (the only bridge there is)\n  \
+    foilpress bridge reset                        (the only bridge)\n  \
     foilpress bridge reset --to serial:/dev/ttyACM0\n  \
     foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
-    A bridge that has lost its memory in the middle of a sheet does not do this by itself. Refused while it prints. What a printer does with a sheet it holds is not known for certain: if it does not \
-    come out, switch the printer off and on.")]
+    A bridge that has lost its memory in the middle of a sheet does not reset the printer by itself. The command is refused \
+    while the bridge prints. It is not known for certain what a printer does with a sheet it holds; if the sheet does not come \
+    out, switch the printer off and on.")]
 pub struct Args {
-    /// Where the bridge is [default: the only one there is]
+    /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// Only note that the printer has been switched off and on
+    /// Reset nothing; only record that the printer has been switched off and on
     #[arg(long, conflicts_with = "to")]
     by_hand: bool,
 }
@@ -40,11 +41,11 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let address = match &args.to {
         Some(address) => address.clone(),
-        None => super::only()?,
+        None => only()?,
     };
     let mut link = address.open()?;
     reset(&mut Query::new(&mut *link, PATIENCE)?, &journal)?;
-    crate::cli::show("the printer has been reset; if a sheet is still in it, take it out\n")
+    crate::cli::stdio::show("the printer has been reset; if a sheet is still in it, take it out\n")
 }
 
 fn reset(query: &mut Query<'_>, journal: &Journal) -> Result<()> {
@@ -82,7 +83,7 @@ pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Obser
     Ok(())
 }
 
-/// Asks a person; where there is none the answer is no.
+/// Asks the user; without a terminal the answer is no.
 fn agreed(question: &str) -> Result<bool> {
     if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
         return Ok(false);

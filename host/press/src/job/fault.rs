@@ -1,9 +1,9 @@
-//! The faults of a stream in words: what was found, and what belongs there.
+//! The faults of a stream in the printer's language, in words: what was found, and what belongs there.
 
 use protocol::rgl::Fault;
 
 /// A fault in words, without its place.
-pub fn words(fault: Fault) -> &'static str {
+pub(crate) fn words(fault: Fault) -> &'static str {
     match fault {
         Fault::UnknownCommand => "no command of the printer's language begins with these bytes",
         Fault::Truncated => "the stream ends before the job does",
@@ -12,14 +12,14 @@ pub fn words(fault: Fault) -> &'static str {
         Fault::MediaCode => "this media code is unknown, reserved or for dye-sub",
         Fault::PaperCode => "this paper code is unknown or for dye-sub",
         Fault::ModeCode => {
-            "this transfer mode is not 00 (black), 04 (colour planes) or 08 (with a cassette list)"
+            "this transfer mode is not 00 (black), 04 (colour planes) or 08 (with a cartridge list)"
         }
         Fault::CurlCode => "curl correction is neither 00 (on) nor 01 (off)",
         Fault::CompressionCode => "rows are neither plain (00) nor PackBits (02)",
-        Fault::InkCode => "no ink is known for sure by this code",
+        Fault::InkCode => "no ink is known to have this code",
         Fault::LastPassFlag => "the last-pass flag is neither 00 nor 80",
-        Fault::CartridgeCount => "a cassette list has one to seven entries",
-        Fault::Barcode => "no ink is known by this barcode",
+        Fault::CartridgeCount => "a cartridge list has one to seven entries",
+        Fault::Barcode => "no ink is known to have this barcode",
         Fault::Adjustment => "this adjustment is 0 or out of its range",
         Fault::ZeroShift => "a shift of 0 is not written",
         Fault::Filler => "a byte that must be 00 is not",
@@ -32,13 +32,13 @@ pub fn words(fault: Fault) -> &'static str {
         Fault::MissingWidth => "the setup has no page width",
         Fault::MissingCurl => "the setup does not say whether curl is corrected",
         Fault::MissingMode => "the setup has no transfer mode",
-        Fault::MissingCartridges => "transfer mode 08 needs a cassette list",
-        Fault::UnexpectedCartridges => "a cassette list belongs to transfer mode 08 only",
+        Fault::MissingCartridges => "transfer mode 08 needs a cartridge list",
+        Fault::UnexpectedCartridges => "a cartridge list belongs to transfer mode 08 only",
         Fault::PageSize => {
-            "the page has no dots or is larger than the machine takes (4940 x 7760 at 600 dpi)"
+            "the page has no dots or is larger than the printer takes (4940 x 7760 at 600 dpi)"
         }
         Fault::NoPass => "no pass has begun; an ink-select must come first",
-        Fault::InkNotInList => "the pass's ink is not in the cassette list",
+        Fault::InkNotInList => "the pass's ink is not in the cartridge list",
         Fault::MissingBackFeed => "another pass begins without a back-feed",
         Fault::BackFeedAfterLast => "a back-feed follows the last pass",
         Fault::BackFeedWithoutPass => "no pass follows the back-feed",
@@ -61,7 +61,7 @@ pub fn words(fault: Fault) -> &'static str {
         Fault::NoRoom => "the output buffer is too small",
         Fault::NoPasses => "the job has no passes",
         Fault::TooManyPasses => "the job has more than 32 passes",
-        Fault::TooManyCartridges => "the job needs more than seven cassettes, and the printer holds seven",
+        Fault::TooManyCartridges => "the job needs more than seven cartridges, and the printer holds seven",
         Fault::SpotResolution => {
             "only cyan, magenta, yellow and black print at other resolutions than 600 dpi; use 600 dpi or drop the other inks"
         }

@@ -1,18 +1,15 @@
-//! How large a document is on the page.
+//! How large a document or art is on paper.
 //!
-//! Millimetres exist only here, in the layout and at the command line: what comes out is a size in 600 dpi dots. A document
-//! keeps its shape; where it lies is the layout's business.
+//! What comes out is a size in 600 dpi dots. A document keeps its shape; where it lies is the rest of the layout's
+//! business.
 
 use std::fmt;
 use std::str::FromStr;
 
-use protocol::paper::{LARGEST, Paper};
+use protocol::paper::LARGEST;
 
-use crate::halftone::Placement;
-use crate::layout::Layout;
-
-/// Dots in a millimetre at 600 dpi.
-pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
+use super::settings::Layout;
+use crate::sheet::DOTS_PER_MM;
 
 /// A size on paper as typed: `120x90mm`, `12x9cm`, `5x4in`, or only the width, `120mm`.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -23,16 +20,16 @@ pub struct Size {
     pub height: Option<f64>,
 }
 
-/// Why a document cannot be placed, or a size not read.
+/// Why a size is not one, or not one that can be printed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlacementError {
+pub enum SizeError {
     /// Not a size.
-    #[error("`{0}` is no size; write it like 120x90mm, 12x9cm, 5x4in, or only the width, 120mm")]
-    Size(String),
+    #[error("`{0}` is not a size; write it like 120x90mm, 12x9cm, 5x4in, or only the width, 120mm")]
+    Text(String),
     /// Larger than the printable area.
     #[error(
-        "{width:.1} x {height:.1} mm does not fit: {paper} prints {most_width:.1} x {most_height:.1} mm here; \
-         give a smaller --size, another --paper, or --crop to cut"
+        "{width:.1} x {height:.1} mm does not fit; the printable area of {paper} has room for {most_width:.1} x \
+         {most_height:.1} mm"
     )]
     TooLarge {
         /// Width asked for, in mm.
@@ -47,7 +44,7 @@ pub enum PlacementError {
         most_height: f64,
     },
     /// Less than a dot.
-    #[error("{width:.4} x {height:.4} mm is less than a dot (1 dot is {:.4} mm); give a larger --size", 1.0 / DOTS_PER_MM)]
+    #[error("{width:.4} x {height:.4} mm is smaller than a dot (1 dot is {:.4} mm)", 1.0 / DOTS_PER_MM)]
     TooSmall {
         /// Width asked for, in mm.
         width: f64,
@@ -57,16 +54,16 @@ pub enum PlacementError {
 }
 
 impl FromStr for Size {
-    type Err = PlacementError;
+    type Err = SizeError;
 
-    fn from_str(text: &str) -> Result<Size, PlacementError> {
-        let wrong = || PlacementError::Size(text.into());
+    fn from_str(text: &str) -> Result<Size, SizeError> {
+        let wrong = || SizeError::Text(text.into());
         let lower = text.trim().to_ascii_lowercase();
         let (numbers, unit) = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)]
             .into_iter()
             .find_map(|(name, mm)| Some((lower.strip_suffix(name)?, mm)))
             .ok_or_else(wrong)?;
-        let length = |number: &str| -> Result<f64, PlacementError> {
+        let length = |number: &str| -> Result<f64, SizeError> {
             let value: f64 = number.trim().parse().map_err(|_| wrong())?;
             if value.is_finite() && value > 0.0 { Ok(value * unit) } else { Err(wrong()) }
         };
@@ -86,17 +83,19 @@ impl fmt::Display for Size {
     }
 }
 
-/// Dots across and down of a document of `pixels` (width, height) that a layout has room for.
+/// Dots across and down of a document of `pixels` (width, height) on a page of this layout.
 ///
-/// `asked` is the size wanted: the document fills it as far as its shape allows. Without it the document's own
-/// size `own_mm` counts, and without that the largest size that fits. A layout that cuts has room for any document up to
-/// the largest sheet.
+/// The document fills the size `asked` for as far as its shape allows. Without one it has its own size `own_mm`, and
+/// without that the largest size that fits. A layout that cuts has room for any document up to the largest sheet.
+///
+/// # Errors
+/// A size smaller than a dot, or larger than the room.
 pub fn dots(
     pixels: (usize, usize),
     own_mm: Option<(f64, f64)>,
     asked: Option<Size>,
     layout: &Layout,
-) -> Result<(u16, u16), PlacementError> {
+) -> Result<(u16, u16), SizeError> {
     let largest = layout.largest();
     let fill = (largest.0 as f64 / DOTS_PER_MM, largest.1 as f64 / DOTS_PER_MM);
     let most = if layout.cut { (usize::from(LARGEST.0), usize::from(LARGEST.1)) } else { largest };
@@ -117,10 +116,10 @@ pub fn dots(
     // Rounding gives half a dot of grace, so that a size computed from the page's own dots is not refused.
     let dots = ((width * DOTS_PER_MM).round(), (height * DOTS_PER_MM).round());
     if !(dots.0 >= 1.0 && dots.1 >= 1.0) {
-        return Err(PlacementError::TooSmall { width, height });
+        return Err(SizeError::TooSmall { width, height });
     }
     if dots.0 > most.0 as f64 || dots.1 > most.1 as f64 {
-        return Err(PlacementError::TooLarge {
+        return Err(SizeError::TooLarge {
             width,
             height,
             paper: layout.paper.name(),
@@ -132,25 +131,10 @@ pub fn dots(
     Ok((dots.0 as u16, dots.1 as u16))
 }
 
-/// Places a document in the middle of `paper`; its size is that of [`dots`].
-pub fn place(
-    pixels: (usize, usize),
-    own_mm: Option<(f64, f64)>,
-    asked: Option<Size>,
-    paper: Paper,
-) -> Result<Placement, PlacementError> {
-    let (width, height) = dots(pixels, own_mm, asked, &Layout::centred(paper))?;
-    Ok(Placement { paper, x: (paper.width() - width) / 2, y: (paper.length() - height) / 2, width, height })
-}
-
-/// Width and height of a placed document in millimetres.
-pub fn size_mm(placement: &Placement) -> (f64, f64) {
-    (f64::from(placement.width) / DOTS_PER_MM, f64::from(placement.height) / DOTS_PER_MM)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol::paper::Paper;
 
     #[test]
     fn sizes_are_read_with_their_unit_and_refused_without() {
@@ -162,33 +146,43 @@ mod tests {
         }
     }
 
+    fn on_a4(
+        pixels: (usize, usize),
+        own: Option<(f64, f64)>,
+        asked: Option<&str>,
+    ) -> Result<(u16, u16), SizeError> {
+        let layout = Layout::centred(Paper::A4);
+        dots(pixels, own, asked.map(|text| text.parse().unwrap()), &layout)
+    }
+
     #[test]
     fn a_document_without_a_size_fills_the_page_in_its_own_shape() {
-        let p = place((1000, 1000), None, None, Paper::A4).unwrap();
-        assert_eq!((p.width, p.height, p.x, p.y), (4800, 4800, 0, 786));
-        let p = place((480, 6372), None, None, Paper::A4).unwrap();
-        assert_eq!((p.width, p.height), (480, 6372));
+        assert_eq!(on_a4((1000, 1000), None, None), Ok((4800, 4800)));
+        assert_eq!(on_a4((480, 6372), None, None), Ok((480, 6372)));
     }
 
     #[test]
     fn a_box_is_filled_as_far_as_the_shape_allows() {
-        let p = place((200, 100), None, Some("100x100mm".parse().unwrap()), Paper::A4).unwrap();
-        assert_eq!((p.width, p.height), (2362, 1181));
-        let p = place((200, 100), Some((50.0, 50.0)), Some("100mm".parse().unwrap()), Paper::A4);
-        assert_eq!(p.map(|p| (p.width, p.height)), Ok((2362, 2362)), "its own size gives the shape");
+        assert_eq!(on_a4((200, 100), None, Some("100x100mm")), Ok((2362, 1181)));
+        let own = on_a4((200, 100), Some((50.0, 50.0)), Some("100mm"));
+        assert_eq!(own, Ok((2362, 2362)), "its own size gives the shape");
     }
 
     #[test]
     fn what_does_not_fit_is_refused_with_both_sizes() {
-        let wrong = place((10, 10), None, Some("300mm".parse().unwrap()), Paper::A4).unwrap_err();
-        let text = wrong.to_string();
+        let text = on_a4((10, 10), None, Some("300mm")).unwrap_err().to_string();
         assert!(
             text.contains("300.0 x 300.0") && text.contains("203.2 x 269.7") && text.contains("a4"),
             "{text}"
         );
-        assert!(matches!(
-            place((10, 10), Some((0.01, 0.01)), None, Paper::A4),
-            Err(PlacementError::TooSmall { .. })
-        ));
+        assert!(matches!(on_a4((10, 10), Some((0.01, 0.01)), None), Err(SizeError::TooSmall { .. })));
+    }
+
+    #[test]
+    fn a_layout_that_cuts_has_room_up_to_the_largest_sheet() {
+        let layout = Layout { cut: true, ..Layout::centred(Paper::Postcard) };
+        let large = |asked: &str| dots((10, 10), None, Some(asked.parse().unwrap()), &layout);
+        assert_eq!(large("200mm"), Ok((4724, 4724)));
+        assert!(matches!(large("220mm"), Err(SizeError::TooLarge { .. })));
     }
 }

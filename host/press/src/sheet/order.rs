@@ -11,6 +11,7 @@
 
 use std::collections::HashMap;
 
+use inks::Stack;
 use protocol::ink::{Ink, Kind};
 
 /// States looked at before giving up.
@@ -18,14 +19,14 @@ const MOST_STATES: usize = 200_000;
 
 /// A list of passes.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) struct Order {
-    pub(super) inks: Vec<Ink>,
+pub(crate) struct Order {
+    pub(crate) inks: Vec<Ink>,
     /// Whether no shorter list exists.
-    pub(super) shortest: bool,
+    pub(crate) shortest: bool,
 }
 
 /// The customary place of an ink: undercoats first, opaque below transparent, clear coat last.
-pub fn place(ink: Ink) -> (u8, u8) {
+pub(crate) fn customary(ink: Ink) -> (u8, u8) {
     let kind = match ink.kind() {
         Kind::Primer => 0,
         Kind::White => 1,
@@ -38,8 +39,13 @@ pub fn place(ink: Ink) -> (u8, u8) {
     (kind, if ink == Ink::Black { u8::MAX } else { ink as u8 })
 }
 
+/// The passes that lay down all of these stacks, lowest first.
+pub(crate) fn passes_of(stacks: &[Stack]) -> Vec<Ink> {
+    order(&stacks.iter().map(Stack::layers).collect::<Vec<_>>()).inks
+}
+
 /// Passes for stacks given by their layers, bottom to top.
-pub(super) fn order(stacks: &[&[Ink]]) -> Order {
+pub(crate) fn order(stacks: &[&[Ink]]) -> Order {
     let mut wanted: Vec<&[Ink]> = Vec::new();
     for &stack in stacks {
         let served = |by: &[Ink]| embed(stack, by).is_some();
@@ -49,7 +55,7 @@ pub(super) fn order(stacks: &[&[Ink]]) -> Order {
         }
     }
     let mut inks: Vec<Ink> = wanted.iter().flat_map(|w| w.iter().copied()).collect();
-    inks.sort_by_key(|&ink| place(ink));
+    inks.sort_by_key(|&ink| customary(ink));
     inks.dedup();
     let mut search = Search { wanted, inks, failed: HashMap::new(), states: 0, found: Vec::new() };
     let start = vec![0u8; search.wanted.len()];
@@ -64,7 +70,7 @@ pub(super) fn order(stacks: &[&[Ink]]) -> Order {
 }
 
 /// The first places in `passes` where `layers` are found in order.
-pub(super) fn embed(layers: &[Ink], passes: &[Ink]) -> Option<Vec<usize>> {
+pub(crate) fn embed(layers: &[Ink], passes: &[Ink]) -> Option<Vec<usize>> {
     let mut places = Vec::with_capacity(layers.len());
     let mut from = 0;
     for layer in layers {
