@@ -6,8 +6,7 @@
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::gamut::Printable;
-use appearance::solve::gram::inner_products;
-use appearance::solve::{Gram, Simplex};
+use appearance::solve::{Gram, Simplex, inner_products};
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;

@@ -15,11 +15,11 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::brdf::Space;
-use crate::document::Materials;
+use crate::materials::Materials;
 
-use super::FactorError;
 use super::cbrt::cbrt;
 use super::columns::Columns;
+use super::error::{BRIGHTEST, FactorError};
 
 /// Most pixels looked at.
 const DRAWS: usize = 1 << 16;
@@ -31,8 +31,6 @@ const VALUES: usize = 1 << 22;
 const FEWEST: usize = 1024;
 /// The distance (in the metric, where 0.01 is hard to see) merged materials stay within.
 const MERGED: f64 = 0.005;
-/// No reflectance beyond this (1/sr) is taken for one: a mirror's peak as narrow as the sun is a tenth of it.
-pub(super) const BRIGHTEST: f32 = 1e6;
 
 /// Materials as rows of [`Columns`].
 #[derive(Clone, Debug)]

@@ -7,6 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::brdf::Space;
+use crate::materials::Materials;
 use crate::weights::ONE;
 use observe::Silent;
 

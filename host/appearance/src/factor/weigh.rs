@@ -6,13 +6,13 @@
 
 use rayon::prelude::*;
 
-use crate::document::{Distinct, Materials};
+use crate::materials::{Distinct, Materials};
 use crate::weights::{ONE, WeightMaps, quantise};
 use observe::Observer;
 
-use super::FactorError;
 use super::code::Coder;
 use super::columns::Columns;
+use super::error::FactorError;
 use super::sample::read;
 
 /// Pixels of a run.

@@ -9,7 +9,7 @@
 
 use rayon::prelude::*;
 
-use super::basis::prune;
+use super::prune::prune;
 use crate::weights::{ONE, WeightMaps, quantise};
 
 /// Distance up to which a clamped pixel counts as in the gamut, and from which as far out.

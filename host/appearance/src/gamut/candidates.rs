@@ -2,9 +2,8 @@
 
 use inks::{InkSet, Library, Stack};
 
-use crate::brdf::{Space, Table};
-use crate::solve::hull::LAYER_PRICE;
-use crate::solve::{Hull, MixtureError};
+use crate::brdf::{self, Space, Table};
+use crate::solve::{Hull, LAYER_PRICE, MixtureError};
 
 /// What the printer can print: stacks and their curves. Only stacks of inks that are at hand.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,13 +17,9 @@ pub struct Printable {
 impl Printable {
     /// The stacks of a library that need no ink but these, in a half-angle space.
     pub fn from_library(library: &Library, at_hand: &InkSet, space: &Space) -> Printable {
-        let mut curves = Table::new(space.columns());
-        let mut stacks = Vec::new();
-        for entry in library.at_hand(at_hand) {
-            curves.push(&space.row(&entry.curve_at(space.angles())));
-            stacks.push(entry.stack.clone());
-        }
-        Printable { stacks, curves }
+        let entries = library.at_hand(at_hand);
+        let stacks = entries.iter().map(|entry| entry.stack.clone()).collect();
+        Printable { stacks, curves: brdf::rows(space, entries) }
     }
 }
 

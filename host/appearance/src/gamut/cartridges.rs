@@ -11,12 +11,11 @@ use protocol::ink::Ink;
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
-use super::{GamutError, GivenUp};
+use super::error::GamutError;
+use super::prune::PRUNED;
+use super::report::GivenUp;
 use crate::solve::{Hull, Mixer, MixtureError, Target};
 use observe::Observer;
-
-/// Weights below this are pruned, so they load no cartridge.
-pub(super) const PRUNED: f64 = 0.005;
 
 /// The stacks to mix from so that at most `most` inks are used, and what was given up for that.
 pub(super) fn choose(

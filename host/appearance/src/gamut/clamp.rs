@@ -10,11 +10,11 @@
 
 use rayon::prelude::*;
 
-use super::GamutError;
-use super::basis::prune;
 use super::candidates::Candidates;
+use super::error::GamutError;
+use super::prune::prune;
 use crate::brdf::{Space, Table};
-use crate::document::{Distinct, Materials};
+use crate::materials::{Distinct, Materials};
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::quantise;
 use observe::Observer;

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::gloss::{DIFFERENT, MERGED};
 use super::mix::InkMix;
 use crate::brdf::{Space, Table};
-use crate::document::Materials;
+use crate::materials::Materials;
 
 /// Pairs of pixels that are compared.
 const PAIRS: usize = 20_000;

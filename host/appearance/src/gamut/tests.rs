@@ -6,8 +6,8 @@ use protocol::ink::Ink;
 
 use super::*;
 use crate::brdf::{Space, Table};
-use crate::document::Surface;
-use crate::weights::quantise;
+use crate::materials::{Factored, Materials, Surface};
+use crate::weights::{ONE, WeightMaps, quantise};
 use observe::Silent;
 
 fn space() -> Space {

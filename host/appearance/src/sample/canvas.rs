@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::{Finish, Painting};
+use super::painting::{Finish, Painting};
 
 /// A point or a vector, in pixels, y down.
 pub type Point = [f32; 2];
@@ -46,7 +46,7 @@ impl Coat {
 
 /// An sRGB colour as linear values.
 pub fn colour(hex: u32) -> [f32; 3] {
-    [hex >> 16, hex >> 8, hex].map(|v| crate::document::picture::decode_srgb((v & 255) as f32 / 255.0))
+    [hex >> 16, hex >> 8, hex].map(|v| crate::srgb::decode((v & 255) as f32 / 255.0))
 }
 
 /// From `a` to `b`.
@@ -263,8 +263,7 @@ pub fn byte(v: f32) -> u8 {
 
 /// A linear value as an sRGB byte.
 pub fn encode(v: f32) -> u8 {
-    use palette::encoding::{FromLinear, Srgb};
-    byte(<Srgb as FromLinear<f32, f32>>::from_linear(v.clamp(0.0, 1.0)))
+    byte(crate::srgb::encode(v))
 }
 
 /// A smooth function of the place, sampled every few pixels and linear between.

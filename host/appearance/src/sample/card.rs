@@ -2,8 +2,8 @@
 
 use std::f32::consts::TAU;
 
-use super::Painting;
 use super::canvas::{Coat, Point, Shape, bezier, clouds, hash, inside, mix, noise, paint, smooth};
+use super::painting::Painting;
 
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 1443;

@@ -1,7 +1,7 @@
 //! A dove in silver with a glossy olive twig, on matte blue.
 
-use super::Painting;
 use super::canvas::{Coat, Point, Shape, bezier, clouds, inside, mix, noise, paint, smooth};
+use super::painting::Painting;
 
 const WIDTH: usize = 1280;
 const HEIGHT: usize = 960;

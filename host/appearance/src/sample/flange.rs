@@ -2,8 +2,8 @@
 
 use std::f32::consts::TAU;
 
-use super::Painting;
 use super::canvas::{Coat, Point, cells, clouds, hash, inside, mix, noise, paint, smooth};
+use super::painting::Painting;
 
 const SIDE: usize = 1024;
 const CENTRE: Point = [512.0, 512.0];

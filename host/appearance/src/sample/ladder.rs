@@ -4,7 +4,7 @@
 //! keeps relative gloss keeps four steps.
 
 use super::canvas::{Point, byte, encode, inside, mix};
-use super::{Finish, Painting};
+use super::painting::{Finish, Painting};
 
 /// Shares of the full gloss, from the left.
 pub const STEPS: [f32; 4] = [1.0, 0.8, 0.5, 0.1];

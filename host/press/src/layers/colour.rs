@@ -210,7 +210,7 @@ impl Colour {
         // Sums of linear light, 16 bits a channel: exact enough for 8-bit sRGB to come back as it was.
         let linear: Vec<u32> = (0..=255u8)
             .map(|v| {
-                (65535.0 * appearance::document::picture::decode_srgb(f32::from(v) / 255.0)).round() as u32
+                (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32
             })
             .collect();
         let coded: Vec<u8> = (0..=65535)
@@ -383,7 +383,7 @@ impl Lattice {
         let paper = printable.curves.row(bare).to_vec();
         let black = printable.curves.row(darkest).to_vec();
         let light = std::array::from_fn(|i| {
-            f64::from(appearance::document::picture::decode_srgb(i as f32 / (NODES - 1) as f32))
+            f64::from(appearance::srgb::decode(i as f32 / (NODES - 1) as f32))
         });
         Lattice { space, paper, black, light }
     }
@@ -431,7 +431,7 @@ mod tests {
         let mut shares = vec![0.0; mix.stacks.len()];
         for (pixel, &v) in greys.iter().enumerate() {
             mix.shares(pixel, &mut shares);
-            let light = f64::from(appearance::document::picture::decode_srgb(f32::from(v) / 255.0));
+            let light = f64::from(appearance::srgb::decode(f32::from(v) / 255.0));
             // The raking half of the curve: the body's colour without the surface's gloss.
             let at = 3 * (SAMPLES - 1) + 1;
             let printed: f64 = mix

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgba};
 
-use super::super::{Content, Document, DocumentError, Materials, Options, Surface, Surfaces, open};
-use crate::document::ColourSpace;
+use crate::document::{ColourSpace, Content, Document, DocumentError, Options, open};
+use crate::materials::{Materials, Surface, Surfaces};
 use observe::Silent;
 
 struct Folder(tempfile::TempDir);

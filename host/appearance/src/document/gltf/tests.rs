@@ -1,7 +1,8 @@
 //! Files made here, by hand: each workflow, each way to store a picture, each way out of the folder.
 
 use super::*;
-use crate::document::{Materials, Surface, open};
+use crate::document::open;
+use crate::materials::{Materials, Surface};
 use base64::Engine;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use observe::Silent;

@@ -257,7 +257,8 @@ proptest! {
                 (values[5 * i + j], values[5 * j + i]) = if i == j { (v.abs(), v.abs()) } else { (v, v) };
             }
         }
-        let gram = Gram::from_values(5, values).unwrap();
+        let mut gram = Gram::empty();
+        gram.refill_products(5, |i, j| values[5 * i + j]);
         let mut a = a;
         match Simplex::new().solve(&gram, &h, &mut a) {
             Ok(certificate) => {
