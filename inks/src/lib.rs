@@ -1,5 +1,10 @@
-//! The ink library: what each cartridge is, what each stack of layers reflects, and where each number comes from.
+//! The ink library: cartridges, the reflectance of each stack of layers, and the source of each number.
 #![forbid(unsafe_code)]
+#![warn(clippy::cast_possible_truncation, clippy::cast_possible_wrap, clippy::cast_sign_loss)]
+#![allow(
+    clippy::cast_precision_loss,
+    reason = "only numbers of samples become floating point, far below 2^52"
+)]
 
 pub mod albedo;
 pub mod curve;

@@ -24,7 +24,9 @@ pub struct Space {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpaceError {
     /// The lists differ in length or are empty.
-    #[error("a tabulation needs one quadrature weight for each cosine and at least one of each; found {cosines} cosines and {weights} weights")]
+    #[error(
+        "a tabulation needs one quadrature weight for each cosine and at least one of each; found {cosines} cosines and {weights} weights"
+    )]
     Length {
         /// Number of cosines.
         cosines: usize,
@@ -32,7 +34,9 @@ pub enum SpaceError {
         weights: usize,
     },
     /// A number is negative, infinite or not a number.
-    #[error("configuration {sample}: cosine {cosine} and weight {weight} must be finite numbers of 0 or more")]
+    #[error(
+        "configuration {sample}: cosine {cosine} and weight {weight} must be finite numbers of 0 or more"
+    )]
     Value {
         /// Which configuration.
         sample: usize,
@@ -106,13 +110,6 @@ impl Space {
     /// give an empty row.
     pub fn row(&self, curve: &Curve) -> Vec<f64> {
         self.angles.iter().flat_map(|&theta| curve.at(theta)).collect()
-    }
-
-    /// A row of a half-angle space as a curve.
-    #[cfg(test)]
-    pub(crate) fn curve(&self, row: &[f64]) -> Curve {
-        let mut samples = row.chunks_exact(3);
-        Curve::sampled(&self.angles, |_| samples.next().map_or([0.0; 3], |v| [v[0], v[1], v[2]]))
     }
 
     /// Distance between two rows of reflectance in 1/sr (0.01: barely visible; 0.05: obvious).

@@ -93,7 +93,9 @@ pub(super) fn stem(path: &Path) -> String {
 /// Checks that a size on paper is plausible: from one dot to 10 metres.
 pub(super) fn check_size_mm(size: [f64; 2]) -> Result<(), String> {
     match size.iter().find(|mm| !(0.04..=10_000.0).contains(*mm)) {
-        Some(mm) => Err(format!("size_mm: {mm} is not a length on paper; expected 0.04 to 10000 millimetres")),
+        Some(mm) => {
+            Err(format!("size_mm: {mm} is not a length on paper; expected 0.04 to 10000 millimetres"))
+        }
         None => Ok(()),
     }
 }

@@ -93,7 +93,9 @@ pub fn write(
     }
     if factored.bases.len() != factored.maps.channels() || factored.bases.len() > MOST_BASES {
         let (bases, maps) = (factored.bases.len(), factored.maps.channels());
-        return Err(field(format!("{bases} bases and {maps} maps; expected equal numbers, at most {MOST_BASES}")));
+        return Err(field(format!(
+            "{bases} bases and {maps} maps; expected equal numbers, at most {MOST_BASES}"
+        )));
     }
     if path.exists() {
         let exists = std::io::Error::from(std::io::ErrorKind::AlreadyExists);

@@ -97,7 +97,9 @@ impl Reader<'_, '_> {
         let planes = picture.linear(space);
         let outside = planes.iter().any(|plane| plane.data().iter().any(|v| !(0.0..=1.0).contains(v)));
         if outside {
-            self.source.note(format!("{name}: colours outside 0 to 1 are clamped, because reflectances cannot lie there"));
+            self.source.note(format!(
+                "{name}: colours outside 0 to 1 are clamped, because reflectances cannot lie there"
+            ));
         }
         let [r, g, b] = planes;
         Ok([Field::Map(self.fit(r, name)?), Field::Map(self.fit(g, name)?), Field::Map(self.fit(b, name)?)])
@@ -174,7 +176,9 @@ fn encoding_words(space: ColourSpace, chosen: bool) -> String {
             format!("integer colours are read as sRGB; set colour_space in {SETTINGS} if they are linear")
         }
         (false, ColourSpace::Linear) => {
-            format!("floating-point colours are read as linear; set colour_space in {SETTINGS} if they are sRGB")
+            format!(
+                "floating-point colours are read as linear; set colour_space in {SETTINGS} if they are sRGB"
+            )
         }
     }
 }

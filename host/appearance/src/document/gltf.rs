@@ -233,14 +233,15 @@ fn normal_variance(
     base: Option<(usize, usize)>,
 ) -> Result<Option<Field>, DocumentError> {
     if loader.placement.is_some_and(|first| first.coordinates != normal.tex_coord) {
-        loader.source.note("normalTexture: ignored, because its coordinates differ from those of the other maps".into());
+        loader.source.note(
+            "normalTexture: ignored, because its coordinates differ from those of the other maps".into(),
+        );
         return Ok(None);
     }
     let Loaded { name, picture } = loader.texture(normal.index.value(), "normalTexture")?;
     if picture.colours() != 3 {
-        return Err(
-            loader.wrong("normalTexture", format!("{name}: expected normals with three components, found grey"))
-        );
+        return Err(loader
+            .wrong("normalTexture", format!("{name}: expected normals with three components, found grey")));
     }
     let scale = base.map_or(1.0, |(width, _)| picture.width as f64 / width as f64);
     let radius = (scale * (relief::WINDOW / 2) as f64).round().clamp(1.0, 256.0) as usize;

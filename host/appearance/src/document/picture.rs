@@ -256,7 +256,10 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
         DynamicImage::ImageRgb32F(p) => picture(3, Values::Float(p.into_raw())),
         DynamicImage::ImageRgba32F(p) => picture(4, Values::Float(p.into_raw())),
         other => {
-            return Err(wrong(format!("pixels of type {:?} are not supported; save the image as RGB", other.color())));
+            return Err(wrong(format!(
+                "pixels of type {:?} are not supported; save the image as RGB",
+                other.color()
+            )));
         }
     })
 }

@@ -89,7 +89,9 @@ pub fn widened(alpha: f32, variance: f32) -> f32 {
 
 /// The note about a normal map.
 pub fn note(name: &str) -> String {
-    format!("{name}: paper is flat; bumps within {WINDOW} pixels are printed as roughness, larger relief is lost")
+    format!(
+        "{name}: paper is flat; bumps within {WINDOW} pixels are printed as roughness, larger relief is lost"
+    )
 }
 
 #[cfg(test)]

@@ -42,9 +42,8 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentEr
     let measured = Measured::new(&file)?;
     let theta_h: Vec<f64> =
         (0..THETA_H).map(|i| FRAC_PI_2 * ((i as f64 + 0.5) / THETA_H as f64).powi(2)).collect();
-    average::curve(&theta_h, CELLS.0, CELLS.1, |_, wi, wo| measured.reflectance(wi, wo)).ok_or_else(|| {
-        file.wrong("theta_i", "no pair of directions within its range can be averaged".into())
-    })
+    average::curve(&theta_h, CELLS.0, CELLS.1, |_, wi, wo| measured.reflectance(wi, wo))
+        .ok_or_else(|| file.wrong("theta_i", "no pair of directions within its range can be averaged".into()))
 }
 
 /// A table over the unit square: bilinear between `height` x `width` values, the outermost of them on the border.
@@ -174,8 +173,9 @@ impl Measured {
         let densities = vndf.data[..n * h * w]
             .chunks_exact(h * w)
             .map(|data| {
-                Density::new(Grid { width: w, height: h, data })
-                    .ok_or_else(|| file.wrong("vndf", "the density of visible normals is zero everywhere".into()))
+                Density::new(Grid { width: w, height: h, data }).ok_or_else(|| {
+                    file.wrong("vndf", "the density of visible normals is zero everywhere".into())
+                })
             })
             .collect::<Result<_, _>>()?;
         let (rgb, side) = colours(file, turns, n)?;
@@ -278,13 +278,15 @@ fn colours(
     }
     let wavelengths = file.tensor("wavelengths", 1)?.data;
     if wavelengths.len() != layers {
-        let problem = format!("{} wavelengths for {layers} layers of spectra; expected equal numbers", wavelengths.len());
+        let problem = format!(
+            "{} wavelengths for {layers} layers of spectra; expected equal numbers",
+            wavelengths.len()
+        );
         return Err(file.wrong("wavelengths", problem));
     }
     let Some(weights) = rgb_weights(&wavelengths) else {
-        return Err(
-            file.wrong("wavelengths", "expected ascending wavelengths that cover 430 to 650 nanometres".into())
-        );
+        return Err(file
+            .wrong("wavelengths", "expected ascending wavelengths that cover 430 to 650 nanometres".into()));
     };
     let mut rgb = vec![0.0f32; n * 3 * size];
     for i in 0..n {

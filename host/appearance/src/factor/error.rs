@@ -8,30 +8,32 @@ pub(super) const BRIGHTEST: f32 = 1e6;
 /// Why a document cannot be factored.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FactorError {
-    /// No pixels, or more than can be counted.
-    #[error("a document of {width} x {height} pixels cannot be factored; both sides must be at least 1")]
+    /// The document has no pixels, or too many.
+    #[error(
+        "cannot factor a document of {width} x {height} pixels; it must have at least one pixel and fit in memory"
+    )]
     Size {
         /// Pixels across.
         width: usize,
         /// Pixels down.
         height: usize,
     },
-    /// A setting is out of its range.
-    #[error("setting `{name}` is {value}; choose a number from {least} to {most}")]
+    /// A setting is out of range.
+    #[error("the setting `{name}` is {value}; expected a number from {least} to {most}")]
     Setting {
         /// Its name.
         name: &'static str,
         /// Its value.
         value: f64,
-        /// Least value that makes sense.
+        /// Smallest allowed value.
         least: f64,
-        /// Largest value that makes sense.
+        /// Largest allowed value.
         most: f64,
     },
-    /// A pixel's reflectance is no reflectance.
+    /// The reflectance of a pixel is too large or not a number.
     #[error(
-        "pixel ({x}, {y}) has the reflectance {value} in column {column}; a finite number up to {} per steradian was \
-         expected: check the texture or curve it comes from",
+        "pixel ({x}, {y}) has the reflectance {value} in column {column}; expected a finite number up to {} per \
+         steradian: check the texture or curve of this pixel",
         BRIGHTEST
     )]
     Reflectance {
@@ -44,7 +46,7 @@ pub enum FactorError {
         /// The value found.
         value: f32,
     },
-    /// The weights are no weight maps: a bug, reported instead of printed.
-    #[error("the weights found are no partition of unity: {0}")]
+    /// The weights are not weight maps, which is a bug in this crate.
+    #[error("the computed weights are not a partition of unity (this is a bug): {0}")]
     Weights(#[from] WeightError),
 }

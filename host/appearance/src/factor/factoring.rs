@@ -15,28 +15,28 @@ use super::{grow, kmeans, sacls, weigh};
 use crate::brdf::Table;
 use crate::materials::{Factored, Materials};
 
-/// How well it went. Distances are in the metric: about 0.01 is hard to see, 0.05 is plain.
+/// How well the bases reproduce the document. Distances are in the metric (0.01: barely visible; 0.05: obvious).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// How bases were learnt.
     pub method: Method,
-    /// How many there are. Fewer than asked for when the document has fewer materials.
+    /// Number of bases. Fewer than requested if the document has fewer materials.
     pub bases: usize,
-    /// How many were asked for.
+    /// Number of bases requested.
     pub asked: Option<usize>,
-    /// Where chance started.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Distinct materials the bases were learnt from.
+    /// Number of distinct materials that the bases were learnt from.
     pub materials: usize,
-    /// Root mean square distance of a pixel from its mixture of bases, weights rounded as they are stored.
+    /// Root mean square distance between a pixel and its mixture of bases, with weights rounded as stored.
     pub rmse: f64,
-    /// 95 of 100 pixels are nearer than this.
+    /// The distance that 95 % of the pixels do not exceed.
     pub p95: f64,
-    /// The worst pixel.
+    /// The distance of the worst pixel.
     pub max: f64,
-    /// Share of the pixels whose distance from the hull of the bases exceeds 0.01.
+    /// Share of the pixels whose distance exceeds 0.01.
     pub uncovered: f64,
-    /// For each basis its distance from the hull of the document's materials, in the document's spread.
+    /// For each basis, its distance from the hull of the document's materials, in units of the document's spread.
     pub excursion: Vec<f64>,
 }
 
@@ -44,7 +44,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} basis material{}; pixels are d = {:.4} from their mixture on average (95 % below {:.4}, worst {:.4})",
+            "{} basis material{}; average difference d = {:.4} between a pixel and its mixture (95 % below {:.4}, worst {:.4})",
             self.bases,
             if self.bases == 1 { "" } else { "s" },
             self.rmse,
@@ -54,22 +54,22 @@ impl fmt::Display for Report {
         match 100.0 * self.uncovered {
             few if few < 0.05 => Ok(()),
             share => {
-                write!(f, "; {share:.1} % of them lie more than 0.01 outside all that the bases can mix")
+                write!(f, "; for {share:.1} % of the pixels no mixture of the bases is closer than 0.01")
             }
         }
     }
 }
 
-/// What factoring gives.
+/// The result of factoring.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Factoring {
     /// Bases and weights.
     pub factored: Factored,
-    /// How well it went.
+    /// How well they reproduce the document.
     pub report: Report,
 }
 
-/// Factors a document: bases, weight maps of the document's size, and how well they reproduce it.
+/// Factors a document into bases and weight maps of the document's size, and measures how well they reproduce it.
 pub fn factor(
     document: &dyn Materials,
     settings: &Settings,
@@ -110,12 +110,12 @@ fn check_size(document: &dyn Materials) -> Result<(), FactorError> {
 
 /// Sweeps of metric archetypes; most of the gain comes in the first ten.
 const SWEEPS: usize = 20;
-/// Relative fall of the mean squared distance in a sweep that counts as settled.
+/// The relative decrease of the mean squared distance below which a sweep is the last one.
 const SETTLED: f64 = 1e-3;
-/// Axes in which corners are looked for.
+/// Axes in which corners are searched.
 const CORNER_AXES: usize = 10;
 
-/// Bases for a sample, as rows of its columns, and its principal axes.
+/// Learns bases for a sample, as rows of its columns. Also returns its principal axes.
 fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca, Vec<f32>) {
     let axes = settings.bases.unwrap_or(grow::MOST).max(CORNER_AXES + 1) - 1;
     let pca = Pca::of(sample, axes, settings.seed);
@@ -123,7 +123,7 @@ fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca,
     if most == 1 || settings.bases.is_some_and(|k| k >= most) {
         if let Some(k) = settings.bases.filter(|&k| k > most) {
             observer.note(&format!(
-                "{k} bases were asked for, but the document has only {most} distinct material{}",
+                "{k} bases were requested, but the document has only {most} distinct material{}",
                 if most == 1 { "" } else { "s" }
             ));
         }

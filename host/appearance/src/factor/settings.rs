@@ -7,33 +7,33 @@ use super::error::FactorError;
 /// The most bases that can be requested: twice what any document has needed.
 pub const MOST_BASES: usize = 32;
 
-/// How bases are learnt.
+/// How the bases are learnt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Corners of the document fitted in the metric. Reproduces the document nearly as well as bases that are no
-    /// real materials, and prints best.
+    /// Corners of the document, fitted in the metric. Reproduces the document nearly as well as bases that are not real
+    /// materials, and prints best.
     #[default]
     Archetypes,
-    /// The paper's convex-hull k-means: real materials, robust, but inside the corners.
+    /// The paper's convex-hull k-means: real materials and robust, but slightly inside the corners.
     Kmeans,
-    /// Sparse alternating constrained least squares, the paper's other method: reproduces the document best, with
-    /// bases that may be far from any real material.
+    /// Sparse alternating constrained least squares, the paper's other method. Reproduces the document best, with bases that
+    /// may be far from any real material.
     Sacls,
 }
 
-/// How to factor. The default suits every document.
+/// The settings of factoring. The defaults suit every document.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
-    /// How bases are learnt.
+    /// How the bases are learnt.
     pub method: Method,
-    /// How many bases, 1..=[`MOST_BASES`]; as many as the document needs (15 at most) when not told.
+    /// Number of bases, 1..=[`MOST_BASES`]; by default as many as the document needs (15 at most).
     pub bases: Option<usize>,
-    /// Where chance starts.
+    /// Seed of the random numbers.
     pub seed: u64,
-    /// Archetypes only: how far a basis may lie outside the document's hull, in the document's spread (the root
-    /// mean square distance from its mean), 0..=10.
+    /// Archetypes only: the largest distance of a basis outside the hull of the document, in units of the document's spread
+    /// (the root mean square distance from its mean), 0..=10.
     pub delta: f64,
     /// SACLS only: the weight of the penalty on all but the dominant basis of a pixel, 0..=10.
     pub lambda: f64,

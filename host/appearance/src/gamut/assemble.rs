@@ -1,4 +1,4 @@
-//! The mix the halftoner reads, from shares over the candidates.
+//! Turning weights over the candidates into the mix that the halftoner reads.
 
 use inks::Stack;
 
@@ -8,7 +8,7 @@ use super::mix::InkMix;
 use crate::brdf::Table;
 use crate::weights::{ONE, WeightError, WeightMaps};
 
-/// Drops the candidates that no pixel uses: the identity as matrix, and maps of the others.
+/// Drops the candidates that no pixel uses. Returns the identity as matrix and the maps of the others.
 pub(super) fn compact(
     mut shares: Vec<u16>,
     k: usize,
@@ -20,7 +20,7 @@ pub(super) fn compact(
         used.iter_mut().zip(pixel).for_each(|(used, &w)| *used |= w > 0);
     }
     let kept: Vec<usize> = (0..k).filter(|&q| used[q]).collect();
-    // In place: what is kept of a pixel never lies after where it was.
+    // In place: a value never moves to a later position.
     for pixel in 0..width * height {
         for (channel, &q) in kept.iter().enumerate() {
             shares[pixel * kept.len() + channel] = shares[pixel * k + q];
@@ -33,8 +33,8 @@ pub(super) fn compact(
     Ok((kept.into_iter().map(unit).collect(), maps))
 }
 
-/// The mix of rows of shares over the candidates, and the curves of its stacks: the substrate first, then the
-/// candidates that have a share.
+/// The mix from rows of weights over the candidates, and the curves of its stacks: the substrate first, then the candidates
+/// with any weight.
 pub(super) fn assemble(
     candidates: &Candidates,
     shares: Vec<Vec<u16>>,
@@ -53,7 +53,7 @@ pub(super) fn assemble(
                 curves.push(candidates.curves.row(*q));
                 stacks.push(candidates.stacks[*q].clone());
             }
-            // A substrate that may not be used has no share and needs no curve.
+            // A substrate that is not a candidate has no weight and needs no curve.
             None => {
                 curves.push(&vec![0.0; candidates.curves.columns()]);
                 stacks.push(Stack::SUBSTRATE);

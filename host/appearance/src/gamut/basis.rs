@@ -1,4 +1,4 @@
-//! Each basis by eq. 1, pruned, with its certificate.
+//! Mapping each basis by eq. 1, with pruning and a certificate.
 
 use rayon::prelude::*;
 
@@ -12,9 +12,9 @@ use crate::brdf::{Space, Table};
 use crate::solve::{Best, Mixer, MixtureError};
 use crate::weights::{ONE, quantise};
 
-/// The bases' mixtures over the candidates.
+/// The mixtures of the bases over the candidates.
 pub(super) struct Bases {
-    /// One row of shares for each basis, summing to [`ONE`].
+    /// One row of weights per basis, with sum [`ONE`].
     pub shares: Vec<Vec<u16>>,
     pub reports: Vec<BasisReport>,
     pub gloss_scale: Option<f64>,
@@ -92,7 +92,7 @@ fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Ma
     let target = candidates.free.target(row)?;
     let best = mixer.best(&candidates.priced, &target)?;
     let mut weights = best.weights.clone();
-    // The price has decided which stacks; among them the distance alone counts.
+    // The price has selected the stacks; the final weights minimise the distance alone.
     let unpruned = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?.distance;
     let mut distance = unpruned;
     while prune(&mut weights) {

@@ -9,19 +9,19 @@ use crate::weights::WeightError;
 /// Why a document was not mapped.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GamutError {
-    /// Nothing can be printed.
+    /// No stack can be printed.
     #[error(
-        "no stack can be printed with the inks at hand; add an ink, or leave the bare substrate among the stacks"
+        "no stack can be printed with the available inks; add an ink, or keep the bare substrate among the stacks"
     )]
     NothingPrintable,
-    /// More stacks than the index of a sheet holds.
-    #[error("{found} stacks are more than the 255 a sheet can hold beside the substrate; choose fewer inks")]
+    /// More stacks than the index of a sheet can hold.
+    #[error("{found} stacks; a sheet can hold 255 besides the substrate: choose fewer inks")]
     TooManyStacks {
         /// Stacks given.
         found: usize,
     },
-    /// As many curves as stacks are needed.
-    #[error("{stacks} stacks come with {curves} curves")]
+    /// The number of curves differs from the number of stacks.
+    #[error("{stacks} stacks have {curves} curves; expected one each")]
     Curves {
         /// Stacks given.
         stacks: usize,
@@ -35,15 +35,17 @@ pub enum GamutError {
         stack: Stack,
     },
     /// Weight maps and bases disagree.
-    #[error("the document has {bases} bases and weights for {channels}")]
+    #[error("the document has {bases} bases, but weights for {channels}")]
     Channels {
         /// Bases.
         bases: usize,
         /// Channels of the weight maps.
         channels: usize,
     },
-    /// The materials are not those of the factored document.
-    #[error("the materials are {found_width} x {found_height} pixels, their weight maps {width} x {height}")]
+    /// The materials do not belong to the factored document.
+    #[error(
+        "the materials have {found_width} x {found_height} pixels, but the weight maps have {width} x {height}"
+    )]
     Size {
         /// Pixels across of the maps.
         width: usize,
@@ -54,9 +56,9 @@ pub enum GamutError {
         /// Pixels down of the materials.
         found_height: usize,
     },
-    /// No cartridge may be used, and the bare substrate is not among the stacks.
+    /// The limit excludes all mixtures, and the bare substrate is not among the stacks.
     #[error(
-        "no mixture keeps to {most} cartridges; allow more, or leave the bare substrate among the stacks"
+        "no mixture is possible with {most} cartridges; allow more, or keep the bare substrate among the stacks"
     )]
     Cartridges {
         /// The limit.
@@ -65,15 +67,15 @@ pub enum GamutError {
     /// Eq. 1 could not be solved.
     #[error("{what}: {source}")]
     Mixture {
-        /// Which target: a basis or a pixel.
+        /// The target: a basis or a pixel.
         what: String,
         /// Why.
         source: MixtureError,
     },
-    /// The result breaks a rule of mixes: a bug.
+    /// The result is not a valid mix, which is a bug.
     #[error(transparent)]
     Mix(#[from] MixError),
-    /// The result breaks a rule of weight maps: a bug.
+    /// The result is not valid weight maps, which is a bug.
     #[error(transparent)]
     Weights(#[from] WeightError),
 }

@@ -1,9 +1,9 @@
-//! Leaving out weights too small to print.
+//! Leaving out weights that are too small to print.
 
 /// Weights below this are left out, so they need no cartridge.
 pub(super) const PRUNED: f64 = 0.005;
 
-/// Drops weights below 0.5 %; whether there were any. The largest always stays: it is at least one part in 256.
+/// Drops weights below 0.5 %, and returns whether there were any. The largest weight always stays.
 pub(super) fn prune(weights: &mut [f64]) -> bool {
     let small = |w: f64| w > 0.0 && w < PRUNED;
     if !weights.iter().any(|&w| small(w)) {
@@ -40,7 +40,7 @@ mod tests {
         assert!(!prune(&mut weights));
     }
 
-    /// More than two hundred equal weights are all small: those that are the largest stay.
+    /// With more than two hundred equal weights all are small, and all are the largest, so they stay.
     #[test]
     fn the_largest_weight_stays_however_small() {
         let mut weights = vec![1.0 / 250.0; 250];

@@ -1,4 +1,4 @@
-//! What a mapping gives, and what is known about it.
+//! The result of a mapping, and facts about it.
 
 use inks::Stack;
 use protocol::ink::Ink;
@@ -6,53 +6,53 @@ use protocol::ink::Ink;
 use super::mix::InkMix;
 use super::settings::Intent;
 
-/// A mapped document and what is known of the mapping.
+/// A mapped document and the report of the mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mapped {
-    /// What the halftoner reads.
+    /// The input of the halftoner.
     pub mix: InkMix,
-    /// What happened.
+    /// The report.
     pub report: Report,
 }
 
-/// What happened in the mapping.
+/// The report of a mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// The intent used: never [`Intent::Auto`].
     pub intent: Intent,
-    /// The inks of the result, in the order of the ink codes.
+    /// The inks of the result, in the order of their codes.
     pub cartridges: Vec<Ink>,
-    /// Inks given up to keep to the number of cartridges, in the order they were given up.
+    /// Inks left out because of the number of cartridges, in the order of leaving out.
     pub given_up: Vec<GivenUp>,
-    /// The common factor on the gloss of the bases, if it was scaled.
+    /// The factor on the gloss of all bases, if it was scaled.
     pub gloss_scale: Option<f64>,
-    /// Each basis before and after.
+    /// Each basis before and after mapping.
     pub bases: Vec<BasisReport>,
     /// The pixels, for the intents that map them.
     pub pixels: Option<PixelReport>,
 }
 
-/// An ink given up.
+/// An ink that was left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GivenUp {
     /// The ink.
     pub ink: Ink,
-    /// Root mean square distance of targets and mixtures with it and without it.
+    /// Root mean square distance between targets and mixtures with the ink.
     pub before: f64,
-    /// See `before`.
+    /// The same without the ink.
     pub after: f64,
 }
 
-/// One basis before and after.
+/// One basis before and after mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BasisReport {
-    /// The target (1/sr), with its gloss scaled if [`Report::gloss_scale`] says so.
+    /// The target (1/sr), with scaled gloss if [`Report::gloss_scale`] is set.
     pub target: Vec<f64>,
-    /// What the mixture reflects (1/sr), from the weights as rounded for the halftoner.
+    /// The reflectance of the mixture (1/sr), from the weights as rounded for the halftoner.
     pub printed: Vec<f64>,
-    /// Distance d of the two.
+    /// Distance d between the two.
     pub distance: f64,
-    /// Distance d of the printed row and the basis with its gloss as it was.
+    /// Distance d between the printed row and the basis with its original gloss.
     pub unscaled_distance: f64,
     /// The stacks of the mixture and their weights, largest first.
     pub weights: Vec<(Stack, f64)>,
@@ -64,22 +64,22 @@ pub struct BasisReport {
     pub starts: usize,
     /// Starts that reached the same distance.
     pub agreeing: usize,
-    /// What leaving out weights below 0.5 % added to the distance.
+    /// Increase of the distance by leaving out weights below 0.5 %.
     pub pruning_cost: f64,
 }
 
 /// The pixels of a clamped or blended mapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelReport {
-    /// Root mean square distance of pixels and their clamped mixtures.
+    /// Root mean square distance between pixels and their clamped mixtures.
     pub rms: f64,
-    /// The distance 95 % of the pixels are within.
+    /// The distance that 95 % of the pixels do not exceed.
     pub p95: f64,
     /// The largest distance.
     pub max: f64,
     /// The largest gap of any pixel before pruning, in squared distance.
     pub gap: f64,
-    /// Share of sampled pairs of pixels that differ (d > 0.03) and are printed at less than a quarter of that.
+    /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
     pub merged: f64,
     /// Mean weight of the clamped mixture in the result: 1 for clamp.
     pub clamped: f64,

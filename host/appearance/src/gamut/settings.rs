@@ -6,26 +6,26 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intent {
-    /// Clamp, unless that merges more than 1 % of pairs of materials that differ; then blend.
+    /// Clamp, unless that merges more than 1 % of the pairs of different materials; then blend.
     #[default]
     Auto,
-    /// Map the bases, keep the weights: relative differences survive.
+    /// Map the bases and keep the weights: relative differences survive.
     Basis,
-    /// Map each pixel by itself: lowest error, differences outside the gamut are lost.
+    /// Map each pixel on its own: lowest error, but differences outside the gamut are lost.
     Clamp,
-    /// Clamped where that is near, the mapped bases where it is not.
+    /// Clamped pixels where they are close to the target, the mapped bases elsewhere.
     Blend,
 }
 
-/// How the bases' gloss is treated before they are mapped.
+/// How the gloss of the bases is treated before they are mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Gloss {
-    /// Scale, if mapping would otherwise merge bases that differ and scaling helps.
+    /// Scale if mapping would otherwise merge different bases and scaling helps.
     #[default]
     WhereMerged,
-    /// Leave the gloss as it is.
+    /// Keep the gloss.
     Keep,
-    /// Scale all gloss in common, so that the most extreme basis just reaches the gamut.
+    /// Scale the gloss of all bases by one factor, so that the most extreme basis just reaches the gamut.
     Scale,
 }
 
@@ -34,11 +34,11 @@ pub enum Gloss {
 pub struct Settings {
     /// What to do with materials outside the gamut.
     pub intent: Intent,
-    /// How the bases' gloss is treated.
+    /// How the gloss of the bases is treated.
     pub gloss: Gloss,
-    /// Most different cartridges in the result; the machine holds 7.
+    /// The most cartridges in the result; the printer holds 7.
     pub most_cartridges: usize,
-    /// Seed of the sample of pixels that cartridges and intent are chosen by.
+    /// Seed of the sample of pixels that the cartridges and the intent are chosen by.
     pub seed: u64,
 }
 

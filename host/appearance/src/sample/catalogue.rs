@@ -41,7 +41,10 @@ pub struct UnknownSample {
 impl Sample {
     /// The sample with this name.
     pub fn named(name: &str) -> Result<Sample, UnknownSample> {
-        SAMPLES.into_iter().find(|sample| sample.name == name).ok_or_else(|| UnknownSample { name: name.into() })
+        SAMPLES
+            .into_iter()
+            .find(|sample| sample.name == name)
+            .ok_or_else(|| UnknownSample { name: name.into() })
     }
 
     /// Draws it, which takes a fraction of a second.

@@ -209,9 +209,7 @@ impl Colour {
         }
         // Sums of linear light, 16 bits a channel: exact enough for 8-bit sRGB to come back as it was.
         let linear: Vec<u32> = (0..=255u8)
-            .map(|v| {
-                (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32
-            })
+            .map(|v| (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32)
             .collect();
         let coded: Vec<u8> = (0..=65535)
             .map(|light| {
@@ -382,9 +380,8 @@ impl Lattice {
         let darkest = black.or(darkest).unwrap_or(0);
         let paper = printable.curves.row(bare).to_vec();
         let black = printable.curves.row(darkest).to_vec();
-        let light = std::array::from_fn(|i| {
-            f64::from(appearance::srgb::decode(i as f32 / (NODES - 1) as f32))
-        });
+        let light =
+            std::array::from_fn(|i| f64::from(appearance::srgb::decode(i as f32 / (NODES - 1) as f32)));
         Lattice { space, paper, black, light }
     }
 }

@@ -82,7 +82,9 @@ impl Files {
                 _ => return,
             };
             self.by_role.retain(|(_, name)| *name != drop);
-            source.note(format!("{drop}: not read, because the same normals are there in the other convention"));
+            source.note(format!(
+                "{drop}: not read, because the same normals are there in the other convention"
+            ));
         }
     }
 

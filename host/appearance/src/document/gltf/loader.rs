@@ -126,9 +126,10 @@ impl<'a> Loader<'a, '_> {
             None => match &self.blob {
                 Some(blob) if number == 0 => blob,
                 _ => {
-                    return Err(
-                        self.wrong(field, format!("buffer {number} has no uri, and the file has no data chunk"))
-                    );
+                    return Err(self.wrong(
+                        field,
+                        format!("buffer {number} has no uri, and the file has no data chunk"),
+                    ));
                 }
             },
         };
@@ -162,10 +163,8 @@ impl<'a> Loader<'a, '_> {
         let within =
             Path::new(&*file).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         if !within || file.contains([':', '\\', '\0']) || file.is_empty() {
-            return Err(self.wrong(
-                field,
-                format!("{label}: `{uri}` must be a file in the document's folder or below"),
-            ));
+            return Err(self
+                .wrong(field, format!("{label}: `{uri}` must be a file in the document's folder or below")));
         }
         let path = self.path.parent().unwrap_or(Path::new("")).join(&*file);
         let bytes = self.source.read(&path, MOST_BYTES)?;
