@@ -7,25 +7,27 @@
 )]
 
 pub mod albedo;
-pub mod curve;
-pub mod format;
+mod curve;
+mod format;
 pub mod ggx;
 pub mod gloss;
-pub mod lab;
-pub mod library;
-pub mod lobes;
+mod lab;
+mod library;
+mod lobes;
 pub mod model;
-pub mod problem;
+mod open;
+mod problem;
 pub mod provenance;
 mod read;
-pub mod rule;
+mod rule;
 pub mod set;
-pub mod stack;
+mod stack;
 
 pub use curve::{Curve, CurveError};
 pub use format::{Caution, FILE_NAME};
-pub use library::{Cartridge, Entry, Library, LibraryError};
+pub use library::{Cartridge, Entry, Library};
 pub use lobes::{Lobe, Lobes};
+pub use open::LibraryError;
 pub use problem::Problem;
 pub use provenance::{Provenance, Source};
 pub use rule::{Certainty, Rule, Severity};

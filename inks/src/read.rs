@@ -31,11 +31,11 @@ const CALIBRATION: f64 = 1.05;
 
 type Found = (Option<Library>, Vec<Problem>);
 
-/// Reads `folder/library.toml`.
-pub(crate) fn folder(folder: &Path) -> Found {
+/// Reads `folder/library.toml`, which may be based on the built-in library.
+pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
     let file = folder.join(FILE_NAME);
     match text(&file, MOST_BYTES) {
-        Ok(text) => parse(&text, &file, Some(folder)),
+        Ok(text) => parse(&text, &file, Some((folder, built_in))),
         Err(problem) => {
             let problem =
                 Problem { file, line: None, field: String::new(), severity: Severity::Error, text: problem };
@@ -62,8 +62,9 @@ struct Listing {
     measured: Option<(Curve, Provenance)>,
 }
 
-/// Reads the text of a library. `folder` holds its curves; without a folder there can be none.
-pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
+/// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
+/// text itself has no folder.
+pub(crate) fn parse(text: &str, file: &Path, folder: Option<(&Path, fn() -> Library)>) -> Found {
     let mut findings = Findings { text, file: file.to_path_buf(), found: Vec::new() };
     let parsed = match toml::from_str::<File>(text) {
         Ok(parsed) => parsed,
@@ -77,16 +78,16 @@ pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
         findings.error(Some(parsed.format.span().start), "format", problem);
         return (None, findings.found);
     }
-    let base = match &parsed.based_on {
-        None => None,
-        Some(name) if folder.is_some() && name.get_ref() == "built-in" => Some(Library::builtin()),
-        Some(name) => {
+    let base = match (&parsed.based_on, folder) {
+        (None, _) => None,
+        (Some(name), Some((_, built_in))) if name.get_ref() == "built-in" => Some(built_in()),
+        (Some(name), _) => {
             let problem = format!("`{}`: expected `built-in`, or no `based_on` at all", name.get_ref());
             findings.error(Some(name.span().start), "based_on", problem);
             return (None, findings.found);
         }
     };
-    let library = build(parsed, base, folder, &mut findings);
+    let library = build(parsed, base, folder.map(|(folder, _)| folder), &mut findings);
     let usable = library.filter(|_| !findings.fatal());
     (usable, findings.found)
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use inks::curve::CurveError;
+use inks::CurveError;
 
 use crate::sample::UnknownSample;
 use crate::weights::WeightError;

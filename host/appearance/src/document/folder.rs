@@ -167,7 +167,7 @@ pub(super) fn open(
     })
 }
 
-/// How the colours are read, and how to change that where nobody has chosen.
+/// A note on how the colours are read, and how to change that if it is a default.
 fn encoding_words(space: ColourSpace, chosen: bool) -> String {
     match (chosen, space) {
         (true, ColourSpace::Srgb) => "read as sRGB, as requested".into(),

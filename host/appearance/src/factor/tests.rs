@@ -363,7 +363,7 @@ fn a_stronger_penalty_gives_purer_pixels() {
     assert!(sparse > plain, "{plain} {sparse}");
 }
 
-/// A tabulation that is no half-angle curve: five directions of unequal worth, one of which nobody sees.
+/// A tabulation other than half-angle curves: five directions with unequal weights, one of them zero.
 #[test]
 fn any_linear_tabulation_goes_through() {
     let space = Space::tabulated(&[1.0, 0.9, 0.5, 0.2, 0.0], &[0.3, 0.1, 0.0, 0.2, 0.4]).unwrap();

@@ -67,7 +67,7 @@ struct Packed {
     position: f32,
 }
 
-/// A surface for every pixel. See the module text.
+/// A surface for every pixel. See the module documentation.
 #[derive(Clone, Debug)]
 pub struct Surfaces {
     width: usize,
