@@ -51,6 +51,7 @@ impl DocumentArgs {
                     self.document
                 )));
             }
+            Err(error @ document::DocumentError::Choice { .. }) => bail!("{error} (--material)"),
             Err(error) => return Err(error.into()),
         };
         // A name may come from anybody's file, and is shown on the terminal.
