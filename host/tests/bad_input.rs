@@ -344,7 +344,7 @@ fn notes_are_said_once() {
     small_document(&bench.path("tile"));
     let output = bench.run(&format!("print tile {SMALL} -q"));
     let said = text(&output.stderr);
-    assert_eq!(said.matches("taken as sRGB").count(), 1, "{said}");
+    assert_eq!(said.matches("read as sRGB").count(), 1, "{said}");
     let mut lines: Vec<&str> = said.lines().collect();
     lines.sort_unstable();
     lines.dedup();

@@ -48,6 +48,7 @@ impl DocumentArgs {
                     self.document
                 )));
             }
+            Err(error @ document::DocumentError::Choice { .. }) => bail!("{error} (--material)"),
             Err(error) => return Err(error.into()),
         };
         // The name may come from a file of unknown origin, and it is shown on the terminal.

@@ -90,7 +90,7 @@ impl Map {
     /// Bases → mixtures of stacks.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let (set, library) = self.inks.at_hand()?;
-        let read = foil::read_watched(&self.factored, observer)?;
+        let read = foil::read(&self.factored, observer)?;
         let (factored, _) = stages::factored(&read, &Default::default(), observer)?;
         let document = self
             .document

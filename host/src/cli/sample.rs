@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 
 use super::output::{Kind, Staged};
+use appearance::document;
 use appearance::sample::{SAMPLES, Sample};
 
 /// The samples, or one of them as a folder of texture maps.
@@ -37,7 +38,7 @@ pub fn run(args: Args) -> Result<()> {
     let sample = Sample::named(&args.name)?;
     let target = args.output.unwrap_or_else(|| PathBuf::from(sample.name));
     let staged = Staged::folder(&target, Kind::Maps)?;
-    sample.draw().write(sample.name, staged.create()?)?;
+    document::write_sample(&sample, staged.create()?)?;
     staged.commit()?;
     writeln!(out, "{}", target.display())?;
     Ok(())

@@ -127,7 +127,7 @@ mod tests {
             let entry = library.entry(&stack.parse().unwrap()).unwrap();
             entry.curve_at(&[1.2]).rgb()[0]
         };
-        let light = |v: u8| f64::from(appearance::document::picture::decode_srgb(f32::from(v) / 255.0));
+        let light = |v: u8| f64::from(appearance::srgb::decode(f32::from(v) / 255.0));
         for clear in ["F", "P"] {
             let (film, bare) = (beneath(clear), beneath("substrate"));
             let shown = upon(&clear.parse().unwrap(), [255; 3]);

@@ -1,29 +1,30 @@
 //! The distinct materials of a document.
 //!
-//! Problem: textures repeat themselves, bit for bit, in a third to nine tenths of their pixels; what is computed
+//! Problem: in textures a third to nine tenths of the pixels repeat an earlier one bit for bit, and what has been computed
 //! for a material need not be computed again.
-//! Method: pixels are told apart by a hash of their reflectance, numbered in reading order, and compared whole
-//! with the first of their number, so that a collision costs time and nothing else.
-//! Cost: two evaluations and a hash a pixel, on all cores; 12 bytes a pixel. Limits: equal means equal to the last bit.
+//! Method: pixels are grouped by a hash of their reflectance and numbered in reading order. Each pixel is then compared
+//! in full with the first pixel of its group; one that differs (a hash collision) becomes a material of its own, so a
+//! collision costs time and nothing else.
+//! Cost: two evaluations and one hash per pixel, on all cores; 12 bytes per pixel. Limits: equal means bit for bit.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::Materials;
+use super::pixels::Materials;
 
-/// Pixels of a parallel task.
+/// Pixels per parallel task.
 const RUN: usize = 4096;
 
-/// Which pixels have the same material. See the module text.
+/// Which pixels have the same material. See the module documentation.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Distinct {
+pub(crate) struct Distinct {
     class: Vec<u32>,
     first: Vec<u32>,
 }
 
 impl Distinct {
-    /// Finds the distinct materials; the document must have fewer than 2^32 pixels.
+    /// Finds the distinct materials. The document must have fewer than 2^32 pixels.
     pub fn of(materials: &dyn Materials) -> Distinct {
         let (pixels, columns) = (materials.width() * materials.height(), materials.space().columns());
         let mut hashes = vec![0u64; pixels];
@@ -46,13 +47,13 @@ impl Distinct {
                 })
             })
             .collect();
-        let strangers: Vec<Vec<u32>> = class
+        let colliding: Vec<Vec<u32>> = class
             .par_chunks(RUN)
             .enumerate()
             .map(|(run, class)| {
                 let (mut row, mut same) = (vec![0.0; columns], vec![0.0; columns]);
                 let mut held = None;
-                let mut strangers = Vec::new();
+                let mut colliding = Vec::new();
                 for (i, &class) in class.iter().enumerate() {
                     let pixel = run * RUN + i;
                     let model = first[class as usize];
@@ -65,13 +66,13 @@ impl Distinct {
                     }
                     materials.reflectance(pixel, &mut row);
                     if bits(&row).ne(bits(&same)) {
-                        strangers.push(pixel as u32);
+                        colliding.push(pixel as u32);
                     }
                 }
-                strangers
+                colliding
             })
             .collect();
-        for pixel in strangers.into_iter().flatten() {
+        for pixel in colliding.into_iter().flatten() {
             class[pixel as usize] = first.len() as u32;
             first.push(pixel);
         }
@@ -83,12 +84,13 @@ impl Distinct {
         &self.first
     }
 
-    /// For every pixel the number of its material in [`Distinct::first`].
+    /// For every pixel, the index of its material in [`Distinct::first`].
+    #[cfg(test)]
     pub fn class(&self) -> &[u32] {
         &self.class
     }
 
-    /// Values of the materials, `each` at a time, as values of the pixels.
+    /// Copies the values of the materials, `each` per material, to their pixels.
     pub fn spread<T: Copy + Default + Send + Sync>(&self, values: &[T], each: usize) -> Vec<T> {
         let mut out = vec![T::default(); self.class.len() * each];
         out.par_chunks_mut(RUN * each).zip(self.class.par_chunks(RUN)).for_each(|(out, class)| {
@@ -117,7 +119,7 @@ mod tests {
     use crate::brdf::Space;
     use proptest::prelude::*;
 
-    /// Pixels named by small numbers; equal numbers are equal materials.
+    /// Pixels that are small numbers; equal numbers are equal materials.
     struct Named(Vec<u8>, Space);
 
     impl Materials for Named {
