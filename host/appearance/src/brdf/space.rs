@@ -112,6 +112,12 @@ impl Space {
         self.angles.iter().flat_map(|&theta| curve.at(theta)).collect()
     }
 
+    /// A row of a half-angle space as a curve.
+    pub fn curve(&self, row: &[f64]) -> Curve {
+        let mut samples = row.chunks_exact(3);
+        Curve::sampled(&self.angles, |_| samples.next().map_or([0.0; 3], |v| [v[0], v[1], v[2]]))
+    }
+
     /// Distance between two rows of reflectance in 1/sr (0.01: barely visible; 0.05: obvious).
     pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut sum = 0.0;

@@ -14,7 +14,7 @@ use crate::sheet::files::{PaperText, check_format};
 use crate::sheet::picture::{Kind, read_png, write_png};
 
 /// The text beside the pictures.
-const TEXT: &str = "passes.toml";
+pub(super) const TEXT: &str = "passes.toml";
 
 /// Number of the format, raised when old files can no longer be read.
 const FORMAT: u32 = 1;
