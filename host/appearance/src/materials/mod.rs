@@ -2,7 +2,7 @@
 //!
 //! [`Materials`] is all that factoring and gamut mapping know of a document. It is implemented by a surface for every
 //! pixel ([`Surfaces`]), by bases and weight maps ([`Factored`]) and by one material everywhere ([`Uniform`]).
-//! [`Distinct`] finds the pixels that are equal, so that each material is computed once.
+//! `Distinct` finds the pixels that are equal, so that each material is computed once.
 
 mod distinct;
 mod factored;
