@@ -63,17 +63,18 @@ mod tests {
     use appearance::factor::FactorError;
     use appearance::gamut::files::MixFileError;
     use appearance::gamut::{GamutError, MixError};
-    use appearance::solve::hull::MixtureError;
+    use appearance::solve::MixtureError;
     use appearance::weights::WeightError;
     use device::flash::drive::DriveError;
     use device::flash::image::ImageError;
     use device::flash::picoboot::WriteError;
     use device::send::Unsendable;
-    use inks::curve::CurveError;
+    use inks::CurveError;
+    use press::files::FileError;
     use press::inspect::StreamError;
     use press::layers::LayersError;
-    use press::pipeline::PrintError;
-    use press::sheet::FileError;
+    use press::pipeline::{JobError, document};
+
     use press::simulate::{CarouselError, SimulateError};
 
     use super::*;
@@ -134,8 +135,8 @@ mod tests {
             ),
             (Box::new(layers()), fire()),
             (Box::new(LayersError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
-            (Box::new(PrintError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
-            (Box::new(PrintError::Simulate(SimulateError::Carousel(carousel()))), carousel().to_string()),
+            (Box::new(document::DocumentError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
+            (Box::new(JobError::Simulate(SimulateError::Carousel(carousel()))), carousel().to_string()),
             (Box::new(FileError::Io { path: path(), source: disk() }), fire()),
             (Box::new(png()), fire()),
             (Box::new(press::job::stream::StreamError::Output(disk())), fire()),
