@@ -73,7 +73,7 @@ mod tests {
     use press::inspect::StreamError;
     use press::layers::LayersError;
     use press::pipeline::PrintError;
-    use press::sheet::FileError;
+    use press::files::FileError;
     use press::simulate::{CarouselError, SimulateError};
 
     use super::*;
