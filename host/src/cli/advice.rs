@@ -3,7 +3,7 @@
 use press::chart::ChartError;
 use press::layout::{LayoutError, SizeError};
 use press::pipeline::JobError;
-use press::pipeline::document::DocumentError;
+use press::pipeline::document::StageError;
 
 /// Which options to try, if this error is one of those that options help against.
 pub fn of(error: &anyhow::Error) -> Option<&'static str> {
@@ -14,12 +14,12 @@ pub fn of(error: &anyhow::Error) -> Option<&'static str> {
             _ => None,
         });
         let layout = layout.or_else(|| match cause.downcast_ref()? {
-            DocumentError::Layout(error) => Some(error),
+            StageError::Layout(error) => Some(error),
             _ => None,
         });
         let size = cause.downcast_ref::<SizeError>();
         let size = size.or_else(|| match cause.downcast_ref()? {
-            DocumentError::Size(error) => Some(error),
+            StageError::Size(error) => Some(error),
             _ => None,
         });
         match (layout, size, cause.downcast_ref()) {

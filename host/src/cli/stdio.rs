@@ -73,8 +73,8 @@ mod tests {
     use press::files::FileError;
     use press::inspect::StreamError;
     use press::layers::LayersError;
-    use press::pipeline::{JobError, document};
-
+    use press::pipeline::JobError;
+    use press::pipeline::document::StageError;
     use press::simulate::{CarouselError, SimulateError};
 
     use super::*;
@@ -135,7 +135,7 @@ mod tests {
             ),
             (Box::new(layers()), fire()),
             (Box::new(LayersError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
-            (Box::new(document::DocumentError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
+            (Box::new(StageError::Gamut(mixture())), MixtureError::NoStacks.to_string()),
             (Box::new(JobError::Simulate(SimulateError::Carousel(carousel()))), carousel().to_string()),
             (Box::new(FileError::Io { path: path(), source: disk() }), fire()),
             (Box::new(png()), fire()),
@@ -155,6 +155,13 @@ mod tests {
             (Box::new(FilterError::NoGhostscript(disk())), fire()),
             (Box::new(FilterError::Plates(layers())), fire()),
             (Box::new(FilterError::Layers { page: 3, source: layers() }), fire()),
+            (
+                Box::new(FilterError::Job {
+                    page: 3,
+                    source: press::job::stream::StreamError::Output(disk()).into(),
+                }),
+                fire(),
+            ),
             (Box::new(FilterError::Raster(RasterError::Io(disk()))), fire()),
         ]
     }

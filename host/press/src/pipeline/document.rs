@@ -40,7 +40,7 @@ pub struct Halftoned {
 
 /// Why a document does not become dots: the error of the stage that refused.
 #[derive(Debug, thiserror::Error)]
-pub enum DocumentError {
+pub enum StageError {
     /// Its size on paper.
     #[error(transparent)]
     Size(#[from] SizeError),
@@ -68,7 +68,7 @@ pub fn halftoned(
     settings: &Settings,
     layout: &Layout,
     observer: &dyn Observer,
-) -> Result<Halftoned, DocumentError> {
+) -> Result<Halftoned, StageError> {
     let materials = document.materials();
     let pixels = (materials.width(), materials.height());
     let (width, height) = size::dots(pixels, document.size_mm, settings.size, layout)?;
