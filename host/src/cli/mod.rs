@@ -4,6 +4,7 @@
 //! 1 failed, 2 wrong usage, 130 interrupted. Results go to standard output, everything else to standard error; a
 //! closed pipe is success.
 
+mod advice;
 mod args;
 mod bridge;
 mod chain;
