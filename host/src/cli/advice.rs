@@ -10,7 +10,7 @@ use super::choice::Choice;
 pub fn options_of(remedy: &Remedy, allowed: &InkSet) -> String {
     match remedy {
         Remedy::Accept(accept) => {
-            let name = Accept::ALL.iter().find(|(known, ..)| known == accept).map_or("", |(_, name, _)| name);
+            let name = Accept::ALL.iter().find(|(known, ..)| known == accept).map_or("", |(_, name, _)| *name);
             format!("--accept {name}")
         }
         Remedy::Media(media) => format!("--media {}", media.name()),
