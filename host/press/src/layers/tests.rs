@@ -8,6 +8,7 @@ use observe::Silent;
 use proptest::prelude::*;
 use protocol::ink::Ink;
 use tempfile::TempDir;
+use testing::needs::{self, Need};
 
 struct Bench(TempDir);
 
@@ -474,13 +475,11 @@ showpage
 ";
 
 fn ghostscript() -> bool {
-    let there = std::process::Command::new("gs").arg("--version").output().is_ok();
-    let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
-    assert!(there || !required, "there is no Ghostscript here; `cargo xtask test` installs it");
-    if !there {
-        println!("skipped: there is no Ghostscript here");
+    let found = needs::starts("gs");
+    if !found {
+        Need::Queue.skip("Ghostscript is not installed; `cargo xtask queue` installs it");
     }
-    there
+    found
 }
 
 #[test]

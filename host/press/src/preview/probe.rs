@@ -330,12 +330,9 @@ mod tests {
 
     #[test]
     fn real_panoramas_open() {
-        let Ok(data) = std::env::var("FOILPRESS_DATA") else {
-            println!("skipped: FOILPRESS_DATA is not set");
-            return;
-        };
+        let Some(data) = testing::needs::data() else { return };
         for name in ["studio.hdr", "venice.hdr"] {
-            let probe = Probe::read_hdr(&Path::new(&data).join("env").join(name)).unwrap();
+            let probe = Probe::read_hdr(&data.join("env").join(name)).unwrap();
             assert_eq!((probe.width(), probe.height()), (1024, 512));
             let small = probe.shrunk(128);
             assert_eq!((small.width(), small.height()), (256, 128));
