@@ -8,26 +8,25 @@ mod test;
 mod watch;
 
 pub use list::ask;
-pub use reset::before_sending;
 
 use std::io::{self, Write as _};
 use std::time::Duration;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, anyhow};
 use clap::{Args as ClapArgs, Subcommand};
 use protocol::link::message::{Ask, Fault, JobState, Lines, Progress};
 use serde_json::json;
 
+use device::deliver::Failure;
 use device::flash::FlashError;
 use device::flash::image::Firmware;
 use device::send::find;
-use device::send::journal::JournalError;
 use device::send::query::{Query, Reply, is_alps};
 use device::send::session::Bridge;
 use device::send::status::Status;
 use device::send::transport::Transport;
 use device::send::usb::UDEV_RULES;
-use device::send::{Address, OpenError, RunError, words};
+use device::send::{Address, OpenError, words};
 use observe::Observer;
 
 /// How long to wait for a bridge to answer.
@@ -95,7 +94,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 
 /// The only bridge there is.
 pub(super) fn only() -> Result<Address> {
-    let bridge = find::only()?;
+    let bridge =
+        find::only().map_err(|error| anyhow!("{error}; name one with --to, or see `foilpress doctor`"))?;
     let (address, _) = bridge.open()?;
     Ok(address.clone())
 }
@@ -106,7 +106,7 @@ pub fn is_forbidden(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref().is_some_and(refused)
             || match cause.downcast_ref() {
-                Some(RunError::<JournalError>::Open(open)) => refused(open),
+                Some(Failure::Open(open)) => refused(open),
                 _ => false,
             }
             || match cause.downcast_ref() {
@@ -135,23 +135,6 @@ pub fn permission() -> String {
          sudo tee /etc/udev/rules.d/70-foilpress.rules <<'END'\n{rules}END\n\
          sudo udevadm control --reload && sudo udevadm trigger\n"
     )
-}
-
-/// Makes sure that a bridge is there and that the printer behind it is one of ALPS, as far as it says what it is; with
-/// `force` that is only said. So a mistyped address or a missing permission leaves no job behind that waits.
-pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> Result<()> {
-    let mut link = address.open().context("not sent")?;
-    let mut query = Query::new(&mut *link, PATIENCE).context("not sent")?;
-    match query.device_id(PATIENCE, PRINTER_PATIENCE) {
-        Some(id) if !is_alps(&id) && force => {
-            observer.note(&format!("the printer says it is no ALPS: {id}"));
-            Ok(())
-        }
-        Some(id) if !is_alps(&id) => {
-            bail!("not sent: the printer says it is no ALPS: {id}; to go on all the same: --force")
-        }
-        _ => Ok(()),
-    }
 }
 
 /// What a bridge does, in words.

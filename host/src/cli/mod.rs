@@ -27,6 +27,7 @@ mod queue;
 mod resume;
 mod sample;
 mod send;
+mod terminal;
 
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
@@ -36,11 +37,10 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 
+use device::deliver::Failure;
 use device::flash::FlashError;
-use device::send::journal::JournalError;
+use device::send::OpenError;
 use device::send::query::QueryError;
-use device::send::raw::RawError;
-use device::send::{OpenError, RunError};
 use progress::Progress;
 
 /// The largest stream that is read: several times a page of noise in seven passes.
@@ -224,11 +224,10 @@ fn read_job(path: &Path) -> Result<Vec<u8>> {
 /// away is something else.
 fn closed_pipe(error: &anyhow::Error) -> bool {
     let device = error.chain().any(|cause| {
-        cause.is::<RawError>()
+        cause.is::<Failure>()
             || cause.is::<QueryError>()
             || cause.is::<OpenError>()
             || cause.is::<FlashError>()
-            || cause.is::<RunError<JournalError>>()
     });
     !device
         && error.chain().any(|cause| {

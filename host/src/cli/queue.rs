@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command as Process, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
@@ -15,6 +15,7 @@ use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
 use crate::queue::options::{self, Choices};
 use crate::queue::{backend, filter, listing, ppd, uri};
+use device::printers::{self, Printers};
 use observe::Observer;
 use press::layout::Profile;
 
@@ -146,6 +147,8 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             observer.note(&format!("wrote {}", file.path.display()));
         }
     }
+    // Queue and users must know the same of a printer that needs a reset.
+    printers::make_shared_folder().with_context(as_root)?;
     // A queue's own description knows its machine.
     let mut description = tempfile::NamedTempFile::new().context("cannot write the printer description")?;
     description
@@ -252,10 +255,14 @@ pub fn backend(args: &Conventional) -> ExitCode {
     if let Err(error) = ctrlc::set_handler(|| STOP.store(true, Ordering::SeqCst)) {
         messages.debug(&format!("cannot listen to signals: {error}"));
     }
-    let exit = match Call::read(&args.arguments, &|name| std::env::var_os(name)) {
-        Ok(call) => backend::run(&call, &mut io::stdin().lock(), &messages, &|| STOP.load(Ordering::SeqCst)),
+    let call = Call::read(&args.arguments, &|name| std::env::var_os(name)).map_err(Error::from);
+    let exit = match call.and_then(|call| Ok((call, Printers::of_system()?))) {
+        Ok((call, printers)) => {
+            let stop = || STOP.load(Ordering::SeqCst);
+            backend::run(&call, &printers, &mut io::stdin().lock(), &messages, &stop)
+        }
         Err(error) => {
-            messages.error(&error.to_string());
+            messages.error(&super::chain(&error));
             Exit::Stop
         }
     };

@@ -32,7 +32,7 @@ pub enum Sheet {
     /// The printer says it has nothing to print any more.
     Out,
     /// Nothing can be known, for this reason.
-    Unknown(&'static str),
+    Unknown(String),
 }
 
 /// Why the printer could not be asked. The job is printed as far as the bridge can tell.
@@ -44,6 +44,10 @@ pub enum FinishError {
     /// The bridge did not answer.
     #[error(transparent)]
     Query(#[from] QueryError),
+}
+
+fn unknown(why: &str) -> Sheet {
+    Sheet::Unknown(why.into())
 }
 
 /// Waits, without limit, until the printer says that it is done, asking every `every`. `watch` is told what is the
@@ -59,10 +63,10 @@ pub fn await_sheet(
     let (mut idle, mut unanswered, mut most) = (0, 0, NEVER);
     loop {
         let (now, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
-            Reply::OneWay => return Ok(Sheet::Unknown("the printer's port does not talk back")),
-            Reply::NotNow => return Ok(Sheet::Unknown("the bridge has another job by now")),
+            Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
+            Reply::NotNow => return Ok(unknown("the bridge already has another job")),
             Reply::Stopped(Fault::PowerOff) => {
-                return Ok(Sheet::Unknown("the printer is switched off or its cable is loose"));
+                return Ok(unknown("the printer is switched off or its cable is loose"));
             }
             Reply::Stopped(Fault::BusyTooLong) | Reply::Silent => (None, Vec::new()),
             Reply::Stopped(fault) => (None, vec![super::words::fault(fault, None)]),
@@ -87,7 +91,7 @@ pub fn await_sheet(
             return Ok(Sheet::Out);
         }
         if unanswered == most {
-            return Ok(Sheet::Unknown("the printer does not answer"));
+            return Ok(unknown("the printer does not answer"));
         }
         sleep(every);
     }

@@ -299,7 +299,7 @@ mod tests {
         let mut plain = job.clone();
         plain.splice(from..from + 8, data.iter().copied());
         plain[at + 3] = 0;
-        assert!(super::super::check(&plain, &Silent).is_ok(), "legal all the same");
+        assert!(crate::send::check(&plain, &Silent).is_ok(), "legal all the same");
         assert_eq!(of_job(&plain, &Silent), None);
         assert_eq!(of_job(b"text", &Silent), None);
         assert_eq!(of_job(b"", &Silent), None);
@@ -315,7 +315,7 @@ mod tests {
         put(writer.next_pass(&mut out).unwrap(), &out);
         put(writer.row(&[1, 2, 3], &mut out).unwrap(), &out);
         put(writer.end(&mut out).unwrap(), &out);
-        assert!(super::super::check(&job, &Silent).is_ok());
+        assert!(crate::send::check(&job, &Silent).is_ok());
         assert_eq!(of_job(&job, &Silent), None);
     }
 

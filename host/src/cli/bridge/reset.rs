@@ -1,19 +1,16 @@
-//! `foilpress bridge reset`, and the look whether a printer still waits for the rest of a sheet that was lost.
+//! `foilpress bridge reset`: a printer that may hold part of a job is made ready for the next one.
 //!
-//! Half a job followed by another is text to the printer. A bridge that knows of the half resets the printer by itself. One
-//! that has lost its memory does not; then nothing is sent until the printer has been reset: by the bridge, which pulls
-//! the port's nInit line, or by its own switch.
+//! The bridge pulls the port's nInit line; or the user has used the printer's own switch. That the printer was reset is noted
+//! for every user and queue of this computer ([`device::printers`]).
 
-use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
-
-use anyhow::{Result, bail};
+use anyhow::Result;
 use clap::Args as ClapArgs;
 
 use super::PATIENCE;
+use device::deliver;
+use device::printers::Printers;
 use device::send::Address;
-use device::send::journal::{Entry, Journal};
 use device::send::query::Query;
-use observe::Observer;
 
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]
@@ -21,74 +18,28 @@ use observe::Observer;
     foilpress bridge reset                        (the only bridge there is)\n  \
     foilpress bridge reset --to serial:/dev/ttyACM0\n  \
     foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
-    A bridge that has lost its memory in the middle of a sheet does not do this by itself. Refused while it prints. What a printer does with a sheet it holds is not known for certain: if it does not \
-    come out, switch the printer off and on.")]
+    A bridge that has lost its memory in the middle of a sheet cannot do this by itself. The reset is refused while a job is open. \
+    If a sheet is in the printer and does not come out, switch the printer off and on.")]
 pub struct Args {
     /// Where the bridge is [default: the only one there is]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// Only note that the printer has been switched off and on
+    /// Only note that every printer has been switched off and on
     #[arg(long, conflicts_with = "to")]
     by_hand: bool,
 }
 
 /// Runs `bridge reset`.
 pub fn run(args: &Args) -> Result<()> {
-    let journal = Journal::of_user()?;
+    let printers = Printers::of_system()?;
     if args.by_hand {
-        return Ok(journal.settle(None)?);
+        return Ok(printers.reset(None)?);
     }
     let address = match &args.to {
         Some(address) => address.clone(),
         None => super::only()?,
     };
     let mut link = address.open()?;
-    reset(&mut Query::new(&mut *link, PATIENCE)?, &journal)?;
+    deliver::reset(&mut Query::new(&mut *link, PATIENCE)?, &printers)?;
     crate::cli::show("the printer has been reset; if a sheet is still in it, take it out\n")
-}
-
-fn reset(query: &mut Query<'_>, journal: &Journal) -> Result<()> {
-    query.initialise(PATIENCE)?;
-    Ok(journal.settle(Some(query.bridge().serial))?)
-}
-
-/// Makes sure that the printer at `address` does not wait for the rest of a lost job: resets it if the user agrees, and
-/// fails if it may still wait.
-pub fn before_sending(journal: &Journal, address: &Address, observer: &dyn Observer) -> Result<()> {
-    let lost: Vec<Entry> = journal.entries()?.into_iter().filter(Entry::left_open).collect();
-    if lost.is_empty() {
-        return Ok(());
-    }
-    let mut link = address.open()?;
-    let mut query = Query::new(&mut *link, PATIENCE)?;
-    let serial = query.bridge().serial;
-    let Some(entry) =
-        lost.iter().rev().find(|entry| entry.record.bridge.is_none_or(|bridge| bridge == serial))
-    else {
-        return Ok(());
-    };
-    let (name, job) = (&entry.name, entry.record.job);
-    let why = format!(
-        "what became of {name} (job {job:08x}) is not known, and the printer may still wait for the rest of it"
-    );
-    if !agreed(&format!("{why}. Reset the printer through the bridge now?"))? {
-        bail!(
-            "not sent: {why}, so that anything else would be printed as text. `foilpress bridge reset --to {address}` \
-             resets it through the bridge; if you have switched it off and on: `foilpress bridge reset --by-hand`"
-        );
-    }
-    reset(&mut query, journal)?;
-    observer.note("the printer has been reset");
-    Ok(())
-}
-
-/// Asks a person; where there is none the answer is no.
-fn agreed(question: &str) -> Result<bool> {
-    if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
-        return Ok(false);
-    }
-    write!(io::stderr(), "{question} [y/N] ")?;
-    let mut answer = String::new();
-    io::stdin().lock().read_line(&mut answer)?;
-    Ok(matches!(answer.trim(), "y" | "Y" | "yes"))
 }
