@@ -28,7 +28,7 @@ pub struct Missing {
 }
 
 /// Looks for the cartridges of these inks in the printer's answer.
-pub fn find(status: &Status, wanted: &[Ink]) -> Found {
+pub(crate) fn find(status: &Status, wanted: &[Ink]) -> Found {
     if status.stale {
         return Found::Stale;
     }

@@ -16,7 +16,7 @@ use super::status::Status;
 use super::transport::Transport;
 
 /// Between two questions: the vendor's monitor asks every four seconds.
-pub const EVERY: Duration = Duration::from_secs(4);
+pub(crate) const EVERY: Duration = Duration::from_secs(4);
 /// How long the bridge may take to answer for itself.
 const BRIDGE_PATIENCE: Duration = Duration::from_secs(5);
 /// How long it may take to put a question to the printer, and to get the answer.
@@ -37,7 +37,7 @@ pub enum Sheet {
 
 /// Why the printer could not be asked. The job is printed as far as the bridge can tell.
 #[derive(Debug, thiserror::Error)]
-pub enum FinishError {
+pub(crate) enum FinishError {
     /// The link could not be opened again.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -52,7 +52,7 @@ fn unknown(why: &str) -> Sheet {
 
 /// Waits, without limit, until the printer says that it is done, asking every `every`. `watch` is told what is the
 /// matter with the printer, once for each change; nothing when all is well again.
-pub fn await_sheet(
+pub(crate) fn await_sheet(
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
     every: Duration,
     watch: &mut dyn FnMut(&[String]),
