@@ -1,19 +1,34 @@
-//! The bridge: what stands between a USB link and the printer's IEEE 1284 port.
+//! The bridge between a USB link and the printer's IEEE 1284 port.
 //!
-//! This library is everything of it that has logic and nothing of it that has a board: the [`port`] talks to
-//! pins through `embedded-hal`, the [`engine`] is a state machine without input or output. `no_std`, no
-//! allocation, no `unsafe`; it runs in tests on a workstation exactly as it runs on a microcontroller.
+//! Every decision of the bridge is made in this library, and tested here without a board, in virtual time:
+//!
+//! | module | decides |
+//! |---|---|
+//! | [`engine`] | what becomes of messages and data: printer bytes, answers, the end of a job |
+//! | [`turn`] | how long the engine works before others may run |
+//! | [`driver`] | who may use the port and when; questions to the printer; faults; what is logged |
+//! | [`port`] | levels and times of the port's lines, both directions |
+//! | [`links`] | which of two ways to the host is answered |
+//! | [`printer_class`] | the ordinary printer that operating systems see |
+//! | [`lamp`] | what the lamp shows |
+//!
+//! A board adds pins, a [sender](driver::Sender), a clock, packets, memory that survives a reset, and the calls between these.
+//! `bridge/firmware` is one. `no_std`, no allocation, no `unsafe`. A conversion with `as` loses no bits, or the place says why.
 #![no_std]
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), warn(clippy::cast_possible_truncation))]
 
 #[cfg(any(test, feature = "simulation"))]
 extern crate std;
 
+pub mod driver;
 pub mod engine;
-pub mod pinned;
+pub mod lamp;
+pub mod links;
 pub mod port;
+pub mod printer_class;
 mod ring;
 #[cfg(any(test, feature = "simulation"))]
 pub mod simulation;
 mod streams;
-mod track;
+pub mod turn;

@@ -1,6 +1,11 @@
-//! A queue of bytes in memory that was given.
+//! A queue of bytes in borrowed memory.
+//!
+//! Every byte of a job goes through two queues, in portions, and the port reads them where they lie. `heapless`'s `Deque`
+//! takes and gives bytes one by one: on a workstation 1.1 to 1.6 ns a byte against 0.02 to 0.08 here (portions of 64 to
+//! 1024 bytes), on a Cortex-M0+ some 40 clock cycles a byte against 2. Two queues of them would cost a quarter of the 300
+//! cycles in which the printer takes a byte. Hence this module.
 
-/// A ring buffer.
+/// A ring buffer that copies whole portions.
 pub(crate) struct Ring<'m> {
     memory: &'m mut [u8],
     start: usize,
@@ -32,7 +37,7 @@ impl<'m> Ring<'m> {
         (self.start, self.length) = (0, 0);
     }
 
-    /// Appends as many of the bytes as there is room for, and says how many.
+    /// Appends as many of the bytes as there is room for and returns how many.
     pub(crate) fn push(&mut self, bytes: &[u8]) -> usize {
         let count = bytes.len().min(self.free());
         let end = self.start + self.length;
@@ -44,12 +49,12 @@ impl<'m> Ring<'m> {
         count
     }
 
-    /// The oldest bytes, as many as lie side by side.
+    /// The oldest bytes, as many as are contiguous.
     pub(crate) fn front(&self) -> &[u8] {
         self.behind(0)
     }
 
-    /// The bytes behind the oldest `skip`, as many as lie side by side.
+    /// The bytes after the oldest `skip`, as many as are contiguous.
     pub(crate) fn behind(&self, skip: usize) -> &[u8] {
         if skip >= self.length {
             return &[];
@@ -63,7 +68,7 @@ impl<'m> Ring<'m> {
         }
     }
 
-    /// Removes the oldest bytes; no more than there are.
+    /// Removes the oldest bytes, at most all of them.
     pub(crate) fn pop(&mut self, count: usize) {
         let count = count.min(self.length);
         self.start += count;

@@ -1,8 +1,9 @@
-//! A job of pass streams as bytes of the printer's language, a row at a time.
+//! From the pass streams of a job to bytes of the printer's language, a row at a time.
 //!
-//! Nothing is written before the first band is complete, so a job that is cancelled or turns out to be no job by
-//! then has not touched a sheet.
+//! Nothing is written before the first band is complete, so a job that is cancelled or turns out to be invalid before
+//! that has not touched a sheet.
 
+use heapless::Vec;
 use protocol::link::message::DefectKind;
 use protocol::rgl::JobWriter;
 use protocol::rgl::job::ROW_ROOM;
@@ -11,8 +12,8 @@ use protocol::runs::{Decoder, Defect, Header, HeaderError, MAX_HEADER, Step, ban
 /// Room for whatever one slice of work writes: the longest row, 9880 dots.
 pub(crate) const WRITE_ROOM: usize = ROW_ROOM + 1235;
 
-/// Bytes of a stream read in one slice of work: some hundred runs, so that a slice takes well below a
-/// millisecond on a microcontroller.
+/// Bytes of a stream read in one slice of work: some hundred runs, so that a slice takes well under a millisecond on a
+/// microcontroller.
 const SLICE: usize = 64;
 
 /// What a slice of work did.
@@ -30,27 +31,34 @@ enum Stage {
     Header,
     /// Reading a band.
     Read,
-    /// Rows `next..end` of the band are to be written, or so many blank ones.
-    Rows {
-        next: u16,
-        end: u16,
-    },
+    /// Writing rows `next..end` of the band.
+    Rows { next: u16, end: u16 },
+    /// Writing so many blank rows.
     Blank(u16),
     /// The job is complete.
     Ended,
 }
 
+/// What has been written of the job.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Written {
+    Nothing,
+    /// The setup and whole passes.
+    Setup,
+    /// The beginning of the pass under way.
+    Pass,
+}
+
+/// The job under way.
 pub(crate) struct Streams<'m> {
     band: &'m mut [u8],
     decoder: Decoder,
     writer: Option<JobWriter>,
     stage: Stage,
-    begun: bool,
-    in_pass: bool,
+    written: Written,
     stride: usize,
     row: u16,
-    head: [u8; MAX_HEADER],
-    head_length: usize,
+    head: Vec<u8, MAX_HEADER>,
 }
 
 impl<'m> Streams<'m> {
@@ -60,12 +68,10 @@ impl<'m> Streams<'m> {
             decoder: Decoder::new(0, 0),
             writer: None,
             stage: Stage::Header,
-            begun: false,
-            in_pass: false,
+            written: Written::Nothing,
             stride: 0,
             row: 0,
-            head: [0; MAX_HEADER],
-            head_length: 0,
+            head: Vec::new(),
         }
     }
 
@@ -73,7 +79,9 @@ impl<'m> Streams<'m> {
     pub(crate) fn restart(&mut self) {
         self.writer = None;
         self.stage = Stage::Header;
-        (self.begun, self.in_pass, self.head_length, self.row) = (false, false, 0, 0);
+        self.written = Written::Nothing;
+        self.head.clear();
+        self.row = 0;
     }
 
     /// Whether every byte of the job has been written.
@@ -83,12 +91,12 @@ impl<'m> Streams<'m> {
 
     /// Pass and row that come next.
     pub(crate) fn position(&self) -> (u8, u16) {
+        let passes = self.writer.as_ref().map_or(0, JobWriter::passes);
         // At most 32 passes.
-        let passes = self.writer.as_ref().map_or(0, JobWriter::passes) as u8;
-        (passes.saturating_sub(1), self.row)
+        (u8::try_from(passes.saturating_sub(1)).unwrap_or(u8::MAX), self.row)
     }
 
-    /// Does a little work.
+    /// Does a slice of work.
     pub(crate) fn work(&mut self, input: &[u8], out: &mut [u8; WRITE_ROOM]) -> Result<Worked, DefectKind> {
         let mut worked = Worked { used: 0, written: 0, progress: true };
         if let Stage::Header = self.stage {
@@ -107,7 +115,9 @@ impl<'m> Streams<'m> {
                     self.stage = Stage::Ended;
                 } else {
                     self.decoder.restart();
-                    self.in_pass = false;
+                    if self.written == Written::Pass {
+                        self.written = Written::Setup;
+                    }
                 }
             }
             Stage::Read => {
@@ -127,13 +137,13 @@ impl<'m> Streams<'m> {
                     Some(Step::End) => {}
                 }
             }
-            Stage::Rows { .. } | Stage::Blank(_) if !self.begun => {
+            Stage::Rows { .. } | Stage::Blank(_) if self.written == Written::Nothing => {
                 worked.written = writer.begin(out).map_err(|_| DefectKind::Forbidden)?;
-                self.begun = true;
+                self.written = Written::Setup;
             }
-            Stage::Rows { .. } | Stage::Blank(_) if !self.in_pass => {
+            Stage::Rows { .. } | Stage::Blank(_) if self.written == Written::Setup => {
                 worked.written = writer.next_pass(out).map_err(|_| DefectKind::Forbidden)?;
-                self.in_pass = true;
+                self.written = Written::Pass;
             }
             Stage::Blank(rows) => {
                 writer.blank_rows(rows).map_err(|_| DefectKind::Stream)?;
@@ -151,20 +161,19 @@ impl<'m> Streams<'m> {
         Ok(worked)
     }
 
-    /// The bytes that end the job behind what has been written; nothing if that is nothing.
+    /// Writes the bytes that end the job after what has been written: none if that is nothing.
     pub(crate) fn cancel(&mut self, out: &mut [u8; WRITE_ROOM]) -> usize {
-        let begun = self.begun;
+        let begun = self.written != Written::Nothing;
         self.stage = Stage::Ended;
-        // Nothing in the writer can refuse it: there is room, and any order of a writer's own can be ended.
+        // The writer cannot refuse: there is room, and every order it has written can be ended.
         self.writer.as_mut().filter(|_| begun).map_or(0, |writer| writer.cancel(out).unwrap_or(0))
     }
 
     /// Takes bytes of the header until it is complete.
     fn collect(&mut self, input: &[u8]) -> Result<usize, DefectKind> {
         for (i, &byte) in input.iter().enumerate() {
-            *self.head.get_mut(self.head_length).ok_or(DefectKind::Header)? = byte;
-            self.head_length += 1;
-            let read = Header::read(&self.head[..self.head_length]).map_err(|error| match error {
+            self.head.push(byte).map_err(|_| DefectKind::Header)?;
+            let read = Header::read(&self.head).map_err(|error| match error {
                 HeaderError::Unknown => DefectKind::Header,
                 HeaderError::Forbidden(_) => DefectKind::Forbidden,
             })?;
@@ -172,8 +181,8 @@ impl<'m> Streams<'m> {
                 if band_bytes(header.columns()) > self.band.len() {
                     return Err(DefectKind::TooLarge);
                 }
-                let writer =
-                    JobWriter::new(*header.setup(), header.rows()).map_err(|_| DefectKind::Forbidden)?;
+                let writer = JobWriter::new(header.setup().clone(), header.rows())
+                    .map_err(|_| DefectKind::Forbidden)?;
                 self.writer = Some(writer);
                 self.decoder.resize(header.columns(), header.rows());
                 self.stride = stride(header.columns());

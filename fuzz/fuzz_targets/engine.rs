@@ -1,7 +1,5 @@
 //! The bridge's engine: garbage on the link, and every order of calls.
 #![no_main]
 
-#[path = "../properties/mod.rs"]
-mod properties;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| properties::engine::check(bytes));

@@ -1,7 +1,5 @@
 //! The printer's language: bytes to commands and back.
 #![no_main]
 
-#[path = "../properties/mod.rs"]
-mod properties;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| properties::rgl::check(bytes));

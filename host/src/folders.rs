@@ -1,15 +1,15 @@
-//! Where the user's own files are: profiles of machines and presets.
+//! Where the user's own files are: calibration profiles and presets.
 
 use std::path::{Path, PathBuf};
 
-/// There is no place for the user's files.
+/// There is no folder for the user's files.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("no folder for your settings: set HOME, or FOILPRESS_CONFIG to a folder of your choice")]
+#[error("there is no folder for your settings; set HOME, or set FOILPRESS_CONFIG to a folder")]
 pub struct NoFolder;
 
-/// A name that is no file's.
+/// A name that cannot be the name of a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no name; use letters, digits, - and _, 64 at most")]
+#[error("`{0}` is not a valid name; use at most 64 letters, digits, - and _")]
 pub struct NoName(String);
 
 /// The folder of settings: `FOILPRESS_CONFIG`, or `foilpress` where the system keeps programs' settings.
@@ -26,7 +26,7 @@ pub fn config() -> Result<PathBuf, NoFolder> {
     var("FOILPRESS_CONFIG").or_else(|| system.map(|system| system.join("foilpress"))).ok_or(NoFolder)
 }
 
-/// `NAME.toml` in a folder. A name leads to no other folder.
+/// The path of `NAME.toml` in a folder. A name cannot lead to another folder.
 pub fn file(folder: &Path, name: &str) -> Result<PathBuf, NoName> {
     const LONGEST: usize = 64;
     let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';

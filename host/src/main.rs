@@ -1,4 +1,4 @@
-//! The program. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.
+//! The program. Exit codes: 0 success, 1 failure, 2 usage error, 130 interrupted.
 
 use std::process::ExitCode;
 

@@ -5,9 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Stdio;
 
-mod common;
-
-use common::{Bench, entries, small_document, text};
+use testing::program::{Bench, entries, small_document, text};
 
 /// As small a print as there is.
 const SMALL: &str = "--size 2x2mm --paper postcard";
@@ -114,9 +112,10 @@ fn files_that_only_claim_to_be_large_are_answered_within_bounds_of_memory() {
     let bench = Bench::new();
     let within = |command: &str, name: &str| {
         let mut shell = std::process::Command::new("sh");
-        let program = env!("CARGO_BIN_EXE_foilpress");
+        let program = testing::program::path().display();
         shell.args(["-c", &format!("ulimit -v 2000000; exec {program} {command}")]);
         shell.env("FOILPRESS_CONFIG", bench.path("config")).env("FOILPRESS_JOBS", bench.path("jobs"));
+        shell.env("FOILPRESS_PRINTERS", bench.path("printers"));
         let output = shell.current_dir(bench.path("")).stdin(Stdio::null()).output().unwrap();
         let said = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{command}, {name}: {said}");
@@ -203,7 +202,8 @@ fn every_description_refuses_keys_it_does_not_know() {
     small_document(&bench.path("tile"));
     bench.done("factor tile -o t.foil -q");
     bench.done("map t.foil -o t.mix -q");
-    bench.done(&format!("halftone t.mix {SMALL} -o t.sheet -q"));
+    bench.done("halftone t.mix --size 2x2mm -o t.dots -q");
+    bench.done("layout t.dots --paper postcard -o t.sheet -q");
     bench.done("separate t.sheet -o t.passes -q");
     fs::create_dir(bench.path("lib")).unwrap();
     fs::write(bench.path("lib/library.toml"), "format = 1\nbased_on = \"built-in\"\n").unwrap();
@@ -212,7 +212,9 @@ fn every_description_refuses_keys_it_does_not_know() {
     for (file, command) in [
         ("tile/material.toml", format!("print tile {SMALL}")),
         ("t.foil/document.toml", "map t.foil -o x.mix".into()),
-        ("t.mix/mix.toml", format!("halftone t.mix {SMALL} -o x.sheet")),
+        ("t.mix/mix.toml", "halftone t.mix --size 2x2mm -o x.dots".into()),
+        ("t.dots/dots.toml", "layout t.dots --paper postcard -o x.sheet".into()),
+        ("t.sheet/layout.toml", "separate t.sheet -o x.passes".into()),
         ("t.sheet/sheet.toml", "separate t.sheet -o x.passes".into()),
         ("t.passes/passes.toml", "encode t.passes -o x.rgl".into()),
         ("lib/library.toml", format!("print sample:ladder {SMALL} --library lib")),
@@ -343,7 +345,7 @@ fn notes_are_said_once() {
     small_document(&bench.path("tile"));
     let output = bench.run(&format!("print tile {SMALL} -q"));
     let said = text(&output.stderr);
-    assert_eq!(said.matches("taken as sRGB").count(), 1, "{said}");
+    assert_eq!(said.matches("read as sRGB").count(), 1, "{said}");
     let mut lines: Vec<&str> = said.lines().collect();
     lines.sort_unstable();
     lines.dedup();

@@ -5,9 +5,7 @@ use std::fs;
 use image::{GrayImage, Luma};
 use serde_json::Value;
 
-mod common;
-
-use common::{Bench, entries};
+use testing::program::{Bench, entries};
 
 /// A layer of 60 x 40 pixels with ink in a rectangle, at 600 dpi.
 fn layer(bench: &Bench, name: &str, x: std::ops::Range<u32>, y: std::ops::Range<u32>) {
@@ -103,7 +101,7 @@ fn the_plan_of_art_is_that_of_its_print_and_writes_nothing_else() {
     assert!(suggestions.is_empty(), "white is laid three times: {suggestions:?}");
     assert_eq!(own.as_object_mut().unwrap().remove("art").as_ref(), Some(&report["art"]));
     assert_eq!(own, report["plan"]);
-    assert_eq!(plan["pieces"], serde_json::json!([2, 3]));
+    assert_eq!(plan["copies"], serde_json::json!([2, 3]));
     let words = bench.done(&format!("plan layers {options} --html plan.html"));
     assert!(words.contains("From the art, lowest first"), "{words}");
     let page = fs::read_to_string(bench.path("plan.html")).unwrap();
@@ -167,12 +165,13 @@ fn more_cartridges_than_the_machine_holds_are_planned_and_not_sent() {
     let page = fs::read_to_string(bench.path("plan.html")).unwrap();
     for text in [words, page] {
         assert!(
-            text.contains("The machine holds no more") && text.contains("white has the fewest dots (25)"),
+            text.contains("The printer holds no more")
+                && text.contains("white, which has the fewest dots (25)"),
             "{text}"
         );
     }
     let said = bench.refused(1, &format!("layers {art} --paper postcard --to file:job.rgl"));
-    assert!(said.contains("8 cartridges, and the machine holds 7"), "{said}");
+    assert!(said.contains("8 cartridges and the printer holds 7"), "{said}");
     assert!(!bench.path("job.rgl").exists() && !bench.entries().iter().any(|name| name.ends_with(".print")));
 }
 
@@ -231,10 +230,9 @@ mod programs {
         let path = std::env::var_os("PATH").unwrap_or_default();
         let found =
             std::env::split_paths(&path).map(|folder| folder.join(program)).find(|file| file.is_file());
-        let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
-        assert!(found.is_some() || !required, "{program} is not installed; `cargo xtask test` installs it");
         if found.is_none() {
-            println!("skipped: {program} is not installed");
+            testing::needs::Need::Queue
+                .skip(&format!("{program} is not installed; `cargo xtask queue` installs it"));
         }
         found
     }
@@ -253,7 +251,7 @@ mod programs {
             let output =
                 command.args(["-o", &format!("{program}.print")]).env("PATH", bench.path(program)).output();
             let output = output.unwrap();
-            let said = common::text(&output.stderr);
+            let said = testing::program::text(&output.stderr);
             assert!(output.status.success(), "{program}: {said}");
             assert_eq!(said.contains("read by Poppler"), program == "pdftocairo", "{said}");
             // 24 x 24 and 12 x 12 points at 600 dpi, edges on whole dots; the white one, too.
@@ -302,7 +300,7 @@ mod programs {
             .env("TMPDIR", bench.path("scratch"))
             .output()
             .unwrap();
-        assert!(common::text(&output.stderr).contains("cannot be read: broken"));
+        assert!(testing::program::text(&output.stderr).contains("cannot be read: broken"));
         assert!(entries(&bench.path("scratch")).is_empty());
     }
 }

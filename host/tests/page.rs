@@ -7,9 +7,7 @@ use press::sheet::Sheet;
 use press::simulate;
 use serde_json::Value;
 
-mod common;
-
-use common::{Bench, small_document, text};
+use testing::program::{Bench, small_document, text};
 
 const SMALL: &str = "--size 12x8mm --paper postcard";
 
@@ -43,7 +41,7 @@ fn a_document_is_placed_repeated_and_mirrored_dot_by_dot() {
         for (x, y) in (0..189).step_by(4).flat_map(|y| (0..283).map(move |x| (x, y))) {
             let want = at(&plain, left + 282 - x, top + y);
             let found = at(&page, 236 - 80 + column * (283 + 24) + x, 472 - 71 + row * (189 + 47) + y);
-            assert_eq!(found, want, "piece {column}, {row}, dot {x}, {y}");
+            assert_eq!(found, want, "copy {column}, {row}, dot {x}, {y}");
             inked += usize::from(want != "substrate");
         }
     }
@@ -138,7 +136,7 @@ fn the_plan_of_a_job_has_the_figures_that_are_in_its_bytes() {
     let before =
         bench.done(&format!("plan tile {SMALL} --repeat 2x1 --gap 3mm --media thick --curl off --json"));
     assert_eq!(json(&before)["passes"].as_array().map(Vec::len), Some(planned.len()));
-    assert_eq!(json(&before)["pieces"], serde_json::json!([2, 1]));
+    assert_eq!(json(&before)["copies"], serde_json::json!([2, 1]));
     bench.done("plan job.rgl --html page.html");
     let page = fs::read_to_string(bench.path("page.html")).unwrap();
     assert!(page.contains("data:image/png;base64,") && !page.contains("http"), "whole in itself");
@@ -162,7 +160,7 @@ fn a_preset_stands_for_its_options_and_gives_way_to_what_is_typed() {
     bench.done("preset use none");
     assert!(bench.refused(1, "print tile --preset crad").contains("card"));
     assert!(bench.refused(1, "preset save bad --media foo").contains("the media are paper, thick, film"));
-    assert!(bench.refused(1, "preset save ../x --mirror").contains("is no name"));
+    assert!(bench.refused(1, "preset save ../x --mirror").contains("is not a valid name"));
     assert!(!bench.entries().contains(&"x.toml".to_string()));
 }
 
@@ -172,7 +170,7 @@ fn a_measured_machine_is_corrected_without_being_named() {
     small_document(&bench.path("tile"));
     bench.done("profile set default --cross 21x30mm");
     let output = bench.run(&format!("print tile {SMALL} -q --at 20x30mm --to file:moved.rgl"));
-    assert!(text(&output.stderr).contains("profile is used"), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("using the printer's profile"), "{}", text(&output.stderr));
     let plan = json(&bench.done("plan moved.rgl --json"));
     // It prints 1 mm too far to the right: what is sent lies 1 mm further left.
     assert!((plan["from_edge_mm"][0].as_f64().unwrap() - 19.0).abs() < 0.1, "{}", plan["from_edge_mm"]);

@@ -33,7 +33,7 @@ impl Bench {
     }
 
     fn run(&self, args: &str) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_foilpress"))
+        Command::new(testing::program::path())
             .args(args.split_whitespace())
             .current_dir(self.folder.path())
             .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))

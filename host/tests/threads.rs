@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-mod common;
-
-use common::Bench;
+use testing::program::Bench;
 
 /// Every file of a folder and its folders, by its name within it.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
-    for name in common::entries(folder) {
+    for name in testing::program::entries(folder) {
         let path = folder.join(&name);
         if path.is_dir() {
             found.extend(files(&path).into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
@@ -45,7 +43,7 @@ fn document(folder: &Path) {
 fn with_threads(bench: &Bench, threads: u32, args: &str) -> BTreeMap<String, Vec<u8>> {
     let mut command = bench.command(&format!("{args} -q -o out.print"));
     let output = command.env("RAYON_NUM_THREADS", threads.to_string()).output().unwrap();
-    assert!(output.status.success(), "{args}: {}", common::text(&output.stderr));
+    assert!(output.status.success(), "{args}: {}", testing::program::text(&output.stderr));
     let written = files(&bench.path("out.print"));
     fs::remove_dir_all(bench.path("out.print")).unwrap();
     written

@@ -1,12 +1,12 @@
-//! Directional albedo: the share of light from one direction that a half-angle curve sends back.
+//! Directional albedo: the share of light from one direction that a half-angle curve reflects.
 //!
-//! Problem: a library must not hold a surface that makes light. For incidence theta_i the albedo is the
+//! Problem: a library must not contain a surface that creates light. For incidence theta_i the albedo is the
 //! integral of f(theta_h) cos theta_o over outgoing directions.
-//! Method: integrate over half vectors instead, `d omega_o = 4 (i.h) d omega_h`. Then f depends on one variable
-//! only and the azimuth integral is a weight, computed once for each incidence; peaks at theta_h = 0 are met by the
-//! square-root grid theta_h = (pi/2) u^2.
-//! Cost: `RINGS x AZIMUTHS` once, then one product with `RINGS` samples a curve.
-//! Limits: exact for BRDFs that depend on theta_h alone, which is what a curve says.
+//! Method: integrate over half vectors instead, `d omega_o = 4 (i.h) d omega_h`. Then f depends on one variable only, and
+//! the azimuth integral is a weight that is computed once per incidence. The square-root grid theta_h = (pi/2) u^2 resolves
+//! peaks at theta_h = 0.
+//! Cost: `RINGS x AZIMUTHS` once, then one product with `RINGS` samples per curve.
+//! Limits: exact only for BRDFs that depend on theta_h alone, as curves do.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -23,7 +23,7 @@ pub struct Albedo {
 }
 
 impl Albedo {
-    /// The quadrature for light from `incidence` radians off the normal, 0..pi/2.
+    /// The quadrature for light that arrives `incidence` radians from the normal, 0..pi/2.
     pub fn new(incidence: f64) -> Albedo {
         let (sin_i, cos_i) = incidence.sin_cos();
         let (mut theta, mut weight) = (Vec::with_capacity(RINGS), Vec::with_capacity(RINGS));
@@ -65,7 +65,7 @@ impl Albedo {
     }
 }
 
-/// The incidences a library is checked at, in degrees.
+/// The incidences at which a library is checked, in degrees.
 pub const INCIDENCES: [f64; 4] = [0.0, 30.0, 60.0, 75.0];
 
 /// The quadratures of [`INCIDENCES`].
@@ -79,14 +79,14 @@ mod tests {
     use crate::ggx;
 
     #[test]
-    fn a_white_lambertian_sends_everything_back() {
+    fn a_white_lambertian_reflects_everything() {
         for albedo in standard() {
             let sum = albedo.sum(|_| [1.0 / PI; 3]);
             assert!((sum[1] - 1.0).abs() < 2e-4, "{sum:?}");
         }
     }
 
-    /// A second route: outgoing directions on a polar grid about the mirror direction.
+    /// An independent method: outgoing directions on a polar grid around the mirror direction.
     #[test]
     fn lobes_agree_with_an_integral_over_outgoing_directions() {
         for alpha in [0.12, 0.28] {

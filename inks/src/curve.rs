@@ -1,7 +1,7 @@
 //! A measured or modelled BRDF as a curve over the half angle.
 //!
 //! Angles theta_h ascend from 0 to pi/2 (radians here, degrees in files); values are RGB reflectance in 1/sr,
-//! linear Rec. 709 primaries. Between angles the curve is linear in theta, outside it holds its end values.
+//! linear Rec. 709 primaries. The curve is linear in theta between angles and constant outside them.
 //! File form: CSV with the header `theta_h_deg,r,g,b`.
 
 use std::f64::consts::FRAC_PI_2;
@@ -9,46 +9,46 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-/// The most rows a curve file may have: far beyond any measurement, small enough to refuse a hostile file.
-pub const MOST_SAMPLES: usize = 65_536;
+/// The most rows in a curve file: far more than any measurement has, few enough for hostile files.
+const MOST_SAMPLES: usize = 65_536;
 
-/// Reflectance in 1/sr over the half angle. See the module text for units and interpolation.
+/// Reflectance in 1/sr over the half angle. See the module documentation for units and interpolation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     theta: Vec<f64>,
     rgb: Vec<[f64; 3]>,
 }
 
-/// Why a set of numbers is not a curve.
+/// Why some numbers are not a curve.
 #[derive(Debug, thiserror::Error)]
 pub enum CurveError {
     /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be read or written", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The file is not CSV with the expected columns.
     #[error(
-        "{}: line {line}: {problem}; expected the header `theta_h_deg,r,g,b` and four numbers a line",
+        "{}: line {line}: {problem}; expected the header `theta_h_deg,r,g,b` and four numbers per line",
         path.display()
     )]
     Csv {
         /// The file.
         path: PathBuf,
-        /// Line, counted from one; 0 when the file as a whole is meant.
+        /// Line, counted from one; 0 for the file as a whole.
         line: u64,
-        /// What is wrong with it.
+        /// What is wrong.
         problem: String,
     },
-    /// The samples break a rule every curve keeps.
+    /// A sample is invalid.
     #[error("sample {sample}: {problem}")]
     Sample {
         /// Sample, counted from zero.
         sample: usize,
-        /// What is wrong with it.
+        /// What is wrong.
         problem: String,
     },
 }
@@ -68,7 +68,11 @@ impl Curve {
         if theta.is_empty() || theta.len() != rgb.len() || theta.len() > MOST_SAMPLES {
             return wrong(
                 0,
-                format!("{} angles and {} values; 1 to {MOST_SAMPLES} of each", theta.len(), rgb.len()),
+                format!(
+                    "{} angles and {} values; expected equal numbers, 1 to {MOST_SAMPLES}",
+                    theta.len(),
+                    rgb.len()
+                ),
             );
         }
         for (i, (&t, value)) in theta.iter().zip(&rgb).enumerate() {
@@ -85,7 +89,7 @@ impl Curve {
         Ok(Curve { theta, rgb })
     }
 
-    /// Samples `f` at the given angles (radians); panics never, negative and non-finite results count as 0.
+    /// Samples `f` at the given angles (radians). Never panics; negative and non-finite results count as 0.
     pub fn sampled(theta: &[f64], mut f: impl FnMut(f64) -> [f64; 3]) -> Curve {
         let clean = |v: f64| if v.is_finite() { v.max(0.0) } else { 0.0 };
         Curve { theta: theta.to_vec(), rgb: theta.iter().map(|&t| f(t).map(clean)).collect() }
@@ -96,12 +100,12 @@ impl Curve {
         &self.theta
     }
 
-    /// Values in 1/sr, one for each angle.
+    /// Values in 1/sr, one per angle.
     pub fn rgb(&self) -> &[[f64; 3]] {
         &self.rgb
     }
 
-    /// The value at an angle in radians: linear in between, held outside.
+    /// The value at an angle in radians: linear between samples, constant outside.
     pub fn at(&self, theta: f64) -> [f64; 3] {
         let above = self.theta.partition_point(|&t| t <= theta);
         if above == 0 {
@@ -122,7 +126,7 @@ impl Curve {
         Curve::from_csv(std::io::BufReader::new(file), path)
     }
 
-    /// Reads the CSV form from anything; `path` is only named in errors.
+    /// Reads the CSV form from any input; `path` is used only in errors.
     pub fn from_csv(input: impl std::io::Read, path: &Path) -> Result<Curve, CurveError> {
         let wrong = |line, problem: String| CurveError::Csv { path: path.to_path_buf(), line, problem };
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(input);
@@ -160,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_linear_between_angles_and_held_outside() {
+    fn values_are_linear_between_angles_and_constant_outside() {
         let curve = Curve::new(vec![0.1, 0.3], vec![[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]]).unwrap();
         assert_eq!(curve.at(0.0), [1.0, 2.0, 3.0]);
         assert_eq!(curve.at(1.5), [3.0, 2.0, 1.0]);

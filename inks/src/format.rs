@@ -1,6 +1,6 @@
-//! The library's file as it is written: `library.toml`.
+//! The structure of `library.toml`.
 //!
-//! Every table refuses keys it does not know. Values that are checked later keep their place in the file.
+//! Unknown keys are errors. Values that are checked later keep their position in the file.
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -10,13 +10,13 @@ use crate::provenance::Figure;
 use crate::rule::{Certainty, Rule};
 use crate::set::InkName;
 
-/// The version of the format this program reads.
+/// The version of the format that is read.
 pub(crate) const FORMAT: u32 = 1;
 
-/// The name of the file in a library's folder.
+/// The name of the file in the folder of a library.
 pub const FILE_NAME: &str = "library.toml";
 
-/// A library's file is refused beyond this size.
+/// The largest library file, in bytes.
 pub(crate) const MOST_BYTES: u64 = 1 << 20;
 
 #[derive(Deserialize)]
@@ -52,13 +52,13 @@ pub(crate) struct InkTable {
     pub layer: Option<Spanned<Layer>>,
 }
 
-/// Something an owner should know before using a cartridge.
+/// Advice for owners before using a cartridge.
 #[derive(Clone, Debug, PartialEq, Deserialize, serde::Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Caution {
-    /// The words.
+    /// The advice.
     pub text: String,
-    /// How sure it is.
+    /// How certain it is.
     pub certainty: Certainty,
 }
 

@@ -1,12 +1,12 @@
-//! What a gloss meter would read: specular gloss at 60 degrees.
+//! Specular gloss at 60 degrees, as a gloss meter reads it.
 //!
-//! Problem: owners have gloss meters, not gonioreflectometers; the two numbers must be brought together.
-//! Method: the light of each lobe that falls through the meter's window (4.4 degrees in the plane of
-//! incidence, 11.7 across it, ISO 2813) for a beam at 60 degrees, relative to polished black glass of index
-//! 1.567, which reads 100. Each lobe is evaluated as the full microfacet BRDF it is a slice of: Smith's shadowing, and the
-//! rise of reflectance at 60 degrees by Fresnel's equations for a dielectric surface, by Schlick's form for metal.
-//! Cost: 4096 evaluations a lobe. Limits: the beam is taken as parallel; the diffuse body adds nothing. Long GGX tails
-//! make a lobe read low for its visible sharpness.
+//! Problem: owners have gloss meters, not gonioreflectometers, and want to compare their readings with curves.
+//! Method: the light of each lobe that passes the window of the meter (4.4 degrees in the plane of incidence, 11.7 across
+//! it, ISO 2813) for a beam at 60 degrees, relative to polished black glass of index 1.567, which reads 100. Each lobe is
+//! evaluated as a full microfacet BRDF with Smith's shadowing; reflectance rises at 60 degrees by Fresnel's equations for a
+//! dielectric surface and by Schlick's form for metal.
+//! Cost: 4096 evaluations per lobe. Limits: the beam is assumed to be parallel, and the diffuse body is ignored. Because of
+//! the long tails of GGX, a lobe reads lower than its visible sharpness suggests.
 
 use std::f64::consts::FRAC_PI_3;
 
@@ -18,7 +18,7 @@ const GLASS: f64 = 1.567;
 /// Half the window, in degrees: in the plane of incidence and across it.
 const WINDOW: [f64; 2] = [2.2, 5.85];
 const STEPS: usize = 64;
-/// Beyond this a lobe is metal: dielectrics up to index 1.8 reflect less.
+/// A lobe above this is metal; dielectrics up to index 1.8 reflect less.
 const DIELECTRIC: f64 = 0.082;
 
 /// Unpolarised reflectance of a dielectric of index `n` at the angle with cosine `cos`.
@@ -48,11 +48,11 @@ fn lambda(cos: f64, alpha: f64) -> f64 {
     ((1.0 + alpha * alpha * (1.0 / (cos * cos) - 1.0)).sqrt() - 1.0) / 2.0
 }
 
-/// Light through the window over light in the beam, for one lobe.
+/// The ratio of light through the window to light in the beam, for one lobe.
 fn through_window(lobe: &Lobe) -> f64 {
     let (sin_i, cos_i) = FRAC_PI_3.sin_cos();
     let half = WINDOW.map(f64::to_radians);
-    // Steps grow from the middle outwards, where a narrow lobe is. Gives the place and the width of a step.
+    // The position and width of a step. Steps are smallest in the centre, where narrow lobes are.
     let at = |i: usize, half: f64| {
         let u = (2 * i + 1) as f64 / STEPS as f64 - 1.0;
         (half * u * u.abs(), half * 2.0 * u.abs() * 2.0 / STEPS as f64)
@@ -61,7 +61,7 @@ fn through_window(lobe: &Lobe) -> f64 {
     for row in 0..STEPS {
         for column in 0..STEPS {
             let ((along, height), (across, width)) = (at(row, half[0]), at(column, half[1]));
-            // The direction through this spot of a flat window square to the mirror direction.
+            // The direction through this point of a flat window perpendicular to the mirror direction.
             let (x, y) = (along.tan(), across.tan());
             let length = (1.0 + x * x + y * y).sqrt();
             let o = [(sin_i + cos_i * x) / length, y / length, (cos_i - sin_i * x) / length];
@@ -100,8 +100,8 @@ mod tests {
         assert!((reading - 100.0).abs() < 1.0, "{reading}");
     }
 
-    /// Published with the model for F0 = 0.04 and for a metal of 0.85, to whole units; how
-    /// its beam was modelled is not said, hence 3%.
+    /// Published with the model for F0 = 0.04 and for a metal of 0.85, in whole units. The model of the beam was not
+    /// published, hence the tolerance of 3 %.
     #[test]
     fn the_published_readings() {
         for (alpha, clear, metal) in [

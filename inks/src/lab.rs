@@ -1,6 +1,6 @@
 //! CIELAB under D50 to linear Rec. 709.
 //!
-//! Printed solids are specified as CIELAB under D50 (ISO 12647-2 class); the pipeline computes in linear
+//! Printed solids are specified in CIELAB under D50 (as in ISO 12647-2); the pipeline computes in linear
 //! Rec. 709 under D65. Method: CIE 15 inverse, Bradford adaptation, the Rec. 709 matrix. Limits: the result is
 //! not clipped, and inks such as cyan lie outside the gamut, so a channel may be negative.
 

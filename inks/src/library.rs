@@ -1,7 +1,4 @@
-//! The library: cartridges, the stacks they print, and what each stack reflects.
-
-use std::path::Path;
-use std::sync::LazyLock;
+//! The library: cartridges, the stacks they print, and the reflectance of each stack.
 
 use protocol::ink::Ink;
 
@@ -9,41 +6,39 @@ use crate::curve::Curve;
 use crate::format::Caution;
 use crate::lobes::Lobes;
 use crate::model::Optics;
-use crate::problem::Problem;
 use crate::provenance::{Figure, Provenance};
-use crate::read;
 use crate::rule::{Rule, Severity};
 use crate::set::InkSet;
 use crate::stack::Stack;
 
-/// A cassette as it is sold.
+/// A cartridge as it is sold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cartridge {
-    /// The ink in it; its code, barcode and part number are those of [`Ink`].
+    /// Its ink; [`Ink`] has the code, barcode and part number.
     pub ink: Ink,
     /// The name on Okidata's box.
     pub okidata: String,
     /// The name on ALPS's box.
     pub alps: String,
-    /// The smallest cluster that prints, in dots of 1/600 inch.
+    /// The smallest cluster that prints reliably, in dots of 1/600 inch.
     pub minimum_cluster: Figure<u16>,
-    /// What an owner should know.
+    /// Advice for owners.
     pub cautions: Vec<Caution>,
 }
 
-/// A stack and what it reflects.
+/// A stack and its reflectance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
-    /// Its place in the library, counted from zero.
+    /// Its position in the library, counted from zero.
     pub number: usize,
     /// The layers.
     pub stack: Stack,
-    /// Reflectance in 1/sr over the half angle. A modelled one is sampled at 512 angles of the square-root grid;
-    /// [`Entry::curve_at`] gives it at any others without interpolation.
+    /// Reflectance in 1/sr over the half angle. A modelled curve is sampled at 512 angles of the square-root grid;
+    /// [`Entry::curve_at`] evaluates it at other angles without interpolation.
     pub curve: Curve,
-    /// The modelled lobes; none when the curve was measured.
+    /// The modelled lobes; none if the curve was measured.
     pub lobes: Option<Lobes>,
-    /// Where the curve comes from.
+    /// The source of the curve.
     pub provenance: Provenance,
 }
 
@@ -57,7 +52,7 @@ impl Entry {
     }
 }
 
-/// Cartridges, stacks, curves and rules. Built in, or read from a folder by the same code.
+/// Cartridges, stacks, curves and rules: built in, or read from a folder by the same code.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Library {
     pub(crate) name: String,
@@ -68,62 +63,13 @@ pub struct Library {
     pub(crate) entries: Vec<Entry>,
 }
 
-/// Why a folder is not a library.
-#[derive(Debug, thiserror::Error)]
-pub enum LibraryError {
-    /// It has errors; warnings and notes may be among the list.
-    #[error("{}", summary(problems))]
-    Problems {
-        /// Everything that was found.
-        problems: Vec<Problem>,
-    },
-}
-
-fn summary(problems: &[Problem]) -> String {
-    let errors: Vec<_> = problems.iter().filter(|p| p.severity == Severity::Error).collect();
-    let mut text: Vec<String> = errors.iter().take(5).map(ToString::to_string).collect();
-    if errors.len() > 5 {
-        text.push(format!("and {} more; `foilpress inks check` lists them", errors.len() - 5));
-    }
-    text.join("\n")
-}
-
-const BUILTIN: &str = include_str!("../library/library.toml");
-
-static CHECKED_BUILTIN: LazyLock<Library> =
-    LazyLock::new(|| match read::parse(BUILTIN, "built-in".as_ref(), None) {
-        (Some(library), _) => library,
-        // The text is part of the program, and a test reads it: this cannot be reached by any input.
-        (None, problems) => panic!("{}", summary(&problems)),
-    });
-
 impl Library {
-    /// The library that comes with the program: every curve modelled.
-    pub fn builtin() -> Library {
-        CHECKED_BUILTIN.clone()
-    }
-
-    /// Reads the library in a folder: `library.toml` and the curves it names.
-    pub fn from_dir(folder: &Path) -> Result<Library, LibraryError> {
-        match read::folder(folder) {
-            (Some(library), _) => Ok(library),
-            (None, problems) => Err(LibraryError::Problems { problems }),
-        }
-    }
-
-    /// Everything there is to say about the library in a folder, worst first.
-    pub fn check(folder: &Path) -> Vec<Problem> {
-        let (_, mut problems) = read::folder(folder);
-        problems.sort_by_key(|problem| std::cmp::Reverse(problem.severity));
-        problems
-    }
-
     /// Its name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What it is, in a sentence.
+    /// A description in one sentence.
     pub fn about(&self) -> &str {
         &self.about
     }
@@ -138,8 +84,8 @@ impl Library {
         self.entries.iter().find(|entry| entry.stack == *stack)
     }
 
-    /// The stacks that need no ink but these and break no rule of severity [`Severity::Error`], in the library's order;
-    /// the substrate is always among them.
+    /// The stacks that need only these inks and break no rule of severity [`Severity::Error`], in the order of the library.
+    /// The substrate is always among them.
     pub fn at_hand(&self, inks: &InkSet) -> Vec<&Entry> {
         let forbidden =
             |stack: &Stack| self.broken_rules(stack).iter().any(|rule| rule.severity == Severity::Error);
@@ -147,7 +93,7 @@ impl Library {
         self.entries.iter().filter(usable).collect()
     }
 
-    /// The cartridges, in the order of the ink codes.
+    /// The cartridges, in the order of their ink codes.
     pub fn cartridges(&self) -> &[Cartridge] {
         &self.cartridges
     }
@@ -157,29 +103,29 @@ impl Library {
         self.cartridges.iter().find(|cartridge| cartridge.ink == ink)
     }
 
-    /// The order rules.
+    /// The rules on the order of layers.
     pub fn rules(&self) -> &[Rule] {
         &self.rules
     }
 
-    /// The order rules a stack breaks.
+    /// The rules that a stack breaks.
     pub fn broken_rules(&self, stack: &Stack) -> Vec<&Rule> {
         self.rules.iter().filter(|rule| rule.broken_by(stack)).collect()
     }
 
-    /// The smallest cluster of a stack in dots: that of its most demanding layer.
+    /// The minimum cluster of a stack in dots: that of its most demanding layer.
     pub fn minimum_cluster(&self, stack: &Stack) -> u16 {
         let bare = self.optics.paper.minimum_cluster.get();
         let layers = stack.layers().iter().filter_map(|&ink| self.cartridge(ink));
         layers.map(|cartridge| cartridge.minimum_cluster.get()).fold(bare, u16::max)
     }
 
-    /// The figures the modelled curves rest on.
+    /// The figures behind the modelled curves.
     pub fn optics(&self) -> &Optics {
         &self.optics
     }
 
-    /// A stack in the words of Okidata's boxes, bottom layer first, such as `metallic silver, cyan, finish`.
+    /// The names of the layers on Okidata's boxes, bottom first, such as `metallic silver, cyan, finish`.
     pub fn words(&self, stack: &Stack) -> String {
         if stack.layers().is_empty() {
             return self.optics.paper.name.clone();

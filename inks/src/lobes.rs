@@ -1,4 +1,4 @@
-//! A reflectance as a diffuse albedo and a few GGX lobes: what the ink model computes with.
+//! A reflectance as a diffuse albedo and a few GGX lobes, the form in which the ink model computes.
 
 use std::f64::consts::PI;
 
@@ -23,7 +23,7 @@ pub struct Lobes {
     pub kd: [f64; 3],
     /// Share of the light that passes the surface and reaches the diffuse body, 0..=1.
     pub entering: f64,
-    /// The lobes, from the deepest to the surface.
+    /// The lobes, from the deepest layer to the surface.
     pub lobes: Vec<Lobe>,
 }
 

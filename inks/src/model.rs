@@ -1,13 +1,13 @@
-//! What a stack of layers reflects, from figures for each layer.
+//! The reflectance of a stack of layers, computed from figures for each layer.
 //!
-//! Problem: no measurements of these ribbons are public, and 57 stacks are wanted.
-//! Method: walk the layers from the paper up, carrying a diffuse albedo, at most one metal lobe and at most
-//! one surface lobe. A process ink is a filter passed twice (Beer-Lambert): it multiplies what lies beneath by
-//! T = solid / paper and brings its own surface. Flakes and foil are opaque: they replace everything. Primer levels the
-//! surface. Finish is a coat in optical contact: Saunderson's form `(1 - F0)(1 - r) kd / (1 - r kd)` on a
-//! body, `(1 - F0)^2` and a wider lobe on metal, and a new surface in either case.
-//! Cost: a few operations a layer. Limits: full cover, no trapping, no scattering between layers; co-located
-//! light and eye. Layers the model was never fitted to (a filter over finish, primer over metal) get the same rules.
+//! Problem: no measurements of these ribbons are public, and the library needs 57 stacks.
+//! Method: process the layers from the paper upward, with a diffuse albedo, at most one metal lobe and at most one surface
+//! lobe. A process ink is a filter that light passes twice (Beer-Lambert): it multiplies everything beneath it by
+//! T = solid / paper and has its own surface. Flakes and foil are opaque and replace everything. Primer levels the surface.
+//! Finish is a coat in optical contact: Saunderson's form `(1 - F0)(1 - r) kd / (1 - r kd)` on a body, `(1 - F0)^2` and a
+//! wider lobe on metal, and a new surface in both cases.
+//! Cost: a few operations per layer. Limits: full coverage, no trapping, no scattering between layers; light and eye in one
+//! place. Combinations that the model was not fitted to (a filter over finish, primer over metal) follow the same rules.
 
 use protocol::ink::Ink;
 use serde::Deserialize;
@@ -25,7 +25,7 @@ type Rgb = [f64; 3];
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paper {
-    /// What it is.
+    /// A description.
     pub name: String,
     /// CIELAB under D50.
     pub lab: Figure<[f64; 3]>,
@@ -33,7 +33,7 @@ pub struct Paper {
     pub f0: Figure<f64>,
     /// Surface lobe: microfacet width.
     pub alpha: Figure<f64>,
-    /// Smallest patch of bare paper, in dots of 1/600 inch.
+    /// Minimum cluster of bare paper, in dots of 1/600 inch.
     pub minimum_cluster: Figure<u16>,
 }
 
@@ -41,27 +41,27 @@ pub struct Paper {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
-    /// Name and version, as it stands in the provenance of a curve.
+    /// Name and version, as recorded in the provenance of a curve.
     pub name: String,
-    /// Share of the light the surface turns back before it reaches the diffuse body.
+    /// Share of the light that the surface reflects before it reaches the diffuse body.
     pub interface: Figure<f64>,
-    /// Lower bound of the channels of a solid, for inks outside Rec. 709.
+    /// Lower bound for the channels of a solid, needed for inks outside Rec. 709.
     pub darkest: Figure<f64>,
-    /// Normal-incidence reflectance of aluminium, the metal of flakes and foils.
+    /// Reflectance of aluminium, the metal of flakes and foils, at normal incidence.
     pub aluminium: Figure<Rgb>,
-    /// Factor on a metal's reflectance for each filter over it, beside the filter's own.
+    /// Factor on the reflectance of a metal for each filter over it, in addition to the filter's transmittance.
     pub ink_on_metal_f0: Figure<f64>,
-    /// Factor on a metal's alpha for each filter over it.
+    /// Factor on the alpha of a metal for each filter over it.
     pub ink_on_metal_widening: Figure<f64>,
     /// Alpha of the surface of a filter over metal.
     pub ink_on_metal_alpha: Figure<f64>,
     /// Effective internal reflection r under a coat.
     pub coat_internal: Figure<f64>,
-    /// Factor on a metal's alpha under a coat.
+    /// Factor on the alpha of a metal under a coat.
     pub coat_widening: Figure<f64>,
 }
 
-/// What one ink does to the layers beneath it.
+/// The effect of an ink on the layers beneath it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Layer {
@@ -69,9 +69,9 @@ pub enum Layer {
     Filter(Filter),
     /// Opaque flakes or film.
     Metal(Box<Metal>),
-    /// A clear layer that levels what it covers.
+    /// A clear layer that levels the surface beneath it.
     Undercoat(Undercoat),
-    /// A clear coat that makes the surface.
+    /// A clear coat with a new surface.
     Coat(Coat),
 }
 
@@ -93,37 +93,37 @@ pub struct Filter {
 pub struct Metal {
     /// Diffuse albedo.
     pub diffuse: Figure<f64>,
-    /// Its colour; grey when absent.
+    /// Its colour; grey if absent.
     pub diffuse_tint: Option<Figure<Rgb>>,
-    /// Share of the aluminium's reflectance.
+    /// Share of the reflectance of aluminium.
     pub reflectance: Figure<f64>,
-    /// Colour of the reflectance; none when absent.
+    /// Colour of the reflectance; neutral if absent.
     pub tint: Option<Figure<Rgb>>,
-    /// A process ink whose pigment colours body and flakes.
+    /// A process ink whose pigment colours the body and the flakes.
     pub seen_through: Option<Spanned<InkName>>,
-    /// Power of that ink's T on the flakes.
+    /// Exponent of that ink's T for the flakes.
     pub seen_power: Option<Figure<f64>>,
     /// Microfacet width.
     pub alpha: Figure<f64>,
     /// Factor on alpha directly on primer.
     pub alpha_on_primer: Figure<f64>,
-    /// Surface of the binder: reflectance; no such lobe when absent.
+    /// Surface of the binder: reflectance; no such lobe if absent.
     pub binder_f0: Option<Figure<f64>>,
     /// Surface of the binder: microfacet width.
     pub binder_alpha: Option<Figure<f64>>,
 }
 
-/// A clear layer that levels what it covers.
+/// A clear layer that levels the surface beneath it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Undercoat {
-    /// Factor on what lies beneath.
+    /// Factor on the light from beneath.
     pub transmission: Figure<f64>,
     /// Factor on the alpha of the surface beneath.
     pub levelling: Figure<f64>,
 }
 
-/// A clear coat that makes the surface.
+/// A clear coat with a new surface.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Coat {
@@ -133,14 +133,14 @@ pub struct Coat {
     pub alpha: Figure<f64>,
 }
 
-/// A figure's name, the range it must lie in, and the figure.
+/// The name of a figure, its range, and the figure.
 pub(crate) type Listed<'a> = (&'static str, [f64; 2], Value<'a>);
 
 const SHARE: [f64; 2] = [0.0, 1.0];
-/// Below 0.01 a lobe is narrower than any curve or printed film; above 1 it is no longer a lobe.
+/// A lobe below 0.01 is narrower than any curve or printed film; above 1 it is not a lobe.
 const ALPHA: [f64; 2] = [0.01, 1.0];
 const FACTOR: [f64; 2] = [0.1, 4.0];
-/// Covers L*, a* and b* alike; what matters is caught by the albedo that follows.
+/// Covers L*, a* and b*; the later check of the albedo catches impossible colours.
 const LAB: [f64; 2] = [-150.0, 150.0];
 
 impl Paper {
@@ -204,15 +204,15 @@ impl Layer {
 /// Why a stack cannot be computed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ModelError {
-    /// Nothing is known of an ink's optics.
+    /// An ink has no optical figures.
     #[error("{} has no `[ink.layer]`, so stack {stack} cannot be modelled; measure it instead", ink.name())]
     NoLayer {
-        /// The stack asked for.
+        /// The stack.
         stack: Stack,
         /// The ink without figures.
         ink: Ink,
     },
-    /// A metal is coloured by an ink that is no filter.
+    /// A metal is coloured by an ink that is not a filter.
     #[error("{} is seen through {}, which has no `[ink.layer.filter]`", metal.name(), filter.name())]
     NoFilter {
         /// The metal.
@@ -229,7 +229,7 @@ pub struct Optics {
     pub paper: Paper,
     /// Figures shared by all layers.
     pub model: Model,
-    /// What each ink does, where that is known; indexed by `Ink as usize`.
+    /// The effect of each ink, if known; indexed by `Ink as usize`.
     pub layers: [Option<Layer>; Ink::ALL.len()],
 }
 
@@ -249,7 +249,7 @@ impl Optics {
         lab::to_linear_rgb(self.paper.lab.get()).map(|v| v.clamp(self.model.darkest.get(), 1.0))
     }
 
-    /// What the light loses on its way down and up through a filter: T = solid / paper, at most 1.
+    /// The transmittance of a filter for light that passes it twice: T = solid / paper, at most 1.
     fn double_pass(&self, filter: &Filter) -> Rgb {
         let paper = self.paper_albedo();
         each(lab::to_linear_rgb(filter.lab.get()), |c, v| {
@@ -334,7 +334,7 @@ impl Optics {
         pile.surface = Some(Lobe { f0: [coat.f0.get(); 3], alpha: coat.alpha.get() });
     }
 
-    /// The figures the lobes of a stack rest on: model, paper, then each ink once.
+    /// The figures behind the lobes of a stack: paper, model, then each ink once.
     pub fn parameters(&self, stack: &Stack) -> Vec<Parameter> {
         let mut inks: Vec<Ink> = Vec::new();
         for &ink in stack.layers() {

@@ -1,4 +1,4 @@
-//! What is wrong with a library, where, and how much it matters.
+//! Findings about a library: what is wrong, where, and how severe it is.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -12,11 +12,11 @@ use crate::rule::Severity;
 pub struct Problem {
     /// The file.
     pub file: PathBuf,
-    /// Line, counted from one, when it is about one.
+    /// Line, counted from one, if the finding concerns one.
     pub line: Option<usize>,
-    /// The field, such as `ink cyan: filter.alpha`; empty when the file as a whole is meant.
+    /// The field, such as `ink cyan: filter.alpha`; empty for the file as a whole.
     pub field: String,
-    /// How much it matters.
+    /// How severe it is.
     pub severity: Severity,
     /// What was found, what was expected, what to do.
     pub text: String,

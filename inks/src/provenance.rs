@@ -1,4 +1,4 @@
-//! Where a number comes from, kept beside the number.
+//! The source of a number, stored with the number.
 
 use std::fmt;
 
@@ -11,11 +11,11 @@ use toml::Spanned;
 pub enum Source {
     /// Measured on the printed ink itself.
     Measured,
-    /// Published for this ink, this machine, or the same class of print or metal.
+    /// Published for this ink, this printer, or the same class of print or metal.
     Literature,
-    /// Follows from other figures.
+    /// Derived from other figures.
     Formula,
-    /// An informed guess. Nobody has published it.
+    /// An informed guess; nothing is published.
     Guess,
 }
 
@@ -45,12 +45,12 @@ impl<T: Copy> Figure<T> {
         *self.value.get_ref()
     }
 
-    /// Where it comes from.
+    /// Its source.
     pub fn source(&self) -> Source {
         self.source
     }
 
-    /// A word on it, if the file has one.
+    /// A remark, if the file has one.
     pub fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }
@@ -61,12 +61,12 @@ impl<T: Copy> Figure<T> {
     }
 }
 
-/// A figure of either shape, to list and to check.
+/// A figure of either shape, for lists and checks.
 #[derive(Clone, Copy, Debug)]
 pub enum Value<'a> {
     /// One number.
     Scalar(&'a Figure<f64>),
-    /// One number for each channel, or L*, a*, b*.
+    /// One number per channel, or L*, a*, b*.
     Triple(&'a Figure<[f64; 3]>),
 }
 
@@ -79,7 +79,7 @@ impl Value<'_> {
         }
     }
 
-    /// Where they come from.
+    /// Their source.
     pub fn source(&self) -> Source {
         match self {
             Value::Scalar(figure) => figure.source(),
@@ -96,22 +96,22 @@ impl Value<'_> {
     }
 }
 
-/// One figure a modelled curve rests on.
+/// A figure behind a modelled curve.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parameter {
-    /// Its place in the library, such as `cyan.lab`.
+    /// Its path in the library, such as `cyan.lab`.
     pub name: String,
-    /// Its number, or three.
+    /// Its one or three numbers.
     pub value: Vec<f64>,
-    /// Where it comes from.
+    /// Its source.
     pub source: Source,
 }
 
-/// Where a curve comes from, so that nobody mistakes a model for a measurement.
+/// The source of a curve, so that nobody mistakes a model for a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Provenance {
-    /// Computed from figures of the library; nobody measured this print.
+    /// Computed from figures of the library; not measured.
     Modelled {
         /// The model's name.
         model: String,

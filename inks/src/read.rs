@@ -1,7 +1,7 @@
-//! Reading and checking a library: the built-in text and an owner's folder take the same way.
+//! Reading and checking a library, with the same code for the built-in text and an owner's folder.
 //!
-//! A finding is collected, not thrown, so that an owner sees all of them at once; only a file that is not TOML of
-//! the expected shape ends the reading early. A library with errors is not made.
+//! Findings are collected, so that an owner sees all of them at once; only a file that is not TOML with the expected keys
+//! stops the reading early. A library with errors is not returned.
 
 use std::f64::consts::FRAC_PI_2;
 use std::io::Read;
@@ -14,28 +14,28 @@ use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::curve::{Curve, CurveError};
 use crate::format::{FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
 use crate::library::{Cartridge, Entry, Library};
-use crate::model::{Layer, Listed, Optics};
+use crate::model::{Layer, Listed, Model, Optics, Paper};
 use crate::problem::{Findings, Problem};
 use crate::provenance::{Figure, Provenance};
 use crate::rule::{Rule, Severity};
 use crate::stack::Stack;
 
-/// A sheet numbers its stacks with a byte.
+/// The most stacks: a sheet numbers them with a byte.
 const MOST_STACKS: usize = 256;
-/// Far beyond what holds; a limit for hostile files only.
+/// The most layers: far more than can be printed, as a limit for hostile files.
 const MOST_LAYERS: usize = 16;
-/// A curve file is refused beyond this size.
+/// The largest curve file, in bytes.
 const MOST_CURVE_BYTES: u64 = 16 << 20;
-/// A measured albedo up to here is a calibration error, beyond it is no reflectance.
+/// A measured albedo up to this value is a calibration error; a larger one is not a reflectance.
 const CALIBRATION: f64 = 1.05;
 
 type Found = (Option<Library>, Vec<Problem>);
 
-/// Reads `folder/library.toml`.
-pub(crate) fn folder(folder: &Path) -> Found {
+/// Reads `folder/library.toml`, which may be based on the built-in library.
+pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
     let file = folder.join(FILE_NAME);
     match text(&file, MOST_BYTES) {
-        Ok(text) => parse(&text, &file, Some(folder)),
+        Ok(text) => parse(&text, &file, Some((folder, built_in))),
         Err(problem) => {
             let problem =
                 Problem { file, line: None, field: String::new(), severity: Severity::Error, text: problem };
@@ -44,26 +44,27 @@ pub(crate) fn folder(folder: &Path) -> Found {
     }
 }
 
-/// A text file no longer than `most` bytes.
+/// Reads a text file of at most `most` bytes.
 fn text(path: &Path, most: u64) -> Result<String, String> {
     let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
     let mut text = String::new();
     file.take(most + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
     if text.len() as u64 > most {
-        return Err(format!("longer than {most} bytes"));
+        return Err(format!("the file is longer than {most} bytes"));
     }
     Ok(text)
 }
 
-/// A stack that is wanted, and the place in the text that wants it.
-struct Wanted {
+/// A listed stack and its position in the text.
+struct Listing {
     stack: Stack,
     offset: Option<usize>,
     measured: Option<(Curve, Provenance)>,
 }
 
-/// Reads a library's text. `folder` holds its curves; without it there can be none.
-pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
+/// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
+/// text itself has no folder.
+pub(crate) fn parse(text: &str, file: &Path, folder: Option<(&Path, fn() -> Library)>) -> Found {
     let mut findings = Findings { text, file: file.to_path_buf(), found: Vec::new() };
     let parsed = match toml::from_str::<File>(text) {
         Ok(parsed) => parsed,
@@ -73,22 +74,54 @@ pub(crate) fn parse(text: &str, file: &Path, folder: Option<&Path>) -> Found {
         }
     };
     if *parsed.format.get_ref() != FORMAT {
-        let problem = format!("version {}; this program reads version {FORMAT}", parsed.format.get_ref());
+        let problem = format!("version {}; expected version {FORMAT}", parsed.format.get_ref());
         findings.error(Some(parsed.format.span().start), "format", problem);
         return (None, findings.found);
     }
-    let base = match &parsed.based_on {
-        None => None,
-        Some(name) if folder.is_some() && name.get_ref() == "built-in" => Some(Library::builtin()),
-        Some(name) => {
-            let problem = format!("`{}`: a library can be based on `built-in` or on nothing", name.get_ref());
+    let base = match (&parsed.based_on, folder) {
+        (None, _) => None,
+        (Some(name), Some((_, built_in))) if name.get_ref() == "built-in" => Some(built_in()),
+        (Some(name), _) => {
+            let problem = format!("`{}`: expected `built-in`, or no `based_on` at all", name.get_ref());
             findings.error(Some(name.span().start), "based_on", problem);
             return (None, findings.found);
         }
     };
-    let library = build(parsed, base, folder, &mut findings);
+    let library = build(parsed, base, folder.map(|(folder, _)| folder), &mut findings);
     let usable = library.filter(|_| !findings.fatal());
     (usable, findings.found)
+}
+
+/// The parts of a library that a text can take from its base or replace.
+#[derive(Default)]
+struct Parts {
+    name: Option<String>,
+    about: Option<String>,
+    paper: Option<Paper>,
+    model: Option<Model>,
+    layers: [Option<Layer>; Ink::ALL.len()],
+    cartridges: Vec<Cartridge>,
+    rules: Vec<Rule>,
+    stacks: Option<Vec<Stack>>,
+}
+
+impl Parts {
+    fn of(base: Library) -> Parts {
+        Parts {
+            name: Some(format!("{}, changed", base.name)),
+            about: Some("Modelled where it was not measured.".into()),
+            paper: Some(base.optics.paper),
+            model: Some(base.optics.model),
+            layers: base.optics.layers,
+            cartridges: base.cartridges,
+            rules: base.rules,
+            stacks: Some(base.entries.into_iter().map(|entry| entry.stack).collect()),
+        }
+    }
+}
+
+fn missing(findings: &mut Findings, table: &str) {
+    findings.error(None, table, "missing; add it, or set `based_on = \"built-in\"`");
 }
 
 fn build(
@@ -97,71 +130,80 @@ fn build(
     folder: Option<&Path>,
     findings: &mut Findings,
 ) -> Option<Library> {
-    let missing = |findings: &mut Findings, table: &str| {
-        findings.error(None, table, "missing; give it, or set `based_on = \"built-in\"`");
-    };
-    let (mut cartridges, mut rules, mut layers, mut stacks) =
-        (Vec::new(), Vec::new(), [const { None }; 13], None);
-    // Figures of a base were checked when it was read, and their places are in another text.
-    if let Some(paper) = &file.paper {
+    let mut parts = base.map_or_else(Parts::default, Parts::of);
+    // Only the figures of this text are checked; those of a base were checked when it was read.
+    if let Some(paper) = file.paper {
         ranges("paper", &paper.figures(), findings);
         cluster("paper", &paper.minimum_cluster, findings);
+        parts.paper = Some(paper);
     }
-    if let Some(model) = &file.model {
+    if let Some(model) = file.model {
         ranges("model", &model.figures(), findings);
+        parts.model = Some(model);
     }
-    let (mut paper, mut model, mut name, mut about) = (file.paper, file.model, file.name, file.about);
-    if let Some(base) = base {
-        cartridges = base.cartridges;
-        rules = base.rules;
-        layers = base.optics.layers;
-        stacks = Some(base.entries.into_iter().map(|entry| entry.stack).collect::<Vec<_>>());
-        paper = paper.or(Some(base.optics.paper));
-        model = model.or(Some(base.optics.model));
-        name = name.or_else(|| Some(format!("{}, changed", base.name)));
-        about = about.or(Some("Modelled where it was not measured.".into()));
-    }
+    parts.name = file.name.or(parts.name);
+    parts.about = file.about.or(parts.about);
     let mut seen = Vec::new();
     for table in file.ink {
         let offset = table.span().start;
-        ink(table.into_inner(), offset, &mut seen, &mut cartridges, &mut layers, findings);
+        ink(table.into_inner(), offset, &mut seen, &mut parts, findings);
     }
-    cartridges.sort_by_key(|cartridge| cartridge.ink);
-    merge_rules(file.rule, &mut rules, findings);
-    let mut wanted = match (file.stacks, stacks) {
+    parts.cartridges.sort_by_key(|cartridge| cartridge.ink);
+    merge_rules(file.rule, &mut parts.rules, findings);
+    let mut wanted = match (file.stacks, parts.stacks.take()) {
         (Some(texts), _) => listed_stacks(&texts, findings),
         (None, Some(stacks)) => {
-            stacks.into_iter().map(|stack| Wanted { stack, offset: None, measured: None }).collect()
+            stacks.into_iter().map(|stack| Listing { stack, offset: None, measured: None }).collect()
         }
         (None, None) => {
             missing(findings, "stacks");
             Vec::new()
         }
     };
-    let named: Vec<String> =
-        file.measured.iter().map(|table| table.get_ref().curve.get_ref().clone()).collect();
-    if let Some(beyond) = file.measured.get(MOST_STACKS) {
+    measurements(&file.measured, folder, &mut wanted, findings);
+    check_stacks(&wanted, &parts.cartridges, findings);
+    finish(parts, wanted, findings)
+}
+
+/// Reads all measured curves, and warns about curves in the folder that are not used.
+fn measurements(
+    tables: &[Spanned<MeasuredTable>],
+    folder: Option<&Path>,
+    wanted: &mut Vec<Listing>,
+    findings: &mut Findings,
+) {
+    if let Some(beyond) = tables.get(MOST_STACKS) {
         findings.error(Some(beyond.span().start), "measured", format!("more than {MOST_STACKS}"));
     }
-    for table in file.measured.iter().take(MOST_STACKS) {
-        measured(table.get_ref(), folder, &mut wanted, findings);
+    for table in tables.iter().take(MOST_STACKS) {
+        measured(table.get_ref(), folder, wanted, findings);
     }
-    for want in &wanted {
+    if let Some(folder) = folder {
+        let named: Vec<String> = tables.iter().map(|table| table.get_ref().curve.get_ref().clone()).collect();
+        unused_curves(folder, &named, findings);
+    }
+}
+
+/// Checks that every layer has a cartridge, and the number and the first of the stacks.
+fn check_stacks(wanted: &[Listing], cartridges: &[Cartridge], findings: &mut Findings) {
+    for want in wanted {
         for ink in want.stack.layers() {
             if !cartridges.iter().any(|cartridge| cartridge.ink == *ink) {
-                let problem = format!("holds {}, of which there is no `[[ink]]`", ink.name());
+                let problem = format!("contains {}, which has no `[[ink]]`", ink.name());
                 findings.error(want.offset, format!("stack {}", want.stack), problem);
             }
         }
     }
     if wanted.first().is_none_or(|first| first.stack != Stack::SUBSTRATE) || wanted.len() > MOST_STACKS {
         let problem =
-            format!("{} stacks; `substrate` must be the first of at most {MOST_STACKS}", wanted.len());
+            format!("{} stacks; expected at most {MOST_STACKS}, with `substrate` first", wanted.len());
         findings.error(None, "stacks", problem);
     }
-    if let Some(folder) = folder {
-        unused_curves(folder, &named, findings);
-    }
+}
+
+/// Makes the library, if there are no errors so far.
+fn finish(parts: Parts, wanted: Vec<Listing>, findings: &mut Findings) -> Option<Library> {
+    let Parts { name, about, paper, model, layers, cartridges, rules, .. } = parts;
     let Some(paper) = paper else {
         missing(findings, "paper");
         return None;
@@ -190,31 +232,31 @@ fn build(
     })
 }
 
-/// The stacks of the file's own list, without those that are none or stand there twice.
-fn listed_stacks(texts: &[Spanned<String>], findings: &mut Findings) -> Vec<Wanted> {
-    let mut wanted: Vec<Wanted> = Vec::new();
+/// The stacks that the file lists, without invalid ones and duplicates.
+fn listed_stacks(texts: &[Spanned<String>], findings: &mut Findings) -> Vec<Listing> {
+    let mut wanted: Vec<Listing> = Vec::new();
     for text in texts {
         let (offset, field) = (text.span().start, format!("stacks: {}", text.get_ref()));
         if wanted.len() == MOST_STACKS {
             findings.error(Some(offset), "stacks", format!("more than {MOST_STACKS}"));
             break;
         }
-        let Some(stack) = wanted_stack(text.get_ref(), &field, offset, findings) else { continue };
+        let Some(stack) = parse_stack(text.get_ref(), &field, offset, findings) else { continue };
         if wanted.iter().any(|other| other.stack == stack) {
             findings.error(Some(offset), field, "is listed twice");
         } else {
-            wanted.push(Wanted { stack, offset: Some(offset), measured: None });
+            wanted.push(Listing { stack, offset: Some(offset), measured: None });
         }
     }
     wanted
 }
 
-/// Reads a stack's text; says so if it is none.
-fn wanted_stack(text: &str, field: &str, offset: usize, findings: &mut Findings) -> Option<Stack> {
+/// Parses a stack, and reports an error if that fails.
+fn parse_stack(text: &str, field: &str, offset: usize, findings: &mut Findings) -> Option<Stack> {
     match text.parse::<Stack>() {
         Ok(stack) if stack.layers().len() <= MOST_LAYERS => Some(stack),
         Ok(stack) => {
-            let problem = format!("{} layers; at most {MOST_LAYERS}", stack.layers().len());
+            let problem = format!("{} layers; the limit is {MOST_LAYERS}", stack.layers().len());
             findings.error(Some(offset), field, problem);
             None
         }
@@ -236,30 +278,23 @@ fn ranges(owner: &str, figures: &[Listed<'_>], findings: &mut Findings) {
 
 fn cluster(owner: &str, figure: &Figure<u16>, findings: &mut Findings) {
     if !(1..=1024).contains(&figure.get()) {
-        let problem = format!("{} dots; 1 to 1024", figure.get());
+        let problem = format!("{} dots; expected 1 to 1024", figure.get());
         findings.error(Some(figure.offset()), format!("{owner}.minimum_cluster"), problem);
     }
 }
 
-/// Checks an ink's table and puts it in the place of the one known so far.
-fn ink(
-    table: InkTable,
-    offset: usize,
-    seen: &mut Vec<Ink>,
-    cartridges: &mut Vec<Cartridge>,
-    layers: &mut [Option<Layer>; 13],
-    findings: &mut Findings,
-) {
+/// Checks the table of an ink and replaces the one known so far.
+fn ink(table: InkTable, offset: usize, seen: &mut Vec<Ink>, parts: &mut Parts, findings: &mut Findings) {
     let ink = table.ink.0;
     let owner = format!("ink {}", ink.name());
     if seen.contains(&ink) {
         findings.error(Some(offset), owner.clone(), "is given twice");
     }
     seen.push(ink);
-    // The machine knows an ink by these; a slip here would print with another ribbon.
+    // The printer identifies an ink by these; a typo would print with another ribbon.
     let mut same = |field: &str, offset: usize, found: String, expected: String| {
         if found != expected {
-            let problem = format!("{found}, but the machine's is {expected}");
+            let problem = format!("{found}, but the printer uses {expected}");
             findings.error(Some(offset), format!("{owner}.{field}"), problem);
         }
     };
@@ -273,14 +308,14 @@ fn ink(
         if let Layer::Metal(metal) = layer.get_ref()
             && metal.binder_f0.is_some() != metal.binder_alpha.is_some()
         {
-            let problem = "binder_f0 and binder_alpha come together or not at all";
+            let problem = "binder_f0 and binder_alpha need each other: give both or neither";
             findings.error(Some(layer.span().start), owner.clone(), problem);
         }
         layer.into_inner()
     });
-    layers[ink as usize] = layer;
-    cartridges.retain(|cartridge| cartridge.ink != ink);
-    cartridges.push(Cartridge {
+    parts.layers[ink as usize] = layer;
+    parts.cartridges.retain(|cartridge| cartridge.ink != ink);
+    parts.cartridges.push(Cartridge {
         ink,
         okidata: table.okidata,
         alps: table.alps,
@@ -289,7 +324,7 @@ fn ink(
     });
 }
 
-/// Puts each rule in the place of the one of its name, or behind all others.
+/// Each rule replaces the one with its name, or is appended.
 fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut Findings) {
     let mut seen: Vec<String> = Vec::new();
     for rule in given {
@@ -305,19 +340,24 @@ fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut 
     }
 }
 
-/// Reads a measured curve and gives it to its stack, which joins the list if it is new.
-fn measured(table: &MeasuredTable, folder: Option<&Path>, wanted: &mut Vec<Wanted>, findings: &mut Findings) {
+/// Reads a measured curve and assigns it to its stack, which is appended to the list if it is new.
+fn measured(
+    table: &MeasuredTable,
+    folder: Option<&Path>,
+    wanted: &mut Vec<Listing>,
+    findings: &mut Findings,
+) {
     let owner = format!("measured {}", table.stack.get_ref());
     let offset = table.stack.span().start;
-    let stack = wanted_stack(table.stack.get_ref(), &owner, offset, findings);
+    let stack = parse_stack(table.stack.get_ref(), &owner, offset, findings);
     for (name, value) in [("by", &table.by), ("when", &table.when), ("setup", &table.setup)] {
         if value.get_ref().trim().is_empty() {
-            let problem = "is empty; a measurement says who, when and how";
+            let problem = "is empty; a measurement needs who, when and how";
             findings.error(Some(value.span().start), format!("{owner}.{name}"), problem);
         }
     }
     if !is_date(table.when.get_ref()) {
-        let problem = format!("`{}` is no date; write YYYY-MM-DD or YYYY-MM", table.when.get_ref());
+        let problem = format!("`{}` is not a date; expected YYYY-MM-DD or YYYY-MM", table.when.get_ref());
         findings.error(Some(table.when.span().start), format!("{owner}.when"), problem);
     }
     let field = format!("{owner}.curve");
@@ -335,7 +375,7 @@ fn measured(table: &MeasuredTable, folder: Option<&Path>, wanted: &mut Vec<Wante
         setup: table.setup.get_ref().clone(),
     };
     let place = wanted.iter().position(|want| want.stack == stack).unwrap_or_else(|| {
-        wanted.push(Wanted { stack, offset: Some(offset), measured: None });
+        wanted.push(Listing { stack, offset: Some(offset), measured: None });
         wanted.len() - 1
     });
     if wanted[place].measured.is_some() {
@@ -345,12 +385,12 @@ fn measured(table: &MeasuredTable, folder: Option<&Path>, wanted: &mut Vec<Wante
     wanted[place].measured = Some((curve, provenance));
 }
 
-/// A file inside the folder, named without leaving it.
+/// The path of a file inside the folder; names that lead out of it are errors.
 fn curve_path(folder: Option<&Path>, name: &str) -> Result<PathBuf, String> {
-    let folder = folder.ok_or("a library without a folder has no curve files")?;
+    let folder = folder.ok_or("a library without a folder cannot have curve files")?;
     let plain = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
     if name.is_empty() || !plain {
-        return Err(format!("`{name}` must name a file inside the library's folder"));
+        return Err(format!("`{name}` must be the name of a file inside the library's folder"));
     }
     Ok(folder.join(name))
 }
@@ -398,7 +438,7 @@ fn is_date(text: &str) -> bool {
         && number(day, 2).is_some_and(|day| (1..=31).contains(&day))
 }
 
-/// Curves that lie in the folder and are named by nothing are probably a slip.
+/// Warns about curves in the folder that the library does not use, probably by mistake.
 fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
     let Ok(list) = std::fs::read_dir(folder) else { return };
     let mut unused: Vec<PathBuf> = list
@@ -413,28 +453,28 @@ fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
             line: None,
             field: String::new(),
             severity: Severity::Warning,
-            text: "no `[[measured]]` names this curve".into(),
+            text: "this curve is not used by any `[[measured]]`".into(),
         });
     }
 }
 
-/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. A lobe grows as
-/// 1 / cos towards 90 degrees, so the last value is held there rather than drawn towards a pole.
+/// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. Lobes grow as 1 / cos toward
+/// 90 degrees, so beyond the grid the last value is used.
 fn grid() -> Vec<f64> {
     const STEPS: u32 = 512;
     (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).powi(2)).collect()
 }
 
-/// The entry of a stack, after the checks that need its curve.
+/// Makes the entry of a stack, with the checks that need its curve.
 fn entry(
     number: usize,
-    want: Wanted,
+    want: Listing,
     optics: &Optics,
     quadratures: &[Albedo],
     rules: &[Rule],
     findings: &mut Findings,
 ) -> Option<Entry> {
-    let Wanted { stack, offset, measured } = want;
+    let Listing { stack, offset, measured } = want;
     let field = format!("stack {stack}");
     let (curve, lobes, provenance) = match measured {
         Some((curve, provenance)) => (curve, None, provenance),
@@ -452,18 +492,18 @@ fn entry(
     for (quadrature, degrees) in quadratures.iter().zip(INCIDENCES) {
         let albedo = quadrature.of(&curve).into_iter().fold(0.0, f64::max);
         if albedo > 1.0 {
-            // The quadrature itself is good to 2e-4, far inside what separates the two cases.
+            // The error of the quadrature, 2e-4, is far below the difference between the two cases.
             let severity =
                 if albedo <= CALIBRATION && lobes.is_none() { Severity::Warning } else { Severity::Error };
             let problem = format!(
-                "sends back {:.1}% of the light that comes in {degrees} degrees off the normal",
+                "reflects {:.1}% of the light that arrives {degrees} degrees from the normal",
                 100.0 * albedo
             );
             findings.add(severity, offset, field.clone(), problem);
             break;
         }
     }
-    // Of a base's stacks the owner of this text has said nothing, so nothing is said to him.
+    // Stacks of the base library are not listed in this text, so their findings do not concern its owner.
     for rule in rules.iter().filter(|rule| offset.is_some() && rule.broken_by(&stack)) {
         let problem = format!("{} ({}; {})", rule.says, rule.name, rule.certainty);
         findings.add(rule.severity, offset, field.clone(), problem);

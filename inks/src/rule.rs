@@ -1,7 +1,7 @@
-//! What may lie on what: the machine's order rules, kept as data.
+//! Rules on the order of layers, as data.
 //!
-//! Knowledge of this is uneven, so every rule says how sure it is, and breaking one is something to be told, not
-//! something forbidden: owners have printed against most of them.
+//! Knowledge about them is uneven, so every rule states its certainty. Breaking a rule usually gives a warning and is not
+//! forbidden, because owners have successfully broken most of them.
 
 use std::fmt;
 
@@ -10,23 +10,23 @@ use serde::{Deserialize, Serialize};
 use crate::set::InkSet;
 use crate::stack::Stack;
 
-/// How sure a rule or a caution is.
+/// How certain a rule or a caution is.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Certainty {
-    /// Seen on a real machine under controlled conditions.
+    /// Observed on a real printer under controlled conditions.
     Measured,
-    /// Experiments on such a machine, published by others.
+    /// Published experiments on such a printer.
     Published,
-    /// The established open driver does so, or its streams show it.
+    /// From the established open driver or its streams.
     Driver,
-    /// The vendor's manual or driver says so.
+    /// From the vendor's manual or driver.
     Vendor,
-    /// Owners or sellers say so.
+    /// Reported by owners or sellers.
     Reported,
-    /// Concluded from other facts.
+    /// Inferred from other facts.
     Inferred,
-    /// A guess on the safe side.
+    /// A cautious guess.
     Guess,
 }
 
@@ -48,11 +48,11 @@ impl fmt::Display for Certainty {
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// Good to know.
+    /// Information.
     Note,
     /// Usable, but expect trouble.
     Warning,
-    /// Not usable: a file with it is not read, a stack with it is not chosen, a sheet with it is not printed.
+    /// Not usable: such a file is not read, such a stack not chosen, such a sheet not printed.
     Error,
 }
 
@@ -66,25 +66,25 @@ impl fmt::Display for Severity {
     }
 }
 
-/// One rule on the order of layers. Without a condition it is never broken.
+/// A rule on the order of layers. Without a condition it is never broken.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
-    /// Short name, by which a library that is based on another replaces its rule.
+    /// Short name. A library that is based on another replaces a rule by its name.
     pub name: String,
-    /// The reason, in words.
+    /// The reason, as shown to users.
     pub says: String,
-    /// What breaking it means.
+    /// The severity of breaking it.
     pub severity: Severity,
-    /// How sure it is.
+    /// How certain it is.
     pub certainty: Certainty,
     /// The inks the rule is about.
     pub over: Option<InkSet>,
-    /// What they should not lie above, whatever is between.
+    /// The inks they should not lie above, with or without layers between.
     pub under: Option<InkSet>,
-    /// What they should not lie on with nothing between.
+    /// The inks they should not lie on directly.
     pub directly_on: Option<InkSet>,
-    /// What they should all have beneath them.
+    /// The inks that must all lie beneath them.
     pub needs: Option<InkSet>,
     /// The most layers a stack should have.
     pub most_layers: Option<usize>,
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rule_looks_at_everything_beneath() {
+    fn a_rule_considers_every_layer_beneath() {
         let stack = |text: &str| text.parse::<Stack>().unwrap();
         let below_colour = rule("metallic", Some("process"), None, None);
         assert!(below_colour.broken_by(&stack("C+F+MS")) && !below_colour.broken_by(&stack("MS+C+F")));

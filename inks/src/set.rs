@@ -1,9 +1,9 @@
-//! The inks at hand.
+//! Sets of inks.
 //!
-//! Text form: words joined by commas, each an ink (`cyan`, `MS`) or a group (`process`, `metallic`, `clear`,
-//! `foil`, `default`, `all`), taken away with a leading `-`. A text that begins with `-` or `+` changes the default
-//! set. Foils are in no set that does not name them or `all`: their ink codes were never seen in a real stream,
-//! so using them takes an explicit choice.
+//! Text form: words joined by commas, each an ink (`cyan`, `MS`) or a group (`process`, `metallic`, `clear`, `foil`,
+//! `default`, `all`); a leading `-` removes it. A text that starts with `-` or `+` modifies the default set. A set contains
+//! foils only if it names them or `all`: their ink codes have never been seen in a real stream, so using them must be an
+//! explicit choice.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,18 +11,18 @@ use std::str::FromStr;
 use protocol::ink::{Ink, Kind};
 use serde::Deserialize;
 
-/// A set of inks. `Default` is every ink but the foils and white.
+/// A set of inks. The default is every ink except the foils and white.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
 #[serde(try_from = "String")]
 pub struct InkSet(u16);
 
-/// Why a text is not a set of inks.
+/// A word that is neither an ink nor a group.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is no ink and no group of inks{}; {}", hint(suggestion), choices())]
+#[error("`{word}` is neither an ink nor a group of inks{}; {}", hint(suggestion), choices())]
 pub struct InkSetError {
-    /// The word that is not understood.
+    /// The word.
     pub word: String,
-    /// What may have been meant.
+    /// A similar name, if there is one.
     pub suggestion: Option<&'static str>,
 }
 
@@ -32,7 +32,7 @@ fn hint(suggestion: &Option<&'static str>) -> String {
 
 fn choices() -> String {
     let groups: Vec<_> = GROUPS.iter().map(|(name, _)| *name).collect();
-    format!("groups are {}; inks are {}", groups.join(", "), Ink::ALL.map(Ink::name).join(", "))
+    format!("the groups are {}; the inks are {}", groups.join(", "), Ink::ALL.map(Ink::name).join(", "))
 }
 
 type Member = fn(Ink) -> bool;
@@ -53,10 +53,10 @@ impl Default for InkSet {
 }
 
 impl InkSet {
-    /// No ink: only the bare substrate can be printed.
+    /// The empty set: only the bare substrate can be printed.
     pub const EMPTY: InkSet = InkSet(0);
 
-    /// Every ink, the foils included.
+    /// Every ink, including the foils.
     pub const ALL: InkSet = InkSet((1 << Ink::ALL.len()) - 1);
 
     /// The set of these inks.
@@ -64,7 +64,7 @@ impl InkSet {
         inks.into_iter().fold(InkSet::EMPTY, InkSet::with)
     }
 
-    /// The set and this ink.
+    /// The set with this ink.
     #[must_use]
     pub fn with(self, ink: Ink) -> InkSet {
         InkSet(self.0 | 1 << ink as u16)
@@ -85,17 +85,17 @@ impl InkSet {
         self.0 & 1 << ink as u16 != 0
     }
 
-    /// Whether every one of the inks is in the set.
+    /// Whether all of the inks are in the set.
     pub fn contains_all(self, inks: &[Ink]) -> bool {
         inks.iter().all(|&ink| self.contains(ink))
     }
 
-    /// How many inks are in the set.
+    /// The number of inks in the set.
     pub fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// Whether there is none.
+    /// Whether the set is empty.
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -138,7 +138,7 @@ impl TryFrom<String> for InkSet {
     }
 }
 
-/// One ink, named in a file by its long or short name.
+/// An ink, given in a file by its long or short name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
 pub struct InkName(pub Ink);
@@ -154,7 +154,7 @@ impl TryFrom<String> for InkName {
     }
 }
 
-/// The known name most like this one, if any is like it at all.
+/// The known name most similar to this one, if any is similar enough.
 fn closest(word: &str) -> Option<&'static str> {
     let word = word.to_ascii_lowercase();
     let names = Ink::ALL.into_iter().map(Ink::name).chain(GROUPS.iter().map(|(name, _)| *name));
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn words_add_and_take_away_in_order() {
+    fn words_add_and_remove_in_order() {
         let inks = [Ink::Black, Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::MetallicSilver, Ink::Finish];
         assert_eq!(set("process,metallic-silver,finish"), InkSet::of(inks));
         assert_eq!(set("all,-white"), InkSet::ALL.without(Ink::White));
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_of_the_pen_is_understood() {
+    fn a_typo_gets_a_suggestion() {
         let error = "process,metalic-silver".parse::<InkSet>().unwrap_err();
         assert_eq!(error.suggestion, Some("metallic-silver"));
         assert!(error.to_string().contains("did you mean `metallic-silver`?"), "{error}");

@@ -6,8 +6,8 @@ use std::str::FromStr;
 use protocol::ink::Ink;
 use serde::{Deserialize, Serialize};
 
-/// Layers of ink on one dot, bottom to top. Text form: short names joined by `+`, such as `MS+C+F`;
-/// the bare substrate is `substrate`. Long names are read too.
+/// Layers of ink on one dot, bottom to top. Text form: short names joined by `+`, such as `MS+C+F`; the bare substrate is
+/// `substrate`. Long names are accepted too.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Stack(Vec<Ink>);
@@ -15,12 +15,12 @@ pub struct Stack(Vec<Ink>);
 /// Why a text is not a stack.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StackError {
-    /// A layer names no known ink.
-    #[error("`{layer}` in stack `{stack}` is no ink; the inks are {}", known())]
+    /// A layer is not a known ink.
+    #[error("`{layer}` in the stack `{stack}` is not an ink; the inks are {}", known())]
     UnknownInk {
         /// The whole text.
         stack: String,
-        /// The part that is no ink.
+        /// The layer.
         layer: String,
     },
 }
@@ -33,7 +33,7 @@ impl Stack {
     /// The bare substrate.
     pub const SUBSTRATE: Stack = Stack(Vec::new());
 
-    /// A stack of these layers, bottom to top.
+    /// A stack with these layers, bottom to top.
     pub fn new(layers: impl Into<Vec<Ink>>) -> Stack {
         Stack(layers.into())
     }
@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_and_stack_are_the_same_thing() {
+    fn stacks_and_their_texts_correspond() {
         for text in ["substrate", "MS+C+F", "P+SF", "K"] {
             assert_eq!(text.parse::<Stack>().unwrap().to_string(), text);
         }

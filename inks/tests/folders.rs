@@ -1,4 +1,4 @@
-//! Libraries in folders: what replaces what, and what is said about a bad one.
+//! Libraries in folders: what replaces what, and the findings about invalid ones.
 
 use std::fs;
 use std::path::Path;
@@ -33,7 +33,7 @@ fn errors(problems: &[Problem]) -> Vec<String> {
     problems.iter().filter(|p| p.severity == Severity::Error).map(ToString::to_string).collect()
 }
 
-/// The one error of a library; its text must hold all of the words.
+/// Checks that a library has exactly one error, and that its text contains all of the words.
 fn one_error(files: &[(&str, &str)], words: &[&str]) {
     let errors = errors(&check(files));
     assert_eq!(errors.len(), 1, "{errors:#?}");
@@ -107,7 +107,7 @@ fn unknown_keys_are_named_with_their_line() {
 }
 
 #[test]
-fn the_machine_numbers_are_checked() {
+fn the_printers_numbers_are_checked() {
     let text = BUILTIN.replacen("barcode = 19", "barcode = 17", 1);
     one_error(&[("library.toml", &text)], &["ink finish.barcode", "17", "19"]);
     let text = BUILTIN.replacen("code = 0x11", "code = 0x14", 1);
@@ -135,7 +135,7 @@ fn stacks_that_cannot_be_are_named() {
     let text = BUILTIN.replacen("\"C+Y\"", "\"W+Y\"", 1);
     one_error(&[("library.toml", &text)], &["stack W+Y", "white", "measure it"]);
     let text = BUILTIN.replacen("    \"substrate\",\n", "", 1);
-    one_error(&[("library.toml", &text)], &["`substrate` must be the first"]);
+    one_error(&[("library.toml", &text)], &["with `substrate` first"]);
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn a_stack_of_an_ink_without_a_cartridge_is_named() {
     let end = start + BUILTIN[start..].find("# ----").unwrap();
     let text = format!("{}{}", &BUILTIN[..start], &BUILTIN[end..]);
     let errors = errors(&check(&[("library.toml", &text)]));
-    assert!(errors.iter().all(|e| e.contains("holds yellow, of which there is no `[[ink]]`")), "{errors:#?}");
+    assert!(errors.iter().all(|e| e.contains("contains yellow, which has no `[[ink]]`")), "{errors:#?}");
     let stacks =
         Library::builtin().entries().iter().filter(|e| e.stack.layers().contains(&Ink::Yellow)).count();
     assert_eq!(errors.len(), stacks);
@@ -179,7 +179,7 @@ fn bad_curves_are_named_with_file_line_and_field() {
 }
 
 #[test]
-fn a_curve_that_makes_light_is_refused_and_a_little_too_much_is_told() {
+fn a_curve_that_creates_light_is_an_error_or_a_warning() {
     let text = measured("substrate", "paper.csv");
     let curve = |v: f64| format!("theta_h_deg,r,g,b\n0,0.1,{v},0.1\n");
     let lambert = |share: f64| curve(share / std::f64::consts::PI);
@@ -200,7 +200,7 @@ fn a_curve_outside_the_folder_is_not_read() {
 }
 
 #[test]
-fn a_measurement_says_who_when_and_how() {
+fn a_measurement_needs_who_when_and_how() {
     let curve = ("c.csv", "theta_h_deg,r,g,b\n0,0.1,0.1,0.1\n");
     let text = measured("C", "c.csv").replace("A. Owner", " ");
     one_error(&[("library.toml", &text), curve], &["measured C.by", "empty"]);
@@ -211,14 +211,14 @@ fn a_measurement_says_who_when_and_how() {
 }
 
 #[test]
-fn a_curve_nobody_names_is_told() {
+fn an_unused_curve_gives_a_warning() {
     let problems = check(&[("library.toml", BASED), ("stray.csv", "")]);
     assert!(errors(&problems).is_empty());
     assert!(problems.iter().any(|p| p.file.ends_with("stray.csv") && p.severity == Severity::Warning));
 }
 
 #[test]
-fn foil_without_its_undercoat_is_told_in_words_and_with_its_line() {
+fn foil_without_its_undercoat_gives_a_finding_with_its_line() {
     let problems = check(&[("library.toml", BUILTIN)]);
     let told = problems.iter().filter(|p| p.text.contains("foil-needs-undercoat")).collect::<Vec<_>>();
     let foils = Library::builtin().entries().iter().filter(|e| e.stack.to_string().contains("F")).count();
@@ -229,7 +229,7 @@ fn foil_without_its_undercoat_is_told_in_words_and_with_its_line() {
 }
 
 #[test]
-fn what_is_no_library_is_an_error_with_its_path() {
+fn an_invalid_library_is_an_error_with_its_path() {
     let error = Library::from_dir(Path::new("/nowhere/at/all")).unwrap_err();
     let LibraryError::Problems { problems } = &error;
     assert_eq!(problems.len(), 1);
@@ -276,9 +276,9 @@ fn the_examples_of_the_guide_are_libraries() {
 }
 
 proptest! {
-    /// A library's text is an owner's or a stranger's: whatever it says, the answer is a library or a list of problems.
+    /// Libraries come from anybody: any text gives a library or a list of problems.
     #[test]
-    fn a_damaged_library_is_told_and_never_panics(at in 0usize..BUILTIN.len(), cut in 0usize..200, put in "\\PC{0,8}") {
+    fn a_damaged_library_gives_findings(at in 0usize..BUILTIN.len(), cut in 0usize..200, put in "\\PC{0,8}") {
         prop_assume!(BUILTIN.is_ascii());
         let end = (at + cut).min(BUILTIN.len());
         let text = format!("{}{put}{}", &BUILTIN[..at], &BUILTIN[end..]);
@@ -292,7 +292,7 @@ proptest! {
     }
 
     #[test]
-    fn a_damaged_curve_is_told_and_never_panics(rows in prop::collection::vec("[-0-9.,eEnNaAiIfF \"]{0,24}", 0..12)) {
+    fn a_damaged_curve_gives_findings(rows in prop::collection::vec("[-0-9.,eEnNaAiIfF \"]{0,24}", 0..12)) {
         let curve = format!("theta_h_deg,r,g,b\n{}", rows.join("\n"));
         let folder = folder(&[("library.toml", &measured("C", "c.csv")), ("c.csv", &curve)]);
         if let Ok(library) = Library::from_dir(folder.path()) {

@@ -1,4 +1,4 @@
-//! What must hold for any surface, and what the published model says should follow from it.
+//! Properties that hold for any surface, and consequences of the published model.
 
 use inks::albedo::{self, INCIDENCES};
 use inks::{InkSet, Library, Lobes, Stack};
@@ -10,7 +10,7 @@ fn lobes(library: &Library, stack: &str) -> Lobes {
 }
 
 #[test]
-fn no_stack_makes_light_and_plain_paper_sends_most_of_it_back() {
+fn no_stack_creates_light_and_plain_paper_reflects_most_of_it() {
     let library = Library::builtin();
     let mut most = (0.0, Stack::SUBSTRATE, 0.0);
     for (quadrature, degrees) in albedo::standard().iter().zip(INCIDENCES) {
@@ -79,9 +79,9 @@ fn the_tabulated_curve_is_the_lobes() {
 }
 
 proptest! {
-    /// Any order of any inks, sensible or not: the model answers, and the answer sends no light back that was not there.
+    /// For any inks in any order the model gives a result, and the result creates no light.
     #[test]
-    fn no_pile_of_layers_makes_light(inks in prop::collection::vec(0usize..13, 0..7)) {
+    fn no_sequence_of_layers_creates_light(inks in prop::collection::vec(0usize..13, 0..7)) {
         let library = Library::builtin();
         let layers: Vec<Ink> =
             inks.into_iter().map(|i| Ink::ALL[i]).filter(|&ink| ink != Ink::White).collect();
@@ -96,7 +96,7 @@ proptest! {
     }
 
     #[test]
-    fn stacks_at_hand_need_only_what_is_at_hand(bits in prop::collection::vec(any::<bool>(), 13)) {
+    fn available_stacks_need_only_available_inks(bits in prop::collection::vec(any::<bool>(), 13)) {
         let library = Library::builtin();
         let set = InkSet::of(Ink::ALL.into_iter().zip(&bits).filter(|(_, there)| **there).map(|(ink, _)| ink));
         let at_hand = library.at_hand(&set);

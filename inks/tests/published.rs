@@ -1,4 +1,4 @@
-//! The 57 stacks against the figures published with the model, computed by other code.
+//! The 57 stacks compared with the figures published with the model, which other code computed.
 //!
 //! Columns: stack, diffuse albedo, lobes (F0, alpha), green reflectance at half angles of 0, 10 and 30 degrees in 1/sr
 //! to three significant digits.
@@ -84,8 +84,7 @@ const PUBLISHED: [Row; 57] = [
     row("MS+K", [0.002, 0.002, 0.002], &[([0.01, 0.01, 0.01], 0.284), ([0.04, 0.04, 0.04], 0.120)], ["0.234", "0.0323", "0.00277"]),
 ];
 
-/// Half a unit of the last digit a figure is given with, and 0.1% because the anchors themselves were published
-/// with three digits.
+/// Half a unit of the last published digit, plus 0.1 % because the anchors were published with three digits.
 fn rounding(text: &str) -> f64 {
     let decimals = text.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     0.5 * 10f64.powi(-(decimals as i32)) + 1e-3 * text.parse::<f64>().unwrap()
@@ -142,8 +141,8 @@ fn reflectance_agrees_with_the_published_figures_within_rounding() {
     }
 }
 
-/// Gloss of stacks whose metal, if any, is not coloured: the published readings do not say how they weigh channels,
-/// nor how a metal's reflectance rises under a dark ink.
+/// Gloss of stacks without coloured metal. The published readings do not say how channels are weighted, nor how the
+/// reflectance of a metal rises under a dark ink.
 #[test]
 fn gloss_agrees_with_the_published_readings() {
     let library = Library::builtin();
@@ -165,7 +164,7 @@ fn gloss_agrees_with_the_published_readings() {
     }
 }
 
-/// Folder of outside data, if this machine has it.
+/// The folder of external data, if there is one.
 fn data() -> Option<PathBuf> {
     let data = std::env::var_os("FOILPRESS_DATA").map(PathBuf::from);
     if data.is_none() {
@@ -200,8 +199,8 @@ fn the_metal_is_aluminium() {
     }
 }
 
-/// The flakes of the model beside a measured flake paint: the same height of peak. Away from the peak the paint falls far
-/// faster, which the library says.
+/// The flakes of the model peak at the height of a measured flake paint. Away from the peak the paint falls far faster,
+/// which a comment in the library states.
 #[test]
 fn silver_flakes_peak_like_a_measured_silver_paint() {
     let Some(data) = data() else { return };
@@ -215,7 +214,7 @@ fn silver_flakes_peak_like_a_measured_silver_paint() {
     }
 }
 
-/// Every real curve at hand, offered as a measurement of one of our prints: refused only for the reason that it makes light.
+/// Every real curve in the data, read as a measurement of a print. The only allowed error is that it creates light.
 #[test]
 fn real_measurements_are_read_and_judged_by_their_energy() {
     let Some(data) = data() else { return };

@@ -12,7 +12,7 @@ fn broken(library: &Library, text: &str) -> Vec<String> {
     library.broken_rules(&stack(text)).iter().map(|rule| rule.name.clone()).collect()
 }
 
-/// A library based on the built-in one, with this text behind it.
+/// A library based on the built-in one, with this text appended.
 fn based(text: &str) -> Result<Library, LibraryError> {
     let folder = tempfile::tempdir().unwrap();
     let text = format!("format = 1\nbased_on = \"built-in\"\n{text}");
@@ -95,7 +95,7 @@ fn a_rule_given_twice_is_named_with_its_line() {
 }
 
 #[test]
-fn a_stack_that_a_rule_forbids_is_not_at_hand() {
+fn a_stack_that_a_rule_forbids_is_not_available() {
     let text = rule("no-finish-on-flakes", "error", "over = \"finish\"\nunder = \"metallic\"");
     let (library, builtin) = (based(&text).unwrap(), Library::builtin());
     let names = |library: &Library| -> Vec<String> {

@@ -1,12 +1,12 @@
-//! The inks: one cassette each, with the two numbers the machine knows it by.
+//! The inks: one cartridge each, with the two numbers by which the printer knows it.
 //!
-//! The *ink code* stands in the ink-select command of a job; the *barcode* is printed on the cassette and
-//! stands in the cassette list and in the printer's status. They are different numbers.
+//! The *ink code* is in the ink-select command of a job. The *barcode* is printed on the cartridge and is in the cartridge
+//! list and in the printer's status. They are different numbers.
 //! Sources: streams of the established open driver (codes of process inks, metallics, white, finish, primer),
 //! observation on hardware (black, cyan, magenta, yellow, white, finish, primer), vendor driver data
 //! (barcodes, the foils' codes, which no captured stream confirms).
 
-/// An ink this project prints with. The order is that of the machine's ink codes.
+/// An ink this project prints with, in the order of the printer's ink codes.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 #[repr(u8)]
 pub enum Ink {
@@ -38,7 +38,7 @@ pub enum Ink {
     SilverFoil,
 }
 
-/// What an ink is made of, as far as the order and the size of its dots depend on it.
+/// The material of an ink, as far as the order and the size of its dots depend on it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// Transparent colour: cyan, magenta, yellow, black. The only inks that may print at 1200 dpi.
@@ -109,12 +109,12 @@ impl Ink {
         &TABLE[self as usize]
     }
 
-    /// The name used in files and on the command line, such as `metallic-silver`.
+    /// The name for people and in files, such as `metallic-silver`.
     pub fn name(self) -> &'static str {
         self.row().name
     }
 
-    /// The one- or two-letter name used in stacks, such as `MS`.
+    /// The one- or two-letter name in stacks, such as `MS`.
     pub fn short(self) -> &'static str {
         self.row().short
     }
@@ -124,17 +124,17 @@ impl Ink {
         self.row().code
     }
 
-    /// The number on the cassette, in the cassette list and in the printer's status.
+    /// The number on the cartridge, in the cartridge list and in the printer's status.
     pub fn barcode(self) -> u8 {
         self.row().barcode
     }
 
-    /// The vendor's part number of the cassette.
+    /// The vendor's part number of the cartridge.
     pub fn part(self) -> &'static str {
         self.row().part
     }
 
-    /// What the ink is made of.
+    /// The material of the ink.
     pub fn kind(self) -> Kind {
         self.row().kind
     }
@@ -144,12 +144,12 @@ impl Ink {
         TABLE.iter().find(|row| row.code == code).map(|row| row.ink)
     }
 
-    /// The ink on the cassette with this barcode.
+    /// The ink on the cartridge with this barcode.
     pub fn from_barcode(barcode: u8) -> Option<Ink> {
         TABLE.iter().find(|row| row.barcode == barcode).map(|row| row.ink)
     }
 
-    /// The ink with this long or short name; upper and lower case are the same.
+    /// The ink with this long or short name, in upper or lower case.
     pub fn from_name(name: &str) -> Option<Ink> {
         TABLE
             .iter()

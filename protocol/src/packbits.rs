@@ -1,21 +1,21 @@
 //! PackBits as the printer's established driver writes it.
 //!
 //! Problem: many byte sequences unpack to the same row, and ours must equal the driver's byte for byte.
-//! Method: cut the row into runs of one byte and runs of changing bytes exactly as that driver does (a run never
-//! grows beyond 128, the first of several equal bytes after a literal stays in the literal), join neighbouring
-//! literals while they stay within 128, write each with its header.
-//! Cost: one walk over the row, no memory beside the output.
-//! Limits: header `80` is never written, and refused when read: drivers disagree about its meaning.
-//! Source: streams of the established driver, all of which come out again byte for byte.
+//! Method: cut the row into runs of one byte and runs of changing bytes exactly as that driver does (a run never grows
+//! beyond 128 bytes; the first of several equal bytes after a literal stays in the literal), join neighbouring literals
+//! while they stay within 128 bytes, and write each with its header.
+//! Cost: one walk over the row, no memory besides the output.
+//! Limits: header `80` is never written, and refused when read, because drivers disagree about its meaning.
+//! Source: streams of the established driver, all of which this module reproduces byte for byte.
 
 /// The longest run one header can stand for.
 const LONGEST: usize = 128;
 
-/// Whether eight bytes are looked at together. A microcontroller that loads them one by one is slower that way.
+/// Whether to compare eight bytes at a time. A microcontroller loads them one by one and is slower that way.
 const WIDE: bool = cfg!(target_pointer_width = "64");
 
-/// Packs `row` into `out`. Returns the bytes written, or `None` when `out` is too small for the result; then the
-/// content of `out` is arbitrary. An `out` one byte shorter than `row` therefore asks for a *gain*.
+/// Packs `row` into `out`. Returns the number of bytes written, or `None` if `out` is too small for the result; the
+/// content of `out` is arbitrary then. With an `out` one byte shorter than `row`, `Some` means that packing gained.
 pub fn pack_into(row: &[u8], out: &mut [u8]) -> Option<usize> {
     let mut written = 0;
     // The joined literal not written yet: row[literal..at].
@@ -25,8 +25,12 @@ pub fn pack_into(row: &[u8], out: &mut [u8]) -> Option<usize> {
         let (length, repeat) = segment(&row[at..]);
         if repeat {
             written = put_literal(&row[literal..at], out, written)?;
-            // length is 2..=128, so the header is 255 down to 129.
-            *out.get_mut(written)? = (257 - length) as u8;
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "the length is 2 to 128, so the header 255 to 129"
+            )]
+            let header = (257 - length) as u8;
+            *out.get_mut(written)? = header;
             *out.get_mut(written + 1)? = row[at];
             written += 2;
             literal = at + length;
@@ -86,7 +90,9 @@ fn put_literal(bytes: &[u8], out: &mut [u8], at: usize) -> Option<usize> {
     }
     let end = at + 1 + bytes.len();
     let place = out.get_mut(at..end)?;
-    place[0] = (bytes.len() - 1) as u8;
+    #[expect(clippy::cast_possible_truncation, reason = "a literal has 1 to 128 bytes")]
+    let header = (bytes.len() - 1) as u8;
+    place[0] = header;
     place[1..].copy_from_slice(bytes);
     Some(end)
 }
@@ -105,7 +111,7 @@ pub struct Error {
 pub enum ErrorKind {
     /// Header `80`.
     ReservedHeader,
-    /// The bytes the header announces are not there.
+    /// The bytes that the header announces are missing.
     CutOff,
     /// The row is longer than the room for it.
     TooLong,

@@ -1,13 +1,13 @@
-//! Paper: the codes of the printer's language and the area that can be printed.
+//! Paper: the codes of the printer's language and the printable area.
 //!
-//! Lengths are in dots of 1/600 inch. The machine itself enforces the left and top margins: a mark at (0, 0)
-//! lands at (`left`, `top`) from the sheet's corner. Source: the established open driver's table, checked on
-//! hardware for all but legal.
+//! Lengths are in dots of 1/600 inch. The printer itself enforces the left and top margins: a dot at (0, 0) lands at
+//! (`left`, `top`) from the sheet's corner. Source: the established open driver's table, checked on hardware for all
+//! papers but legal.
 
-/// A sheet the machine knows by a code. Dye-sub labels are left out on purpose: they need dye-sub media.
+/// A sheet that the printer knows by a code. Dye-sub labels are left out because they need dye-sub media.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Paper {
-    /// Any size up to the machine's width, given as the printable area in dots.
+    /// Any size up to the printer's width, given as the printable area in dots.
     Custom {
         /// Printable width.
         width: u16,
@@ -62,12 +62,12 @@ impl Paper {
         TABLE.iter().find(|row| row.paper == self)
     }
 
-    /// The name used on the command line.
+    /// The name for people and in files.
     pub fn name(self) -> &'static str {
         self.row().map_or("custom", |row| row.name)
     }
 
-    /// The paper of that name; upper and lower case are the same.
+    /// The paper of that name, in upper or lower case.
     pub fn from_name(name: &str) -> Option<Paper> {
         TABLE.iter().find(|row| row.name.eq_ignore_ascii_case(name)).map(|row| row.paper)
     }

@@ -1,19 +1,19 @@
-//! The printer's answer to the status question: 38 bytes about its state, its cassettes and its errors.
+//! The printer's answer to the status question: 38 bytes about its state, its cartridges and its errors.
 //!
 //! ```text
 //! 02 80 length(2) state { entry(3) } errors(5) 03        length = 33, nine entries
 //! ```
 //!
-//! The question is `05 01`, put only before a job or after its last byte. Layout as the established open driver's
-//! tool reads it, checked against answers recorded from the hardware. The second and third byte of an entry look
-//! like a level of ribbon and are none: they go up and down.
+//! The question is `05 01`, asked only before a job or after its last byte. The layout is that of the established open
+//! driver's tool, checked against answers recorded from the hardware. The second and third byte of an entry look like the
+//! level of the ribbon but are not: they rise and fall.
 
 use crate::ink::Ink;
 
 /// Length of an answer.
 pub const LENGTH: usize = 38;
 
-/// Cassette places: four above, four below, and the one on the carriage.
+/// Cartridge places: four above, four below, and the one on the carriage.
 pub const PLACES: usize = 9;
 
 /// An answer.
@@ -28,37 +28,37 @@ pub struct Status {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NotAStatus;
 
-/// What is in a place.
+/// What a cartridge place holds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Place {
     /// Nothing.
     Empty,
-    /// A cassette with this barcode.
+    /// A cartridge with this barcode.
     Loaded(u8),
-    /// One whose ribbon is in backwards.
+    /// One inserted backwards.
     Backwards(u8),
     /// One whose ribbon is at its end.
     AtEnd(u8),
 }
 
-/// An error, as the printer tells it; its cause may be another.
+/// An error, as the printer reports it; the real cause may differ.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Complaint {
     /// A motor: which one is in the bits.
     Motor {
-        /// 80 cassette changer, 40 carriage, 20 bail arm, 10 line feed, 08 feeder, 04 anti-curl.
+        /// Hexadecimal: 80 cartridge changer, 40 carriage, 20 bail arm, 10 line feed, 08 feeder, 04 anti-curl.
         units: u8,
     },
     /// The cover is open.
     CoverOpen,
-    /// The settings memory.
+    /// The settings memory has failed.
     Memory,
-    /// No sheet to take.
+    /// There is no sheet to feed.
     NoPaper {
         /// In the manual slot; otherwise in the tray.
         manual: bool,
     },
-    /// The sheet is shorter than the job says.
+    /// The sheet is shorter than the job declares.
     WrongSize {
         /// From the manual slot; otherwise from the tray.
         manual: bool,
@@ -72,19 +72,19 @@ pub enum Complaint {
     RibbonEnd,
     /// A ribbon is torn.
     RibbonBreak,
-    /// Two cassettes for one place.
+    /// Two cartridges for one place.
     PlaceOccupied,
-    /// A pass needs a cassette that is not loaded.
-    WrongCassette {
-        /// The barcode of the cassette wanted.
+    /// A pass needs a cartridge that is not loaded.
+    WrongCartridge {
+        /// The barcode of the cartridge wanted.
         wanted: u8,
     },
-    /// Something about the cassettes that is not known.
-    Cassette,
+    /// An unknown error of a cartridge.
+    Cartridge,
 }
 
 impl Status {
-    /// The answer in these bytes, which must be exactly one.
+    /// Reads an answer. The bytes must be exactly one.
     pub fn parse(bytes: &[u8]) -> Result<Status, NotAStatus> {
         let [0x02, 0x80, 33, 0, state, rest @ ..] = bytes else { return Err(NotAStatus) };
         let Some((entries, [e0, e1, e2, e3, e4, 0x03])) = rest.split_at_checked(3 * PLACES) else {
@@ -97,34 +97,34 @@ impl Status {
         Ok(Status { state: *state, entries: first, errors: [*e0, *e1, *e2, *e3, *e4] })
     }
 
-    /// Not on line.
+    /// Whether the printer is off line.
     pub fn off_line(&self) -> bool {
         self.state & 0x80 != 0
     }
 
-    /// Stopped by an error. The places are then those of before the error, and no ink must be called missing by
-    /// them.
+    /// Whether an error has stopped the printer. The places are then those from before the error, and do not tell whether
+    /// an ink is missing.
     pub fn in_error(&self) -> bool {
         self.state & 0xc0 == 0xc0
     }
 
-    /// Printing, which goes on for long after the last byte of a job.
+    /// Whether the printer is printing, which continues for long after the last byte of a job.
     pub fn printing(&self) -> bool {
         self.state & 0x08 != 0
     }
 
-    /// The feed lever stands at automatic; otherwise at manual.
+    /// Whether the feed lever is set to automatic, and not to manual.
     pub fn automatic_feed(&self) -> bool {
         self.state & 0x10 != 0
     }
 
-    /// There are data in the printer.
+    /// Whether there are data in the printer.
     pub fn has_data(&self) -> bool {
         self.state & 0x01 != 0
     }
 
-    /// The places: upper 1 to 4, lower 1 to 4, carriage. The carousel turns, so a cassette is found by its
-    /// barcode and not by its place.
+    /// The places: upper 1 to 4, lower 1 to 4, carriage. The carousel turns, so find a cartridge by its barcode and not by
+    /// its place.
     pub fn places(&self) -> [Place; PLACES] {
         self.entries.map(|entry| match (entry, entry & 0x3f) {
             (0xff, _) => Place::Empty,
@@ -135,31 +135,31 @@ impl Status {
         })
     }
 
-    /// Whether a cassette of this ink can be printed with; `None` while the printer is in error and does not say.
+    /// Whether a usable cartridge of this ink is loaded; `None` while the printer is in error, for then it does not tell.
     pub fn has(&self, ink: Ink) -> Option<bool> {
         (!self.in_error()).then(|| self.places().contains(&Place::Loaded(ink.barcode())))
     }
 
-    /// What the printer complains of; nothing unless it is in error.
+    /// The errors that the printer reports; none unless it is in error.
     pub fn complaints(&self) -> impl Iterator<Item = Complaint> + use<> {
         let [e0, e1, e2, e3, e4] = if self.in_error() { self.errors } else { [0; 5] };
         let manual = e2 & 0x40 != 0;
-        let cassette = match (e3 & 7) >> 1 {
+        let cartridge = match (e3 & 7) >> 1 {
             2 => Complaint::PlaceOccupied,
-            3 => Complaint::WrongCassette { wanted: e3 >> 3 },
-            _ => Complaint::Cassette,
+            3 => Complaint::WrongCartridge { wanted: e3 >> 3 },
+            _ => Complaint::Cartridge,
         };
         [
             (e0 & 0x80 != 0, Complaint::Motor { units: e4 }),
             (e0 & 0x40 != 0, Complaint::CoverOpen),
             (e0 & 0x01 != 0, Complaint::Memory),
-            // Without paper the size is wrong too; that would be no news.
+            // Without paper the size is wrong too; that adds nothing.
             (e1 & 0x80 != 0 && e2 & 0x80 == 0, Complaint::NoPaper { manual }),
             (e2 & 0x80 != 0, Complaint::WrongSize { manual }),
             (e1 & 0x40 != 0, Complaint::Jam { at_exit: e2 & 0x08 != 0 }),
             (e1 & 0x20 != 0, Complaint::RibbonEnd),
             (e1 & 0x02 != 0, Complaint::RibbonBreak),
-            (e1 & 0x10 != 0, cassette),
+            (e1 & 0x10 != 0, cartridge),
         ]
         .into_iter()
         .filter_map(|(is, complaint)| is.then_some(complaint))
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cassettes_of_an_idle_printer_are_found_by_their_barcodes() {
+    fn the_cartridges_of_an_idle_printer_are_found_by_their_barcodes() {
         let status = Status::parse(&IDLE).unwrap();
         assert!(!status.off_line() && !status.in_error() && !status.printing() && !status.has_data());
         for (ink, there) in [(Ink::Cyan, true), (Ink::Magenta, true), (Ink::Black, true), (Ink::White, false)]
@@ -203,7 +203,7 @@ mod tests {
         // In the order of the recordings: a missing white, a sheet too short, a jam at the exit, the changer.
         let mismatch = with(0xc9, [0x00, 0x10, 0x00, 0x86, 0x00]);
         let complaints: Vec<_> = mismatch.complaints().collect();
-        assert_eq!(complaints, [Complaint::WrongCassette { wanted: Ink::White.barcode() }]);
+        assert_eq!(complaints, [Complaint::WrongCartridge { wanted: Ink::White.barcode() }]);
         assert_eq!(mismatch.has(Ink::Cyan), None, "stale entries");
         assert!(with(0xc0, [0, 0x80, 0x80, 0, 0]).complaints().eq([Complaint::WrongSize { manual: false }]));
         let jam = with(0xd9, [0, 0xc0, 0x08, 0, 0]);

@@ -4,7 +4,7 @@ use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
 use inks::Stack;
 use observe::Silent;
-use press::halftone::{Placement, Settings, halftone};
+use press::halftone::{Settings, halftone};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use std::sync::OnceLock;
@@ -37,11 +37,11 @@ pub fn clustered((width, height): (usize, usize), scale: (f64, f64), paper: Pape
     let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { ONE } else { 0 }).collect()).collect();
     let maps = WeightMaps::new(width, height, count, data).expect("quantised");
     let mix = InkMix { stacks: stacks.collect(), maps, matrix };
-    let page = Placement { paper, x: 0, y: 0, width: paper.width(), height: paper.length() };
-    let sheet = halftone(&mix, &page, &Settings::uniform(count, 8), &Silent).expect("a page");
+    let page = (paper.width(), paper.length());
+    let map = halftone(&mix, page, &Settings::uniform(count, 8), &Silent).expect("a page");
     (1..9u8)
         .map(|ink| {
-            let dots = sheet.index().chunks_exact(8);
+            let dots = map.index().chunks_exact(8);
             dots.map(|dots| dots.iter().fold(0, |byte, &stack| byte << 1 | u8::from(stack == ink))).collect()
         })
         .collect()

@@ -5,7 +5,7 @@ use appearance::weights::{WeightMaps, quantise};
 use bridge::engine::{Engine, Identity, Memory};
 use inks::Stack;
 use observe::Silent;
-use press::halftone::{Placement, Settings, halftone};
+use press::halftone::{Settings, halftone};
 use press::job::stream::write_job;
 use press::separate::{Pass, separate};
 use press::sheet::Sheet;
@@ -38,8 +38,10 @@ fn sheet() -> Sheet {
     }
     let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { 1 << 15 } else { 0 }).collect()).collect();
     let mix = InkMix { stacks, maps: WeightMaps::new(width, height, count, data).unwrap(), matrix };
-    let place = Placement { paper: PAPER, x: 0, y: 0, width: 900, height: 610 };
-    halftone(&mix, &place, &Settings::uniform(count, 9), &Silent).unwrap()
+    let page = (PAPER.width(), PAPER.length());
+    let dots = halftone(&mix, page, &Settings::uniform(count, 9), &Silent).unwrap();
+    let (stacks, index) = dots.into_parts();
+    Sheet::new(PAPER, stacks, index).unwrap()
 }
 
 /// The job's data for the bridge.

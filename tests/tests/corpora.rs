@@ -1,8 +1,5 @@
 //! Everything the fuzzer has found worth keeping, tried again: the same checks without the fuzzer.
 
-#[path = "../../fuzz/properties/mod.rs"]
-mod properties;
-
 use std::path::Path;
 
 fn replay(target: &str, check: fn(&[u8])) {

@@ -1,18 +1,27 @@
 //! Every sample, and every real document at hand, becomes a job that the simulated printer prints dot for dot.
 //!
-//! [`pipeline::print`] itself refuses a sheet that differs from the one sent; what is asserted here is asserted of
-//! what came out of the printer. Real documents stand in the folder named by `FOILPRESS_DATA`.
+//! [`Job::prove`] itself refuses a sheet that differs from the page; what is asserted here is asserted of what came out
+//! of the printer. Real documents stand in the folder named by `FOILPRESS_DATA`.
 
 use appearance::document::{self, Options};
 use appearance::gamut::{self, Intent};
 use appearance::{factor, sample};
 use inks::{InkSet, Library, Stack};
 use observe::Silent;
-use press::job::placement::Size;
-use press::layout::Layout;
-use press::pipeline::{self, Print, Settings};
+use press::job::Handling;
+use press::layout::{Layout, Size};
+use press::pipeline::document::{Halftoned, Settings, halftoned};
+use press::pipeline::{self, Job, Request};
+use press::sheet::Sheet;
 use protocol::paper::Paper;
 use protocol::rgl::Media;
+
+/// A document, its job, and the sheet that the simulated printer made of it.
+struct Print {
+    halftoned: Halftoned,
+    job: Job,
+    printed: Sheet,
+}
 
 fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
     let document =
@@ -21,13 +30,23 @@ fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
         factor: factor::Settings { bases: Some(4), ..Default::default() },
         gamut: gamut::Settings { intent, ..Default::default() },
         inks,
-        layout: Layout::centred(Paper::Postcard),
-        media: Media::Plain,
-        curl_correction: true,
         size: Some(Size { width: 80.0, height: Some(80.0) }),
     };
-    pipeline::print(&document, &Library::builtin(), &settings, &Silent)
-        .unwrap_or_else(|e| panic!("{spec}: {e}"))
+    let (layout, library) = (Layout::centred(Paper::Postcard), Library::builtin());
+    let halftoned =
+        halftoned(&document, &library, &settings, &layout, &Silent).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    let request = Request {
+        name: &document.name,
+        dots: &halftoned.dots,
+        layout: &layout,
+        handling: Handling { media: Media::Plain, curl_correction: true },
+        allowed: inks,
+        library: &library,
+    };
+    let job = pipeline::job(&request, &Silent).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    let printout = job.prove(&Silent).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    let printed = printout.sheet_with(job.draft.sheet.stacks()).unwrap_or_else(|e| panic!("{spec}: {e}"));
+    Print { halftoned, job, printed }
 }
 
 /// What must be true of any sheet that comes out of the printer.
@@ -44,21 +63,22 @@ fn check(spec: &str, print: &Print, inks: InkSet) {
     for stack in &used {
         assert!(inks.contains_all(stack.layers()), "{spec}: `{stack}` needs an ink that is not at hand");
         assert!(library.entry(stack).is_some(), "{spec}: `{stack}` is no stack of the library");
-        assert!(print.mapped.mix.stacks.contains(stack), "{spec}: `{stack}` was not asked for");
+        assert!(print.halftoned.mapped.mix.stacks.contains(stack), "{spec}: `{stack}` was not asked for");
     }
     assert!(used.len() > 1, "{spec}: something is printed");
     let cartridges = InkSet::of(used.iter().flat_map(|stack| stack.layers().iter().copied()));
     assert!(cartridges.len() <= 7, "{spec}: {} cartridges", cartridges.len());
 
     // Outside its rectangle the sheet is bare; inside, every stack has the share the mix asks for.
-    let place = &print.placement;
+    let [place] = print.job.draft.laid.copies[..] else { panic!("{spec}: one copy") };
+    assert_eq!((place.width, place.length), (print.halftoned.dots.width(), print.halftoned.dots.length()));
     let inside = |dot: usize| {
         let (x, y) = (dot % sheet.width(), dot / sheet.width());
-        (usize::from(place.x)..usize::from(place.x + place.width)).contains(&x)
-            && (usize::from(place.y)..usize::from(place.y + place.height)).contains(&y)
+        (place.left..place.left + place.width).contains(&x)
+            && (place.top..place.top + place.length).contains(&y)
     };
     assert!(sheet.index().iter().enumerate().all(|(dot, &stack)| stack == 0 || inside(dot)), "{spec}");
-    let mix = &print.mapped.mix;
+    let mix = &print.halftoned.mapped.mix;
     let pixels = (mix.maps.width() * mix.maps.height()) as f64;
     let mut asked = vec![0.0; mix.stacks.len()];
     for weights in mix.maps.data().chunks_exact(mix.maps.channels()) {
@@ -68,7 +88,7 @@ fn check(spec: &str, print: &Print, inks: InkSet) {
             }
         }
     }
-    let dots = f64::from(place.width) * f64::from(place.height);
+    let dots = (place.width * place.length) as f64;
     let outside = (sheet.index().len() as f64) - dots;
     for (stack, (count, asked)) in sheet.stacks().iter().zip(sheet.census().into_iter().zip(asked)) {
         let bare = if stack.layers().is_empty() { outside } else { 0.0 };
@@ -105,11 +125,8 @@ fn a_document_prints_pixel_by_pixel() {
 
 #[test]
 fn every_real_document_prints() {
-    let Some(data) = std::env::var_os("FOILPRESS_DATA") else {
-        println!("skipped: FOILPRESS_DATA names no folder");
-        return;
-    };
-    let folder = std::path::Path::new(&data).join("svbrdf");
+    let Some(data) = testing::needs::data() else { return };
+    let folder = data.join("svbrdf");
     let documents: Vec<_> = std::fs::read_dir(&folder).expect("the real documents").flatten().collect();
     assert!(!documents.is_empty(), "{} is empty", folder.display());
     for document in documents {

@@ -1,9 +1,7 @@
 //! The established driver's streams: read, written back, and made again from their images.
 //!
-//! The streams and images stand in the folder that `FOILPRESS_GOLDEN` names; without it the tests say that they are
-//! skipped. What each stream was made of is said in that folder's README.
-
-use std::path::PathBuf;
+//! The streams and images are in the folder that `FOILPRESS_GOLDEN` names; without it the tests are left out. The folder's
+//! README says what each stream was made of.
 
 use observe::Silent;
 use press::inspect::inspect;
@@ -12,14 +10,7 @@ use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::encode::encode_into;
 use protocol::rgl::{JobSetup, JobWriter, Order, Page, Resolution, Step, parse};
-
-fn folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("FOILPRESS_GOLDEN").map(PathBuf::from);
-    if folder.is_none() {
-        eprintln!("skipped: FOILPRESS_GOLDEN names no folder with the driver's streams");
-    }
-    folder
-}
+use testing::needs::golden as folder;
 
 /// Which plane of the image a pass prints.
 #[derive(Clone, Copy)]

@@ -8,19 +8,11 @@ use appearance::brdf::{Space, Table};
 use inks::Curve;
 use observe::Silent;
 use press::preview::{Probe, Radiance, sphere};
+use testing::needs::{self, Need};
 
 /// Where the reference is, if it can run here.
 fn reference() -> Option<PathBuf> {
-    let Ok(script) = std::env::var("FOILPRESS_REFERENCE") else {
-        println!("skipped: FOILPRESS_REFERENCE is not set");
-        return None;
-    };
-    let numpy = Command::new("python3").args(["-c", "import numpy"]).output();
-    if !numpy.is_ok_and(|out| out.status.success()) {
-        println!("skipped: no python3 with NumPy");
-        return None;
-    }
-    Some(PathBuf::from(script))
+    needs::path(Need::Reference, "FOILPRESS_REFERENCE").filter(|_| needs::numpy())
 }
 
 /// Diffuse reflectance, F0 and width as a curve of the working grid, so that both sides interpolate the same samples.

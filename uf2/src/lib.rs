@@ -1,153 +1,161 @@
-//! UF2, the format in which a board's boot loader takes an image: made, read, and checked before anything is erased.
+//! UF2, the file format of boot loaders: writing, reading, and checking an image before anything is erased.
 //!
-//! A file is a row of 512-byte blocks, each with 256 bytes of the image, its own address and its own number, so that
-//! they may arrive in any order. The boot loader restarts the board when it has seen all of them, whatever was in
-//! them; so a reader that wants to be sure has to look first. [`decode`] takes one whole image for an RP2040 with the
-//! flash of a Pico and nothing else; [`Image::check_boot`] says whether the boot ROM would start it.
+//! A file is a sequence of 512-byte blocks. Each contains 256 bytes of the image, their address and the number of the block,
+//! so blocks can arrive in any order. The boot loader restarts the board once it has received all blocks, whatever they
+//! contain, so a file must be checked first. [`decode`] accepts exactly one complete image for an RP2040 with the flash of a
+//! Pico; [`Image::check_boot`] checks that the boot ROM would start it.
 //!
-//! The format has no checksum. [`encode`] writes one of each block behind its page, into bytes that boot loaders do not look
-//! at, and [`decode`] holds a file that has any to all of them.
+//! The format has no checksum. [`encode`] adds one to each block after its page, in bytes that boot loaders ignore. If any
+//! block of a file has a checksum, [`decode`] requires a correct one in every block.
 //!
-//! Cost: two passes over the file, a copy of its pages. Limits: no other chips, no files of several chips, none of the
-//! format's extensions; the linker and the usual tools write none of these for the RP2040.
+//! Cost: two passes over the file and a copy of its pages. Limits: no other chips, no files for several chips, no
+//! extensions of the format; the linker and the usual tools do not use these for the RP2040.
 //! Source: Microsoft's description of UF2; RP2040 data sheet, 2.8.1.3.1 (checksum) and 2.8.4 (UF2).
+#![forbid(unsafe_code)]
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss
+)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crc::{CRC_32_ISO_HDLC, CRC_32_MPEG_2, Crc};
 
-/// Bytes of the image in one block, which is a page of the flash.
-pub const PAGE: usize = 256;
-/// Bytes of one block in the file.
+/// Bytes of the image in one block: a page of the flash.
+pub const PAGE: usize = PAGE_BYTES as usize;
+const PAGE_BYTES: u32 = 256;
+/// Bytes of a block in the file.
 pub const BLOCK: usize = 512;
-/// Bytes of flash that are erased at once.
+/// Bytes of flash that are erased together.
 pub const SECTOR: u32 = 4096;
 /// The flash of a Pico, 2 MiB, as the processor sees it.
 pub const FLASH: Range<u32> = 0x1000_0000..0x1020_0000;
-/// The longest file there can be: every page of the flash once.
+/// The largest possible file: every page of the flash once.
 pub const LARGEST_FILE: usize = (FLASH.end - FLASH.start) as usize / PAGE * BLOCK;
 
 const MAGIC: [u32; 3] = [0x0A32_4655, 0x9E5D_5157, 0x0AB1_6F30];
-/// Stands behind the page, before the checksum of everything in front of it.
+/// Marks the checksum, which follows it and covers everything before the mark.
 const CHECKED: u32 = 0x4352_4331;
-/// Where.
+/// Offset of the mark in a block.
 const CHECK: usize = 32 + PAGE;
 const FAMILY_PRESENT: u32 = 0x2000;
 const RP2040: u32 = 0xE48B_FF56;
-/// The chips of the Pico 2.
+/// The families of the RP2350 on the Pico 2.
 const RP2350: Range<u32> = 0xE48B_FF57..0xE48B_FF5C;
 const MEMORY: Range<u32> = 0x2000_0000..0x2004_2000;
-/// Where the vector table is: behind the second-stage boot loader.
-const VECTORS: u32 = FLASH.start + PAGE as u32;
+/// Address of the vector table, after the second-stage boot loader.
+const VECTORS: u32 = FLASH.start + PAGE_BYTES;
 
-/// What is wrong with an image or a file. Blocks are counted from 0 as they stand in the file.
+/// What is wrong with an image or a file. Blocks are counted from 0 in the order of the file.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Uf2Error {
-    /// Bytes that are not to be in flash.
+    /// Bytes outside the flash.
     #[error(
-        "the image has {length} bytes at {address:#010x}, which is not all in the Pico's flash (0x10000000 to 0x10200000)"
+        "the image has {length} bytes at {address:#010x}, at least partly outside the Pico's flash (0x10000000 to 0x10200000)"
     )]
     NotFlash {
-        /// Where they begin.
+        /// Address of the first.
         address: u64,
-        /// How many.
+        /// Number of bytes.
         length: usize,
     },
-    /// Two values for one byte.
+    /// Two parts of the image share a byte.
     #[error("two parts of the image overlap at {0:#010x}")]
     Overlap(u32),
-    /// Nothing.
+    /// The file is empty.
     #[error("the file is empty")]
     Empty,
-    /// More than fits the flash.
-    #[error("the file has {0} bytes; the largest image for a Pico has {LARGEST_FILE}")]
+    /// More than fits in the flash.
+    #[error("the file has {0} bytes; the largest file for a Pico has {LARGEST_FILE}")]
     TooLarge(usize),
-    /// Cut off, or not made of blocks.
-    #[error("the file has {0} bytes, which is no whole number of 512-byte blocks; was it copied to its end?")]
+    /// The file is truncated, or not made of blocks.
+    #[error("the file has {0} bytes, which is not a multiple of 512; was it copied completely?")]
     Length(usize),
     /// Not a block.
-    #[error("block {0} does not begin and end as UF2 blocks do: no UF2 file, or a damaged one")]
+    #[error("block {0} is not a UF2 block: this is not a UF2 file, or it is damaged")]
     Magic(usize),
-    /// For another chip.
+    /// The block is for another chip.
     #[error("block {at} is for {}, not for the Pico's RP2040", chip(*.family))]
     Family {
-        /// Which block.
+        /// The block.
         at: usize,
-        /// Its chip, 0 if it names none.
+        /// Its family, 0 if it gives none.
         family: u32,
     },
-    /// Changed since it was made.
-    #[error("block {0} is damaged: its checksum is not that of its bytes; get the file anew")]
+    /// The block has changed since the file was written.
+    #[error("block {0} is damaged: its checksum does not match; download or build the file again")]
     Checksum(usize),
-    /// Something the boot ROM would not write.
+    /// The boot ROM would not write the block.
     #[error(
-        "block {at} is of a kind a Pico does not take (flags {flags:#x}, {size} bytes; 0x2000 and 256 are usual)"
+        "block {at} has flags {flags:#x} and {size} bytes, which a Pico does not accept; expected 0x2000 and 256"
     )]
     Kind {
-        /// Which block.
+        /// The block.
         at: usize,
         /// Its flags.
         flags: u32,
-        /// Bytes of the image in it.
+        /// Bytes of the image in the block.
         size: u32,
     },
-    /// Not a page of the flash.
+    /// The address is not a page of the flash.
     #[error(
-        "block {at} is for {address:#010x}, which is no page of the Pico's flash (0x10000000 to 0x10200000)"
+        "block {at} has the address {address:#010x}, which is not a page of the Pico's flash (0x10000000 to 0x10200000)"
     )]
     Address {
-        /// Which block.
+        /// The block.
         at: usize,
-        /// Where it is to go.
+        /// Its address.
         address: u32,
     },
     /// Blocks are missing, or there are too many.
     #[error(
-        "block {at} says that there are {total} blocks, but the file has {blocks}; was it copied to its end?"
+        "block {at} gives a total of {total} blocks, but the file has {blocks}; was it copied completely?"
     )]
     Total {
-        /// Which block.
+        /// The block.
         at: usize,
-        /// How many it says.
+        /// The total it gives.
         total: u32,
-        /// How many there are.
+        /// The blocks in the file.
         blocks: usize,
     },
-    /// A number twice, or one beyond the last.
-    #[error("block {at} has the number {number}, which {}", if *.twice { "another one has too" } else { "is beyond the last" })]
+    /// The number of a block occurs twice, or exceeds the last.
+    #[error("block {at} has the number {number}, which {}", if *.twice { "another block has too" } else { "exceeds the last number" })]
     Number {
-        /// Which block.
+        /// The block.
         at: usize,
         /// Its number.
         number: u32,
-        /// Another block has it.
+        /// Whether another block has it.
         twice: bool,
     },
-    /// A page twice.
-    #[error("block {at} is for {address:#010x}, as another one is")]
+    /// Two blocks are for the same page.
+    #[error("block {at} has the address {address:#010x}, which another block has too")]
     Twice {
-        /// Which block.
+        /// The block.
         at: usize,
-        /// The page.
+        /// The address.
         address: u32,
     },
     /// The first page is missing.
-    #[error("the image has nothing at 0x10000000, where the board starts")]
+    #[error("the image has no data at 0x10000000, where the board starts")]
     NoBoot,
     /// The boot ROM would not start it.
     #[error(
-        "the first 256 bytes have the checksum {found:#010x} where the boot ROM asks for {expected:#010x}: the board would not start"
+        "the first 256 bytes have the checksum {found:#010x}, but the boot ROM expects {expected:#010x}: the board would not start"
     )]
     BootChecksum {
-        /// Of the first 252 bytes.
+        /// The checksum of the first 252 bytes.
         expected: u32,
-        /// In the last four.
+        /// The checksum in the last four bytes.
         found: u32,
     },
-    /// The first page would start nothing.
-    #[error("the image has no program behind its first page (stack {stack:#010x}, start {start:#010x})")]
+    /// There is no program after the first page.
+    #[error("the image has no program after its first page (stack {stack:#010x}, start {start:#010x})")]
     NoProgram {
         /// The first word of the vector table.
         stack: u32,
@@ -158,48 +166,51 @@ pub enum Uf2Error {
 
 fn chip(family: u32) -> String {
     match family {
-        0 => "no chip in particular".into(),
+        0 => "an unspecified chip".into(),
         family if RP2350.contains(&family) => "the RP2350 of a Pico 2".into(),
         family => format!("another chip (family {family:#010x})"),
     }
 }
 
-/// What is to be in flash: pages of 256 bytes and where they go.
+/// The contents of the flash: pages of 256 bytes and their addresses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     pages: BTreeMap<u32, [u8; PAGE]>,
 }
 
 impl Image {
-    /// The pages in ascending order, each with its address, a multiple of 256.
+    /// The pages in ascending order, each with its address (a multiple of 256).
     pub fn pages(&self) -> impl ExactSizeIterator<Item = (u32, &[u8; PAGE])> {
         self.pages.iter().map(|(&address, page)| (address, page))
     }
 
-    /// The sectors it touches, in ascending order: addresses, multiples of 4096.
+    /// The addresses of its sectors (multiples of 4096), in ascending order.
     pub fn sectors(&self) -> BTreeSet<u32> {
         self.pages.keys().map(|page| page & !(SECTOR - 1)).collect()
     }
 
-    /// Its bytes from `address` on, at most `length` of them: those up to the first that is not part of it.
+    /// Its bytes from `address` on: at most `length`, and only up to the first address outside the image.
     pub fn read(&self, address: u32, length: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
+        let mut at = address;
         while bytes.len() < length {
-            // Cannot overflow: the last page ends below 0x1020_0000.
-            let at = address.wrapping_add(bytes.len() as u32);
-            let Some(page) = self.pages.get(&(at & !(PAGE as u32 - 1))) else { break };
-            let rest = &page[at as usize % PAGE..];
+            let start = page_of(at);
+            let Some(page) = self.pages.get(&start) else { break };
+            let rest = &page[(at - start) as usize..];
             bytes.extend_from_slice(&rest[..rest.len().min(length - bytes.len())]);
+            // Cannot overflow: the last page ends at 0x1020_0000.
+            at = start + PAGE_BYTES;
         }
         bytes
     }
 
-    /// A little-endian word of it.
+    /// The little-endian word at `address`, if the image contains it.
     pub fn word(&self, address: u32) -> Option<u32> {
         Some(u32::from_le_bytes(self.read(address, 4).try_into().ok()?))
     }
 
-    /// Whether the boot ROM would start it, and find a program: the checksum of the first page, and a vector table behind it.
+    /// Checks that the boot ROM would start it and find a program: the checksum of the first page, and a vector table
+    /// after it.
     pub fn check_boot(&self) -> Result<(), Uf2Error> {
         let first = self.pages.get(&FLASH.start).ok_or(Uf2Error::NoBoot)?;
         let expected = Crc::<u32>::new(&CRC_32_MPEG_2).checksum(&first[..PAGE - 4]);
@@ -208,7 +219,7 @@ impl Image {
             return Err(Uf2Error::BootChecksum { expected, found });
         }
         let (stack, start) = (self.word(VECTORS).unwrap_or(0), self.word(VECTORS + 4).unwrap_or(0));
-        // The stack grows downwards from its word; an odd address means Thumb code.
+        // The stack grows downward from this address; an odd start address means Thumb code.
         let sound = stack > MEMORY.start
             && stack <= MEMORY.end
             && stack.is_multiple_of(4)
@@ -218,18 +229,19 @@ impl Image {
     }
 }
 
-/// The file for an image given as pieces of flash. Gaps inside a sector are filled with ff, so that nothing depends
-/// on what the ROM does with pages it is not given.
+/// Writes a file from pieces of flash, each with its address. Gaps inside a sector are filled with ff, so that nothing
+/// depends on what the ROM does with missing pages.
 pub fn encode(pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
     let mut pages = BTreeMap::<u32, ([u8; PAGE], [bool; PAGE])>::new();
     for &(address, bytes) in pieces {
         let end = address.saturating_add(bytes.len() as u64);
-        if address < FLASH.start.into() || end > FLASH.end.into() {
+        let inside = |start: &u32| *start >= FLASH.start && end <= FLASH.end.into();
+        let Some(start) = u32::try_from(address).ok().filter(inside) else {
             return Err(Uf2Error::NotFlash { address, length: bytes.len() });
-        }
-        for (at, &byte) in (address as u32..).zip(bytes) {
-            let page = pages.entry(at & !(PAGE as u32 - 1)).or_insert(([0xff; PAGE], [false; PAGE]));
-            let offset = at as usize % PAGE;
+        };
+        for (at, &byte) in (start..).zip(bytes) {
+            let page = pages.entry(page_of(at)).or_insert(([0xff; PAGE], [false; PAGE]));
+            let offset = (at - page_of(at)) as usize;
             if std::mem::replace(&mut page.1[offset], true) {
                 return Err(Uf2Error::Overlap(at));
             }
@@ -242,23 +254,25 @@ pub fn encode(pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
             pages.entry(page).or_insert(([0xff; PAGE], [false; PAGE]));
         }
     }
-    let total = pages.len() as u32;
+    // At most 8192 pages.
+    let total = u32::try_from(pages.len()).unwrap_or(u32::MAX);
     let mut file = Vec::with_capacity(pages.len() * BLOCK);
-    for (number, (address, (bytes, _))) in pages.into_iter().enumerate() {
-        let words = [MAGIC[0], MAGIC[1], FAMILY_PRESENT, address, PAGE as u32, number as u32, total, RP2040];
+    for (number, (address, (bytes, _))) in (0..).zip(pages) {
+        let block = file.len();
+        let words = [MAGIC[0], MAGIC[1], FAMILY_PRESENT, address, PAGE_BYTES, number, total, RP2040];
         file.extend(words.iter().flat_map(|word| word.to_le_bytes()));
         file.extend(bytes);
-        let checksum = checksum(&file[number * BLOCK..]);
+        let checksum = checksum(&file[block..]);
         file.extend(CHECKED.to_le_bytes());
         file.extend(checksum.to_le_bytes());
-        file.resize((number + 1) * BLOCK - 4, 0);
+        file.resize(block + BLOCK - 4, 0);
         file.extend(MAGIC[2].to_le_bytes());
     }
     Ok(file)
 }
 
-/// The image in a file. Refuses anything that is not one whole image for a Pico: every block once, every page once,
-/// all of them inside the flash; and damaged ones, if [`encode`] made them.
+/// Reads the image in a file. Fails unless it is one complete image for a Pico: every block once, every page once, all of
+/// them inside the flash. Detects damage if [`encode`] wrote the file.
 pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
     if file.is_empty() {
         return Err(Uf2Error::Empty);
@@ -266,7 +280,7 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
     if file.len() > LARGEST_FILE {
         return Err(Uf2Error::TooLarge(file.len()));
     }
-    // A file that is something else is told so, whatever its length.
+    // Another format is recognised as such, whatever the length.
     if file.len() >= 8 && [word(file, 0), word(file, 4)] != MAGIC[..2] {
         return Err(Uf2Error::Magic(0));
     }
@@ -281,15 +295,15 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
             return Err(Uf2Error::Magic(at));
         }
         let [flags, address, size, number, total] = [8, 12, 16, 20, 24].map(|offset| word(block, offset));
-        // Without its flag the field means something else.
+        // Without this flag the field has another meaning.
         let family = if flags & FAMILY_PRESENT == 0 { 0 } else { word(block, 28) };
         if family != RP2040 {
             return Err(Uf2Error::Family { at, family });
         }
-        if flags != FAMILY_PRESENT || size != PAGE as u32 {
+        if flags != FAMILY_PRESENT || size != PAGE_BYTES {
             return Err(Uf2Error::Kind { at, flags, size });
         }
-        if !FLASH.contains(&address) || !address.is_multiple_of(PAGE as u32) {
+        if !FLASH.contains(&address) || !address.is_multiple_of(PAGE_BYTES) {
             return Err(Uf2Error::Address { at, address });
         }
         if total as usize != blocks {
@@ -305,7 +319,7 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
             return Err(Uf2Error::Twice { at, address });
         }
     }
-    // Last, so that what is wrong with a block is said more exactly if it can be.
+    // Last, because the checks above give more specific errors.
     let is_sound =
         |block: &[u8]| (word(block, CHECK), word(block, CHECK + 4)) == (CHECKED, checksum(&block[..CHECK]));
     if file.chunks_exact(BLOCK).any(|block| word(block, CHECK) == CHECKED)
@@ -316,11 +330,16 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
     Ok(Image { pages })
 }
 
+/// The address of the page that contains an address.
+fn page_of(address: u32) -> u32 {
+    address & !(PAGE_BYTES - 1)
+}
+
 fn checksum(bytes: &[u8]) -> u32 {
     Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(bytes)
 }
 
-/// The little-endian word at `offset`, which is inside `bytes`.
+/// The little-endian word at `offset`, which must be inside `bytes`.
 fn word(bytes: &[u8], offset: usize) -> u32 {
     u32::from_le_bytes([bytes[offset], bytes[offset + 1], bytes[offset + 2], bytes[offset + 3]])
 }

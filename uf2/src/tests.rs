@@ -1,10 +1,11 @@
-//! Against a second reading of the data sheet: what the boot ROM makes of a file.
+//! Compared with an independent model of the boot ROM, written from the data sheet.
+#![allow(clippy::cast_possible_truncation, reason = "test data is small")]
 
 use super::*;
 use proptest::prelude::*;
 
-/// What the boot ROM makes of a file that arrives block by block: a second reading of the data sheet. The flash
-/// afterwards, and whether the board restarts.
+/// A model of the boot ROM that receives a file block by block: changes the flash, and returns whether the board
+/// restarts.
 fn rom(file: &[u8], flash: &mut [u8]) -> bool {
     let (mut erased, mut seen) = (BTreeSet::new(), BTreeSet::new());
     let mut total = 0;
@@ -51,7 +52,7 @@ fn file() -> Vec<u8> {
 }
 
 #[test]
-fn the_first_block_is_what_the_format_says() {
+fn the_first_block_follows_the_format() {
     let file = encode(&[(0x1000_0000, b"boot")]).unwrap();
     let mut expected = b"UF2\n\x57\x51\x5d\x9e\x00\x20\x00\x00\x00\x00\x00\x10\x00\x01\x00\x00".to_vec();
     expected.extend(b"\x00\x00\x00\x00\x10\x00\x00\x00\x56\xff\x8b\xe4boot\xff");
@@ -87,7 +88,7 @@ fn an_image_that_the_boot_rom_starts_passes_and_a_damaged_first_page_does_not() 
 
 #[test]
 fn an_image_without_a_program_is_refused() {
-    // No vector table at all, a stack outside memory, a start that is no code, a start outside the image.
+    // No vector table, a stack outside memory, a start address that is not code, a start outside the image.
     for (stack, start) in [
         (0xffff_ffffu32, 0xffff_ffffu32),
         (0x3000_0000, 0x1000_0201),
@@ -106,7 +107,7 @@ fn an_image_without_a_program_is_refused() {
 fn a_file_with_any_bit_flipped_is_refused() {
     let file = file();
     for block in [0, 7, 15] {
-        // But for the zeros that mean nothing.
+        // Except for unused zeros.
         for byte in (0..CHECK + 8).chain(508..512) {
             for bit in 0..8 {
                 let mut broken = file.clone();
@@ -121,14 +122,14 @@ fn a_file_with_any_bit_flipped_is_refused() {
 }
 
 #[test]
-fn files_of_other_tools_have_no_checksums_and_are_taken() {
+fn files_of_other_tools_without_checksums_are_accepted() {
     let mut file = file();
     file.chunks_exact_mut(BLOCK).for_each(|block| block[32 + PAGE..508].fill(0));
     decode(&file).unwrap().check_boot().unwrap();
 }
 
 #[test]
-fn every_fault_is_told_by_name() {
+fn every_fault_has_its_error() {
     let file = file();
     let edited = |at: usize, field: usize, value: u32| {
         let mut file = file.clone();
@@ -160,7 +161,7 @@ fn every_fault_is_told_by_name() {
 
 proptest! {
     #[test]
-    fn what_was_encoded_is_decoded_and_what_the_boot_rom_would_write(
+    fn decoding_restores_the_image_and_agrees_with_the_boot_rom(
         start in 0u32..20_000,
         bytes in proptest::collection::vec(any::<u8>(), 1..9000),
         gap in 1u32..9000,
@@ -193,7 +194,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_accepted_is_what_the_boot_rom_would_write_whole(
+    fn accepted_files_are_written_completely_by_the_boot_rom(
         edits in proptest::collection::vec((0usize..16 * 512, any::<u8>()), 0..4),
     ) {
         let mut file = file();
@@ -211,7 +212,7 @@ proptest! {
     }
 
     #[test]
-    fn garbage_is_refused_and_never_a_panic(bytes in proptest::collection::vec(any::<u8>(), 0..2000)) {
+    fn garbage_is_an_error(bytes in proptest::collection::vec(any::<u8>(), 0..2000)) {
         prop_assert!(decode(&bytes).is_err());
     }
 

@@ -17,6 +17,7 @@ use protocol::walk::{EDGE, Walk};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use testing::needs::Need;
 
 /// What every use of the emulator needs.
 struct Bench {
@@ -34,7 +35,7 @@ impl Bench {
         fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
         let node = match Node::find(&folder) {
             Ok(node) => node,
-            Err(missing) => return tools::skip("the emulator", &missing).map(|()| None),
+            Err(missing) => return tools::skip(Need::Emulator, &format!("{missing:#}")).map(|()| None),
         };
         let image = firmware::build(root)?;
         let scripts = root.join("tests/emulator");
@@ -67,7 +68,7 @@ pub fn run(root: &Path) -> Result<()> {
     let usbfs = bench.folder.join("usbfs");
     let has_usb = match tools::usbfs(&bench.scripts.join("usbfs.c"), &usbfs) {
         Ok(()) => true,
-        Err(missing) => tools::skip("the program over USB", &missing).map(|()| false)?,
+        Err(missing) => tools::skip(Need::Usb, &format!("{missing:#}")).map(|()| false)?,
     };
     run_step("the program", cargo(&["build", "--package", "foilpress", "--locked"]).current_dir(root))?;
     // A test each for the board, the program and the printer: two at a time keep two cores at work.

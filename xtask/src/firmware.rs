@@ -1,9 +1,12 @@
 //! `cargo xtask firmware`: the bridge's image, and whether it is as small as it is to be.
 
-use crate::{BARE_METAL, cargo, elf};
+use crate::{cargo, elf};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
+
+/// Where the microcontroller's code is built for: Cortex-M0+, no atomics with compare-and-swap.
+pub const BARE_METAL: &str = "thumbv6m-none-eabi";
 
 /// Flash and static memory the image may take.
 struct Budget {

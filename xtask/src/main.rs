@@ -1,12 +1,11 @@
-//! The project's own chores, so that a person and the gate type the same words.
+//! The project's chores, so that a person and the gate run the same commands.
 //!
-//! `cargo xtask test` is the whole gate: formatting, lints, documents, every test, the bare-metal build of `protocol`
-//! and `bridge`, the firmware's image in its emulator, for which it fetches what is missing, and the Debian package where
-//! print queues can be tried. It runs every step, then says which failed.
+//! `cargo xtask test` is the whole gate ([`gate`]); the other tasks are its steps and what people do by hand.
 
 mod elf;
 mod emulator;
 mod firmware;
+mod gate;
 mod package;
 mod queue;
 mod tools;
@@ -14,16 +13,11 @@ mod tools;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
+use anyhow::{Context as _, ensure};
 use clap::{Parser, Subcommand};
 
-/// Where the microcontroller's code is built for: Cortex-M0+, no atomics with compare-and-swap.
-const BARE_METAL: &str = "thumbv6m-none-eabi";
-
-/// What the property tests' cases are drawn from.
-const PROPERTY_SEED: &str = "PROPTEST_RNG_SEED";
-
 #[derive(Parser)]
-#[command(name = "cargo xtask", about = "The project's own chores")]
+#[command(name = "cargo xtask", about = "Build, test and package the project")]
 struct Args {
     #[command(subcommand)]
     task: Task,
@@ -31,23 +25,23 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Format check, clippy, documents, all tests, bare-metal build, emulator: what has to pass before anything lands
+    /// Run everything that has to pass: format, lints, documents, all tests, emulator, print queues, package
     Test,
-    /// The benchmarks (results are ratios to read, not tests that pass)
+    /// Run the benchmarks
     Bench,
-    /// The bridge's image as UF2, its size against bridge/firmware/budget.toml
+    /// Build the bridge's firmware as UF2 and check its size against bridge/firmware/budget.toml
     Firmware,
-    /// The bridge's image on an emulated board: its tests, or with --serve a bridge for other programs
+    /// Test the firmware's image on an emulated board
     Emulator {
-        /// Shows the bridge on a serial port with a simulated printer behind it, until standard input ends
+        /// Serve a bridge with a simulated printer on a serial port instead, until standard input ends
         #[arg(long)]
         serve: bool,
     },
-    /// Print queues on a print server of their own, which is installed if need be (needs root)
+    /// Test print queues on a private print server; installs CUPS if it is missing (needs root)
     Queue,
-    /// The Debian package, tried in a root of its own, and as root on this machine, which is then as before
+    /// Build the Debian package, try it in a root of its own and, as root, on this computer
     Package {
-        /// Of the build that the tests make: slower, and ready sooner
+        /// Package the build that the tests make: slower, but ready sooner
         #[arg(long)]
         dev: bool,
     },
@@ -56,82 +50,15 @@ enum Task {
 fn main() -> ExitCode {
     // The workspace, wherever this was started from: it is the folder above this package.
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
-    let task = Args::parse().task;
-    let steps: Vec<(&str, Command)> = match task {
-        Task::Firmware => return finish(firmware::build(root).map(drop)),
-        Task::Emulator { serve: true } => return finish(emulator::serve(root)),
-        Task::Emulator { serve: false } => return finish(emulator::run(root)),
-        Task::Queue => return finish(queue::run()),
-        Task::Package { dev: false } => return finish(package::run(root, package::Profile::Release)),
-        Task::Package { dev: true } => return finish(package::run(root, package::Profile::Dev)),
-        Task::Test => vec![
-            ("bare-metal target", command("rustup", &["target", "add", BARE_METAL])),
-            ("formatting", cargo(&["fmt", "--all", "--check"])),
-            ("lints", cargo(&["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"])),
-            ("documents", {
-                let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
-                doc.env("RUSTDOCFLAGS", "-D warnings");
-                doc
-            }),
-            (
-                "bare-metal build",
-                cargo(&[
-                    "build",
-                    "--package",
-                    "foilpress-protocol",
-                    "--package",
-                    "foilpress-bridge",
-                    "--target",
-                    BARE_METAL,
-                    "--locked",
-                ]),
-            ),
-            ("tests", {
-                let mut test = cargo(&["test", "--workspace", "--locked", "--no-fail-fast"]);
-                // The gate answers the same for the same tree; `cargo test` by itself goes on looking at new cases.
-                if std::env::var_os(PROPERTY_SEED).is_none() {
-                    test.env(PROPERTY_SEED, "1");
-                }
-                test
-            }),
-        ],
-        Task::Bench => vec![("benchmarks", cargo(&["bench", "--workspace", "--locked"]))],
-    };
-
-    let mut failed = Vec::new();
-    if matches!(task, Task::Test)
-        && let Err(error) = queue::install()
-    {
-        // The tests then say that they are skipped, or fail where they have to run.
-        eprintln!("print queues and PDF: {error:#}");
-    }
-    for (name, mut step) in steps {
-        eprintln!("== {name}: {step:?}");
-        match step.status() {
-            Ok(status) if status.success() => {}
-            Ok(status) => failed.push(format!("{name} ({status})")),
-            Err(error) => failed.push(format!("{name} (cannot start: {error})")),
-        }
-    }
-    if matches!(task, Task::Test) {
-        eprintln!("== emulator");
-        if let Err(error) = emulator::run(root) {
-            failed.push(format!("emulator ({error:#})"));
-        }
-    }
-    // Its tests are those of the print queues: where they fail, the package would.
-    if matches!(task, Task::Test) && failed.is_empty() {
-        eprintln!("== package");
-        if let Err(error) = package::run_where_possible(root) {
-            failed.push(format!("package ({error:#})"));
-        }
-    }
-    if failed.is_empty() {
-        eprintln!("all steps passed");
-        ExitCode::SUCCESS
-    } else {
-        eprintln!("failed: {}", failed.join(", "));
-        ExitCode::FAILURE
+    match Args::parse().task {
+        Task::Test => gate::run(root),
+        Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),
+        Task::Firmware => finish(firmware::build(root).map(drop)),
+        Task::Emulator { serve: true } => finish(emulator::serve(root)),
+        Task::Emulator { serve: false } => finish(emulator::run(root)),
+        Task::Queue => finish(queue::run()),
+        Task::Package { dev: false } => finish(package::run(root, package::Profile::Release)),
+        Task::Package { dev: true } => finish(package::run(root, package::Profile::Dev)),
     }
 }
 
@@ -147,6 +74,12 @@ fn finish(result: anyhow::Result<()>) -> ExitCode {
 
 fn cargo(args: &[&str]) -> Command {
     command(&std::env::var("CARGO").unwrap_or_else(|_| "cargo".into()), args)
+}
+
+fn succeed(command: &mut Command) -> anyhow::Result<()> {
+    let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
+    ensure!(status.success(), "{command:?}: {status}");
+    Ok(())
 }
 
 fn command(program: &str, args: &[&str]) -> Command {

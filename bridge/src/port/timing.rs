@@ -51,6 +51,16 @@ impl Timing {
         Ok(Timing { setup, strobe, hold, settle })
     }
 
+    /// The divider of a clock of `clock_hz`, in 1/256, that makes a tick at least an eighth of the longest of these times:
+    /// for senders that give each time eight ticks.
+    pub fn eighth(&self, clock_hz: u32) -> u32 {
+        let longest = self.setup.max(self.strobe).max(self.hold).max(self.settle);
+        // Whole clock cycles; one more, because a divider with a fraction may give eight ticks one cycle less than
+        // eight times its value. At most 65.5 µs, so far below the range of a divider.
+        let cycles = (u64::from(longest) * u64::from(clock_hz)).div_ceil(1_000_000_000) as u32 + 1;
+        (cycles * 256).div_ceil(8).max(256)
+    }
+
     /// These times with the Busy handshake and all lines heeded, as settings.
     pub fn settings(self) -> PortSettings {
         let ns = |time: u32| u16::try_from(time).unwrap_or(u16::MAX);
@@ -60,8 +70,31 @@ impl Timing {
             hold_ns: ns(self.hold),
             settle_ns: ns(self.settle),
             handshake: Handshake::Busy,
-            patience_s: (Self::PATIENCE_MS / 1000) as u16,
+            patience_s: u16::try_from(Self::PATIENCE_MS / 1000).unwrap_or(u16::MAX),
             heed: Lines::ALL,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn eight_ticks_of_the_clock_are_never_shorter_than_the_longest_time(
+            times in prop::array::uniform4(100u32..=65_535),
+            clock_mhz in 48u32..=266,
+        ) {
+            let [setup, strobe, hold, settle] = times;
+            let divider = u64::from(Timing { setup, strobe, hold, settle }.eighth(clock_mhz * 1_000_000));
+            let longest = u64::from(times.into_iter().max().unwrap_or(0));
+            // A fractional divider skips or adds single cycles: eight ticks have eight times its value, rounded down.
+            let cycles = 8 * divider / 256;
+            prop_assert!(cycles * 1000 >= longest * u64::from(clock_mhz), "{} cycles", cycles);
+            // And no more than two cycles longer, unless the clock itself is slower.
+            prop_assert!(divider == 256 || (cycles - 2) * 1000 <= longest * u64::from(clock_mhz));
         }
     }
 }

@@ -1,21 +1,27 @@
-//! The other end of the cable: a printer's port in virtual time.
+//! A printer, its cable and the board in front of it, in virtual time.
 //!
 //! [`SimulatedPort`] holds all lines and a clock. Its pins implement the `embedded-hal` traits; looking at a pin
 //! and waiting are what makes time pass, so a test sees every edge with its time to the nanosecond and minutes
 //! of an operator's absence cost nothing. The printer's side reacts as IEEE 1284 describes, with times of its own;
 //! bytes it has taken, what it would send back and every edge on the way can be looked at afterwards.
+//! [`SimulatedBoard`] is what the driver needs beside the pins.
 //!
 //! Limits: edges are ideal, no analogue behaviour of a cable is modelled.
 
+mod board;
 mod check;
 mod peripheral;
 mod pins;
 
+pub use board::SimulatedBoard;
 pub use check::{Violation, check};
-pub use peripheral::{Pause, Peripheral};
+pub use peripheral::{Pause, Peripheral, Response};
 pub use pins::{AckLine, DataLines, DelayLine, InLine, OutLine};
 
+use crate::driver::Event;
+use crate::engine::Checkpoint;
 use crate::port::Pins;
+use board::Strobing;
 use peripheral::Phase;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -75,6 +81,15 @@ pub(crate) struct World {
     /// A strobe before this is not seen: the last byte is still being worked on.
     ready_at: u64,
     resets: usize,
+    off: bool,
+    /// What the printer will have to say, and from when on.
+    responses: Vec<(u64, Vec<u8>)>,
+    strobing: Strobing,
+    /// Bytes sent since the last checkpoint.
+    marks: u32,
+    checkpoint: Option<Checkpoint>,
+    events: Vec<Event>,
+    boots: usize,
 }
 
 /// The cable and what hangs at its end. Clones are the same cable.
@@ -106,6 +121,13 @@ impl SimulatedPort {
             sent_back: 0,
             ready_at: 0,
             resets: 0,
+            off: false,
+            responses: Vec::new(),
+            strobing: Strobing::new(),
+            marks: 0,
+            checkpoint: None,
+            events: Vec::new(),
+            boots: 0,
         })))
     }
 
@@ -144,6 +166,11 @@ impl SimulatedPort {
         self.0.borrow_mut().plan(after, line, level);
     }
 
+    /// Switches the printer on or off. What it was at work on, and what was planned, is gone.
+    pub fn switch(&self, on: bool) {
+        self.0.borrow_mut().switch(on);
+    }
+
     /// The bytes the printer has taken.
     pub fn taken(&self) -> Vec<u8> {
         self.0.borrow().taken.clone()
@@ -172,13 +199,22 @@ impl World {
 
     pub(crate) fn pass(&mut self, ns: u64) {
         let until = self.now + ns;
-        while let Some(entry) = self.plan.first_entry() {
-            if entry.key().0 > until {
-                break;
+        loop {
+            let planned = self.plan.first_key_value().map(|(&(at, _), _)| at);
+            let strobes = self.strobes_at();
+            match (planned, strobes) {
+                (Some(at), _) if at <= until && strobes.is_none_or(|strobes| at <= strobes) => {
+                    self.now = at;
+                    if let Some((_, (line, level))) = self.plan.pop_first() {
+                        self.change(line, level);
+                    }
+                }
+                (_, Some(at)) if at <= until => {
+                    self.now = at;
+                    self.strobe();
+                }
+                _ => break,
             }
-            let ((at, _), (line, level)) = entry.remove_entry();
-            self.now = at;
-            self.change(line, level);
         }
         self.now = until;
     }
@@ -196,11 +232,16 @@ impl World {
         true
     }
 
-    /// The host sets a line.
-    pub(crate) fn host(&mut self, line: Line, level: u8) {
-        if self.change(line, level) {
+    /// The host's side sets a line.
+    fn drive(&mut self, line: Line, level: u8) {
+        if self.change(line, level) && !self.off {
             self.react(line, level);
         }
+    }
+
+    /// The host's processor sets a line.
+    pub(crate) fn host(&mut self, line: Line, level: u8) {
+        self.drive(line, level);
         // An instruction of a microcontroller at 125 MHz.
         self.pass(8);
     }

@@ -1,6 +1,7 @@
 //! The printer's side of the conversation.
 
 use super::{Line, World};
+use crate::driver::STATUS;
 use std::vec::Vec;
 
 /// A printer that, having taken so many bytes, has a fault for a while.
@@ -37,6 +38,17 @@ pub struct Peripheral {
     pub device_id: Option<Vec<u8>>,
     /// What it has to say in nibble mode.
     pub reverse_data: Vec<u8>,
+    /// What it adds to that when it has taken the status question.
+    pub status: Vec<Response>,
+}
+
+/// A piece of an answer.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Response {
+    /// How long after the question, in ns.
+    pub after: u64,
+    /// The piece.
+    pub bytes: Vec<u8>,
 }
 
 impl Default for Peripheral {
@@ -52,6 +64,7 @@ impl Default for Peripheral {
             dumb_after: None,
             device_id: None,
             reverse_data: Vec::new(),
+            status: Vec::new(),
         }
     }
 }
@@ -72,6 +85,9 @@ impl World {
     /// What the printer does about an edge of the host's.
     pub(super) fn react(&mut self, line: Line, level: u8) {
         let late = self.peripheral.answer_after;
+        let now = self.now;
+        let due = self.responses.extract_if(.., |(at, _)| *at <= now);
+        self.peripheral.reverse_data.extend(due.flat_map(|(_, bytes)| bytes));
         match (self.phase, line, level) {
             (_, Line::Init, 0) => self.resets += 1,
             (Phase::Forward, Line::Strobe, 0) => self.take(),
@@ -147,11 +163,34 @@ impl World {
         }
     }
 
+    /// The printer's own switch. The lines of a printer that is off rest as the board's resistors have them.
+    pub(super) fn switch(&mut self, on: bool) {
+        self.off = !on;
+        (self.phase, self.sent_back, self.ready_at) = (Phase::Forward, self.peripheral.reverse_data.len(), 0);
+        self.plan.clear();
+        self.responses.clear();
+        let rest = u8::from(!on);
+        for (line, level) in [
+            (Line::Power, u8::from(on)),
+            (Line::Busy, rest),
+            (Line::PaperOut, rest),
+            (Line::Select, 1),
+            (Line::Fault, 1),
+            (Line::Ack, 1),
+        ] {
+            self.change(line, level);
+        }
+    }
+
     fn take(&mut self) {
         if self.now < self.ready_at {
             return;
         }
         self.taken.push(self.level(Line::Data));
+        if self.taken.ends_with(&STATUS) {
+            let status = self.peripheral.status.iter();
+            self.responses.extend(status.map(|Response { after, bytes }| (self.now + after, bytes.clone())));
+        }
         let Peripheral { busy_after, work, ack, has_busy, .. } = self.peripheral;
         let mut busy = work;
         let count = self.taken.len();

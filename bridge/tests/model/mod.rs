@@ -1,6 +1,8 @@
 //! Both ends of the link in memory: a small host, a wire that misbehaves, a port with an absent-minded operator.
 #![allow(dead_code)]
 
+pub mod bench;
+
 use bridge::engine::{Checkpoint, Engine, Identity, Memory, Outcome, Task};
 use protocol::ink::Ink;
 use protocol::link::frame::{self, MAX, Read, Reader};

@@ -1,4 +1,4 @@
-//! Equation 1 at every pixel of rusty metal (a made-up one without FOILPRESS_DATA), on all threads.
+//! Equation 1 at every pixel of rusty metal (synthetic without FOILPRESS_DATA), on all threads.
 
 use appearance::brdf::Table;
 use appearance::document::Materials;

@@ -1,6 +1,6 @@
 //! Factoring a real texture of a million pixels: `FOILPRESS_DATA=… cargo bench --bench factor`.
 //!
-//! Without the textures a made document of the same size stands in, so the benchmark always runs.
+//! Without the textures it uses a synthetic document of the same size, so the benchmark always runs.
 
 use std::path::Path;
 
@@ -99,7 +99,7 @@ fn rusty_metal_in_as_many_bases_as_it_needs(bencher: Bencher) {
     });
 }
 
-/// What reading the pixels costs by itself: a floor under all of the above.
+/// The cost of reading the pixels alone: a lower bound for all of the above.
 #[divan::bench(sample_count = 3)]
 fn rusty_metal_read_once(bencher: Bencher) {
     let document = Document::rusty();

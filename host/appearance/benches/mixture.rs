@@ -1,4 +1,4 @@
-//! Equation 1 for one basis: all starts, one start, and from a neighbour's answer.
+//! Equation 1 for one basis: all starts, one start, and a start from a neighbour's solution.
 
 use appearance::brdf::Space;
 use appearance::document::Surface;

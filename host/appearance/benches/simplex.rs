@@ -1,13 +1,12 @@
 //! Least squares on the simplex for a stream of pixels, each started from the one before.
 //!
-//! `scalar_products` has the inner products with the target in its time, `solve` has not. `lawson_hanson` is the
-//! textbook method on the same Gram matrix, cold as it always is.
+//! The time of `scalar_products` includes the inner products with the target, that of `solve` does not. `lawson_hanson` is
+//! the textbook method on the same Gram matrix, which always starts cold.
 
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::gamut::Printable;
-use appearance::solve::gram::inner_products;
-use appearance::solve::{Gram, Simplex};
+use appearance::solve::{Gram, Simplex, inner_products};
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
@@ -16,7 +15,7 @@ mod common;
 
 const PIXELS: usize = 4096;
 
-/// Stacks and pixels in the metric's tangent at the pixels' mean.
+/// Stacks and pixels in the tangent of the metric at the mean of the pixels.
 fn problem(k: usize) -> (Table, Table) {
     let field = common::Field::rusty_metal(256);
     let space: &Space = field.space();
@@ -109,7 +108,7 @@ fn lawson_hanson(bencher: Bencher, k: usize) {
     bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
         for t in targets.rows() {
             inner_products(&stacks, t, &mut h);
-            // Slopes are judged on the scale of the problem, not of the heavy row.
+            // The tolerance follows the scale of the problem, not that of the heavy row.
             let tolerance = 1e-9 * h.iter().copied().fold(0.0, f64::max);
             h.iter_mut().for_each(|h| *h += heavy * heavy);
             black_box(nnls(&gram, &h, tolerance));

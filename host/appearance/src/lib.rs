@@ -1,14 +1,25 @@
 //! What a material is, and how inks make it.
 //!
-//! The modules stand in the order of the data: [`brdf`] holds curves and the metric that compares them, [`document`] reads
-//! materials, [`factor`] turns them into bases and [`weights`], [`gamut`] maps the bases to stacks of ink with the solvers of
-//! [`solve`]. [`sample`] draws documents to try all of it on. Nothing here knows dots, pages or printers.
+//! The modules follow the data, and each uses only the ones before it: [`brdf`] holds curves and the metric that compares
+//! them, [`weights`] fixed-point weight maps, [`solve`] the constrained least squares, [`materials`] what the pixels of a
+//! document reflect, [`sample`] drawn materials to try things on. [`document`] reads and writes files of materials,
+//! [`factor`] turns materials into bases and weights, and [`gamut`] maps the bases to stacks of ink. Nothing here knows
+//! about dots, pages or printers.
 #![deny(unsafe_code)]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "numerical code: counts stay far below 2^52, rounding to f32 and to fixed point is the purpose of most casts"
+)]
 
 pub mod brdf;
 pub mod document;
 pub mod factor;
 pub mod gamut;
+pub mod materials;
 pub mod sample;
 pub mod solve;
+pub mod srgb;
 pub mod weights;

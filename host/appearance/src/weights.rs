@@ -1,13 +1,12 @@
-//! Weight maps: for every pixel of a document how much of each basis (or stack) it is.
+//! Weight maps: the weight of each basis (or stack) at every pixel of a document.
 //!
-//! Weights are fixed point with [`ONE`] as 1, and at every pixel they sum to [`ONE`] exactly: a partition of
-//! unity that survives files, threads and machines. Layout: interleaved, `channels` values a pixel, rows from
-//! the top.
+//! Weights are fixed point with [`ONE`] as 1. At every pixel they sum to [`ONE`] exactly, so rounding cannot break the
+//! partition of unity on any machine. Layout: interleaved, `channels` values per pixel, rows from the top.
 
 /// Full weight. A power of two, so that products scale back by a shift.
 pub const ONE: u16 = 1 << 15;
 
-/// Weight maps of one size. See the module text.
+/// Weight maps of one size. See the module documentation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WeightMaps {
     width: usize,
@@ -16,17 +15,17 @@ pub struct WeightMaps {
     data: Vec<u16>,
 }
 
-/// Why numbers are not weight maps.
+/// Why some numbers are not weight maps.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum WeightError {
     /// The data does not fill the maps.
-    #[error("{width} x {height} pixels with {channels} weights each need {expected} values, not {found}")]
+    #[error("{width} x {height} pixels with {channels} weights each need {expected} values; found {found}")]
     Size {
         /// Pixels across.
         width: usize,
         /// Pixels down.
         height: usize,
-        /// Weights a pixel.
+        /// Weights per pixel.
         channels: usize,
         /// Values needed.
         expected: usize,
@@ -46,7 +45,7 @@ pub enum WeightError {
 }
 
 impl WeightMaps {
-    /// Maps from interleaved fixed-point weights; every pixel must sum to [`ONE`].
+    /// Makes maps from interleaved fixed-point weights; the weights of every pixel must sum to [`ONE`].
     pub fn new(
         width: usize,
         height: usize,
@@ -66,7 +65,7 @@ impl WeightMaps {
         Ok(WeightMaps { width, height, channels, data })
     }
 
-    /// The same full weight of channel 0 at every pixel of a one-channel map.
+    /// A one-channel map with full weight at every pixel.
     pub fn uniform(width: usize, height: usize) -> WeightMaps {
         WeightMaps { width, height, channels: 1, data: vec![ONE; width * height] }
     }
@@ -81,7 +80,7 @@ impl WeightMaps {
         self.height
     }
 
-    /// Weights a pixel.
+    /// Weights per pixel.
     pub fn channels(&self) -> usize {
         self.channels
     }
@@ -98,7 +97,7 @@ impl WeightMaps {
 }
 
 /// Rounds weights (finite, 0 or more, sum near 1) to fixed point by largest remainder, so that they sum to
-/// [`ONE`] exactly. Ties go to the lower index. All zero gives channel 0 full weight.
+/// [`ONE`] exactly. Ties go to the lower index. If all are zero, channel 0 gets full weight.
 pub fn quantise(weights: &[f64], out: &mut [u16]) {
     let sum: f64 = weights.iter().map(|w| w.max(0.0)).sum();
     out.fill(0);

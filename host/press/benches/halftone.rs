@@ -9,8 +9,9 @@ use divan::Bencher;
 use inks::{Library, Stack};
 use observe::Silent;
 use press::halftone::metrics::tones;
-use press::halftone::{Placement, Settings, halftone};
+use press::halftone::{Settings, halftone};
 use press::separate::{compose, separate};
+use press::sheet::{DotMap, Sheet};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
@@ -53,15 +54,15 @@ fn document(count: usize) -> InkMix {
     InkMix { stacks: stacks(count), maps, matrix }
 }
 
-fn page() -> Placement {
-    Placement { paper: Paper::A4, x: 0, y: 0, width: Paper::A4.width(), height: Paper::A4.length() }
+fn page() -> (u16, u16) {
+    (Paper::A4.width(), Paper::A4.length())
 }
 
 /// A full A4 page of so many active stacks, all with a minimum of 9 dots.
 #[divan::bench(args = [8, 57], sample_count = 5)]
 fn one_minimum(bencher: Bencher, count: usize) {
     let (mix, settings) = (document(count), Settings::uniform(count, 9));
-    bencher.bench(|| halftone(&mix, &page(), &settings, &Silent).expect("a valid mix"));
+    bencher.bench(|| halftone(&mix, page(), &settings, &Silent).expect("a valid mix"));
 }
 
 /// The same with metallic silver, and all stacks on it, at 16 dots.
@@ -69,22 +70,27 @@ fn one_minimum(bencher: Bencher, count: usize) {
 fn two_minima(bencher: Bencher, count: usize) {
     let mix = document(count);
     let settings = Settings::of(&mix.stacks, 9, |ink| if ink == Ink::MetallicSilver { 16 } else { 9 });
-    bencher.bench(|| halftone(&mix, &page(), &settings, &Silent).expect("a valid mix"));
+    bencher.bench(|| halftone(&mix, page(), &settings, &Silent).expect("a valid mix"));
 }
 
 /// Stacks of the paper's oak leaf: metallic silver and three process inks, with finish on some; five passes.
-fn leaf() -> (InkMix, press::sheet::Sheet) {
+fn leaf() -> (InkMix, DotMap) {
     let mut mix = document(8);
     let text = ["substrate", "C", "M", "Y", "MS", "MS+C", "MS+M+Y", "MS+Y+F"];
     mix.stacks = text.map(|stack| stack.parse().expect("known inks")).to_vec();
-    let sheet = halftone(&mix, &page(), &Settings::uniform(8, 9), &Silent).expect("a valid mix");
-    (mix, sheet)
+    let dots = halftone(&mix, page(), &Settings::uniform(8, 9), &Silent).expect("a valid mix");
+    (mix, dots)
+}
+
+fn leaf_page() -> Sheet {
+    let (stacks, index) = leaf().1.into_parts();
+    Sheet::new(Paper::A4, stacks, index).expect("a page of dots")
 }
 
 /// A full A4 page in five passes, planes and checks on cluster sizes included.
 #[divan::bench(sample_count = 5)]
 fn five_passes(bencher: Bencher) {
-    let ((_, sheet), library) = (leaf(), Library::builtin());
+    let (sheet, library) = (leaf_page(), Library::builtin());
     let separate = || separate(&sheet, library.rules(), &Silent).expect("five inks");
     assert_eq!(separate().passes.len(), 5);
     bencher.bench(separate);
@@ -93,7 +99,7 @@ fn five_passes(bencher: Bencher) {
 /// The same back to a sheet.
 #[divan::bench(sample_count = 5)]
 fn five_passes_back(bencher: Bencher) {
-    let (_, sheet) = leaf();
+    let sheet = leaf_page();
     let separation = separate(&sheet, &[], &Silent).expect("five inks");
     bencher.bench(|| compose(sheet.paper(), &separation.passes, sheet.stacks()).expect("the same sheet"));
 }
@@ -101,6 +107,6 @@ fn five_passes_back(bencher: Bencher) {
 /// Tones and clusters of a full A4 page.
 #[divan::bench(sample_count = 3)]
 fn report(bencher: Bencher) {
-    let (mix, sheet) = leaf();
-    bencher.bench(|| tones(&mix, &page(), &sheet, &Silent).expect("the same sheet"));
+    let (mix, dots) = leaf();
+    bencher.bench(|| tones(&mix, &dots, &Silent).expect("the same stacks"));
 }

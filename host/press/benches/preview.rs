@@ -9,8 +9,8 @@ use appearance::weights::{ONE, WeightMaps};
 use divan::Bencher;
 use inks::{Curve, Stack};
 use observe::Silent;
-use press::preview::{Area, Light, Probe, STANDARD_LIGHTS, Source, fidelity, flat, sphere};
-use press::sheet::Sheet;
+use press::preview::{Light, Probe, STANDARD_LIGHTS, Source, fidelity, flat, sphere};
+use press::sheet::{Area, Sheet};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
@@ -49,7 +49,8 @@ fn page() -> Sheet {
 fn a4_page_under_four_lights(bencher: Bencher, longest: usize) {
     let (space, sheet) = (Space::half_angle(32), page());
     let stacks = materials(&space, STACKS);
-    let print = Source::Print { sheet: &sheet, space: &space, stacks: &stacks, area: Area::whole(&sheet) };
+    let print =
+        Source::Print { dots: sheet.dots(), space: &space, stacks: &stacks, area: Area::whole(sheet.dots()) };
     let lights: Vec<Light> = STANDARD_LIGHTS.iter().map(|l| l.1).collect();
     let (width, height) = print.fit(longest);
     bencher.bench_local(|| flat(&print, &lights, width, height, &Silent).unwrap());
@@ -71,7 +72,8 @@ fn fidelity_of_an_a4_page(bencher: Bencher) {
     let weights = [ONE / STACKS as u16; STACKS].repeat(1024 * 1024);
     let maps = WeightMaps::new(1024, 1024, STACKS, weights).unwrap();
     let target = Factored { space: space.clone(), bases: stacks.clone(), maps };
-    let print = Source::Print { sheet: &sheet, space: &space, stacks: &stacks, area: Area::whole(&sheet) };
+    let print =
+        Source::Print { dots: sheet.dots(), space: &space, stacks: &stacks, area: Area::whole(sheet.dots()) };
     let size = (sheet.width(), sheet.length());
     bencher.bench_local(|| fidelity(&Source::Factored(&target), &print, size, 0.5, &Silent).unwrap());
 }

@@ -16,8 +16,9 @@ use protocol::ink::Ink;
 use protocol::rgl::{Command, Compression, Fault, Mode, Order, Step, parse};
 use serde::Serialize;
 
+use crate::job::fault::words;
 use crate::separate::{Pass, Plane};
-use crate::simulate::{Canvas, words};
+use crate::simulate::Canvas;
 use observe::Observer;
 
 /// A stream in figures. Offsets are in bytes from its start; dots and rows at the job's resolution.
@@ -316,7 +317,7 @@ fn setup(order: &Order) -> Setup {
         curl_correction: declared.curl,
         built_in_gloss: declared.gloss,
         mode: declared.mode.map(mode_name),
-        cassettes: declared.cassettes.map(|list| list.inks().iter().map(|ink| ink.name()).collect()),
+        cassettes: declared.cartridges.map(|list| list.inks().iter().map(|ink| ink.name()).collect()),
     }
 }
 

@@ -1,196 +1,137 @@
-//! The whole chain: a document in, the bytes of a job and the simulated sheet out.
+//! From something laid on a page to a job with its plan: one way for everything that is printed.
 //!
-//! Nothing is decided here that a stage does not decide; this is only their order, and the values between them kept
-//! for those who want to look.
+//! Problem: documents, layers, charts, pages of a queue and the step-by-step commands must not differ in what they
+//! refuse, what they warn of and what they send.
+//! Method: [`draft`] lays a dot map on its page, separates it and draws up the plan; [`job`] also refuses what must not be
+//! printed and writes the bytes. The steps in between, [`separate_page`] and [`encode`], are what the step-by-step commands
+//! call. [`document`] makes the dot map of a document; those of layers and charts come from their modules.
+//!
+//! Where the bytes are parsed: not here, but for [`Job::prove`]. A job is written by the writer of `protocol::rgl`, whose
+//! tests hold it against the parser, so reading it back adds nothing that a plan or a queue needs.
+//! 1. A job that is kept is proved once, where it is made: `prove` prints it on the simulated printer and compares the sheet
+//!    dot for dot. Its pictures are drawn from that printout, so they show what the bytes say, not what was meant.
+//! 2. A job that is sent is parsed strictly once more by the sender, before the first byte leaves: its bytes may come from
+//!    a file, a queue or another program, and no sender is to trust the one before it.
+//!
+//! `docs/decisions/where-a-job-is-checked.md` has the figures.
 
-use inks::{InkSet, Library};
+pub mod document;
+
+use inks::{InkSet, Library, Severity};
 use protocol::ink::Kind;
 use protocol::paper::Paper;
-use protocol::rgl::{FoilConsent, Media, Page};
+use protocol::rgl::{FoilConsent, Page};
 
-use crate::halftone::{self, HalftoneError, Placement};
-use crate::job::placement::{self, PlacementError, Size};
+use crate::job::Handling;
+use crate::job::plan::{Plan, Subject};
 use crate::job::stream::{self, StreamError};
 use crate::layout::{self, Arranged, Laid, Layout, LayoutError};
-use crate::separate::{self, Pass, SeparateError, Separation, Severity};
-use crate::sheet::{Piece, Sheet};
+use crate::separate::{self, Pass, SeparateError, Separation};
+use crate::sheet::{DotMap, Sheet};
 use crate::simulate::{self, Difference, Printout, PrintoutError, SimulateError};
-use appearance::brdf::{Space, Table};
-use appearance::document::Document;
-use appearance::factor::{self, FactorError, Factored};
-use appearance::gamut::{self, GamutError, InkMix, Mapped, Printable};
 use observe::Observer;
 
-/// What the user may choose.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// How the document is factored.
-    pub factor: factor::Settings,
-    /// How it is mapped to the printer's gamut.
-    pub gamut: gamut::Settings,
-    /// The inks at hand. Foils in the set are the user's consent to print them.
-    pub inks: InkSet,
-    /// The paper and how the document lies on it.
-    pub layout: Layout,
-    /// What the paper is made of.
-    pub media: Media,
-    /// Whether the machine corrects the paper's curl.
-    pub curl_correction: bool,
-    /// Size on paper.
-    pub size: Option<Size>,
+/// What is to be printed, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a> {
+    /// Name of the document or art.
+    pub name: &'a str,
+    /// Its dots.
+    pub dots: &'a DotMap,
+    /// The paper and how the dots lie on it.
+    pub layout: &'a Layout,
+    /// How the printer is told to treat the sheet.
+    pub handling: Handling,
+    /// The inks that may be used. A foil among them is the user's consent to print it.
+    pub allowed: InkSet,
+    /// The ink library: its rules and names.
+    pub library: &'a Library,
 }
 
-/// Everything a print is made of.
-pub struct Print {
-    /// The document in bases and weight maps.
-    pub factored: Factored,
-    /// What the factoring reports; absent when the document came factored.
-    pub factoring: Option<factor::Report>,
-    /// The mixture of stacks, and what the mapping reports.
-    pub mapped: Mapped,
-    /// The document by itself, as halftoned: what the page repeats, mirrors and marks.
-    pub halftoned: Sheet,
-    /// Where the first of it lies on the page.
-    pub placement: Placement,
-    /// Where everything lies on the page.
-    pub laid: Laid,
+/// A job before its bytes are written: the page, its passes and its plan.
+#[derive(Clone, Debug)]
+pub struct Draft {
     /// The page.
     pub sheet: Sheet,
-    /// Its passes.
+    /// Where things are on it.
+    pub laid: Laid,
+    /// Its passes, and what the rules say of them.
     pub separation: Separation,
-    /// The job in the printer's language.
-    pub job: Vec<u8>,
-    /// What the simulated printer made of `job`, pass by pass.
-    pub printout: Printout,
-    /// The same as a sheet: equal to `sheet`, dot for dot.
-    pub printed: Sheet,
+    /// The plan.
+    pub plan: Plan,
 }
 
-/// Why a document was not printed: the error of the stage that refused.
+/// A job with its plan.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// What it prints.
+    pub draft: Draft,
+    /// The job in the printer's language.
+    pub bytes: Vec<u8>,
+}
+
+/// Why there is no job.
 #[derive(Debug, thiserror::Error)]
-pub enum PrintError {
-    /// Factoring.
-    #[error(transparent)]
-    Factor(#[from] FactorError),
-    /// Gamut mapping.
-    #[error(transparent)]
-    Gamut(#[from] GamutError),
-    /// Placing on the page.
-    #[error(transparent)]
-    Placement(#[from] PlacementError),
-    /// Halftoning.
-    #[error(transparent)]
-    Halftone(#[from] HalftoneError),
+pub enum JobError {
     /// Laying it on the page.
     #[error(transparent)]
     Layout(#[from] LayoutError),
     /// Separation.
     #[error(transparent)]
     Separate(#[from] SeparateError),
-    /// Writing the job.
-    #[error(transparent)]
-    Stream(#[from] StreamError),
     /// The rules on stacks and pages forbid the job.
     #[error("this must not be printed: {0}")]
     Refused(String),
-    /// The simulated printer.
-    #[error("the simulated printer did not print the job: {0}")]
+    /// Writing the job.
+    #[error(transparent)]
+    Stream(#[from] StreamError),
+    /// The simulated printer refused the job. Never seen; if it is, it is a bug worth a report.
+    #[error("the simulated printer did not print the job")]
     Simulate(#[from] SimulateError),
-    /// The simulated sheet.
+    /// The simulated sheet cannot be compared. Never seen either.
     #[error(transparent)]
     Printout(#[from] PrintoutError),
-    /// The simulated sheet is another one. Never seen; if it is, it is a bug worth a report.
-    #[error("the simulated sheet is not the one that was sent: {0}")]
+    /// The simulated sheet is not the one that was laid out. Never seen either.
+    #[error("the simulated sheet is not the one that was laid out: {0}")]
     Different(Difference),
 }
 
-/// Prints a document on the simulated printer.
-pub fn print(
-    document: &Document,
-    library: &Library,
-    settings: &Settings,
-    observer: &dyn Observer,
-) -> Result<Print, PrintError> {
-    let materials = document.materials();
-    // Refused before the long work, not after it.
-    let pixels = (materials.width(), materials.height());
-    let (width, height) = placement::dots(pixels, document.size_mm, settings.size, &settings.layout)?;
-    layout::check(width.into(), height.into(), &settings.layout)?;
-    let (factored, factoring) = factor_document(document, &settings.factor, observer)?;
-    if let Some(report) = &factoring {
-        observer.note(&report.to_string());
-    }
-    let printable = Printable::from_library(library, &settings.inks, &factored.space);
-    let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
-    let alone = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-    let halftoned = halftone_mix(&mapped.mix, library, &alone, observer)?;
-    let Arranged { sheet, laid } =
-        layout::arrange(&Piece::from(halftoned.clone()), &settings.layout, observer)?;
+/// Lays dots on their page, separates them and draws up the plan. What must not be printed is planned, too: the plan's
+/// checks say why.
+///
+/// # Errors
+/// A layout without room, or more passes than a sheet can take.
+pub fn draft(request: &Request<'_>, observer: &dyn Observer) -> Result<Draft, JobError> {
+    let Request { name, layout, library, .. } = *request;
+    let Arranged { sheet, laid } = layout::arrange(request.dots, layout, observer)?;
     let separation = separate_page(&sheet, &laid, library, observer)?;
-    if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
-        return Err(PrintError::Refused(check.with_stacks()));
-    }
-    let page = Page {
-        media: settings.media,
-        curl_correction: settings.curl_correction,
-        ..Page::plain(settings.layout.paper)
-    };
-    let job = job_on(page, &separation.passes, &settings.inks, observer)?;
-    let printout = simulate::print(&job, &simulate::Setup::default(), observer)?;
-    let printed = printout.sheet_with(sheet.stacks())?;
-    if let Some(difference) = simulate::difference(&sheet, &printed) {
-        return Err(PrintError::Different(difference));
-    }
-    // Sides of a sheet are u16, and the layout has refused a page without a piece.
-    let [x, y, width, height] =
-        laid.pieces.first().map_or([0; 4], |p| [p.left, p.top, p.width, p.length].map(|dots| dots as u16));
-    let placement = Placement { paper: settings.layout.paper, x, y, width, height };
-    Ok(Print {
-        factored,
-        factoring,
-        mapped,
-        halftoned,
-        placement,
-        laid,
-        sheet,
-        separation,
-        job,
-        printout,
-        printed,
-    })
+    let page = request.handling.page(layout.paper);
+    let plan = Plan::new(&Subject::new(name, &sheet, &laid, &separation, &page), library);
+    Ok(Draft { sheet, laid, separation, plan })
 }
 
-/// A document's bases and maps: its own if it came factored.
-pub fn factor_document(
-    document: &Document,
-    settings: &factor::Settings,
-    observer: &dyn Observer,
-) -> Result<(Factored, Option<factor::Report>), FactorError> {
-    if let Some(factored) = document.as_factored() {
-        return Ok((factored.clone(), None));
-    }
-    let factoring = factor::factor(document.materials(), settings, observer)?;
-    Ok((factoring.factored, Some(factoring.report)))
+/// Makes a job with its plan.
+///
+/// # Errors
+/// Those of [`draft`], a rule that forbids the job, or nothing to print.
+pub fn job(request: &Request<'_>, observer: &dyn Observer) -> Result<Job, JobError> {
+    let draft = draft(request, observer)?;
+    permit(&draft.separation)?;
+    let passes = &draft.separation.passes;
+    let bytes = encode(request.layout.paper, request.handling, passes, &request.allowed, observer)?;
+    Ok(Job { draft, bytes })
 }
 
-/// Halftones a mix with the library's minimum clusters.
-pub fn halftone_mix(
-    mix: &InkMix,
-    library: &Library,
-    placement: &Placement,
-    observer: &dyn Observer,
-) -> Result<Sheet, HalftoneError> {
-    let minimum = mix.stacks.iter().map(|stack| library.minimum_cluster(stack)).collect();
-    halftone::halftone(mix, placement, &halftone::Settings { minimum }, observer)
-}
-
-/// The passes of a page. What the rules say is about its pieces: marks are cut off.
+/// The passes of a page, and what the rules say of its copies: marks are cut off, so no rule but a ban is about them.
+///
+/// # Errors
+/// More passes or layers than a sheet can take.
 pub fn separate_page(
     sheet: &Sheet,
     laid: &Laid,
     library: &Library,
     observer: &dyn Observer,
-) -> Result<Separation, SeparateError> {
+) -> Result<Separation, JobError> {
     let mut separation = separate::separate(sheet, library.rules(), observer)?;
     let census = laid.census(sheet);
     separation.spare_marks(|stack| {
@@ -199,30 +140,118 @@ pub fn separate_page(
     Ok(separation)
 }
 
-/// The bytes of a job on this page. A foil among `inks` is the user's consent to print it.
-pub fn job_on(
-    page: Page,
-    passes: &[Pass],
-    inks: &InkSet,
-    observer: &dyn Observer,
-) -> Result<Vec<u8>, StreamError> {
-    let foil = inks.iter().any(|ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
-    let mut job = Vec::new();
-    stream::write_job(page, foil, passes, &mut job, observer)?;
-    Ok(job)
+/// Whether the rules permit to print this.
+///
+/// # Errors
+/// [`JobError::Refused`] with the rule and its stacks.
+pub fn permit(separation: &Separation) -> Result<(), JobError> {
+    match separation.checks.iter().find(|check| check.severity == Severity::Error) {
+        Some(check) => Err(JobError::Refused(check.with_stacks())),
+        None => Ok(()),
+    }
 }
 
-/// What the stacks of a sheet reflect, one row a stack, as the library has it.
+/// The bytes of a job. A foil among the inks `allowed` is the user's consent to print it.
 ///
-/// A stack the library does not know shows as its longest part from the top that it does know: the uppermost
-/// layers decide most of what is seen.
-pub fn stack_table(sheet: &Sheet, library: &Library, space: &Space) -> Table {
-    let mut table = Table::new(space.columns());
-    for stack in sheet.stacks() {
-        let layers = stack.layers();
-        let known = (0..=layers.len()).find_map(|below| library.entry(&inks::Stack::new(&layers[below..])));
-        let row = known.map(|entry| space.row(&entry.curve_at(space.angles())));
-        table.push(&row.unwrap_or_else(|| vec![0.0; space.columns()]));
+/// # Errors
+/// Nothing to print, foil without consent, or passes that are not the paper's size.
+pub fn encode(
+    paper: Paper,
+    handling: Handling,
+    passes: &[Pass],
+    allowed: &InkSet,
+    observer: &dyn Observer,
+) -> Result<Vec<u8>, JobError> {
+    let page: Page = handling.page(paper);
+    let foil = allowed.iter().any(|ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
+    let mut bytes = Vec::new();
+    stream::write_job(page, foil, passes, &mut bytes, observer)?;
+    Ok(bytes)
+}
+
+impl Job {
+    /// Prints the bytes on the simulated printer and compares its sheet with the page, dot for dot. Returns what the
+    /// printer made of the bytes, pass by pass.
+    ///
+    /// # Errors
+    /// Bytes that the simulated printer refuses, or another sheet: a bug, never a matter of input.
+    pub fn prove(&self, observer: &dyn Observer) -> Result<Printout, JobError> {
+        let printout = simulate::print(&self.bytes, &simulate::Setup::default(), observer)?;
+        let sheet = &self.draft.sheet;
+        match simulate::difference(sheet, &printout.sheet_with(sheet.stacks())?) {
+            Some(difference) => Err(JobError::Different(difference)),
+            None => Ok(printout),
+        }
     }
-    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use inks::Stack;
+    use observe::Silent;
+    use protocol::ink::Ink;
+    use protocol::rgl::Media;
+
+    const PLAIN: Handling = Handling { media: Media::Plain, curl_correction: true };
+
+    fn square(stack: &str) -> DotMap {
+        let stacks = vec![Stack::SUBSTRATE, stack.parse().unwrap()];
+        let index = (0..2400).map(|dot| u8::from((5..35).contains(&(dot % 60)) && dot / 60 < 30)).collect();
+        DotMap::new(60, 40, stacks, index).unwrap()
+    }
+
+    fn request<'a>(
+        dots: &'a DotMap,
+        layout: &'a Layout,
+        allowed: InkSet,
+        library: &'a Library,
+    ) -> Request<'a> {
+        Request { name: "square", dots, layout, handling: PLAIN, allowed, library }
+    }
+
+    #[test]
+    fn a_job_prints_the_page_it_was_drafted_as() {
+        let (dots, library) = (square("MS+C"), Library::builtin());
+        let layout = Layout {
+            repeat: layout::Repeat::Grid(2, 3),
+            crop_marks: true,
+            ..Layout::centred(Paper::Custom { width: 700, length: 700 })
+        };
+        let request = request(&dots, &layout, InkSet::default(), &library);
+        let job = job(&request, &Silent).unwrap();
+        let printout = job.prove(&Silent).unwrap();
+        let inks: Vec<Ink> = printout.passes.iter().map(|pass| pass.ink).collect();
+        assert_eq!(inks, [Ink::MetallicSilver, Ink::Cyan]);
+        assert_eq!((job.draft.plan.copies, job.draft.plan.passes.len()), ((2, 3), 2));
+        // Another sheet is told apart.
+        let mut other = job;
+        let (stacks, mut index) = other.draft.sheet.dots().clone().into_parts();
+        index[0] ^= 1;
+        other.draft.sheet = Sheet::new(layout.paper, stacks, index).unwrap();
+        assert!(matches!(other.prove(&Silent), Err(JobError::Different(_))));
+    }
+
+    #[test]
+    fn what_must_not_be_printed_is_planned_but_becomes_no_job() {
+        // Foil in clusters of four dots does not stick.
+        let stacks = vec![Stack::SUBSTRATE, Stack::new([Ink::GoldFoil])];
+        let index = (0..2400).map(|dot| u8::from(dot % 60 % 8 < 2 && dot / 60 % 8 < 2)).collect();
+        let (dots, library) = (DotMap::new(60, 40, stacks, index).unwrap(), Library::builtin());
+        let layout = Layout::centred(Paper::Postcard);
+        let request = request(&dots, &layout, InkSet::ALL, &library);
+        let draft = draft(&request, &Silent).unwrap();
+        assert_eq!(draft.plan.checks[0].rule, "foil-speckle");
+        let said = job(&request, &Silent).unwrap_err().to_string();
+        assert!(said.starts_with("this must not be printed: foil in clusters"), "{said}");
+    }
+
+    #[test]
+    fn foil_is_written_only_with_consent() {
+        let (dots, library) = (square("SF"), Library::builtin());
+        let layout = Layout::centred(Paper::Postcard);
+        assert!(job(&request(&dots, &layout, InkSet::ALL, &library), &Silent).is_ok());
+        let refused = job(&request(&dots, &layout, InkSet::default(), &library), &Silent);
+        assert!(matches!(refused, Err(JobError::Stream(StreamError::Forbidden(_)))));
+    }
 }

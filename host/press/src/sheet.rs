@@ -1,89 +1,41 @@
-//! A sheet is the one printable thing: a page and one stack for every dot.
+//! What everything printed becomes: a stack for every dot, by itself ([`DotMap`]) or on a page ([`Sheet`]).
+//!
+//! Halftoned documents, layers and charts are dot maps; the layout repeats, mirrors, marks and places a dot map on a
+//! page. Everything after that knows only sheets.
 
-pub mod colours;
-pub mod files;
-pub mod picture;
-pub mod piece;
+mod area;
+pub(crate) mod clusters;
+pub(crate) mod colours;
+mod dots;
+pub(crate) mod files;
+pub(crate) mod order;
+pub(crate) mod picture;
 
 use inks::Stack;
 use protocol::paper::Paper;
-use rayon::prelude::*;
 
-pub use picture::FileError;
-pub use piece::Piece;
+pub use area::Area;
+pub(crate) use dots::check_stacks;
+pub use dots::{DotMap, SheetError};
 
-/// One stack for every dot of the printable area at 600 dpi. Stack 0 is always the bare substrate.
+/// Dots in a millimetre at 600 dpi, the resolution of every dot map and sheet.
+pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
+
+/// One stack for every dot of the printable area of a sheet of paper.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sheet {
     paper: Paper,
-    stacks: Vec<Stack>,
-    index: Vec<u8>,
-}
-
-/// Why numbers are not a sheet.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum SheetError {
-    /// The page has no dots, or the index does not fill it.
-    #[error("a sheet of {width} x {length} dots needs {} values, not {found}", width.saturating_mul(*length))]
-    Size {
-        /// Dots across.
-        width: usize,
-        /// Rows.
-        length: usize,
-        /// Values given.
-        found: usize,
-    },
-    /// The first stack must be the substrate, stacks must differ, and there can be 256 at most.
-    #[error("stack {index} (`{stack}`): a sheet has the substrate first, then at most 255 different stacks")]
-    Stacks {
-        /// Position in the list.
-        index: usize,
-        /// The stack.
-        stack: Stack,
-    },
-    /// A dot names a stack that is not in the list.
-    #[error("dot ({x}, {y}) has stack number {stack}, but there are only {stacks}")]
-    Index {
-        /// Column.
-        x: usize,
-        /// Row.
-        y: usize,
-        /// The number found.
-        stack: u8,
-        /// How many stacks there are.
-        stacks: usize,
-    },
-}
-
-/// Whether these can be the stacks of a sheet: the substrate first, at most 256, all different.
-pub(crate) fn check_stacks(stacks: &[Stack]) -> Result<(), SheetError> {
-    for (i, stack) in stacks.iter().enumerate() {
-        if (i == 0) != stack.layers().is_empty() || i > 255 || stacks[..i].contains(stack) {
-            return Err(SheetError::Stacks { index: i, stack: stack.clone() });
-        }
-    }
-    if stacks.is_empty() {
-        return Err(SheetError::Stacks { index: 0, stack: Stack::SUBSTRATE });
-    }
-    Ok(())
+    dots: DotMap,
 }
 
 impl Sheet {
-    /// A sheet from its dots, row by row from the top.
+    /// A sheet from the stack number of every dot of the printable area, row by row from the top.
+    ///
+    /// # Errors
+    /// Those of [`DotMap::new`].
     pub fn new(paper: Paper, stacks: Vec<Stack>, index: Vec<u8>) -> Result<Sheet, SheetError> {
-        let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
-        if index.len() != width * length || index.is_empty() {
-            return Err(SheetError::Size { width, length, found: index.len() });
-        }
-        check_stacks(&stacks)?;
-        // Branch-free over the page first; only a bad sheet is searched for its dot.
-        if usize::from(index.iter().copied().max().unwrap_or(0)) >= stacks.len()
-            && let Some(dot) = index.iter().position(|&s| usize::from(s) >= stacks.len())
-        {
-            let stack = index[dot];
-            return Err(SheetError::Index { x: dot % width, y: dot / width, stack, stacks: stacks.len() });
-        }
-        Ok(Sheet { paper, stacks, index })
+        let dots = DotMap::new(paper.width().into(), paper.length().into(), stacks, index)?;
+        Ok(Sheet { paper, dots })
     }
 
     /// The paper it is meant for.
@@ -91,48 +43,33 @@ impl Sheet {
         self.paper
     }
 
+    /// Its dots.
+    pub fn dots(&self) -> &DotMap {
+        &self.dots
+    }
+
     /// Dots across.
     pub fn width(&self) -> usize {
-        usize::from(self.paper.width())
+        self.dots.width()
     }
 
     /// Rows.
     pub fn length(&self) -> usize {
-        usize::from(self.paper.length())
+        self.dots.length()
     }
 
     /// The stacks; number 0 is the bare substrate.
     pub fn stacks(&self) -> &[Stack] {
-        &self.stacks
+        self.dots.stacks()
     }
 
     /// The stack number of every dot, row by row.
     pub fn index(&self) -> &[u8] {
-        &self.index
-    }
-
-    /// The stacks and the stack number of every dot.
-    pub fn into_parts(self) -> (Vec<Stack>, Vec<u8>) {
-        (self.stacks, self.index)
+        self.dots.index()
     }
 
     /// How many dots each stack has.
     pub fn census(&self) -> Vec<u64> {
-        let counted = self.index.par_chunks(1 << 20).map(|dots| {
-            // Neighbours are alike: four tables keep their counts from waiting for each other.
-            let mut counts = [[0u32; 256]; 4];
-            let quads = dots.chunks_exact(4);
-            for &dot in quads.remainder() {
-                counts[0][usize::from(dot)] += 1;
-            }
-            for quad in quads {
-                for (count, &dot) in counts.iter_mut().zip(quad) {
-                    count[usize::from(dot)] += 1;
-                }
-            }
-            (0..self.stacks.len()).map(|i| counts.iter().map(|c| u64::from(c[i])).sum()).collect::<Vec<u64>>()
-        });
-        let none = || vec![0; self.stacks.len()];
-        counted.reduce(none, |a, b| a.into_iter().zip(b).map(|(a, b)| a + b).collect())
+        self.dots.census()
     }
 }

@@ -6,14 +6,15 @@ use protocol::paper::Paper;
 use appearance::gamut::{self, InkMix};
 use appearance::weights::{ONE, WeightMaps};
 use observe::Silent;
-use press::halftone::{self, Placement};
+use press::halftone::{self, halftone};
+use press::layout::{self, Arranged, Layout};
 use press::separate;
-use press::sheet::Sheet;
+use press::sheet::{DotMap, Sheet};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use testing::damage::{damages, survives};
 
-/// A mix, its sheet and the sheet's passes.
+/// A mix, its dots, their page and the page's passes.
 fn folders() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let ramp = (0..24u16).flat_map(|pixel| [1365 * pixel, ONE - 1365 * pixel]).collect();
@@ -21,14 +22,15 @@ fn folders() -> tempfile::TempDir {
     let stacks = ["substrate", "MS+C", "Y"].map(|s| s.parse().unwrap()).to_vec();
     let mix = InkMix::new(stacks, maps, vec![vec![0, ONE, 0], vec![ONE / 2, 0, ONE / 2]]).unwrap();
     let paper = Paper::Custom { width: 40, length: 30 };
-    let place = Placement { paper, x: 0, y: 0, width: 40, height: 30 };
-    let sheet = halftone::halftone(&mix, &place, &halftone::Settings::uniform(3, 4), &Silent).unwrap();
-    let passes = separate::separate(&sheet, Library::builtin().rules(), &Silent).unwrap();
-    for name in ["mix", "sheet", "passes"] {
+    let dots = halftone(&mix, (20, 16), &halftone::Settings::uniform(3, 4), &Silent).unwrap();
+    let page = layout::arrange(&dots, &Layout::centred(paper), &Silent).unwrap();
+    let passes = separate::separate(&page.sheet, Library::builtin().rules(), &Silent).unwrap();
+    for name in ["mix", "dots", "sheet", "passes"] {
         std::fs::create_dir(folder.path().join(name)).unwrap();
     }
     gamut::files::save(&mix, &gamut::files::Provenance::default(), &folder.path().join("mix")).unwrap();
-    sheet.save(&folder.path().join("sheet")).unwrap();
+    dots.save(&folder.path().join("dots")).unwrap();
+    page.save(&folder.path().join("sheet")).unwrap();
     separate::files::save(&passes, &folder.path().join("passes")).unwrap();
     folder
 }
@@ -39,7 +41,10 @@ fn damaged_mixes_sheets_and_passes_are_answered() {
     let path = |name: &str| folders.path().join(name);
     proptest!(ProptestConfig::with_cases(500), |(which in any::<Index>(), damages in damages())| {
         survives(&path("mix"), which, &damages, gamut::files::load);
+        survives(&path("dots"), which, &damages, DotMap::load);
         survives(&path("sheet"), which, &damages, Sheet::load);
+        let census = |folder: &_| Arranged::load(folder).map(|page| page.laid.census(&page.sheet));
+        survives(&path("sheet"), which, &damages, census);
         survives(&path("passes"), which, &damages, separate::files::load);
     });
 }

@@ -1,23 +1,32 @@
-//! Every arrow of the chain by itself: each command reads what the one before it wrote.
+//! Every step of the chain by itself: each command reads what the one before it wrote. Together they give the job of
+//! `print`, since the steps are the ones that `pipeline` is made of.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 
-use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs, PageArgs};
+use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
 use super::choice::choice;
-use super::layout::MediaArgs;
-use super::output::{Kind, Staged};
+use super::layout::{LayoutArgs, MediaArgs};
+use super::output::{self, Kind, Staged};
 use appearance::document::{self, ColourSpace, foil};
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, Printable};
 use observe::Observer;
-use press::job::placement;
-use press::separate::{self, Severity};
-use press::sheet::Sheet;
-use press::{pipeline, simulate};
+use press::layout::{self, Size};
+use press::pipeline::{self, document as stages};
+use press::separate;
+use press::sheet::DotMap;
+use press::{halftone, simulate};
+use protocol::paper::Paper;
+
+/// Where a result goes: the place named, else the current folder under the name of what it is made from.
+fn named(output: &Option<PathBuf>, from: &Path, ending: &str) -> PathBuf {
+    let name = || from.file_stem().map_or_else(|| "document".into(), |stem| stem.to_string_lossy());
+    output.clone().unwrap_or_else(|| format!("{}.{ending}", output::file_name(&name())).into())
+}
 
 /// Arguments of `factor`.
 #[derive(ClapArgs, Debug)]
@@ -27,17 +36,18 @@ pub struct Factor {
     document: DocumentArgs,
     #[command(flatten)]
     factor: FactorArgs,
-    /// Folder to write: bases.csv, weight maps as pictures, document.toml
+    /// Folder to write: bases.csv, weight maps as pictures, document.toml [default: DOC.foil in the current folder]
     #[arg(short, long, value_name = "DOC.foil")]
-    output: PathBuf,
+    output: Option<PathBuf>,
 }
 
 impl Factor {
     /// Document → bases and weight maps.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let document = self.document.open(observer)?;
-        let staged = Staged::folder(&self.output, Kind::Foil)?;
-        let (factored, report) = pipeline::factor_document(&document, &self.factor.settings(), observer)?;
+        let usual = || format!("{}.foil", output::file_name(&document.name)).into();
+        let staged = Staged::folder(&self.output.clone().unwrap_or_else(usual), Kind::Foil)?;
+        let (factored, report) = stages::factored(&document, &self.factor.settings(), observer)?;
         if let Some(report) = report {
             observer.note(&report.to_string());
         }
@@ -52,36 +62,36 @@ impl Factor {
     after_help = "Example:\n  foilpress map my-material.foil --intent basis --inks process,MS -o my-material.mix"
 )]
 pub struct Map {
-    /// A folder made by `factor`
+    /// Folder written by `factor`
     #[arg(value_name = "DOC.foil")]
     factored: PathBuf,
-    /// The document it was made from, so that clamp and blend see its own pixels instead of the bases' mixtures
+    /// Document that was factored, so that clamp and blend use its own pixels instead of mixtures of the bases
     #[arg(long, value_name = "DOC")]
     document: Option<String>,
-    /// Which material of that document, as it was given to `factor`
+    /// Material of that document, as given to `factor`
     #[arg(long, value_name = "NUMBER|NAME", requires = "document")]
     material: Option<String>,
-    /// Encoding of that document's colour maps, as it was given to `factor`
+    /// Encoding of that document's colour maps, as given to `factor`
     #[arg(long, value_name = "SPACE", requires = "document", value_parser = choice::<ColourSpace>())]
     colour_space: Option<ColourSpace>,
     #[command(flatten)]
     gamut: GamutArgs,
     #[command(flatten)]
     inks: InkArgs,
-    /// Seed of the sample of pixels that cartridges are chosen by
+    /// Seed of the random sample of pixels by which cartridges are chosen
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder to write: weight maps over stacks as pictures, mix.toml
+    /// Folder to write: weight maps over stacks as pictures, mix.toml [default: DOC.mix in the current folder]
     #[arg(short, long, value_name = "DOC.mix")]
-    output: PathBuf,
+    output: Option<PathBuf>,
 }
 
 impl Map {
     /// Bases → mixtures of stacks.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let (set, library) = self.inks.at_hand()?;
-        let read = foil::read_watched(&self.factored, observer)?;
-        let (factored, _) = pipeline::factor_document(&read, &Default::default(), observer)?;
+        let read = foil::read(&self.factored, observer)?;
+        let (factored, _) = stages::factored(&read, &Default::default(), observer)?;
         let document = self
             .document
             .as_ref()
@@ -95,7 +105,7 @@ impl Map {
                 document::open(spec, &options, observer)
             })
             .transpose()?;
-        let staged = Staged::folder(&self.output, Kind::Mix)?;
+        let staged = Staged::folder(&named(&self.output, &self.factored, "mix"), Kind::Mix)?;
         let printable = Printable::from_library(&library, &set, &factored.space);
         let materials = document.as_ref().map(|document| document.materials());
         let mapped = gamut::map(&factored, materials, &printable, &self.gamut.settings(self.seed), observer)?;
@@ -112,19 +122,21 @@ impl Map {
 
 /// Arguments of `halftone`.
 #[derive(ClapArgs, Debug)]
-#[command(after_help = "Example:\n  foilpress halftone my-material.mix --size 120x90mm -o my-material.sheet")]
+#[command(after_help = "Example:\n  foilpress halftone my-material.mix --size 120x90mm -o my-material.dots")]
 pub struct Halftone {
-    /// A folder made by `map`
+    /// Folder written by `map`
     #[arg(value_name = "DOC.mix")]
     mix: PathBuf,
-    #[command(flatten)]
-    page: PageArgs,
-    /// Folder of an ink library of your own: its minimum clusters count
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
+    /// [default: the document's own size, else as large as a4 allows]
+    #[arg(long)]
+    size: Option<Size>,
+    /// Folder of your own ink library; its minimum clusters apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
-    /// Folder to write: one stack for every dot as a picture, sheet.toml
-    #[arg(short, long, value_name = "DOC.sheet")]
-    output: PathBuf,
+    /// Folder to write: a picture with one stack for every dot, dots.toml [default: DOC.dots in the current folder]
+    #[arg(short, long, value_name = "DOC.dots")]
+    output: Option<PathBuf>,
 }
 
 impl Halftone {
@@ -133,10 +145,40 @@ impl Halftone {
         let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
         let (mix, provenance) = gamut::files::load(&self.mix)?;
         let pixels = (mix.maps.width(), mix.maps.height());
-        let placement = placement::place(pixels, provenance.size_mm, self.page.size, self.page.paper)?;
-        let staged = Staged::folder(&self.output, Kind::Sheet)?;
-        let sheet = pipeline::halftone_mix(&mix, &library, &placement, observer)?;
-        sheet.save(staged.create()?)?;
+        // Whether it fits its paper is the layout's business; only the largest sheet is a limit here.
+        let any = layout::Layout { cut: true, ..layout::Layout::centred(Paper::A4) };
+        let size = layout::size::dots(pixels, provenance.size_mm, self.size, &any)?;
+        let staged = Staged::folder(&named(&self.output, &self.mix, "dots"), Kind::Dots)?;
+        let settings = halftone::Settings::from_library(&mix.stacks, &library);
+        halftone::halftone(&mix, size, &settings, observer)?.save(staged.create()?)?;
+        staged.commit()
+    }
+}
+
+/// Arguments of `layout`.
+#[derive(ClapArgs, Debug)]
+#[command(
+    after_help = "Example:\n  foilpress layout my-material.dots --paper letter --repeat 2x3 --gap 3mm -o my-material.sheet"
+)]
+pub struct Layout {
+    /// A folder made by `halftone`
+    #[arg(value_name = "DOC.dots")]
+    dots: PathBuf,
+    #[command(flatten)]
+    layout: LayoutArgs,
+    /// Folder to write: one stack for every dot of the page as a picture, sheet.toml, layout.toml
+    /// [default: DOC.sheet in the current folder]
+    #[arg(short, long, value_name = "DOC.sheet")]
+    output: Option<PathBuf>,
+}
+
+impl Layout {
+    /// Dots → a page.
+    pub fn run(&self, observer: &dyn Observer) -> Result<()> {
+        let layout = self.layout.layout(observer)?;
+        let dots = DotMap::load(&self.dots)?;
+        let staged = Staged::folder(&named(&self.output, &self.dots, "sheet"), Kind::Sheet)?;
+        layout::arrange(&dots, &layout, observer)?.save(staged.create()?)?;
         staged.commit()
     }
 }
@@ -145,29 +187,29 @@ impl Halftone {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress separate my-material.sheet -o my-material.passes")]
 pub struct Separate {
-    /// A folder made by `halftone` or `simulate`
+    /// Folder written by `layout` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
-    /// Folder of an ink library of your own: its order rules count
+    /// Folder of your own ink library; its order rules apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
-    /// Folder to write: a one-bit picture for each pass, passes.toml
+    /// Folder to write: a one-bit picture for each pass, passes.toml [default: DOC.passes in the current folder]
     #[arg(short, long, value_name = "DOC.passes")]
-    output: PathBuf,
+    output: Option<PathBuf>,
 }
 
 impl Separate {
-    /// Sheet → one-bit passes.
+    /// A page → one-bit passes.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
-        let sheet = Sheet::load(&self.sheet)?;
-        let staged = Staged::folder(&self.output, Kind::Passes)?;
-        let separation = separate::separate(&sheet, library.rules(), observer)?;
+        let layout::Arranged { sheet, laid } = layout::Arranged::load(&self.sheet)?;
+        let staged = Staged::folder(&named(&self.output, &self.sheet, "passes"), Kind::Passes)?;
+        let separation = pipeline::separate_page(&sheet, &laid, &library, observer)?;
+        pipeline::permit(&separation)?;
         for check in &separation.checks {
             match check.severity {
-                Severity::Error => bail!("this must not be printed: {}", check.with_stacks()),
-                Severity::Warning => observer.note(&check.to_string()),
-                Severity::Note => observer.note(&check.text),
+                inks::Severity::Note => observer.note(&check.text),
+                inks::Severity::Warning | inks::Severity::Error => observer.note(&check.to_string()),
             }
         }
         separate::files::save(&separation, staged.create()?)?;
@@ -179,27 +221,28 @@ impl Separate {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress encode my-material.passes -o job.rgl")]
 pub struct Encode {
-    /// A folder made by `separate`
+    /// Folder written by `separate`
     #[arg(value_name = "DOC.passes")]
     passes: PathBuf,
     #[command(flatten)]
     media: MediaArgs,
-    /// Yes, print foil: its codes were never seen on hardware, and it needs process ink beneath it
+    /// Allow foil; its ink codes have never been seen on hardware, and it needs process ink beneath it
     #[arg(long)]
     foil: bool,
-    /// File to write
+    /// File to write [default: DOC.rgl in the current folder]
     #[arg(short, long, value_name = "JOB.rgl")]
-    output: PathBuf,
+    output: Option<PathBuf>,
 }
 
 impl Encode {
     /// Passes → the printer's language.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
         let saved = separate::files::load(&self.passes)?;
-        let staged = Staged::file(&self.output)?;
-        let inks = if self.foil { inks::InkSet::ALL } else { inks::InkSet::default() };
-        let job = pipeline::job_on(self.media.page(saved.paper), &saved.passes, &inks, observer)?;
-        fs::write(staged.path(), job).with_context(|| format!("cannot write {}", self.output.display()))?;
+        let output = named(&self.output, &self.passes, "rgl");
+        let staged = Staged::file(&output)?;
+        let allowed = if self.foil { inks::InkSet::ALL } else { inks::InkSet::default() };
+        let job = pipeline::encode(saved.paper, self.media.handling(), &saved.passes, &allowed, observer)?;
+        fs::write(staged.path(), job).with_context(|| format!("cannot write {}", output.display()))?;
         staged.commit()
     }
 }
@@ -208,10 +251,10 @@ impl Encode {
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Example:\n  foilpress simulate job.rgl -o printed.sheet")]
 pub struct Simulate {
-    /// A job in the printer's language
+    /// Job in the printer's language
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
-    /// Folder to write: the sheet the simulated printer made
+    /// Folder to write: the sheet that the simulated printer made
     #[arg(short, long, value_name = "SHEET")]
     output: PathBuf,
 }
@@ -219,7 +262,7 @@ pub struct Simulate {
 impl Simulate {
     /// The printer's language → the sheet that comes out.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let job = super::read_job(&self.job)?;
+        let job = super::stdio::read_job(&self.job)?;
         let staged = Staged::folder(&self.output, Kind::Sheet)?;
         let printout = simulate::print(&job, &simulate::Setup::default(), observer)
             .with_context(|| format!("{}", self.job.display()))?;

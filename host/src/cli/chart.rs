@@ -1,19 +1,20 @@
-//! `foilpress chart`: sheets made to look at, to measure inks and to measure the machine.
+//! `foilpress chart`: sheets made to look at, to measure inks and to calibrate the printer.
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
+use serde_json::Value;
 
 use super::args::InkArgs;
 use super::deliver::DeliverArgs;
+use super::job::{Artwork, JobArgs, ResultArgs};
 use super::layout::{MediaArgs, ink};
-use super::piece::{self, Job, PieceArgs, ResultArgs};
 use observe::Observer;
 use press::chart;
 use press::layout::{self, Layout};
 use press::separate::MOST_CARTRIDGES;
-use press::sheet::Piece;
+use press::sheet::DotMap;
 
 /// Arguments of `chart`.
 #[derive(ClapArgs, Debug)]
@@ -31,23 +32,24 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Chart {
-    /// From one stack to another, halftoned, with a checkerboard to hold so that it is reflected
+    /// Print a halftoned ramp from one stack to another, with a checkerboard to hold so that the ramp reflects it
     Ramp(Ramp),
-    /// Four levels of gloss between a glossy and a dull stack: clamped, and with their differences kept
+    /// Print four levels of gloss between a glossy and a dull stack, both clamped and with their differences kept
     Ladder(Ladder),
-    /// A labelled patch of every stack that a choice of inks can make
+    /// Print a labelled patch of every stack that the chosen inks can make
     Stacks(Stacks),
-    /// Verniers between the first ink and the others: how far passes are apart
+    /// Print verniers between the first ink and each other ink, to measure how far apart passes land
     Registration(Registration),
-    /// Two crosses to measure with a ruler: where this machine prints and how far it feeds (`foilpress profile set`)
+    /// Print two crosses to measure with a ruler, for `foilpress profile set`: where this printer prints and how far it
+    /// feeds
     Calibration(Calibration),
 }
 
 #[derive(ClapArgs, Debug)]
 struct Ramp {
-    /// The stack at the left: short or long names of inks joined by +, from the bottom, such as MS or MS+C
+    /// Stack on the left: short or long names of inks joined by +, from the bottom, such as MS or MS+C
     first: Stack,
-    /// The stack at the right
+    /// Stack on the right
     second: Stack,
     #[command(flatten)]
     step: StepArgs,
@@ -56,19 +58,19 @@ struct Ramp {
 /// What charts between two stacks share.
 #[derive(ClapArgs, Debug)]
 struct StepArgs {
-    /// Folder of an ink library of your own
+    /// Folder of your own ink library [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<std::path::PathBuf>,
     #[command(flatten)]
-    piece: PieceArgs,
+    job: JobArgs,
 }
 
 #[derive(ClapArgs, Debug)]
 struct Ladder {
-    /// The glossier stack: short or long names of inks joined by +, from the bottom
+    /// Glossier stack: short or long names of inks joined by +, from the bottom
     #[arg(default_value = "MS+F", requires = "dull")]
     glossy: Stack,
-    /// The duller stack
+    /// Duller stack
     #[arg(default_value = "MS")]
     dull: Stack,
     #[command(flatten)]
@@ -80,12 +82,12 @@ struct Stacks {
     #[command(flatten)]
     inks: InkArgs,
     #[command(flatten)]
-    piece: PieceArgs,
+    job: JobArgs,
 }
 
 #[derive(ClapArgs, Debug)]
 struct Registration {
-    /// The inks, joined by commas; the first is compared with each of the others
+    /// Inks, separated by commas; the first is compared with each of the others
     #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = ink)]
     inks: Vec<Ink>,
     #[command(flatten)]
@@ -94,17 +96,17 @@ struct Registration {
 
 #[derive(ClapArgs, Debug)]
 struct Calibration {
-    /// The ink to print with
+    /// Ink to print with
     #[arg(long, default_value = "black", value_parser = ink)]
     ink: Ink,
     #[command(flatten)]
     whole: WholePage,
 }
 
-/// Charts of the whole printable area have no layout but their paper, and measure the machine as it is.
+/// Charts of the whole printable area have no layout but their paper, and measure the printer as it is.
 #[derive(ClapArgs, Debug)]
 struct WholePage {
-    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     paper: protocol::paper::Paper,
     #[command(flatten)]
@@ -115,7 +117,7 @@ struct WholePage {
     deliver: DeliverArgs,
 }
 
-/// Inks of `chart stacks` when none are named: as many as go in.
+/// Inks of `chart stacks` when none are named: as many as the printer holds.
 const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
 
 /// Runs `chart`.
@@ -130,40 +132,45 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             let (set, library) = if stacks.inks.inks.is_some() { &stacks.inks } else { &usual }.at_hand()?;
             if set.len() > MOST_CARTRIDGES {
                 bail!(
-                    "--inks: {} inks, but the machine holds {MOST_CARTRIDGES} cartridges; print a chart for some at a time, \
-                     such as --inks {USUAL}",
+                    "--inks: {} inks, but the printer holds {MOST_CARTRIDGES} cartridges; print several charts, each of some \
+                     inks, such as --inks {USUAL}",
                     set.len()
                 );
             }
             let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
-            let piece = chart::stacks(&all, stacks.piece.layout.paper)?;
-            let job = Job {
-                name: "stacks",
-                piece: &piece,
-                allowed: set,
-                library: &library,
-                report: None,
-                advice: String::new(),
-            };
-            piece::print(&job, &stacks.piece, observer)
+            let dots = chart::stacks(&all, stacks.job.layout.paper)?;
+            let artwork = artwork("stacks", &dots, set, &library);
+            print(&artwork, &stacks.job, observer)
         }
         Chart::Registration(registration) => {
             let inks = &registration.inks;
             if let Some(twice) = inks.iter().enumerate().find(|(i, ink)| inks[..*i].contains(ink)) {
-                bail!("--inks: {} comes twice", twice.1.name());
+                bail!("--inks: {} is given twice", twice.1.name());
             }
-            let piece = chart::registration(inks, registration.whole.paper)?;
-            registration.whole.print("registration", &piece, inks, observer)
+            let dots = chart::registration(inks, registration.whole.paper)?;
+            registration.whole.print("registration", &dots, inks, observer)
         }
         Chart::Calibration(calibration) => {
             let ink = calibration.ink;
-            let piece = chart::calibration(ink, calibration.whole.paper)?;
-            calibration.whole.print("calibration", &piece, &[ink], observer)
+            let dots = chart::calibration(ink, calibration.whole.paper, &NEXT)?;
+            calibration.whole.print("calibration", &dots, &[ink], observer)
         }
     }
 }
 
-type Make = fn(&Stack, &Stack, &Library, &dyn Observer) -> Result<Piece, chart::ChartError>;
+/// What to do with what was measured on the calibration chart, printed on it.
+const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", "       --distance Dmm"];
+
+type Make = fn(&Stack, &Stack, &Library, &dyn Observer) -> Result<DotMap, chart::ChartError>;
+
+fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Library) -> Artwork<'a> {
+    Artwork { name, dots, allowed, library, report: Value::Null, advice: String::new() }
+}
+
+fn print(artwork: &Artwork<'_>, args: &JobArgs, observer: &dyn Observer) -> Result<()> {
+    let layout = args.layout.layout(observer)?;
+    artwork.print(&layout, &args.media, &args.result, &args.deliver, observer)
+}
 
 impl StepArgs {
     fn run(
@@ -174,28 +181,19 @@ impl StepArgs {
         observer: &dyn Observer,
     ) -> Result<()> {
         let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
-        let piece = make(first, second, &library, observer)?;
-        // Who names a foil wants it.
-        let allowed = InkSet::ALL;
+        let dots = make(first, second, &library, observer)?;
         let name = format!("{name} {first} {second}");
-        let job = Job {
-            name: &name,
-            piece: &piece,
-            allowed,
-            library: &library,
-            report: None,
-            advice: String::new(),
-        };
-        piece::print(&job, &self.piece, observer).with_context(|| name.clone())
+        // Who names a foil wants it.
+        let artwork = artwork(&name, &dots, InkSet::ALL, &library);
+        print(&artwork, &self.job, observer).with_context(|| name.clone())
     }
 }
 
 impl WholePage {
-    fn print(&self, name: &str, piece: &Piece, inks: &[Ink], observer: &dyn Observer) -> Result<()> {
+    fn print(&self, name: &str, dots: &DotMap, inks: &[Ink], observer: &dyn Observer) -> Result<()> {
         let library = Library::builtin();
-        let allowed = InkSet::of(inks.iter().copied());
-        let job = Job { name, piece, allowed, library: &library, report: None, advice: String::new() };
+        let artwork = artwork(name, dots, InkSet::of(inks.iter().copied()), &library);
         let layout = Layout::centred(self.paper);
-        piece::print_on(&job, &layout, &self.media, &self.result, &self.deliver, observer)
+        artwork.print(&layout, &self.media, &self.result, &self.deliver, observer)
     }
 }

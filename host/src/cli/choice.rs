@@ -73,7 +73,7 @@ impl Choice for White {
         (White::Under, "under", "Under every dot of every ink"),
         (White::Reserved, "reserved", "Where the picture has the vendor's reserved white, 230,230,230"),
         (White::Opaque, "opaque", "Where the picture is neither pure white nor transparent"),
-        (White::Silhouette, "silhouette", "Everything inside the outline, including holes"),
+        (White::Silhouette, "silhouette", "Everything inside the outline, including holes and white areas"),
         (White::Alpha, "alpha", "Where the picture is not transparent, including pure white"),
     ];
 }
@@ -89,7 +89,7 @@ impl Choice for Finish {
 impl Choice for Accept {
     const ALL: &'static [(Accept, &'static str, &'static str)] = &[
         (Accept::FoilUndercoat, "foil-undercoat", "Solid cyan, magenta, yellow and black beneath every foil"),
-        (Accept::EvenWhite, "even-white", "Primer, finish, primer between black and the white on it"),
-        (Accept::WhiteThrice, "white-thrice", "Three layers of white where there is one"),
+        (Accept::EvenWhite, "even-white", "Primer, finish and primer between black and the white above it"),
+        (Accept::WhiteThrice, "white-thrice", "Three layers of white instead of one"),
     ];
 }

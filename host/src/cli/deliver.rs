@@ -19,16 +19,21 @@ use observe::Observer;
 /// Where a job goes, how often, and whether it was asked for.
 #[derive(Args, Debug)]
 pub struct DeliverArgs {
-    /// Also send the job there: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
+    /// Also send the job to: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
+    ///
+    /// The plan is shown first, and the job is sent after you confirm it (see --yes). A file is written without asking.
+    /// Without --to nothing is sent.
     #[arg(long, value_name = "WHERE")]
     pub to: Option<Destination>,
-    /// Sheets to print; the program waits between them
+    /// Number of sheets to print; the program waits for Enter between them
     #[arg(long, value_name = "N", default_value_t = 1, requires = "to", value_parser = clap::value_parser!(u16).range(1..=99))]
     pub copies: u16,
     /// Send even if the device does not identify itself as an ALPS printer
     #[arg(long, requires = "to")]
     pub force: bool,
     /// Send without asking for confirmation
+    ///
+    /// Needed where there is no terminal to confirm the plan on.
     #[arg(short, long)]
     pub yes: bool,
 }

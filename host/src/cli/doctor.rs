@@ -1,24 +1,27 @@
-//! `foilpress doctor`: what is needed to print, what of it is there, and what to do next.
+//! `foilpress doctor`: what printing needs, what is missing, and what to do next.
 
 use std::path::Path;
 
 use anyhow::{Error, Result, bail};
 use clap::Args as ClapArgs;
 
-use super::bridge::{Found, ask, is_forbidden, permission};
+use super::bridge::{Found, ask};
+use super::permission;
 use super::resume::line;
+use super::stdio::chain;
 use device::flash::{drive, usb};
 use device::send::find::{self, Candidate};
 use device::send::journal::Journal;
 use device::send::query::is_alps;
 use device::send::session::Phase;
 use device::send::{Address, OpenError};
+use observe::with_causes;
 
 /// Arguments of `doctor`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress doctor\n  foilpress doctor --to serial:/dev/ttyACM0")]
 pub struct Args {
-    /// Where the bridge is [default: every one there is]
+    /// Address of the bridge [default: every bridge found]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
 }
@@ -26,13 +29,13 @@ pub struct Args {
 /// What was found so far.
 struct Visit<W> {
     out: W,
-    /// What stands in the way.
+    /// Number of problems that prevent printing.
     troubles: usize,
-    /// Something is there that may not be used.
+    /// Whether a permission is missing.
     forbidden: bool,
 }
 
-/// Runs `doctor`. Fails if something stands in the way of printing.
+/// Runs `doctor`. Fails if something prevents printing.
 pub fn run(args: &Args) -> Result<()> {
     let mut visit = Visit { out: std::io::stdout().lock(), troubles: 0, forbidden: false };
     visit.journal()?;
@@ -43,8 +46,8 @@ pub fn run(args: &Args) -> Result<()> {
     let boards = if args.to.is_none() { visit.boards()? } else { 0 };
     if bridges.is_empty() && boards == 0 {
         visit.trouble(
-            "no bridge on USB: plug it in. If it is, its cable may carry no data, or it has no firmware yet: then hold its \
-             BOOTSEL button while plugging it in, and `foilpress bridge flash`. A bridge elsewhere can be named with --to",
+            "no bridge found on USB: plug it in. If it is plugged in, its cable may carry no data, or it has no firmware yet: hold \
+             its BOOTSEL button while plugging it in, then run `foilpress bridge flash`. Name a bridge elsewhere with --to",
         )?;
     }
     for bridge in &bridges {
@@ -61,18 +64,22 @@ impl<W: std::io::Write> Visit<W> {
     }
 
     fn failure(&mut self, error: &Error) -> Result<()> {
-        self.forbidden |= is_forbidden(error);
-        self.trouble(&super::chain(error))
+        self.forbidden |= permission::is_missing(error);
+        self.trouble(&chain(error))
     }
 
     fn journal(&mut self) -> Result<()> {
         match Journal::of_user() {
-            Err(error) => self.trouble(&format!("jobs cannot be kept: {error}")),
+            Err(error) => self.trouble(&format!("cannot keep jobs: {}", with_causes(&error))),
             Ok(journal) => {
                 writeln!(self.out, "jobs are kept in {}", journal.folder().display())?;
                 for entry in journal.entries()? {
                     if !matches!(entry.record.phase, Phase::Ended(_)) {
-                        writeln!(self.out, "    waits for `foilpress resume`: {}", line(&entry))?;
+                        writeln!(
+                            self.out,
+                            "    unfinished (`foilpress resume` continues it): {}",
+                            line(&entry)
+                        )?;
                     }
                 }
                 Ok(())
@@ -80,20 +87,20 @@ impl<W: std::io::Write> Visit<W> {
         }
     }
 
-    /// Boards in their boot loader; how many.
+    /// Reports boards in their boot loader; returns how many there are.
     fn boards(&mut self) -> Result<usize> {
         let found = match usb::boards() {
             Ok(found) => found,
             Err(error) => {
-                self.trouble(&format!("USB cannot be searched: {error}"))?;
+                self.trouble(&format!("cannot search USB: {error}"))?;
                 Vec::new()
             }
         };
         let drives = drive::find();
         for board in &found {
             self.trouble(
-                "\na board is in its boot loader, without firmware: `foilpress bridge flash` puts it on; if that was not \
-                 meant, plug it in again",
+                "\na board is in its boot loader, without firmware: `foilpress bridge flash` installs it; to leave the boot loader, \
+                 unplug the board and plug it in again",
             )?;
             let Some(closed) = board.closed.filter(|_| drives.is_empty()) else { continue };
             self.forbidden |= board.is_forbidden();
@@ -103,7 +110,7 @@ impl<W: std::io::Write> Visit<W> {
         }
         for drive in drives.iter().skip(found.len()) {
             self.trouble(&format!(
-                "\na board's drive is mounted at {}: `foilpress bridge flash` puts firmware on it",
+                "\na board's drive is mounted at {}: `foilpress bridge flash` installs firmware on it",
                 drive.display()
             ))?;
         }
@@ -117,7 +124,7 @@ impl<W: std::io::Write> Visit<W> {
             Err(error) => return self.failure(&error),
             Ok(found) => self.answers(&found)?,
         }
-        // It can be spoken to; but the owner may mean to use one of its other addresses.
+        // The bridge answers on one address; the user may want to use another.
         for address in bridge.addresses.iter().filter(|_| bridge.addresses.len() > 1) {
             if let Err(error @ OpenError::Forbidden(_)) = address.open() {
                 self.failure(&error.into())?;
@@ -131,7 +138,8 @@ impl<W: std::io::Write> Visit<W> {
         self.troubles += usize::from(found.fault.is_some());
         match found.device_id() {
             Some(id) if !is_alps(&id) => self.trouble(
-                "the printer is no ALPS, so jobs for it are refused; if it takes them all the same, `--force` with send and print goes on",
+                "the device does not identify itself as an ALPS printer, so jobs are not sent to it; `--force` with send or print \
+                 sends them anyway",
             ),
             _ => Ok(()),
         }
@@ -142,10 +150,10 @@ impl<W: std::io::Write> Visit<W> {
         if raw.exists() {
             let (place, out) = (raw.display(), &mut self.out);
             match std::fs::OpenOptions::new().write(true).open(raw) {
-                Ok(_) => writeln!(out, "\n{place} is there: `--to raw:{place}` sends to it")?,
+                Ok(_) => writeln!(out, "\n{place} can be written: `--to raw:{place}` sends to it")?,
                 Err(error) => {
                     self.forbidden |= error.kind() == std::io::ErrorKind::PermissionDenied;
-                    writeln!(out, "\n{place} is there but: {error}")?;
+                    writeln!(out, "\n{place} cannot be opened: {error}")?;
                 }
             }
         }
@@ -154,10 +162,10 @@ impl<W: std::io::Write> Visit<W> {
 
     fn end(mut self) -> Result<()> {
         if self.forbidden {
-            write!(self.out, "\n{}", permission())?;
+            write!(self.out, "\n{}", permission::how_to_give())?;
         }
         if self.troubles > 0 {
-            bail!("things that stand in the way of printing: {}", self.troubles);
+            bail!("problems that prevent printing: {}", self.troubles);
         }
         Ok(writeln!(self.out, "\nall is well")?)
     }

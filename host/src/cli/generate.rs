@@ -1,10 +1,10 @@
-//! `foilpress generate`: what a package needs beside the program, as a tree of files. Not for people; no help shows it.
+//! `foilpress generate`: the files a package needs besides the program, as a tree. For packaging only, so help hides it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use clap::{Args as ClapArgs, CommandFactory as _};
+use clap::Args as ClapArgs;
 use clap_complete::Shell;
 
 use crate::queue::install::{Places, put};
@@ -15,17 +15,16 @@ const PROGRAM: &str = "/usr/bin/foilpress";
 /// Arguments of `generate`.
 #[derive(ClapArgs, Debug)]
 pub struct Args {
-    /// Folder that stands for the root of the file system
+    /// Folder that takes the place of the root of the file system
     #[arg(value_name = "DIR")]
     root: PathBuf,
 }
 
-/// Runs `generate`.
-pub fn run(args: &Args) -> Result<()> {
-    let command = super::Args::command();
+/// Runs `generate` for the command line `command`.
+pub fn run(args: &Args, command: &clap::Command) -> Result<()> {
     let folder = |path: &str| -> Result<PathBuf> {
         let folder = args.root.join(path);
-        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
         Ok(folder)
     };
     clap_mangen::generate_to(command.clone(), folder("usr/share/man/man1")?)

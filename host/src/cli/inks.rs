@@ -1,4 +1,4 @@
-//! `foilpress inks`: what the library knows, and what is wrong with one.
+//! `foilpress inks`: list, show and check the inks and stacks of a library.
 
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -6,16 +6,18 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use inks::{Entry, InkSet, Library, Provenance, Severity, Source, Stack};
+use protocol::ink::Ink;
 use serde::Serialize;
 
 use super::output::Staged;
+use super::stdio::{closed_pipe, show};
 use appearance::brdf::plot;
 
 /// The library of inks and stacks.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress inks list --inks process,metallic-silver\n  \
-    foilpress inks show MS+C --figures                   (what its curve rests on)\n  \
+    foilpress inks show MS+C --figures                   (with the figures behind its curve)\n  \
     foilpress inks check my-library/                     (before it is used with --library)")]
 pub struct Args {
     #[command(subcommand)]
@@ -24,36 +26,36 @@ pub struct Args {
 
 #[derive(clap::Subcommand, Debug)]
 enum What {
-    /// List the stacks: layers, peak reflectance and where the curve comes from.
+    /// List the stacks with their layers, their peak reflectance and the origin of their curves
     List {
-        /// A folder with a `library.toml`; without it the built-in library, which is modelled, not measured.
+        /// Folder of an ink library, with its `library.toml` [default: the built-in library, which is modelled, not measured]
         #[arg(long, value_name = "DIR")]
         library: Option<PathBuf>,
-        /// Only stacks that need no ink but these, such as `process,metallic-silver,finish`, `all` or
-        /// `-metallic`. Foils are left out unless they or `all` are named. Without it every stack is listed.
+        /// List only stacks made of these inks, such as `process,metallic-silver,finish`, `all` or `-metallic`; foils are
+        /// left out unless they or `all` are named [default: list every stack]
         #[arg(long, value_name = "INKS", allow_hyphen_values = true)]
         inks: Option<InkSet>,
-        /// As JSON.
+        /// Print JSON
         #[arg(long)]
         json: bool,
     },
-    /// Show one stack: cartridges, cautions, figures, and the curve as a plot.
+    /// Show one stack with its cartridges, cautions and figures, and a plot of its curve
     Show {
-        /// Layers from the bottom up, such as `MS+C+F`, `metallic-silver+cyan` or `substrate`.
+        /// Stack: inks from the bottom up, such as `MS+C+F`, `metallic-silver+cyan` or `substrate`
         stack: String,
-        /// A folder with a `library.toml`; without it the built-in library.
+        /// Folder of an ink library, with its `library.toml` [default: the built-in library]
         #[arg(long, value_name = "DIR")]
         library: Option<PathBuf>,
-        /// List every figure the curve rests on.
+        /// List every figure that the curve is based on
         #[arg(long)]
         figures: bool,
-        /// Also write the plot to this SVG file.
+        /// Also write the plot to this SVG file
         #[arg(long, value_name = "FILE.svg")]
         plot: Option<PathBuf>,
     },
-    /// Check a library's folder and list every problem with its file, line and field.
+    /// Check the folder of a library and list every problem with its file, line and field
     Check {
-        /// The folder with `library.toml`.
+        /// Folder with `library.toml`
         dir: PathBuf,
     },
 }
@@ -66,7 +68,7 @@ pub fn run(args: Args) -> anyhow::Result<()> {
             let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
             let library = open(library.as_deref())?;
             let entry = find(&library, &stack)?;
-            let mut text = show(&library, entry, figures);
+            let mut text = describe(&library, entry, figures);
             text.push_str(&plot::terminal(&entry.curve, colour));
             if let Some(file) = &plot {
                 let title =
@@ -81,9 +83,9 @@ pub fn run(args: Args) -> anyhow::Result<()> {
         }
         What::Check { dir } => check(&dir),
     };
-    match super::show(&text) {
-        // A reader that has seen enough, such as `head`, is no failure.
-        Err(error) if !super::closed_pipe(&error) => Err(error),
+    match show(&text) {
+        // A reader that closes the pipe early, such as `head`, is not a failure.
+        Err(error) if !closed_pipe(&error) => Err(error),
         _ => verdict,
     }
 }
@@ -96,7 +98,7 @@ fn open(folder: Option<&Path>) -> anyhow::Result<Library> {
     }
 }
 
-/// The entry of a stack given in words; suggests one when there is none.
+/// The entry of a stack given as text. Suggests another when the library lacks it.
 fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
     let stack: Stack = text.parse()?;
     if let Some(entry) = library.entry(&stack) {
@@ -109,7 +111,7 @@ fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
     };
     if let Some(other) = library.entries().iter().find(|entry| sorted(&entry.stack) == sorted(&stack)) {
         bail!(
-            "stack {stack} is not in the library, but {} is: the first layer lies at the bottom",
+            "stack {stack} is not in the library, but {} is; name the inks from the bottom up",
             other.stack
         );
     }
@@ -121,7 +123,7 @@ fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
         .max_by(|a, b| a.0.total_cmp(&b.0));
     match near {
         Some((_, near)) => bail!(
-            "stack {stack} is not in the library; the nearest is {near}, `foilpress inks list` shows all of them"
+            "stack {stack} is not in the library; the nearest is {near}; `foilpress inks list` shows every stack"
         ),
         None => bail!("stack {stack} is not in the library"),
     }
@@ -193,67 +195,15 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
     Ok(text)
 }
 
-fn show(library: &Library, entry: &Entry, figures: bool) -> String {
+/// A stack in words: its curve, its cartridges, and the rules it breaks.
+fn describe(library: &Library, entry: &Entry, figures: bool) -> String {
     let stack = &entry.stack;
     let mut lines = vec![format!("{stack}: {}", library.words(stack))];
-    match &entry.provenance {
-        Provenance::Modelled { model, parameters } => {
-            let count = |source| parameters.iter().filter(|p| p.source == source).count();
-            lines.push(format!("curve     modelled, not measured: {model}"));
-            lines.push(format!(
-                "rests on  {} figures: {} measured, {} from literature, {} from formulas, {} guesses",
-                parameters.len(),
-                count(Source::Measured),
-                count(Source::Literature),
-                count(Source::Formula),
-                count(Source::Guess)
-            ));
-        }
-        Provenance::Measured { by, when, setup } => {
-            lines.push(format!("curve     measured by {by}, {when}: {setup}"));
-        }
-    }
-    if let Some(lobes) = &entry.lobes {
-        let rgb = |v: [f64; 3]| format!("{:.3} {:.3} {:.3}", v[0], v[1], v[2]);
-        lines.push(format!("diffuse   albedo {}", rgb(lobes.kd)));
-        for lobe in &lobes.lobes {
-            lines.push(format!("lobe      F0 {}, alpha {:.3}", rgb(lobe.f0), lobe.alpha));
-        }
-    }
-    if let Some(lobes) = &entry.lobes {
-        lines.push(format!(
-            "gloss     {:.0} units at 60 degrees, as a gloss meter would read the model",
-            inks::gloss::units(lobes)
-        ));
-    }
-    lines.push(format!("cluster   {} dots of 1/600 inch or more", library.minimum_cluster(stack)));
+    lines.extend(curve_lines(entry));
+    lines.push(format!("cluster   at least {} dots of 1/600 inch", library.minimum_cluster(stack)));
     for (place, &ink) in stack.layers().iter().enumerate() {
         lines.push(String::new());
-        let at = if place == 0 { "first, lowest" } else { "above" };
-        match library.cartridge(ink) {
-            Some(cartridge) => {
-                lines.push(format!(
-                    "{at}: {} ({}), sold by ALPS as {}",
-                    cartridge.okidata,
-                    ink.short(),
-                    cartridge.alps
-                ));
-                lines.push(format!(
-                    "  cartridge {}, barcode {}, ink code {:02x}, clusters of {} dots",
-                    ink.part(),
-                    ink.barcode(),
-                    ink.code(),
-                    cartridge.minimum_cluster.get()
-                ));
-                lines.extend(
-                    cartridge
-                        .cautions
-                        .iter()
-                        .map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
-                );
-            }
-            None => lines.push(format!("{at}: {}, of which the library has no cartridge", ink.name())),
-        }
+        lines.extend(layer_lines(library, ink, if place == 0 { "bottom" } else { "above" }));
     }
     let broken = library.broken_rules(stack);
     if !broken.is_empty() {
@@ -272,6 +222,61 @@ fn show(library: &Library, entry: &Entry, figures: bool) -> String {
     lines.push(String::new());
     lines.push("reflectance in 1/sr over the half angle:".into());
     lines.join("\n") + "\n"
+}
+
+/// The origin of a stack's curve and, if it is modelled, the lobes it is made of.
+fn curve_lines(entry: &Entry) -> Vec<String> {
+    let mut lines = Vec::new();
+    match &entry.provenance {
+        Provenance::Modelled { model, parameters } => {
+            let count = |source| parameters.iter().filter(|p| p.source == source).count();
+            lines.push(format!("curve     modelled, not measured: {model}"));
+            lines.push(format!(
+                "based on  {} figures: {} measured, {} from literature, {} from formulas, {} guesses",
+                parameters.len(),
+                count(Source::Measured),
+                count(Source::Literature),
+                count(Source::Formula),
+                count(Source::Guess)
+            ));
+        }
+        Provenance::Measured { by, when, setup } => {
+            lines.push(format!("curve     measured by {by}, {when}: {setup}"));
+        }
+    }
+    if let Some(lobes) = &entry.lobes {
+        let rgb = |v: [f64; 3]| format!("{:.3} {:.3} {:.3}", v[0], v[1], v[2]);
+        lines.push(format!("diffuse   albedo {}", rgb(lobes.kd)));
+        for lobe in &lobes.lobes {
+            lines.push(format!("lobe      F0 {}, alpha {:.3}", rgb(lobe.f0), lobe.alpha));
+        }
+        lines.push(format!(
+            "gloss     {:.0} units at 60 degrees, as a gloss meter would read the model",
+            inks::gloss::units(lobes)
+        ));
+    }
+    lines
+}
+
+/// One layer of a stack: its cartridge and the cautions about it.
+fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
+    let Some(cartridge) = library.cartridge(ink) else {
+        return vec![format!("{place}: {}, for which the library has no cartridge", ink.name())];
+    };
+    let mut lines = vec![
+        format!("{place}: {} ({}), sold by ALPS as {}", cartridge.okidata, ink.short(), cartridge.alps),
+        format!(
+            "  cartridge {}, barcode {}, ink code {:02x}, minimum cluster {} dots",
+            ink.part(),
+            ink.barcode(),
+            ink.code(),
+            cartridge.minimum_cluster.get()
+        ),
+    ];
+    lines.extend(
+        cartridge.cautions.iter().map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
+    );
+    lines
 }
 
 fn check(dir: &Path) -> (String, anyhow::Result<()>) {
@@ -313,9 +318,7 @@ mod tests {
     #[test]
     fn sets_of_inks_are_arguments() {
         let What::List { inks: Some(inks), .. } = parse("list --inks -metallic").unwrap() else { panic!() };
-        assert!(
-            !inks.contains(protocol::ink::Ink::MetallicSilver) && inks.contains(protocol::ink::Ink::Finish)
-        );
+        assert!(!inks.contains(Ink::MetallicSilver) && inks.contains(Ink::Finish));
         let error = parse("list --inks finnish").err().unwrap();
         assert!(error.to_string().contains("did you mean `finish`?"), "{error}");
     }
@@ -345,7 +348,7 @@ mod tests {
     #[test]
     fn a_foil_stack_is_shown_with_its_cartridges_and_its_trouble() {
         let library = Library::builtin();
-        let text = show(&library, find(&library, "SF+C").unwrap(), true);
+        let text = describe(&library, find(&library, "SF+C").unwrap(), true);
         for word in [
             "Flash Silver",
             "MDC-FMES",

@@ -7,6 +7,7 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
 use super::output::{Kind, Staged};
+use super::stdio::read_job;
 use observe::Observer;
 use press::inspect::{Inspected, Inspection, inspect, sheets};
 use press::separate::files::{self, save_plane};
@@ -15,24 +16,24 @@ use press::separate::files::{self, save_plane};
 #[derive(ClapArgs, Debug)]
 #[command(
     after_help = "Examples:\n  foilpress inspect job.rgl\n  foilpress inspect job.rgl --passes passes/ --json\n\n\
-    A stream of several sheets, as drivers write the pages of a document, is told sheet by sheet, in JSON as a list. \
+    A stream of several sheets, as drivers write the pages of a document, is described sheet by sheet, in JSON as a list. \
     Streams of Ghostscript's drivers for these printers are understood as well."
 )]
 pub struct Args {
-    /// A stream in the printer's language
+    /// Stream in the printer's language
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
-    /// The summary as JSON
+    /// Print the summary as JSON
     #[arg(long)]
     json: bool,
-    /// Also write the dots of each pass as a one-bit picture into this folder
+    /// Also write the dots of each pass as a one-bit picture to this folder
     #[arg(long, value_name = "DIR")]
     passes: Option<PathBuf>,
 }
 
 /// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let job = super::read_job(&args.job)?;
+    let job = read_job(&args.job)?;
     let places = sheets(&job);
     let several = places.len() > 1;
     let mut out = std::io::stdout().lock();
@@ -82,11 +83,11 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
         out,
         "{} bytes, {}{}",
         summary.bytes,
-        if summary.complete { "one whole job" } else { "no whole job" },
+        if summary.complete { "a complete job" } else { "not a complete job" },
         summary.dialect.map_or(String::new(), |driver| format!(", in the dialect of {driver}'s drivers"))
     )?;
     if setup.resolution.is_none() {
-        return Ok(writeln!(out, "no page is set up")?);
+        return Ok(writeln!(out, "no page is declared")?);
     }
     writeln!(
         out,
@@ -108,7 +109,7 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
         writeln!(out, "shifted by {} dots and {} rows", setup.shift_x, setup.shift_y)?;
     }
     if let Some(cassettes) = &setup.cassettes {
-        writeln!(out, "cassette list: {}", cassettes.join(", "))?;
+        writeln!(out, "cartridges declared: {}", cassettes.join(", "))?;
     }
     for pass in &summary.passes {
         write!(
@@ -128,7 +129,7 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
         match &pass.bounds {
             Some(bounds) => writeln!(
                 out,
-                "\n    from ({}, {}), {} x {} dots; {:.1} x {:.1} mm at {:.1}, {:.1} mm of the printable area",
+                "\n    from ({}, {}), {} x {} dots; {:.1} x {:.1} mm at {:.1}, {:.1} mm in the printable area",
                 bounds.x,
                 bounds.y,
                 bounds.width,

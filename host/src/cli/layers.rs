@@ -10,69 +10,73 @@ use serde_json::json;
 
 use super::choice::choice;
 use super::deliver::DeliverArgs;
+use super::job::{Artwork, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
-use super::piece::{self, Job, ResultArgs};
-use super::plan::Shown;
 use super::preset::PresetArg;
+use super::shown::Shown;
 use observe::Observer;
-use press::job::placement::{DOTS_PER_MM, Size};
 use press::job::plan::grouped;
 use press::layers::{self, Accept, Composed, Finish, Order, Room, Suggestion, White, names};
-use press::layout::{Layout, Mm, NoLength};
+use press::layout::{Layout, Mm, NoLength, Size};
+use press::pipeline;
+use press::sheet::DOTS_PER_MM;
 
 /// What to read and how it becomes layers of ink.
 #[derive(ClapArgs, Debug)]
 pub struct LayersArgs {
-    /// Pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with named spot channels,
-    /// an SVG with named layers, a PDF or PostScript file, or one picture
+    /// Artwork: pictures named after their inks (white.png, 02-gold.png), a folder of them, a TIFF with named spot
+    /// channels, an SVG with named layers, a PDF or PostScript file, or one picture
     #[arg(value_name = "ART", required = true)]
     pub art: Vec<PathBuf>,
-    /// The vendor's reserved colours stand for inks: white 230,230,230, gold 225,160,0, silver 189,193,197,
+    /// Print the vendor's reserved colours in their inks: white 230,230,230, gold 225,160,0, silver 189,193,197,
     /// metallic red 163,36,115, metallic blue 0,176,201, black 0,0,0
     #[arg(long)]
     pub reserved: bool,
-    /// How far red, green and blue may be from a reserved colour [default: 8 for white and black, 12 for metals]
+    /// Largest difference of red, green and blue from a reserved colour, 0 to 60 [default: 8 for white and black, 12
+    /// for metals]
     #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = clap::value_parser!(u8).range(0..=60))]
     pub tolerance: Option<u8>,
-    /// Resolution of pictures that do not say theirs, or say it wrongly, in pixels an inch
+    /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one
     #[arg(long, value_name = "DPI", value_parser = dpi)]
     pub dpi: Option<f64>,
     /// Page of a PDF or PostScript file
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = page)]
     pub page: u32,
-    /// Layers that keep their tones, as dots; the others are solid where they are darker than half
+    /// Layers to halftone, so that they keep their tones; other layers are solid where they are darker than half
     #[arg(long, value_name = "INKS")]
     pub halftone: Option<String>,
-    /// Inks that may be used: names and the groups process, metallic, clear, foil, all, joined by commas; + and -
+    /// Inks that may be used: names and the groups process, metallic, clear, foil, all, separated by commas; + and -
     /// change the default [default: all but the foils]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub inks: Option<String>,
-    /// Order from the paper up: rules, given, or the inks one by one, such as white,black,white
-    /// [default: as numbered names say, else by the ink library's rules]
+    /// Order from the paper up: rules, given, or a list of inks such as white,black,white
+    /// [default: the numbers in the file names, else the ink library's rules]
+    ///
+    /// rules follows the ink library; given follows the order of the files or layers.
     #[arg(long, value_name = "ORDER", value_parser = order)]
     pub order: Option<Order>,
-    /// How often an ink is laid, such as white=3,primer=2
+    /// Number of passes of an ink, such as white=3,primer=2 [default: 1 each]
     #[arg(long, value_name = "INK=N", value_delimiter = ',', value_parser = passes)]
     pub passes: Vec<(Ink, u8)>,
-    /// Inks that leave out the process inks beneath them, or none [default: metallic]
+    /// Inks that knock out the process inks beneath them, or none [default: metallic]
     #[arg(long, value_name = "INKS")]
     pub knockout: Option<String>,
-    /// Where white goes [default: where the art draws it]
+    /// Where white is printed [default: where the artwork draws it]
     #[arg(long, value_name = "MODE", value_parser = choice::<White>())]
     pub white: Option<White>,
-    /// Shrink the white by this, so that it does not show beside the colours, such as 0.1mm
+    /// Shrink the white by this length, such as 0.1mm, so that it does not show beside the colours
     #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "spread")]
     pub choke: Option<f64>,
-    /// Spread the white by this
+    /// Spread the white by this length, such as 0.1mm
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub spread: Option<f64>,
-    /// Where glossy finish goes [default: where the art draws it]
+    /// Where glossy finish is printed [default: where the artwork draws it]
     #[arg(long, value_name = "WHERE", value_parser = choice::<Finish>())]
     pub finish: Option<Finish>,
-    /// Suggestions of the plan to follow
+    /// Suggestions of the plan to accept, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
     pub accept: Vec<Accept>,
-    /// Folder of an ink library of your own: its order rules and clusters count
+    /// Folder of your own ink library; its order rules and minimum clusters apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     pub library: Option<PathBuf>,
 }
@@ -187,8 +191,8 @@ impl LayersArgs {
 pub struct Work {
     #[command(flatten)]
     layers: LayersArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the art keeps its shape
-    /// [default: what the files say, else 600 dpi for layers and as large as the page allows for a plain picture]
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the artwork keeps its proportions
+    /// [default: the size stated in the files, else 600 dpi for layers and as large as the page allows for a plain picture]
     #[arg(long)]
     size: Option<Size>,
     #[command(flatten)]
@@ -210,8 +214,9 @@ pub struct Work {
     foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
     foilpress layers decal.pdf --page 1 --white alpha\n  \
     foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n  \
-    foilpress plan layers white.png gold.png black.png      (the plan alone; nothing is written or sent)\n\n\
-    In layers dark is ink; on a transparent ground, what is drawn is ink. Art drawn at 600 dpi is printed as drawn."
+    foilpress plan layers white.png gold.png black.png      (only the plan; nothing is written or sent)\n\n\
+    In a layer, dark pixels are ink; on a transparent background, everything drawn is ink. Artwork drawn at 600 dpi is \
+    printed dot for dot."
 )]
 pub struct Args {
     #[command(flatten)]
@@ -228,9 +233,9 @@ pub struct Args {
     args_override_self = true,
     after_help = "Examples:\n  \
     foilpress plan layers white.png gold.png black.png --passes white=3\n  \
-    foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to lay beside the machine)\n  \
+    foilpress plan layers decal/ --repeat 3x4 --gap 2mm --html plan.html     (one page to keep beside the printer)\n  \
     foilpress plan layers art.svg --json\n\n\
-    The options are those of `foilpress layers` that decide what is printed, not where it goes."
+    Takes the options of `foilpress layers` that decide what is printed, but not those that decide where it goes."
 )]
 pub struct PlanArgs {
     #[command(flatten)]
@@ -244,40 +249,37 @@ impl Work {
     fn with<T>(
         &self,
         observer: &dyn Observer,
-        then: impl FnOnce(&Job<'_>, &Layout) -> Result<T>,
+        then: impl FnOnce(&Artwork<'_>, &Layout) -> Result<T>,
     ) -> Result<T> {
         let library = self.layers.library()?;
         let layout = self.layout.layout(observer)?;
         let (options, settings) = (self.layers.options(self.size, &layout)?, self.layers.settings()?);
         let art = layers::open(&self.layers.art, &options, observer)?;
         let composed = layers::compose(&art, &settings, &library, observer)?;
-        let job = Job {
+        let artwork = Artwork {
             name: &art.name,
-            piece: &composed.piece,
+            dots: &composed.dots,
             allowed: settings.inks,
             library: &library,
-            report: Some((
-                "art",
-                json!({ "composed": composed.report, "suggestions": composed.suggestions }),
-            )),
+            report: json!({ "art": { "composed": composed.report, "suggestions": composed.suggestions } }),
             advice: words(&composed),
         };
-        then(&job, &layout)
+        then(&artwork, &layout)
     }
 }
 
 /// Runs `layers`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let Args { work, result, deliver } = args;
-    work.with(observer, |job, layout| piece::print_on(job, layout, &work.media, result, deliver, observer))
+    work.with(observer, |artwork, layout| artwork.print(layout, &work.media, result, deliver, observer))
 }
 
 /// Runs `plan layers`.
 pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
     let page = args.shown.stage()?;
-    args.work.with(observer, |job, layout| {
-        let piece::Prepared { sheet, plan, .. } = piece::prepare(job, layout, &args.work.media, observer)?;
-        args.shown.show(page, (&plan, &sheet), job.report.clone(), &job.advice)
+    args.work.with(observer, |artwork, layout| {
+        let draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
+        args.shown.show(page, (&draft.plan, &draft.sheet), &artwork.report, &artwork.advice)
     })
 }
 

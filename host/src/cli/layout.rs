@@ -1,4 +1,4 @@
-//! Arguments of the page: paper, position, repeats, marks, the machine, and what the sheet is made of.
+//! Arguments of the page: paper, position, repeats, marks, the printer's profile, and what the sheet is made of.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,11 @@ use clap::{Args, ValueEnum};
 use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
-use protocol::rgl::{Media, Page};
+use protocol::rgl::Media;
 
 use crate::folders;
 use observe::Observer;
+use press::job::Handling;
 use press::layout::{self, Layout, Mm, Point, Position, Profile, Repeat};
 
 /// The profile that is used when none is named.
@@ -19,37 +20,38 @@ pub const DEFAULT_PROFILE: &str = "default";
 /// How things lie on the page.
 #[derive(Args, Debug)]
 pub struct LayoutArgs {
-    /// Paper: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
+    /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
     #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
     pub paper: Paper,
-    /// Top left corner of the print, such as 20x30mm: across, then down [default: centred]
+    /// Position of the top left corner, across and down, such as 20x30mm [default: centred]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
     pub at: Option<Point>,
-    /// What --at is measured from
+    /// Edge that --at is measured from
     #[arg(long, value_name = "WHERE", default_value = "edge", requires = "at")]
     pub from: From,
-    /// The print several times side by side and below each other, such as 3x4, or as often as it fits: fill
+    /// Print several copies on the sheet in a grid, such as 3x4; fill prints as many as fit
     #[arg(long, value_name = "COLUMNSxROWS", default_value = "1x1", value_parser = repeat)]
     pub repeat: Repeat,
-    /// Space between repeats: 2mm, or across and down 2x5mm
+    /// Space between repeats, such as 2mm, or across and down, such as 2x5mm
     #[arg(long, value_name = "LENGTH", default_value = "0", value_parser = gap)]
     pub gap: Point,
-    /// Turn the print left to right: water-slide decals put face down, window decals seen from inside
+    /// Mirror the print left to right, for water-slide decals applied face down or window decals seen from inside
     #[arg(long)]
     pub mirror: bool,
-    /// Ticks where to cut
+    /// Print crop marks: ticks that show where to cut
     #[arg(long)]
     pub crop_marks: bool,
-    /// A cross at each side that every pass prints, to see whether passes meet
+    /// Print a cross in every pass at each side, to see whether the passes line up
     #[arg(long)]
     pub registration_marks: bool,
-    /// Inks of the marks, joined by commas [default: those in use: the one that shows best for ticks, all for crosses]
+    /// Inks of the marks, separated by commas [default: of the inks in use, the one that shows best for ticks and all of
+    /// them for crosses]
     #[arg(long, value_name = "INKS")]
     pub mark_ink: Option<InkSet>,
-    /// Cut off what lies beyond the printable area instead of refusing
+    /// Cut off what lies beyond the printable area [default: an error]
     #[arg(long)]
     pub crop: bool,
-    /// Profile of the machine (`foilpress profile`) [default: the one named `default`, if there is one]
+    /// Calibration profile of the printer (`foilpress profile`) [default: the profile named `default`, if it exists]
     #[arg(long, value_name = "NAME")]
     pub profile: Option<String>,
 }
@@ -74,7 +76,7 @@ fn repeat(text: &str) -> Result<Repeat, String> {
         Some(Repeat::Grid(count(columns)?, count(rows)?))
     });
     grid.ok_or_else(|| {
-        format!("write columns x rows, such as 3x4, each up to {}; or fill", layout::MOST_REPEATS)
+        format!("expected columns x rows, such as 3x4, each up to {}, or fill", layout::MOST_REPEATS)
     })
 }
 
@@ -84,13 +86,13 @@ fn gap(text: &str) -> Result<Point, String> {
         Err(error) => text.parse().map_err(|_| error.to_string())?,
     };
     if point.0.0 < 0.0 || point.1.0 < 0.0 {
-        return Err("pieces cannot overlap; the gap is 0 or more".into());
+        return Err("copies cannot overlap; the gap is 0 or more".into());
     }
     Ok(point)
 }
 
 impl LayoutArgs {
-    /// The layout meant. A profile that is used without being named is told to the observer.
+    /// The layout meant. Notes to the observer when a profile is used without being named.
     pub fn layout(&self, observer: &dyn Observer) -> Result<Layout> {
         let position = match (self.at, self.from) {
             (None, _) => Position::Centred,
@@ -112,7 +114,7 @@ impl LayoutArgs {
     }
 }
 
-/// One ink by its name; a misspelt one is answered with the one meant.
+/// One ink by its name; the error for a misspelt one suggests the name meant.
 pub fn ink(name: &str) -> Result<Ink, String> {
     let set: InkSet = name.parse().map_err(|error: inks::InkSetError| error.to_string())?;
     match set.iter().collect::<Vec<_>>()[..] {
@@ -140,7 +142,7 @@ pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
         (Some(name), false) => {
             let known = folders::names(&folder).unwrap_or_default();
             bail!(
-                "there is no profile `{name}` in {}{}; `foilpress profile set {name}` makes it",
+                "there is no profile `{name}` in {}{}; make it with `foilpress profile set {name}`",
                 folder.display(),
                 if known.is_empty() { String::new() } else { format!(" (there are: {})", known.join(", ")) }
             )
@@ -150,7 +152,7 @@ pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
             if name.is_none() && profile != Profile::default() {
                 let [x, y] = profile.offset_mm;
                 observer.note(&format!(
-                    "the machine's profile is used ({}): offset {x}, {y} mm, feed {}",
+                    "using the printer's profile {}: offset {x}, {y} mm, feed {}",
                     path.display(),
                     profile.feed
                 ));
@@ -163,11 +165,11 @@ pub fn profile(name: Option<&str>, observer: &dyn Observer) -> Result<Profile> {
 /// What the sheet is made of.
 #[derive(Args, Debug)]
 pub struct MediaArgs {
-    /// What the sheet is made of: paper, thick (card), film (decal film: curl correction off), or the printer's own
-    /// word for it, such as plain, cardboard, glossy-paper
-    #[arg(long, default_value = "paper", value_parser = Stock::read)]
-    pub media: Stock,
-    /// Whether the machine corrects the curl of the sheet [default: on for all but film]
+    /// Material of the sheet: paper, thick (card), film (decal film; curl correction off), or one of the printer's own
+    /// media types such as plain, cardboard, glossy-paper
+    #[arg(long, default_value = "paper", value_parser = handling)]
+    pub media: Handling,
+    /// Curl correction of the printer [default: off for film, on for everything else]
     #[arg(long, value_name = "on|off")]
     pub curl: Option<Curl>,
 }
@@ -175,54 +177,43 @@ pub struct MediaArgs {
 /// Curl correction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Curl {
-    /// Corrected
+    /// The printer corrects the curl of the sheet
     On,
-    /// Left alone
+    /// The printer leaves the sheet as it is, so that decals stay on their film
     Off,
 }
 
 impl MediaArgs {
-    /// The page in the printer's language, on this paper.
-    pub fn page(&self, paper: Paper) -> Page {
-        let curl = self.curl.map_or(self.media.curl_correction, |curl| curl == Curl::On);
-        Page { media: self.media.media, curl_correction: curl, ..Page::plain(paper) }
+    /// How the printer is to treat the sheet.
+    pub fn handling(&self) -> Handling {
+        let curl_correction = self.curl.map_or(self.media.curl_correction, |curl| curl == Curl::On);
+        Handling { curl_correction, ..self.media }
     }
 }
 
-/// A sheet by what it is made of.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Stock {
-    /// The printer's media type, which sets its heat.
-    pub media: Media,
-    /// Whether curl is corrected.
-    pub curl_correction: bool,
-}
+/// What owners print on, by their own words: decals come off film that went through curl correction.
+const STOCKS: [(&str, Handling); 3] = [
+    ("paper", Handling { media: Media::Plain, curl_correction: true }),
+    ("thick", Handling { media: Media::Cardboard, curl_correction: true }),
+    ("film", Handling { media: Media::Plain, curl_correction: false }),
+];
 
-impl Stock {
-    /// The three that owners use, by their own words: decals come off film that went through curl correction.
-    const PRESETS: [(&'static str, Stock); 3] = [
-        ("paper", Stock { media: Media::Plain, curl_correction: true }),
-        ("thick", Stock { media: Media::Cardboard, curl_correction: true }),
-        ("film", Stock { media: Media::Plain, curl_correction: false }),
-    ];
-
-    /// A preset or a media type by its name.
-    fn read(name: &str) -> Result<Stock, String> {
-        if let Some((_, stock)) = Stock::PRESETS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
-            return Ok(*stock);
-        }
-        Media::from_name(name).map(|media| Stock { media, curl_correction: true }).ok_or_else(|| {
-            let names: Vec<&str> =
-                Stock::PRESETS.iter().map(|(name, _)| *name).chain(Media::all().map(Media::name)).collect();
-            format!("the media are {}", names.join(", "))
-        })
+/// One of [`STOCKS`] or a media type by its name.
+fn handling(name: &str) -> Result<Handling, String> {
+    if let Some((_, handling)) = STOCKS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)) {
+        return Ok(*handling);
     }
+    Media::from_name(name).map(|media| Handling { media, curl_correction: true }).ok_or_else(|| {
+        let names: Vec<&str> =
+            STOCKS.iter().map(|(name, _)| *name).chain(Media::all().map(Media::name)).collect();
+        format!("the media are {}", names.join(", "))
+    })
 }
 
 /// Arguments of `papers`.
 #[derive(Args, Debug)]
 pub struct PapersArgs {
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
@@ -232,7 +223,7 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
     use std::fmt::Write as _;
     let table: Vec<_> = layout::paper::table().collect();
     if args.json {
-        return super::show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
+        return super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
     }
     let mut text =
         String::from("            sheet, mm        printable, mm    margins: left, top, right, bottom\n");
@@ -246,8 +237,8 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
             paper.name, paper.known
         )?;
     }
-    text.push_str("Any other size as --paper 120x180mm, with the margins of a4.\n");
-    super::show(&text)
+    text.push_str("Any other size: --paper 120x180mm, for example, with the margins of a4.\n");
+    super::stdio::show(&text)
 }
 
 /// Arguments of `profile`.
@@ -264,20 +255,20 @@ pub struct ProfileArgs {
 
 #[derive(clap::Subcommand, Debug)]
 enum ProfileCommand {
-    /// The profiles there are
+    /// List the profiles
     List,
-    /// What was measured on the calibration chart becomes a profile; `default` is used without being named
+    /// Save measurements of the calibration chart as a profile; the profile `default` is used whenever none is named
     Set(SetProfile),
 }
 
 #[derive(Args, Debug)]
 struct SetProfile {
-    /// Its name
+    /// Name of the profile
     name: String,
-    /// Where the middle of the first cross is, from the left and from the top edge of the sheet
+    /// Centre of the first cross, measured from the left and top edges of the sheet
     #[arg(long, value_name = "X,Y")]
     cross: Point,
-    /// From the first cross to the one below it [default: not measured, feed taken as exact]
+    /// Distance from the first cross to the one below it [default: not measured; the feed is taken as exact]
     #[arg(long, value_name = "LENGTH")]
     distance: Option<Mm>,
 }
@@ -297,11 +288,11 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
             }
             if text.is_empty() {
                 text = format!(
-                    "no profiles in {}; `foilpress chart calibration` is the way to one\n",
+                    "no profiles in {}; print `foilpress chart calibration` to make one\n",
                     folder.display()
                 );
             }
-            super::show(&text)
+            super::stdio::show(&text)
         }
         ProfileCommand::Set(set) => {
             let profile = press::chart::calibration::profile(set.cross, set.distance);
@@ -312,7 +303,7 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
             std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
             profile.save(&path)?;
             let Profile { offset_mm: [x, y], feed } = profile;
-            super::show(&format!("{}: offset {x:.2}, {y:.2} mm, feed {feed:.4}\n", path.display()))
+            super::stdio::show(&format!("{}: offset {x:.2}, {y:.2} mm, feed {feed:.4}\n", path.display()))
         }
     }
 }

@@ -14,22 +14,22 @@ use press::job::ribbon;
 /// Arguments of `ledger`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress ledger                   (ribbon used so far, failed jobs counted too)\n  \
-    foilpress ledger new white         (a new cartridge of white is loaded)\n  \
+    foilpress ledger                   (ribbon used so far, including failed jobs)\n  \
+    foilpress ledger new white         (a new white cartridge is loaded)\n  \
     foilpress ledger --json")]
 pub struct Args {
     #[command(subcommand)]
     command: Option<Command>,
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Note that a new cartridge of an ink is loaded: its count starts again
+    /// Record a new cartridge of an ink and restart its count
     New {
-        /// The ink
+        /// Ink of the cartridge
         #[arg(value_parser = super::layout::ink)]
         ink: Ink,
     },

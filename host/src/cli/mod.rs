@@ -1,9 +1,10 @@
 //! The command line: one file for each subcommand.
 //!
-//! Arguments are typed here and in the subcommands' files; the stages see only settings. Exit codes: 0 done,
-//! 1 failed, 2 wrong usage, 130 interrupted. Results go to standard output, everything else to standard error; a
+//! Arguments are defined here and in the subcommands' files; the stages see only settings. Exit codes: 0 success,
+//! 1 failure, 2 usage error, 130 interrupted. Results go to standard output, everything else to standard error; a
 //! closed pipe is success.
 
+mod advice;
 mod args;
 mod bridge;
 mod chain;
@@ -14,11 +15,12 @@ mod doctor;
 mod generate;
 mod inks;
 mod inspect;
+mod job;
 mod layers;
 mod layout;
 mod ledger;
 mod output;
-mod piece;
+mod permission;
 mod plan;
 mod preset;
 mod print;
@@ -27,24 +29,18 @@ mod queue;
 mod resume;
 mod sample;
 mod send;
+mod shown;
+mod stdio;
 mod terminal;
 
-use std::fs::File;
-use std::io::{self, Read as _, Write as _};
-use std::path::Path;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
-use clap::{Parser, Subcommand};
+use anyhow::Result;
+use clap::{CommandFactory as _, Parser, Subcommand};
 
-use device::deliver::Failure;
-use device::flash::FlashError;
-use device::send::OpenError;
-use device::send::query::QueryError;
 use progress::Progress;
-
-/// The largest stream that is read: several times a page of noise in seven passes.
-const LARGEST_JOB: u64 = 256 << 20;
+use stdio::{chain, closed_pipe, read_job, show};
 
 /// Print materials instead of colours on the ALPS MD-5500 (Oki DP-5000).
 #[derive(Parser)]
@@ -58,12 +54,12 @@ const LARGEST_JOB: u64 = 256 << 20;
         foilpress inks show MS+C\n  \
         foilpress inspect job.rgl --passes passes/\n  \
         foilpress send job.rgl --to serial:/dev/ttyACM0\n\n\
-        The chain, step by step: factor, map, halftone, separate, encode, simulate.\n\
-        Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
+        The steps of `print`, one command each: factor, map, halftone, layout, separate, encode, simulate.\n\
+        Exit codes: 0 success, 1 failure, 2 usage error, 130 interrupted."
 )]
 struct Args {
-    /// No progress on standard error, only notes and errors
-    #[arg(short, long, global = true)]
+    /// Show no progress on standard error, only notes and errors
+    #[arg(short, long, global = true, display_order = 900)]
     quiet: bool,
     #[command(subcommand)]
     command: Command,
@@ -71,66 +67,76 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Print a document: the job, the simulated sheet, and everything to look at, in one folder
+    /// Print a document of materials
+    ///
+    /// Writes one folder with the job, the plan, the sheet as the simulated printer prints it, and previews. With --to the
+    /// job is also sent to a printer.
     Print(Box<print::Args>),
-    /// Print spot-colour art: a picture for each ink, reserved colours, or named layers
+    /// Print spot-colour artwork: a picture for each ink, reserved colours, or named layers
+    ///
+    /// Writes one folder with the job, the plan, the sheet as the simulated printer prints it, and previews. With --to the
+    /// job is also sent to a printer.
     Layers(Box<layers::Args>),
-    /// What a job or a document needs: cartridges, passes, ribbon, time, cautions. Nothing is sent
+    /// Show what a job or a document needs: cartridges, passes, ribbon, time and cautions
+    ///
+    /// Sends nothing, and writes nothing unless --html names a file.
     Plan(Box<plan::Args>),
-    /// Sheets to look at, to measure inks and to measure the machine
+    /// Print a chart: to judge stacks by eye, to measure inks, or to calibrate the printer
     Chart(Box<chart::Args>),
-    /// Options under a name: save, list, use
+    /// Save, list and use named sets of options
     Preset(preset::Args),
-    /// How much of each ribbon has gone
+    /// Show how much ribbon each cartridge has used
     Ledger(ledger::Args),
-    /// The papers, their printable areas and margins, and how well they are known
+    /// List paper sizes with their printable areas and margins, and how well each is known
     Papers(layout::PapersArgs),
-    /// Machines as measured: offset and feed
+    /// Manage printer calibration profiles (offset, feed)
     Profile(layout::ProfileArgs),
-    /// Take a document apart into a few basis materials and their weight maps
+    /// Factor a document into a few basis materials and their weight maps
     Factor(chain::Factor),
-    /// Fit basis materials (or every pixel) to mixtures of printable stacks
+    /// Map basis materials (or every pixel) to mixtures of printable stacks
     Map(chain::Map),
-    /// Choose one stack for every dot of the page
+    /// Choose one stack for every dot of a document
     Halftone(chain::Halftone),
-    /// Split a sheet into one-bit passes, one ink each
+    /// Lay dots on a page: position, copies, marks, mirror, profile
+    Layout(chain::Layout),
+    /// Split a page into one-bit passes, one ink each
     Separate(chain::Separate),
-    /// Write passes as a job in the printer's language
+    /// Encode passes as a job in the printer's language
     Encode(chain::Encode),
-    /// Feed a job to the simulated printer and keep its sheet
+    /// Print a job on the simulated printer and keep the sheet
     Simulate(chain::Simulate),
-    /// Tell what is in a job, with byte offsets where something is wrong
+    /// Describe the contents of a job and report errors with their byte offset
     Inspect(inspect::Args),
-    /// Send a job to a printer, through a bridge or as it is
+    /// Send a job to a printer, through a bridge or directly to a device
     Send(send::Args),
-    /// Go on with a job that was interrupted
+    /// Resume an interrupted job
     Resume(resume::Resume),
-    /// End a job early, leaving the printer ready for the next one
+    /// Cancel a job and leave the printer ready for the next one
     Cancel(resume::Cancel),
-    /// The bridges there are, and how one of them and its printer are
+    /// List bridges and show their status; flash, test or reset a bridge
     Bridge(bridge::Args),
-    /// Find out what stands in the way of printing
+    /// Find out what prevents printing and how to fix it
     Doctor(doctor::Args),
-    /// The ink library: list, show, check
+    /// List, show and check the inks and stacks of a library
     Inks(inks::Args),
-    /// Print queues of the system: make, remove, list
+    /// Install, remove and list print queues of the system
     Queue(queue::Args),
-    /// What the print system starts to bring a job to the printer
+    /// Deliver a job to the printer (called by the print system)
     #[command(hide = true)]
     CupsBackend(queue::Conventional),
-    /// What the print system starts to make jobs of pages
+    /// Turn pages into jobs (called by the print system)
     #[command(hide = true)]
     CupsFilter(queue::Conventional),
-    /// What a package needs beside the program
+    /// Write the files that a package needs besides the program
     #[command(hide = true)]
     Generate(generate::Args),
-    /// Documents made by the program itself: list them or write one as a texture folder
+    /// List the built-in sample documents or write one as a texture folder
     Sample(sample::Args),
 }
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
-    let args = match preset::expand(std::env::args_os().collect()) {
+    let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
         Ok(args) => Args::parse_from(args),
         Err(error) => {
             let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
@@ -148,9 +154,10 @@ pub fn main() -> ExitCode {
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             output::yield_to_interrupt();
-            let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
-            if bridge::is_forbidden(&error) {
-                let _ = write!(io::stderr(), "\n{}", bridge::permission());
+            let advice = advice::of(&error).map_or_else(String::new, |advice| format!("; {advice}"));
+            let _ = writeln!(io::stderr(), "foilpress: {}{advice}", chain(&error));
+            if permission::is_missing(&error) {
+                let _ = write!(io::stderr(), "\n{}", permission::how_to_give());
             }
             ExitCode::FAILURE
         }
@@ -164,13 +171,14 @@ fn run(args: Args) -> Result<()> {
         Command::Layers(args) => layers::run(&args, observer),
         Command::Plan(args) => plan::run(&args, observer),
         Command::Chart(args) => chart::run(&args, observer),
-        Command::Preset(args) => preset::run(&args),
+        Command::Preset(args) => preset::run(&args, &Args::command()),
         Command::Ledger(args) => ledger::run(&args),
         Command::Papers(args) => layout::papers(&args),
         Command::Profile(args) => layout::profile_command(&args),
         Command::Factor(args) => args.run(observer),
         Command::Map(args) => args.run(observer),
         Command::Halftone(args) => args.run(observer),
+        Command::Layout(args) => args.run(observer),
         Command::Separate(args) => args.run(observer),
         Command::Encode(args) => args.run(observer),
         Command::Simulate(args) => args.run(observer),
@@ -181,56 +189,10 @@ fn run(args: Args) -> Result<()> {
         Command::Bridge(args) => bridge::run(&args, observer),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
-        Command::Generate(args) => generate::run(&args),
+        Command::Generate(args) => generate::run(&args, &Args::command()),
         Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),
-        // Done before anything else; see `main`.
+        // `main` has run these already.
         Command::CupsBackend(_) | Command::CupsFilter(_) => Ok(()),
     }
-}
-
-/// An error with its causes. Many name their cause in their own words; it is not said again.
-fn chain(error: &anyhow::Error) -> String {
-    let mut said = String::new();
-    for cause in error.chain() {
-        let cause = cause.to_string();
-        if said.is_empty() {
-            said = cause;
-        } else if !said.contains(cause.trim_end()) {
-            said = format!("{said}: {cause}");
-        }
-    }
-    said.trim_end().to_owned()
-}
-
-/// Writes to standard output, where results go.
-fn show(text: &str) -> Result<()> {
-    io::stdout().lock().write_all(text.as_bytes()).context("cannot write to standard output")
-}
-
-/// Reads a job whole.
-fn read_job(path: &Path) -> Result<Vec<u8>> {
-    let cannot = || format!("cannot read {}", path.display());
-    let file = File::open(path).with_context(cannot)?;
-    let mut job = Vec::new();
-    file.take(LARGEST_JOB + 1).read_to_end(&mut job).with_context(cannot)?;
-    if job.len() as u64 > LARGEST_JOB {
-        bail!("{} is larger than {} MB: no job for this printer", path.display(), LARGEST_JOB >> 20);
-    }
-    Ok(job)
-}
-
-/// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`. A printer or a bridge that went
-/// away is something else.
-fn closed_pipe(error: &anyhow::Error) -> bool {
-    let device = error.chain().any(|cause| {
-        cause.is::<Failure>()
-            || cause.is::<QueryError>()
-            || cause.is::<OpenError>()
-            || cause.is::<FlashError>()
-    });
-    !device
-        && error.chain().any(|cause| {
-            cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
-        })
 }

@@ -1,9 +1,8 @@
 //! Outputs appear whole or not at all.
 //!
-//! Everything is written to a hidden staging folder beside its destination and moved there at the end. If the
-//! program fails the folder goes with it; if it is stopped, [`remove_on_interrupt`] sees to that. What stood at the
-//! destination is replaced only if this program wrote all of it: a file by a file, a folder by a folder of the same
-//! [`Kind`], nothing else.
+//! Everything is written to a hidden staging folder beside its destination and moved there at the end. The folder is removed
+//! when the program fails, and by [`remove_on_interrupt`] when it is stopped. Existing output is replaced only if this program
+//! wrote all of it: a file by a file, a folder by a folder of the same [`Kind`].
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -16,12 +15,12 @@ use press::scratch::{self, Scratch};
 /// What the user is told when the program is interrupted.
 static FAREWELL: Mutex<Option<String>> = Mutex::new(None);
 
-/// From now on an interruption is not without consequences: says which.
+/// Sets what the user is told if the program is interrupted from now on.
 pub fn say_on_interrupt(text: &str) {
     *FAREWELL.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_owned());
 }
 
-/// What a folder of ours is, which says what may be in it.
+/// The kind of a folder this program writes, which decides what may be in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The result of `print`.
@@ -31,6 +30,8 @@ pub enum Kind {
     /// Mixtures of stacks.
     Mix,
     /// One stack for every dot.
+    Dots,
+    /// The same on a page.
     Sheet,
     /// One-bit passes.
     Passes,
@@ -47,13 +48,14 @@ impl Kind {
             Kind::Print => Some("report.json"),
             Kind::Foil => Some("document.toml"),
             Kind::Mix => Some("mix.toml"),
+            Kind::Dots => Some("dots.toml"),
             Kind::Sheet => Some("sheet.toml"),
             Kind::Passes => Some("passes.toml"),
             Kind::Pictures | Kind::Maps => None,
         }
     }
 
-    /// Whether a file of that name can be one this program wrote.
+    /// Whether this program writes files of that name.
     fn writes(self, name: &str) -> bool {
         let picture = |name: &str| name.ends_with(".png");
         self.marker() == Some(name)
@@ -65,7 +67,8 @@ impl Kind {
                 }
                 Kind::Foil => name == "bases.csv" || (name.starts_with("weights-") && picture(name)),
                 Kind::Mix => name.starts_with("weights-") && picture(name),
-                Kind::Sheet => name == "separation.png",
+                Kind::Dots => name == "separation.png",
+                Kind::Sheet => ["separation.png", "layout.toml"].contains(&name),
                 Kind::Passes | Kind::Pictures => {
                     name.starts_with(|c: char| c.is_ascii_digit()) && name.contains('-') && picture(name)
                 }
@@ -76,7 +79,7 @@ impl Kind {
     }
 
     /// The first entry of a folder that this program did not write, if there is one.
-    fn stranger(self, folder: &Path) -> io::Result<Option<PathBuf>> {
+    fn foreign_entry(self, folder: &Path) -> io::Result<Option<PathBuf>> {
         let (mut entries, mut marked) = (0, self.marker().is_none());
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
@@ -86,8 +89,8 @@ impl Kind {
             if !known || entry.file_type()?.is_dir() != passes {
                 return Ok(Some(entry.path()));
             }
-            if passes && let Some(stranger) = Kind::Passes.stranger(&entry.path())? {
-                return Ok(Some(stranger));
+            if passes && let Some(foreign) = Kind::Passes.foreign_entry(&entry.path())? {
+                return Ok(Some(foreign));
             }
             marked |= self.marker().is_some_and(|marker| name == marker);
             entries += 1;
@@ -117,41 +120,40 @@ impl Staged {
         })
     }
 
-    /// Prepares to write the folder `target`. Fails early if it cannot be written or holds what is not ours.
+    /// Prepares to write the folder `target`. Fails early if it cannot be written or holds anything this program did not write.
     pub fn folder(target: &Path, kind: Kind) -> Result<Staged> {
         Staged::new(target, |target, found| {
             if !found.is_dir() {
                 bail!("{} is a file; name a folder to write", target.display());
             }
-            let stranger =
-                kind.stranger(target).with_context(|| format!("cannot look into {}", target.display()))?;
-            match stranger {
+            let foreign =
+                kind.foreign_entry(target).with_context(|| format!("cannot read {}", target.display()))?;
+            match foreign {
                 None => Ok(()),
-                Some(stranger) if stranger == target => bail!(
-                    "{} exists and is no result of this command; choose another place with -o",
+                Some(foreign) if foreign == target => bail!(
+                    "{} exists and was not written by this command; choose another place with -o",
                     target.display()
                 ),
-                Some(stranger) => bail!(
+                Some(foreign) => bail!(
                     "{} exists and holds {}, which this command did not write; choose another place with -o",
                     target.display(),
-                    stranger.strip_prefix(target).unwrap_or(&stranger).display()
+                    foreign.strip_prefix(target).unwrap_or(&foreign).display()
                 ),
             }
         })
     }
 
     fn new(target: &Path, check: impl FnOnce(&Path, &fs::Metadata) -> Result<()>) -> Result<Staged> {
-        // Behind a link stands what is meant; the link itself stays.
+        // A link is followed: its target is replaced, and the link stays.
         let linked = fs::symlink_metadata(target).is_ok_and(|found| found.is_symlink());
         let target = if linked {
-            fs::canonicalize(target)
-                .with_context(|| format!("{} is a link that leads nowhere", target.display()))?
+            fs::canonicalize(target).with_context(|| format!("{} is a broken link", target.display()))?
         } else {
             target.to_path_buf()
         };
         let name = target
             .file_name()
-            .with_context(|| format!("{} names no file or folder to write", target.display()))?
+            .with_context(|| format!("{} does not name a file or folder to write", target.display()))?
             .to_owned();
         if let Ok(found) = fs::metadata(&target) {
             check(&target, &found)?;
@@ -164,19 +166,19 @@ impl Staged {
             bail!("cannot write {}: there is no folder {}", target.display(), parent.display());
         }
         let folder = Scratch::beside(parent).map_err(|error| {
-            // Its own words name the staging folder, which says nothing to the user.
+            // The error's own text names the staging folder, which means nothing to the user.
             let reason = error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
             anyhow::anyhow!("cannot write in {}: {reason}", parent.display())
         })?;
         Ok(Staged { inside: folder.path().join(name), target, folder })
     }
 
-    /// Where to write; nothing is there yet.
+    /// Where to write; nothing exists there yet.
     pub fn path(&self) -> &Path {
         &self.inside
     }
 
-    /// Where to write, as a folder that is there.
+    /// Where to write, as a folder that was created.
     pub fn create(&self) -> Result<&Path> {
         fs::create_dir(&self.inside).with_context(|| format!("cannot write {}", self.target.display()))?;
         Ok(&self.inside)
@@ -184,7 +186,7 @@ impl Staged {
 
     /// Moves what was written to its own name, replacing what was there.
     pub fn commit(self) -> Result<()> {
-        // Held to the end: an interruption waits until old and new have changed places.
+        // Held to the end, so that an interruption waits until the new output has replaced the old.
         let mut folders = scratch::folders();
         let mut old = self.inside.clone().into_os_string();
         old.push(".replaced");
@@ -198,7 +200,7 @@ impl Staged {
             if old.exists() && fs::rename(&old, &self.target).is_err() {
                 let kept = self.folder.keep(&mut folders);
                 bail!(
-                    "cannot write {}: {error}; what was there is in {}",
+                    "cannot write {}: {error}; the previous contents are in {}",
                     self.target.display(),
                     kept.display()
                 );
@@ -210,7 +212,7 @@ impl Staged {
     }
 }
 
-/// A document's name as the name of a file: names come from documents, which are not to choose where we write.
+/// A document's name as a file name. Names come from documents, which must not decide where this program writes.
 pub fn file_name(name: &str) -> String {
     const LONGEST: usize = 80;
     let plain: String = name
@@ -225,8 +227,8 @@ pub fn file_name(name: &str) -> String {
     if cut == 0 { "document".into() } else { plain[..cut].to_owned() }
 }
 
-/// Waits for ever if the program is being stopped. Called before it ends by itself with a failure, which may be no
-/// more than the staging folder that is taken away under its hands.
+/// Waits for ever if the program is being stopped. Called before the program ends with a failure, which may only be that the
+/// staging folder was removed while it was in use.
 pub fn yield_to_interrupt() {
     drop(scratch::folders());
 }
@@ -235,7 +237,7 @@ pub fn yield_to_interrupt() {
 /// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
-        // Never released: nothing new is staged, and nothing is moved to its place, from here on.
+        // Never released, so that from here on nothing new is staged and nothing is moved to its destination.
         let paths = scratch::folders();
         for path in paths.iter() {
             // A stage may still be writing into the folder; a second try catches what it added meanwhile.
@@ -247,7 +249,7 @@ pub fn remove_on_interrupt() -> Result<()> {
             }
         }
         let farewell = FAREWELL.lock().unwrap_or_else(PoisonError::into_inner);
-        let text = farewell.as_deref().unwrap_or("nothing half-written is left");
+        let text = farewell.as_deref().unwrap_or("nothing unfinished is left behind");
         let _ = writeln!(io::stderr(), "\nfoilpress: interrupted; {text}");
         std::process::exit(130);
     })

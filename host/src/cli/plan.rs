@@ -2,24 +2,22 @@
 
 use std::fs::File;
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use clap::{ArgMatches, Args as ClapArgs, Command, FromArgMatches};
 use inks::Library;
 use protocol::rgl::Page;
+use serde_json::Value;
 
-use super::output::Staged;
+use super::layers;
 use super::print::Work;
-use super::{layers, piece};
+use super::shown::Shown;
 use observe::Observer;
-use press::job;
 use press::job::plan::{Plan, Subject};
 use press::layout::Laid;
-use press::preview::Area;
-use press::preview::inks::{Ground, thumbnail};
 use press::separate::{self, Pass, Planned};
-use press::sheet::Sheet;
+use press::sheet::{Area, Sheet};
 use press::simulate;
 
 /// Arguments of `plan`: a job or a document, or the sub-command for art.
@@ -49,7 +47,7 @@ impl FromArgMatches for Args {
 impl ClapArgs for Args {
     fn augment_args(command: Command) -> Command {
         let layers = layers::PlanArgs::augment_args(Command::new(LAYERS))
-            .about("The plan of spot-colour art; takes the options of `layers` that decide what is printed");
+            .about("Show the plan of spot-colour artwork");
         Document::augment_args(command)
             .mut_arg("html", |html| html.alias("page"))
             .subcommand_negates_reqs(true)
@@ -73,60 +71,15 @@ const LAYERS: &str = "layers";
     foilpress plan job.rgl\n  \
     foilpress plan sample:leaf --size 80mm --repeat 2x3 --gap 2mm\n  \
     foilpress plan layers white.png gold.png --passes white=3\n  \
-    foilpress plan job.rgl --html plan.html              (one page to print and lay beside the machine)\n  \
+    foilpress plan job.rgl --html plan.html              (one page to print and keep beside the printer)\n  \
     foilpress plan job.rgl --json\n\n\
-    A job is planned from its bytes; the options of page, inks and materials are for documents."
+    A job is planned from its bytes; the options for page, inks and materials apply only to documents."
 )]
 pub struct Document {
     #[command(flatten)]
     work: Work,
     #[command(flatten)]
     shown: Shown,
-}
-
-/// How a plan is shown.
-#[derive(ClapArgs, Debug)]
-pub struct Shown {
-    /// Also write the plan as a page (HTML, whole in itself) into this file
-    #[arg(long, value_name = "FILE.html")]
-    html: Option<PathBuf>,
-    /// Colour of the ground in the page's picture: #204080, black, white, clear
-    #[arg(long, value_name = "COLOUR")]
-    background: Option<Ground>,
-    /// As JSON
-    #[arg(long)]
-    json: bool,
-}
-
-impl Shown {
-    /// Prepares the page before the work, so that a wrong place is told early.
-    pub fn stage(&self) -> Result<Option<Staged>> {
-        self.html.as_deref().map(Staged::file).transpose()
-    }
-
-    /// Shows a plan and writes its page, if that is wanted. `report` is more for programs, under a name of its own,
-    /// `advice` more for people.
-    pub fn show(
-        &self,
-        page: Option<Staged>,
-        (plan, sheet): (&Plan, &Sheet),
-        report: Option<(&str, serde_json::Value)>,
-        advice: &str,
-    ) -> Result<()> {
-        if let Some(staged) = page {
-            let picture = thumbnail(sheet, self.background.unwrap_or_default(), piece::THUMBNAIL);
-            piece::write(staged.path(), job::page::html(plan, &picture)?.as_bytes())?;
-            staged.commit()?;
-        }
-        if !self.json {
-            return super::show(&format!("{plan}{advice}"));
-        }
-        let mut json = serde_json::to_value(plan)?;
-        if let Some((name, value)) = report {
-            json[name] = value;
-        }
-        super::show(&format!("{}\n", serde_json::to_string_pretty(&json)?))
-    }
 }
 
 /// Runs `plan`.
@@ -140,10 +93,10 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let (plan, sheet) = if is_job(path) {
         of_job(path, &args.work.inks.library()?, observer)?
     } else {
-        let done = args.work.print(observer)?;
-        (done.plan, done.print.printed)
+        let draft = args.work.draft(observer)?;
+        (draft.plan, draft.sheet)
     };
-    args.shown.show(page, (&plan, &sheet), None, "")
+    args.shown.show(page, (&plan, &sheet), &Value::Null, "")
 }
 
 /// Whether a file begins like a job. All jobs begin with an escape; no document's file does.
@@ -157,23 +110,22 @@ fn is_job(path: &Path) -> bool {
 
 /// The plan of a job from its bytes, and the sheet it prints.
 fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<(Plan, Sheet)> {
-    let job = super::read_job(path)?;
+    let job = super::stdio::read_job(path)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)
         .with_context(|| format!("{}", path.display()))?;
     let sheet = printout.sheet().with_context(|| format!("{}", path.display()))?;
-    let curl = press::inspect::inspect(&job, observer).inspection.setup.curl_correction;
     let page = Page {
         media: printout.media,
         resolution: printout.resolution,
-        curl_correction: curl.unwrap_or(true),
+        curl_correction: printout.curl_correction,
         ..Page::plain(printout.paper)
     };
     let passes: Vec<Pass> = printout.passes.into_iter().filter(|pass| pass.plane.dots() > 0).collect();
-    let Some(area) = inked(&sheet) else { bail!("{}: there is nothing on the sheet", path.display()) };
+    let Some(area) = inked(&sheet) else { bail!("{}: the job prints nothing", path.display()) };
     let planned: Vec<Planned> =
         passes.iter().map(|pass| Planned { ink: pass.ink, dots: pass.plane.dots() }).collect();
     let checks = separate::check(&sheet, &planned, library.rules());
-    let laid = Laid { pieces: vec![area], area, grid: (1, 1), cut: None, marks_left_out: 0 };
+    let laid = Laid::single(area);
     let name = path.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
     let subject = Subject {
         name: &name,

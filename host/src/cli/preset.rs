@@ -1,23 +1,27 @@
-//! `foilpress preset`: options under a name.
+//! `foilpress preset`: named sets of options.
 //!
-//! A preset is a table of long options. It is applied before the arguments are read, as if its options had been typed first:
-//! so every option of a command can be in it, is checked by the same rules, and gives way to what is typed.
+//! A preset is a table of long options. It is applied before the arguments are parsed, as if its options had been typed first:
+//! so it can hold any option of a command, its options are checked by the same rules, and typed options override it.
 
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
-use clap::{Args as ClapArgs, CommandFactory as _, Subcommand};
+use clap::{Args as ClapArgs, Subcommand};
 use serde::{Deserialize, Serialize};
 
+use super::stdio::show;
 use crate::folders;
-use press::sheet::picture::{read_toml, write_toml};
+use press::files::{read_toml, write_toml};
 
-/// `--preset`, for commands whose options can be kept under a name.
+/// `--preset`, for commands whose options a preset can hold.
 #[derive(ClapArgs, Debug)]
 pub struct PresetArg {
-    /// Options kept under this name by `foilpress preset save`; what is typed counts more
+    /// Load a preset; options given here override it
+    ///
+    /// `foilpress preset save` makes a preset. Without --preset the one chosen by `foilpress preset use` applies, if there is
+    /// one and its options fit the command.
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
 }
@@ -27,7 +31,7 @@ pub struct PresetArg {
 #[command(after_help = "Examples:\n  \
     foilpress preset save decal --media film --mirror --paper postcard\n  \
     foilpress print sample:leaf --preset decal --size 60mm\n  \
-    foilpress preset use decal         (from now on without being named)\n  \
+    foilpress preset use decal         (apply it from now on without naming it)\n  \
     foilpress preset use none\n  \
     foilpress preset list")]
 pub struct Args {
@@ -37,24 +41,24 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Keep options under a name, replacing what had it
+    /// Save options under a name, replacing any preset of that name
     Save {
-        /// The name
+        /// Name of the preset
         name: String,
-        /// The options, as they would be typed
+        /// Options to save, by their long names, as they would be typed
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "OPTIONS")]
         options: Vec<String>,
     },
-    /// The presets there are, and which is in use
+    /// List the presets and show which one is in use
     List,
-    /// Use a preset wherever it fits without naming it; `none` ends that
+    /// Apply a preset to every command that it fits, without naming it; `none` stops that
     Use {
-        /// Its name, or none
+        /// Name of the preset, or none
         name: String,
     },
 }
 
-/// A preset as it is kept.
+/// A preset as it is saved.
 #[derive(Serialize, Deserialize, Debug, PartialEq)]
 #[serde(deny_unknown_fields)]
 struct Preset {
@@ -69,7 +73,7 @@ impl Preset {
         while let Some(word) = words.next() {
             let Some(name) = word.strip_prefix("--").filter(|name| !name.is_empty()) else {
                 bail!(
-                    "`{word}` is no option; a preset holds options by their long names, such as --media film"
+                    "`{word}` is not an option; a preset takes options by their long names, such as --media film"
                 );
             };
             let (name, value) = match name.split_once('=') {
@@ -78,7 +82,7 @@ impl Preset {
             };
             let value = value.map_or(toml::Value::Boolean(true), toml::Value::String);
             if options.insert(name.to_owned(), value).is_some() {
-                bail!("--{name} comes twice");
+                bail!("--{name} is given twice");
             }
         }
         Ok(Preset { options })
@@ -94,7 +98,7 @@ impl Preset {
                 toml::Value::String(text) => words.push(format!("--{name}={text}")),
                 toml::Value::Integer(number) => words.push(format!("--{name}={number}")),
                 toml::Value::Float(number) => words.push(format!("--{name}={number}")),
-                _ => bail!("option {name}: a text, a number, true or false is expected"),
+                _ => bail!("option {name}: expected text, a number, true or false"),
             }
         }
         Ok(words)
@@ -106,7 +110,7 @@ impl Preset {
         if !path.is_file() {
             let known = folders::names(&folder).unwrap_or_default();
             bail!(
-                "there is no preset `{name}`{}; `foilpress preset save {name} OPTIONS` makes it",
+                "there is no preset `{name}`{}; `foilpress preset save {name} OPTIONS` creates it",
                 if known.is_empty() { String::new() } else { format!(" (there are: {})", known.join(", ")) }
             );
         }
@@ -136,87 +140,89 @@ fn takes_preset(command: &clap::Command) -> bool {
 }
 
 /// Why a command would not take these options, in clap's words; `None` if it would.
-fn refusal(command: &[&str], words: &[String]) -> Option<String> {
+fn refusal(program: &clap::Command, command: &[&str], words: &[String]) -> Option<String> {
     let typed = ["foilpress"].iter().chain(command).map(|&name| name.to_owned()).chain(words.iter().cloned());
-    // What the command works on is not a preset's business: any name will do.
-    match super::Args::command().try_get_matches_from(typed.chain(["document".to_owned()])) {
+    // A preset holds no file names, so any name of a document will do.
+    match program.clone().try_get_matches_from(typed.chain(["document".to_owned()])) {
         Ok(_) => None,
         // The first line says what is wrong, the others how to get help.
         Err(error) => Some(error.to_string().lines().next().unwrap_or_default().to_owned()),
     }
 }
 
-/// Runs `preset`.
-pub fn run(args: &Args) -> Result<()> {
+/// Runs `preset`. `program` is the whole command line, whose commands decide which options fit.
+pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
     match &args.command {
-        Command::Save { name, options } => {
-            let preset = Preset::of_words(options)?;
-            let (words, program) = (preset.words()?, super::Args::command());
-            let able: Vec<&str> = program
-                .get_subcommands()
-                .filter(|command| takes_preset(command))
-                .map(clap::Command::get_name)
-                .collect();
-            let refusals: Vec<Option<String>> =
-                able.iter().map(|&command| refusal(&[command], &words)).collect();
-            if words.iter().any(|word| word.starts_with("--preset")) {
-                bail!("a preset cannot name another one");
-            }
-            if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
-                bail!("no command takes these options together: {}", first.trim_start_matches("error: "));
-            }
-            let folder = presets()?;
-            let path = folders::file(&folder, name)?;
-            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-            write_toml(&path, &preset)?;
-            let fits: Vec<&str> = able
-                .into_iter()
-                .zip(&refusals)
-                .filter(|(_, refusal)| refusal.is_none())
-                .map(|(name, _)| name)
-                .collect();
-            super::show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
-        }
-        Command::List => {
-            let folder = presets()?;
-            let names =
-                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
-            let used = in_use();
-            let mut text = String::new();
-            for name in &names {
-                let words = Preset::load(name)?.words()?.join(" ");
-                let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
-                text.push_str(&format!("{name:<16} {words}{used}\n"));
-            }
-            if names.is_empty() {
-                text = format!(
-                    "no presets in {}; `foilpress preset save NAME OPTIONS` makes one\n",
-                    folder.display()
-                );
-            }
-            super::show(&text)
-        }
-        Command::Use { name } => {
-            let path = marker()?;
-            if name == "none" {
-                return match std::fs::remove_file(&path) {
-                    Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                        Err(error).with_context(|| format!("cannot remove {}", path.display()))
-                    }
-                    _ => super::show("no preset is in use\n"),
-                };
-            }
-            let words = Preset::load(name)?.words()?.join(" ");
-            std::fs::write(&path, format!("{name}\n"))
-                .with_context(|| format!("cannot write {}", path.display()))?;
-            super::show(&format!("from now on: {words}\n"))
-        }
+        Command::Save { name, options } => save(name, options, program),
+        Command::List => list(),
+        Command::Use { name } => apply(name),
     }
 }
 
-/// The arguments with the options of a preset put in, if one is named or in use.
-pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
-    let program = super::Args::command();
+fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
+    let preset = Preset::of_words(options)?;
+    let words = preset.words()?;
+    let able: Vec<&str> = program
+        .get_subcommands()
+        .filter(|command| takes_preset(command))
+        .map(clap::Command::get_name)
+        .collect();
+    let refusals: Vec<Option<String>> =
+        able.iter().map(|&command| refusal(program, &[command], &words)).collect();
+    if words.iter().any(|word| word.starts_with("--preset")) {
+        bail!("a preset cannot load another preset");
+    }
+    if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
+        bail!("no command accepts these options together: {}", first.trim_start_matches("error: "));
+    }
+    let folder = presets()?;
+    let path = folders::file(&folder, name)?;
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    write_toml(&path, &preset)?;
+    let fits: Vec<&str> = able
+        .into_iter()
+        .zip(&refusals)
+        .filter(|(_, refusal)| refusal.is_none())
+        .map(|(name, _)| name)
+        .collect();
+    show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
+}
+
+fn list() -> Result<()> {
+    let folder = presets()?;
+    let names = folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let used = in_use();
+    let mut text = String::new();
+    for name in &names {
+        let words = Preset::load(name)?.words()?.join(" ");
+        let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
+        text.push_str(&format!("{name:<16} {words}{used}\n"));
+    }
+    if names.is_empty() {
+        text =
+            format!("no presets in {}; `foilpress preset save NAME OPTIONS` creates one\n", folder.display());
+    }
+    show(&text)
+}
+
+/// Applies a preset from now on, or none.
+fn apply(name: &str) -> Result<()> {
+    let path = marker()?;
+    if name == "none" {
+        return match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("cannot remove {}", path.display()))
+            }
+            _ => show("no preset is in use\n"),
+        };
+    }
+    let words = Preset::load(name)?.words()?.join(" ");
+    std::fs::write(&path, format!("{name}\n")).with_context(|| format!("cannot write {}", path.display()))?;
+    show(&format!("applied from now on: {words}\n"))
+}
+
+/// The arguments with the options of a preset inserted, if one is named or in use.
+pub fn expand(args: Vec<OsString>, program: &clap::Command) -> Result<Vec<OsString>> {
     let place = args.iter().skip(1).position(|arg| !arg.to_string_lossy().starts_with('-')).map(|at| at + 1);
     let Some(mut place) = place else { return Ok(args) };
     let Some(mut command) = program.find_subcommand(&args[place]) else { return Ok(args) };
@@ -243,13 +249,13 @@ pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
         (Some(name), _) => Preset::load(name)?.words().with_context(|| format!("preset `{name}`"))?,
         (None, Some(name)) => {
             let words = Preset::load(&name).and_then(|preset| preset.words()).with_context(|| {
-                format!("preset `{name}` is in use (`foilpress preset use none` ends that)")
+                format!("preset `{name}` is in use (`foilpress preset use none` stops that)")
             })?;
             let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
-            let fits = refusal(&path, &words).is_none();
+            let fits = refusal(program, &path, &words).is_none();
             if !quiet {
                 let what =
-                    if fits { words.join(" ") } else { "does not fit this command and is left out".into() };
+                    if fits { words.join(" ") } else { "does not fit this command and is ignored".into() };
                 let _ = writeln!(std::io::stderr(), "note: preset `{name}`: {what}");
             }
             if !fits {
@@ -268,6 +274,7 @@ pub fn expand(args: Vec<OsString>) -> Result<Vec<OsString>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory as _;
 
     #[test]
     fn options_come_back_as_they_were_typed() {
@@ -286,10 +293,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_typed_counts_more_than_a_preset() {
+    fn typed_options_override_a_preset() {
         let words: Vec<String> =
             ["--media=film", "--media=thick", "--mirror", "--mirror"].map(str::to_owned).to_vec();
-        assert_eq!(refusal(&["print"], &words), None);
-        assert!(refusal(&["print"], &["--meda=film".to_owned()]).is_some());
+        let program = crate::cli::Args::command();
+        assert_eq!(refusal(&program, &["print"], &words), None);
+        assert!(refusal(&program, &["print"], &["--meda=film".to_owned()]).is_some());
     }
 }

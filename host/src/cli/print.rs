@@ -1,27 +1,25 @@
-//! `foilpress print`: a document in, a folder with the job and everything to look at out.
+//! `foilpress print`: from a document to a folder with the job and everything to look at.
 
-use std::fs;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use image::RgbImage;
 use inks::{InkSet, Library};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
 use super::deliver::DeliverArgs;
+use super::job::{self, Places, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
-use super::piece::{Places, ResultArgs, write, write_job};
 use super::preset::PresetArg;
 use appearance::document::Document;
 use observe::Observer;
-use press::job::placement::Size;
-use press::job::plan::{Plan, Subject};
-use press::layout::Mm;
-use press::pipeline::{self, Print};
-use press::preview::{self, Area, Probe, STANDARD_LIGHTS, Source, Swatch};
-use press::separate;
+use press::layout::{Layout, Mm, Size};
+use press::pipeline::document::{self, Halftoned, Settings};
+use press::pipeline::{self, Draft, Request};
+use press::preview::{self, Probe, STANDARD_LIGHTS, Source, Swatch};
+use press::sheet::Area;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;
@@ -35,7 +33,7 @@ const EYE: f64 = 0.5;
 pub struct Work {
     #[command(flatten)]
     pub document: DocumentArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its shape
+    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
     /// [default: the document's own size, else as large as the page allows]
     #[arg(long)]
     pub size: Option<Size>,
@@ -53,54 +51,50 @@ pub struct Work {
     pub preset: PresetArg,
 }
 
-/// A document that was printed on the simulated printer.
-pub struct Done {
-    /// The document.
-    pub document: Document,
-    /// The ink library.
-    pub library: Library,
-    /// What was decided.
-    pub settings: pipeline::Settings,
-    /// What came of it.
-    pub print: Print,
-    /// The plan.
-    pub plan: Plan,
+/// A document's dots and how they lie on the page.
+struct Laid {
+    document: Document,
+    library: Library,
+    settings: Settings,
+    layout: Layout,
+    halftoned: Halftoned,
 }
 
 impl Work {
-    /// Opens the document.
-    pub fn open(&self, observer: &dyn Observer) -> Result<Document> {
-        self.document.open(observer)
-    }
-
-    /// Opens the document and prints it.
-    pub fn print(&self, observer: &dyn Observer) -> Result<Done> {
+    /// The plan of the document. Nothing is written.
+    pub fn draft(&self, observer: &dyn Observer) -> Result<Draft> {
         let (inks, library) = self.inks.at_hand()?;
-        self.print_document(self.open(observer)?, inks, library, observer)
+        let laid = self.halftone(self.document.open(observer)?, inks, library, observer)?;
+        Ok(pipeline::draft(&self.request(&laid), observer)?)
     }
 
-    fn print_document(
+    fn halftone(
         &self,
         document: Document,
         inks: InkSet,
         library: Library,
         observer: &dyn Observer,
-    ) -> Result<Done> {
+    ) -> Result<Laid> {
         let layout = self.layout.layout(observer)?;
-        let page = self.media.page(layout.paper);
-        let settings = pipeline::Settings {
+        let settings = Settings {
             factor: self.factor.settings(),
             gamut: self.gamut.settings(self.factor.seed),
             inks,
-            layout,
-            media: page.media,
-            curl_correction: page.curl_correction,
             size: self.size,
         };
-        let print = pipeline::print(&document, &library, &settings, observer)?;
-        let subject = Subject::new(&document.name, &print.sheet, &print.laid, &print.separation, &page);
-        let plan = Plan::new(&subject, &library);
-        Ok(Done { document, library, settings, print, plan })
+        let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
+        Ok(Laid { document, library, settings, layout, halftoned })
+    }
+
+    fn request<'a>(&self, laid: &'a Laid) -> Request<'a> {
+        Request {
+            name: &laid.document.name,
+            dots: &laid.halftoned.dots,
+            layout: &laid.layout,
+            handling: self.media.handling(),
+            allowed: laid.settings.inks,
+            library: &laid.library,
+        }
     }
 }
 
@@ -118,7 +112,7 @@ impl Work {
 pub struct Args {
     #[command(flatten)]
     work: Work,
-    /// Light probe (.hdr) for the balls in materials.png [default: a soft studio]
+    /// Light probe (.hdr) that lights the spheres in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     #[command(flatten)]
@@ -134,39 +128,22 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Some(path) => Probe::read_hdr(path)?,
         None => Probe::studio(128),
     };
-    let document = args.work.open(observer)?;
-    let places = Places::new(args.result.target(&document.name), args.deliver.file())?;
-    let Done { document, library, settings, print, plan } =
-        args.work.print_document(document, inks, library, observer)?;
-
-    let folder = places.create()?;
+    let document = args.work.document.open(observer)?;
+    let places = Places::new(&document.name, &args.result, &args.deliver)?;
+    let laid = args.work.halftone(document, inks, library, observer)?;
     let ground = args.result.background.unwrap_or_default();
-    write_job(folder, &print.job, &plan, &print.printed, &print.printout, &print.laid, ground)?;
-    let passes = folder.join("passes");
-    fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
-    separate::files::save(&print.separation, &passes)?;
-    let pictures = pictures(&document, &print, &library, &probe, observer)?;
+    let made = job::make(&args.work.request(&laid), places, ground, observer)?;
+    let pictures = pictures(&laid, made.job.draft.separation.passes.len(), &probe, observer)?;
     for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
-        picture.save(folder.join(name)).with_context(|| format!("cannot write {name}"))?;
+        picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))?;
     }
-    print.sheet.save_colours(print.laid.area, &folder.join("separation.png"))?;
-    let report = report(&document, &settings, &print, &plan, &pictures.fidelity);
-    let report = serde_json::to_string_pretty(&report)?;
-    write(&folder.join("report.json"), report.as_bytes())?;
-    let target = places.target.clone();
-    places.commit(&print.job)?;
-
-    if args.result.json {
-        super::show(&format!("{report}\n"))?;
-    } else {
-        super::show(&format!(
-            "{plan}\nSeen from {EYE} m the print differs from the document by d = {:.3} on average (0.01 is hard to see, \
-             0.05 plain).\nThe simulated printer made exactly this sheet. Look at {}\n",
-            pictures.fidelity.mean,
-            target.join("sheet.png").display()
-        ))?;
-    }
-    args.deliver.send(&document.name, &print.job, observer)
+    let advice = format!(
+        "\nSeen from {EYE} m, print and document differ: average difference d = {:.3} (0.01: barely visible; 0.05: \
+         obvious).",
+        pictures.fidelity.mean
+    );
+    let report = report(&laid, &pictures.fidelity);
+    made.finish(report, (&advice, "sheet.png"), &args.result, &args.deliver, observer)
 }
 
 /// What there is to look at, and how far print and document are apart.
@@ -176,34 +153,29 @@ struct Pictures {
     fidelity: preview::Report,
 }
 
-fn pictures(
-    document: &Document,
-    print: &Print,
-    library: &inks::Library,
-    probe: &Probe,
-    observer: &dyn Observer,
-) -> Result<Pictures> {
-    let space = &print.factored.space;
+fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) -> Result<Pictures> {
+    let Laid { document, library, halftoned, .. } = laid;
+    let space = &halftoned.factored.space;
     // The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
-    // machine profile do to the page is undone on paper.
-    let halftoned = &print.halftoned;
-    let stacks = pipeline::stack_table(halftoned, library, space);
-    let area = Area::whole(halftoned);
+    // printer profile do to the page is undone on paper.
+    let dots = &halftoned.dots;
+    let stacks = preview::stack_table(dots, library, space);
+    let area = Area::whole(dots);
     let target = match document.as_factored() {
         Some(factored) => Source::Factored(factored),
         None => Source::Document(document.materials()),
     };
-    let printed = Source::Print { sheet: halftoned, space, stacks: &stacks, area };
+    let printed = Source::Print { dots, space, stacks: &stacks, area };
     let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
     let (width, height) = (Mm::of_dots(area.width as i64).0, Mm::of_dots(area.length as i64).0);
     let notes = [
-        format!("{width:.0} x {height:.0} mm, {} passes", print.separation.passes.len()),
+        format!("{width:.0} x {height:.0} mm, {passes} passes"),
         format!("seen from {EYE} m: mean d {:.3}, 95 % below {:.3}", fidelity.mean, fidelity.p95),
     ];
     let sheet =
         preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
     let swatches: Vec<Swatch> = (1..)
-        .zip(&print.mapped.report.bases)
+        .zip(&halftoned.mapped.report.bases)
         .map(|(number, basis)| Swatch {
             name: format!("basis {number}"),
             target: &basis.target,
@@ -215,15 +187,10 @@ fn pictures(
     Ok(Pictures { sheet, materials, fidelity })
 }
 
-/// Everything that is known of a print, for programs.
-fn report(
-    document: &Document,
-    settings: &pipeline::Settings,
-    print: &Print,
-    plan: &Plan,
-    fidelity: &preview::Report,
-) -> serde_json::Value {
-    let mapped = &print.mapped.report;
+/// What the report of a document says beside what every report says.
+fn report(laid: &Laid, fidelity: &preview::Report) -> Value {
+    let Laid { document, settings, halftoned, .. } = laid;
+    let mapped = &halftoned.mapped.report;
     let bases: Vec<_> = mapped
         .bases
         .iter()
@@ -252,20 +219,15 @@ fn report(
         })
     });
     json!({
-        "program": concat!("foilpress ", env!("CARGO_PKG_VERSION")),
         "document": { "name": document.name, "sha256": document.digest, "notes": document.notes },
         "seed": settings.factor.seed,
-        "factoring": print.factoring,
+        "factoring": halftoned.factoring,
         "gamut": {
             "intent": mapped.intent, "gloss_scale": mapped.gloss_scale, "bases": bases,
             "given_up": given_up, "pixels": pixels,
         },
-        "plan": plan,
-        "job": { "bytes": print.job.len() },
         "fidelity": {
             "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,
         },
-        // `pipeline::print` compares the sheets dot for dot and fails if they differ.
-        "simulated": { "equal": true },
     })
 }

@@ -11,12 +11,12 @@ use observe::Observer;
 /// Stages shorter than this leave no line behind.
 const WORTH_A_LINE: Duration = Duration::from_millis(50);
 
-/// A line on standard error. Nobody may be listening there, which is no reason to stop working.
+/// Writes a line to standard error. A closed standard error does not stop the work.
 fn say(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
-/// Draws on standard error. Where that is no terminal only notes and finished stages are written, one a line.
+/// Draws on standard error. Without a terminal it writes only notes and finished stages, one on a line.
 pub struct Progress {
     quiet: bool,
     current: Mutex<Option<(ProgressBar, String, Instant)>>,

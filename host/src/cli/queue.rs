@@ -10,13 +10,14 @@ use anyhow::{Context, Error, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
+use super::stdio::{chain, show};
 use crate::queue::call::{Call, Exit};
 use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
 use crate::queue::options::{self, Choices};
 use crate::queue::{backend, filter, listing, ppd, uri};
 use device::printers::{self, Printers};
-use observe::Observer;
+use observe::{Observer, with_causes};
 use press::layout::Profile;
 
 /// Arguments of `queue`.
@@ -25,7 +26,7 @@ use press::layout::Profile;
     sudo foilpress queue install --name Alps --to serial:/dev/ttyACM0\n  \
     lp -d Alps file.pdf\n  \
     lp -d Alps -o MediaType=GlossyPaper -o FoilpressWhite=Under photo.png\n  \
-    lp -d Alps job.rgl                                   (a job as it is)\n  \
+    lp -d Alps job.rgl                                   (a job, unchanged)\n  \
     foilpress queue list\n  \
     sudo foilpress queue remove --name Alps")]
 pub struct Args {
@@ -35,13 +36,13 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Make a queue, so that every application can print, or change one (as root)
+    /// Install a queue so that every application can print, or change one (as root)
     Install(Install),
     /// Remove a queue (as root)
     Remove(Remove),
-    /// The queues that lead to this program
+    /// List the queues of this program
     List,
-    /// The printer description, for print systems that want it by hand
+    /// Print the printer description (PPD), to install a queue by hand
     Ppd,
 }
 
@@ -51,10 +52,11 @@ struct Install {
     /// Name of the queue
     #[arg(long, value_parser = queue_name)]
     name: String,
-    /// Where it leads: serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE
+    /// Destination: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE
     #[arg(long, value_name = "WHERE", value_parser = uri::of)]
     to: String,
-    /// Profile of the machine (`foilpress profile`), or its file [default: the one named `default`, if there is one]
+    /// Calibration profile of the printer (`foilpress profile`), or its file [default: the profile named `default`, if it
+    /// exists]
     #[arg(long, value_name = "NAME|FILE")]
     profile: Option<String>,
 }
@@ -67,13 +69,17 @@ struct Remove {
     name: String,
 }
 
-/// What the print system takes as a name.
+/// Checks that the print system accepts a name for a queue.
 fn queue_name(name: &str) -> Result<String, String> {
     let fits = !name.is_empty()
         && name.len() <= 127
         && !name.starts_with('-')
         && name.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c));
-    if fits { Ok(name.into()) } else { Err("a queue's name has letters, digits, - and _".into()) }
+    if fits {
+        Ok(name.into())
+    } else {
+        Err("a queue name consists of letters, digits, -, _ and ., and does not begin with -".into())
+    }
 }
 
 /// Runs `queue`.
@@ -82,11 +88,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::Install(args) => install(args, observer),
         Command::Remove(args) => remove(args, observer),
         Command::List => list(),
-        Command::Ppd => super::show(&ppd::description(&Profile::default())),
+        Command::Ppd => show(&ppd::description(&Profile::default())),
     }
 }
 
-/// Starts a program of the print system and gives what it says.
+/// Runs a program of the print system and returns its output.
 fn system(program: &str, arguments: &[&str]) -> Result<String> {
     let output = Process::new(program).args(arguments).env("LC_ALL", "C").output().with_context(|| {
         format!("cannot start {program}; is CUPS installed (Debian: apt install cups ghostscript)?")
@@ -108,7 +114,7 @@ fn system(program: &str, arguments: &[&str]) -> Result<String> {
 }
 
 fn as_root() -> String {
-    "only root may change queues; the same command with sudo does it".into()
+    "only root may change queues; run the same command with sudo".into()
 }
 
 /// Where a package puts the program.
@@ -122,18 +128,18 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
     let places = Places::usual(Path::new("/"));
     if !places.programs.is_dir() {
         bail!(
-            "{} is not there; is CUPS installed (Debian: apt install cups ghostscript)?",
+            "{} does not exist; is CUPS installed (Debian: apt install cups ghostscript)?",
             places.programs.display()
         );
     }
-    // Before anything is written: without an answer there will be no queue.
+    // Asked before anything is written: if the print system does not answer, no queue can be installed.
     queues()?;
     let mut program = std::env::current_exe().context("cannot find this program")?;
-    // A package has put its own files there, which stay.
+    // A package has installed its own files, which stay.
     if program != Path::new(PACKAGED) && !install::is_roots(&program).with_context(as_root)? {
         install::copy_program(&program, &places.program).with_context(as_root)?;
         observer.note(&format!(
-            "{} is not root's, so the print system gets a copy: {}; after an update, install the queue again",
+            "others than root can change {}, so the print system gets a copy: {}; after an update, install the queue again",
             program.display(),
             places.program.display()
         ));
@@ -147,16 +153,16 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             observer.note(&format!("wrote {}", file.path.display()));
         }
     }
-    // Queue and users must know the same of a printer that needs a reset.
+    // Queue and users must share what is known about a printer that needs a reset.
     printers::make_shared_folder().with_context(as_root)?;
-    // A queue's own description knows its machine.
+    // The description of a queue holds the calibration profile of its printer.
     let mut description = tempfile::NamedTempFile::new().context("cannot write the printer description")?;
     description
         .write_all(ppd::description(&profile).as_bytes())
         .context("cannot write the printer description")?;
     let description =
-        description.path().to_str().context("the folder for temporary files has no name in text")?;
-    // A job that fails is not begun again by itself, and one lost sheet is not to stop the others.
+        description.path().to_str().context("the path of the folder for temporary files is not UTF-8")?;
+    // A failed job is not repeated automatically, and one lost sheet must not stop the jobs after it.
     system(
         "lpadmin",
         &[
@@ -173,17 +179,17 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             "-E",
         ],
     )?;
-    observer.note(&format!("{} is a queue now: lp -d {} file.pdf", args.name, args.name));
+    observer.note(&format!("queue {} is installed; print with: lp -d {} file.pdf", args.name, args.name));
     Ok(())
 }
 
 fn remove(args: &Remove, observer: &dyn Observer) -> Result<()> {
     ours(&args.name)?;
     system("lpadmin", &["-x", &args.name])?;
-    observer.note(&format!("{} is no queue any more", args.name));
+    observer.note(&format!("queue {} is removed", args.name));
     let left = queues()?.into_iter().any(|(_, device)| uri::parse(&device).is_ok());
     if !left && !Path::new(PACKAGED).exists() {
-        // What was written for the first queue goes with the last; the package's files are the package's.
+        // Files written for the first queue are removed with the last; the files of a package are left to it.
         for file in Places::usual(Path::new("/")).remove().with_context(as_root)? {
             observer.note(&format!("removed {}", file.display()));
         }
@@ -193,7 +199,7 @@ fn remove(args: &Remove, observer: &dyn Observer) -> Result<()> {
 
 /// Names and devices of all queues.
 fn queues() -> Result<Vec<(String, String)>> {
-    // Without any queue the program fails, which is no error here.
+    // The program fails when there is no queue at all, which is not an error here.
     let text = match system("lpstat", &["-v"]) {
         Err(error) if error.to_string().contains("No destinations") => String::new(),
         other => other?,
@@ -207,9 +213,11 @@ fn queues() -> Result<Vec<(String, String)>> {
 
 fn ours(name: &str) -> Result<()> {
     match queues()?.iter().find(|(queue, _)| queue == name) {
-        None => bail!("there is no queue {name}; `foilpress queue list` shows those there are"),
+        None => bail!("there is no queue {name}; `foilpress queue list` shows the queues"),
         Some((_, device)) if uri::parse(device).is_err() => {
-            bail!("{name} leads to {device}, which is not this program's; `lpadmin -x {name}` removes it")
+            bail!(
+                "queue {name} leads to {device}, which does not belong to this program; `lpadmin -x {name}` removes it"
+            )
         }
         Some(_) => Ok(()),
     }
@@ -227,25 +235,25 @@ fn list() -> Result<()> {
         }
     }
     if !found {
-        writeln!(out, "no queue leads to this program; `foilpress queue install` makes one")?;
+        writeln!(out, "no queue leads to this program; `foilpress queue install` installs one")?;
     }
     Ok(())
 }
 
-/// Arguments the print system gives; they are not for people.
+/// Arguments passed by the print system, not by people.
 #[derive(ClapArgs, Debug)]
 pub struct Conventional {
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     arguments: Vec<OsString>,
 }
 
-/// Set by a signal that asks to end.
+/// Set by the signal that asks the program to end.
 static STOP: AtomicBool = AtomicBool::new(false);
 
 /// The backend: without arguments a list of devices, otherwise a job.
 pub fn backend(args: &Conventional) -> ExitCode {
     if args.arguments.is_empty() {
-        return match super::show(&listing::devices()) {
+        return match show(&listing::devices()) {
             Ok(()) => ExitCode::SUCCESS,
             Err(_) => ExitCode::from(Exit::Failed as u8),
         };
@@ -253,7 +261,7 @@ pub fn backend(args: &Conventional) -> ExitCode {
     let messages = Messages::new(io::stderr());
     // The print system asks a job to end by SIGTERM.
     if let Err(error) = ctrlc::set_handler(|| STOP.store(true, Ordering::SeqCst)) {
-        messages.debug(&format!("cannot listen to signals: {error}"));
+        messages.debug(&format!("cannot watch for signals: {}", with_causes(&error)));
     }
     let call = Call::read(&args.arguments, &|name| std::env::var_os(name)).map_err(Error::from);
     let exit = match call.and_then(|call| Ok((call, Printers::of_system()?))) {
@@ -262,7 +270,7 @@ pub fn backend(args: &Conventional) -> ExitCode {
             backend::run(&call, &printers, &mut io::stdin().lock(), &messages, &stop)
         }
         Err(error) => {
-            messages.error(&super::chain(&error));
+            messages.error(&chain(&error));
             Exit::Stop
         }
     };
@@ -279,7 +287,7 @@ pub fn filter(args: &Conventional) -> ExitCode {
         }
         Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
-            messages.error(&super::chain(&error));
+            messages.error(&chain(&error));
             ExitCode::FAILURE
         }
     }
@@ -291,7 +299,7 @@ fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
         [_job, _user, _title, _copies, options, file] => (options, Some(PathBuf::from(file))),
         other => bail!("expected job-id user title copies options [file], found {} arguments", other.len()),
     };
-    // Its defaults are the queue's; without it the usual ones count.
+    // Its defaults are the queue's; without it the program's own apply.
     let description = std::env::var_os("PPD").and_then(|path| std::fs::read_to_string(path).ok());
     let choices = Choices::read(&options::parse(&asked.to_string_lossy()), description.as_deref())?;
     let mut out = io::BufWriter::with_capacity(1 << 18, io::stdout());

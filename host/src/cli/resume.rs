@@ -16,17 +16,17 @@ use observe::Observer;
 /// Arguments of `resume`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress resume                                     (the one job that has not ended)\n  \
-    foilpress resume 5f3a9c01 --to serial:/dev/ttyACM1   (the port has another name today)\n  \
+    foilpress resume                                     (the only unfinished job)\n  \
+    foilpress resume 5f3a9c01 --to serial:/dev/ttyACM1   (the port has a new name)\n  \
     foilpress resume --list")]
 pub struct Resume {
-    /// Number of the job [default: the only one that has not ended]
+    /// Number of the job [default: the only unfinished job]
     #[arg(value_parser = number)]
     job: Option<u32>,
-    /// Where the bridge is now [default: where the job was sent to]
+    /// Current address of the bridge [default: the address the job was sent to]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// List the jobs and their states
+    /// List the jobs and their states without resuming any
     #[arg(long, conflicts_with_all = ["job", "to"])]
     list: bool,
 }
@@ -34,16 +34,16 @@ pub struct Resume {
 /// Arguments of `cancel`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress cancel                                     (the one job that has not ended)\n  \
+    foilpress cancel                                     (the only unfinished job)\n  \
     foilpress cancel 5f3a9c01\n  \
-    foilpress cancel ffffffff                            (what the system prints through the bridge by itself)\n\n\
+    foilpress cancel ffffffff                            (whatever the system is printing through the bridge by itself)\n\n\
     A sheet that has begun comes out unfinished, and the printer is ready for the next job. Stop a `send` that is \
     still running first (Ctrl-C).")]
 pub struct Cancel {
-    /// Number of the job [default: the only one that has not ended]
+    /// Number of the job [default: the only unfinished job]
     #[arg(value_parser = number)]
     job: Option<u32>,
-    /// Where the bridge is now [default: where the job was sent to]
+    /// Current address of the bridge [default: the address the job was sent to]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
 }

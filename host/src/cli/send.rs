@@ -15,11 +15,12 @@ use observe::Observer;
 #[command(after_help = "Examples:\n  \
     foilpress send job.rgl --to usb:                     (the only bridge on USB)\n  \
     foilpress send job.rgl --to serial:/dev/ttyACM0      (a bridge; `foilpress bridge list` finds it)\n  \
-    foilpress send job.rgl --to raw:/dev/usb/lp0         (a printer at a USB-to-parallel cable)\n\n\
-    With a bridge, the job is kept on disk until it has been sent. After a pulled cable it goes on by itself; after anything \
-    worse, `foilpress resume` goes on. A raw device cannot tell what it printed, so a job cannot be resumed there.")]
+    foilpress send job.rgl --to raw:/dev/usb/lp0         (a printer on a USB-to-parallel cable)\n\n\
+    A job sent to a bridge is kept on disk until it is printed. After a pulled cable it continues by itself; after any \
+    other interruption `foilpress resume` continues it. A raw device cannot report what it has printed, so a job sent to \
+    one cannot be resumed.")]
 pub struct Args {
-    /// One complete job in the printer's language
+    /// Complete job in the printer's language
     #[arg(value_name = "JOB.rgl")]
     job: PathBuf,
     /// Destination: usb:, serial:PORT or tcp:HOST:PORT for a bridge, raw:DEVICE, or file:PATH
@@ -28,7 +29,7 @@ pub struct Args {
     /// Send even if the device does not identify itself as an ALPS printer
     #[arg(long)]
     force: bool,
-    /// Sheets to print; the program waits between them
+    /// Number of sheets to print; the program waits for Enter between them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
     copies: u16,
 }

@@ -83,7 +83,10 @@ impl<W: Write + Send> Backend<'_, W> {
             .zip(&places)
             .map(|(number, place)| {
                 send::check(&job[place.clone()], &Silent).map_err(|error| {
-                    self.fail(Exit::Cancel, &format!("sheet {number} of {}: {error}", places.len()))
+                    self.fail(
+                        Exit::Cancel,
+                        &format!("sheet {number} of {}: {}", places.len(), observe::with_causes(&error)),
+                    )
                 })
             })
             .collect::<Result<_, _>>()?;
@@ -218,7 +221,7 @@ impl<W: Write + Send> Backend<'_, W> {
 
     /// What the print system is to do about a failure.
     fn failed(&self, failure: Failure, folder: &Path) -> Stopped {
-        let text = system::chain(&failure);
+        let text = observe::with_causes(&failure);
         match failure {
             failure
                 if self.call.in_class && (failure.may_pass() || matches!(failure, Failure::ResetOwed(_))) =>

@@ -1,4 +1,4 @@
-//! The conversation with the print system: how a backend is called, and what its exit tells.
+//! How the print system calls a backend, and what the backend's exit code tells it.
 //!
 //! Source: backend(7).
 
@@ -9,19 +9,19 @@ use super::{options, uri};
 use device::send::Destination;
 use device::send::journal::{Journal, JournalError};
 
-/// What the print system is to do next. The numbers are its own.
+/// What the print system should do next. The numbers are defined by CUPS.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Exit {
     /// The job is printed.
     Ok = 0,
-    /// It failed; the queue's own policy decides.
+    /// The job failed; the policy of the queue decides.
     Failed = 1,
-    /// It is held until somebody releases it.
+    /// The job is held until somebody releases it.
     Hold = 3,
     /// The queue stops until the administrator has acted.
     Stop = 4,
-    /// The job makes no sense and is cancelled.
+    /// The job is invalid and is cancelled.
     Cancel = 5,
 }
 
@@ -32,13 +32,13 @@ pub struct Call {
     pub title: String,
     /// The job's identity, the same when it is started again.
     pub identity: String,
-    /// How often it is printed; 1 when filters have seen to it.
+    /// Number of copies to print; 1 when filters have made the copies.
     pub copies: u32,
     /// The file; standard input without one.
     pub file: Option<PathBuf>,
     /// Where the queue leads.
     pub to: Destination,
-    /// Folder for what has to outlive the process.
+    /// Folder for data that must outlive the process.
     pub journal: PathBuf,
     /// Whether another printer of a class may do the job.
     pub in_class: bool,
@@ -49,11 +49,11 @@ pub struct Call {
 pub enum CallError {
     /// Too few or too many arguments.
     #[error(
-        "expected job-id user title copies options [file], found {0} arguments; this is for the print system to call"
+        "expected job-id user title copies options [file], found {0} arguments; only the print system calls this"
     )]
     Arguments(usize),
     /// No URI.
-    #[error("DEVICE_URI is not set; this is for the print system to call")]
+    #[error("DEVICE_URI is not set; only the print system calls this")]
     NoUri,
     /// No destination.
     #[error(transparent)]
@@ -63,7 +63,7 @@ pub enum CallError {
     Journal(#[from] JournalError),
 }
 
-/// A name that is safe as one of a file.
+/// A text reduced to a safe file name.
 fn file_name(text: &str) -> String {
     text.chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(64).collect()
 }
@@ -82,7 +82,7 @@ impl Call {
         let to = uri::parse(&text("DEVICE_URI").ok_or(CallError::NoUri)?)?;
         let options = options::parse(&options.to_string_lossy());
         let uuid = options.iter().find(|(name, _)| name == "job-uuid").map(|(_, value)| value.as_str());
-        // Without an identity of its own the job's number and title have to do.
+        // A job without an identity is known by its number and title.
         let identity = match uuid.map(|uuid| file_name(uuid.strip_prefix("urn:uuid:").unwrap_or(uuid))) {
             Some(uuid) if !uuid.is_empty() => uuid,
             _ => format!("job-{}-{}", file_name(&job.to_string_lossy()), file_name(&title.to_string_lossy())),

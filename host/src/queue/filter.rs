@@ -1,14 +1,14 @@
 //! The filter: pages in, jobs in the printer's language out, one for each sheet.
 //!
-//! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this machine cannot print on.
+//! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this printer cannot print on.
 //! Method: a PDF is drawn by Ghostscript; each page becomes art as if it were a picture given to `foilpress layers`: black
 //! is solid black, reserved colours are inks of their own if wanted, everything else is halftoned in process inks. A page
 //! with spot colours that name inks is separated instead, and its plates are layers. The art is laid where the page has it,
-//! or where the user wants it, on a sheet of the page's size; what lies on the margins is told in millimetres.
+//! or where the user wants it, on a sheet of the page's size; what lies on the margins is reported in millimetres.
 //! Cost: the page at three bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one more
 //! drawing of all pages at a low resolution.
-//! Limits: documents of 1 GB, sheets the machine takes, upright. Transparency is gone when a page has been drawn, so
-//! white cannot follow it. On a separated page the choice of inks leaves plates out, it does not mix them anew.
+//! Limits: documents of 1 GB, sheets the printer takes, upright. Transparency is gone when a page has been drawn, so
+//! white cannot follow it. On a separated page the choice of inks leaves plates out; it does not mix them again.
 
 mod drawing;
 mod page;
@@ -28,13 +28,8 @@ use super::raster::{self, RasterError};
 use drawing::Drawing;
 use observe::Observer;
 use page::Press;
-use press::job::stream::StreamError;
 use press::layers::{self, LayersError, Window};
-use press::layout::LayoutError;
-use press::separate::SeparateError;
-use press::sheet::SheetError;
-
-pub use page::Place;
+use press::pipeline::JobError;
 
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
@@ -47,7 +42,7 @@ pub enum FilterError {
     Choice(#[from] NoChoice),
     /// Neither PDF nor raster.
     #[error(
-        "this is neither PDF nor PWG raster; the print system converts other files if its filters are installed"
+        "the document is neither PDF nor PWG raster; install the print system's filters to convert other files"
     )]
     Kind,
     /// Reading or writing.
@@ -68,7 +63,7 @@ pub enum FilterError {
     /// Raster pages.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// A page of a size that does not go in.
+    /// A page of a size that the printer does not take.
     #[error("page {page} is {width:.0} x {length:.0} mm: {problem}; choose a paper in the print dialog")]
     Paper {
         /// Page, from 1.
@@ -77,13 +72,13 @@ pub enum FilterError {
         width: f64,
         /// Its length in mm.
         length: f64,
-        /// Why it does not go in.
+        /// Why the printer does not take it.
         problem: String,
     },
     /// Foil without consent.
     #[error(
-        "page {page} asks for {}: the codes of the foils are inferred and were never seen on hardware, so they are \
-         printed only when asked for: -o FoilpressFoils=On",
+        "page {page} asks for {}; the ink codes of the foils are inferred and were never seen on hardware, so foil is \
+         printed only with the option FoilpressFoils=On",
         .ink.name()
     )]
     Foil {
@@ -96,48 +91,31 @@ pub enum FilterError {
     #[error("the document is larger than 1 GB; print fewer pages at once")]
     TooLarge,
     /// The plates of a document.
-    #[error("cannot read the document's spot colours: {0}")]
+    #[error("cannot read the document's spot colours")]
     Plates(#[source] LayersError),
     /// The art.
-    #[error("page {page}: {source}")]
+    #[error("page {page} cannot be printed")]
     Layers {
         /// Page, from 1.
         page: usize,
         /// What is the matter.
         source: LayersError,
     },
-    /// Its place on the sheet.
-    #[error("page {page}: {source}")]
-    Layout {
+    /// Its job.
+    #[error("page {page} cannot be printed")]
+    Job {
         /// Page, from 1.
         page: usize,
         /// What is the matter.
-        source: LayoutError,
+        source: JobError,
     },
-    /// The rules of the inks.
-    #[error("page {page} must not be printed: {why}")]
-    Refused {
-        /// Page, from 1.
-        page: usize,
-        /// The rule.
-        why: String,
-    },
-    /// Its passes.
-    #[error(transparent)]
-    Separate(#[from] SeparateError),
-    /// Its dots.
-    #[error(transparent)]
-    Sheet(#[from] SheetError),
-    /// Its bytes.
-    #[error(transparent)]
-    Stream(#[from] StreamError),
 }
 
 fn io_error(what: &'static str) -> impl FnOnce(io::Error) -> FilterError {
     move |source| FilterError::Io { what, source }
 }
 
-/// Makes jobs of a document. A page on which nothing is drawn becomes no job, and is told.
+/// Makes jobs of a document. A page on which nothing is drawn becomes no job, with a note.
 ///
 /// `document` is read from its start; `file` is where it can be read again, if it is a file. Returns the number of jobs.
 pub fn run(
@@ -262,17 +240,17 @@ fn may_have_spots(path: &Path) -> Result<bool, FilterError> {
     const WORDS: [&[u8]; 3] = [b"/Separation", b"/DeviceN", b"/ObjStm"];
     const LONGEST: usize = 11;
     let mut file = File::open(path).map_err(io_error("read the document"))?.take(LARGEST);
-    let mut piece = Vec::new();
+    let mut part = Vec::new();
     loop {
-        // A word may lie across two pieces.
-        piece.drain(..piece.len().saturating_sub(LONGEST - 1));
-        let before = piece.len();
-        (&mut file).take(1 << 20).read_to_end(&mut piece).map_err(io_error("read the document"))?;
-        let program = before == 0 && piece.starts_with(b"%!");
-        if program || WORDS.iter().any(|word| memmem::find(&piece, word).is_some()) {
+        // A word may lie across two parts.
+        part.drain(..part.len().saturating_sub(LONGEST - 1));
+        let before = part.len();
+        (&mut file).take(1 << 20).read_to_end(&mut part).map_err(io_error("read the document"))?;
+        let program = before == 0 && part.starts_with(b"%!");
+        if program || WORDS.iter().any(|word| memmem::find(&part, word).is_some()) {
             return Ok(true);
         }
-        if piece.len() == before {
+        if part.len() == before {
             return Ok(false);
         }
     }
@@ -438,7 +416,7 @@ mod tests {
         };
         assert!(suspected(b"%!PS"));
         assert!(!suspected(b"%PDF-1.4 /DeviceRGB /DeviceCMYK /Separa tion"));
-        // Before, across and after the border of two pieces.
+        // Before, across and after the border of two parts.
         for at in (1 << 20) - 14..(1 << 20) + 3 {
             let mut bytes = vec![b' '; 3 << 20];
             bytes[at..at + 11].copy_from_slice(b"/Separation");

@@ -1,8 +1,8 @@
-//! What makes the program part of the print system: where its files go.
+//! The files that make this program part of the print system, and where they go.
 //!
-//! CUPS starts a backend and a filter by their place in its own folders, as a user of its own, and refuses what others
-//! than root could change. So what is put there are two lines of shell that start this program, and the program
-//! itself has to be root's too: one that is not is copied to a place that is.
+//! CUPS finds backends and filters in its own folders, runs them as its own user, and refuses files that others than root can
+//! change. So two short shell scripts go there that start this program. The program itself must also be changeable only by
+//! root; if it is not, a copy is installed that is.
 //! Limits: Unix.
 
 use std::fs;
@@ -21,18 +21,18 @@ pub struct Places {
     pub types: PathBuf,
     /// Folder of printer descriptions.
     pub descriptions: PathBuf,
-    /// Where a program that is not root's is copied to.
+    /// Where the program is copied to if others than root can change it.
     pub program: PathBuf,
 }
 
-/// A file to be there.
+/// A file to install.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Wanted {
-    /// Where.
+    /// Its path.
     pub path: PathBuf,
-    /// What is in it.
+    /// Its contents.
     pub text: String,
-    /// Whether it is a program.
+    /// Whether it is executable.
     pub executable: bool,
 }
 
@@ -40,7 +40,7 @@ pub struct Wanted {
 pub const DESCRIPTION: &str = "foilpress-md5500.ppd";
 
 impl Places {
-    /// Where the print system of Debian and its kin keeps them, below another root if need be.
+    /// Where Debian and its derivatives keep them, below `root`.
     pub fn usual(root: &Path) -> Places {
         Places {
             programs: root.join("usr/lib/cups"),
@@ -67,7 +67,7 @@ impl Places {
         ]
     }
 
-    /// Removes what [`files`](Places::files) names and the copy of the program; gives what was there.
+    /// Removes the files of [`files`](Places::files) and the copy of the program; returns those that existed.
     pub fn remove(&self) -> io::Result<Vec<PathBuf>> {
         let mut removed = Vec::new();
         let files = self.files(&self.program).into_iter().map(|file| file.path);
@@ -78,7 +78,7 @@ impl Places {
                 Err(error) => return Err(error),
             }
         }
-        // Only ours, and only when nothing else is in them.
+        // Only folders of this program, and only if they are empty.
         for folder in [Some(self.descriptions.as_path()), self.program.parent()].into_iter().flatten() {
             let _ = fs::remove_dir(folder);
         }
@@ -86,14 +86,14 @@ impl Places {
     }
 }
 
-/// Whether only root can change a program: it and every folder above it are root's, and no others may write there.
+/// Whether only root can change a program: root owns it and every folder above it, and nobody else may write to them.
 #[cfg(unix)]
 pub fn is_roots(program: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt as _;
     let real = program.canonicalize()?;
     for path in real.ancestors() {
         let found = fs::metadata(path)?;
-        // A folder like /tmp, where others may write but not change what is not theirs, does not count as safe either.
+        // A folder such as /tmp, where others may write but not change files of others, does not count as safe either.
         if found.uid() != 0 || found.mode() & 0o022 != 0 {
             return Ok(false);
         }
@@ -107,7 +107,7 @@ pub fn is_roots(_program: &Path) -> io::Result<bool> {
     Ok(false)
 }
 
-/// Writes a file whole or not at all, unless it is there just so. True if it was written.
+/// Writes a file whole or not at all, unless it already has these contents. True if it was written.
 pub fn put(wanted: &Wanted) -> io::Result<bool> {
     if fs::read_to_string(&wanted.path).is_ok_and(|text| text == wanted.text) {
         return Ok(false);
@@ -121,7 +121,7 @@ pub fn put(wanted: &Wanted) -> io::Result<bool> {
     Ok(true)
 }
 
-/// Copies the program to a place that is root's.
+/// Copies the program to a folder that only root can change.
 pub fn copy_program(from: &Path, to: &Path) -> io::Result<()> {
     let folder = to.parent().unwrap_or(Path::new("/"));
     fs::create_dir_all(folder)?;

@@ -1,4 +1,4 @@
-//! What the backend lists: the bridges at this computer, and printers at cables of their own.
+//! The devices that the backend lists: bridges on this computer, and printers on parallel cables.
 //!
 //! Source: backend(7).
 
@@ -9,9 +9,9 @@ use super::uri;
 use device::send::find;
 use device::send::query::is_alps;
 
-/// What is said when no device is there, so that the backend is known to be.
+/// The line that is printed when there is no device, so that the print system knows the backend.
 const NO_DEVICE: &str = "network foilpress \"Unknown\" \"ALPS MD-5500 through a Foilpress bridge\"";
-/// The device ID a bridge's printer is listed with: listing asks no printer.
+/// The device ID listed for the printer of a bridge: the printer is not asked.
 const ID: &str = "MFG:ALPS;MDL:MD-5500;CMD:RGL;";
 
 /// A line for every device there is; one line if there is none.
@@ -25,14 +25,14 @@ pub fn devices() -> String {
         let id = fs::read_to_string(format!("/sys/class/usbmisc/lp{number}/device/ieee1284_id")).ok()?;
         (device.exists() && is_alps(&id)).then(|| at_cable(&device, &id))
     });
-    // What cannot be named by a URI cannot be listed.
+    // A device whose address has no URI is left out.
     let lines: String = bridges.chain(cables).flatten().collect();
     if lines.is_empty() { format!("{NO_DEVICE}\n") } else { lines }
 }
 
 fn at_cable(path: &Path, id: &str) -> Result<String, uri::UriError> {
     let path = path.display();
-    device(&format!("raw:{path}"), &format!("ALPS MD-5500 at a cable ({path})"), id.trim())
+    device(&format!("raw:{path}"), &format!("ALPS MD-5500 on a parallel cable ({path})"), id.trim())
 }
 
 fn device(address: &str, about: &str, id: &str) -> Result<String, uri::UriError> {
@@ -49,7 +49,7 @@ mod tests {
         let line = at_cable(Path::new("/dev/usb/lp0"), "MFG:ALPS;DES:\"MD\"\n;\n").unwrap();
         assert_eq!(
             line,
-            "direct foilpress:/raw/dev/usb/lp0 \"ALPS MD-5500\" \"ALPS MD-5500 at a cable (/dev/usb/lp0)\" \
+            "direct foilpress:/raw/dev/usb/lp0 \"ALPS MD-5500\" \"ALPS MD-5500 on a parallel cable (/dev/usb/lp0)\" \
              \"MFG:ALPS;DES: MD  ;\"\n"
         );
     }

@@ -1,7 +1,7 @@
-//! What the print system is told: lines on standard error that begin with a keyword.
+//! Messages to the print system: lines on standard error that begin with a keyword.
 //!
 //! `STATE:` lines add and remove reasons of the printer's state, `ATTR:` lines set attributes, `INFO:` and `ERROR:` lines
-//! are what people read beside the printer's name, `PAGE:` lines count sheets. Only changes are told. Reasons are keywords
+//! are what people read beside the printer's name, `PAGE:` lines count sheets. Only changes are reported. Reasons are keywords
 //! of IPP where there is one, so that print dialogs show them in the user's language.
 
 use std::collections::BTreeSet;
@@ -18,9 +18,9 @@ use observe::Observer;
 /// Why a printer does not print, or soon will not.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Reason {
-    /// The bridge is not there, or another program has it.
+    /// The bridge is not connected, or another program uses it.
     Connecting,
-    /// The printer is off line, switched off, or its bridge is away.
+    /// The printer is off line or switched off, or its bridge is disconnected.
     OffLine,
     /// No paper.
     MediaEmpty,
@@ -32,7 +32,7 @@ pub enum Reason {
     CoverOpen,
     /// A ribbon is at its end.
     SupplyEmpty,
-    /// A cassette is wanted that is not loaded.
+    /// A cartridge is needed that is not loaded.
     SupplyMissing,
     /// Something else that needs the operator.
     Other,
@@ -66,7 +66,7 @@ impl Reason {
         }
     }
 
-    /// The reason for what the port's lines say.
+    /// The reason for a fault that the port's lines show.
     pub fn of_fault(fault: Fault) -> Reason {
         match fault {
             Fault::PaperOut => Reason::MediaEmpty,
@@ -75,7 +75,7 @@ impl Reason {
         }
     }
 
-    /// The reason for what the printer itself complains of.
+    /// The reason for a complaint of the printer itself.
     pub fn of_complaint(complaint: &Complaint) -> Reason {
         match complaint {
             Complaint::CoverOpen => Reason::CoverOpen,
@@ -83,7 +83,7 @@ impl Reason {
             Complaint::WrongSize { .. } => Reason::MediaNeeded,
             Complaint::Jam { .. } => Reason::MediaJam,
             Complaint::RibbonEnd | Complaint::RibbonBreak => Reason::SupplyEmpty,
-            Complaint::WrongCassette { .. } => Reason::SupplyMissing,
+            Complaint::WrongCartridge { .. } => Reason::SupplyMissing,
             _ => Reason::Other,
         }
     }
@@ -92,19 +92,19 @@ impl Reason {
 struct State<W> {
     out: W,
     reasons: BTreeSet<Reason>,
-    /// The stage shown, its steps and those done, and the share told last.
+    /// The current stage, its steps, the steps done, and the percentage reported last.
     stage: (String, u64, u64),
     share: Option<u64>,
 }
 
-/// The way to the print system. Also watches stages: their notes are information, their progress the job's.
+/// Messages to the print system. As an observer it reports notes as information and progress as that of the job.
 pub struct Messages<W> {
     state: Mutex<State<W>>,
     progress: bool,
 }
 
 impl<W: Write> Messages<W> {
-    /// Begins with a printer that has no reason of ours, whatever an earlier process left.
+    /// Begins by removing every reason that an earlier process may have left.
     pub fn new(out: W) -> Messages<W> {
         let state = State { out, reasons: ALL.into(), stage: (String::new(), 0, 0), share: None };
         let messages = Messages { state: Mutex::new(state), progress: true };
@@ -112,7 +112,7 @@ impl<W: Write> Messages<W> {
         messages
     }
 
-    /// For a filter, which knows nothing of the printer and whose progress is not the job's.
+    /// For a filter, which knows nothing about the printer and whose progress is not that of the job.
     pub fn of_filter(out: W) -> Messages<W> {
         let state = State { out, reasons: BTreeSet::new(), stage: (String::new(), 0, 0), share: None };
         Messages { state: Mutex::new(state), progress: false }
@@ -123,14 +123,14 @@ impl<W: Write> Messages<W> {
     }
 
     fn line(&self, keyword: &str, text: &str) {
-        // A message is a line, and nobody may be listening, which is no reason to stop.
+        // A message is one line. If nobody reads it, the job goes on.
         let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
         self.with(|state| {
             let _ = writeln!(state.out, "{keyword}: {text}");
         });
     }
 
-    /// The printer's reasons are these and no others.
+    /// Replaces the printer's reasons by these.
     pub fn reasons(&self, reasons: &[Reason]) {
         let wanted: BTreeSet<Reason> = reasons.iter().copied().collect();
         let before = self.with(|state| std::mem::replace(&mut state.reasons, wanted.clone()));
@@ -142,30 +142,30 @@ impl<W: Write> Messages<W> {
         }
     }
 
-    /// These are reasons no more.
+    /// Removes these reasons.
     pub fn lift(&self, over: &[Reason]) {
         let left: Vec<Reason> =
             self.with(|state| state.reasons.iter().copied().filter(|r| !over.contains(r)).collect());
         self.reasons(&left);
     }
 
-    /// Only this one, if it is one, stays a reason.
+    /// Removes all reasons but this one.
     pub fn lift_all_but(&self, stays: Reason) {
         let over: Vec<Reason> = ALL.into_iter().filter(|&reason| reason != stays).collect();
         self.lift(&over);
     }
 
-    /// What people are to read now.
+    /// A message for people.
     pub fn info(&self, text: &str) {
         self.line("INFO", text);
     }
 
-    /// Why a job does not go on.
+    /// Why the job failed or stopped.
     pub fn error(&self, text: &str) {
         self.line("ERROR", text);
     }
 
-    /// For the log only.
+    /// A message for the log only.
     pub fn debug(&self, text: &str) {
         self.line("DEBUG", text);
     }
@@ -183,7 +183,7 @@ impl<W: Write> Messages<W> {
         }
     }
 
-    /// The cassettes the printer has found. It does not know how much is left on them, so nothing is said of that.
+    /// The cartridges the printer has found. It does not know how much ribbon is left, so no amount is reported.
     pub fn cassettes(&self, status: &Status) {
         if status.stale || status.cassettes.is_empty() {
             return;
@@ -199,7 +199,7 @@ impl<W: Write> Messages<W> {
             &format!(
                 "marker-names={} marker-types={} marker-colors={} marker-levels={}",
                 each(&|c| ink(c.barcode)
-                    .map_or_else(|| format!("cassette-{}", c.barcode), |ink| ink.name().into())),
+                    .map_or_else(|| format!("cartridge-{}", c.barcode), |ink| ink.name().into())),
                 each(&|_| "ribbonWax".into()),
                 each(&|c| ink(c.barcode).map_or("none", colour).into()),
                 each(&|c| level(c.condition).into()),

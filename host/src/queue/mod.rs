@@ -4,18 +4,18 @@
 //! lp file.pdf ─▶ cupsd ─▶ pdftopdf ─▶ [filter] ─▶ jobs in the printer's language ─▶ [backend] ─▶ bridge ─▶ printer
 //! lp job.rgl  ─▶ cupsd ──────────────────────────────────────────────────────────▶ [backend]
 //! ```
-//! The [`filter`] makes one job of every page, by the [`options`] of the print dialog, which the [`ppd`] declares from the
-//! same tables. The [`backend`] sends them one after the other, keeps them in a journal so that none is printed twice, and
-//! tells the print system in its own [`messages`] how printer and job are. A queue leads to an [`uri`].
+//! `filter` makes one job of every page, with the `options` of the print dialog, which [`ppd`] declares from the same
+//! tables. `backend` sends the jobs one after the other, keeps them in a journal so that none is printed twice, and reports
+//! the states of printer and job to the print system as `messages`. A queue leads to a `uri`.
 //! Source: the man pages backend(7) and filter(7), and the specifications of PPD and PWG raster files.
 
-pub mod backend;
-pub mod call;
-pub mod filter;
+pub(crate) mod backend;
+pub(crate) mod call;
+pub(crate) mod filter;
 pub mod install;
-pub mod listing;
-pub mod messages;
-pub mod options;
+pub(crate) mod listing;
+pub(crate) mod messages;
+pub(crate) mod options;
 pub mod ppd;
-pub mod raster;
-pub mod uri;
+pub(crate) mod raster;
+pub(crate) mod uri;

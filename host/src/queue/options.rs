@@ -1,30 +1,33 @@
-//! The options of the print dialog: one table for the printer description that declares them and the filter that obeys.
+//! The options of the print dialog: one table for the printer description that declares them and the filter that applies them.
 //!
-//! Option strings of the print system are `name=value` apart by blanks, values in quotes or with backslashes where
-//! they hold blanks; a bare `name` means true and `noname` false.
+//! Option strings of the print system are pairs `name=value`, separated by blanks; a value with blanks is quoted or has
+//! backslashes; a bare `name` means true and `noname` false.
 
 use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::rgl::Media;
 
-use super::filter::Place;
-use super::ppd;
 use press::layers::{Finish, White};
 use press::layout::{Point, Profile};
+
+/// Keywords for the calibration profile of the queue's printer in its description.
+pub const OFFSET: &str = "FoilpressOffset";
+/// See [`OFFSET`].
+pub const FEED: &str = "FoilpressFeed";
 
 /// One option of the dialog.
 pub struct DialogOption {
     /// Its keyword.
     pub keyword: &'static str,
-    /// What people read.
+    /// The text in the dialog.
     pub text: &'static str,
     /// Keywords and texts of the choices; the first is the default.
     pub choices: Vec<(String, String)>,
-    /// Name and text of a value of one's own, if there can be one.
+    /// Name and text of a custom value, if the option takes one.
     pub custom: Option<(&'static str, &'static str)>,
 }
 
-/// Which colours are inks of their own.
+/// Which colours print in inks of their own.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Spots {
     /// Spot colours of the document that name inks.
@@ -35,12 +38,23 @@ pub enum Spots {
     None,
 }
 
+/// Where the drawing goes on its sheet.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Place {
+    /// Where the page has it.
+    Page,
+    /// In the middle of the printable area.
+    Centre,
+    /// With its top left corner this far from the corner of the sheet.
+    At(Point),
+}
+
 /// What the user chose.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Choices {
     /// What the paper is made of.
     pub media: Media,
-    /// Whether the machine corrects the sheet's curl.
+    /// Whether the printer corrects the sheet's curl.
     pub curl_correction: bool,
     /// The inks of pictures' colours.
     pub colours: InkSet,
@@ -48,19 +62,19 @@ pub struct Choices {
     pub spots: Spots,
     /// Whether foils may be printed.
     pub foils: bool,
-    /// Where white is laid.
+    /// Where white is printed.
     pub white: White,
-    /// Where finish is laid.
+    /// Where finish is printed.
     pub finish: Finish,
-    /// Pixels an inch the page is drawn at.
+    /// Resolution at which the page is rendered, in pixels per inch.
     pub dpi: u16,
-    /// Where what is drawn goes on its sheet.
+    /// Where the drawing goes on its sheet.
     pub place: Place,
-    /// Whether pages are turned left to right.
+    /// Whether pages are mirrored left to right.
     pub mirror: bool,
-    /// Whether a sheet of a size of its own is meant, and not the paper that is nearly as large.
+    /// Whether the sheet has a custom size, rather than that of the paper nearest to it.
     pub custom_paper: bool,
-    /// The queue's machine.
+    /// Calibration profile of the queue's printer.
     pub profile: Profile,
 }
 
@@ -72,20 +86,18 @@ const INKS: [(&str, &str); 3] = [
 
 const SPOTS: [(&str, &str, Spots); 3] = [
     ("Named", "Spot colours named after inks", Spots::Named),
-    ("Reserved", "These and the vendor's reserved colours", Spots::Reserved),
-    ("Off", "None, everything in process inks", Spots::None),
+    ("Reserved", "Spot colours named after inks, and the vendor's reserved colours", Spots::Reserved),
+    ("Off", "None (everything in process inks)", Spots::None),
 ];
 
 const FOILS: [(&str, &str, bool); 2] =
-    [("Off", "Never", false), ("On", "Where the page names them (never tried)", true)];
+    [("Off", "Never", false), ("On", "Where the page names them (untested)", true)];
 
-const PLACE: [(&str, &str, Place); 2] = [
-    ("Page", "Where the page has it", Place::Page),
-    ("Centre", "What is drawn in the middle of the sheet", Place::Centre),
-];
+const PLACE: [(&str, &str, Place); 2] =
+    [("Page", "As on the page", Place::Page), ("Centre", "Drawing centred on the sheet", Place::Centre)];
 
 const WHITE: [(&str, &str, White); 5] = [
-    ("None", "Only what the page names", White::None),
+    ("None", "Only where the page names it", White::None),
     ("Under", "Under every ink", White::Under),
     ("Reserved", "Where the page has the reserved white 230,230,230", White::Reserved),
     ("Opaque", "Where the page is not pure white", White::Opaque),
@@ -93,13 +105,13 @@ const WHITE: [(&str, &str, White); 5] = [
 ];
 
 const FINISH: [(&str, &str, Finish); 3] = [
-    ("None", "Only what the page names", Finish::None),
-    ("Artwork", "On what is drawn", Finish::Artwork),
+    ("None", "Only where the page names it", Finish::None),
+    ("Artwork", "On everything drawn", Finish::Artwork),
     ("All", "On the whole page", Finish::All),
 ];
 
 const QUALITY: [(&str, &str, u16); 2] =
-    [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (drawn at 300 dpi)", 300)];
+    [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (rendered at 300 dpi)", 300)];
 
 const CURL: [(&str, &str, bool); 2] = [("On", "On (paper)", true), ("Off", "Off (decal film)", false)];
 
@@ -122,7 +134,7 @@ fn texts<'a>(rows: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<(String, Str
 pub fn all() -> Vec<DialogOption> {
     let option = |keyword, text, choices| DialogOption { keyword, text, choices, custom: None };
     let mut place = option("FoilpressPosition", "Position", texts(PLACE.iter().map(|row| (row.0, row.1))));
-    place.custom = Some(("Corner", "Top left corner of what is drawn, such as 20x30mm"));
+    place.custom = Some(("Corner", "Top left corner of the drawing, such as 20x30mm"));
     vec![
         option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
         option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
@@ -136,9 +148,9 @@ pub fn all() -> Vec<DialogOption> {
     ]
 }
 
-/// An option whose value is no choice of it.
+/// An option with a value that is not one of its choices.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("{option}: `{found}` is no choice; there are {known}")]
+#[error("{option}: `{found}` is not a choice; the choices are {known}")]
 pub struct NoChoice {
     /// The option.
     pub option: &'static str,
@@ -149,12 +161,12 @@ pub struct NoChoice {
 }
 
 impl Choices {
-    /// The choices of a job: by its options, else by the defaults of the printer description, else the usual ones.
+    /// The choices of a job: its options override the defaults of the printer description, which override the first choices.
     ///
     /// # Errors
-    /// A value in the job's options that is no choice. Defaults that are none are passed over.
+    /// A value in the job's options that is not a choice. Such a value among the defaults is ignored.
     pub fn read(options: &[(String, String)], description: Option<&str>) -> Result<Choices, NoChoice> {
-        // The last one counts, as in the print system.
+        // The last one wins, as in the print system.
         let asked = |keyword: &str| {
             options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(keyword)).map(|(_, value)| value)
         };
@@ -197,7 +209,7 @@ impl Choices {
                 .into_iter()
                 .any(|keyword| asked(keyword).is_some_and(|value| value.eq_ignore_ascii_case("true"))),
             custom_paper: ["PageSize", "media"].into_iter().any(is_custom),
-            profile: description.map_or_else(Profile::default, ppd::profile_in),
+            profile: description.map_or_else(Profile::default, profile_in),
         })
     }
 }
@@ -210,7 +222,7 @@ impl DialogOption {
     }
 }
 
-/// A place as dialogs write it, `Custom.20x30mm`, or as people do.
+/// A position as dialogs write it, `Custom.20x30mm`, or as people do, `20x30mm`.
 fn read_corner(option: &DialogOption, value: &str) -> Result<Point, NoChoice> {
     let bare = match value.get(..7) {
         Some(head) if head.eq_ignore_ascii_case("custom.") => &value[7..],
@@ -224,6 +236,24 @@ fn default_of<'a>(description: &'a str, keyword: &str) -> Option<&'a str> {
     description.lines().find_map(|line| {
         Some(line.strip_prefix("*Default")?.strip_prefix(keyword)?.strip_prefix(':')?.trim())
     })
+}
+
+/// The calibration profile in a printer description; values out of range are ignored.
+pub fn profile_in(description: &str) -> Profile {
+    let numbers = |keyword: &str| -> Option<Vec<f64>> {
+        let value = description
+            .lines()
+            .find_map(|line| line.strip_prefix('*')?.strip_prefix(keyword)?.strip_prefix(':'))?;
+        value.trim().trim_matches('"').split_whitespace().map(|number| number.parse().ok()).collect()
+    };
+    let mut profile = Profile::default();
+    if let Some(&[x, y]) = numbers(OFFSET).as_deref() {
+        profile.offset_mm = [x, y];
+    }
+    if let Some(&[feed]) = numbers(FEED).as_deref() {
+        profile.feed = feed;
+    }
+    if profile.problem().is_some() { Profile::default() } else { profile }
 }
 
 /// Reads an option string of the print system.
@@ -289,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn the_job_counts_more_than_the_queue_and_the_queue_more_than_the_usual() {
+    fn the_job_overrides_the_queue_and_the_queue_overrides_the_defaults() {
         let usual = Choices::read(&[], None).unwrap();
         assert_eq!(
             (usual.media, usual.white, usual.dpi, usual.spots),
@@ -321,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_choice_is_answered_with_those_there_are() {
+    fn a_value_that_is_not_a_choice_is_answered_with_the_choices() {
         let error = Choices::read(&[pair("FoilpressWhite", "Beneath")], None).unwrap_err().to_string();
         assert!(
             error.contains("FoilpressWhite") && error.contains("Beneath") && error.contains("Silhouette"),

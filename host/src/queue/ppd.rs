@@ -1,30 +1,26 @@
-//! The printer description: papers with the margins the machine enforces, and the [`options`] of the
-//! dialog, as a PPD file, which is what print systems of this kind understand.
+//! The printer description: papers with the margins the printer enforces, and the [`options`] of the
+//! dialog, as a PPD file.
 //!
 //! Source: the PPD specification 4.3 and the print system's extensions to it (`cupsFilter2`, `cupsManualCopies`). The
-//! numbers come from the tables the jobs are made by, so that dialog and job cannot differ.
+//! numbers come from the tables that jobs are made from, so that dialog and job cannot differ.
 
 use std::fmt::Write as _;
 
 use protocol::paper::{LEFT, Paper};
 
-use super::options;
+use super::options::{self, FEED, OFFSET};
 use press::layout::{self, Mm, Point, Profile};
 use press::simulate::Stock;
 
-/// What the filter makes.
+/// The type of the filter's output.
 pub const JOB_TYPE: &str = "application/vnd.foilpress-rgl";
 
-/// How the print system knows a file of that type by its first bytes.
+/// How the print system recognises a file of that type by its first bytes.
 pub const TYPES: &str = "\
 # Jobs for ALPS MD printers: they begin with the command that selects the printer's language, or with a reset before it.\n\
 application/vnd.foilpress-rgl rgl string(0,<1B258041>) string(0,<1B651B258041>)\n";
 
-/// What a queue's description says of its machine.
-const OFFSET: &str = "FoilpressOffset";
-const FEED: &str = "FoilpressFeed";
-
-/// Papers and what dialogs call them.
+/// Papers and their names in dialogs.
 const PAPERS: [(Paper, &str, &str); 6] = [
     (Paper::A4, "A4", "A4"),
     (Paper::Letter, "Letter", "US Letter"),
@@ -34,13 +30,13 @@ const PAPERS: [(Paper, &str, &str); 6] = [
     (Paper::Postcard, "Postcard", "Postcard (100 x 148 mm)"),
 ];
 
-/// 1/600 inch as points, as short as it is exact to a thousandth.
+/// Converts 1/600 inch to points: the shortest text that is exact to a thousandth.
 fn points(dots: f64) -> String {
     let text = format!("{:.3}", dots * 72.0 / 600.0);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// The size of a sheet in points. Known sizes have the numbers everybody gives them.
+/// The size of a sheet in points. Known sizes have their customary numbers.
 fn sheet(paper: Paper) -> (String, String) {
     let (width, length) = match paper {
         Paper::A4 => ("595", "842"),
@@ -57,11 +53,11 @@ fn sheet(paper: Paper) -> (String, String) {
     (width.into(), length.into())
 }
 
-/// The paper of a sheet of so many millimetres: a known one that is as large within 2 mm, unless a sheet of its own size is
-/// meant; otherwise that.
+/// The paper of a sheet of this size in millimetres: a known paper that agrees within 2 mm, unless the size is `custom`;
+/// otherwise a sheet of exactly this size.
 ///
 /// # Errors
-/// In words: a sheet that the machine cannot take.
+/// In words: why the printer cannot take the sheet.
 pub fn paper_of(width: f64, length: f64, custom: bool) -> Result<Paper, String> {
     const NEAR: f64 = 2.0;
     let known = PAPERS.into_iter().map(|(paper, ..)| paper).find(|&paper| {
@@ -74,7 +70,7 @@ pub fn paper_of(width: f64, length: f64, custom: bool) -> Result<Paper, String> 
     }
 }
 
-/// The printer description, for a machine as its profile says.
+/// The printer description, for a printer with this calibration profile.
 pub fn description(profile: &Profile) -> String {
     let mut text = format!(
         "*PPD-Adobe: \"4.3\"\n\
@@ -132,7 +128,7 @@ pub fn description(profile: &Profile) -> String {
         }
     }
     text.push_str(
-        "\n*OpenUI *MirrorPrint/Mirror, for what is seen from behind: Boolean\n\
+        "\n*OpenUI *MirrorPrint/Mirror (for prints seen from behind): Boolean\n\
          *OrderDependency: 20 AnySetup *MirrorPrint\n\
          *DefaultMirrorPrint: False\n\
          *MirrorPrint False/No: \"\"\n\
@@ -143,7 +139,7 @@ pub fn description(profile: &Profile) -> String {
     text
 }
 
-/// A text as a PPD holds it: a colon would end it.
+/// A text for a PPD file, where a colon would end it.
 fn translation(text: &str) -> String {
     text.replace(':', ",").replace('…', "...")
 }
@@ -165,7 +161,7 @@ fn papers_into(text: &mut String) {
     text.push_str("\n*DefaultImageableArea: A4\n");
     for (paper, name, words) in PAPERS {
         let (_, length) = sheet(paper);
-        // Points count from the lower left corner, the machine from the upper left.
+        // Points count from the lower left corner, the printer from the upper left.
         let length: f64 = length.parse::<f64>().unwrap_or_default() * 600.0 / 72.0;
         let (left, right) = (f64::from(LEFT), f64::from(LEFT + paper.width()));
         let top = length - f64::from(paper.top());
@@ -187,10 +183,10 @@ fn papers_into(text: &mut String) {
     }
 }
 
-/// Sheets of sizes of their own.
+/// Sheets of custom sizes.
 fn custom_papers_into(text: &mut String) {
     let (Point(narrowest, shortest), Point(widest, longest)) = layout::paper::custom_range();
-    // Inwards to a hundredth of a point, so that what is declared goes in.
+    // Rounded inwards to a hundredth of a point, so that the printer accepts every declared size.
     let least = |side: Mm| (side.0 * 7200.0 / 25.4).ceil() / 100.0;
     let most = |side: Mm| (side.0 * 7200.0 / 25.4).floor() / 100.0;
     let [left, top, right, bottom] =
@@ -215,27 +211,10 @@ fn custom_papers_into(text: &mut String) {
     );
 }
 
-/// The machine of a printer description, as far as it says; nonsense is passed over.
-pub fn profile_in(description: &str) -> Profile {
-    let numbers = |keyword: &str| -> Option<Vec<f64>> {
-        let value = description
-            .lines()
-            .find_map(|line| line.strip_prefix('*')?.strip_prefix(keyword)?.strip_prefix(':'))?;
-        value.trim().trim_matches('"').split_whitespace().map(|number| number.parse().ok()).collect()
-    };
-    let mut profile = Profile::default();
-    if let Some(&[x, y]) = numbers(OFFSET).as_deref() {
-        profile.offset_mm = [x, y];
-    }
-    if let Some(&[feed]) = numbers(FEED).as_deref() {
-        profile.feed = feed;
-    }
-    if profile.problem().is_some() { Profile::default() } else { profile }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::queue::options::profile_in;
 
     #[test]
     fn a_page_of_points_is_the_paper_it_was_declared_as() {

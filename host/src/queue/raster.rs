@@ -1,4 +1,4 @@
-//! Pages of PWG raster, the form in which print systems hand over pictures of pages.
+//! Pages of PWG raster, the format in which print systems pass on pictures of pages.
 //!
 //! Method: header and rows are read as they come; a row is unpacked into red, green and blue. Grey and black-and-white
 //! pages become colours of equal parts.
@@ -11,16 +11,13 @@ use std::io::{self, Read};
 pub const SYNC: [u8; 4] = *b"RaS2";
 const HEADER: usize = 1796;
 
-/// Why a stream is no page this printer can print.
+/// Why a stream cannot be printed.
 #[derive(Debug, thiserror::Error)]
 pub enum RasterError {
     /// It cannot be read, or ends too early.
     #[error("the raster stream ends in the middle of a page, or cannot be read")]
     Io(#[from] io::Error),
-    /// It does not begin as one.
-    #[error("this is no PWG raster stream")]
-    Sync,
-    /// A header field has a value that is not taken.
+    /// A header field has a value that is not supported.
     #[error("page {page}: {field} is {found}; expected {expected}")]
     Field {
         /// Page, from 1.
@@ -29,11 +26,11 @@ pub enum RasterError {
         field: &'static str,
         /// Its value.
         found: String,
-        /// What is taken.
+        /// What is supported.
         expected: &'static str,
     },
     /// A row has more pixels than the page is wide, or a page more rows.
-    #[error("page {page}, row {row}: damaged")]
+    #[error("page {page}, row {row}: the raster stream has more pixels or rows than its header declares")]
     Damaged {
         /// Page, from 1.
         page: usize,
@@ -52,16 +49,16 @@ enum Colours {
     Bits,
 }
 
-/// A page's header, as much of it as matters.
+/// The parts of a page's header that are used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Page {
     /// Pixels across.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Pixels an inch, both ways.
+    /// Pixels per inch in both directions.
     pub dpi: u16,
-    /// How often it is wanted, at least 1.
+    /// Number of copies, at least 1.
     pub copies: u32,
     colours: Colours,
     line: usize,
@@ -73,7 +70,7 @@ pub struct Reader<R> {
     number: usize,
     page: Option<Page>,
     row: usize,
-    /// How often the row in `line` still counts.
+    /// How often the row in `line` is still to be repeated.
     repeat: usize,
     line: Vec<u8>,
 }
@@ -84,7 +81,7 @@ impl<R: Read> Reader<R> {
         Reader { input, number: 0, page: None, row: 0, repeat: 0, line: Vec::new() }
     }
 
-    /// The next page; `None` at the end. Rows of the page before that were not read are passed over.
+    /// The next page; `None` at the end. Unread rows of the page before are skipped.
     pub fn next_page(&mut self) -> Result<Option<Page>, RasterError> {
         let mut scratch = Vec::new();
         while self.page.is_some_and(|page| self.row < page.height) {
@@ -119,7 +116,7 @@ impl<R: Read> Reader<R> {
             return Err(wrong(
                 "cupsWidth x cupsHeight",
                 format!("{width} x {height}"),
-                "the pixels of a sheet",
+                "the pixel size of a sheet",
             ));
         }
         let (bits, pixel, space, order) = (number(384), number(388), number(400), number(396));
@@ -141,7 +138,7 @@ impl<R: Read> Reader<R> {
         }
         let line = (width * pixel).div_ceil(8);
         if number(392) != line {
-            return Err(wrong("cupsBytesPerLine", number(392).to_string(), "that of the page's pixels"));
+            return Err(wrong("cupsBytesPerLine", number(392).to_string(), "the bytes of one row of pixels"));
         }
         let (width, height, line) = (width as usize, height as usize, line as usize);
         Ok(Page { width, height, dpi, copies: number(340).clamp(1, 1000), colours, line })
@@ -177,7 +174,7 @@ impl<R: Read> Reader<R> {
         Ok(byte[0])
     }
 
-    /// Runs of pixels: so many times one, or so many one by one; 128 is paper to the end of the row.
+    /// Unpacks runs of pixels: one pixel repeated, or several pixels as they are; 128 is paper to the end of the row.
     fn unpack(&mut self, page: &Page) -> Result<(), RasterError> {
         let pixel = if page.colours == Colours::Rgb { 3 } else { 1 };
         let paper = if matches!(page.colours, Colours::Black | Colours::Bits) { 0 } else { 255 };

@@ -1,8 +1,8 @@
-//! Device URIs: where a queue leads, as the print system writes it.
+//! Device URIs: the destination of a queue, as the print system writes it.
 //!
 //! `foilpress:/KIND/REST` is the destination `KIND:REST` of every other command: `foilpress:/serial/dev/ttyACM0`,
-//! `foilpress:/tcp/host:4000`, `foilpress:/raw/dev/usb/lp0`. Files are no destination of a queue: everybody who may print
-//! could write them with the print system's rights.
+//! `foilpress:/tcp/host:4000`, `foilpress:/raw/dev/usb/lp0`. A file is not a destination of a queue: everybody who
+//! may print could write it with the rights of the print system.
 
 use percent_encoding::{AsciiSet, CONTROLS, percent_decode_str, utf8_percent_encode};
 
@@ -11,20 +11,20 @@ use device::send::{Destination, NoDestination};
 /// The scheme, and the name of the backend.
 pub const SCHEME: &str = "foilpress";
 
-/// What would end a URI, or not survive a command line.
+/// Characters that would end a URI or not survive a command line.
 const UNSAFE: &AsciiSet =
     &CONTROLS.add(b' ').add(b'"').add(b'#').add(b'%').add(b'<').add(b'>').add(b'?').add(b'\\').add(b'`');
 
-/// A text that is no device URI of ours.
+/// A text that is not a device URI of this program.
 #[derive(Debug, thiserror::Error)]
 pub enum UriError {
-    /// Another scheme, or no kind and place.
-    #[error("`{0}` is no device of this program; expected foilpress:/serial/dev/ttyACM0 or the like")]
+    /// Another scheme, or the kind or place is missing.
+    #[error("`{0}` is not a device of this program; expected one such as foilpress:/serial/dev/ttyACM0")]
     Form(String),
     /// A file.
-    #[error("a queue cannot print into a file; `foilpress print --to file:…` does")]
+    #[error("a queue cannot print to a file; `foilpress print --to file:…` can")]
     File,
-    /// No destination.
+    /// The kind or place is not a valid destination.
     #[error(transparent)]
     Destination(#[from] NoDestination),
 }
@@ -57,7 +57,7 @@ pub fn of(destination: &str) -> Result<String, UriError> {
     };
     let place = if is_path(kind) { place.strip_prefix('/').unwrap_or(place) } else { place };
     let uri = format!("{SCHEME}:/{kind}/{}", utf8_percent_encode(place, UNSAFE));
-    // What cannot be read back is no destination.
+    // An address is valid if its URI can be read back.
     parse(&uri)?;
     Ok(uri)
 }

@@ -1,13 +1,13 @@
 //! Frames: one message on the wire is `COBS(postcard(message) ‖ CRC-32) ‖ 00`.
 //!
-//! COBS takes every zero out of the frame, so a zero on the wire is always the end of a frame and a reader
-//! that has lost its place finds it again at the next one. The checksum is CRC-32/ISO-HDLC (the one of
-//! Ethernet and zip), little-endian: frames are at most [`MAX`] bytes, where it finds every burst up to 32
-//! bits and every error of up to three bits.
+//! COBS removes every zero from the frame, so a zero on the wire always ends a frame, and a reader that has lost its
+//! place finds it again at the next zero. The checksum is CRC-32/ISO-HDLC (used by Ethernet and zip), little-endian.
+//! In frames of at most [`MAX`] bytes it detects every burst of up to 32 bits and every error of up to three bits.
 //!
 //! Cost: one pass over the bytes on either side, and one buffer of [`MAX`] bytes in the reader.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use heapless::Vec;
 use postcard::ser_flavors::crc::CrcModifier;
 use postcard::ser_flavors::{Cobs, Slice};
 use serde::{Deserialize, Serialize};
@@ -15,8 +15,7 @@ use serde::{Deserialize, Serialize};
 /// The longest frame, with its closing zero.
 pub const MAX: usize = 1024;
 
-/// The longest message inside a frame: what is left of [`MAX`] after the zero, COBS' one byte in 254 and the
-/// checksum.
+/// The longest message inside a frame: what [`MAX`] leaves after the zero, COBS's one byte in 254 and the checksum.
 pub const MAX_MESSAGE: usize = MAX - 1 - (MAX - 1).div_ceil(255) - CHECKSUM;
 
 const CHECKSUM: usize = 4;
@@ -53,28 +52,37 @@ pub enum Damage {
     Checksum,
 }
 
-/// What came of reading some bytes. Every outcome says what of the input is still unread.
+/// The result of reading some bytes. Every case returns the input that is still unread.
 #[derive(PartialEq, Eq, Debug)]
 pub enum Read<'r, 'i> {
     /// All of the input was read and no frame has ended.
     More,
     /// A frame: the message's bytes without the checksum.
     Message(&'r [u8], &'i [u8]),
-    /// A damaged frame was thrown away; reading goes on behind its end.
+    /// A damaged frame was dropped; reading continues after its end.
     Damaged(Damage, &'i [u8]),
 }
 
 /// Finds frames in bytes that arrive in any portions.
 ///
-/// Bytes before the first zero may be the rest of an older conversation; if they are no frame they are passed
-/// over without a word.
+/// Bytes before the first zero may be the rest of an older conversation; if they are no frame they are skipped without
+/// a report.
 pub struct Reader {
-    buffer: [u8; MAX],
-    used: usize,
-    /// The frame under way is longer than the buffer: throw away up to its end.
-    overlong: bool,
-    /// A frame's end has been seen, so what follows should be a frame.
+    /// The frame under way without its closing zero; after it has ended, the message in it.
+    buffer: Vec<u8, { MAX - 1 }>,
+    state: State,
+    /// Whether the end of a frame has been seen, so that what follows should be a frame.
     synchronised: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// The buffer holds what has come of the frame under way.
+    Filling,
+    /// The frame under way is longer than the buffer: skip to its end.
+    Overlong,
+    /// The buffer holds a frame that has ended.
+    Ended,
 }
 
 impl Default for Reader {
@@ -86,13 +94,13 @@ impl Default for Reader {
 impl Reader {
     /// A reader that has seen nothing.
     pub const fn new() -> Self {
-        Reader { buffer: [0; MAX], used: 0, overlong: false, synchronised: false }
+        Reader { buffer: Vec::new(), state: State::Filling, synchronised: false }
     }
 
-    /// Forgets a frame under way: the link was cut and begins anew.
+    /// Forgets a frame under way: the link was cut and starts again.
     pub fn reset(&mut self) {
-        self.used = 0;
-        self.overlong = false;
+        self.buffer.clear();
+        self.state = State::Filling;
         self.synchronised = false;
     }
 
@@ -105,15 +113,16 @@ impl Reader {
             };
             self.keep(&input[..end]);
             input = &input[end + 1..];
-            let (used, overlong, synchronised) = (self.used, self.overlong, self.synchronised);
-            (self.used, self.overlong, self.synchronised) = (0, false, true);
-            if used == 0 && !overlong {
-                // A sender may write extra zeros to make itself understood after a cut.
+            let overlong = self.state == State::Overlong;
+            let synchronised = core::mem::replace(&mut self.synchronised, true);
+            self.state = State::Ended;
+            if self.buffer.is_empty() && !overlong {
+                // A sender may write extra zeros to be understood after a cut.
                 continue;
             }
-            let found = if overlong { Err(Damage::TooLong) } else { self.open(used) };
+            let found = if overlong { Err(Damage::TooLong) } else { self.open() };
             match found {
-                Ok(length) => return Read::Message(&self.buffer[..length], input),
+                Ok(()) => return Read::Message(&self.buffer, input),
                 Err(damage) if synchronised => return Read::Damaged(damage, input),
                 Err(_) => continue,
             }
@@ -121,26 +130,31 @@ impl Reader {
     }
 
     fn keep(&mut self, bytes: &[u8]) {
-        // The closing zero is not kept, so a legal frame leaves at least one byte free.
-        if self.overlong || bytes.len() > MAX - 1 - self.used {
-            self.overlong = true;
-            return;
+        if self.state == State::Ended {
+            self.buffer.clear();
+            self.state = State::Filling;
         }
-        self.buffer[self.used..self.used + bytes.len()].copy_from_slice(bytes);
-        self.used += bytes.len();
+        // The closing zero is not kept, so the longest frame fills the buffer.
+        if self.state == State::Filling && self.buffer.extend_from_slice(bytes).is_err() {
+            self.state = State::Overlong;
+        }
     }
 
-    /// Undoes COBS in place and checks; returns the length of the message.
-    fn open(&mut self, used: usize) -> Result<usize, Damage> {
-        let length = cobs::decode_in_place(&mut self.buffer[..used]).map_err(|_| Damage::Coding)?;
-        let body = length.checked_sub(CHECKSUM).ok_or(Damage::Checksum)?;
-        let (message, sum) = self.buffer[..length].split_at(body);
-        if CRC.checksum(message).to_le_bytes() == sum { Ok(body) } else { Err(Damage::Checksum) }
+    /// Undoes COBS in place, checks, and leaves the message in the buffer.
+    fn open(&mut self) -> Result<(), Damage> {
+        let length = cobs::decode_in_place(&mut self.buffer).map_err(|_| Damage::Coding)?;
+        self.buffer.truncate(length);
+        let (message, sum) = self.buffer.split_last_chunk::<CHECKSUM>().ok_or(Damage::Checksum)?;
+        if CRC.checksum(message).to_le_bytes() != *sum {
+            return Err(Damage::Checksum);
+        }
+        self.buffer.truncate(length - CHECKSUM);
+        Ok(())
     }
 }
 
-/// Why an undamaged message was not understood: it is of a kind, or has a field value, that this version does
-/// not know, or it is longer than its kind.
+/// An undamaged message was not understood: this version does not know its kind or the value of a field, or the message
+/// is longer than its kind.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Unknown;
 
@@ -157,8 +171,7 @@ mod tests {
     extern crate std;
     use super::*;
     use proptest::prelude::*;
-    use std::vec;
-    use std::vec::Vec;
+    use std::{vec, vec::Vec};
 
     fn framed(message: &[u8]) -> Vec<u8> {
         let mut buffer = [0; MAX];

@@ -1,33 +1,30 @@
-//! Messages: what workstation and bridge say to each other.
+//! The messages between workstation and bridge.
 //!
-//! The bytes are postcard's: a variant is its number, integers are varints (seven bits to a byte, low bits
-//! first), a slice is its length and its bytes. **The numbers and the order of fields are the wire format.**
-//! Variants are only ever appended; a field is never added, moved or widened - a new variant takes its place.
-//! A reader that meets a number it does not know gets [`frame::Unknown`](super::frame::Unknown) and says so
-//! with [`Refusal::Unknown`].
+//! The bytes are postcard's: a variant is its number, integers are varints (seven bits to a byte, low bits first), a
+//! slice is its length and its bytes. **The numbers and the order of fields are the wire format.** Variants are only ever
+//! appended. A field is never added, moved or widened; a new variant takes its place. A reader that meets an unknown
+//! number gets [`frame::Unknown`](super::frame::Unknown) and answers [`Refusal::Unknown`].
 //!
-//! Nothing here answers by position: every message of the bridge tells a state, so it may be lost, repeated or
-//! late without harm, and a host that has missed one asks again.
+//! The order of answers has no meaning. Every message of the bridge reports a state, so it may be lost, repeated or late
+//! without harm, and a host that has missed one asks again.
 
 use serde::{Deserialize, Serialize};
 
-/// Version of the message set. Changes only if an old message changes its meaning; appended messages do not
-/// change it.
+/// Version of the message set. It changes only if an old message changes its meaning, not when messages are appended.
 pub const VERSION: u8 = 1;
 
-/// Fingerprint of the message set: the CRC-32 over one example of every variant. Two sides with the same
-/// fingerprint know the same messages; with different ones, the same version still understands all that the
-/// older of them knows.
+/// Fingerprint of the message set: the CRC-32 over one example of every variant. With equal fingerprints, host and bridge
+/// know the same messages. With different fingerprints but the same version, both understand everything the older knows.
 pub const SCHEMA: u32 = 0x8432_812c;
 
-/// The most data bytes to put in one [`ToBridge::Data`]; fits a frame whatever the other fields are.
+/// The most data bytes in one [`ToBridge::Data`]. They fit a frame whatever the other fields are.
 pub const DATA_MAX: usize = 960;
 
 /// From the workstation to the bridge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum ToBridge<'a> {
-    /// A host is there. Answered by [`ToHost::Hello`] and [`ToHost::Progress`]. Changes nothing: a job under
-    /// way goes on.
+    /// A host has connected. Answered by [`ToHost::Hello`] and [`ToHost::Progress`]. Changes nothing: a job under way
+    /// continues.
     Hello {
         /// [`VERSION`] of the host.
         version: u8,
@@ -36,19 +33,19 @@ pub enum ToBridge<'a> {
     },
     /// Opens a job. Repeating it for the same job changes nothing. Answered by [`ToHost::Progress`].
     Begin {
-        /// The host's number for the job, never 0 and never used for another job.
+        /// The host's number for the job: not 0, and never used for another job.
         job: u32,
-        /// What its data are.
+        /// The kind of its data.
         kind: JobKind,
-        /// How many bytes of data it has.
+        /// Its number of data bytes.
         length: u32,
     },
-    /// A piece of a job's data. Bytes that were accepted before are passed over; a piece that begins beyond
-    /// the accepted position is dropped whole. Answered by [`ToHost::Progress`], not necessarily one by one.
+    /// A piece of a job's data. Bytes that were accepted before are skipped. A piece that begins beyond the accepted
+    /// position is dropped. Answered by [`ToHost::Progress`], not necessarily one by one.
     Data {
         /// The job.
         job: u32,
-        /// Place of the first byte in the job's data.
+        /// Offset of the first byte in the job's data.
         offset: u32,
         /// At most [`DATA_MAX`] bytes.
         #[serde(borrow)]
@@ -59,32 +56,32 @@ pub enum ToBridge<'a> {
         /// The job.
         job: u32,
     },
-    /// Asks for something; answered by [`ToHost::Lines`] or [`ToHost::Answer`] with the same number.
+    /// Asks a question. Answered by [`ToHost::Lines`] or [`ToHost::Answer`] with the same number.
     Ask {
-        /// Returned with the answer.
+        /// Number of the question, returned with the answer.
         request: u16,
-        /// What is asked for.
+        /// The question.
         what: Ask,
     },
     /// Sets how the port is driven, from the next byte on.
     Configure(PortSettings),
-    /// Resets the printer with a pulse on nInit. Refused while a job is open; a job that was open when the bridge
-    /// itself was reset, and whose data have not been sent again, is given up as [`JobState::Lost`].
+    /// Resets the printer with a pulse on nInit. Refused while a job is open. A job that was open when the bridge itself was
+    /// reset, and whose data have not been sent again, is given up as [`JobState::Lost`].
     Initialise,
-    /// Restarts the bridge in its boot loader, to be flashed. Refused while a job is open.
+    /// Restarts the bridge in its boot loader, for flashing. Refused while a job is open.
     Bootloader,
-    /// Sets the port's outputs by hand, for the wiring test; [`Ask::Lines`] reads the inputs. The next job
-    /// begins from the idle levels again. Refused while a job is open.
+    /// Sets the port's outputs by hand, for the wiring test; [`Ask::Lines`] reads the inputs. The next job starts from the
+    /// idle levels again. Refused while a job is open.
     Drive {
         /// Levels of Data1..Data8, Data1 in bit 0.
         data: u8,
         /// Levels of nStrobe, nAutoFd, nInit, nSelectIn in bits 0..3.
         control: u8,
     },
-    /// As [`ToBridge::Drive`], and reads the inputs when they have settled. Answered by [`ToHost::Lines`] with the same
+    /// Like [`ToBridge::Drive`], and reads the inputs once they have settled. Answered by [`ToHost::Lines`] with the same
     /// number, or by [`Answer::NotNow`] while a job is open.
     Probe {
-        /// Returned with the answer.
+        /// Number of the question, returned with the answer.
         request: u16,
         /// Levels of Data1..Data8, Data1 in bit 0.
         data: u8,
@@ -93,26 +90,26 @@ pub enum ToBridge<'a> {
     },
     /// Asks for a piece of the firmware's log. Answered by [`ToHost::LogPart`] with the same number, at any time.
     ReadLog {
-        /// Returned with the answer.
+        /// Number of the question, returned with the answer.
         request: u16,
-        /// From which byte on, counted since the log began. 0 gives the oldest there is.
+        /// The first byte wanted, counted since the log began. 0 gives the oldest bytes kept.
         from: u32,
     },
 }
 
-/// What the data of a job are.
+/// The kind of a job's data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum JobKind {
-    /// The printer's language, made elsewhere; passed through.
+    /// The printer's language, made elsewhere and passed through.
     Raw,
-    /// A job header and one pass stream per ink; the bridge makes the printer's language of them.
+    /// A job header and one pass stream per pass, which the bridge turns into the printer's language.
     Streams,
 }
 
-/// What can be asked for.
+/// The questions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Ask {
-    /// The port's status lines as they are.
+    /// The current levels of the port's status lines.
     Lines,
     /// The printer's own status answer of 38 bytes. Not while a job is open: the question would be row data.
     Printer,
@@ -127,17 +124,16 @@ pub struct PortSettings {
     pub setup_ns: u16,
     /// nStrobe low, in ns.
     pub strobe_ns: u16,
-    /// Data kept after nStrobe rises, in ns.
+    /// Data held after nStrobe rises, in ns.
     pub hold_ns: u16,
-    /// From nStrobe falling until Busy is believed, in ns.
+    /// Time after nStrobe falls before Busy is read, in ns.
     pub settle_ns: u16,
     /// Which of the printer's signals ends a byte.
     pub handshake: Handshake,
-    /// How long the printer may be busy without reporting an error before the host is told, in seconds. The
-    /// byte is kept and goes out when Busy falls, however late.
+    /// How long the printer may be busy without reporting an error before the host is told, in seconds. The byte is kept
+    /// and goes out when Busy falls, however late.
     pub patience_s: u16,
-    /// The status lines that are wired and mean what they should, as in [`Lines`]; the others are taken for
-    /// idle.
+    /// The status lines that are wired and reliable, as in [`Lines`]. The others are read as idle.
     pub heed: Lines,
 }
 
@@ -148,14 +144,14 @@ pub enum Handshake {
     Busy,
     /// nAck has pulsed and Busy is low again.
     BusyAck,
-    /// nAck has pulsed; Busy is not wired or not to be trusted.
+    /// nAck has pulsed; Busy is not wired or not reliable.
     Ack,
 }
 
 /// From the bridge to the workstation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum ToHost<'a> {
-    /// The bridge is there.
+    /// The bridge's answer to [`ToBridge::Hello`].
     Hello {
         /// [`VERSION`] of the bridge.
         version: u8,
@@ -163,13 +159,13 @@ pub enum ToHost<'a> {
         schema: u32,
         /// Differs after every restart of the bridge.
         boot: u32,
-        /// The board's own number, to tell two bridges apart.
+        /// The board's serial number, to tell two bridges apart.
         serial: u64,
-        /// Version of the firmware, for people.
+        /// Version of the firmware, for display.
         firmware: &'a str,
     },
-    /// How far the job is. Sent after everything that could change it, now and then while printing, and when
-    /// the host repeats itself.
+    /// How far the job is. Sent after everything that could change it, at intervals while printing, and when the host
+    /// repeats a message.
     Progress(Progress),
     /// The port's status lines.
     Lines {
@@ -177,48 +173,48 @@ pub enum ToHost<'a> {
         request: u16,
         /// The levels.
         lines: Lines,
-        /// What they mean.
+        /// The fault they show, if any.
         fault: Option<Fault>,
     },
-    /// The answer to a question that went to the printer.
+    /// The answer to a question to the printer.
     Answer {
         /// The number of the question.
         request: u16,
-        /// What came of it.
+        /// The answer.
         #[serde(borrow)]
         answer: Answer<'a>,
     },
-    /// A message that could not be followed. A damaged frame is not refused but ignored.
+    /// The bridge did not act on a message. Damaged frames are ignored, not refused.
     Refused {
         /// Why.
         reason: Refusal,
         /// The job the message named, or 0.
         job: u32,
     },
-    /// A piece of the firmware's log without its place. No bridge sends it any more: [`ToHost::LogPart`].
+    /// A piece of the firmware's log without its offset. Bridges send [`ToHost::LogPart`] instead.
     Log(&'a [u8]),
     /// A piece of the firmware's log, encoded by defmt.
     LogPart {
         /// The number of the question.
         request: u16,
-        /// Where the piece begins. Beyond what was asked for if that is gone: the log keeps the last bytes only.
+        /// Offset of the first byte. Beyond the byte asked for if that is gone: the log keeps only the last bytes.
         at: u32,
-        /// Bytes logged so far: the piece is the last one if it ends there.
+        /// Bytes logged so far: the last piece ends there.
         end: u32,
         /// The bytes, at most [`DATA_MAX`].
         bytes: &'a [u8],
     },
 }
 
-/// How far a job is. All positions count from the job's beginning and never go back, except that `accepted`
-/// starts again from 0 when the bridge itself has restarted in the middle of a job.
+/// How far a job is. All positions count from the beginning of the job and never go back, except that `accepted` starts
+/// again from 0 if the bridge itself has restarted in the middle of a job.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Progress {
     /// The job, or 0 if there was none since the bridge started.
     pub job: u32,
-    /// Where it stands.
+    /// Its state.
     pub state: JobState,
-    /// Data taken: the next piece should begin here.
+    /// Data bytes accepted: the next piece should begin here.
     pub accepted: u32,
     /// The bridge has memory for data up to here; never less than `accepted`.
     pub limit: u32,
@@ -230,26 +226,26 @@ pub struct Progress {
     pub row: u16,
 }
 
-/// Where a job stands.
+/// The state of a job.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum JobState {
     /// There is no job.
     None,
-    /// Data are awaited or on their way to the printer.
+    /// The bridge waits for data or sends them to the printer.
     Printing,
-    /// The printer does not take bytes; the job goes on when the fault is gone.
+    /// The printer does not take bytes. The job continues when the fault is gone.
     Stopped(Fault),
-    /// Being brought to an end early.
+    /// The job is being ended early.
     Cancelling,
     /// Every byte has crossed the port.
     Done,
-    /// Ended early; the printer is ready for the next job.
+    /// The job was ended early, and the printer is ready for the next one.
     Cancelled,
-    /// The data made no sense; ended as if cancelled.
+    /// The data were invalid. The job was ended as if cancelled.
     Broken(Defect),
-    /// Given up in the middle, nothing more was sent: the printer was switched off, or the bridge was reset and
-    /// nobody had the data any more. The sheet is lost.
+    /// The job was given up in the middle: the printer was switched off, or the bridge was reset and the data were gone.
+    /// Nothing more was sent, and the sheet is lost.
     Lost,
 }
 
@@ -263,7 +259,7 @@ pub enum Fault {
     OffLine,
     /// nFault is low, with paper and on line.
     Error,
-    /// The +5 V of the port are absent.
+    /// The port's +5 V are missing.
     PowerOff,
     /// Busy for longer than [`PortSettings::patience_s`], with no error line set.
     BusyTooLong,
@@ -277,7 +273,7 @@ pub enum Fault {
 pub struct Defect {
     /// Offset in the job's data of the byte where it was noticed.
     pub at: u32,
-    /// What it is.
+    /// Its kind.
     pub what: DefectKind,
 }
 
@@ -285,9 +281,9 @@ pub struct Defect {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DefectKind {
-    /// Not a job header this bridge knows.
+    /// Not a job header that this bridge knows.
     Header,
-    /// The header asks for something the printer must not be sent.
+    /// The header asks for something that must not be sent to the printer.
     Forbidden,
     /// The page needs more memory than the bridge has.
     TooLarge,
@@ -299,7 +295,7 @@ pub enum DefectKind {
     Truncated,
 }
 
-/// An answer that came, or did not come, from the printer.
+/// The answer to a question to the printer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Answer<'a> {
     /// What the printer sent.
@@ -310,16 +306,16 @@ pub enum Answer<'a> {
     OneWay,
     /// The printer negotiated but did not answer in time.
     Silent,
-    /// The printer does not take bytes at the moment, so the question could not be put.
+    /// The printer does not take bytes at the moment, so it could not be asked.
     Stopped(Fault),
 }
 
-/// Why a message was not followed.
+/// Why the bridge did not act on a message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum Refusal {
     /// Not a message of this version.
     Unknown,
-    /// Another job is open; its number is that of the last progress.
+    /// Another job is open; the last progress has its number.
     JobOpen,
     /// No such job.
     NoSuchJob,
@@ -329,7 +325,7 @@ pub enum Refusal {
     Empty,
     /// Data beyond the limit the bridge gave.
     BeyondLimit,
-    /// Settings the port cannot work with.
+    /// Settings that the port cannot use.
     Settings,
 }
 
@@ -358,17 +354,17 @@ impl Lines {
     /// A printer that is switched on, on line and waiting for data.
     pub const IDLE: Lines = Lines(Self::ACK | Self::SELECT | Self::FAULT | Self::POWER);
 
-    /// Whether all of these are high.
+    /// Whether all of `lines` are high.
     pub fn high(self, lines: u8) -> bool {
         self.0 & lines == lines
     }
 
-    /// These lines where they are to be heeded, and idle elsewhere.
+    /// These levels on the lines in `heed`, and idle levels on the others.
     pub fn heeding(self, heed: Lines) -> Lines {
         Lines((self.0 & heed.0) | (Lines::IDLE.0 & !heed.0))
     }
 
-    /// What the operator has to see to, by the lines alone. Busy is no fault.
+    /// The fault that the lines show, if any. Busy is no fault.
     pub fn fault(self) -> Option<Fault> {
         if !self.high(Self::POWER) {
             Some(Fault::PowerOff)

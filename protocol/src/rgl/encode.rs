@@ -1,4 +1,6 @@
 //! One command as bytes.
+//!
+//! The bytes of each command: `docs/rgl.md`, sections "Setup", "Passes", "Rows" and "End of a job".
 
 use super::command::{Command, Compression};
 use super::fault::Fault;
@@ -8,13 +10,13 @@ pub(super) const SUB: u8 = 0x1a;
 pub(super) const FF: u8 = 0x0c;
 /// The flag of the last pass's ink-select.
 pub(super) const LAST: u8 = 0x80;
-/// The largest adjustment of the print head's drive, either way.
+/// The largest adjustment of the print head's drive, in either direction.
 pub(super) const MOST_DRIVE: u8 = 50;
 
 /// Writes a command to the start of `out` and returns its length.
 ///
-/// Errors: [`Fault::NoRoom`]; what [`parse`](super::parse::parse) would not take back: [`Fault::Adjustment`],
-/// [`Fault::ZeroShift`], [`Fault::ZeroSkip`], [`Fault::EmptyRow`]; [`Fault::BeyondWidth`] for a row of more than 65535
+/// Errors: [`Fault::NoRoom`]; for what [`parse`](super::parse::parse) would refuse, [`Fault::Adjustment`],
+/// [`Fault::ZeroShift`], [`Fault::ZeroSkip`] and [`Fault::EmptyRow`]; [`Fault::BeyondWidth`] for a row of more than 65535
 /// bytes.
 pub fn encode_into(command: &Command<'_>, out: &mut [u8]) -> Result<usize, Fault> {
     let value = |letters: [u8; 2], value: u16, end: u8| {
@@ -25,7 +27,7 @@ pub fn encode_into(command: &Command<'_>, out: &mut [u8]) -> Result<usize, Fault
     match *command {
         Command::Reset => put(out, &[ESC, b'e'], &[]),
         Command::SelectRgl => put(out, &[ESC, b'%', 0x80, b'A'], &[]),
-        // The driver sends one byte too many here; every stream the hardware has printed from it has the byte.
+        // The driver sends one byte too many here, and so does every stream the hardware has printed.
         Command::Resolution(r) => put(out, &[ESC, b'*', b't', r.code(), b'R', 0], &[]),
         Command::Media(media) => put(out, &value(*b"&l", u16::from_le_bytes(media.code()), b'M'), &[]),
         Command::Paper(paper) => put(out, &value(*b"&l", paper.code().into(), b'A'), &[]),
@@ -37,13 +39,15 @@ pub fn encode_into(command: &Command<'_>, out: &mut [u8]) -> Result<usize, Fault
         Command::Skip(0) => Err(Fault::ZeroSkip),
         Command::LineFeed(by) => put(out, &adjust(by as u8, b'L'), &[]),
         Command::HeadDrive(by) => put(out, &adjust(by as u8, b'V'), &[]),
-        Command::Cassettes(list) => {
-            let mut barcodes = [0; super::command::MAX_CASSETTES];
+        Command::Cartridges(list) => {
+            let mut barcodes = [0; super::command::MAX_CARTRIDGES];
             for (place, ink) in barcodes.iter_mut().zip(list.inks()) {
                 *place = ink.barcode();
             }
             let count = list.inks().len();
-            put(out, &value(*b"&l", count as u16, b'C'), &barcodes[..count])
+            #[expect(clippy::cast_possible_truncation, reason = "at most seven")]
+            let number = count as u16;
+            put(out, &value(*b"&l", number, b'C'), &barcodes[..count])
         }
         Command::ShiftX(dots) => put(out, &value(*b"&a", dots, b'L'), &[]),
         Command::ShiftY(rows) => put(out, &value(*b"&l", rows, b'E'), &[]),

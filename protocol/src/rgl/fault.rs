@@ -1,6 +1,8 @@
-//! What can be wrong with a stream or with a job that was asked for.
+//! What can be wrong with a stream or with a requested job.
+//!
+//! What the strict reader refuses: `docs/rgl.md`, section "What is never sent".
 
-/// A fault. The numbers are part of what tools and the link report: append only, never renumber.
+/// A fault. Tools and the link report the numbers: append only, never renumber.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 #[repr(u8)]
 #[non_exhaustive]
@@ -23,15 +25,15 @@ pub enum Fault {
     CurlCode = 8,
     /// The compression code is neither 00 nor 02.
     CompressionCode = 9,
-    /// An ink code without a sure value.
+    /// An unknown ink code, or one whose meaning is uncertain.
     InkCode = 10,
     /// The last-pass flag is neither 00 nor 80.
     LastPassFlag = 11,
-    /// A cassette list of none or more than seven.
-    CassetteCount = 12,
-    /// A barcode of no known ink.
+    /// A cartridge list with no entry or more than seven.
+    CartridgeCount = 12,
+    /// A barcode that belongs to no known ink.
     Barcode = 13,
-    /// An adjustment of 0 or out of its range.
+    /// An adjustment of 0 or out of range.
     Adjustment = 14,
     /// A shift of 0.
     ZeroShift = 15,
@@ -40,7 +42,7 @@ pub enum Fault {
 
     /// A command outside its place in the job.
     OutOfOrder = 32,
-    /// A setup command for the second time.
+    /// A setup command is repeated.
     Repeated = 33,
     /// A setup without resolution.
     MissingResolution = 34,
@@ -56,23 +58,23 @@ pub enum Fault {
     MissingCurl = 39,
     /// A setup without transfer mode.
     MissingMode = 40,
-    /// multiPlane without a cassette list.
-    MissingCassettes = 41,
-    /// A cassette list in a mode that has none.
-    UnexpectedCassettes = 42,
-    /// A page of no dots, or beyond what the machine takes.
+    /// multiPlane without a cartridge list.
+    MissingCartridges = 41,
+    /// A cartridge list in a mode that has none.
+    UnexpectedCartridges = 42,
+    /// A page without dots, or larger than the printer takes.
     PageSize = 43,
-    /// Raster data end, or a row comes, before any pass.
+    /// The raster data end, or a row comes, before any pass.
     NoPass = 44,
-    /// A pass selects an ink that is not in the cassette list.
+    /// A pass selects an ink that is not in the cartridge list.
     InkNotInList = 45,
-    /// Another pass without a back-feed before it.
+    /// Another pass begins without a back-feed.
     MissingBackFeed = 46,
     /// A back-feed after the last pass.
     BackFeedAfterLast = 47,
-    /// A back-feed with no pass after it.
+    /// No pass follows a back-feed.
     BackFeedWithoutPass = 48,
-    /// Raster data end in a pass that was not announced as the last.
+    /// The raster data end in a pass that was not announced as the last.
     NotLastPass = 49,
     /// Another pass after the one announced as the last.
     PassAfterLast = 50,
@@ -85,13 +87,13 @@ pub enum Fault {
 
     /// A row before the pass has said how rows are packed.
     NoCompression = 64,
-    /// A compression command with no row after it.
+    /// No row follows a compression command.
     CompressionWithoutRow = 65,
     /// A skip of 0 rows.
     ZeroSkip = 66,
-    /// Two skips, or a skip with no row after it.
+    /// Two skips, or no row after a skip.
     SkipWithoutRow = 67,
-    /// A row of no bytes.
+    /// A row without bytes.
     EmptyRow = 68,
     /// A row that ends in a blank byte.
     TrailingZero = 69,
@@ -112,8 +114,8 @@ pub enum Fault {
     NoPasses = 97,
     /// More passes than [`MAX_PASSES`](super::order::MAX_PASSES).
     TooManyPasses = 98,
-    /// More than seven different cassettes.
-    TooManyCassettes = 99,
+    /// More than seven different cartridges.
+    TooManyCartridges = 99,
     /// An ink other than cyan, magenta, yellow and black at another resolution than 600 dpi.
     SpotResolution = 100,
     /// A foil without the user's explicit consent.
@@ -129,7 +131,7 @@ impl Fault {
     }
 }
 
-/// A fault and where: `at` counts bytes from the start of the slice that was looked at.
+/// A fault and its place: `at` counts bytes from the start of the slice that was read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Refusal {
     /// What is wrong.

@@ -1,9 +1,10 @@
 //! A job to send, row by row.
 //!
-//! [`JobWriter`] takes one row after the other and gives the bytes for it; it holds no row and no page, so the same
-//! code serves a workstation and a microcontroller. What must never be sent has been refused by
-//! [`JobSetup`] before, and every command passes through [`Order`] before it is written, so an
-//! illegal job cannot come out.
+//! [`JobWriter`] takes one row after the other and writes the bytes for it. It holds no row and no page, so the same
+//! code serves a workstation and a microcontroller. [`JobSetup`] has refused what must never be sent, and every command
+//! passes through [`Order`] before it is written, so an illegal job cannot come out.
+//!
+//! The rule for each row: `docs/rgl.md`, section "Rows"; an early end: section "End of a job".
 
 use super::command::{Command, Compression, Mode, PaperCode};
 use super::encode::encode_into;
@@ -13,16 +14,16 @@ use super::parse::ROW_HEAD;
 use super::setup::JobSetup;
 use crate::packbits;
 
-/// Room that [`JobWriter::begin`], [`JobWriter::next_pass`], [`JobWriter::end`] and [`JobWriter::cancel`] need at most.
+/// The most room that [`JobWriter::begin`], [`JobWriter::next_pass`], [`JobWriter::end`] and [`JobWriter::cancel`] need.
 pub const COMMAND_ROOM: usize = 96;
 
-/// Room that [`JobWriter::row`] needs beside the row itself: three commands of six bytes.
+/// Room that [`JobWriter::row`] needs besides the row itself: three commands of six bytes.
 pub const ROW_ROOM: usize = 18;
 
 /// Writes a job: `begin`, then for each pass `next_pass` and its rows, then `end`.
 ///
-/// Every call gives the number of bytes written to the start of `out`. A call that fails has changed nothing and may
-/// be repeated; calls out of turn are [`Fault::OutOfOrder`].
+/// Every call returns the number of bytes written to the start of `out`. A call that fails has changed nothing and may
+/// be repeated. A call in the wrong order is [`Fault::OutOfOrder`].
 #[derive(Clone, Debug)]
 pub struct JobWriter {
     setup: JobSetup,
@@ -36,9 +37,9 @@ pub struct JobWriter {
 }
 
 impl JobWriter {
-    /// A writer for an image of `rows` rows, which start at the page's top or below its shift.
+    /// A writer for an image of `rows` rows, which start at the top of the page or below its shift.
     ///
-    /// Errors: [`Fault::TooManyRows`] when the page has no room for them.
+    /// Errors: [`Fault::TooManyRows`] if the page has no room for them.
     pub fn new(setup: JobSetup, rows: u16) -> Result<JobWriter, Fault> {
         let page = setup.page();
         if u32::from(rows) + u32::from(page.resolution.along(page.shift_y)) > u32::from(page.length()) {
@@ -68,8 +69,8 @@ impl JobWriter {
             put(Command::Paper(PaperCode::of(page.paper)))?;
             put(Command::Length(page.length()))?;
             put(Command::Width(page.width()))?;
-            if let Some(list) = self.setup.cassettes() {
-                put(Command::Cassettes(list))?;
+            if let Some(list) = self.setup.cartridges() {
+                put(Command::Cartridges(list))?;
             }
             if shift_x > 0 {
                 put(Command::ShiftX(shift_x))?;
@@ -87,12 +88,12 @@ impl JobWriter {
         })
     }
 
-    /// Ends the pass before, if any, and begins the next. `out` needs [`COMMAND_ROOM`]. Rows the pass before has not
-    /// been given are blank.
+    /// Ends the previous pass, if any, and begins the next. `out` needs [`COMMAND_ROOM`]. Rows that were not given to the
+    /// previous pass are blank.
     pub fn next_pass(&mut self, out: &mut [u8]) -> Result<usize, Fault> {
         let passes = self.setup.passes();
         if self.setup.mode() == Mode::BlackRaster {
-            // Its pass has begun with the raster data; this call is there so that all modes are driven alike.
+            // Its pass began with the raster data; this call exists so that all modes are driven alike.
             return if self.order.passes() == 1 && self.row == 0 { Ok(0) } else { Err(Fault::OutOfOrder) };
         }
         let next = self.order.passes();
@@ -108,8 +109,8 @@ impl JobWriter {
         Ok(length)
     }
 
-    /// The next row of the pass: 8 dots to a byte, most significant bit left, 1 = ink; blank bytes at the right may
-    /// be left out. `out` needs [`ROW_ROOM`] more bytes than the row has. Blank rows give no bytes now.
+    /// The next row of the pass: 8 dots to a byte, most significant bit left, 1 = ink. Blank bytes at the right may be
+    /// omitted. `out` needs [`ROW_ROOM`] bytes more than the row has. A blank row writes nothing yet.
     ///
     /// Errors: [`Fault::BeyondWidth`] for a dot beyond the page, [`Fault::TooManyRows`], [`Fault::NoRoom`].
     pub fn row(&mut self, row: &[u8], out: &mut [u8]) -> Result<usize, Fault> {
@@ -152,7 +153,8 @@ impl JobWriter {
         }
         let last = self.row + 1 == self.rows;
         order.accept_row(extent, last)?;
-        // The data is in place already, only its head is missing; a row of at most 1235 bytes fits 16 bits.
+        // The data are in place already, only their head is missing.
+        #[expect(clippy::cast_possible_truncation, reason = "a row that fits a page has at most 1235 bytes")]
         let [low, high] = (length as u16).to_le_bytes();
         let letter = if last { b'V' } else { b'W' };
         out[at..at + ROW_HEAD].copy_from_slice(&[super::encode::ESC, b'*', b'b', low, high, letter]);
@@ -163,7 +165,7 @@ impl JobWriter {
         Ok(at + ROW_HEAD + length)
     }
 
-    /// As many rows without a dot.
+    /// The next `count` rows are blank.
     pub fn blank_rows(&mut self, count: u16) -> Result<(), Fault> {
         if !self.order.in_pass() {
             return Err(Fault::OutOfOrder);
@@ -185,9 +187,9 @@ impl JobWriter {
         Ok(length)
     }
 
-    /// Ends the job early in a way the machine knows, so that the sheet is ejected and the next job starts clean:
-    /// when the current pass was not announced as the last, an empty pass of the same ink is, which needs no other
-    /// cassette. Gives no bytes when the job has not begun or has ended. `out` needs [`COMMAND_ROOM`].
+    /// Ends the job early in a way the printer knows, so that the sheet is ejected and the next job starts clean. If the
+    /// current pass was not announced as the last, an empty pass of the same ink follows that is; it needs no other
+    /// cartridge. Writes nothing if the job has not begun or has ended. `out` needs [`COMMAND_ROOM`].
     pub fn cancel(&mut self, out: &mut [u8]) -> Result<usize, Fault> {
         if self.order.is_idle() || self.order.is_complete() {
             return Ok(0);
@@ -208,7 +210,7 @@ impl JobWriter {
         Ok(length)
     }
 
-    /// Runs `commands` on a copy of the order and gives it back with the length, so that a failure changes nothing.
+    /// Runs `commands` on a copy of the order and returns it with the length, so that a failure changes nothing.
     fn write(
         &self,
         out: &mut [u8],
@@ -252,7 +254,7 @@ fn trim(row: &[u8]) -> &[u8] {
 mod tests {
     extern crate std;
 
-    use super::super::command::{Cassettes, Resolution};
+    use super::super::command::{Cartridges, Resolution};
     use super::super::parse::{Step, parse};
     use super::super::setup::Page;
     use super::*;
@@ -340,11 +342,11 @@ mod tests {
     }
 
     #[test]
-    fn five_cassettes_make_multi_plane_and_repeats_do_not() {
+    fn five_cartridges_make_multi_plane_and_repeats_do_not() {
         let five = [&CMYK[..], &[Ink::Finish]].concat();
         assert_eq!(a4(&five).mode(), Mode::MultiPlane);
         let bytes = stream(a4(&five), 1, &vec![vec![]; 5]).unwrap();
-        assert!(commands(&bytes).contains(&Command::Cassettes(Cassettes::new(&five).unwrap())));
+        assert!(commands(&bytes).contains(&Command::Cartridges(Cartridges::new(&five).unwrap())));
         let seven_of_four =
             [Ink::Black, Ink::Primer, Ink::Finish, Ink::Primer, Ink::White, Ink::White, Ink::White];
         assert_eq!(a4(&seven_of_four).mode(), Mode::ColourPlane);

@@ -7,16 +7,18 @@
 //! pass   = ink-select rows                  the last one says so
 //! rows   = { [compression] [skip] row }
 //! ```
-//! [`Order`] is the state machine: the writer asks it before it writes, the reader after it has parsed. It keeps a
-//! few dozen bytes and never looks at anything twice.
+//! [`Order`] is the state machine. The writer asks it before it writes, the reader after it has parsed. It keeps a few
+//! dozen bytes and reads everything once.
+//!
+//! The order and its sources: `docs/rgl.md`, sections "Order of a job" and "Setup".
 
-use super::command::{Cassettes, Command, Compression, MAX_CASSETTES, Mode, PaperCode, Resolution};
+use super::command::{Cartridges, Command, Compression, MAX_CARTRIDGES, Mode, PaperCode, Resolution};
 use super::fault::{Fault, Refusal};
 use super::parse::ROW_HEAD;
 use crate::ink::Ink;
 use crate::{packbits, paper};
 
-/// The most passes in a job. The machine's own limit is not known; seven cassettes with repeats stay far below.
+/// The most passes in a job. The printer's own limit is not known; seven cartridges with repeats stay far below.
 pub const MAX_PASSES: usize = 32;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -48,8 +50,8 @@ pub struct Declared {
     pub length: u16,
     /// Page width in dots of the job's resolution.
     pub width: u16,
-    /// Cassette list.
-    pub cassettes: Option<Cassettes>,
+    /// Cartridge list.
+    pub cartridges: Option<Cartridges>,
     /// Shift to the right in dots.
     pub shift_x: u16,
     /// Shift downwards in rows.
@@ -125,7 +127,7 @@ fn place(command: &Command<'_>) -> Option<u8> {
         Command::Width(_) => 6,
         Command::LineFeed(_) => 7,
         Command::HeadDrive(_) => 8,
-        Command::Cassettes(_) => 9,
+        Command::Cartridges(_) => 9,
         Command::ShiftX(_) => 10,
         Command::ShiftY(_) => 11,
         Command::BuiltInGloss => 12,
@@ -154,7 +156,7 @@ impl Order {
                 paper: None,
                 length: 0,
                 width: 0,
-                cassettes: None,
+                cartridges: None,
                 shift_x: 0,
                 shift_y: 0,
                 gloss: false,
@@ -272,14 +274,14 @@ impl Order {
                 }
                 self.declared.width = dots;
             }
-            Command::Cassettes(list) => self.declared.cassettes = Some(list),
+            Command::Cartridges(list) => self.declared.cartridges = Some(list),
             Command::ShiftX(dots) => self.declared.shift_x = dots,
             Command::ShiftY(rows) => self.declared.shift_y = rows,
             Command::BuiltInGloss => self.declared.gloss = true,
             Command::CurlCorrection(on) => self.declared.curl = Some(on),
-            Command::Mode(mode) => match (mode, self.declared.cassettes) {
-                (Mode::MultiPlane, None) => return Err(Fault::MissingCassettes),
-                (Mode::ColourPlane | Mode::BlackRaster, Some(_)) => return Err(Fault::UnexpectedCassettes),
+            Command::Mode(mode) => match (mode, self.declared.cartridges) {
+                (Mode::MultiPlane, None) => return Err(Fault::MissingCartridges),
+                (Mode::ColourPlane | Mode::BlackRaster, Some(_)) => return Err(Fault::UnexpectedCartridges),
                 _ => self.declared.mode = Some(mode),
             },
             _ => {}
@@ -301,12 +303,12 @@ impl Order {
         if usize::from(self.passes) == MAX_PASSES {
             return Err(Fault::TooManyPasses);
         }
-        if self.declared.cassettes.is_some_and(|list| !list.inks().contains(&ink)) {
+        if self.declared.cartridges.is_some_and(|list| !list.inks().contains(&ink)) {
             return Err(Fault::InkNotInList);
         }
         let inks = self.inks | 1 << ink as u16;
-        if inks.count_ones() as usize > MAX_CASSETTES {
-            return Err(Fault::TooManyCassettes);
+        if inks.count_ones() as usize > MAX_CARTRIDGES {
+            return Err(Fault::TooManyCartridges);
         }
         self.inks = inks;
         self.passes += 1;

@@ -1,14 +1,17 @@
 //! Bytes as commands: the exact inverse of [`encode_into`](super::encode::encode_into).
 //!
-//! [`parse`] looks at the start of a slice and gives one command, or how many bytes it has to see. It keeps no
-//! state, so a stream may arrive in any pieces: a verdict once given does not change when more bytes follow.
+//! [`parse`] reads the start of a slice and returns one command, or how many bytes it needs. It keeps no state, so a
+//! stream may arrive in any portions: more bytes never change a result once given.
+//!
+//! The bytes of each command: `docs/rgl.md`, sections "Setup", "Passes", "Rows" and "End of a job".
 
-use super::command::{Cassettes, Command, Compression, MAX_CASSETTES, Media, Mode, PaperCode, Resolution};
+use super::command::{Cartridges, Command, Compression, MAX_CARTRIDGES, Media, Mode, PaperCode, Resolution};
 use super::encode::{ESC, FF, LAST, MOST_DRIVE, SUB};
 use super::fault::{Fault, Refusal};
 use crate::ink::Ink;
+use heapless::Vec;
 
-/// What stands at the start of a slice.
+/// What is at the start of a slice.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Step<'a> {
     /// A command and its length in bytes.
@@ -19,7 +22,7 @@ pub enum Step<'a> {
 
 /// Reads the command at the start of `bytes`.
 ///
-/// Errors: the fault and its position in `bytes`; the position is 0 when it is the command itself that is unknown.
+/// Errors: the fault and its position in `bytes`. The position is 0 if the command itself is unknown.
 pub fn parse(bytes: &[u8]) -> Result<Step<'_>, Refusal> {
     let unknown = Err(Refusal::new(Fault::UnknownCommand, 0));
     match *bytes {
@@ -108,18 +111,19 @@ fn page(value: [u8; 2], letter: u8, bytes: &[u8]) -> Result<Step<'_>, Refusal> {
         b'E' => Command::ShiftY(number),
         b'C' => {
             let count = usize::from(number);
-            if count == 0 || count > MAX_CASSETTES {
-                return Err(Refusal::new(Fault::CassetteCount, 3));
+            if count == 0 || count > MAX_CARTRIDGES {
+                return Err(Refusal::new(Fault::CartridgeCount, 3));
             }
             let Some(barcodes) = bytes.get(6..6 + count) else {
                 return Ok(Step::More(6 + count));
             };
-            let mut inks = [Ink::Black; MAX_CASSETTES];
-            for (i, (ink, &barcode)) in inks.iter_mut().zip(barcodes).enumerate() {
-                *ink = Ink::from_barcode(barcode).ok_or(Refusal::new(Fault::Barcode, 6 + i))?;
+            let mut inks = Vec::<Ink, MAX_CARTRIDGES>::new();
+            for (i, &barcode) in barcodes.iter().enumerate() {
+                let ink = Ink::from_barcode(barcode).ok_or(Refusal::new(Fault::Barcode, 6 + i))?;
+                inks.push(ink).map_err(|_| Refusal::new(Fault::CartridgeCount, 3))?;
             }
-            let list = Cassettes::new(&inks[..count]).ok_or(Refusal::new(Fault::CassetteCount, 3))?;
-            return done(Command::Cassettes(list), 6 + count);
+            let list = Cartridges::new(&inks).ok_or(Refusal::new(Fault::CartridgeCount, 3))?;
+            return done(Command::Cartridges(list), 6 + count);
         }
         _ => return Err(Refusal::new(Fault::UnknownCommand, 0)),
     };
@@ -172,7 +176,7 @@ mod tests {
             Command::LineFeed((number as i8).min(-1)),
             Command::HeadDrive((number % 50) as i8 + 1),
             Command::HeadDrive(-((number % 50) as i8) - 1),
-            Command::Cassettes(Cassettes::new(&Ink::ALL[..usize::from(number % 7) + 1]).unwrap()),
+            Command::Cartridges(Cartridges::new(&Ink::ALL[..usize::from(number % 7) + 1]).unwrap()),
             Command::ShiftX(number.max(1)),
             Command::ShiftY(number.max(1)),
             Command::BuiltInGloss,
@@ -221,9 +225,9 @@ mod tests {
         assert_eq!(bytes(Command::BackFeed), [0x1b, 0x1a, 0x00, 0x00, 0x0c]);
         assert_eq!(bytes(Command::Skip(40)), [0x1b, 0x2a, 0x62, 0x28, 0x00, 0x59]);
         assert_eq!(bytes(Command::Row { last: false, data: &[7] }), [0x1b, 0x2a, 0x62, 0x01, 0x00, 0x57, 7]);
-        let list = Cassettes::new(&[Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::Finish]).unwrap();
+        let list = Cartridges::new(&[Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::Finish]).unwrap();
         assert_eq!(
-            bytes(Command::Cassettes(list)),
+            bytes(Command::Cartridges(list)),
             [0x1b, 0x26, 0x6c, 0x05, 0x00, 0x43, 0x03, 0x02, 0x01, 0x00, 0x13]
         );
     }
@@ -258,7 +262,7 @@ mod tests {
         assert_eq!(refused(&[0x1b, 0x1a, 0, 1, 0x72]), (Fault::LastPassFlag, 3));
         assert_eq!(refused(&[0x1b, 0x1a, 1, 0, 0x0c]), (Fault::Filler, 2));
         assert_eq!(refused(&[0x1b, 0x1a, 51, 0, 0x56]), (Fault::Adjustment, 2));
-        assert_eq!(refused(&[0x1b, 0x26, 0x6c, 8, 0, 0x43]), (Fault::CassetteCount, 3));
+        assert_eq!(refused(&[0x1b, 0x26, 0x6c, 8, 0, 0x43]), (Fault::CartridgeCount, 3));
         assert_eq!(refused(&[0x1b, 0x26, 0x6c, 2, 0, 0x43, 3, 99]), (Fault::Barcode, 7));
         assert_eq!(refused(&[0x1b, 0x2a, 0x62, 1, 0, 0x4d]), (Fault::CompressionCode, 3));
         assert_eq!(refused(&[0x1b, 0x2a, 0x62, 0, 0, 0x59]), (Fault::ZeroSkip, 3));

@@ -1,28 +1,31 @@
 //! What a job may be, before its first byte.
 //!
-//! [`JobSetup::new`] is where what must never be sent is refused: inks other than cyan, magenta, yellow and black at
-//! another resolution than 600 dpi, foils without consent, more than seven cassettes, a page larger than the machine
-//! takes. A value of this type is the proof.
+//! [`JobSetup::new`] refuses what must never be sent: inks other than cyan, magenta, yellow and black at a resolution
+//! other than 600 dpi, foils without consent, more than seven cartridges, a page larger than the printer takes. A value
+//! of this type is the proof.
+//!
+//! What is refused and why: `docs/rgl.md`, section "What is never sent"; the choice of mode: section "Transfer modes".
 
-use super::command::{Cassettes, MAX_CASSETTES, Media, Mode, Resolution};
+use super::command::{Cartridges, MAX_CARTRIDGES, Media, Mode, Resolution};
 use super::fault::Fault;
 use super::order::MAX_PASSES;
 use crate::ink::{Ink, Kind};
 use crate::paper::{LARGEST, Paper};
+use heapless::Vec;
 
-/// The user's explicit choice to use foil: its ink codes are inferred, no stream of the vendor's confirms them, and
-/// foil needs cyan, magenta, yellow and black beneath it.
+/// The user's explicit choice to use foil. Its ink codes are inferred, no stream of the vendor's driver confirms them,
+/// and foil needs cyan, magenta, yellow and black beneath it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FoilConsent(());
 
 impl FoilConsent {
-    /// To be called only where the user has said so.
+    /// Call this only where the user has agreed.
     pub fn given_by_the_user() -> FoilConsent {
         FoilConsent(())
     }
 }
 
-/// The sheet and how it is printed, whatever the inks.
+/// The sheet and how it is printed, independent of the inks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Page {
     /// The paper.
@@ -31,7 +34,7 @@ pub struct Page {
     pub media: Media,
     /// Dots per inch.
     pub resolution: Resolution,
-    /// Whether the machine corrects curl: on for paper, off for decal film.
+    /// Whether the printer corrects curl: on for paper, off for decal film.
     pub curl_correction: bool,
     /// Shift to the right in 1/600 inch.
     pub shift_x: u16,
@@ -64,28 +67,25 @@ impl Page {
 }
 
 /// A page and its passes, proved to be sendable.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct JobSetup {
     page: Page,
     mode: Mode,
-    cassettes: Option<Cassettes>,
-    inks: [Ink; MAX_PASSES],
-    passes: u8,
+    cartridges: Option<Cartridges>,
+    passes: Vec<Ink, MAX_PASSES, u8>,
 }
 
 impl JobSetup {
-    /// A job of these passes, first printed first. Up to four cassettes the mode is colourPlane, from five to seven
-    /// multiPlane with a list of them in the order of first use; an ink in several passes counts once.
+    /// A job of these passes, in printing order. With up to four cartridges the mode is colourPlane; with five to seven it
+    /// is multiPlane with a list of them in the order of first use. An ink in several passes counts once.
     ///
-    /// Errors: [`Fault::NoPasses`], [`Fault::TooManyPasses`], [`Fault::TooManyCassettes`], [`Fault::SpotResolution`],
+    /// Errors: [`Fault::NoPasses`], [`Fault::TooManyPasses`], [`Fault::TooManyCartridges`], [`Fault::SpotResolution`],
     /// [`Fault::FoilWithoutConsent`], [`Fault::PageSize`].
     pub fn new(page: Page, passes: &[Ink], foil: Option<FoilConsent>) -> Result<JobSetup, Fault> {
         if passes.is_empty() {
             return Err(Fault::NoPasses);
         }
-        if passes.len() > MAX_PASSES {
-            return Err(Fault::TooManyPasses);
-        }
+        let passes = Vec::from_slice(passes).map_err(|_| Fault::TooManyPasses)?;
         check_page(&page)?;
         if page.resolution != Resolution::Dpi600 && passes.iter().any(|ink| ink.kind() != Kind::Process) {
             return Err(Fault::SpotResolution);
@@ -93,21 +93,17 @@ impl JobSetup {
         if foil.is_none() && passes.iter().any(|ink| ink.kind() == Kind::Foil) {
             return Err(Fault::FoilWithoutConsent);
         }
-        let mut cassettes = [passes[0]; MAX_CASSETTES];
-        let mut count = 0;
-        for ink in passes {
-            if !cassettes[..count].contains(ink) {
-                *cassettes.get_mut(count).ok_or(Fault::TooManyCassettes)? = *ink;
-                count += 1;
+        let mut cartridges = Vec::<Ink, MAX_CARTRIDGES, u8>::new();
+        for ink in &passes {
+            if !cartridges.contains(ink) {
+                cartridges.push(*ink).map_err(|_| Fault::TooManyCartridges)?;
             }
         }
-        let (mode, cassettes) = match count {
+        let (mode, cartridges) = match cartridges.len() {
             0..=4 => (Mode::ColourPlane, None),
-            _ => (Mode::MultiPlane, Cassettes::new(&cassettes[..count])),
+            _ => (Mode::MultiPlane, Cartridges::new(&cartridges)),
         };
-        let mut inks = [passes[0]; MAX_PASSES];
-        inks[..passes.len()].copy_from_slice(passes);
-        Ok(JobSetup { page, mode, cassettes, inks, passes: passes.len() as u8 })
+        Ok(JobSetup { page, mode, cartridges, passes })
     }
 
     /// A job of one plane of black in the mode made for that.
@@ -115,8 +111,7 @@ impl JobSetup {
     /// Errors: [`Fault::PageSize`].
     pub fn black_raster(page: Page) -> Result<JobSetup, Fault> {
         check_page(&page)?;
-        let inks = [Ink::Black; MAX_PASSES];
-        Ok(JobSetup { page, mode: Mode::BlackRaster, cassettes: None, inks, passes: 1 })
+        Ok(JobSetup { page, mode: Mode::BlackRaster, cartridges: None, passes: Vec::from_iter([Ink::Black]) })
     }
 
     /// The page.
@@ -126,12 +121,12 @@ impl JobSetup {
 
     /// The inks of the passes, first printed first.
     pub fn passes(&self) -> &[Ink] {
-        &self.inks[..usize::from(self.passes)]
+        &self.passes
     }
 
-    /// The cassette list, in the mode that has one.
-    pub fn cassettes(&self) -> Option<Cassettes> {
-        self.cassettes
+    /// The cartridge list, in the mode that has one.
+    pub fn cartridges(&self) -> Option<Cartridges> {
+        self.cartridges
     }
 
     /// The transfer mode.
@@ -168,7 +163,7 @@ mod tests {
             assert!(JobSetup::new(plain, &[foil], Some(FoilConsent::given_by_the_user())).is_ok());
         }
         assert_eq!(why(plain, &[], None), Fault::NoPasses);
-        assert_eq!(why(plain, &Ink::ALL[..8], None), Fault::TooManyCassettes);
+        assert_eq!(why(plain, &Ink::ALL[..8], None), Fault::TooManyCartridges);
         assert_eq!(why(plain, &[Ink::Black; 33], None), Fault::TooManyPasses);
         let custom = |width, length| Page::plain(Paper::Custom { width, length });
         for page in

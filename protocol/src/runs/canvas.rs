@@ -1,14 +1,14 @@
 //! The tile under way: dots in the order of the walk on one side, rows of the band on the other.
 //!
-//! Problem: a microcontroller has some thirty clock cycles for every dot of the page, those without ink included, and
-//! an inked dot set on its own costs a dozen. Method: runs are filled into a line of 4096 bits, a word at a time; a
-//! complete tile is then laid out in the band. In a full tile sixteen dots that follow one another are a square of four
-//! by four, walked in one of four ways, so four look-ups turn sixteen bits of the line into four nibbles of four
-//! rows. A tile inked all over is filled row by row. Tiles of other sizes, which stand at the right and lower edge of
-//! a page only, are laid out dot by dot from a table.
+//! Problem: a microcontroller has some thirty clock cycles for every dot of the page, including those without ink, and
+//! setting a single dot costs a dozen. Method: runs are filled into a line of 4096 bits, a word at a time, and a complete
+//! tile is then laid out in the band. In a full tile, sixteen consecutive dots are a square of four by four, walked in one
+//! of four ways, so four look-ups turn sixteen bits of the line into four nibbles of four rows. A tile that is inked all
+//! over is filled row by row. Tiles of other sizes, which occur only at the right and lower edge of a page, are laid out
+//! dot by dot from a table.
 //!
-//! Cost: two operations a dot or three where there is ink, and none for words without; 8 KB for the table, 1.5 KB for the
-//! order of the squares. Limits: none beyond those of the walk.
+//! Cost: two or three operations a dot where there is ink, none for words without; 8 KB for the table, 1.5 KB for the
+//! order of the squares. Limits: those of the walk.
 
 use crate::walk::{EDGE, MOST, Orientation, Tile};
 
@@ -44,12 +44,12 @@ const fn laid() -> [[[u16; 16]; 4]; 4] {
 /// Words of the line that are laid out dot by dot before others may run: a thousand dots.
 const PORTION: usize = 32;
 
-/// What [`Canvas::lay`] has come to.
+/// The result of [`Canvas::lay`].
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Laid {
     /// There was nothing to lay out.
     Blank,
-    /// There is more: it is to be called again, nothing being inked in between.
+    /// There is more: call it again, and ink nothing in between.
     Part,
     /// The tile is laid out.
     Whole,
@@ -82,7 +82,7 @@ impl Canvas {
         Canvas { line: [0; MOST / 32], used: UNUSED, squares: [None; 3], shape: None, table: [0; MOST] }
     }
 
-    /// Forgets what has not been laid out.
+    /// Drops what has not been laid out.
     pub(super) fn clear(&mut self) {
         self.line.fill(0);
         self.used = UNUSED;
@@ -102,8 +102,8 @@ impl Canvas {
         self.used = (self.used.0.min(first), self.used.1.max(last + 1));
     }
 
-    /// Lays the tile out in rows of `stride` bytes, the first of which is that of the tile, and begins the next one; a tile
-    /// that takes long only in part. The place for it is blank.
+    /// Lays the tile out in rows of `stride` bytes, starting with its first row, and begins the next tile. A tile that takes
+    /// long is laid out only in part. Its place must be blank.
     pub(super) fn lay(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
         let (first, end) = self.used;
         if first >= end {
@@ -147,7 +147,7 @@ impl Canvas {
                 let shift = if column.is_multiple_of(2) { 4 } else { 0 };
                 let mut at = row * 4 * stride + left + column / 2;
                 for from in [12, 8, 4, 0] {
-                    rows[at] |= ((dots >> from & 15) << shift) as u8;
+                    rows[at] |= (((dots >> from & 15) << shift) & 0xff) as u8;
                     at += stride;
                 }
             }
@@ -196,7 +196,9 @@ fn squares(orientation: Orientation) -> [Square; SQUARES] {
     let mut squares = [Square { place: 0, way: 0 }; SQUARES];
     for (square, quarters) in squares.iter_mut().zip(dots.chunks_exact(4)) {
         let (x, y, end) = (quarters[0] % EDGE, quarters[0] / EDGE, quarters[3] % EDGE);
-        square.place = (y / 2 * 16 + x / 2) as u8;
+        #[expect(clippy::cast_possible_truncation, reason = "squares are counted from 0 to 15 either way")]
+        let place = (y / 2 * 16 + x / 2) as u8;
+        square.place = place;
         // It begins at the top left or the bottom right, and ends in the same column or in the same row.
         square.way = match (x % 2, x == end) {
             (0, true) => 0,

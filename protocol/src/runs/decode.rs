@@ -1,4 +1,4 @@
-//! A pass stream as bands of rows, in bounded memory and from input in any portions.
+//! Decodes a pass stream into bands of rows, in bounded memory and from input in any portions.
 
 use super::canvas::{Canvas, Laid};
 use super::rice::{ESCAPE, Mean};
@@ -8,9 +8,9 @@ use crate::walk::{Band, Tile, Walk};
 /// What is wrong with a stream.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Defect {
-    /// A band begins with a byte that is no form.
+    /// A band begins with an unknown form.
     Form,
-    /// No band, or no row, or more of them than there are.
+    /// A count of bands or rows is 0 or more than remain.
     Count,
     /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
     Row,
@@ -18,23 +18,23 @@ pub enum Defect {
     Memory,
 }
 
-/// What [`Decoder::step`] has come to.
+/// The result of [`Decoder::step`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Step {
-    /// All input is used up and the band is not complete.
+    /// All input has been read, and the band is not complete.
     More,
-    /// So many rows without a dot come next, from row `y` of the page.
+    /// The next rows of the page are blank.
     Blank {
         /// First row.
         y: u16,
-        /// How many.
+        /// Number of rows.
         rows: u16,
     },
     /// The next band is complete in the memory: rows of [`stride`] bytes each.
     Band {
         /// First row.
         y: u16,
-        /// How many.
+        /// Number of rows.
         rows: u16,
     },
     /// The page is complete; input behind it is not read.
@@ -127,13 +127,13 @@ impl Decoder {
         decoder
     }
 
-    /// Begins the stream of another pass of the same page.
+    /// Starts the stream of another pass of the same page.
     pub fn restart(&mut self) {
         self.next = 0;
         self.follow();
     }
 
-    /// Begins the stream of another page.
+    /// Starts the stream of another page.
     pub fn resize(&mut self, width: u16, height: u16) {
         self.walk = Walk::new(width, height);
         self.restart();
@@ -150,10 +150,10 @@ impl Decoder {
         self.state = if self.band.is_some() { State::Form } else { State::End };
     }
 
-    /// Reads until a band is complete, and says how many bytes of `input` it has read. `memory` needs
-    /// [`band_bytes`] bytes and must be the same, unchanged, until the band is complete.
+    /// Reads until a band is complete and returns how many bytes of `input` it has read. `memory` needs [`band_bytes`]
+    /// bytes and must stay the same, unchanged, until the band is complete.
     ///
-    /// After a defect the decoder stays where it was; only [`Decoder::restart`] and [`Decoder::resize`] help.
+    /// After a defect only [`Decoder::restart`] and [`Decoder::resize`] help.
     pub fn step(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Step), Defect> {
         let mut read = 0;
         loop {
@@ -165,8 +165,8 @@ impl Decoder {
         }
     }
 
-    /// As [`Decoder::step`], but it also stops, with `None`, behind every tile it has laid out, and several times within
-    /// those that take long: for those who have other things to do, and who call it again, with whatever input there then is.
+    /// Like [`Decoder::step`], but also stops, with `None`, after every tile it has laid out, and several times within tiles
+    /// that take long. The caller can do other things and then call it again with the rest of the input.
     pub fn slice(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Option<Step>), Defect> {
         let width = self.walk.width();
         let memory = memory.get_mut(..band_bytes(width)).ok_or(Defect::Memory)?;
@@ -267,12 +267,12 @@ impl Runs {
         }
     }
 
-    /// Reads runs until the band is full or something has been laid out; says how much was read and whether it is full.
+    /// Reads runs until the band is full or something has been laid out. Returns how much was read and whether it is full.
     fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
         let mut read = 0;
         self.laid = false;
         while self.done < place.band.len() {
-            // On a microcontroller others wait for their turn.
+            // On a microcontroller other tasks wait for their turn.
             if self.laid {
                 return (read, false);
             }
@@ -306,8 +306,8 @@ impl Runs {
         (read, self.tile.is_none())
     }
 
-    /// Reads whole codes while there is input for any code; between two codes, and says how much was read. This is where
-    /// the time goes: the bits are held a word ahead, and what was read too much is given back in the end.
+    /// Reads whole codes while there is enough input for any code, and returns how much was read. To be called between two
+    /// codes. Most of the time is spent here: the bits are read a word ahead, and the surplus is given back at the end.
     fn read_codes(&mut self, input: &[u8], place: &mut Place<'_>) -> usize {
         let mut read = 0;
         while self.done < place.band.len() && !self.laid && input.len() - read >= CODE_BYTES {
@@ -417,7 +417,7 @@ impl Runs {
 }
 
 impl Row {
-    /// Reads rows until the band is full; says how much was read and whether it is.
+    /// Reads rows until the band is full. Returns how much was read and whether it is full.
     fn read(
         &mut self,
         input: &[u8],
@@ -434,7 +434,7 @@ impl Row {
                 if !matches!(run, Run::Head) {
                     return Err(Defect::Row);
                 }
-                let spare = (stride * 8 - usize::from(width)) as u32;
+                let spare = stride * 8 - usize::from(width);
                 if u32::from(memory[row + stride - 1]) & ((1 << spare) - 1) != 0 {
                     return Err(Defect::Row);
                 }

@@ -4,9 +4,10 @@ use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
 use crate::packbits;
 use crate::walk::{Band, EDGE, MOST, Tile, Walk};
+use heapless::Vec;
 
-/// The most bytes one band can take, whatever is in it, on the widest page (9880 dots at 1200 dpi): the size of
-/// the buffer for [`encode`].
+/// The most bytes one band can take, whatever its content, on the widest page (9880 dots at 1200 dpi): the size of the
+/// buffer for [`encode`].
 pub const MAX_BAND: usize = 1 + EDGE as usize * (2 + MAX_STRIDE);
 
 const MAX_STRIDE: usize = 1235;
@@ -15,8 +16,8 @@ const MAX_STRIDE: usize = 1235;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NoRoom;
 
-/// Codes a plane of `width` by `height` dots, 8 dots to a byte, most significant bit left, 1 = ink, rows padded
-/// to whole bytes with zeros. `put` gets the stream band by band; `buffer` needs [`MAX_BAND`] bytes.
+/// Encodes a plane of `width` by `height` dots: 8 dots to a byte, most significant bit left, 1 = ink, rows padded to
+/// whole bytes with zeros. `put` receives the stream band by band. `buffer` needs [`MAX_BAND`] bytes.
 pub fn encode(
     width: u16,
     height: u16,
@@ -81,8 +82,8 @@ impl Table {
     }
 }
 
-/// Puts a tile's rows into words, first column in the highest bit; false if there is no dot in them. What lies
-/// right of the tile may be in them too.
+/// Puts a tile's rows into words, the first column in the highest bit. Returns false if there is no dot in them. Dots to
+/// the right of the tile may be in them too.
 fn gather(tile: &Tile, rows: &[u8], stride: usize, words: &mut [u64; EDGE as usize]) -> bool {
     let (byte, shift) = (usize::from(tile.x) / 8, u32::from(tile.x % 8));
     let mut any = 0;
@@ -128,7 +129,7 @@ fn for_each_run(
 }
 
 fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mut [u8]) -> Option<usize> {
-    // The first and the last run are cut by the band, so they say nothing about the clusters.
+    // The band cuts the first and the last run, so they say nothing about the clusters.
     let (mut minimum, mut last, mut count) = (u32::from(u8::MAX), 0, 0u32);
     for_each_run(band, rows, stride, table, |length| {
         if count > 1 {
@@ -139,7 +140,7 @@ fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mu
     })?;
     let [head, codes @ ..] = out else { return None };
     let [least, codes @ ..] = codes else { return None };
-    (*head, *least) = (form::RUNS, minimum as u8);
+    (*head, *least) = (form::RUNS, u8::try_from(minimum).unwrap_or(u8::MAX));
     let mut bits = Bits { out: codes, at: 0, pending: 0, held: 0 };
     let mut means = [Mean::START; 2];
     let mut index = 0;
@@ -174,13 +175,13 @@ struct Bits<'o> {
 }
 
 impl Bits<'_> {
-    /// The low `count` (at most 21) bits of `value`, which has no others.
+    /// Puts the low `count` (at most 21) bits of `value`, which has no others.
     fn put(&mut self, value: u32, count: u32) -> Option<()> {
         self.pending = self.pending << count | value;
         self.held += count;
         while self.held >= 8 {
             self.held -= 8;
-            *self.out.get_mut(self.at)? = (self.pending >> self.held) as u8;
+            *self.out.get_mut(self.at)? = (self.pending >> self.held & 0xff) as u8;
             self.at += 1;
         }
         Some(())
@@ -193,15 +194,14 @@ impl Bits<'_> {
     }
 }
 
-/// What a row is to be written as.
+/// How a row is written.
 enum Row {
     Same,
     Packed(usize),
     Plain(usize),
 }
 
-/// How the rows of a band are written, one after the other, with their packed bytes; rows alike are counted by
-/// the caller.
+/// Calls `row` for each row of a band with how it is written and its bytes. The caller counts equal rows.
 fn for_each_row(rows: &[u8], stride: usize, mut row: impl FnMut(Row, &[u8]) -> Option<()>) -> Option<()> {
     let mut packed = [0; MAX_STRIDE];
     let mut above: &[u8] = &[];
@@ -228,8 +228,8 @@ fn rows_length(rows: &[u8], stride: usize) -> usize {
         length += match row {
             Row::Same if same => 0,
             Row::Same => 2,
-            Row::Packed(bytes) => varint(2 * bytes + 1).1 + bytes,
-            Row::Plain(bytes) => varint(2 * bytes).1 + bytes,
+            Row::Packed(bytes) => varint(2 * bytes + 1).len() + bytes,
+            Row::Plain(bytes) => varint(2 * bytes).len() + bytes,
         };
         same = matches!(row, Row::Same);
         Some(())
@@ -257,17 +257,19 @@ fn put_rows(rows: &[u8], stride: usize, out: &mut [u8]) -> Option<usize> {
             Row::Plain(length) => varint(2 * length),
         };
         same = 0;
-        let end = at + head.1 + data.len();
+        let end = at + head.len() + data.len();
         let place = out.get_mut(at..end)?;
-        place[..head.1].copy_from_slice(&head.0[..head.1]);
-        place[head.1..].copy_from_slice(data);
+        place[..head.len()].copy_from_slice(&head);
+        place[head.len()..].copy_from_slice(data);
         at = end;
         Some(())
     })?;
     Some(at)
 }
 
-/// A number below 2^14 and how many bytes it takes.
-fn varint(number: usize) -> ([u8; 2], usize) {
-    if number < 0x80 { ([number as u8, 0], 1) } else { ([number as u8 | 0x80, (number >> 7) as u8], 2) }
+/// A number below 2^14 in one byte or two.
+fn varint(number: usize) -> Vec<u8, 2, u8> {
+    #[expect(clippy::cast_possible_truncation, reason = "seven bits each")]
+    let (low, high) = ((number & 0x7f) as u8, (number >> 7 & 0x7f) as u8);
+    if high == 0 { Vec::from_array([low]) } else { Vec::from_array([low | 0x80, high]) }
 }

@@ -1,4 +1,4 @@
-//! What stands before the pass streams of a job: the page, the plane's size, the inks.
+//! The header before the pass streams of a job: the page, the planes' size, the inks.
 //!
 //! ```text
 //! header = version (01) resolution media media paper width width length length curl
@@ -7,14 +7,15 @@
 //!
 //! Resolution, media, paper and ink codes are those of the printer's language; two-byte numbers are
 //! little-endian. `width` and `length` are the printable area in 1/600 inch of a custom sheet (code 0), and 0
-//! for every other. `curl` is 1 if the machine is to correct curl; `consent` is 1 if the user has agreed to
-//! foil. `columns` and `rows` are the size of the planes in dots. One stream follows for each pass.
+//! for every other. `curl` is 1 if the printer corrects curl; `consent` is 1 if the user has agreed to foil. `columns`
+//! and `rows` are the size of the planes in dots. One stream follows for each pass.
 
 use crate::ink::Ink;
 use crate::paper::Paper;
 use crate::rgl::command::PaperCode;
 use crate::rgl::order::MAX_PASSES;
 use crate::rgl::{Fault, FoilConsent, JobSetup, Media, Page, Resolution};
+use heapless::Vec;
 
 /// Bytes before the inks.
 const FIXED: usize = 20;
@@ -25,7 +26,7 @@ pub const MAX_HEADER: usize = FIXED + MAX_PASSES;
 const VERSION: u8 = 1;
 
 /// A job's page, planes and inks. Making one proves that it can be printed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Header {
     setup: JobSetup,
     consent: bool,
@@ -36,17 +37,17 @@ pub struct Header {
 /// Why bytes are no header.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum HeaderError {
-    /// Not version 1, or a code or flag that means nothing.
+    /// Not version 1, or an unknown code or flag.
     Unknown,
     /// The printer must not be sent this.
     Forbidden(Fault),
 }
 
 impl Header {
-    /// A job of planes of `columns` by `rows` dots, printed with these inks, first printed first.
+    /// A job of planes of `columns` by `rows` dots, with these inks in printing order.
     ///
-    /// Errors: those of [`JobSetup::new`]; [`Fault::BeyondWidth`] and [`Fault::TooManyRows`] when the page has no
-    /// room for the planes; [`Fault::PageSize`] for planes without a dot.
+    /// Errors: those of [`JobSetup::new`]; [`Fault::BeyondWidth`] and [`Fault::TooManyRows`] if the planes do not fit the
+    /// page; [`Fault::PageSize`] for planes without a dot.
     pub fn new(
         page: Page,
         inks: &[Ink],
@@ -110,8 +111,9 @@ impl Header {
             out[at..at + 2].copy_from_slice(&word.to_le_bytes());
         }
         let inks = self.setup.passes();
-        // At most MAX_PASSES, by JobSetup.
-        (out[18], out[19]) = (u8::from(self.consent), inks.len() as u8);
+        #[expect(clippy::cast_possible_truncation, reason = "at most MAX_PASSES, by JobSetup")]
+        let passes = inks.len() as u8;
+        (out[18], out[19]) = (u8::from(self.consent), passes);
         for (place, ink) in out[FIXED..].iter_mut().zip(inks) {
             *place = ink.code();
         }
@@ -143,19 +145,20 @@ impl Header {
         };
         let (curl_correction, consent) = (flag(9)?, flag(18)?);
         let count = usize::from(fixed[19]);
+        let too_many = HeaderError::Forbidden(Fault::TooManyPasses);
         if count > MAX_PASSES {
-            return Err(HeaderError::Forbidden(Fault::TooManyPasses));
+            return Err(too_many);
         }
         let Some(codes) = rest.get(..count) else {
             return Ok(None);
         };
-        let mut inks = [Ink::Black; MAX_PASSES];
-        for (ink, &code) in inks.iter_mut().zip(codes) {
-            *ink = Ink::from_code(code).ok_or(HeaderError::Unknown)?;
+        let mut inks = Vec::<Ink, MAX_PASSES>::new();
+        for &code in codes {
+            inks.push(Ink::from_code(code).ok_or(HeaderError::Unknown)?).map_err(|_| too_many)?;
         }
         let page = Page { paper, media, resolution, curl_correction, shift_x: word(10), shift_y: word(12) };
         let consent = consent.then(FoilConsent::given_by_the_user);
-        let header = Header::new(page, &inks[..count], consent, word(14), word(16));
+        let header = Header::new(page, &inks, consent, word(14), word(16));
         header.map(|header| Some((header, FIXED + count))).map_err(HeaderError::Forbidden)
     }
 }

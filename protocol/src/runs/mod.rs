@@ -1,20 +1,19 @@
 //! Pass streams: one pass as on/off runs along the band walk.
 //!
-//! Problem: a halftoned plane is as good as noise to a raster coder, because its clusters follow the walk and
-//! not the rows; sent as packed rows, eight planes of an A4 page are some 25 MB. Along the walk the same plane
-//! is runs that are never shorter than the minimum cluster.
+//! Problem: to a raster coder a halftoned plane looks like noise, because its clusters follow the walk and not the rows.
+//! Sent as packed rows, eight planes of an A4 page are some 25 MB. Along the walk the same plane is a sequence of runs
+//! that are never shorter than the minimum cluster.
 //!
-//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in whichever of three forms is the
-//! shortest: nothing (blank bands), runs with adaptive Rice codes, or rows packed as the printer packs them. The
-//! last keeps type, line art and solids from ever costing more than they do in the printer's own language.
-//! The decoder holds one band (38 KB for 4800 dots), one tile's table (8 KB) and some counters, takes its input
-//! in any portions, and never looks back.
+//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in the shortest of three forms: nothing (blank
+//! bands), runs with adaptive Rice codes, or rows packed as the printer packs them. The last ensures that type, line art
+//! and solids never cost more than in the printer's own language. The decoder holds one band (38 KB for 4800 dots), one
+//! tile's table (8 KB) and some counters, and takes its input in any portions.
 //!
 //! Cost: encoding and decoding walk each inked dot once; blank dots are skipped by the run. On eight clustered
 //! planes of a full page the streams are a sixth to a seventh of the packed rows
-//! (`docs/decisions/pass-streams.md` has the figures, and the codecs that were not taken).
+//! (`docs/decisions/pass-streams.md` has the figures, and the codecs that were rejected).
 //!
-//! Limits: a band is rebuilt from its own bytes alone, so what is alike from band to band is paid for again.
+//! Limits: a band is rebuilt from its own bytes alone, so what repeats from band to band is coded again.
 //!
 //! # Format
 //!
@@ -50,12 +49,12 @@ pub use decode::{Decoder, Defect, Step};
 pub use encode::{MAX_BAND, NoRoom, encode};
 pub use header::{Header, HeaderError, MAX_HEADER};
 
-/// Bytes of a row of so many dots.
+/// Bytes of a row of `width` dots.
 pub fn stride(width: u16) -> usize {
     usize::from(width).div_ceil(8)
 }
 
-/// Bytes of memory for one band of so many dots across: what [`Decoder::step`] is given.
+/// Bytes of memory for one band of `width` dots across, as [`Decoder::step`] needs it.
 pub fn band_bytes(width: u16) -> usize {
     stride(width) * usize::from(crate::walk::EDGE)
 }

@@ -20,8 +20,8 @@ impl Mean {
         self.parameter
     }
 
-    /// Takes note of a value that was coded with the present parameter. A single long gap must not make the following
-    /// short ones dear, so it counts only eightfold.
+    /// Adds a value that was coded with the present parameter. A single long gap must not make the short ones after it
+    /// expensive, so it counts at most eightfold.
     pub(super) fn add(&mut self, value: u32) {
         self.sum += value.min(8 << self.parameter).min(1 << 20);
         self.count += 1;

@@ -1,4 +1,9 @@
 //! What tests of several crates share.
+//!
+//! [`needs`] leaves a test out where this computer lacks something, and sees to it that nobody overlooks that; [`program`] runs
+//! the program in a folder of its own; [`damage`] spoils good files for the tests of readers.
 #![forbid(unsafe_code)]
 
 pub mod damage;
+pub mod needs;
+pub mod program;

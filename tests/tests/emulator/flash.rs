@@ -231,7 +231,7 @@ impl Bench {
     fn new() -> Option<Bench> {
         let (image, program) = super::parts()?;
         let Some(usbfs) = std::env::var_os("FOILPRESS_USBFS") else {
-            println!("skipped: there is no umockdev");
+            testing::needs::Need::Usb.skip("`cargo xtask emulator` found no umockdev");
             return None;
         };
         let folder = tempfile::tempdir().unwrap();
@@ -338,7 +338,7 @@ fn a_damaged_image_is_refused_before_the_board_is_touched() {
     let mut flipped = file.clone();
     flipped[50 * 512 + 40] ^= 1;
     for (bytes, word) in
-        [(&file[..file.len() - 512], "copied to its end"), (&flipped[..], "block 50 is damaged")]
+        [(&file[..file.len() - 512], "copied completely"), (&flipped[..], "block 50 is damaged")]
     {
         fs::write(&damaged, bytes).unwrap();
         let said = bench.flash(&damaged).unwrap_err();

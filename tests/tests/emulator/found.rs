@@ -17,7 +17,7 @@ fn descriptors(vendor: u16, product: u16) -> Vec<u8> {
 fn with(devices: &[(u16, u16, &str, &str)], args: &[&str]) -> Option<Output> {
     let (_, program) = super::parts()?;
     let Some(usbfs) = std::env::var_os("FOILPRESS_USBFS") else {
-        println!("skipped: there is no umockdev");
+        testing::needs::Need::Usb.skip("`cargo xtask emulator` found no umockdev");
         return None;
     };
     let folder = tempfile::tempdir().unwrap();

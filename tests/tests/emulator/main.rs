@@ -22,6 +22,7 @@ use press::simulate::{Carousel, Cassette, Lever, Printer, Stock, Trouble, differ
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
+use testing::needs::Need;
 
 /// Nothing here takes longer, unless it never ends.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -30,7 +31,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 fn parts() -> Option<(PathBuf, PathBuf)> {
     let parts = std::env::var_os("FOILPRESS_IMAGE").zip(std::env::var_os("FOILPRESS_PROGRAM"));
     if parts.is_none() {
-        println!("skipped: `cargo xtask emulator` builds what this needs, and runs it");
+        Need::Emulator.skip("`cargo xtask emulator` builds it and runs this test");
     }
     parts.map(|(image, program)| (image.into(), program.into()))
 }
@@ -61,7 +62,7 @@ impl Bench {
         let mut bench = Bench::new(cassettes)?;
         bench.usbfs = std::env::var_os("FOILPRESS_USBFS").map(PathBuf::from);
         if bench.usbfs.is_none() {
-            println!("skipped: `cargo xtask emulator` found no umockdev, and USB is shown with it");
+            Need::Usb.skip("`cargo xtask emulator` found no umockdev");
             return None;
         }
         Some(bench)

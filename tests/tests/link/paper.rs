@@ -8,8 +8,10 @@ use appearance::{factor, gamut};
 use device::send::session::Outcome;
 use device::send::streams;
 use observe::Silent;
+use press::job::Handling;
 use press::layout::Layout;
-use press::pipeline;
+use press::pipeline::document::{Settings, halftoned};
+use press::pipeline::{self, Request};
 use press::simulate::{Carousel, Lever, Printer, Stock, Trouble, difference, wanted};
 use protocol::link::message::{Fault, JobKind};
 use protocol::paper::Paper;
@@ -20,26 +22,33 @@ use std::cell::RefCell;
 #[test]
 fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
     let document = document::open("sample:leaf", &Options::default(), &Silent).unwrap();
-    let settings = pipeline::Settings {
+    let settings = Settings {
         factor: factor::Settings::default(),
         gamut: gamut::Settings::default(),
         inks: inks::InkSet::default(),
-        layout: Layout::centred(Paper::Postcard),
-        media: Media::default(),
-        curl_correction: true,
         size: Some("12x9mm".parse().unwrap()),
     };
-    let print = pipeline::print(&document, &inks::Library::builtin(), &settings, &Silent).unwrap();
-    let streams = streams::of_job(&print.job, &Silent).expect("a job of our own has streams");
+    let (layout, library) = (Layout::centred(Paper::Postcard), inks::Library::builtin());
+    let halftoned = halftoned(&document, &library, &settings, &layout, &Silent).unwrap();
+    let request = Request {
+        name: &document.name,
+        dots: &halftoned.dots,
+        layout: &layout,
+        handling: Handling { media: Media::default(), curl_correction: true },
+        allowed: settings.inks,
+        library: &library,
+    };
+    let print = pipeline::job(&request, &Silent).unwrap();
+    let streams = streams::of_job(&print.bytes, &Silent).expect("a job of our own has streams");
     for seed in 0..4 {
         let mut random = seeded(seed);
         let (kind, data) =
-            if seed % 2 == 0 { (JobKind::Streams, &streams) } else { (JobKind::Raw, &print.job) };
-        let cassettes = wanted(&print.job);
+            if seed % 2 == 0 { (JobKind::Streams, &streams) } else { (JobKind::Raw, &print.bytes) };
+        let cassettes = wanted(&print.bytes);
         let printer = RefCell::new(Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto));
         printer.borrow_mut().load(Stock::of(Paper::Postcard));
         let troubles = RefCell::new(0);
-        let job = Job { id: 77, kind, data: data.clone(), expected: print.job.clone() };
+        let job = Job { id: 77, kind, data: data.clone(), expected: print.bytes.clone() };
         let mut boards = wire::boards(&mut random);
         let mut world =
             World::new(&job, &mut boards, ALL, EVERYTHING).with_port(Box::new(|bytes, random| {
@@ -63,7 +72,7 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
                 (printer.feed(&bytes[..count]).unwrap(), None)
             }));
         assert_eq!(world.run(None, &mut random), Outcome::Printed, "seed {seed}");
-        assert!(world.printed == print.job, "seed {seed}");
+        assert!(world.printed == print.bytes, "seed {seed}");
         println!(
             "seed {seed}: {} bytes of {kind:?}, {:?}, {} troubles",
             data.len(),
@@ -72,7 +81,7 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         );
         drop(world);
         let printout = printer.borrow_mut().take_printout().expect("the sheet has come out");
-        let sheet = printout.sheet_with(print.sheet.stacks()).unwrap();
-        assert_eq!(difference(&sheet, &print.printed), None, "seed {seed}");
+        let sheet = printout.sheet_with(print.draft.sheet.stacks()).unwrap();
+        assert_eq!(difference(&sheet, &print.draft.sheet), None, "seed {seed}");
     }
 }

@@ -109,10 +109,7 @@ fn near(found: [usize; 4], expected: [usize; 4]) -> bool {
 
 macro_rules! server {
     () => {
-        match server::missing() {
-            None => Server::start(),
-            Some(why) => return println!("{why}"),
-        }
+        if server::available() { Server::start() } else { return }
     };
 }
 

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use testing::needs::Need;
 
 /// Longer than anything here takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(240);
@@ -20,23 +21,8 @@ pub struct Server {
     cupsd: Option<Child>,
 }
 
-/// The program, built by this very cargo.
-fn program() -> PathBuf {
-    let folder = std::env::current_exe().unwrap();
-    let folder = folder.parent().unwrap().parent().unwrap();
-    let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
-    let mut build = Command::new(cargo);
-    build.args(["build", "--quiet", "--locked", "--package", "foilpress", "--bin", "foilpress"]);
-    if folder.ends_with("release") {
-        build.arg("--release");
-    }
-    build.arg("--target-dir").arg(folder.parent().unwrap());
-    assert!(build.status().unwrap().success());
-    folder.join("foilpress")
-}
-
-/// Why no server can be started here, if so. Where everything is to be tested that is a failure.
-pub fn missing() -> Option<String> {
+/// Whether a server can be started here; else the test is left out.
+pub fn available() -> bool {
     let needed = [
         "/usr/sbin/cupsd",
         "/usr/bin/lp",
@@ -48,16 +34,15 @@ pub fn missing() -> Option<String> {
     let absent: Vec<&str> = needed.into_iter().filter(|path| !Path::new(path).exists()).collect();
     // The server gives its programs other rights, which only root can.
     let root = fs::metadata("/proc/self").is_ok_and(|data| std::os::unix::fs::MetadataExt::uid(&data) == 0);
-    let why = match (absent.as_slice(), root) {
-        ([], true) => return None,
-        ([], false) => "skipped: only root can start a print server".to_owned(),
+    match (absent.as_slice(), root) {
+        ([], true) => return true,
+        ([], false) => Need::Queue.skip("only root can start a print server"),
         (absent, _) => {
-            format!("skipped: {} not here; `cargo xtask queue` installs what is needed", absent.join(", "))
+            Need::Queue
+                .skip(&format!("{} not installed; `cargo xtask queue` installs them", absent.join(", ")));
         }
-    };
-    let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
-    assert!(!required, "{why}, but everything is to be tested");
-    Some(why)
+    }
+    false
 }
 
 impl Server {
@@ -95,7 +80,7 @@ impl Server {
             }
         }
         let program = self.path("bin/foilpress");
-        fs::copy(self::program(), &program).unwrap();
+        fs::copy(testing::program::path(), &program).unwrap();
         let places = Places {
             programs: self.path("bin"),
             types: self.path("etc"),

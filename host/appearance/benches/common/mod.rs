@@ -1,11 +1,11 @@
-//! Documents to measure on: real textures where FOILPRESS_DATA names them, a made-up one otherwise.
+//! Documents for benchmarks: real textures if FOILPRESS_DATA names them, otherwise a synthetic one.
 
 use std::path::PathBuf;
 
 use appearance::brdf::Space;
 use appearance::document::{Materials, Surface};
 
-/// Surfaces, one for each pixel, in a half-angle space.
+/// Surfaces, one per pixel, in a half-angle space.
 pub struct Field {
     space: Space,
     width: usize,

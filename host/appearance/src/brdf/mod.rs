@@ -1,9 +1,8 @@
 //! Reflectance as rows of numbers, and the distance people see between two of them.
 
-pub mod analytic;
 pub mod plot;
-pub mod space;
-pub mod stacks;
+mod space;
+mod stacks;
 
-pub use inks::Curve;
 pub use space::{Space, SpaceError, Table};
+pub(crate) use stacks::rows;

@@ -1,7 +1,7 @@
-//! Half-angle curves as pictures: braille dots for a terminal, SVG for a document.
+//! Plots of half-angle curves: braille dots for a terminal, SVG for a document.
 //!
-//! Both have a linear angle from 0 to 90 degrees across and the logarithm of reflectance upwards, because foil
-//! and paper differ by a factor of a hundred. Values below a millionth of the largest are drawn at that floor.
+//! Both show the angle from 0 to 90 degrees on a linear axis and reflectance on a logarithmic one, because foil and paper
+//! differ by a factor of a hundred. Values below a millionth of the largest are drawn at that floor.
 
 use inks::Curve;
 use plotters::prelude::*;
@@ -9,19 +9,19 @@ use textplots::{Chart, ColorPlot, LabelBuilder, LabelFormat, Plot, Shape, TickDi
 
 /// Why a curve could not be drawn.
 #[derive(Debug, thiserror::Error)]
-#[error("the plot of {title} could not be drawn: {problem}")]
+#[error("cannot draw the plot of {title}: {problem}")]
 pub struct PlotError {
     /// The plot's title.
     pub title: String,
-    /// What the drawing library said.
+    /// The error of the drawing library.
     pub problem: String,
 }
 
-/// Characters across a terminal plot, and down a decade of it: the scale has a label every four rows.
+/// Characters across a terminal plot, and rows per decade. The scale has a label every four rows.
 const TERMINAL: (u32, u32) = (72, 4);
 const INKS: [(u8, u8, u8); 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 
-/// Decades that hold the curve: whole powers of ten, at least three and at most six.
+/// The decades that hold the curve: at least three and at most six.
 fn decades(curve: &Curve) -> (i32, i32) {
     let values = || curve.rgb().iter().flatten().copied().filter(|v| *v > 0.0);
     let most = values().fold(1e-12, f64::max).log10().ceil() as i32;
@@ -29,7 +29,7 @@ fn decades(curve: &Curve) -> (i32, i32) {
     (least.clamp(most - 6, most - 3), most)
 }
 
-/// Points in degrees and decades, close enough together for any plot.
+/// Points in degrees and decades, dense enough for any plot.
 fn points(curve: &Curve, channel: usize, (least, most): (i32, i32)) -> Vec<(f64, f64)> {
     (0..=720)
         .map(|n| f64::from(n) / 8.0)
@@ -44,7 +44,7 @@ fn is_grey(curve: &Curve) -> bool {
     curve.rgb().iter().all(|v| (v[0] - v[1]).abs().max((v[2] - v[1]).abs()) <= 0.01 * v[1])
 }
 
-/// The curve in braille dots with its scales, a line for each channel (one when they agree).
+/// The curve in braille dots with its scales: one line per channel, or a single line if the channels agree.
 pub fn terminal(curve: &Curve, colour: bool) -> String {
     let range = decades(curve);
     let channels = if is_grey(curve) { 1..2 } else { 0..3 };
@@ -54,7 +54,7 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
         .map(|c| points(curve, c, range).into_iter().map(|(x, y)| (x as f32, y as f32)).collect())
         .collect();
     let lines: Vec<Shape<'_>> = shapes.iter().map(|points| Shape::Lines(points)).collect();
-    // A character is two dots wide and four high.
+    // A character is two dots wide and four dots high.
     let (width, height) = (TERMINAL.0 * 2, TERMINAL.1 * 4 * range.0.abs_diff(range.1));
     let mut chart = Chart::new_with_y_range(width, height, 0.0, 90.0, range.0 as f32, range.1 as f32);
     let mut chart: &mut Chart<'_> = chart
@@ -70,7 +70,7 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
     chart.to_string()
 }
 
-/// A reflectance with two significant digits, however small.
+/// A reflectance with at most two significant digits.
 fn number(value: f64) -> String {
     let decimals = 1 - value.max(1e-300).log10().floor() as i32;
     if decimals > 5 {
@@ -83,7 +83,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// The curve as an SVG picture.
+/// The curve as an SVG image.
 pub fn svg(title: &str, curve: &Curve) -> Result<String, PlotError> {
     let mut text = String::new();
     draw(&mut text, title, curve)

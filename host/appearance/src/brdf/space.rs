@@ -1,18 +1,18 @@
-//! The tabulation every stage works in, and the perceptual metric on it.
+//! The tabulation that every stage works in, and the perceptual metric on it.
 //!
-//! Problem: Euclidean distance on raw reflectance overweights highlights nobody notices.
+//! Problem: Euclidean distance on raw reflectance overweights differences in highlights that nobody notices.
 //! Method: a BRDF is a row of columns j = 3 n + channel over configurations n. Each column carries the factor
 //! c_j from reflectance to reflected radiance and the root W_j of its quadrature weight; the distance is
 //! `d^2 = sum_j W_j^2 (cbrt(f_j c_j) - cbrt(f'_j c_j))^2`, eqs. 2-3 of the 2009 paper's appendix discretised.
-//! Nothing but [`Space::half_angle`] knows what a configuration is, so any linear tabulation with its own
-//! quadrature goes through the same code.
-//! Cost: O(columns) a distance. Limits: values are clamped at 0; `g` is not additive, only reflectance is.
+//! Only [`Space::half_angle`] knows what a configuration is, so the same code serves any linear tabulation with its own
+//! quadrature.
+//! Cost: O(columns) per distance. Limits: values below 0 count as 0; cube roots of radiance do not add, only reflectance does.
 
 use std::f64::consts::FRAC_PI_2;
 
 use inks::Curve;
 
-/// What the columns of a tabulated BRDF mean. See the module text.
+/// The meaning of the columns of a tabulated BRDF. See the module documentation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Space {
     radiance: Vec<f64>,
@@ -20,11 +20,13 @@ pub struct Space {
     angles: Vec<f64>,
 }
 
-/// Why numbers do not make a tabulation.
+/// Why some numbers are not a tabulation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpaceError {
     /// The lists differ in length or are empty.
-    #[error("a tabulation needs as many cosines ({cosines}) as quadrature weights ({weights}), at least one")]
+    #[error(
+        "a tabulation needs one quadrature weight for each cosine and at least one of each; found {cosines} cosines and {weights} weights"
+    )]
     Length {
         /// Number of cosines.
         cosines: usize,
@@ -32,7 +34,9 @@ pub enum SpaceError {
         weights: usize,
     },
     /// A number is negative, infinite or not a number.
-    #[error("configuration {sample}: cosine {cosine} and weight {weight} must be finite and not negative")]
+    #[error(
+        "configuration {sample}: cosine {cosine} and weight {weight} must be finite numbers of 0 or more"
+    )]
     Value {
         /// Which configuration.
         sample: usize,
@@ -45,7 +49,7 @@ pub enum SpaceError {
 
 impl Space {
     /// Half-angle curves on the square-root grid theta_n = (pi/2) u^2, u = (n + 1/2) / samples, with quadrature
-    /// weight `dtheta_n sin theta_n cos theta_n`. At least one sample; 32 serve as well as 512 uniform ones.
+    /// weight `dtheta_n sin theta_n cos theta_n`. At least one sample; 32 are as accurate as 512 uniform ones.
     pub fn half_angle(samples: usize) -> Space {
         let samples = samples.max(1);
         let (mut cosine, mut measure, mut angles) = (Vec::new(), Vec::new(), Vec::new());
@@ -60,8 +64,8 @@ impl Space {
         Space { angles, ..Space::interleave(&cosine, &measure) }
     }
 
-    /// Any tabulation: for each configuration the factor from reflectance to reflected radiance (the cosine at
-    /// the light) and the quadrature weight of that configuration in the picture the distance is taken on.
+    /// Any tabulation: for each configuration, the factor from reflectance to reflected radiance (the cosine at the
+    /// light) and the quadrature weight of the configuration in the image that the distance compares.
     pub fn tabulated(cosine: &[f64], measure: &[f64]) -> Result<Space, SpaceError> {
         if cosine.len() != measure.len() || cosine.is_empty() {
             return Err(SpaceError::Length { cosines: cosine.len(), weights: measure.len() });
@@ -82,7 +86,7 @@ impl Space {
         }
     }
 
-    /// Number of columns, three for each configuration, interleaved R G B.
+    /// Number of columns: three per configuration, interleaved R G B.
     pub fn columns(&self) -> usize {
         self.weight.len()
     }
@@ -97,13 +101,13 @@ impl Space {
         &self.weight
     }
 
-    /// The half angles in radians, one for each configuration; empty for other tabulations.
+    /// The half angles in radians, one per configuration; empty for other tabulations.
     pub fn angles(&self) -> &[f64] {
         &self.angles
     }
 
-    /// A curve as a row of this space (reflectance in 1/sr). Only for half-angle spaces: others have no angles
-    /// and give an empty row.
+    /// A curve as a row of this space (reflectance in 1/sr). Only for half-angle spaces; other spaces have no angles and
+    /// give an empty row.
     pub fn row(&self, curve: &Curve) -> Vec<f64> {
         self.angles.iter().flat_map(|&theta| curve.at(theta)).collect()
     }
@@ -114,7 +118,7 @@ impl Space {
         Curve::sampled(&self.angles, |_| samples.next().map_or([0.0; 3], |v| [v[0], v[1], v[2]]))
     }
 
-    /// Distance of two rows of reflectance in 1/sr. About 0.01 is hard to see, 0.05 is plain.
+    /// Distance between two rows of reflectance in 1/sr (0.01: barely visible; 0.05: obvious).
     pub fn distance(&self, a: &[f64], b: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (j, (&a, &b)) in a.iter().zip(b).enumerate() {
@@ -125,14 +129,14 @@ impl Space {
         sum.sqrt()
     }
 
-    /// A row of reflectance in 1/sr as the metric sees it: [`Space::distance`] is the Euclidean distance of two such rows.
-    pub fn seen(&self, row: &[f64]) -> Vec<f64> {
+    /// A row of reflectance in 1/sr transformed so that [`Space::distance`] is the Euclidean distance between two results.
+    pub(crate) fn seen(&self, row: &[f64]) -> Vec<f64> {
         let columns = row.iter().zip(self.radiance.iter().zip(&self.weight));
         columns.map(|(&f, (&c, &weight))| weight * (f.max(0.0) * c).cbrt()).collect()
     }
 }
 
-/// Rows of equal length in one allocation: bases, stacks, candidates. Reflectance in 1/sr unless said.
+/// Rows of equal length in one allocation: bases, stacks, candidates. Reflectance in 1/sr unless noted otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     columns: usize,
@@ -148,9 +152,9 @@ impl Table {
     /// Adds a row; it must have `columns` values.
     ///
     /// # Panics
-    /// When the row has another length: a bug of the caller, never a matter of input.
+    /// If the row has another length, which is a bug in the caller and never depends on input.
     pub fn push(&mut self, row: &[f64]) {
-        assert_eq!(row.len(), self.columns, "a row of another space");
+        assert_eq!(row.len(), self.columns, "the row belongs to another space");
         self.values.extend_from_slice(row);
     }
 
@@ -164,7 +168,7 @@ impl Table {
         self.values.len() / self.columns
     }
 
-    /// Whether there is no row.
+    /// Whether the table has no rows.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -174,7 +178,7 @@ impl Table {
         &self.values[i * self.columns..][..self.columns]
     }
 
-    /// Row `i`, to change.
+    /// Row `i`, mutable.
     pub fn row_mut(&mut self, i: usize) -> &mut [f64] {
         &mut self.values[i * self.columns..][..self.columns]
     }
@@ -257,8 +261,8 @@ mod tests {
         assert!(off(even(32)) > 0.02 && off(even(64)) > 5e-3);
     }
 
-    /// Averaging each cell instead of sampling its middle keeps its energy but bends the cube root: the mean of a
-    /// steep flank is not what is seen there.
+    /// Averaging each cell instead of sampling its centre keeps its energy but distorts the cube root, most of all on steep
+    /// flanks.
     #[test]
     fn sampling_the_middle_of_a_cell_beats_averaging_the_cell() {
         let [primed, plain] = foils();
@@ -306,7 +310,7 @@ mod tests {
             prop_assert!(a == b || d(&a, &b) > 0.0);
         }
 
-        /// The cube root is the whole nonlinearity: light eight times as strong looks twice as strong.
+        /// The cube root is the only nonlinearity: light eight times as strong looks twice as strong.
         #[test]
         fn distances_grow_with_the_cube_root_of_the_light((a, b) in (row(24), row(24)), s in 1e-3f64..1e3) {
             let space = Space::half_angle(8);
@@ -315,7 +319,7 @@ mod tests {
             prop_assert!((far - s.cbrt() * d).abs() <= 1e-9 * (far + 1e-9));
         }
 
-        /// A picture of everything twice, each at half the weight, is the same picture.
+        /// Listing every configuration twice with half its weight changes nothing.
         #[test]
         fn splitting_a_configuration_changes_nothing((a, b) in (row(24), row(24))) {
             let space = Space::half_angle(8);
@@ -332,8 +336,8 @@ mod tests {
         }
     }
 
-    /// A tabulation over theta_h and theta_d, and the picture it is meant for: all pairs of directions, with
-    /// measure sin cos d theta for each angle, the second one normalised to 1.
+    /// A tabulation over theta_h and theta_d: all pairs of directions, with measure sin cos d theta for each angle, the
+    /// second one normalised to 1.
     struct Bivariate {
         space: Space,
         cells: Vec<[f64; 2]>,
@@ -361,7 +365,7 @@ mod tests {
         let table = bivariate(64, 48);
         assert!(table.space.angles().is_empty());
         let [primed, plain] = foils();
-        // Without dependence on theta_d it must say what the half-angle space says.
+        // Without dependence on theta_d it must agree with the half-angle space.
         let lifted = |lobes: &inks::Lobes| flat(table.cells.iter().map(|cell| lobes.at(cell[0])));
         let half = Space::half_angle(64);
         let curve = |lobes: &inks::Lobes| flat(half.angles().iter().map(|&t| lobes.at(t)));
@@ -370,7 +374,7 @@ mod tests {
             half.distance(&curve(&primed), &curve(&plain)),
         );
         assert!((two / one - 1.0).abs() < 1e-3, "{two} {one}");
-        // A surface and the same surface with s(theta_d) times the light: for f = a, f' = a s(theta_d) the distance
+        // A surface and the same surface with s(theta_d) times the light: for f = a and f' = a s(theta_d) the distance
         // separates into the integral of cos^(2/3) sin cos = 3/8 and that of (1 - cbrt s)^2 over theta_d.
         // With s = cos^6 the latter is 2 * integral (1 - x^2)^2 x dx = 1/3.
         let a = 0.25;

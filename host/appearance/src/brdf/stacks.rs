@@ -4,9 +4,9 @@ use inks::Entry;
 
 use super::space::{Space, Table};
 
-/// One row for each entry, reflectance in 1/sr. Only for half-angle spaces, as [`Space::row`]. Modelled stacks
-/// are evaluated at the space's own angles, so that no narrow peak is interpolated.
-pub fn rows<'a>(space: &Space, entries: impl IntoIterator<Item = &'a Entry>) -> Table {
+/// One row per entry, reflectance in 1/sr. Only for half-angle spaces, like [`Space::row`]. Modelled stacks are evaluated
+/// at the angles of the space, so no narrow peak is interpolated.
+pub(crate) fn rows<'a>(space: &Space, entries: impl IntoIterator<Item = &'a Entry>) -> Table {
     let mut table = Table::new(space.columns());
     for entry in entries {
         table.push(&space.row(&entry.curve_at(space.angles())));
@@ -19,7 +19,7 @@ mod tests {
     use super::*;
     use inks::Library;
 
-    /// The curve a library holds is tabulated; reading it through interpolation must be invisible.
+    /// The curve in a library is tabulated; the error of interpolating it must be invisible.
     #[test]
     fn a_tabulated_stack_is_the_modelled_one() {
         let library = Library::builtin();
@@ -29,13 +29,13 @@ mod tests {
             assert_eq!(exact.len(), 57);
             for (entry, row) in library.entries().iter().zip(exact.rows()) {
                 let d = space.distance(row, &space.row(&entry.curve));
-                // A twentieth of what is hard to see; what is left comes from the last third of a degree.
+                // A twentieth of a barely visible difference. The rest comes from the last third of a degree.
                 assert!(d < 5e-4, "{}: {d}", entry.stack);
             }
         }
     }
 
-    /// Published with the model: white paper is about 0.68 from black in this metric.
+    /// Published with the model: the distance between white paper and black is about 0.68 in this metric.
     #[test]
     fn plain_paper_has_its_published_size() {
         let space = Space::half_angle(64);

@@ -1,25 +1,25 @@
 //! A half-angle curve from a measurement over all directions.
 //!
-//! Problem: a measured isotropic BRDF depends on theta_h, theta_d and phi_d; the document stage wants theta_h alone.
-//! Method: at each theta_h the mean over theta_d and phi_d, weighted by `cos_i cos_o sin(theta_d)`, of the cells
-//! that were measured (both directions above the horizon). theta_d runs from 2.5 to 57.5 degrees: nearer
-//! to 0 the instrument is in its own light and files hold extrapolations, beyond lie the grazing pairs.
-//! Limits: what depends on theta_d is lost (metals: factors up to two at the peak). Angles that no pair of
-//! directions reaches are left out; the curve holds its last value there.
+//! Problem: a measured isotropic BRDF depends on theta_h, theta_d and phi_d; documents use theta_h alone.
+//! Method: at each theta_h, average the measured cells (both directions above the horizon) over theta_d and phi_d, weighted
+//! by `cos_i cos_o sin(theta_d)`. theta_d runs from 2.5 to 57.5 degrees: closer to 0 the instrument blocks its own light and
+//! files contain extrapolations; beyond are grazing pairs.
+//! Limits: dependence on theta_d is lost (metals: factors up to two at the peak). Angles that no pair of directions
+//! reaches are left out; the curve keeps its last value there.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use inks::Curve;
 
-/// Range of theta_d that is averaged, in degrees.
-pub const THETA_D: (f64, f64) = (2.5, 57.5);
+/// The range of theta_d that is averaged, in degrees.
+const THETA_D: (f64, f64) = (2.5, 57.5);
 
-/// A direction, z along the normal.
+/// A direction, with z along the normal.
 pub type Direction = [f64; 3];
 
-/// The two directions of half-angle coordinates (radians), by symmetry with phi_h = 0: `wi` is d turned by theta_h about
-/// the y axis, `wo = 2 (wi . h) h - wi`.
-pub fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (Direction, Direction) {
+/// The two directions of half-angle coordinates (radians) with phi_h = 0, by symmetry: `wi` is d rotated by theta_h about
+/// the y axis, and `wo = 2 (wi . h) h - wi`.
+fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (Direction, Direction) {
     let (sh, ch) = theta_h.sin_cos();
     let (sd, cd) = theta_d.sin_cos();
     let (sp, cp) = phi_d.sin_cos();
@@ -31,10 +31,10 @@ pub fn directions(theta_h: f64, theta_d: f64, phi_d: f64) -> (Direction, Directi
     (wi, wo)
 }
 
-/// Mean over theta_d and phi_d at each theta_h, given in `theta_h` (radians, ascending), on a grid of cell centres:
-/// `theta_d_cells` over 0 to 90 degrees and `phi_d_cells` over 0 to 180. `value` gets the indices of theta_h,
-/// theta_d and phi_d with the two directions and answers the reflectance in 1/sr, or `None` where nothing was
-/// measured. `None` if no cell at all was measured.
+/// The mean over theta_d and phi_d at each angle of `theta_h` (radians, ascending), on a grid of cell centres:
+/// `theta_d_cells` over 0 to 90 degrees and `phi_d_cells` over 0 to 180. `value` receives the indices of theta_h, theta_d
+/// and phi_d and the two directions, and returns the reflectance in 1/sr, or `None` where nothing was measured. Returns
+/// `None` if no cell was measured.
 pub fn curve(
     theta_h: &[f64],
     theta_d_cells: usize,

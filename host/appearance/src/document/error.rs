@@ -1,61 +1,57 @@
-//! Why a document could not be read, with the file, the field and what was expected.
+//! Errors in reading and writing documents: the file, the field, and what was expected.
 
 use std::path::PathBuf;
 
-use inks::curve::CurveError;
+use inks::CurveError;
 
+use crate::sample::UnknownSample;
 use crate::weights::WeightError;
 
 /// Why a document could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
     /// The system could not read or write a file.
-    #[error("{}: cannot {attempt}: {source}", path.display())]
+    #[error("{}: cannot {attempt}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// What was attempted.
         attempt: &'static str,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The path is not a kind of document.
     #[error(
-        "{}: not a document this program knows; it reads folders of texture maps or of a factored document, \
-         .gltf, .glb, MERL .binary, RGL .bsdf, curve .csv and `sample:NAME`",
+        "{}: unknown kind of document; expected a folder of texture maps, a factored document, a .gltf, .glb, \
+         MERL .binary, RGL .bsdf or curve .csv file, or `sample:NAME`",
         path.display()
     )]
     Kind {
         /// The file.
         path: PathBuf,
     },
-    /// No sample has that name.
-    #[error("there is no sample `{name}`; there are {}", known.join(", "))]
-    Sample {
-        /// The name asked for.
-        name: String,
-        /// The names there are.
-        known: Vec<&'static str>,
-    },
+    /// No sample has this name.
+    #[error(transparent)]
+    Sample(#[from] UnknownSample),
     /// The number of half angles is out of range.
-    #[error("{found} samples of the half angle: 1 to 4096 can be used, 32 serve well")]
+    #[error("{found} samples of the half angle; expected 1 to 4096 (32 are enough for everything printable)")]
     Samples {
-        /// The number asked for.
+        /// The requested number.
         found: usize,
     },
-    /// A file or what it declares is larger than can be meant.
-    #[error("{}: {field} is {found}, at most {most} can be read", path.display())]
+    /// A file, or something it declares, is implausibly large.
+    #[error("{}: {field} is {found}; the limit is {most}", path.display())]
     Large {
         /// The file.
         path: PathBuf,
         /// What is too large, with its unit.
         field: String,
-        /// How large it says it is.
+        /// The declared size.
         found: u64,
         /// The limit.
         most: u64,
     },
-    /// A picture cannot be decoded or has the wrong channels for its purpose.
+    /// An image cannot be decoded, or its channels do not suit its purpose.
     #[error("{}: {problem}", path.display())]
     Picture {
         /// The file.
@@ -63,14 +59,14 @@ pub enum DocumentError {
         /// What is wrong, and what was expected.
         problem: String,
     },
-    /// A folder's maps do not make a material.
+    /// The maps of a folder do not define a material.
     #[error("{}: {problem}; images in the folder: {}", folder.display(), list(seen))]
     Maps {
         /// The folder.
         folder: PathBuf,
         /// What is missing or ambiguous, and what to do.
         problem: String,
-        /// The image files seen.
+        /// The image files in the folder.
         seen: Vec<String>,
     },
     /// A settings file is wrong.
@@ -78,25 +74,25 @@ pub enum DocumentError {
     Settings {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, with its line where known.
+        /// What is wrong, with its line if known.
         problem: String,
     },
-    /// A field of a file is not what the format asks for.
+    /// A field of a file does not conform to its format.
     #[error("{}: {field}: {problem}", path.display())]
     Field {
         /// The file.
         path: PathBuf,
-        /// The field, or where in the file.
+        /// The field, or the position in the file.
         field: String,
         /// What was expected and found.
         problem: String,
     },
     /// A file with several materials needs a choice.
-    #[error("{}: {problem}; choose one with --material: {}", path.display(), list(materials))]
+    #[error("{}: {problem}; choose a material by number or name: {}", path.display(), list(materials))]
     Choice {
         /// The file.
         path: PathBuf,
-        /// Why there is none chosen.
+        /// Why no material was chosen.
         problem: String,
         /// Number and name of each material.
         materials: Vec<String>,
@@ -105,7 +101,7 @@ pub enum DocumentError {
     #[error(transparent)]
     Curve(#[from] CurveError),
     /// Weight maps are wrong.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: the weight maps cannot be used", path.display())]
     Weights {
         /// The document.
         path: PathBuf,
@@ -114,7 +110,7 @@ pub enum DocumentError {
     },
 }
 
-/// Names in a row, not endlessly many.
+/// The names as a list, cut off after 24.
 pub(super) fn list(names: &[String]) -> String {
     const SHOWN: usize = 24;
     match names.len() {

@@ -1,9 +1,9 @@
-//! The factored document as a folder, read and written.
+//! Reading and writing the factored document, a folder.
 //!
-//! `NAME.foil/` holds `document.toml` (what is there), `bases.csv` (`basis,theta_h_deg,r,g,b`, reflectance in 1/sr)
-//! and one 16-bit grey PNG of weights for each basis. Weights are stored as `round(w 65535 / 32768)` with `w` in
-//! units of 1/32768; since that scale is above one, rounding back gives every weight exactly. What is read must
-//! sum to one at every pixel, but for what rounding to 16 bits explains. Writing goes to a temporary folder that is renamed at the end.
+//! `NAME.foil/` contains `document.toml` (the index), `bases.csv` (`basis,theta_h_deg,r,g,b`, reflectance in 1/sr) and one
+//! 16-bit grey PNG of weights per basis. Weights are stored as `round(w 65535 / 32768)` with `w` in units of 1/32768; since
+//! that scale is above one, rounding back restores every weight exactly. The weights of every pixel must sum to one, up to
+//! rounding to 16 bits. Writing fills a temporary folder and renames it at the end.
 
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
@@ -13,26 +13,25 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use inks::Curve;
 use serde::{Deserialize, Serialize};
 
-use super::error::DocumentError;
-use super::folder::check_size_mm;
-use super::picture::Picture;
-use super::source::{MOST_BYTES, Source};
-use super::surfaces::{MOST_PIXELS, check_reflectance};
-use super::{Content, Document, stem};
-use crate::brdf::{Space, Table};
-use crate::factor::Factored;
-use crate::weights::{ONE, WeightMaps, quantise};
-use observe::{Observer, Silent};
+use observe::Observer;
 
-/// The file that makes a folder a factored document.
-pub const INDEX: &str = "document.toml";
+use super::content::{Content, Document, check_size_mm, stem};
+use super::error::DocumentError;
+use super::picture::{MOST_PIXELS, Picture};
+use super::source::{MOST_BYTES, Source};
+use crate::brdf::{Space, Table};
+use crate::materials::{Factored, check_reflectance};
+use crate::weights::{ONE, WeightMaps, quantise};
+
+/// The file that marks a folder as a factored document.
+pub(super) const INDEX: &str = "document.toml";
 
 const BASES: &str = "bases.csv";
 
-/// The version written and the only one read.
+/// The version that is written, and the only one that is read.
 const FORMAT: u32 = 1;
 
-/// The most bases: each is a map of its own, and no document needs more than a few dozen.
+/// The most bases. Each has its own map, and no document needs more than a few dozen.
 const MOST_BASES: usize = 256;
 
 /// `document.toml`.
@@ -48,7 +47,7 @@ struct Index {
     /// Samples of the half angle, on the square-root grid.
     samples: usize,
     bases: String,
-    /// One file for each basis, in order.
+    /// One file per basis, in order.
     maps: Vec<String>,
 }
 
@@ -61,12 +60,12 @@ struct BasisRow {
     b: f64,
 }
 
-/// A stored weight, 0..=65535, from units of 1/[`ONE`].
+/// The stored form of a weight, 0..=65535, from units of 1/[`ONE`].
 fn stored(weight: u16) -> u16 {
     ((u32::from(weight) * 65_535 + u32::from(ONE) / 2) / u32::from(ONE)) as u16
 }
 
-/// The weight nearest to a stored one.
+/// The weight nearest to a stored value.
 fn weight(stored: u16) -> u16 {
     ((u32::from(stored) * u32::from(ONE) + 32_767) / 65_535) as u16
 }
@@ -76,8 +75,8 @@ fn io(path: &Path, attempt: &'static str) -> impl FnOnce(std::io::Error) -> Docu
     move |source| DocumentError::Io { path, attempt, source }
 }
 
-/// Writes a factored document as the folder `path`, which must not exist yet. Only half-angle tabulations can be
-/// written: the file form is curves.
+/// Writes a factored document as the folder `path`, which must not exist yet. Only half-angle tabulations can be written,
+/// because the file contains curves.
 pub fn write(
     factored: &Factored,
     name: &str,
@@ -89,12 +88,14 @@ pub fn write(
         |problem: String| DocumentError::Field { path: path.to_path_buf(), field: "bases".into(), problem };
     if angles.is_empty() {
         return Err(field(
-            "a factored document on disk holds curves of the half angle, not other tabulations".into(),
+            "only curves of the half angle can be written; this document uses another tabulation".into(),
         ));
     }
     if factored.bases.len() != factored.maps.channels() || factored.bases.len() > MOST_BASES {
         let (bases, maps) = (factored.bases.len(), factored.maps.channels());
-        return Err(field(format!("{bases} bases and {maps} maps; expected as many, at most {MOST_BASES}")));
+        return Err(field(format!(
+            "{bases} bases and {maps} maps; expected equal numbers, at most {MOST_BASES}"
+        )));
     }
     if path.exists() {
         let exists = std::io::Error::from(std::io::ErrorKind::AlreadyExists);
@@ -103,7 +104,7 @@ pub fn write(
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let staging =
         tempfile::Builder::new().prefix(".foil.").tempdir_in(parent).map_err(io(parent, "write in"))?;
-    // A folder within, since a temporary folder is its owner's alone.
+    // A folder inside it, because only the owner can open the temporary folder itself.
     let inside = staging.path().join("document");
     std::fs::create_dir(&inside).map_err(io(&inside, "write"))?;
     let (width, height) = (factored.maps.width(), factored.maps.height());
@@ -153,8 +154,8 @@ pub fn write(
     std::fs::rename(&inside, path).map_err(io(path, "write"))
 }
 
-/// The weights of a pixel from its greys: those that were written, or by largest remainder those that were
-/// painted, whose greys sum to white but for a rounding of each. Otherwise the sum stays wrong, to be named.
+/// The weights of a pixel from its grey values. Written values give the original weights; painted values, which sum to
+/// white up to one rounding each, are rounded by largest remainder. Any other sum stays wrong and becomes an error.
 fn from_greys(grey: &[u16], weights: &mut [u16]) {
     weights.iter_mut().zip(grey).for_each(|(w, &g)| *w = weight(g));
     if weights.iter().map(|&w| u32::from(w)).sum::<u32>() == u32::from(ONE) {
@@ -167,13 +168,8 @@ fn from_greys(grey: &[u16], weights: &mut [u16]) {
     }
 }
 
-/// Reads a factored document, nobody watching.
-pub fn read(path: &Path) -> Result<Document, DocumentError> {
-    read_watched(path, &Silent)
-}
-
-/// Reads a factored document.
-pub fn read_watched(path: &Path, observer: &dyn Observer) -> Result<Document, DocumentError> {
+/// Reads the factored document in the folder `path`.
+pub fn read(path: &Path, observer: &dyn Observer) -> Result<Document, DocumentError> {
     open(path, Source::new(observer))
 }
 
@@ -188,7 +184,7 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
 
     let channels = index.maps.len();
     source.observer.begin("reading", channels as u64);
-    // Maps are read one by one before room for all of them is taken: the description alone allocates nothing.
+    // The first map is read before memory for all maps is allocated, so the index alone allocates nothing.
     let mut data = Vec::new();
     for (channel, name) in index.maps.iter().enumerate() {
         let at = path.join(name);
@@ -229,10 +225,10 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
     })
 }
 
-/// What `document.toml` says must be possible before anything of its size is allocated.
+/// Checks the values in `document.toml`, before anything of that size is allocated.
 fn check(index: &Index) -> Result<(), String> {
     if index.format != FORMAT {
-        return Err(format!("format = {}: this program reads format {FORMAT}", index.format));
+        return Err(format!("format = {}: expected {FORMAT}", index.format));
     }
     let pixels = (index.width as u64).saturating_mul(index.height as u64);
     if pixels == 0 || pixels > MOST_PIXELS {
@@ -242,7 +238,7 @@ fn check(index: &Index) -> Result<(), String> {
         return Err(format!("maps: {} files; expected 1 to {MOST_BASES}", index.maps.len()));
     }
     if pixels * index.maps.len() as u64 > 1 << 30 {
-        return Err(format!("{pixels} pixels of {} weights: more than can be held", index.maps.len()));
+        return Err(format!("{pixels} pixels of {} weights: too many for memory", index.maps.len()));
     }
     if index.samples == 0 || index.samples > 4096 {
         return Err(format!("samples = {}: expected 1 to 4096", index.samples));
@@ -286,16 +282,16 @@ fn read_bases(
     let mut bases = Table::new(space.columns());
     for basis in 0..index.maps.len() {
         let Some((theta, rgb)) = samples.remove(&basis) else {
-            return Err(wrong(format!("basis {basis}"), "no samples, but there is a map for it".into()));
+            return Err(wrong(format!("basis {basis}"), "it has a map but no samples".into()));
         };
         let on_grid = theta.len() == space.angles().len()
             && theta.iter().zip(space.angles()).all(|(a, b)| (a - b).abs() < 1e-9);
         let row: Vec<f64> = rgb.iter().flatten().copied().collect();
         let curve =
             Curve::new(theta, rgb).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
-        // Samples on the very grid are taken as they stand, so that writing and reading changes nothing.
+        // Samples on exactly this grid are used unchanged, so that writing and reading changes nothing.
         let row = if on_grid { row } else { space.row(&curve) };
-        check_reflectance(&row).map_err(|problem| wrong(format!("basis {basis}"), problem))?;
+        check_reflectance(&row).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
         bases.push(&row);
     }
     Ok(bases)
@@ -304,7 +300,7 @@ fn read_bases(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::weights::quantise;
+    use observe::Silent;
     use proptest::prelude::*;
 
     fn factored(width: usize, height: usize, bases: usize, seed: u32) -> Factored {
@@ -345,11 +341,11 @@ mod tests {
             let path = folder.path().join("a.foil");
             let original = factored(width, height, bases, seed);
             write(&original, "a thing", Some((12.5, 30.0)), &path).unwrap();
-            let document = read(&path).unwrap();
+            let document = read(&path, &Silent).unwrap();
             prop_assert_eq!(document.name.as_str(), "a thing");
             prop_assert_eq!(document.size_mm, Some((12.5, 30.0)));
             prop_assert_eq!(document.as_factored(), Some(&original));
-            // Nothing but the folder is left beside it.
+            // No temporary folder is left.
             prop_assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         }
     }
@@ -360,12 +356,12 @@ mod tests {
         let path = folder.path().join("a.foil");
         write(&factored(3, 2, 2, 5), "a", None, &path).unwrap();
         std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
-        let error = read(&path).unwrap_err().to_string();
+        let error = read(&path, &Silent).unwrap_err().to_string();
         assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
     }
 
     proptest! {
-        /// Whoever paints in the maps keeps the sum of greys, not of our units.
+        /// An artist who paints in the maps keeps the sum of grey values, not of our units.
         #[test]
         fn painted_greys_that_sum_to_white_are_weights(
             mut cuts in prop::collection::vec(0u16..=u16::MAX, 1..8), off in -1i32..=1,
@@ -380,7 +376,7 @@ mod tests {
             for (&w, &g) in weights.iter().zip(&grey) {
                 prop_assert!((f64::from(w) - f64::from(g) * 32768.0 / 65535.0).abs() <= 2.0);
             }
-            // A step of 8 bits is no rounding.
+            // A step of 8 bits is more than rounding.
             if grey[0] < 65000 {
                 grey[0] += 257;
                 from_greys(&grey, &mut weights);
@@ -404,7 +400,7 @@ mod tests {
             ("width = 2", "width = 3", "expected 3 x 2"),
         ] {
             std::fs::write(path.join(INDEX), text.replace(from, to)).unwrap();
-            let error = read(&path).unwrap_err().to_string();
+            let error = read(&path, &Silent).unwrap_err().to_string();
             assert!(error.contains(says), "{to}: {error}");
         }
     }

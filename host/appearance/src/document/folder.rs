@@ -1,33 +1,32 @@
 //! A folder of texture maps as a document.
 //!
-//! Base colour with roughness and metallic (apart, or packed as occlusion-roughness-metallic), or diffuse with
-//! specular and glossiness; a normal map folds into roughness ([`super::relief`]). Files are found by name
-//! ([`super::names`]) or named in [`SETTINGS`]. All maps are brought to the size of the base colour. Nothing is taken
-//! silently: the notes say which encoding was assumed, what was resized, what was left out.
+//! The maps are base colour, roughness and metallic (separate, or packed as occlusion-roughness-metallic), or diffuse,
+//! specular and glossiness; a normal map adds to roughness ([`super::relief`]). Files are recognised by name
+//! ([`super::names`]) or listed in [`SETTINGS`]. All maps are resized to the base colour. The notes report which encoding
+//! was assumed, what was resized and what was left out.
 
 mod files;
 mod settings;
 
 use std::path::Path;
 
+use super::content::{ColourSpace, Content, Document, Options, stem};
 use super::error::DocumentError;
 use super::names::Role;
 use super::picture::Picture;
 use super::relief;
 use super::source::{MOST_BYTES, Source};
-use super::surfaces::{Surfaces, dielectric, metallic, specular};
 use super::texture::{Field, Plane, same_shape};
-use super::{ColourSpace, Content, Document, Options, stem};
 use crate::brdf::Space;
+use crate::materials::{Surface, Surfaces, dielectric, metallic, specular};
 
 use files::Files;
-pub(super) use settings::check_size_mm;
-pub use settings::{MapNames, SETTINGS, Settings, Workflow};
+pub(super) use settings::{SETTINGS, Settings, Workflow};
 
 struct Reader<'a, 'b> {
     files: Files,
     source: &'a mut Source<'b>,
-    /// The size everything is brought to.
+    /// The common size of all maps.
     size: (usize, usize),
 }
 
@@ -47,7 +46,7 @@ impl Reader<'_, '_> {
         }
         if !same_shape(found, self.size) {
             return Err(self.files.error(format!(
-                "{name} is {} x {} pixels, but the base colour is {} x {}: maps of one material need one shape",
+                "{name} is {} x {} pixels, but the base colour is {} x {}; all maps need the same proportions",
                 found.0, found.1, self.size.0, self.size.1
             )));
         }
@@ -64,7 +63,7 @@ impl Reader<'_, '_> {
         Ok(Field::Map(self.fit(plane, name)?))
     }
 
-    /// A map of one number a pixel.
+    /// A map with one number per pixel.
     fn single(&mut self, role: Role) -> Result<Option<Field>, DocumentError> {
         let Some(name) = self.files.one(role)? else { return Ok(None) };
         let picture = self.picture(&name)?;
@@ -75,7 +74,7 @@ impl Reader<'_, '_> {
                 return Err(DocumentError::Picture {
                     path: self.files.folder.join(&name),
                     problem: format!(
-                        "expected one {} value a pixel, found colours; if it is packed, name it \
+                        "expected one {} value per pixel, found colours; if this is a packed map, name it \
                          occlusion_roughness_metallic",
                         role.name()
                     ),
@@ -93,19 +92,21 @@ impl Reader<'_, '_> {
         space: ColourSpace,
     ) -> Result<[Field; 3], DocumentError> {
         if picture.has_foreign_profile() {
-            self.source.note(format!("{name}: its colour profile is not applied"));
+            self.source.note(format!("{name}: the colour profile is not applied"));
         }
         let planes = picture.linear(space);
         let outside = planes.iter().any(|plane| plane.data().iter().any(|v| !(0.0..=1.0).contains(v)));
         if outside {
-            self.source.note(format!("{name}: colours outside 0 to 1 are clamped; they are reflectances"));
+            self.source.note(format!(
+                "{name}: colours outside 0 to 1 are clamped, because reflectances cannot lie there"
+            ));
         }
         let [r, g, b] = planes;
         Ok([Field::Map(self.fit(r, name)?), Field::Map(self.fit(g, name)?), Field::Map(self.fit(b, name)?)])
     }
 }
 
-/// Opens a folder of maps. See the module text.
+/// Opens a folder of maps. See the module documentation.
 pub(super) fn open(
     folder: &Path,
     options: &Options,
@@ -127,21 +128,8 @@ pub(super) fn open(
     reader.size = (picture.width, picture.height);
     let chosen = options.colour_space.or(settings.colour_space);
     let encoding = |picture: &Picture| chosen.unwrap_or(picture.natural_space());
-    let said = match (chosen.is_some(), encoding(&picture)) {
-        (true, ColourSpace::Srgb) => "read as sRGB, as told".into(),
-        (true, ColourSpace::Linear) => "read as linear, as told".into(),
-        (false, ColourSpace::Srgb) => {
-            format!(
-                "colours of whole numbers are taken as sRGB; say colour_space in {SETTINGS} if they are linear"
-            )
-        }
-        (false, ColourSpace::Linear) => {
-            format!(
-                "colours in floating point are taken as linear; say colour_space in {SETTINGS} if they are sRGB"
-            )
-        }
-    };
-    reader.source.note(format!("{base_name}: {said}; every other map but colours is linear data"));
+    let how = encoding_words(encoding(&picture), chosen.is_some());
+    reader.source.note(format!("{base_name}: {how}; maps other than colours are read as linear data"));
     let base = reader.colour(&base_name, &picture, encoding(&picture))?;
     drop(picture);
 
@@ -153,31 +141,18 @@ pub(super) fn open(
         Some(workflow) => workflow,
         None => workflow_of(&reader.files, &settings)?,
     };
-    let (width, height) = reader.size;
-    let rougher = |alpha: f32, pixel: usize| match &variance {
-        None => alpha,
-        Some(variance) => relief::widened(alpha, variance.at(pixel)),
-    };
-    let rgb = |fields: &[Field; 3], pixel: usize| -> [f32; 3] {
-        std::array::from_fn(|c| fields[c].at(pixel).clamp(0.0, 1.0))
-    };
     let surfaces = match workflow {
         Workflow::MetallicRoughness => {
             let (roughness, metal) = roughness_metallic(&mut reader, &settings)?;
-            let f0 = [dielectric(1.5); 3];
-            Surfaces::build(width, height, space, |i| {
+            build(reader.size, space, variance.as_ref(), |i| {
                 let metal = metal.at(i).clamp(0.0, 1.0);
-                let mut surface = metallic(rgb(&base, i), f0, roughness.at(i).clamp(0.0, 1.0), metal);
-                surface.alpha = rougher(surface.alpha, i);
-                surface
+                metallic(rgb(&base, i), [dielectric(1.5); 3], roughness.at(i).clamp(0.0, 1.0), metal)
             })
         }
         Workflow::SpecularGlossiness => {
             let (f0, gloss) = specular_glossiness(&mut reader, encoding)?;
-            Surfaces::build(width, height, space, |i| {
-                let mut surface = specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0));
-                surface.alpha = rougher(surface.alpha, i);
-                surface
+            build(reader.size, space, variance.as_ref(), |i| {
+                specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0))
             })
         }
     };
@@ -192,7 +167,43 @@ pub(super) fn open(
     })
 }
 
-/// Which workflow the maps found belong to.
+/// A note on how the colours are read, and how to change that if it is a default.
+fn encoding_words(space: ColourSpace, chosen: bool) -> String {
+    match (chosen, space) {
+        (true, ColourSpace::Srgb) => "read as sRGB, as requested".into(),
+        (true, ColourSpace::Linear) => "read as linear, as requested".into(),
+        (false, ColourSpace::Srgb) => {
+            format!("integer colours are read as sRGB; set colour_space in {SETTINGS} if they are linear")
+        }
+        (false, ColourSpace::Linear) => {
+            format!(
+                "floating-point colours are read as linear; set colour_space in {SETTINGS} if they are sRGB"
+            )
+        }
+    }
+}
+
+/// The surfaces of all pixels, widened by the slope variance of the normal map.
+fn build(
+    (width, height): (usize, usize),
+    space: Space,
+    variance: Option<&Field>,
+    surface: impl Fn(usize) -> Surface + Sync,
+) -> Surfaces {
+    Surfaces::build(width, height, space, |i| {
+        let mut surface = surface(i);
+        if let Some(variance) = variance {
+            surface.alpha = relief::widened(surface.alpha, variance.at(i));
+        }
+        surface
+    })
+}
+
+fn rgb(fields: &[Field; 3], pixel: usize) -> [f32; 3] {
+    std::array::from_fn(|c| fields[c].at(pixel).clamp(0.0, 1.0))
+}
+
+/// The workflow of the maps found.
 fn workflow_of(files: &Files, settings: &Settings) -> Result<Workflow, DocumentError> {
     let has = |role| files.by_role.iter().any(|(r, _)| *r == role);
     let rough = has(Role::Roughness) || has(Role::Packed) || settings.roughness.is_some();
@@ -200,8 +211,8 @@ fn workflow_of(files: &Files, settings: &Settings) -> Result<Workflow, DocumentE
         (true, false) => Ok(Workflow::MetallicRoughness),
         (true, true) if has(Role::Metallic) || has(Role::Packed) => Ok(Workflow::MetallicRoughness),
         (true, true) => Err(files.error(format!(
-            "both roughness and glossiness maps; say workflow = \"metallic-roughness\" or \"specular-glossiness\" \
-             in {SETTINGS}"
+            "found both roughness and glossiness maps; set workflow = \"metallic-roughness\" or \
+             \"specular-glossiness\" in {SETTINGS}"
         ))),
         (false, true) => Ok(Workflow::SpecularGlossiness),
         (false, false) => Err(files.error(format!(
@@ -219,7 +230,7 @@ fn roughness_metallic(
     let mut metal = reader.single(Role::Metallic)?;
     if let Some(name) = reader.files.one(Role::Packed)? {
         if roughness.is_some() && metal.is_some() {
-            reader.source.note(format!("{name}: not read, its channels are there as maps of their own"));
+            reader.source.note(format!("{name}: not read, because its channels exist as separate maps"));
         } else {
             let picture = reader.picture(&name)?;
             if picture.colours() != 3 {
@@ -239,8 +250,8 @@ fn roughness_metallic(
     for role in [Role::Specular, Role::Glossiness] {
         if let Some(name) = reader.files.all(role).first() {
             reader.source.note(format!(
-                "{name}: not read; with roughness the metallic workflow is meant (workflow in {SETTINGS} can say \
-                 otherwise)"
+                "{name}: not read; a roughness map selects the metallic workflow (set workflow in {SETTINGS} to change \
+                 that)"
             ));
         }
     }
@@ -248,7 +259,7 @@ fn roughness_metallic(
         return Err(reader.files.error(format!("no roughness map, and no `roughness` in {SETTINGS}")));
     };
     let metal = metal.or(settings.metallic.map(Field::Constant)).unwrap_or_else(|| {
-        reader.source.note("no metallic map: nothing is metal".into());
+        reader.source.note("no metallic map: the whole material is non-metallic".into());
         Field::Constant(0.0)
     });
     Ok((roughness, metal))
@@ -277,36 +288,28 @@ fn specular_glossiness(
             reader.colour(&name, &picture, encoding)?
         }
         None => {
-            reader.source.note("no specular map: normal-incidence reflectance is 0.04 everywhere".into());
+            reader.source.note("no specular map: reflectance at normal incidence is 0.04 everywhere".into());
             std::array::from_fn(|_| Field::Constant(dielectric(1.5)))
         }
     };
     Ok((f0, gloss))
 }
 
-/// The slope variance of a normal map at the size of the base colour. The window covers the same patch of the
-/// document whatever the size of the normal map.
+/// The slope variance of a normal map, at the size of the base colour. The window covers the same area of the document for
+/// any size of the normal map.
 fn normal_variance(reader: &mut Reader<'_, '_>, name: &str) -> Result<Field, DocumentError> {
     let picture = reader.picture(name)?;
     if picture.colours() != 3 {
         return Err(DocumentError::Picture {
             path: reader.files.folder.join(name),
-            problem: "expected the three components of normals, found grey".into(),
+            problem: "expected normals with three components, found grey".into(),
         });
     }
     let scale = picture.width as f64 / reader.size.0 as f64;
     let radius = (scale * (relief::WINDOW / 2) as f64).round().clamp(1.0, 256.0) as usize;
     let variance = relief::slope_variance(&picture.channel(0), &picture.channel(1), 1.0, radius);
-    reader.source.note(relief_note(name));
+    reader.source.note(relief::note(name));
     Ok(Field::Map(reader.fit(variance, name)?))
-}
-
-/// What the user is told about a normal map.
-pub(super) fn relief_note(name: &str) -> String {
-    format!(
-        "{name}: paper is flat; bumps within {} pixels are printed as roughness, larger relief is lost",
-        relief::WINDOW
-    )
 }
 
 #[cfg(test)]

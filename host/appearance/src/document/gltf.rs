@@ -1,9 +1,9 @@
-//! glTF and GLB: one material of a file as a document, its textures unrolled as they are stored.
+//! glTF and GLB: one material of a file as a document, with its textures as they are stored.
 //!
-//! Read: metallic-roughness with its factors, `KHR_materials_pbrSpecularGlossiness`, `KHR_materials_specular`,
-//! `KHR_materials_ior`, normal maps (folded into roughness). Geometry is not: the print is the texture square, so
-//! where the mesh puts it does not matter. A texture transform common to all maps does not matter either and is noted;
-//! maps with different transforms do not lie on each other and are refused.
+//! Supported: metallic-roughness with its factors, `KHR_materials_pbrSpecularGlossiness`, `KHR_materials_specular`,
+//! `KHR_materials_ior`, and normal maps (converted to roughness). Geometry is ignored: the print is the texture square,
+//! wherever the mesh places it. A texture transform that all maps share is ignored with a note; maps with different
+//! transforms do not align and are an error.
 //! Source: glTF 2.0, sections 3.9 and appendix B.
 
 mod loader;
@@ -12,18 +12,17 @@ use std::path::Path;
 
 use ::gltf::json;
 
+use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, stem};
 use super::error::DocumentError;
-use super::folder::relief_note;
 use super::relief;
 use super::source::{MOST_BYTES, Source};
-use super::surfaces::{Surfaces, dielectric, metallic, specular};
 use super::texture::{Field, same_shape};
-use super::{ColourSpace, Content, Document, Options, SWATCH_MM, stem};
 use crate::brdf::Space;
+use crate::materials::{Surfaces, dielectric, metallic, specular};
 
 use loader::{Loaded, Loader, coloured};
 
-/// Extensions that are read, or that say nothing about reflectance.
+/// Extensions that are supported, or that do not affect reflectance.
 const READ: [&str; 5] = [
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
@@ -57,7 +56,7 @@ pub(super) fn open(
         .filter(|name| name.contains("_materials_") && !READ.contains(name))
         .collect();
     if !foreign.is_empty() {
-        source.note(format!("{}: {} is used by the file and not read", path.display(), foreign.join(", ")));
+        source.note(format!("{}: the file uses {}, which is ignored", path.display(), foreign.join(", ")));
     }
     let maps = count_maps(material);
     source.observer.begin("reading", maps);
@@ -76,7 +75,7 @@ pub(super) fn open(
     })
 }
 
-/// The container's lengths, before the crate that splits it does arithmetic on them.
+/// Checks the lengths in the container, before the `gltf` crate does arithmetic on them.
 fn check_glb(bytes: &[u8]) -> Result<(), String> {
     if !bytes.starts_with(b"glTF") {
         return Ok(());
@@ -85,12 +84,12 @@ fn check_glb(bytes: &[u8]) -> Result<(), String> {
         return Err(format!("expected 12 bytes, found {}", bytes.len()));
     };
     if length < 20 || length as usize > bytes.len() {
-        return Err(format!("says the file has {length} bytes, it has {}", bytes.len()));
+        return Err(format!("it gives a length of {length} bytes, but the file has {}", bytes.len()));
     }
     Ok(())
 }
 
-/// The material asked for, by number or name; the only one if nothing is asked.
+/// The requested material, by number or name; by default the only one.
 fn choose<'r>(
     root: &'r json::Root,
     path: &Path,
@@ -106,7 +105,7 @@ fn choose<'r>(
         return Err(DocumentError::Field {
             path: path.to_path_buf(),
             field: "materials".into(),
-            problem: "the file has no material to print".into(),
+            problem: "the file has no material".into(),
         });
     }
     let found = match asked {
@@ -138,11 +137,11 @@ fn count_maps(material: &json::Material) -> u64 {
     maps
 }
 
-/// The numbers of a material, each a map or a constant.
+/// The parameters of a material, each a map or a constant.
 struct Layers {
     base: [Field; 3],
     kind: Kind,
-    /// Slope variance and the size of the map it comes from.
+    /// Slope variance of the normal map, at the size of that map.
     variance: Option<Field>,
 }
 
@@ -165,7 +164,7 @@ fn layers(
             let (f0, gloss) = match &old.specular_glossiness_texture {
                 Some(info) => {
                     let Loaded { name, picture } = loader.load(info, "specularGlossinessTexture")?;
-                    loader.source.note(format!("{name}: alpha is glossiness here"));
+                    loader.source.note(format!("{name}: alpha is read as glossiness"));
                     let gloss = Field::Map(picture.channel(3)).times(old.glossiness_factor.0);
                     (coloured(&picture, old.specular_factor.0, space), gloss)
                 }
@@ -226,32 +225,33 @@ fn layers(
     Ok(Layers { base, kind, variance })
 }
 
-/// The slope variance of the normal map, or nothing if it does not lie where the other maps do: detail that
-/// repeats at its own scale.
+/// The slope variance of the normal map, or nothing if it has its own coordinates, as detail that repeats at another
+/// scale does.
 fn normal_variance(
     loader: &mut Loader<'_, '_>,
     normal: &json::material::NormalTexture,
     base: Option<(usize, usize)>,
 ) -> Result<Option<Field>, DocumentError> {
     if loader.placement.is_some_and(|first| first.coordinates != normal.tex_coord) {
-        loader.source.note("normalTexture: has coordinates of its own; its relief is left out".into());
+        loader.source.note(
+            "normalTexture: ignored, because its coordinates differ from those of the other maps".into(),
+        );
         return Ok(None);
     }
     let Loaded { name, picture } = loader.texture(normal.index.value(), "normalTexture")?;
     if picture.colours() != 3 {
-        return Err(
-            loader.wrong("normalTexture", format!("{name}: expected components of normals, found grey"))
-        );
+        return Err(loader
+            .wrong("normalTexture", format!("{name}: expected normals with three components, found grey")));
     }
     let scale = base.map_or(1.0, |(width, _)| picture.width as f64 / width as f64);
     let radius = (scale * (relief::WINDOW / 2) as f64).round().clamp(1.0, 256.0) as usize;
-    loader.source.note(relief_note(&name));
+    loader.source.note(relief::note(&name));
     let variance = relief::slope_variance(&picture.channel(0), &picture.channel(1), normal.scale, radius);
     Ok(Some(Field::Map(variance)))
 }
 
-/// Brings all maps to one size, that of the base colour or else the largest, and makes the surfaces. Also says
-/// whether there was any map at all.
+/// Resizes all maps to the base colour, or else to the largest map, and builds the surfaces. Also returns whether there was
+/// any map.
 fn build(
     layers: Layers,
     path: &Path,
@@ -276,7 +276,7 @@ fn build(
                 path: path.to_path_buf(),
                 field: "textures".into(),
                 problem: format!(
-                    "maps of {width} x {height} and {w} x {h} pixels: one material needs one shape"
+                    "maps of {width} x {height} and {w} x {h} pixels; all maps need the same proportions"
                 ),
             });
         }

@@ -1,6 +1,7 @@
-//! Every reader against files nobody would send in good faith.
+//! Every reader against damaged and malicious files.
 //!
-//! Starting from good documents of every kind, one file of which is [damaged](testing::damage). Whatever comes, the answer is a document or an error that names the file; a panic or an endless loop fails the test.
+//! Each test starts from a good document and [damages](testing::damage) one of its files. Every result must be a document
+//! or an error that names the file; a panic or an endless loop fails the test.
 
 use std::path::Path;
 
@@ -8,12 +9,12 @@ use base64::Engine;
 use proptest::prelude::*;
 
 use super::*;
-use crate::brdf::Table;
+use crate::brdf::{Space, Table};
 use crate::weights::{WeightMaps, quantise};
 use observe::Silent;
 use testing::damage::{damages, spoilt};
 
-/// A good document: its files, which one is what is opened (the folder if none), and which one is to be damaged.
+/// A good document: its files, the one to open (the folder if none), and the one to damage.
 #[derive(Clone, Debug)]
 struct Victim {
     files: Vec<(&'static str, Vec<u8>)>,
@@ -66,7 +67,7 @@ fn factored(damaged: &'static str) -> Victim {
     let maps = WeightMaps::new(4, 3, 2, data).unwrap();
     let scratch = tempfile::tempdir().unwrap();
     let path = scratch.path().join("a.foil");
-    foil::write(&crate::factor::Factored { space, bases, maps }, "a", Some((30.0, 20.0)), &path).unwrap();
+    foil::write(&crate::materials::Factored { space, bases, maps }, "a", Some((30.0, 20.0)), &path).unwrap();
     let names = ["document.toml", "bases.csv", "weights-00.png", "weights-01.png"];
     let files = names.map(|name| (name, std::fs::read(path.join(name)).unwrap())).to_vec();
     Victim { files, opened: None, damaged }
@@ -149,7 +150,7 @@ impl Victim {
         bytes
     }
 
-    /// Puts the files, one of them with other bytes, into a folder and opens them.
+    /// Writes the files to a folder, one of them with other bytes, and opens the document.
     fn open_with(&self, folder: &Path, bytes: &[u8]) -> Result<Document, DocumentError> {
         for (name, good) in &self.files {
             let bytes = if *name == self.damaged { bytes } else { good };
@@ -159,7 +160,7 @@ impl Victim {
         open(spec.to_str().unwrap(), &Options::default(), &Silent)
     }
 
-    /// The answer must name the file, or be a document that can be read to its end.
+    /// The result must be a document that can be read to its end, or an error that names the file.
     fn survive(&self, bytes: &[u8]) {
         let folder = tempfile::tempdir().unwrap();
         match self.open_with(folder.path(), bytes) {
@@ -191,7 +192,7 @@ fn the_good_files_are_good() {
 }
 
 #[test]
-fn files_cut_short_anywhere_are_answered() {
+fn truncated_files_give_errors() {
     for victim in victims() {
         let bytes = victim.bytes();
         let step = (bytes.len() / 60).max(1);
@@ -204,7 +205,7 @@ fn files_cut_short_anywhere_are_answered() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(1000))]
     #[test]
-    fn damaged_files_are_answered(
+    fn damaged_files_give_documents_or_errors(
         which in prop::sample::select(victims()).no_shrink(),
         damages in damages(),
     ) {
@@ -212,7 +213,7 @@ proptest! {
     }
 
     #[test]
-    fn noise_under_any_name_is_answered(
+    fn noise_under_any_name_gives_documents_or_errors(
         which in prop::sample::select(victims()).no_shrink(),
         bytes in prop::collection::vec(any::<u8>(), 0..200),
     ) {
@@ -221,7 +222,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_no_document_is_refused() {
+fn other_files_are_errors() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     std::fs::write(path("letter.txt"), "Dear printer").unwrap();

@@ -1,37 +1,38 @@
 //! MERL `.binary`: an isotropic BRDF tabulated over theta_h, theta_d and phi_d.
 //!
-//! Layout (little-endian): three i32 cell counts (90, 90, 180 as published; others are read too), then f64 values,
-//! all red, all green, all blue, phi_d fastest, then theta_d. theta_h cells are square-root spaced, the others even.
-//! Reflectance in 1/sr is the stored number times 1, 1.15 and 1.66 over 1500. Negative numbers are cells nobody measured:
-//! they are missing, never averaged in. The curve follows by [`super::average`].
+//! Layout (little-endian): three i32 cell counts (90, 90, 180 as published; others are read too), then f64 values: all
+//! red, all green, all blue, phi_d fastest, then theta_d. theta_h cells are square-root spaced, the others uniform.
+//! Reflectance in 1/sr is the stored number times 1, 1.15 and 1.66 over 1500. Negative numbers mark cells that were not
+//! measured; they are left out of the average. [`super::average`] computes the curve.
 
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use super::average;
+use super::content::Document;
+use super::curve;
 use super::error::DocumentError;
 use super::source::Source;
-use super::{Document, Uniform};
 use crate::brdf::Space;
 
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
-/// The most cells of one colour: eleven times the published files.
+/// The most cells per colour: eleven times as many as in the published files.
 const MOST_CELLS: u64 = 1 << 24;
 
 const HEADER: usize = 12;
 
 pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
     let bytes = source.read(path, HEADER as u64 + 24 * MOST_CELLS)?;
-    let curve = parse(&bytes, path)?;
+    let averaged = parse(&bytes, path)?;
     source.note(
-        "one isotropic material, averaged over the difference angle to a curve of the half angle".into(),
+        "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),
     );
-    Ok(Uniform::new(space, &curve, path)?.document(path, source))
+    curve::document(&averaged, path, space, source)
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentError> {
     let wrong = |field: &str, problem: String| DocumentError::Field {
         path: path.to_path_buf(),
         field: field.into(),
@@ -52,7 +53,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentError> {
         return Err(wrong(
             "header",
             format!(
-                "sizes {}, {}, {}: expected 90, 90, 180 or others of at most {MOST_CELLS} cells",
+                "sizes {}, {}, {}: expected positive sizes, such as 90, 90, 180, with at most {MOST_CELLS} cells",
                 dims[0], dims[1], dims[2]
             ),
         ));
@@ -86,7 +87,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentError> {
         let rgb: [f64; 3] = std::array::from_fn(|c| stored(cell + c * cells));
         rgb.iter().all(|v| *v >= 0.0).then(|| std::array::from_fn(|c| rgb[c] * SCALE[c]))
     })
-    .ok_or_else(|| wrong("cells", "not one cell between 2.5 and 57.5 degrees of theta_d was measured".into()))
+    .ok_or_else(|| wrong("cells", "no cell with theta_d between 2.5 and 57.5 degrees was measured".into()))
 }
 
 #[cfg(test)]
@@ -108,7 +109,7 @@ mod tests {
         bytes
     }
 
-    /// Each colour and each theta_h bin comes out where the layout says, whatever the other two angles hold, and
+    /// Each colour and each theta_h cell is read from its place in the layout, for any value of the other two angles, and
     /// missing cells do not count.
     #[test]
     fn a_function_of_the_half_angle_comes_back_scaled() {
@@ -144,11 +145,11 @@ mod tests {
         let mut nan = good.clone();
         nan[12 + 8 * 400..12 + 8 * 401].copy_from_slice(&f64::NAN.to_le_bytes());
         check(&nan, "green: cell 40 is NaN");
-        check(&file([3, 30, 4], |_, _, _, _| -1.0), "not one cell");
+        check(&file([3, 30, 4], |_, _, _, _| -1.0), "no cell");
     }
 
-    /// A full-size file written by an independent program from a network of a real measurement, against that
-    /// measurement's published curve.
+    /// A full-size file, written by an independent program from a neural fit of a real measurement, against the published
+    /// curve of that measurement.
     #[test]
     fn a_full_size_file_gives_the_curve_of_its_material() {
         let Some(data) = std::env::var_os("FOILPRESS_DATA").map(std::path::PathBuf::from) else {

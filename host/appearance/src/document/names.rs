@@ -1,13 +1,13 @@
-//! What a texture file is, by its name: the conventions of texture sites and painting programs.
+//! The role of a texture file from its name, by the conventions of texture sites and painting programs.
 //!
 //! Problem: `Metal053C_1K-JPG_NormalGL.jpg`, `rusty_metal_02_arm_2k.png`, `T_Rock_BC.tga`, `albedo.jpg`.
-//! Method: a stem is cut into lower-case words at punctuation and at a capital after a small letter. Words all
-//! files of the folder begin with are the material's name and say nothing (so `rusty_metal_diff` is no metal map).
-//! Of the rest, words about size and format are dropped; then the longest run of words that names a role,
+//! Method: the stem is split into lower-case words at punctuation and where a capital follows a lower-case letter. Words
+//! that all files of the folder begin with are the name of the material and are skipped (so `rusty_metal_diff` is not a
+//! metallic map). Words about size and format are dropped. The longest run of the remaining words that names a role,
 //! furthest to the right, decides. Single letters count only as the last word, as in Unreal's suffixes.
-//! Limits: a name that follows no convention is no map; `material.toml` can name the files instead.
+//! Limits: a file whose name follows no convention is not used; `material.toml` can name the files instead.
 
-/// What a map is for.
+/// The role of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
     /// Base colour, albedo or diffuse colour.
@@ -24,12 +24,12 @@ pub enum Role {
     Glossiness,
     /// Surface normals, of either handedness.
     Normal,
-    /// A map known to say nothing about reflectance: occlusion, height, previews and the like.
+    /// A map that is known not to describe reflectance: occlusion, height, a preview and the like.
     Ignored,
 }
 
 impl Role {
-    /// How errors call it.
+    /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Role::BaseColor => "base colour",
@@ -44,7 +44,7 @@ impl Role {
     }
 }
 
-/// Words run together that name a role.
+/// Words, joined, that name a role.
 const ALIASES: [(&str, Role); 87] = [
     ("basecolor", Role::BaseColor),
     ("basecolour", Role::BaseColor),
@@ -181,7 +181,7 @@ fn is_noise(word: &str) -> bool {
         || word.strip_prefix('v').is_some_and(digits)
 }
 
-/// The role some words name, furthest right, longest first.
+/// The role that some words name: furthest right, then longest.
 fn role(words: &[String]) -> Option<Role> {
     let words: Vec<&str> = words.iter().map(String::as_str).filter(|word| !is_noise(word)).collect();
     let last = *words.last()?;
@@ -199,7 +199,7 @@ fn role(words: &[String]) -> Option<Role> {
     None
 }
 
-/// The role of each file of a folder, by its stem; `None` where the name says nothing.
+/// The role of each file of a folder, by its stem; `None` if the name tells nothing.
 pub fn roles(stems: &[&str]) -> Vec<Option<Role>> {
     let all: Vec<Vec<String>> = stems.iter().map(|stem| words(stem)).collect();
     let mut shared = 0;
@@ -221,8 +221,8 @@ mod tests {
     }
 
     #[test]
-    #[expect(clippy::type_complexity, reason = "a table to read")]
-    fn each_sites_own_names_are_understood() {
+    #[expect(clippy::type_complexity, reason = "a table that is easy to read")]
+    fn the_names_of_each_site_are_recognised() {
         use Role::*;
         let sites: [(&str, &[(&str, Option<Role>)]); 8] = [
             (
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn the_materials_own_name_is_no_role() {
+    fn the_name_of_the_material_is_not_a_role() {
         assert_eq!(all(&["rusty_metal", "rusty_metal_color"]), [None, Some(Role::BaseColor)]);
         assert_eq!(all(&["gloss_paint_diffuse", "gloss_paint_roughness"])[0], Some(Role::BaseColor));
     }

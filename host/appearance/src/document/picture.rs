@@ -1,40 +1,42 @@
-//! Decoding one picture: PNG, JPEG, TIFF, Radiance HDR and OpenEXR, by content and within limits.
+//! Decoding one image: PNG, JPEG, TIFF, Radiance HDR or OpenEXR, recognised by content and within limits.
 //!
-//! The file's name is only a hint; what it holds decides, and a mismatch is noted. Dimensions are checked before
-//! anything of their size is allocated. Floating-point pictures must be finite.
+//! The contents of a file decide its format; a name that disagrees gives a note. Dimensions are checked before anything of
+//! that size is allocated. Floating-point images must be finite.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use exr::prelude::{ReadChannels, ReadLayers};
 use image::{DynamicImage, ImageDecoder, ImageFormat};
-use palette::encoding::{IntoLinear, Srgb};
 use rayon::prelude::*;
 
-use super::ColourSpace;
+use super::content::ColourSpace;
 use super::error::DocumentError;
 use super::source::Source;
-use super::surfaces::MOST_PIXELS;
 use super::texture::Plane;
+use crate::srgb;
+
+/// The most pixels of a document. The largest page has 38 million dots, and no known document has more.
+pub const MOST_PIXELS: u64 = 1 << 26;
 
 /// The most pixels along one side.
-pub const MOST_SIDE: u64 = 16_384;
+const MOST_SIDE: u64 = 16_384;
 
-/// The most values (pixels times channels) of one picture.
-pub const MOST_VALUES: u64 = 1 << 28;
+/// The most values (pixels times channels) in one image.
+const MOST_VALUES: u64 = 1 << 28;
 
-/// The values of a picture, interleaved, rows from the top.
+/// The values of an image, interleaved, rows from the top.
 #[derive(Clone, Debug)]
 enum Values {
     /// 0..=255 for 0..=1.
     Eight(Vec<u8>),
     /// 0..=65535 for 0..=1.
     Sixteen(Vec<u16>),
-    /// As they are; finite.
+    /// Unscaled; finite.
     Float(Vec<f32>),
 }
 
-/// A decoded picture of 1 to 4 channels: grey, grey and alpha, RGB, RGB and alpha.
+/// A decoded image with 1 to 4 channels: grey, grey and alpha, RGB, or RGB and alpha.
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Pixels across, at least 1.
@@ -56,15 +58,15 @@ impl Picture {
             image::guess_format(bytes).ok()
         };
         let Some((format, kind)) = format.and_then(|format| Some((format, kind(format)?))) else {
-            let found = if bytes.is_empty() { "an empty file" } else { "something else" };
+            let found = if bytes.is_empty() { "an empty file" } else { "another format" };
             return Err(wrong(format!(
-                "expected a PNG, JPEG, TIFF, OpenEXR or Radiance HDR picture, found {found}"
+                "expected a PNG, JPEG, TIFF, OpenEXR or Radiance HDR image, found {found}"
             )));
         };
         if let Ok(named) = ImageFormat::from_path(path)
             && named != format
         {
-            source.note(format!("{} is a {kind} picture under another name; read as {kind}", path.display()));
+            source.note(format!("{}: read as {kind}, which it is despite its name", path.display()));
         }
         let picture = match format {
             ImageFormat::OpenExr => decode_exr(bytes, path)?,
@@ -96,12 +98,12 @@ impl Picture {
         matches!(self.values, Values::Float(_))
     }
 
-    /// Whether it carries a colour profile other than sRGB. It is never applied; data has no use for one.
+    /// Whether it has a colour profile other than sRGB. Profiles are never applied, and data maps do not need them.
     pub fn has_foreign_profile(&self) -> bool {
         self.foreign_profile
     }
 
-    /// The values of a 16-bit grey picture, 0 to 65535.
+    /// The values of a 16-bit grey image, 0 to 65535.
     pub fn sixteen(&self) -> Option<&[u16]> {
         match &self.values {
             Values::Sixteen(values) if self.channels == 1 => Some(values),
@@ -127,8 +129,8 @@ impl Picture {
         }
     }
 
-    /// One channel as data, 0 to 1 for whole numbers. Channel 3 is alpha (1 where there is none); of a grey
-    /// picture every other channel is the grey one.
+    /// One channel as data; integers are scaled to 0..1. Channel 3 is alpha (1 if there is none); in a grey image every
+    /// other channel is the grey one.
     pub fn channel(&self, channel: usize) -> Plane {
         let at = match (channel, self.has_alpha()) {
             (3, false) => {
@@ -149,8 +151,7 @@ impl Picture {
         Plane::new(self.width, self.height, data)
     }
 
-    /// Which encoding its colours have unless someone says otherwise: linear in floating point, sRGB in whole
-    /// numbers.
+    /// The default encoding of its colours: linear for floating point, sRGB for integers.
     pub fn natural_space(&self) -> ColourSpace {
         if self.is_float() { ColourSpace::Linear } else { ColourSpace::Srgb }
     }
@@ -160,7 +161,7 @@ impl Picture {
         let plane = self.channel(channel);
         match space {
             ColourSpace::Linear => plane,
-            ColourSpace::Srgb => plane.map(decode_srgb),
+            ColourSpace::Srgb => plane.map(srgb::decode),
         }
     }
 
@@ -174,12 +175,7 @@ impl Picture {
     }
 }
 
-/// Inverts the sRGB transfer curve.
-pub fn decode_srgb(v: f32) -> f32 {
-    <Srgb as IntoLinear<f32, f32>>::into_linear(v.max(0.0))
-}
-
-/// Whether a colour profile calls itself sRGB, in either of the text encodings profiles use.
+/// Whether a colour profile is named sRGB, in either of the text encodings of profiles.
 fn is_srgb(profile: &[u8]) -> bool {
     profile.windows(4).any(|w| w == b"sRGB") || profile.windows(8).any(|w| w == b"\0s\0R\0G\0B")
 }
@@ -195,23 +191,23 @@ fn kind(format: ImageFormat) -> Option<&'static str> {
     }
 }
 
-/// Refuses sizes nobody can mean, before anything is allocated.
+/// Checks that a size is plausible, before anything is allocated.
 fn check_size(path: &Path, width: u64, height: u64, channels: u64) -> Result<(), DocumentError> {
     let large = |field: &str, found, most| {
         Err(DocumentError::Large { path: path.to_path_buf(), field: field.into(), found, most })
     };
     if width == 0 || height == 0 {
-        let problem = format!("the picture is {width} x {height} pixels; expected at least one");
+        let problem = format!("the image has {width} x {height} pixels; expected at least one");
         return Err(DocumentError::Picture { path: path.to_path_buf(), problem });
     }
     if width.max(height) > MOST_SIDE {
-        return large("longer side in pixels", width.max(height), MOST_SIDE);
+        return large("the longer side in pixels", width.max(height), MOST_SIDE);
     }
     if width * height > MOST_PIXELS {
-        return large("number of pixels", width * height, MOST_PIXELS);
+        return large("the number of pixels", width * height, MOST_PIXELS);
     }
     if width * height * channels > MOST_VALUES {
-        return large("number of values", width * height * channels, MOST_VALUES);
+        return large("the number of values", width * height * channels, MOST_VALUES);
     }
     Ok(())
 }
@@ -222,14 +218,14 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
         wrong(match &error {
             image::ImageError::Limits(_) => {
                 format!(
-                    "the picture has more than {MOST_SIDE} pixels along a side, or fills too much memory; \
+                    "the image has more than {MOST_SIDE} pixels along a side or needs too much memory; \
                      make it smaller"
                 )
             }
             image::ImageError::Unsupported(_) => {
-                format!("cannot decode the picture: {error}; save it as a PNG of 8 or 16 bits, or as OpenEXR")
+                format!("cannot decode the image: {error}; save it as an 8-bit or 16-bit PNG, or as OpenEXR")
             }
-            _ => format!("cannot decode the picture: {error}"),
+            _ => format!("cannot decode the image: {error}"),
         })
     };
     let mut limits = image::Limits::default();
@@ -242,7 +238,7 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
     let (width, height) = decoder.dimensions();
     let channels = u64::from(decoder.color_type().channel_count());
     check_size(path, u64::from(width), u64::from(height), channels)?;
-    // Damage to a profile is no damage to the picture.
+    // A damaged profile does not matter.
     let foreign_profile =
         decoder.icc_profile().is_ok_and(|profile| profile.is_some_and(|bytes| !is_srgb(&bytes)));
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
@@ -260,15 +256,18 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
         DynamicImage::ImageRgb32F(p) => picture(3, Values::Float(p.into_raw())),
         DynamicImage::ImageRgba32F(p) => picture(4, Values::Float(p.into_raw())),
         other => {
-            return Err(wrong(format!("pixels of kind {:?} are not read; save it as RGB", other.color())));
+            return Err(wrong(format!(
+                "pixels of type {:?} are not supported; save the image as RGB",
+                other.color()
+            )));
         }
     })
 }
 
-/// OpenEXR files name their channels freely: `R G B`, `Y`, or a single channel of any name are read.
+/// OpenEXR files name their channels freely. Supported are `R`, `G`, `B`; `Y`; and a single channel of any name.
 fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
     let wrong = |problem: String| DocumentError::Picture { path: path.to_path_buf(), problem };
-    let damaged = |error: exr::error::Error| wrong(format!("cannot decode the picture: {error}"));
+    let damaged = |error: exr::error::Error| wrong(format!("cannot decode the image: {error}"));
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &meta.headers {
         let size = header.layer_size;
@@ -293,14 +292,14 @@ fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
         _ if list.len() == 1 => vec![&list[0]],
         _ => {
             let names: Vec<String> = list.iter().map(|channel| channel.name.to_string()).collect();
-            return Err(wrong(format!("expected channels R, G, B or Y, found {}", names.join(", "))));
+            return Err(wrong(format!("expected the channels R, G, B or Y, found {}", names.join(", "))));
         }
     };
     let channels = chosen.len();
     let mut values = vec![0.0; width * height * channels];
     for (c, channel) in chosen.into_iter().enumerate() {
         if channel.sample_data.len() != width * height {
-            return Err(wrong(format!("channel {} is subsampled, which is not read", channel.name)));
+            return Err(wrong(format!("channel {} is subsampled, which is not supported", channel.name)));
         }
         for (pixel, value) in values.chunks_exact_mut(channels).zip(channel.sample_data.values_as_f32()) {
             pixel[c] = value;

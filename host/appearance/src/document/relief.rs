@@ -1,28 +1,28 @@
-//! Relief as roughness: what is left of a normal map on flat paper.
+//! Relief as roughness: what flat paper can show of a normal map.
 //!
-//! Problem: paper is flat. A bumpy surface scatters a highlight by its bumps as well as by its microfacets; the
-//! print can only do the latter.
-//! Method: within a window the slopes of the normal map are one more spread of facets. Widths add in squares:
-//! `alpha'^2 = alpha^2 + 2 var` with `var` the variance of the slope about its mean along one axis (the mean of both axes
-//! here), as for Gaussian slopes. The window is [`WINDOW`] pixels of the base colour: bumps smaller than that
-//! become gloss, larger shapes are lost. Sign conventions (+Y up or down) do not matter to a variance, and z
-//! is taken from x and y, so maps with two channels are read too.
-//! Cost: a few additions a pixel whatever the window (running sums). Limits: isotropic; the mean slope is dropped.
+//! Problem: paper is flat. A bumpy surface scatters a highlight by its bumps as well as by its microfacets; a print can
+//! only imitate the latter.
+//! Method: within a window, the slopes of the normal map act as an additional distribution of facets. Squared widths add:
+//! `alpha'^2 = alpha^2 + 2 var`, where `var` is the variance of the slope about its mean along one axis (here the mean of
+//! both axes), as for Gaussian slopes. The window is [`WINDOW`] pixels of the base colour: smaller bumps become roughness,
+//! larger shapes are lost. A variance does not depend on sign conventions (+Y up or down), and z follows from x and y, so
+//! maps with two channels work too.
+//! Cost: a few additions per pixel for any window (running sums). Limits: isotropic; the mean slope is dropped.
 //! Source: filtering of slope moments in rendering, as in Olano & Baker 2010 (LEAN mapping).
 
 use rayon::prelude::*;
 
 use super::texture::Plane;
 
-/// Side of the window in pixels, about a millimetre of a document printed across a page.
+/// Side of the window in pixels: about a millimetre if the document fills the page.
 pub const WINDOW: usize = 7;
 
-/// The steepest slope counted: 84 degrees.
+/// The steepest slope; steeper ones are clamped. An angle of 84 degrees.
 const STEEPEST: f32 = 10.0;
 
-/// The slope variance (mean of both axes) about the local mean, in a square window of `2 radius + 1` pixels cut
-/// off at the borders. `x` and `y` are the stored components, 0 to 1, of one size; `scale` multiplies the
-/// decoded components as glTF's normal scale does.
+/// The slope variance (mean of both axes) about the local mean, in a square window of `2 radius + 1` pixels that is cut off
+/// at the borders. `x` and `y` are the stored components, 0 to 1, and have the same size; `scale` multiplies the decoded
+/// components like glTF's normal scale.
 pub fn slope_variance(x: &Plane, y: &Plane, scale: f32, radius: usize) -> Plane {
     let (width, height) = (x.width(), x.height());
     let slopes: Vec<[f32; 2]> = x
@@ -82,9 +82,16 @@ pub fn slope_variance(x: &Plane, y: &Plane, scale: f32, radius: usize) -> Plane 
     Plane::new(width, height, data)
 }
 
-/// A microfacet width with the spread of slopes added: `sqrt(alpha^2 + 2 var)`.
+/// A microfacet width plus a slope variance: `sqrt(alpha^2 + 2 var)`.
 pub fn widened(alpha: f32, variance: f32) -> f32 {
     (alpha * alpha + 2.0 * variance).sqrt()
+}
+
+/// The note about a normal map.
+pub fn note(name: &str) -> String {
+    format!(
+        "{name}: paper is flat; bumps within {WINDOW} pixels are printed as roughness, larger relief is lost"
+    )
 }
 
 #[cfg(test)]
@@ -93,7 +100,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn encode(slope: f32) -> f32 {
-        // A slope along one axis only, as a stored component.
+        // A slope along one axis, as a stored component.
         0.5 + 0.5 * slope / (1.0 + slope * slope).sqrt()
     }
 
@@ -102,7 +109,7 @@ mod tests {
         let flat = Plane::new(40, 30, vec![0.5; 1200]);
         let tilted = Plane::new(40, 30, vec![encode(0.4); 1200]);
         assert!(slope_variance(&tilted, &flat, 1.0, 3).data().iter().all(|v| v.abs() < 1e-6));
-        // Slopes +0.3 and -0.3 in turn: within 7 columns 4 of one sign and 3 of the other.
+        // Alternating slopes of +0.3 and -0.3: within 7 columns, 4 of one sign and 3 of the other.
         let ridges =
             Plane::new(40, 30, (0..1200).map(|i| encode(if i % 2 == 0 { 0.3 } else { -0.3 })).collect());
         let var = slope_variance(&ridges, &flat, 1.0, 3);

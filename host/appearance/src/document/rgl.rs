@@ -1,11 +1,11 @@
 //! RGL `.bsdf`: isotropic measurements in an adaptive parameterisation (Dupuy and Jakob 2018).
 //!
-//! Problem: the file stores reflectance on a grid that follows the surface's own lobe. Method: for directions wi, wo the
-//! half vector m has unit coordinates u = sqrt(2 theta_m / pi), v = (phi_m - phi_i + pi) / 2 pi. The table `vndf` at
-//! theta_i is the density of visible normals there; its distribution functions (conditional along u, marginal
-//! along v, bilinear patches) map (u, v) to the unit square, where `rgb` (or `spectra`) is looked up linearly. That
-//! value times `ndf(m) / (4 sigma(wi))` is reflectance times the cosine at wo; dividing by it gives 1/sr. A `jacobian` of 0
-//! means that the factor is in the table already. The curve follows by [`super::average`].
+//! Problem: the file stores reflectance on a grid that follows the lobe of the surface. Method: for directions wi and wo,
+//! the half vector m has the unit coordinates u = sqrt(2 theta_m / pi), v = (phi_m - phi_i + pi) / 2 pi. The table `vndf`
+//! at theta_i is the density of visible normals there. Its distribution functions (conditional along u, marginal along v,
+//! bilinear patches) map (u, v) to the unit square, where `rgb` (or `spectra`) is interpolated linearly. That value times
+//! `ndf(m) / (4 sigma(wi))` is reflectance times the cosine at wo; dividing by the cosine gives 1/sr. A `jacobian` of 0
+//! means that the table already contains the factor. [`super::average`] computes the curve.
 //! Spectra become RGB by the colour matching functions (fits by Wyman, Sloan and Shirley 2013) under an
 //! equal-energy light, each channel normalised so that a flat 1 is (1, 1, 1).
 //! Cost: about a million lookups. Limits: isotropic files only (phi_i of at most two entries).
@@ -14,39 +14,39 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 use super::average;
+use super::content::Document;
+use super::curve;
 use super::error::DocumentError;
 use super::source::{MOST_BYTES, Source};
 use super::tensor::{Tensor, TensorFile};
-use super::{Document, Uniform};
 use crate::brdf::Space;
 
-/// Samples of theta_h of the curve, on the square-root grid.
+/// Samples of theta_h in the curve, on the square-root grid.
 const THETA_H: usize = 90;
 
-/// Cells of theta_d and phi_d the average runs over.
+/// Cells of theta_d and phi_d in the average.
 const CELLS: (usize, usize) = (36, 36);
 
 pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
     let bytes = source.read(path, MOST_BYTES)?;
-    let curve = parse(&bytes, path)?;
+    let averaged = parse(&bytes, path)?;
     source.note(
-        "one isotropic material, averaged over the difference angle to a curve of the half angle".into(),
+        "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),
     );
-    Ok(Uniform::new(space, &curve, path)?.document(path, source))
+    curve::document(&averaged, path, space, source)
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.
-pub fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentError> {
+pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentError> {
     let file = TensorFile::parse(bytes, path)?;
     let measured = Measured::new(&file)?;
     let theta_h: Vec<f64> =
         (0..THETA_H).map(|i| FRAC_PI_2 * ((i as f64 + 0.5) / THETA_H as f64).powi(2)).collect();
-    average::curve(&theta_h, CELLS.0, CELLS.1, |_, wi, wo| measured.reflectance(wi, wo)).ok_or_else(|| {
-        file.wrong("theta_i", "no pair of directions to average over lies in its range".into())
-    })
+    average::curve(&theta_h, CELLS.0, CELLS.1, |_, wi, wo| measured.reflectance(wi, wo))
+        .ok_or_else(|| file.wrong("theta_i", "no pair of directions within its range can be averaged".into()))
 }
 
-/// A table over the unit square, bilinear between `height` x `width` values at its corners and edges.
+/// A table over the unit square: bilinear between `height` x `width` values, the outermost of them on the border.
 #[derive(Clone, Copy)]
 struct Grid<'a> {
     width: usize,
@@ -54,7 +54,7 @@ struct Grid<'a> {
     data: &'a [f32],
 }
 
-/// A place in a grid: its cell and the shares of the right and lower neighbours.
+/// A position in a grid: its cell, and the weights of the right and lower neighbours.
 #[derive(Clone, Copy)]
 struct Place {
     x: usize,
@@ -88,7 +88,7 @@ impl Grid<'_> {
     }
 }
 
-/// The density of visible normals at one theta_i with its running integrals: per row along u, then along v.
+/// The density of visible normals at one theta_i and its running integrals: along u in each row, then along v.
 struct Density {
     width: usize,
     height: usize,
@@ -100,7 +100,7 @@ struct Density {
 }
 
 impl Density {
-    /// Values scaled to an integral of one over the patches. `None` if there is nothing to scale.
+    /// Scales the values to an integral of one. `None` if all are zero.
     fn new(grid: Grid<'_>) -> Option<Density> {
         let (width, height) = (grid.width, grid.height);
         let mut values: Vec<f64> = grid.data.iter().map(|&v| f64::from(v).max(0.0)).collect();
@@ -124,13 +124,13 @@ impl Density {
     }
 }
 
-/// The reflectance of a file, ready to be asked.
+/// The tables of a file, ready for lookups.
 struct Measured {
     theta_i: Vec<f64>,
     ndf: Tensor,
     sigma: Tensor,
     densities: Vec<Density>,
-    /// For each theta_i three tables over the unit square, red, green and blue.
+    /// For each theta_i, three tables over the unit square: red, green and blue.
     rgb: Vec<f32>,
     side: (usize, usize),
     factor_outside: bool,
@@ -145,7 +145,7 @@ impl Measured {
         let turns = file.tensor("phi_i", 1)?.shape[0];
         if turns > 2 {
             let problem =
-                format!("{turns} azimuths: an anisotropic material, which a half-angle curve cannot hold");
+                format!("{turns} azimuths: a half-angle curve cannot represent an anisotropic material");
             return Err(file.wrong("phi_i", problem));
         }
         let table = |name: &str| {
@@ -173,12 +173,13 @@ impl Measured {
         let densities = vndf.data[..n * h * w]
             .chunks_exact(h * w)
             .map(|data| {
-                Density::new(Grid { width: w, height: h, data })
-                    .ok_or_else(|| file.wrong("vndf", "a density of no normals at all".into()))
+                Density::new(Grid { width: w, height: h, data }).ok_or_else(|| {
+                    file.wrong("vndf", "the density of visible normals is zero everywhere".into())
+                })
             })
             .collect::<Result<_, _>>()?;
         let (rgb, side) = colours(file, turns, n)?;
-        // Absent in early files, which all store the quotient.
+        // Early files lack the field; they all store the quotient.
         let factor_outside = !file.has("jacobian") || file.tensor("jacobian", 1)?.data[0] != 0.0;
         Ok(Measured { theta_i, ndf, sigma, densities, rgb, side, factor_outside })
     }
@@ -226,8 +227,8 @@ impl Measured {
         }))
     }
 
-    /// Where the warp that samples visible normals takes (u, v) from: the inverse of bilinear-patch sampling, with
-    /// all tables interpolated between two theta_i.
+    /// The sample that the warp of visible normals maps to (u, v): the inverse of bilinear-patch sampling, with all tables
+    /// interpolated between two theta_i.
     fn invert(&self, below: usize, above: usize, s: f64, u: f64, v: f64) -> Option<(f64, f64)> {
         let (a, b) = (&self.densities[below], &self.densities[above]);
         let (w, h) = (a.width, a.height);
@@ -252,7 +253,7 @@ impl Measured {
     }
 }
 
-/// The colour tables, `[theta_i][3][y][x]`, and their height and width.
+/// The colour tables, `[theta_i][3][y][x]`, with their height and width.
 fn colours(
     file: &TensorFile<'_>,
     turns: usize,
@@ -277,13 +278,15 @@ fn colours(
     }
     let wavelengths = file.tensor("wavelengths", 1)?.data;
     if wavelengths.len() != layers {
-        let problem = format!("{} for {layers} layers of spectra; expected as many", wavelengths.len());
+        let problem = format!(
+            "{} wavelengths for {layers} layers of spectra; expected equal numbers",
+            wavelengths.len()
+        );
         return Err(file.wrong("wavelengths", problem));
     }
     let Some(weights) = rgb_weights(&wavelengths) else {
-        return Err(
-            file.wrong("wavelengths", "expected ascending nanometres through the visible, 430 to 650".into())
-        );
+        return Err(file
+            .wrong("wavelengths", "expected ascending wavelengths that cover 430 to 650 nanometres".into()));
     };
     let mut rgb = vec![0.0f32; n * 3 * size];
     for i in 0..n {
@@ -299,8 +302,8 @@ fn colours(
     Ok((rgb, (h, w)))
 }
 
-/// For each wavelength (nm, ascending) its weights in linear Rec. 709 red, green and blue; each colour's weights sum
-/// to one. `None` unless the wavelengths cover the visible.
+/// For each wavelength (nm, ascending), its weights in linear Rec. 709 red, green and blue. The weights of each colour sum
+/// to one. `None` unless the wavelengths cover the visible range.
 fn rgb_weights(wavelengths: &[f32]) -> Option<Vec<[f64; 3]>> {
     let nm: Vec<f64> = wavelengths.iter().map(|&v| f64::from(v)).collect();
     if nm.windows(2).any(|w| w[0] >= w[1]) || *nm.first()? > 430.0 || *nm.last()? < 650.0 {
@@ -322,7 +325,7 @@ fn rgb_weights(wavelengths: &[f32]) -> Option<Vec<[f64; 3]>> {
     Some(weights)
 }
 
-/// The CIE 1931 colour matching functions at a wavelength in nm, as sums of lopsided Gaussians.
+/// The CIE 1931 colour matching functions at a wavelength in nm, as sums of asymmetric Gaussians.
 fn matching(nm: f64) -> [f64; 3] {
     let lobe = |centre: f64, below: f64, above: f64| {
         let t = (nm - centre) / if nm < centre { below } else { above };
@@ -462,7 +465,7 @@ pub(super) mod tests {
             assert!(error.contains("x.bsdf") && error.contains(text), "{error}");
         };
         says(&good[..10], "ends at byte 10");
-        says(&good[..good.len() - 4], "not within the file");
+        says(&good[..good.len() - 4], "does not fit in the file");
         says(b"something else entirely", "tensor_file");
         let mut anisotropic =
             tensor_file(&[("theta_i", vec![1], vec![0.0]), ("phi_i", vec![3], vec![0.0; 3])]);

@@ -1,4 +1,4 @@
-//! What has been read so far: bounded reading, the fingerprint of it, and notes to the user.
+//! Bounded reading of files, with a fingerprint of everything read and notes for the user.
 
 use std::fs::File;
 use std::io::Read;
@@ -9,28 +9,28 @@ use sha2::{Digest, Sha256};
 use super::error::DocumentError;
 use observe::Observer;
 
-/// The most bytes of one file: an uncompressed 16-bit RGBA picture of the largest page is 0.3 GB.
+/// The most bytes in one file. An uncompressed 16-bit RGBA image of the largest page has 0.3 GB.
 pub const MOST_BYTES: u64 = 1 << 30;
 
-/// The most bytes of a settings file.
-pub const MOST_SETTINGS: u64 = 1 << 20;
+/// The most bytes in a settings file.
+const MOST_SETTINGS: u64 = 1 << 20;
 
-/// Reads files for one document, keeping its fingerprint and the notes for its user.
+/// Reads the files of one document, and keeps their fingerprint and the notes for the user.
 pub struct Source<'a> {
-    /// Who watches.
+    /// Receives progress and notes.
     pub observer: &'a dyn Observer,
-    /// What was decided on the user's behalf.
+    /// What was assumed, in sentences.
     pub notes: Vec<String>,
     hash: Sha256,
 }
 
 impl<'a> Source<'a> {
-    /// Nothing read yet.
+    /// A source from which nothing has been read yet.
     pub fn new(observer: &'a dyn Observer) -> Source<'a> {
         Source { observer, notes: Vec::new(), hash: Sha256::new() }
     }
 
-    /// Tells the user, now through the observer and later through the document.
+    /// Adds a note, which the user sees now through the observer and later through the document.
     pub fn note(&mut self, text: String) {
         if !self.notes.contains(&text) {
             self.observer.note(&text);
@@ -38,7 +38,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Whether the path is a folder; an error if there is nothing.
+    /// Whether the path is a folder; an error if it does not exist.
     pub fn is_folder(&self, path: &Path) -> Result<bool, DocumentError> {
         std::fs::metadata(path).map(|meta| meta.is_dir()).map_err(|source| DocumentError::Io {
             path: path.to_path_buf(),
@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// The first bytes of a file, at most 16, outside the fingerprint.
+    /// The first bytes of a file, at most 16; not part of the fingerprint.
     pub fn head(&self, path: &Path) -> Result<Vec<u8>, DocumentError> {
         let mut head = Vec::new();
         let file = open_regular(path)?;
@@ -59,7 +59,7 @@ impl<'a> Source<'a> {
         Ok(head)
     }
 
-    /// A whole file of at most `most` bytes.
+    /// Reads a whole file of at most `most` bytes.
     pub fn read(&mut self, path: &Path, most: u64) -> Result<Vec<u8>, DocumentError> {
         let io = |source| DocumentError::Io { path: path.to_path_buf(), attempt: "read", source };
         let file = open_regular(path)?;
@@ -83,7 +83,7 @@ impl<'a> Source<'a> {
         Ok(bytes)
     }
 
-    /// A whole settings file as text.
+    /// Reads a whole settings file as text.
     pub fn read_text(&mut self, path: &Path) -> Result<String, DocumentError> {
         let bytes = self.read(path, MOST_SETTINGS)?;
         String::from_utf8(bytes).map_err(|error| DocumentError::Settings {
@@ -94,21 +94,21 @@ impl<'a> Source<'a> {
 
     /// Adds named bytes to the fingerprint.
     pub fn take_in(&mut self, name: &str, bytes: &[u8]) {
-        // Lengths separate the parts, so that no two sets of files run together into the same bytes.
+        // Lengths separate the parts, so that different sets of files never give the same bytes.
         self.hash.update((name.len() as u64).to_le_bytes());
         self.hash.update(name.as_bytes());
         self.hash.update((bytes.len() as u64).to_le_bytes());
         self.hash.update(bytes);
     }
 
-    /// The notes and the fingerprint.
+    /// Returns the notes and the fingerprint.
     pub fn finish(self) -> (Vec<String>, String) {
         let digest = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
         (self.notes, digest)
     }
 }
 
-/// Opens a file that is one: reading a pipe or a device could wait for ever.
+/// Opens a regular file. Reading from a pipe or a device could block forever.
 fn open_regular(path: &Path) -> Result<File, DocumentError> {
     let io = |source| DocumentError::Io { path: path.to_path_buf(), attempt: "open", source };
     if !std::fs::metadata(path).map_err(io)?.is_file() {

@@ -1,7 +1,7 @@
-//! The tensor file: named arrays of numbers behind one header.
+//! The tensor file: named arrays of numbers after one header.
 //!
-//! Layout (little-endian): `tensor_file\0`, two version bytes 1 and 0, u32 number of fields; for each field u16 length and
-//! text of the name, u16 number of dimensions, u8 type, u64 offset from the file's start, then u64 for each dimension.
+//! Layout (little-endian): `tensor_file\0`, two version bytes 1 and 0, u32 number of fields; for each field, u16 length and
+//! text of the name, u16 number of dimensions, u8 type, u64 offset from the start of the file, then u64 per dimension.
 //! Types: 1 u8, 2 i8, 3 u16, 4 i16, 5 u32, 6 i32, 7 u64, 8 i64, 9 f16, 10 f32, 11 f64. Every offset and shape is
 //! checked against the file before a value is read.
 
@@ -9,13 +9,13 @@ use std::path::{Path, PathBuf};
 
 use super::error::DocumentError;
 
-/// The most fields of a file.
+/// The most fields in a file.
 const MOST_FIELDS: u32 = 256;
 
-/// The most dimensions of a field.
+/// The most dimensions in a field.
 const MOST_DIMENSIONS: u16 = 8;
 
-/// Where a field lies.
+/// The place and shape of a field.
 #[derive(Clone, Debug)]
 struct Field {
     name: String,
@@ -24,14 +24,14 @@ struct Field {
     shape: Vec<usize>,
 }
 
-/// The fields of a file and its bytes.
+/// The fields and the bytes of a file.
 pub struct TensorFile<'a> {
     path: PathBuf,
     bytes: &'a [u8],
     fields: Vec<Field>,
 }
 
-/// An array as single-precision numbers, the last dimension fastest.
+/// An array of single-precision numbers, the last dimension fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
     /// Its dimensions, slowest first.
@@ -40,7 +40,7 @@ pub struct Tensor {
     pub data: Vec<f32>,
 }
 
-/// Takes little-endian numbers off the front of the header.
+/// Reads little-endian numbers from the header.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -51,7 +51,7 @@ impl<'a> Cursor<'a> {
         let end = self.at.checked_add(n).filter(|&end| end <= self.bytes.len());
         let Some(end) = end else {
             return Err(format!(
-                "the file ends at byte {}, {n} more were expected at byte {}",
+                "the file ends at byte {}, but {n} bytes were expected from byte {} on",
                 self.bytes.len(),
                 self.at
             ));
@@ -88,31 +88,31 @@ impl<'a> TensorFile<'a> {
         Ok(TensorFile { path: path.to_path_buf(), bytes, fields })
     }
 
-    /// An error about one of the fields.
+    /// An error about a field.
     pub fn wrong(&self, field: &str, problem: String) -> DocumentError {
         DocumentError::Field { path: self.path.clone(), field: field.into(), problem }
     }
 
-    /// Whether there is such a field.
+    /// Whether the file has this field.
     pub fn has(&self, name: &str) -> bool {
         self.fields.iter().any(|field| field.name == name)
     }
 
-    /// A field with that many dimensions, as numbers; each finite.
+    /// A field with this many dimensions. All numbers must be finite.
     pub fn tensor(&self, name: &str, dimensions: usize) -> Result<Tensor, DocumentError> {
         let Some(field) = self.fields.iter().find(|field| field.name == name) else {
             let names: Vec<&str> = self.fields.iter().map(|field| &field.name[..]).collect();
-            return Err(self.wrong(name, format!("not in the file; it has {}", names.join(", "))));
+            return Err(self.wrong(name, format!("missing; the file has {}", names.join(", "))));
         };
         if field.shape.len() != dimensions {
             return Err(
                 self.wrong(name, format!("expected {dimensions} dimensions, found {:?}", field.shape))
             );
         }
-        // The header's check holds the product within the file.
+        // The check of the header bounds the product by the length of the file.
         let count: usize = field.shape.iter().product();
         let Some(size) = size_of(field.kind) else {
-            return Err(self.wrong(name, format!("type {} is not known", field.kind)));
+            return Err(self.wrong(name, format!("unknown type {}", field.kind)));
         };
         let raw = &self.bytes[field.offset..][..count * size];
         let data: Vec<f32> = raw.chunks_exact(size).map(|b| number(field.kind, b)).collect();
@@ -126,15 +126,15 @@ impl<'a> TensorFile<'a> {
 fn header(bytes: &[u8]) -> Result<Vec<Field>, String> {
     let mut cursor = Cursor { bytes, at: 0 };
     if cursor.take(12)? != b"tensor_file\0" {
-        return Err("expected a tensor file, which begins with `tensor_file`".into());
+        return Err("expected a tensor file, which starts with `tensor_file`".into());
     }
     let version = cursor.take(2)?;
     if version != [1, 0] {
-        return Err(format!("version {}.{}: only 1.0 is read", version[0], version[1]));
+        return Err(format!("version {}.{}; expected 1.0", version[0], version[1]));
     }
     let count = cursor.number(4)? as u32;
     if count > MOST_FIELDS {
-        return Err(format!("{count} fields; at most {MOST_FIELDS} are read"));
+        return Err(format!("{count} fields; the limit is {MOST_FIELDS}"));
     }
     let mut fields = Vec::new();
     for index in 0..count {
@@ -143,7 +143,7 @@ fn header(bytes: &[u8]) -> Result<Vec<Field>, String> {
         let dimensions = cursor.number(2)? as u16;
         if dimensions > MOST_DIMENSIONS {
             return Err(format!(
-                "field {index} (`{name}`) has {dimensions} dimensions; at most {MOST_DIMENSIONS}"
+                "field {index} (`{name}`) has {dimensions} dimensions; the limit is {MOST_DIMENSIONS}"
             ));
         }
         let kind = cursor.number(1)? as u8;
@@ -156,10 +156,10 @@ fn header(bytes: &[u8]) -> Result<Vec<Field>, String> {
             .try_fold(size as u64, |n, &d| n.checked_mul(d))
             .and_then(|n| n.checked_add(offset))
             .filter(|&end| end <= bytes.len() as u64 && offset <= bytes.len() as u64);
-        // A zero among the dimensions would let the others be anything.
+        // With a zero among them, the other dimensions could be anything.
         if end.is_none() || shape.contains(&0) {
             return Err(format!(
-                "field {index} (`{name}`) of shape {shape:?} at byte {offset} is not within the file of {} bytes",
+                "field {index} (`{name}`) of shape {shape:?} at byte {offset} does not fit in the file of {} bytes",
                 bytes.len()
             ));
         }
@@ -169,7 +169,7 @@ fn header(bytes: &[u8]) -> Result<Vec<Field>, String> {
     Ok(fields)
 }
 
-/// One number of a known type from exactly its bytes.
+/// One number of a known type, from its bytes.
 fn number(kind: u8, b: &[u8]) -> f32 {
     let bits = b.iter().rev().fold(0u64, |v, &byte| v << 8 | u64::from(byte));
     match kind {

@@ -1,8 +1,8 @@
-//! Maps of one number a pixel, and bringing them to a common size.
+//! Maps with one number per pixel, and resizing them to a common size.
 
 use rayon::prelude::*;
 
-/// One number a pixel, rows from the top.
+/// One number per pixel, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
     width: usize,
@@ -14,9 +14,9 @@ impl Plane {
     /// A plane of `width * height` values.
     ///
     /// # Panics
-    /// When the number of values is another: a bug of the caller, never a matter of input.
+    /// If the number of values is wrong, which is a bug in the caller and never depends on input.
     pub fn new(width: usize, height: usize, data: Vec<f32>) -> Plane {
-        assert_eq!(data.len(), width * height, "a plane of another size");
+        assert_eq!(data.len(), width * height, "the plane has another size");
         Plane { width, height, data }
     }
 
@@ -35,14 +35,14 @@ impl Plane {
         &self.data
     }
 
-    /// Every value through `f`, on all cores.
+    /// Applies `f` to every value, on all cores.
     pub fn map(mut self, f: impl Fn(f32) -> f32 + Sync) -> Plane {
         self.data.par_iter_mut().for_each(|v| *v = f(*v));
         self
     }
 
-    /// At another size: the mean of what a new pixel covers when it shrinks, linear between pixel centres when
-    /// it grows. Separable; cost is the number of pixels read and written.
+    /// Resizes the plane. Shrinking takes the mean over the area of each new pixel; enlarging interpolates linearly between
+    /// pixel centres. Separable; the cost is proportional to the pixels read and written.
     pub fn resized(&self, width: usize, height: usize) -> Plane {
         if (width, height) == (self.width, self.height) {
             return self.clone();
@@ -69,7 +69,7 @@ impl Plane {
     }
 }
 
-/// Which old pixels make a new one along one axis, and with what weights.
+/// The old pixels that contribute to each new one along one axis, with their weights.
 struct Taps {
     starts: Vec<(usize, usize)>,
     weights: Vec<f32>,
@@ -118,7 +118,7 @@ impl Taps {
 pub enum Field {
     /// The same everywhere.
     Constant(f32),
-    /// A number a pixel.
+    /// One number per pixel.
     Map(Plane),
 }
 
@@ -131,7 +131,7 @@ impl Field {
         }
     }
 
-    /// Times a constant.
+    /// Multiplies by a constant.
     pub fn times(self, factor: f32) -> Field {
         match self {
             Field::Constant(value) => Field::Constant(value * factor),
@@ -140,7 +140,7 @@ impl Field {
         }
     }
 
-    /// The size of the map, if it is one.
+    /// The size, if it is a map.
     pub fn size(&self) -> Option<(usize, usize)> {
         match self {
             Field::Constant(_) => None,
@@ -148,7 +148,7 @@ impl Field {
         }
     }
 
-    /// At another size.
+    /// Resizes the map, if it is one.
     pub fn resized(self, width: usize, height: usize) -> Field {
         match self {
             Field::Map(plane) if (plane.width, plane.height) != (width, height) => {
@@ -159,7 +159,7 @@ impl Field {
     }
 }
 
-/// Whether two sizes have the same shape within 1%.
+/// Whether two sizes have the same proportions within 1 %.
 pub fn same_shape(a: (usize, usize), b: (usize, usize)) -> bool {
     let (p, q) = (a.0 as f64 * b.1 as f64, b.0 as f64 * a.1 as f64);
     (p - q).abs() <= 0.01 * p.max(q)

@@ -1,16 +1,16 @@
 //! Metric archetypes: bases at the corners of the document, fitted in the metric itself.
 //!
-//! Problem: minimise the mean squared perceptual distance between materials and mixtures of k bases that stay
-//! within `delta` document spreads of the hull of the document. With `delta = 0` this is archetypal analysis in
-//! the metric of the paper's appendix.
-//! Method: weights by Gauss-Newton on the simplex ([`super::code`]); then all bases by one Gauss-Newton model of
-//! the total, whose normal matrix couples bases within a column only. The model is minimised basis by basis. For
-//! one basis it is a weighted distance, column by column, from its best free position, so its constrained
-//! minimum is a projection: on the hull of the document's corners, plus an excess shrunk to what `delta` allows.
-//! Both sets are convex, so any part of the step is allowed too, and the step is halved until the total falls: it
-//! never rises. A basis nothing uses restarts at the worst represented material.
-//! Cost: a sweep is `O(materials k^2 columns)`. Limits: a local minimum near the start.
-//! Source: Cutler & Breiman 1994 for the hull constraint; the metric, the slack and the descent are our own.
+//! Problem: minimise the mean squared perceptual distance between materials and mixtures of k bases, each within `delta`
+//! document spreads of the hull of the document. With `delta = 0` this is archetypal analysis in the metric of the paper's
+//! appendix.
+//! Method: weights by Gauss-Newton on the simplex ([`super::code`]); then all bases by one Gauss-Newton model of the total,
+//! whose normal matrix couples bases only within a column. The model is minimised basis by basis. For one basis it is a
+//! weighted distance, column by column, from the best unconstrained position, so the constrained minimum is a projection:
+//! onto the hull of the document's corners, plus an excess limited by `delta`. Both sets are convex, so any part of the
+//! step is feasible too, and the step is halved until the total falls; the total never rises. A basis without users
+//! restarts at the worst represented material.
+//! Cost: `O(materials k^2 columns)` per sweep. Limits: a local minimum near the start.
+//! Source: Cutler & Breiman 1994 for the hull constraint; the metric, the slack and the descent are new here.
 
 use super::code::{Coder, Scratch};
 use super::columns::{accumulate, mix};
@@ -18,29 +18,29 @@ use super::hull::{Combination, Hull, Workspace};
 use super::parts;
 use super::sample::Sample;
 
-/// Gauss-Newton steps of the weights in each sweep.
+/// Gauss-Newton steps for the weights in each sweep.
 const WEIGHT_STEPS: u32 = 2;
-/// Rounds over the bases on one model.
+/// Rounds over the bases for one model.
 const ROUNDS: usize = 3;
 /// Levenberg's damping, as a share of the curvature.
 const DAMPING: f64 = 1e-3;
-/// A basis with less than this share of the document is nothing's basis.
+/// A basis with less than this share of the document is unused.
 const UNUSED: f64 = 1e-6;
 
-/// A fit under way.
+/// A fit in progress.
 pub(super) struct Fit<'a> {
     sample: &'a Sample,
     hull: &'a Hull,
     /// The largest distance of a basis from the hull, in the tangent.
     slack: f64,
     k: usize,
-    /// The bases, rows of the sample's columns; always within the hull and slack.
+    /// The bases, as rows of the sample's columns; always in the hull plus slack.
     pub bases: Vec<f32>,
     parts: Vec<Part>,
     weights: Vec<f64>,
 }
 
-/// A basis as a real mixture and its excess over it.
+/// A basis as a mixture of real materials plus an excess.
 #[derive(Clone)]
 struct Part {
     real: Combination,
@@ -53,16 +53,16 @@ struct Model {
     curvature: Vec<f64>,
     /// For each basis and column: `sum w a_l D r`.
     gradient: Vec<f64>,
-    /// The share of the document each basis has.
+    /// The share of the document of each basis.
     usage: Vec<f64>,
     /// Mean squared distance.
     total: f64,
-    /// The worst represented material of each part, and its squared distance.
+    /// The worst represented material of each part, with its squared distance.
     worst: Vec<(f64, usize)>,
 }
 
 impl<'a> Fit<'a> {
-    /// A fit that starts at the given bases, or rather the nearest allowed ones.
+    /// A fit that starts at the feasible points nearest to the given bases.
     pub fn new(sample: &'a Sample, hull: &'a Hull, slack: f64, start: &[f32]) -> Fit<'a> {
         let padded = sample.columns.padded;
         let k = start.len() / padded;
@@ -87,8 +87,8 @@ impl<'a> Fit<'a> {
         fit
     }
 
-    /// One sweep over weights and bases. Returns the mean squared distance before the bases moved; it is never
-    /// more than after the sweep before.
+    /// One sweep over weights and bases. Returns the mean squared distance before the bases move, which never exceeds that
+    /// after the previous sweep.
     pub fn sweep(&mut self) -> f64 {
         let model = self.improve_weights();
         let unused = model.usage.iter().position(|&u| u < UNUSED);
@@ -103,12 +103,12 @@ impl<'a> Fit<'a> {
         model.total
     }
 
-    /// The share of the metric's tangent in squared distances, column by column.
+    /// The weight of each column in squared distances in the tangent of the metric.
     fn tangent2(&self) -> Vec<f64> {
         self.sample.columns.omega.iter().map(|&o| (f64::from(o) / 3.0).powi(2)).collect()
     }
 
-    /// Weights first, then the model at them, in one pass.
+    /// Improves the weights and sets up the model around them, in one pass.
     fn improve_weights(&mut self) -> Model {
         let (sample, k, padded) = (self.sample, self.k, self.sample.columns.padded);
         let coder = Coder::new(&sample.columns, &self.bases);
@@ -167,7 +167,7 @@ impl<'a> Fit<'a> {
         model
     }
 
-    /// Puts an unused basis at a material. No weight is on it, so nothing changes yet.
+    /// Moves an unused basis to a material. No weight depends on it, so the total does not change yet.
     fn restart(&mut self, l: usize, material: usize) {
         let padded = self.sample.columns.padded;
         let row: Vec<f64> = self.sample.row(material).iter().map(|&x| f64::from(x)).collect();
@@ -184,7 +184,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The model's constrained minimum, basis by basis: what each becomes.
+    /// The constrained minimum of the model, basis by basis.
     fn minimise(&self, model: &Model, skip: Option<usize>) -> (Vec<Part>, Vec<f64>) {
         let (k, padded) = (self.k, self.sample.columns.padded);
         let mut bases: Vec<f64> = self.bases.iter().map(|&b| f64::from(b)).collect();
@@ -198,7 +198,7 @@ impl<'a> Fit<'a> {
         for _ in 0..ROUNDS {
             for l in (0..k).filter(|&l| Some(l) != skip) {
                 let own = curvature(l, l);
-                // Where the metric does not look there is no curvature and no gradient: the column follows.
+                // Columns without weight in the metric have no curvature and no gradient; they follow the others.
                 let weight: Vec<f64> = own.iter().map(|c| c * (1.0 + DAMPING)).collect();
                 let here = &bases[l * padded..][..padded];
                 let free: Vec<f64> = (0..padded)
@@ -207,7 +207,7 @@ impl<'a> Fit<'a> {
                         (here[j] - step).max(0.0)
                     })
                     .collect();
-                // The excess as it is, then the real part, then the excess anew: each only lowers the model.
+                // The real part with the excess fixed, then the excess: each step only lowers the model.
                 let aim: Vec<f64> = free.iter().zip(&parts[l].excess).map(|(f, e)| f - e).collect();
                 let (part, next) = self.allowed_from(&free, &aim, &weight, parts[l].clone(), &mut workspace);
                 let away = |b: &[f64]| -> f64 {
@@ -229,7 +229,7 @@ impl<'a> Fit<'a> {
         (parts, bases)
     }
 
-    /// The nearest allowed point to `free`: first the nearest real one, then as much of the rest as is allowed.
+    /// The feasible point nearest to `free`: the nearest real point, plus as much of the rest as the slack allows.
     fn allowed(
         &self,
         free: &[f64],
@@ -255,13 +255,13 @@ impl<'a> Fit<'a> {
         let excess: Vec<f64> = free.iter().zip(&point).map(|(f, p)| f - p).collect();
         let length = excess.iter().zip(&tangent2).map(|(e, t)| t * e * e).sum::<f64>().sqrt();
         let share = if length > self.slack { self.slack / length } else { 1.0 };
-        // `free` is not negative and neither is the real point, hence nor is anything between.
+        // `free` and the real point are not negative, so no point between them is.
         part.excess.iter_mut().zip(&excess).for_each(|(e, v)| *e = share * v);
         point.iter_mut().zip(&part.excess).for_each(|(p, e)| *p = (*p + e).max(0.0));
         (part, point)
     }
 
-    /// Goes towards the model's minimum until the total falls.
+    /// Moves toward the minimum of the model, halving the step until the total falls.
     fn search(&mut self, parts: Vec<Part>, target: &[f64]) {
         let start = self.bases.clone();
         let total = self.total();
@@ -273,7 +273,7 @@ impl<'a> Fit<'a> {
             if self.total() < total {
                 let old = std::mem::replace(&mut self.parts, parts);
                 if share < 1.0 {
-                    self.part_way(&old, share);
+                    self.move_parts(&old, share);
                 }
                 return;
             }
@@ -282,8 +282,8 @@ impl<'a> Fit<'a> {
         self.bases = start;
     }
 
-    /// The parts of bases that went only `share` of their way.
-    fn part_way(&mut self, old: &[Part], share: f64) {
+    /// Adjusts the parts of bases that moved only `share` of the way.
+    fn move_parts(&mut self, old: &[Part], share: f64) {
         for (part, old) in self.parts.iter_mut().zip(old) {
             part.real = old.real.towards(&part.real, share);
             part.excess.iter_mut().zip(&old.excess).for_each(|(e, o)| *e = o + share * (*e - o));
@@ -352,7 +352,7 @@ mod tests {
         }
     }
 
-    /// The model's gradient against differences of the total itself.
+    /// The gradient of the model against finite differences of the total.
     #[test]
     fn the_gradient_is_that_of_the_total() {
         let sample = Sample::draw(&noisy_mixtures(400), 2).unwrap();
@@ -364,7 +364,7 @@ mod tests {
         let size = model.gradient.iter().fold(0.0f64, |m, g| m.max(g.abs()));
         for place in (0..3 * padded).step_by(5) {
             let at = fit.bases[place];
-            // Single precision: a coarse difference, and a tolerance to match.
+            // Single precision needs a coarse difference and tolerance.
             let h = 0.02 * at.max(0.05);
             let mut total = |v: f32| {
                 fit.bases[place] = v;

@@ -1,26 +1,26 @@
 //! The weights of one material over given bases, in the true metric: equation 1 with bases for stacks.
 //!
 //! Problem: minimise `E(a) = 1/2 sum_j (omega_j cbrt((aB)_j) - t_j)^2` over the simplex, for every pixel.
-//! Method: Gauss-Newton. Around the current mixture the response is linear with slope `D_j`, which leaves least
-//! squares on the simplex, solved exactly by [`Simplex`]; the step is halved until E falls. The first weights are
-//! those of the tangent at the target itself, so they depend on the pixel alone and not on its neighbours.
-//! Where E is convex (no column brighter than eight times its target) the Frank-Wolfe gap `a.q - min q`, q the
-//! gradient, bounds what is left; when that is a small share of E the pixel is done, usually after two steps.
-//! Cost: a step is `k^2/2` inner products and `columns` cube roots. Limits: beyond eight-fold overshoot the bound
-//! is none, though one valley remains; [`STEPS`] ends whatever has not ended.
+//! Method: Gauss-Newton. Around the current mixture the response is linear with slope `D_j`, which gives least squares on
+//! the simplex, solved exactly by [`Simplex`]; the step is halved until E falls. The first weights are those of the tangent
+//! at the target, so they depend on the pixel alone and not on its neighbours. Where E is convex (no column brighter than
+//! eight times its target), the Frank-Wolfe gap `a.q - min q`, with q the gradient, bounds the remaining error. The search
+//! ends when that is a small share of E, usually after two steps.
+//! Cost: `k^2/2` inner products and `columns` cube roots per step. Limits: where a column exceeds eight times its target,
+//! the gap is not a bound, although there is still a single valley; [`STEPS`] limits the search.
 
 use crate::solve::{Gram, Simplex};
 
 use super::columns::{Columns, dot, mix};
 
-/// Most Gauss-Newton steps for one material.
+/// The most Gauss-Newton steps for one material.
 pub(super) const STEPS: u32 = 12;
-/// Share of the squared distance that may be left to gain: the distance is then exact to 1e-3 of itself.
+/// The share of the squared distance that may remain as error: the distance is then accurate to 1e-3 of itself.
 const LEFT: f64 = 2e-3;
-/// Squared distance too small to go after: a thousandth of what is hard to see.
+/// A squared distance too small to improve: a thousandth of a barely visible distance.
 const UNSEEN: f64 = 1e-10;
 
-/// Bases, ready to code materials over.
+/// Codes materials over given bases.
 #[derive(Clone, Debug)]
 pub(super) struct Coder<'a> {
     columns: &'a Columns,
@@ -28,14 +28,14 @@ pub(super) struct Coder<'a> {
     k: usize,
 }
 
-/// What one thread needs to code; made once.
+/// The workspace of one thread.
 #[derive(Clone, Debug)]
 pub(super) struct Scratch {
     /// The current mixture.
     pub model: Vec<f32>,
     /// Its cube roots.
     pub root: Vec<f32>,
-    /// Its response less the target's.
+    /// Its response minus that of the target.
     pub residual: Vec<f32>,
     /// The slope of the response.
     pub slope: Vec<f32>,
@@ -54,7 +54,7 @@ impl<'a> Coder<'a> {
         Coder { columns, bases, k: bases.len() / columns.padded }
     }
 
-    /// Workspace.
+    /// A workspace.
     pub fn scratch(&self) -> Scratch {
         let row = vec![0.0; self.columns.padded];
         Scratch {
@@ -72,14 +72,14 @@ impl<'a> Coder<'a> {
         }
     }
 
-    /// Codes a material from nothing. `x` is its row, `t` its response; `a` receives the weights. Returns the
-    /// squared distance; `scratch` holds the mixture.
+    /// Codes a material without a start. `x` is its row, `t` its response; `a` receives the weights. Returns the squared
+    /// distance; `scratch` contains the mixture.
     pub fn code(&self, x: &[f32], t: &[f32], a: &mut [f64], scratch: &mut Scratch) -> f64 {
         if self.k == 1 {
             a[0] = 1.0;
             return self.evaluate(t, a, scratch);
         }
-        // The slope at the target; its response is omega times its root.
+        // The slope at the target, whose response is omega times its root.
         self.columns.compare(x, t, &mut scratch.root, &mut scratch.residual);
         self.columns.slope(&scratch.root, &mut scratch.slope);
         self.linearise(scratch);
@@ -90,7 +90,7 @@ impl<'a> Coder<'a> {
             *q = f64::from(dot(row, &scratch.weighted));
         }
         a.fill(0.0);
-        // An error would say a number is not finite. They are: rows are bounded by `read`, slopes by the floor.
+        // The only possible error is a number that is not finite. All are: `read` bounds rows, the floor bounds slopes.
         if scratch.simplex.solve(&scratch.gram, &scratch.gradient, a).is_err() {
             a.fill(0.0);
             a[0] = 1.0;
@@ -98,8 +98,8 @@ impl<'a> Coder<'a> {
         self.improve(t, a, STEPS, scratch)
     }
 
-    /// Improves weights (a point of the simplex) by at most so many steps; the distance never grows. Returns it,
-    /// squared.
+    /// Improves weights (a point of the simplex) by at most `steps` steps; the distance never grows. Returns the squared
+    /// distance.
     pub fn improve(&self, t: &[f32], a: &mut [f64], steps: u32, scratch: &mut Scratch) -> f64 {
         let mut d2 = self.evaluate(t, a, scratch);
         for _ in 0..steps {
@@ -131,8 +131,8 @@ impl<'a> Coder<'a> {
         d2
     }
 
-    /// Goes from `a` towards `scratch.next` until the distance falls; `None` and everything as it was if it never
-    /// does.
+    /// Moves from `a` toward `scratch.next`, halving the step until the distance falls. Returns `None` and changes nothing if
+    /// it never does.
     fn search(&self, t: &[f32], a: &mut [f64], d2: f64, scratch: &mut Scratch) -> Option<f64> {
         let mut share = 1.0;
         let mut trial = std::mem::take(&mut scratch.trial);
@@ -152,13 +152,13 @@ impl<'a> Coder<'a> {
         found
     }
 
-    /// Mixes and compares; returns the squared distance.
+    /// Computes and compares the mixture; returns the squared distance.
     pub fn evaluate(&self, t: &[f32], a: &[f64], scratch: &mut Scratch) -> f64 {
         mix(self.bases, a, &mut scratch.model);
         self.columns.compare(&scratch.model, t, &mut scratch.root, &mut scratch.residual)
     }
 
-    /// The bases as the response sees them around the current slope, and their inner products.
+    /// The bases scaled by the current slope of the response, and their inner products.
     fn linearise(&self, scratch: &mut Scratch) {
         let padded = self.columns.padded;
         let Scratch { rows, slope, gram, .. } = scratch;
@@ -199,7 +199,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against every mixture on a grid over the simplex, by the definition of the distance.
+        /// Compared with every mixture on a grid over the simplex, by the definition of the distance.
         #[test]
         fn no_mixture_on_a_grid_is_nearer(values in prop::collection::vec(0.01f32..3.0, 4 * COLUMNS)) {
             let (space, columns) = setting(&values);
@@ -243,7 +243,7 @@ mod tests {
         }
 
         #[test]
-        fn improving_never_makes_worse(values in prop::collection::vec(0.0f32..3.0, 4 * COLUMNS)) {
+        fn improving_never_raises_the_distance(values in prop::collection::vec(0.0f32..3.0, 4 * COLUMNS)) {
             let (_, columns) = setting(&values);
             let rows = scaled(&columns, &values);
             let (bases, x) = rows.split_at(3 * columns.padded);

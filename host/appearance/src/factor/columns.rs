@@ -1,13 +1,13 @@
-//! The columns factoring works in: every one divided by its mean over the document.
+//! The columns that factoring works in, each divided by its mean over the document.
 //!
-//! Problem: reflectance spans six decades between the columns of a tabulation, which single precision and any
-//! floor or damping constant shared by all columns would feel.
+//! Problem: reflectance spans six decades between the columns of a tabulation. That harms single precision, and no floor or
+//! damping constant suits all columns.
 //! Method: with `x_j = f_j / mean f_j` the metric of [`Space`] becomes
 //! `d^2 = sum_j omega_j^2 (cbrt x_j - cbrt x'_j)^2`, `omega_j = W_j cbrt(c_j mean f_j)`: the same numbers, all of
-//! order one. The metric's tangent at the mean material is then simply `z_j = omega_j x_j / 3`, the space in
-//! which distances are Euclidean and mixing is still linear.
-//! Limits: rows are `f32`, padded with zeros to a multiple of eight; a target or mixture below 1e-12 of its
-//! column's mean counts as that, which moves a distance by 1e-4 of its size at most.
+//! order one. The tangent of the metric at the mean material is then `z_j = omega_j x_j / 3`, a space in which distances are
+//! Euclidean and mixing is still linear.
+//! Limits: rows are `f32`, padded with zeros to a multiple of eight. Targets and mixtures below 1e-12 of the mean of their
+//! column count as that much, which changes a distance by at most 1e-4 of its size.
 
 use crate::brdf::Space;
 
@@ -15,10 +15,10 @@ use super::cbrt::cbrt;
 
 /// Values of a column are kept above this share of its mean, where the cube root has a slope to follow.
 const FLOOR: f32 = 1e-12;
-/// Rows are padded to a multiple of this, and sums run in as many lanes, whatever the machine's vectors are.
+/// Rows are padded to a multiple of this, and sums use this many lanes on every processor.
 pub(super) const LANES: usize = 8;
 
-/// Scale and importance of each column. See the module text.
+/// Scale and weight of each column. See the module documentation.
 #[derive(Clone, Debug)]
 pub(super) struct Columns {
     /// Columns of the tabulation.
@@ -29,12 +29,12 @@ pub(super) struct Columns {
     mean: Vec<f64>,
     /// `1 / mean`, 0 in the padding.
     scale: Vec<f32>,
-    /// The metric's weight of each column, 0 in the padding and where the metric does not look.
+    /// The weight of each column in the metric; 0 in the padding and in columns that the metric ignores.
     pub omega: Vec<f32>,
 }
 
 impl Columns {
-    /// The columns of a space for a document of the given mean reflectance (1/sr, one value a column).
+    /// The columns of a space for a document with the given mean reflectance (1/sr, one value per column).
     pub fn new(space: &Space, mean: &[f64]) -> Columns {
         let real = space.columns();
         let padded = real.next_multiple_of(LANES);
@@ -47,7 +47,7 @@ impl Columns {
         Columns { real, padded, mean, scale, omega }
     }
 
-    /// Reflectance as a row of this space; `x` has `padded` places.
+    /// Converts reflectance to a row of this space; `x` has `padded` places.
     pub fn scale(&self, reflectance: &[f32], x: &mut [f32]) {
         for ((x, &f), &s) in x.iter_mut().zip(reflectance).zip(&self.scale) {
             *x = f.max(0.0) * s;
@@ -55,20 +55,20 @@ impl Columns {
         x[self.real..].fill(0.0);
     }
 
-    /// A row of this space as reflectance in 1/sr.
+    /// Converts a row of this space to reflectance in 1/sr.
     pub fn reflectance(&self, x: &[f32]) -> Vec<f64> {
         self.mean.iter().zip(x).map(|(&m, &x)| f64::from(x) * m).collect()
     }
 
-    /// What the eye makes of a row: `t_j = omega_j cbrt x_j`, a space with Euclidean distances.
+    /// The perceptual response to a row, `t_j = omega_j cbrt x_j`: a space with Euclidean distances.
     pub fn respond(&self, x: &[f32], t: &mut [f32]) {
         for ((t, &x), &omega) in t.iter_mut().zip(x).zip(&self.omega) {
             *t = omega * cbrt(x.max(FLOOR));
         }
     }
 
-    /// The response of a mixture against a target's: `root_j = cbrt x_j` and `residual_j = omega_j root_j - t_j`.
-    /// Returns the squared distance.
+    /// Compares the response of a mixture with that of a target: `root_j = cbrt x_j` and `residual_j = omega_j root_j -
+    /// t_j`. Returns the squared distance.
     pub fn compare(&self, x: &[f32], t: &[f32], root: &mut [f32], residual: &mut [f32]) -> f64 {
         let n = self.padded;
         let (x, t, omega) = (&x[..n], &t[..n], &self.omega[..n]);
@@ -80,7 +80,7 @@ impl Columns {
         f64::from(dot(residual, residual))
     }
 
-    /// The squared distance of a mixture from a target's response, without keeping its parts.
+    /// The squared distance between a mixture and the response of a target, without intermediate results.
     pub fn distance2(&self, x: &[f32], t: &[f32]) -> f64 {
         let mut sums = [0.0f32; LANES];
         let blocks = x.chunks_exact(LANES).zip(t.chunks_exact(LANES)).zip(self.omega.chunks_exact(LANES));
@@ -93,7 +93,7 @@ impl Columns {
         f64::from(fold(sums))
     }
 
-    /// The slope of the response where its cube root is `root`: `D_j = omega_j / (3 root_j^2)`.
+    /// The slope of the response at a row with the cube roots `root`: `D_j = omega_j / (3 root_j^2)`.
     pub fn slope(&self, root: &[f32], slope: &mut [f32]) {
         for ((d, &root), &omega) in slope.iter_mut().zip(root).zip(&self.omega) {
             *d = omega / (3.0 * root * root);

@@ -1,10 +1,10 @@
-//! How many bases a document needs.
+//! The number of bases that a document needs.
 //!
-//! Method: one basis more at a time, on a few thousand materials, until the document is reproduced to
-//! [`ENOUGH`], another basis would gain less than [`GAIN`], or [`MOST`] are in use. A new basis starts at the best
-//! of a few badly represented materials and all are refined together, so the error only falls.
-//! Cost: about that of fitting the last number once on all materials. Limits: greedy; and judged by metric
-//! archetypes whatever the method, so that methods can be compared with the same number of bases.
+//! Method: adds one basis at a time, on a few thousand materials, until the error is below [`ENOUGH`], another basis would
+//! gain less than [`GAIN`], or there are [`MOST`] bases. A new basis starts at the best of a few badly represented
+//! materials and all bases are refined together, so the error only falls.
+//! Cost: about that of one fit with the final number on all materials. Limits: greedy; always decided by metric archetypes,
+//! so that all methods use the same number of bases and can be compared.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -16,21 +16,21 @@ use super::hull::Hull;
 use super::kmeans::draw;
 use super::sample::Sample;
 
-/// Mean squared distances are small enough below the square of this: where differences are hard to see.
+/// The root mean square distance that is small enough: barely visible.
 const ENOUGH: f64 = 0.015;
-/// Share of the error one more basis has to take away.
+/// The share of the error that another basis must remove.
 const GAIN: f64 = 0.05;
-/// Most bases that are chosen without being asked for: as many as the paper ever used.
+/// The most bases that are chosen automatically: as many as the paper used at most.
 pub(super) const MOST: usize = 15;
-/// Materials that are enough to count by.
+/// Number of materials that the number of bases is chosen by.
 const MATERIALS: usize = 4000;
 const TRIES: usize = 4;
 const SWEEPS: usize = 6;
 
-/// Bases as many as the document needs, fit to a part of the sample.
+/// As many bases as the document needs, fitted to a part of the sample.
 pub(super) fn grow(sample: &Sample, hull: &Hull, slack: f64, seed: u64, observer: &dyn Observer) -> Vec<f32> {
     let most = MOST.min(sample.len());
-    observer.begin("choosing how many bases", most as u64);
+    observer.begin("choosing the number of bases", most as u64);
     let sample = sample.thinned(MATERIALS);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut fit = refined(&sample, hull, slack, &sample.mean());

@@ -1,13 +1,13 @@
-//! The nearest point of the convex hull of many materials.
+//! The nearest point in the convex hull of many materials.
 //!
-//! Problem: bases should stay real, that is inside the hull of what the document holds, and the hull's corners
-//! are among thousands of points in a hundred dimensions.
-//! Method: column generation. Least squares over a handful of points, solved exactly, and the point that would
-//! lower the distance fastest joins until the Frank-Wolfe gap is nothing; points that lose their weight leave.
-//! Distances are weighted by column. Corners are found beforehand as the extremes along random directions of the
-//! principal coordinates, raw and whitened.
-//! Cost: `O(points columns)` for each point that joins, some ten. Limits: stops after [`MOST_JOINED`] joins with
-//! a point inside the hull that is not quite the nearest.
+//! Problem: bases should stay real, that is, inside the hull of the document's materials, and the corners of that hull are
+//! among thousands of points in a hundred dimensions.
+//! Method: column generation. Least squares over a few points is solved exactly, and the point that would lower the
+//! distance fastest joins, until the Frank-Wolfe gap is negligible; points that lose their weight leave. Distances are
+//! weighted by column. Corners are found in advance, as the extremes along random directions of the principal
+//! coordinates, raw and whitened.
+//! Cost: `O(points columns)` for each point that joins, about ten. Limits: stops after [`MOST_JOINED`] joins with a point
+//! in the hull that may not be quite the nearest.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -22,7 +22,7 @@ const MOST_JOINED: usize = 100;
 /// Directions tried for corners, half of them in whitened coordinates.
 const DIRECTIONS: usize = 3000;
 
-/// Points whose hull is meant, rows of equal length.
+/// The points that span the hull, as rows of equal length.
 #[derive(Clone, Debug)]
 pub(super) struct Hull {
     length: usize,
@@ -72,7 +72,7 @@ impl Workspace {
 }
 
 impl Hull {
-    /// The hull of given rows; at least one.
+    /// The hull of the given rows; at least one.
     pub fn new(points: Vec<f32>, length: usize) -> Hull {
         Hull { length, points }
     }
@@ -88,7 +88,7 @@ impl Hull {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let directions: Vec<f64> = (0..DIRECTIONS)
             .flat_map(|i| {
-                // Four uniform numbers add up to a bell, near enough to normal for an even spread of directions.
+                // The sum of four uniform numbers is close enough to normal for evenly spread directions.
                 let bell =
                     |random: &mut ChaCha8Rng| (0..4).map(|_| random.random::<f64>()).sum::<f64>() - 2.0;
                 let raw: Vec<f64> = (0..d).map(|_| bell(&mut random)).collect();
@@ -118,8 +118,8 @@ impl Hull {
         &self.points[i * self.length..][..self.length]
     }
 
-    /// The point of the hull nearest to `target` when column j counts `weight_j`. `from` is a combination to start
-    /// from (or none yet) and receives the one found; `out` receives the point. Returns the squared distance.
+    /// The point in the hull nearest to `target`, with the weight `weight_j` for column j. `from` is the combination to start
+    /// from (empty for a cold start) and receives the result; `out` receives the point. Returns the squared distance.
     pub fn project(
         &self,
         target: &[f64],
@@ -144,7 +144,7 @@ impl Hull {
             let here: f64 = (0..n).map(|j| weight[j] * (out[j] - target[j]) * out[j]).sum();
             let (joining, least) = self.steepest(&workspace.slope);
             let gap = here - f64::from(least);
-            // Single precision sees gaps of 1e-6 of the scale; no progress twice is the same verdict.
+            // Single precision resolves gaps of 1e-6 of the scale; a distance that no longer falls ends the search too.
             if gap <= 1e-3 * distance2 + 1e-9 * scale || distance2 >= last || from.points.contains(&joining) {
                 return distance2;
             }
@@ -155,14 +155,14 @@ impl Hull {
         (0..n).map(|j| weight[j] * (out[j] - target[j]).powi(2)).sum()
     }
 
-    /// Best weights for the points of a combination; points without weight are dropped.
+    /// Computes the best weights for the points of a combination and drops points without weight.
     fn settle(&self, target: &[f64], weight: &[f64], c: &mut Combination, workspace: &mut Workspace) {
         let (n, m) = (self.length, c.points.len());
         if m == 1 {
             c.weights[0] = 1.0;
             return;
         }
-        // Around the target, where the numbers are small and the inner products exact.
+        // Relative to the target, where the numbers are small and the inner products accurate.
         workspace.rows.clear();
         for &p in &c.points {
             let point = self.point(p);
@@ -179,7 +179,7 @@ impl Hull {
         c.weights.retain(|&w| w > 0.0);
     }
 
-    /// The point a combination stands for.
+    /// The point of a combination.
     pub fn combine(&self, c: &Combination, out: &mut [f64]) {
         out.fill(0.0);
         for (&p, &w) in c.points.iter().zip(&c.weights) {
@@ -210,7 +210,7 @@ impl Hull {
     }
 }
 
-/// How far each basis lies outside the hull of a sample, in its spreads: 0 for real materials.
+/// The distance of each basis from the hull of a sample, in units of its spread: 0 for real materials.
 pub(super) fn excursions(sample: &Sample, pca: &Pca, bases: &[f32]) -> Vec<f64> {
     let n = sample.columns.padded;
     let hull = Hull::new(sample.x.clone(), n);
@@ -234,7 +234,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against one least-squares problem over all points at once.
+        /// Compared with one least-squares problem over all points.
         #[test]
         fn projecting_with_few_points_is_projecting_with_all(
             points in prop::collection::vec(0.0f32..2.0, 40 * 8), target in prop::collection::vec(-0.5f64..2.5, 8),

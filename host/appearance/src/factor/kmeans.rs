@@ -1,13 +1,13 @@
 //! Convex-hull k-means: cluster centres pushed out to the corners of the document.
 //!
-//! Problem: cluster means sit inside the document; mixtures of them cannot reach what lies outside.
-//! Method: section 3.1 of the paper, made robust. After each Lloyd step materials that the centres already
-//! represent as a mixture stop attracting them, so centres drift to the hull. Measured documents never lie
-//! exactly in the affine hull of k points, so "represented" is judged in the first k - 1 principal coordinates
-//! and within [`TOLERANCE`] of their spread; every material is judged again each time and may come back. An empty
-//! cluster restarts at the worst represented material, the best of [`STARTS`] k-means++ starts is kept, and a
-//! centre becomes the mean of the real materials nearest to it.
-//! Cost: `O(materials k^2)` an iteration, at most [`ITERATIONS`]. Limits: centres stay a little inside by design.
+//! Problem: cluster means lie inside the document, and mixtures of them cannot reach the materials outside.
+//! Method: section 3.1 of the paper, made robust. After each Lloyd step, materials that mixtures of the centres already
+//! represent stop attracting them, so the centres drift to the hull. Real documents never lie exactly in the affine hull of
+//! k points, so representation is tested in the first k - 1 principal coordinates and within [`TOLERANCE`] of their spread.
+//! Every material is tested again in each iteration and can become active again. An empty cluster restarts at the worst
+//! represented material, the best of [`STARTS`] k-means++ starts is kept, and a centre becomes the mean of the nearest real
+//! materials.
+//! Cost: `O(materials k^2)` per iteration, at most [`ITERATIONS`]. Limits: centres stay slightly inside by design.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,16 +21,16 @@ use super::sample::Sample;
 
 const STARTS: u64 = 4;
 const ITERATIONS: usize = 40;
-/// Iterations without a better hull after which nothing more is expected.
+/// Iterations without a better hull after which the search ends.
 const IDLE: usize = 5;
-/// Materials within this share of the document's spread of a mixture of the centres are represented.
+/// A material is represented if its distance to a mixture of the centres is below this share of the document's spread.
 const TOLERANCE: f64 = 0.07;
-/// As many materials place centres well enough; all of them take part in lifting.
+/// Number of materials that place the centres. All materials take part in lifting.
 const PLACING: usize = 5000;
-/// A basis is the mean of this many real materials.
+/// Number of real materials whose mean is a basis.
 const LIFTED: usize = 12;
 
-/// `k` bases, rows of the sample's columns. The axes should number `k - 1` at least.
+/// `k` bases, as rows of the sample's columns. There should be at least `k - 1` axes.
 pub(super) fn bases(sample: &Sample, pca: &Pca, k: usize, seed: u64) -> Vec<f32> {
     let d = pca.dimensions.min(k - 1);
     let coordinates: Vec<f64> = if d == pca.dimensions {
@@ -69,8 +69,8 @@ impl Cloud<'_> {
         &self.points[i * self.d..][..self.d]
     }
 
-    /// One start. Returns the weighted sum of squared distances of all points from the centres' hull, and the
-    /// centres: those of the iteration where it was least.
+    /// One start. Returns the smallest weighted sum of squared distances of all points from the hull of the centres, and the
+    /// centres of that iteration.
     fn run(&self, k: usize, random: &mut ChaCha8Rng) -> (f64, Vec<f64>) {
         let (n, d) = (self.len(), self.d);
         let mut centres = self.plus_plus(k, random);
@@ -94,7 +94,7 @@ impl Cloud<'_> {
                 idle = 0;
             }
             let now: Vec<bool> = left.iter().map(|&left| left > represented).collect();
-            // Points that come back as others leave can go round in circles.
+            // Points that become active as others become inactive can do so forever.
             let stable = now == active || idle >= IDLE;
             if stable || now.iter().filter(|&&a| a).count() < few || d == 0 {
                 break;
@@ -108,7 +108,7 @@ impl Cloud<'_> {
         left.iter().zip(self.weight).map(|(l, w)| l * w).sum()
     }
 
-    /// k-means++: each centre a point drawn with probability proportional to weight and squared distance.
+    /// k-means++: each centre is a point drawn with probability proportional to weight and squared distance.
     fn plus_plus(&self, k: usize, random: &mut ChaCha8Rng) -> Vec<f64> {
         let mut centres = Vec::with_capacity(k * self.d);
         let mut chance = self.weight.to_vec();
@@ -125,7 +125,7 @@ impl Cloud<'_> {
         centres
     }
 
-    /// Moves each centre to the mean of its active points; a centre without any to the point farthest outside.
+    /// Moves each centre to the mean of its active points, and a centre without any to the point farthest outside.
     fn lloyd(&self, centres: &mut [f64], k: usize, active: &[bool], left: &[f64]) {
         let d = self.d;
         let mut sums = vec![0.0; k * d];
@@ -159,7 +159,7 @@ impl Cloud<'_> {
         }
     }
 
-    /// The squared distance of every point from the hull of the centres; `weights` warm, and updated.
+    /// The squared distance of every point from the hull of the centres. `weights` are the warm start and are updated.
     fn outside(&self, centres: &[f64], k: usize, weights: &mut [f64]) -> Vec<f64> {
         let d = self.d;
         let mut gram = Gram::empty();
@@ -187,11 +187,11 @@ impl Cloud<'_> {
     }
 }
 
-/// Each centre as the mean of the real materials nearest to it.
+/// Replaces each centre by the mean of the nearest real materials.
 fn lift(sample: &Sample, coordinates: &[f64], centres: &[f64], d: usize, k: usize) -> Vec<f32> {
     let n = sample.len();
     let padded = sample.columns.padded;
-    // In a document of few materials as many neighbours would be other materials.
+    // In a document with few materials, this many neighbours would include different materials.
     let count = LIFTED.min(n / (16 * k)).max(1);
     let mut bases = Vec::with_capacity(k * padded);
     for c in 0..k {
@@ -210,7 +210,7 @@ fn lift(sample: &Sample, coordinates: &[f64], centres: &[f64], d: usize, k: usiz
     bases
 }
 
-/// An index drawn with the given chances; the last one that has any, should rounding run over the end.
+/// Draws an index with the given relative probabilities; the last possible one if rounding passes the end.
 pub(super) fn draw(chance: &[f64], random: &mut ChaCha8Rng) -> usize {
     let total: f64 = chance.iter().sum();
     let mut left = random.random::<f64>() * total;

@@ -1,8 +1,8 @@
-//! The directions in which a document's materials differ most, in the metric's tangent at their mean.
+//! The directions in which the materials of a document differ most, in the tangent of the metric at their mean.
 //!
-//! Method: orthogonal iteration on the covariance without forming it, then a Jacobi rotation of the small
-//! projected matrix. Cost: `O(materials columns axes)` an iteration. Limits: iterations are capped; nearly equal
-//! variances may leave their axes rotated into each other, which no use of them here can tell.
+//! Method: orthogonal iteration on the covariance without forming it, then Jacobi rotations of the small projected matrix.
+//! Cost: `O(materials columns axes)` per iteration. Limits: the number of iterations is limited; axes with nearly equal
+//! variances may stay mixed, which does not matter here.
 //! Source: Golub & Van Loan, Matrix Computations, sections 8.2 and 8.5.
 
 use rand::{RngExt, SeedableRng};
@@ -18,17 +18,17 @@ const MOST_ITERATIONS: usize = 40;
 pub(super) struct Pca {
     /// Length of a row of the sample.
     padded: usize,
-    /// Number of axes; fewer than asked for when the materials do not fill as many dimensions.
+    /// Number of axes; fewer than requested if the materials span fewer dimensions.
     pub dimensions: usize,
-    /// The factor of each column from sample row to tangent, `omega / 3`.
+    /// Factor of each column from sample row to tangent, `omega / 3`.
     tangent: Vec<f64>,
     /// The mean material (a sample row).
     mean: Vec<f64>,
     /// Orthonormal rows in the tangent.
     axes: Vec<f64>,
-    /// Variance along each axis, falling.
+    /// Variance along each axis, in descending order.
     pub variance: Vec<f64>,
-    /// Root of the total variance, over all columns: the document's spread.
+    /// Root of the total variance over all columns: the spread of the document.
     pub spread: f64,
 }
 
@@ -53,7 +53,7 @@ impl Pca {
         .iter()
         .sum();
         pca.spread = total.sqrt();
-        // Two spare axes make the wanted ones converge faster.
+        // Two extra axes make the others converge faster.
         let most = (wanted + 2).min(sample.columns.real).min(sample.len() - 1);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut axes: Vec<f64> = (0..most * padded).map(|_| random.random::<f64>() - 0.5).collect();
@@ -61,7 +61,7 @@ impl Pca {
         for _ in 0..MOST_ITERATIONS {
             orthonormalise(&mut axes, padded);
             let image = pca.covariance_times(sample, &axes);
-            // The trace of the projected covariance grows towards the sum of the largest variances.
+            // The trace of the projected covariance grows toward the sum of the largest variances.
             let trace: f64 = axes.iter().zip(&image).map(|(a, b)| a * b).sum();
             let settled = trace - found <= 1e-7 * total;
             found = trace;
@@ -75,7 +75,7 @@ impl Pca {
         pca
     }
 
-    /// Where a material lies, one coordinate for each axis.
+    /// The position of a material, one coordinate per axis.
     pub fn project(&self, row: &[f32], out: &mut [f64]) {
         out.fill(0.0);
         for (out, axis) in out.iter_mut().zip(self.axes.chunks_exact(self.padded)) {
@@ -117,7 +117,7 @@ impl Pca {
         out
     }
 
-    /// Turns an invariant subspace into axes of falling variance and keeps those that have any.
+    /// Rotates an invariant subspace into axes of descending variance, and keeps those with any variance.
     fn rotate(&mut self, sample: &Sample, subspace: Vec<f64>, wanted: usize, total: f64) {
         let padded = self.padded;
         let m = subspace.len() / padded;
@@ -135,7 +135,7 @@ impl Pca {
         let mut order: Vec<usize> = (0..m).collect();
         order.sort_by(|&a, &b| variances[b].total_cmp(&variances[a]));
         for &v in order.iter().take(wanted) {
-            // Below this, single-precision rows have nothing but rounding to say.
+            // Below this, single-precision rows contain only rounding errors.
             if variances[v] <= 1e-11 * total || variances[v] <= 0.0 {
                 break;
             }
@@ -150,7 +150,7 @@ impl Pca {
     }
 }
 
-/// Gram-Schmidt, twice over each row; rows that vanish become zero.
+/// Gram-Schmidt orthonormalisation, twice for each row; rows that vanish become zero.
 fn orthonormalise(rows: &mut [f64], length: usize) {
     use crate::solve::vector::{add_scaled, dot};
     for i in 0..rows.len() / length {
@@ -174,7 +174,7 @@ fn jacobi(mut a: Vec<f64>, n: usize) -> (Vec<f64>, Vec<f64>) {
     let mut v = vec![0.0; n * n];
     (0..n).for_each(|i| v[i * n + i] = 1.0);
     let scale: f64 = a.iter().map(|x| x * x).sum();
-    // Convergence is quadratic: thirty sweeps are several times what any matrix needs.
+    // Convergence is quadratic; thirty sweeps are several times as many as any matrix needs.
     for _ in 0..30 {
         let mut off = 0.0;
         for p in 0..n {
@@ -231,7 +231,7 @@ mod tests {
         }
     }
 
-    /// Materials on a plane: two axes, and distances on them are those of the tangent.
+    /// Materials on a plane have two axes, and distances in their coordinates equal those in the tangent.
     #[test]
     fn axes_of_a_plane_keep_its_distances() {
         let columns = Columns::new(&Space::half_angle(8), &[1.0; 24]);

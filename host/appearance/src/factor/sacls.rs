@@ -1,14 +1,13 @@
-//! Sparse alternating constrained least squares: the paper's first choice of factoring.
+//! Sparse alternating constrained least squares, the paper's first method of factoring.
 //!
-//! Problem: `min |Z - A B|^2`, A on the simplex row by row, B not negative, with most of each pixel in one basis.
-//! Method: in the metric's tangent at the mean material, where distances are Euclidean. Weights by exact simplex
-//! least squares with a penalty `lambda s` on all but the dominant weight of each material (s the mean squared
-//! length of Z); bases by non-negative least squares, column by column with one shared matrix. The penalty ramps
-//! up over the first part of the iterations and is then held until the objective settles; while it is held the
-//! objective never rises.
-//! Cost: `O(materials k columns)` an iteration. Limits: nothing keeps bases inside the document, and they leave it,
-//! often by more than its own spread: reconstruction is the best of all methods, printing need not be.
-//! Source: Lawrence et al. 2006 for the problem; the ramp is our own.
+//! Problem: `min |Z - A B|^2`, the rows of A on the simplex, B not negative, with most of each pixel in one basis.
+//! Method: works in the tangent of the metric at the mean material, where distances are Euclidean. Weights by exact simplex
+//! least squares with a penalty `lambda s` on all but the dominant weight of each material (s: the mean squared length of
+//! Z); bases by non-negative least squares, column by column with one shared matrix. The penalty grows over the first
+//! iterations and then stays constant until the objective settles; from then on the objective never rises.
+//! Cost: `O(materials k columns)` per iteration. Limits: nothing keeps the bases inside the document, and they leave it,
+//! often by more than its spread. Reconstruction is the best of all methods, but prints need not be.
+//! Source: Lawrence et al. 2006 for the problem; the growing penalty is new here.
 
 use crate::solve::{Gram, Simplex};
 
@@ -16,14 +15,14 @@ use super::columns::{accumulate, dot, mix};
 use super::parts;
 use super::sample::Sample;
 
-/// Most iterations; the penalty is at its full strength after [`RAMP`] of them.
+/// The most iterations; the penalty has its full strength after [`RAMP`] of them.
 pub(super) const ITERATIONS: usize = 60;
 const RAMP: usize = 36;
-/// Relative fall of the objective that counts as settled.
+/// The relative decrease of the objective below which it has settled.
 const SETTLED: f64 = 1e-4;
 
-/// Improves `bases` (rows of the sample's columns); `lambda` is the sparsity. `done` is called after each
-/// iteration, with the objective once the penalty is held.
+/// Improves `bases` (rows of the sample's columns); `lambda` is the sparsity. `done` is called after each iteration, with
+/// the objective once the penalty is constant.
 pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: impl FnMut(Option<f64>)) {
     let padded = sample.columns.padded;
     let k = bases.len() / padded;
@@ -34,7 +33,7 @@ pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: 
     for iteration in 0..ITERATIONS {
         let held = iteration >= RAMP;
         let strength = lambda * (iteration.min(RAMP) as f64 / RAMP as f64);
-        // The first round has no dominant weights to favour yet: plain least squares.
+        // The first round has no dominant weights yet: plain least squares.
         let step = code(sample, bases, &tangent2, &mut weights, 0.5 * strength * scale);
         solve_bases(&step, bases, padded);
         let objective = held.then(|| objective(sample, bases, &tangent2, &weights, strength * scale));
@@ -48,13 +47,13 @@ pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: 
     }
 }
 
-/// What the basis step needs of the weights: `A'A` and `A'X`, materials weighted.
+/// The normal equations of the basis step: `A'A` and `A'X`, weighted by material.
 struct Normal {
     matrix: Vec<f64>,
     right: Vec<f64>,
 }
 
-/// The weights of every material, its dominant one favoured by `bonus`; and their normal equations.
+/// Computes the weights of every material, with a `bonus` for the dominant one. Returns their normal equations.
 fn code(sample: &Sample, bases: &[f32], tangent2: &[f32], weights: &mut [f64], bonus: f64) -> Normal {
     let padded = sample.columns.padded;
     let k = bases.len() / padded;
@@ -91,8 +90,8 @@ fn code(sample: &Sample, bases: &[f32], tangent2: &[f32], weights: &mut [f64], b
     normal
 }
 
-/// Non-negative least squares for every column, by coordinate descent from the bases as they are: each step lowers
-/// the objective, and the bases nearly solve the problem already.
+/// Non-negative least squares for every column, by coordinate descent from the current bases. Each step lowers the
+/// objective, and the current bases nearly solve the problem already.
 fn solve_bases(normal: &Normal, bases: &mut [f32], padded: usize) {
     let k = bases.len() / padded;
     let mut b = vec![0.0; k];
@@ -111,7 +110,7 @@ fn nnls(matrix: &[f64], right: impl Fn(usize) -> f64, b: &mut [f64]) {
         let mut size = 0.0f64;
         for l in 0..k {
             let row = &matrix[l * k..][..k];
-            // A basis no material uses stays where it is.
+            // A basis that no material uses does not move.
             if row[l] <= 1e-12 {
                 continue;
             }
@@ -164,7 +163,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against the optimality conditions, which know nothing of how the solution was found.
+        /// Checks the optimality conditions, which do not depend on the method.
         #[test]
         fn non_negative_least_squares_meets_its_optimality_conditions(
             a in prop::collection::vec(-1.0f64..1.0, 20 * 4), y in prop::collection::vec(-1.0f64..1.0, 20)
@@ -187,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn the_objective_never_rises_while_the_penalty_is_held() {
+    fn the_objective_never_rises_while_the_penalty_is_constant() {
         let sample = Sample::draw(&crate::factor::tests::noisy_mixtures(1500), 3).unwrap();
         let mut bases = sample.x[..4 * sample.columns.padded].to_vec();
         let mut held = Vec::new();

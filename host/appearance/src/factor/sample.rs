@@ -1,11 +1,11 @@
-//! Distinct materials of a document to learn from, with the share of its area each stands for.
+//! A sample of the distinct materials of a document, with the share of its area that each represents.
 //!
-//! Problem: a document has millions of pixels, a basis is decided by thousands.
-//! Method: one pixel, at a random place, from every cell of a grid over the document, so small areas are not
-//! missed by chance; cells in random order. Pixels that nobody could tell apart count as one material with the
-//! weight of all: those whose responses are equal after rounding, which keeps them within [`MERGED`].
-//! Cost: at most [`DRAWS`] rows are looked at and [`VALUES`] kept. Limits: a material on less than a cell of the
-//! document (a hundred-thousandth part of a large one) may go unseen.
+//! Problem: a document has millions of pixels; thousands are enough to learn bases.
+//! Method: one pixel from a random place in every cell of a grid over the document, so that small areas are not missed by
+//! chance; cells in random order. Indistinguishable pixels count as one material with their total weight: those whose
+//! responses are equal after rounding, which keeps them within [`MERGED`] of each other.
+//! Cost: at most [`DRAWS`] rows are read and [`VALUES`] values kept. Limits: a material that covers less than a cell of the
+//! document (a hundred-thousandth of a large one) may be missed.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -15,40 +15,38 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::brdf::Space;
-use crate::document::Materials;
+use crate::materials::Materials;
 
-use super::FactorError;
 use super::cbrt::cbrt;
 use super::columns::Columns;
+use super::error::{BRIGHTEST, FactorError};
 
-/// Most pixels looked at.
+/// The most pixels that are read.
 const DRAWS: usize = 1 << 16;
-/// Most materials kept.
+/// The most materials that are kept.
 const MATERIALS: usize = 20_000;
-/// Most values kept; long rows leave room for fewer materials, though never for less than [`FEWEST`].
+/// The most values that are kept. Long rows leave room for fewer materials, but never fewer than [`FEWEST`].
 const VALUES: usize = 1 << 22;
-/// Least room for materials, however long the rows.
+/// Room for at least this many materials, however long the rows.
 const FEWEST: usize = 1024;
-/// The distance (in the metric, where 0.01 is hard to see) merged materials stay within.
+/// The largest distance between merged materials, in the metric (0.01: barely visible).
 const MERGED: f64 = 0.005;
-/// No reflectance beyond this (1/sr) is taken for one: a mirror's peak as narrow as the sun is a tenth of it.
-pub(super) const BRIGHTEST: f32 = 1e6;
 
 /// Materials as rows of [`Columns`].
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
-    /// What the rows are in.
+    /// The columns of the rows.
     pub columns: Columns,
     /// The materials, `columns.padded` values each.
     pub x: Vec<f32>,
     /// Their responses, see [`Columns::respond`].
     pub t: Vec<f32>,
-    /// The share of the document each stands for; they sum to 1.
+    /// The share of the document that each represents; the shares sum to 1.
     pub weight: Vec<f64>,
 }
 
 impl Sample {
-    /// Draws from a document. The result depends on the document and the seed alone.
+    /// Draws a sample. The result depends only on the document and the seed.
     pub fn draw(document: &dyn Materials, seed: u64) -> Result<Sample, FactorError> {
         let space = document.space();
         let pixels = chosen_pixels(document.width(), document.height(), seed);
@@ -101,7 +99,7 @@ impl Sample {
         mean.into_iter().map(|m| m as f32).collect()
     }
 
-    /// About `n` of the materials, evenly picked (their order is random), with weights that sum to 1 again.
+    /// The first `n` materials, which are a fair choice because their order is random; their weights sum to 1 again.
     pub fn thinned(&self, n: usize) -> Sample {
         let n = n.clamp(1, self.len());
         let weight = self.weight[..n].to_vec();
@@ -115,10 +113,10 @@ impl Sample {
     }
 }
 
-/// Reads a pixel's reflectance and refuses what is none.
+/// Reads the reflectance of a pixel and checks it.
 pub(super) fn read(document: &dyn Materials, pixel: usize, row: &mut [f32]) -> Result<(), FactorError> {
     document.reflectance(pixel, row);
-    // One comparison a value, false for NaN: the loop stays a vector's.
+    // One comparison per value, false for NaN, so that the loop can be vectorised.
     if row.iter().all(|&v| v.abs() <= BRIGHTEST) {
         return Ok(());
     }
@@ -133,7 +131,7 @@ fn chosen_pixels(width: usize, height: usize, seed: u64) -> Vec<usize> {
     let cell = (width as f64 * height as f64 / DRAWS as f64).sqrt().max(1.0);
     let count = |n: usize| ((n as f64 / cell).floor() as usize).clamp(1, n.min(DRAWS));
     let (across, down) = (count(width), count(height));
-    // A document one pixel wide would have the other side's cells times one: still within the limit.
+    // Limits the product too, for documents one pixel wide or high.
     let (across, down) = (across.min(DRAWS / down.min(DRAWS)), down);
     let mut pixels = Vec::with_capacity(across * down);
     for j in 0..down {
@@ -152,10 +150,10 @@ fn chosen_pixels(width: usize, height: usize, seed: u64) -> Vec<usize> {
     pixels
 }
 
-/// Materials by their rounded response.
+/// Merges materials with equal rounded responses.
 struct Merge {
     length: usize,
-    /// From the cube root of reflectance to response, in rounding steps.
+    /// Factor from the cube root of reflectance to response, in rounding steps.
     steps: Vec<f32>,
     places: HashMap<u64, usize>,
     rows: Vec<f32>,
@@ -176,7 +174,7 @@ impl Merge {
     }
 
     fn rounded(&self, row: &[f32]) -> impl Iterator<Item = u32> {
-        // The floor is far below a step: everything under it rounds to 0. Values fit: 1e2 in response at most.
+        // The floor is far below a step, so smaller values round to 0. The response is at most 1e2, so values fit.
         row.iter().zip(&self.steps).map(|(&f, &steps)| (steps * cbrt(f.max(1e-20)) + 0.5) as u32)
     }
 
@@ -194,7 +192,7 @@ impl Merge {
                 None
             }
         };
-        // Two materials of one key are kept apart: only equal roundings merge.
+        // Materials with the same key but different roundings stay separate.
         if let Some(i) = place
             && self.rounded(&self.rows[i * self.length..][..self.length]).eq(self.rounded(row))
         {
@@ -253,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn even_a_line_of_pixels_is_covered_end_to_end() {
+    fn a_line_of_pixels_is_sampled_from_end_to_end() {
         for (width, height) in [(1, 10_000_000), (10_000_000, 1)] {
             let mut pixels = chosen_pixels(width, height, 1);
             pixels.sort_unstable();
@@ -263,9 +261,9 @@ mod tests {
         }
     }
 
-    /// Two materials side by side in every proportion: weights are areas.
+    /// Two materials side by side: their weights are their areas.
     #[test]
-    fn materials_weigh_as_much_as_they_cover() {
+    fn weights_are_areas() {
         struct Two(Space);
         impl Materials for Two {
             fn width(&self) -> usize {
@@ -278,7 +276,7 @@ mod tests {
                 &self.0
             }
             fn reflectance(&self, pixel: usize, out: &mut [f32]) {
-                // A hundred-thousandth more or less is the same material.
+                // Differences of 1e-5 are merged.
                 let same = 1.0 + 1e-5 * (pixel % 7) as f32;
                 out.fill(if pixel % 100 < 23 { 0.4 * same } else { 0.1 * same });
             }

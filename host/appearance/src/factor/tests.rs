@@ -1,4 +1,4 @@
-//! The stage as a whole, on made documents with known answers and on real textures.
+//! The stage as a whole, on synthetic documents with known results and on real textures.
 
 use std::path::Path;
 
@@ -7,10 +7,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::*;
+use crate::brdf::Space;
+use crate::materials::Materials;
 use crate::weights::ONE;
 use observe::Silent;
 
-/// Documents as rows given outright.
+/// Documents given as rows.
 struct Rows {
     width: usize,
     space: Space,
@@ -361,7 +363,7 @@ fn a_stronger_penalty_gives_purer_pixels() {
     assert!(sparse > plain, "{plain} {sparse}");
 }
 
-/// A tabulation that is no half-angle curve: five directions of unequal worth, one of which nobody sees.
+/// A tabulation other than half-angle curves: five directions with unequal weights, one of them zero.
 #[test]
 fn any_linear_tabulation_goes_through() {
     let space = Space::tabulated(&[1.0, 0.9, 0.5, 0.2, 0.0], &[0.3, 0.1, 0.0, 0.2, 0.4]).unwrap();
@@ -381,7 +383,7 @@ fn any_linear_tabulation_goes_through() {
 }
 
 #[test]
-fn what_is_no_document_is_named() {
+fn invalid_documents_are_errors() {
     let space = Space::half_angle(4);
     let mut rows = vec![vec![0.1; space.columns()]; 6];
     let document = |rows: &Vec<Vec<f32>>| Rows { width: 3, space: space.clone(), rows: rows.clone() };
@@ -423,9 +425,9 @@ proptest! {
     }
 }
 
-/// The orderings the choice of the default rests on, on a real document of many materials.
+/// The comparison behind the default method, on a real document with many materials.
 #[test]
-fn on_real_materials_the_methods_stand_in_their_order() {
+fn on_real_materials_the_methods_rank_as_documented() {
     let Some(document) = Textures::open("helmet_metal", 6) else { return };
     let [archetypes, kmeans, sacls] = METHODS.map(|method| run(&document, method, 6).report);
     let out = |report: &Report| report.excursion.iter().sum::<f64>() / report.bases as f64;

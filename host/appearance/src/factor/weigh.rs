@@ -1,33 +1,33 @@
-//! Every pixel of a document as weights over given bases, and how far off that is.
+//! The weights of every pixel of a document over given bases, and the error of the result.
 //!
-//! Method: each distinct material is coded in the metric and rounded to fixed point, in runs of fixed length, in
-//! parallel; none knows another. Errors are those of the rounded weights. Cost: a few microseconds a distinct
-//! material; memory is the maps and a few numbers a pixel.
+//! Method: each distinct material is coded in the metric on its own and rounded to fixed point; runs of fixed length go to
+//! the threads. Errors are those of the rounded weights. Cost: a few microseconds per distinct material; memory for the
+//! maps and a few numbers per pixel.
 
 use rayon::prelude::*;
 
-use crate::document::{Distinct, Materials};
+use crate::materials::{Distinct, Materials};
 use crate::weights::{ONE, WeightMaps, quantise};
 use observe::Observer;
 
-use super::FactorError;
 use super::code::Coder;
 use super::columns::Columns;
+use super::error::FactorError;
 use super::sample::read;
 
-/// Pixels of a run.
+/// Materials per run.
 const RUN: usize = 4096;
-/// The distance that is hard to see.
+/// A barely visible distance.
 const COVERED: f32 = 0.01;
 
-/// Distances of pixels from their mixtures, in the metric.
+/// Distances between pixels and their mixtures, in the metric.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Errors {
     /// Root mean square.
     pub rmse: f64,
-    /// 95 of 100 pixels are at most this far off.
+    /// The distance that 95 % of the pixels do not exceed.
     pub p95: f64,
-    /// The worst.
+    /// The largest.
     pub max: f64,
     /// Share above 0.01.
     pub uncovered: f64,
@@ -45,7 +45,7 @@ pub(super) fn weigh(
     let distinct = Distinct::of(document);
     let mut data = vec![0u16; distinct.first().len() * k];
     let mut distance = vec![0.0f32; distinct.first().len()];
-    observer.begin("weighing pixels", distance.len() as u64);
+    observer.begin("computing weights", distance.len() as u64);
     let runs: Vec<Result<(), FactorError>> = data
         .par_chunks_mut(RUN * k)
         .zip(distance.par_chunks_mut(RUN))
@@ -57,7 +57,7 @@ pub(super) fn weigh(
         })
         .collect();
     observer.end();
-    // The first in reading order, whichever thread met one first.
+    // Reports the first error in reading order, whichever thread found one first.
     runs.into_iter().collect::<Result<(), _>>()?;
     let maps = WeightMaps::new(width, height, k, distinct.spread(&data, k))?;
     Ok((maps, measure(&mut distinct.spread(&distance, 1))))
@@ -89,14 +89,14 @@ fn weigh_run(
     Ok(())
 }
 
-/// Sums in runs of fixed length; the distances are left in another order.
+/// Adds in runs of fixed length; reorders the distances.
 fn measure(distance: &mut [f32]) -> Errors {
     let n = distance.len();
     let squares: f64 =
         distance.chunks(RUN).map(|run| run.iter().map(|&d| f64::from(d) * f64::from(d)).sum::<f64>()).sum();
     let uncovered = distance.iter().filter(|&&d| d > COVERED).count() as f64 / n as f64;
     let max = f64::from(distance.iter().copied().fold(0.0, f32::max));
-    // The least distance with 95 of 100 pixels at or under it.
+    // The smallest distance that at least 95 % of the pixels do not exceed.
     let place = (n * 95).div_ceil(100).max(1) - 1;
     let (_, p95, _) = distance.select_nth_unstable_by(place, f32::total_cmp);
     Errors { rmse: (squares / n as f64).sqrt(), p95: f64::from(*p95), max, uncovered }

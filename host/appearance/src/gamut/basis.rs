@@ -1,17 +1,20 @@
-//! Each basis by eq. 1, pruned, with its certificate.
+//! Mapping each basis by eq. 1, with pruning and a certificate.
 
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
-use super::cartridges::PRUNED;
-use super::{BasisReport, GamutError, Gloss, gloss};
+use super::error::GamutError;
+use super::gloss;
+use super::prune::prune;
+use super::report::BasisReport;
+use super::settings::Gloss;
 use crate::brdf::{Space, Table};
 use crate::solve::{Best, Mixer, MixtureError};
 use crate::weights::{ONE, quantise};
 
-/// The bases' mixtures over the candidates.
+/// The mixtures of the bases over the candidates.
 pub(super) struct Bases {
-    /// One row of shares for each basis, summing to [`ONE`].
+    /// One row of weights per basis, with sum [`ONE`].
     pub shares: Vec<Vec<u16>>,
     pub reports: Vec<BasisReport>,
     pub gloss_scale: Option<f64>,
@@ -89,7 +92,7 @@ fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Ma
     let target = candidates.free.target(row)?;
     let best = mixer.best(&candidates.priced, &target)?;
     let mut weights = best.weights.clone();
-    // The price has decided which stacks; among them the distance alone counts.
+    // The price has selected the stacks; the final weights minimise the distance alone.
     let unpruned = mixer.polish(&candidates.free, &target, &mut weights, 0.0)?.distance;
     let mut distance = unpruned;
     while prune(&mut weights) {
@@ -99,50 +102,4 @@ fn map_row(row: &[f64], candidates: &Candidates, mixer: &mut Mixer) -> Result<Ma
     quantise(&weights, &mut shares);
     let printed = candidates.reflectance(shares.iter().map(|&s| f64::from(s) / f64::from(ONE)));
     Ok(Mapping { best, weights, shares, printed, pruning_cost: distance - unpruned })
-}
-
-/// Drops weights below 0.5 %; whether there were any. The largest always stays: it is at least one part in 256.
-pub(super) fn prune(weights: &mut [f64]) -> bool {
-    let small = |w: f64| w > 0.0 && w < PRUNED;
-    if !weights.iter().any(|&w| small(w)) {
-        return false;
-    }
-    let largest = weights.iter().copied().fold(0.0, f64::max);
-    let mut sum = 0.0;
-    let mut dropped = false;
-    for w in weights.iter_mut() {
-        if small(*w) && *w < largest {
-            *w = 0.0;
-            dropped = true;
-        }
-        sum += *w;
-    }
-    if sum > 0.0 {
-        weights.iter_mut().for_each(|w| *w /= sum);
-    }
-    dropped
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn small_weights_are_dropped_and_the_rest_sum_to_one() {
-        let mut weights = [0.6, 0.004, 0.0, 0.396];
-        assert!(prune(&mut weights));
-        assert_eq!(weights[1], 0.0);
-        assert!(
-            (weights.iter().sum::<f64>() - 1.0).abs() < 1e-15 && (weights[0] - 0.6 / 0.996).abs() < 1e-15
-        );
-        assert!(!prune(&mut weights));
-    }
-
-    /// More than two hundred equal weights are all small: those that are the largest stay.
-    #[test]
-    fn the_largest_weight_stays_however_small() {
-        let mut weights = vec![1.0 / 250.0; 250];
-        prune(&mut weights);
-        assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);
-    }
 }

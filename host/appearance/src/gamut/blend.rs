@@ -1,38 +1,38 @@
-//! How much of the clamped mixture a pixel gets, smoothly over the picture.
+//! The weight of the clamped mixture at each pixel, smooth over the document.
 //!
-//! Problem: clamping is best inside the gamut and loses differences outside; the mapped bases keep differences
-//! everywhere and are never exact. Any average of the two is printable.
-//! Method: s falls from 1 at an invisible distance to 0 at a plain one (smoothstep), then a guided filter makes
-//! it smooth within a material and lets it change where the material does, so that no border appears that the
-//! document does not have. Cost: 20 passes over the picture, independent of the radius.
+//! Problem: clamping is best inside the gamut and loses differences outside; the mapped bases keep differences everywhere
+//! and are never exact. Any average of the two is printable.
+//! Method: the weight s falls from 1 at an invisible distance to 0 at an obvious one (smoothstep). A guided filter then
+//! smooths it within a material and lets it change where the material does, so that no new edges appear.
+//! Cost: 20 passes over the pixels, independent of the radius.
 //! Source: He, Sun & Tang 2010 for the filter; the guide is the mean cube root of the reflected radiance.
 
 use rayon::prelude::*;
 
-use super::basis::prune;
+use super::prune::prune;
 use crate::weights::{ONE, WeightMaps, quantise};
 
-/// Distance up to which a clamped pixel counts as in the gamut, and from which as far out.
+/// The distance up to which a clamped pixel counts as in the gamut, and the one from which it counts as far outside.
 const INVISIBLE: f32 = 0.01;
-const PLAIN: f32 = 0.05;
-/// Half the filter's window, in pixels, and the difference in brightness that is an edge.
+const OBVIOUS: f32 = 0.05;
+/// Half the window of the filter, in pixels, and the difference in brightness that counts as an edge.
 const RADIUS: usize = 8;
 const EDGE: f64 = 0.02;
 
-/// The weight of the clamped mixture, 0..=1 for each pixel, from its distance and its brightness.
+/// The weight of the clamped mixture at each pixel, 0..=1, from its distance and brightness.
 pub(super) fn shares(distance: &[f32], brightness: &[f32], width: usize) -> Vec<f32> {
     let near: Vec<f32> = distance
         .iter()
         .map(|&d| {
-            let t = ((PLAIN - d) / (PLAIN - INVISIBLE)).clamp(0.0, 1.0);
+            let t = ((OBVIOUS - d) / (OBVIOUS - INVISIBLE)).clamp(0.0, 1.0);
             t * t * (3.0 - 2.0 * t)
         })
         .collect();
     guided(&near, brightness, width, RADIUS, EDGE * EDGE)
 }
 
-/// Averages each pixel's clamped shares (over as many candidates as a row of `bases` has) with what its weights
-/// make of the mapped bases; `s` is the part of the former. Shares below 0.5 % are left out.
+/// Averages the clamped weights of each pixel (over as many candidates as a row of `bases` has) with its mixture of the
+/// mapped bases; `s` is the weight of the former. Weights below 0.5 % are left out.
 pub(super) fn mix(clamped: &mut [u16], s: &[f32], maps: &WeightMaps, bases: &[Vec<u16>]) {
     let k = bases[0].len();
     clamped.par_chunks_mut(k * 1024).enumerate().for_each(|(chunk, clamped)| {
@@ -56,7 +56,7 @@ pub(super) fn mix(clamped: &mut [u16], s: &[f32], maps: &WeightMaps, bases: &[Ve
     });
 }
 
-/// The guided filter, its result limited to 0..=1.
+/// The guided filter, with the result limited to 0..=1.
 fn guided(signal: &[f32], guide: &[f32], width: usize, radius: usize, edge: f64) -> Vec<f32> {
     let mean = |values: Vec<f64>| box_mean(&values, width, radius);
     let signal = || signal.iter().map(|&v| f64::from(v));
@@ -76,14 +76,14 @@ fn guided(signal: &[f32], guide: &[f32], width: usize, radius: usize, edge: f64)
     guide().enumerate().map(|(i, g)| (slope[i] * g + offset[i]).clamp(0.0, 1.0) as f32).collect()
 }
 
-/// The mean over a window of `2 radius + 1` pixels each way, cut off at the picture's edge.
+/// The mean over a square window of `2 radius + 1` pixels, cut off at the edges.
 fn box_mean(values: &[f64], width: usize, radius: usize) -> Vec<f64> {
     let height = values.len() / width;
     let mut across = vec![0.0; values.len()];
     across.par_chunks_mut(width).zip(values.par_chunks(width)).for_each(|(out, row)| {
         window_means(width, radius, |x| row[x], |x, mean| out[x] = mean);
     });
-    // Columns become rows so that both passes read memory in order.
+    // Transposed, so that both passes read memory in order.
     let turned: Vec<f64> = (0..values.len()).map(|i| across[i % height * width + i / height]).collect();
     let mut down = vec![0.0; values.len()];
     down.par_chunks_mut(height).zip(turned.par_chunks(height)).for_each(|(out, column)| {
@@ -143,8 +143,8 @@ mod tests {
         assert!(shares.iter().all(|s| (s - 0.5).abs() < 1e-6), "{:?}", &shares[..4]);
     }
 
-    /// Two flat materials side by side, one printable and one far out: the share jumps with the material and is
-    /// flat on either side.
+    /// Two flat materials side by side, one printable and one far outside: the weight changes with the material and is
+    /// constant on either side.
     #[test]
     fn shares_change_where_the_material_does() {
         let width = 64;

@@ -1,41 +1,36 @@
-//! The stacks that may be used, as the solver sees them.
+//! The stacks that can be used, in the form the solver needs.
 
 use inks::{InkSet, Library, Stack};
 
-use crate::brdf::{Space, Table};
-use crate::solve::hull::LAYER_PRICE;
-use crate::solve::{Hull, MixtureError};
+use crate::brdf::{self, Space, Table};
+use crate::solve::{Hull, LAYER_PRICE, MixtureError};
 
-/// What the printer can print: stacks and their curves. Only stacks of inks that are at hand.
+/// The stacks that can be printed with the available inks, and their curves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printable {
-    /// The stacks, each once, at most 255 beside the substrate.
+    /// The stacks, each once; at most 255 besides the substrate.
     pub stacks: Vec<Stack>,
-    /// Their reflectance in 1/sr, one a row, in the tabulation of the document.
+    /// Their reflectance in 1/sr, one per row, in the tabulation of the document.
     pub curves: Table,
 }
 
 impl Printable {
-    /// The stacks of a library that need no ink but these, in a half-angle space.
+    /// The stacks of a library that need only these inks, in a half-angle space.
     pub fn from_library(library: &Library, at_hand: &InkSet, space: &Space) -> Printable {
-        let mut curves = Table::new(space.columns());
-        let mut stacks = Vec::new();
-        for entry in library.at_hand(at_hand) {
-            curves.push(&space.row(&entry.curve_at(space.angles())));
-            stacks.push(entry.stack.clone());
-        }
-        Printable { stacks, curves }
+        let entries = library.at_hand(at_hand);
+        let stacks = entries.iter().map(|entry| entry.stack.clone()).collect();
+        Printable { stacks, curves: brdf::rows(space, entries) }
     }
 }
 
-/// Stacks and their hull, once with the price of their layers and once without.
+/// Stacks and their hulls, with and without the price of their layers.
 pub(super) struct Candidates {
     pub stacks: Vec<Stack>,
     pub inks: Vec<InkSet>,
     pub curves: Table,
-    /// With the price of the layers: what decides ties.
+    /// With the price of the layers, which decides ties.
     pub priced: Hull,
-    /// Without: what distances are reported by.
+    /// Without the price, for reported distances.
     pub free: Hull,
 }
 

@@ -1,24 +1,23 @@
-//! Which cartridges to load: the machine holds seven, the library knows more.
+//! Choosing cartridges: the printer holds seven, the library has more.
 //!
-//! Problem: of the inks the best mixtures use, keep as many as fit with the least loss.
-//! Method: greedy. While too many are in use, the mixtures are solved again without each of them in turn, and the
-//! one whose loss (mean squared distance) is least is given up. Cost: targets times inks in use for each ink given
-//! up, about 50 microseconds each. Limits: greedy is not optimal; with two inks that replace each other it can
-//! keep neither when a third would have been the better loss.
+//! Problem: of the inks in the best mixtures, keep as many as fit with the smallest loss.
+//! Method: greedy. While there are too many inks, the mixtures are solved again without each of them in turn, and the ink
+//! with the smallest loss (mean squared distance) is left out. Cost: targets times inks in use for each ink left out, about
+//! 50 microseconds each. Limits: a greedy choice is not optimal. For example, it may leave out both of two inks that can
+//! replace each other where leaving out a third ink would have been better.
 
 use inks::InkSet;
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
-use super::{GamutError, GivenUp};
+use super::error::GamutError;
+use super::prune::PRUNED;
+use super::report::GivenUp;
 use crate::solve::{Hull, Mixer, MixtureError, Target};
 use observe::Observer;
 
-/// Weights below this are pruned, so they load no cartridge.
-pub(super) const PRUNED: f64 = 0.005;
-
-/// The stacks to mix from so that at most `most` inks are used, and what was given up for that.
+/// The stacks to mix from so that at most `most` inks are used, and the inks left out.
 pub(super) fn choose(
     candidates: &Candidates,
     targets: &[Target],
@@ -42,7 +41,7 @@ pub(super) fn choose(
         let inks: Vec<Ink> = inks_of(&used).iter().collect();
         if inks.len() <= most {
             observer.end();
-            // Only inks in use: a pixel outside the sample must not load another.
+            // Only inks in use, so that a pixel outside the sample cannot need another cartridge.
             let inks = InkSet::of(inks);
             allowed.retain(|&k| candidates.inks[k].iter().all(|ink| inks.contains(ink)));
             return if allowed.is_empty() {
@@ -75,7 +74,7 @@ pub(super) fn choose(
 
 #[derive(Clone)]
 struct Solved {
-    /// Over all candidates.
+    /// One weight per candidate.
     weights: Vec<f64>,
     distance: f64,
 }
@@ -86,7 +85,7 @@ fn mean_square(solved: &[Solved], importance: &[f64]) -> f64 {
     if total > 0.0 { sum / total } else { 0.0 }
 }
 
-/// The best mixture of the allowed stacks for each target; one that did without an ink before is as it was.
+/// The best mixture of the allowed stacks for each target. Mixtures that did not use the ink that is left out are kept.
 fn solve_all(
     candidates: &Candidates,
     allowed: &[usize],

@@ -1,36 +1,36 @@
-//! Eq. 1 at every pixel.
+//! Mapping every pixel by eq. 1.
 //!
-//! Problem: a million constrained fits of the perceptual metric, which the 2009 paper puts at hours or days.
-//! Method: each distinct material, in reading order, starts from the one before, whose mixture is nearly its own;
-//! three or four steps with eight stacks in the quadratic, all stacks priced, end with a gap below 1e-7 in squared
-//! distance. Weights below 0.5 % are pruned and the rest solved again. Runs of fixed length go to the threads
-//! whole, so the result does not depend on how many there are.
-//! Cost: about 10 microseconds a distinct material and core. Limits: the one before is a start like any other:
-//! where E is not convex the certificate is a statement about the valley it led to.
+//! Problem: a million constrained fits in the perceptual metric, which takes hours or days according to the 2009 paper.
+//! Method: each distinct material, in reading order, starts from the mixture of the one before, which is usually similar.
+//! Three or four steps, with eight stacks in the quadratic and the gradient of all stacks, reach a gap below 1e-7 in
+//! squared distance. Weights below 0.5 % are pruned and the others solved again. Each thread takes whole runs of fixed
+//! length, so the result does not depend on the number of threads.
+//! Cost: about 10 microseconds per distinct material and core. Limits: the start matters where E is not convex; there the
+//! certificate holds only for the local minimum that was found.
 
 use rayon::prelude::*;
 
-use super::GamutError;
-use super::basis::prune;
 use super::candidates::Candidates;
+use super::error::GamutError;
+use super::prune::prune;
 use crate::brdf::{Space, Table};
-use crate::document::{Distinct, Materials};
+use crate::materials::{Distinct, Materials};
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::quantise;
 use observe::Observer;
 
-/// Materials that are walked as one.
+/// Materials per run.
 const RUN: usize = 4096;
-/// A gap in squared distance that no eye could tell from none: at d = 0.01 it is 5e-6 in d.
+/// An invisible gap in squared distance: at d = 0.01 it is 5e-6 in d.
 const ENOUGH: f64 = 1e-7;
 
-/// Every pixel's mixture over the candidates.
+/// The mixture of every pixel over the candidates.
 pub(super) struct Clamped {
-    /// Interleaved fixed-point shares, one for each candidate; each pixel's sum to [`ONE`].
+    /// Interleaved fixed-point weights, one per candidate; those of each pixel sum to [`ONE`](crate::weights::ONE).
     pub shares: Vec<u16>,
-    /// Distance of each pixel and its mixture.
+    /// Distance between each pixel and its mixture.
     pub distance: Vec<f32>,
-    /// Mean cube root of each pixel's radiance in the metric: what the eye sees of it.
+    /// Mean cube root of the radiance of each pixel in the metric: its perceived brightness.
     pub brightness: Vec<f32>,
     /// The largest gap, in squared distance.
     pub gap: f64,
@@ -86,7 +86,7 @@ pub(super) fn map(
     })
 }
 
-/// What clamping prints (1/sr) for targets given as rows.
+/// The printed reflectance (1/sr) of clamped targets, given as rows.
 pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, GamutError> {
     let mut mixer = Mixer::new();
     let mut printed = Table::new(targets.columns());
@@ -104,20 +104,20 @@ pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, Ga
     Ok(printed)
 }
 
-/// One pixel's outcome.
+/// The result for one pixel.
 #[derive(Clone, Copy)]
-pub(super) struct Met {
+struct Met {
     pub distance: f64,
     pub gap: f64,
     pub brightness: f64,
 }
 
-/// Walks from pixel to pixel.
-pub(super) struct Walker {
+/// Maps one pixel after another.
+struct Walker {
     mixer: Mixer,
     target: Target,
     row: Vec<f32>,
-    /// The last pixel's mixture before pruning, and after it.
+    /// The mixture of the last pixel, before and after pruning.
     start: Vec<f64>,
     weights: Vec<f64>,
     started: bool,
@@ -138,7 +138,7 @@ impl Walker {
         }
     }
 
-    /// Maps a pixel, starting from the one before.
+    /// Maps a pixel, starting from the mixture of the last one.
     pub fn pixel(
         &mut self,
         candidates: &Candidates,
@@ -157,7 +157,7 @@ impl Walker {
         let mut distance = fit.distance;
         if prune(&mut self.weights) {
             distance = self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?.distance;
-            // Whatever has become small now is not worth another round.
+            // Weights that have become small now are not worth another round.
             prune(&mut self.weights);
         }
         quantise(&self.weights, out);

@@ -1,9 +1,9 @@
-//! A mapped document as a folder: `mix.toml` and one 16-bit grey PNG for each weight map.
+//! A mapped document as a folder: `mix.toml` and one 16-bit grey PNG per weight map.
 //!
-//! `mix.toml` names the stacks and the matrix; `weights-000.png` and so on hold weight `w` (of 32768) as
-//! `w * 65535 / 32768`, rounded, so that white is full weight in any viewer; reading gives back the same weights.
-//! Reading is strict: sizes, sums and unknown keys are errors that name file and field. Writing fills a folder
-//! file by file, each appearing whole; whoever wants the folder as a whole to appear at once renames it.
+//! `mix.toml` holds the stacks and the matrix. `weights-000.png` and so on hold a weight `w` (of 32768) as
+//! `w * 65535 / 32768`, rounded, so that full weight is white in any viewer; reading restores the same weights. Reading is
+//! strict: wrong sizes, wrong sums and unknown keys are errors that name the file and the field. Each file is written under
+//! a temporary name and renamed; a caller that needs the whole folder to appear at once must rename it too.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Read, Write};
@@ -17,8 +17,8 @@ use super::mix::{InkMix, MixError};
 use crate::weights::{ONE, WeightError, WeightMaps};
 
 /// The name of the description in the folder.
-pub const FILE_NAME: &str = "mix.toml";
-/// What the description says it is.
+const FILE_NAME: &str = "mix.toml";
+/// The format that the description declares.
 const FORMAT: &str = "foilpress-mix-1";
 /// The largest `mix.toml` read, in bytes.
 const LONGEST: u64 = 4 << 20;
@@ -29,14 +29,14 @@ const MOST_WEIGHTS: usize = 1 << 29;
 #[derive(Debug, thiserror::Error)]
 pub enum MixFileError {
     /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be read or written", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The description is not what it should be.
+    /// The description is invalid.
     #[error("{}: {problem}", path.display())]
     Description {
         /// The file.
@@ -51,43 +51,43 @@ pub enum MixFileError {
         path: PathBuf,
         /// What is wrong.
         problem: String,
-        /// Pixels across the description gives.
+        /// Pixels across, from the description.
         width: usize,
-        /// Pixels down the description gives.
+        /// Pixels down, from the description.
         height: usize,
     },
     /// The weight maps do not fit together.
-    #[error("weight maps in {}: {source}", path.display())]
+    #[error("{}: the weight maps cannot be used", path.display())]
     Weights {
         /// The folder.
         path: PathBuf,
-        /// Which rule they break.
+        /// What is wrong.
         source: WeightError,
     },
     /// Stacks and matrix do not fit together.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: the mixtures cannot be used", path.display())]
     Mix {
         /// The file.
         path: PathBuf,
-        /// Which rule they break.
+        /// What is wrong.
         source: MixError,
     },
 }
 
-/// Where a mix comes from, in words; kept with it.
+/// The origin of a mix, stored with it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
-    /// The document it was made of.
+    /// The document.
     #[serde(default)]
     pub document: String,
-    /// How it was mapped.
+    /// How the document was mapped.
     #[serde(default)]
     pub mapping: String,
-    /// The ink library it was made with.
+    /// The ink library.
     #[serde(default)]
     pub library: String,
-    /// The document's own width and height on paper in millimetres.
+    /// Width and height of the document on paper in millimetres.
     #[serde(default)]
     pub size_mm: Option<(f64, f64)>,
 }
@@ -106,7 +106,7 @@ struct Description {
     provenance: Provenance,
 }
 
-/// Writes a mix to a folder, which is created if it is not there.
+/// Writes a mix to a folder, which is created if it does not exist.
 pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), MixFileError> {
     let described = folder.join(FILE_NAME);
     mix.check().map_err(|source| MixFileError::Mix { path: described.clone(), source })?;
@@ -120,7 +120,7 @@ pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), 
         }
         let path = folder.join(map_name(channel));
         let (Ok(width), Ok(height)) = (u32::try_from(maps.width()), u32::try_from(maps.height())) else {
-            let problem = "a PNG cannot be that large".to_string();
+            let problem = "too large for a PNG".to_string();
             return Err(MixFileError::Map { path, problem, width: maps.width(), height: maps.height() });
         };
         whole(&path, |file| {
@@ -144,11 +144,11 @@ pub fn save(mix: &InkMix, provenance: &Provenance, folder: &Path) -> Result<(), 
     };
     let text = toml::to_string(&description)
         .map_err(|e| MixFileError::Description { path: described.clone(), problem: e.to_string() })?;
-    // Last: a folder without a description is no mix.
+    // Last, because a folder without a description is not a mix.
     whole(&described, |file| file.write_all(text.as_bytes()))
 }
 
-/// Writes a file beside its name and renames it.
+/// Writes a file under a temporary name in the same folder and renames it.
 fn whole(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&File>) -> std::io::Result<()>,
@@ -165,7 +165,7 @@ fn whole(
     Ok(())
 }
 
-/// Reads a mix and where it comes from.
+/// Reads a mix and its origin.
 pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
     let path = folder.join(FILE_NAME);
     let wrong = |problem: String| MixFileError::Description { path: path.clone(), problem };
@@ -173,7 +173,7 @@ pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
     let mut text = String::new();
     File::open(&path).map_err(io)?.take(LONGEST + 1).read_to_string(&mut text).map_err(io)?;
     if text.len() as u64 > LONGEST {
-        return Err(wrong(format!("longer than {LONGEST} bytes")));
+        return Err(wrong(format!("the file is longer than {LONGEST} bytes")));
     }
     let described: Description = toml::from_str(&text).map_err(|e| wrong(e.to_string()))?;
     let Description { format, width, height, one, stacks, matrix, provenance } = described;
@@ -185,16 +185,16 @@ pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
     }
     let channels = matrix.len();
     if channels == 0 {
-        return Err(wrong("`matrix` has no row; one for each weight map is needed".into()));
+        return Err(wrong("`matrix` has no rows; expected one per weight map".into()));
     }
     let total = width.checked_mul(height).and_then(|n| n.checked_mul(channels));
     if width == 0 || height == 0 || total.is_none_or(|n| n > MOST_WEIGHTS) {
         return Err(wrong(format!(
-            "`width`, `height` and the rows of `matrix` give {width} x {height} pixels with {channels} weights; 1 \
-             to {MOST_WEIGHTS} weights can be read"
+            "`width`, `height` and the rows of `matrix` give {width} x {height} pixels with {channels} weights each; \
+             expected 1 to {MOST_WEIGHTS} weights in total"
         )));
     }
-    // Maps are read one by one before room for all of them is taken: the description alone allocates nothing.
+    // The first map is read before memory for all maps is allocated, so the description alone allocates nothing.
     let mut data = Vec::new();
     for channel in 0..channels {
         let path = folder.join(map_name(channel));
@@ -222,14 +222,14 @@ fn read_map(path: &Path, width: usize, height: usize) -> Result<Vec<u8>, MixFile
     let info = reader.info();
     let found = (info.width as usize, info.height as usize);
     if found != (width, height) {
-        return Err(wrong(format!("{} x {} pixels", found.0, found.1)));
+        return Err(wrong(format!("it has {} x {} pixels", found.0, found.1)));
     }
     if (info.color_type, info.bit_depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
-        return Err(wrong(format!("{:?} with {:?} bits", info.color_type, info.bit_depth)));
+        return Err(wrong(format!("its pixels are {:?} with {:?} bits", info.color_type, info.bit_depth)));
     }
     let mut bytes = vec![0; width * height * 2];
     reader.next_frame(&mut bytes).map_err(|e| wrong(e.to_string()))?;
-    // The checksum of the last chunk is only looked at here.
+    // Only this verifies the checksum of the last chunk.
     reader.finish().map_err(|e| wrong(e.to_string()))?;
     Ok(bytes)
 }
@@ -270,7 +270,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.contains(from), "{text}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
-        load(folder.path()).unwrap_err().to_string()
+        observe::with_causes(&load(folder.path()).unwrap_err())
     }
 
     #[test]
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_saved_is_loaded() {
+    fn loading_restores_what_was_saved() {
         let folder = saved();
         let (loaded, provenance) = load(folder.path()).unwrap();
         assert_eq!(loaded, mix());
@@ -325,7 +325,7 @@ mod tests {
         }
         std::fs::copy(folder.path().join("weights-000.png"), &path).unwrap();
         let error = load(folder.path()).unwrap_err();
-        assert!(error.to_string().contains("pixel (0, 0)"), "{error}");
+        assert!(observe::with_causes(&error).contains("pixel (0, 0)"), "{error}");
         std::fs::remove_file(&path).unwrap();
         assert!(matches!(load(folder.path()), Err(MixFileError::Io { .. })));
     }

@@ -1,19 +1,19 @@
-//! Common gloss scaling of the bases: figure 5's ladder when every rung is a basis.
+//! Scaling the gloss of all bases by one factor, as the ladder of figure 5 needs if every step is a basis.
 //!
-//! Problem: eq. 1 maps each basis by itself, so bases that lie beyond the gamut in the same direction are printed
-//! alike. Method: the gloss of a basis is what it reflects above its least value over all configurations, channel
-//! by channel; all gloss is multiplied by one factor, the least of the factors by which the printed bases follow
-//! their targets' gloss (least squares in the metric), so that the most extreme basis just reaches the gamut and
-//! ratios of gloss survive. Cost: a line search a basis. Limits: one factor cannot narrow a lobe, only lower it.
+//! Problem: eq. 1 maps each basis on its own, so bases that lie outside the gamut in the same direction are printed alike.
+//! Method: the gloss of a basis is its reflectance above the minimum over all configurations, channel by channel. For each
+//! basis, the factor on its gloss that fits the printed basis best is computed (least squares in the metric). All gloss is
+//! multiplied by the smallest of these factors, so the most extreme basis just reaches the gamut and ratios of gloss
+//! survive. Cost: one line search per basis. Limits: a factor cannot narrow a lobe, only lower it.
 
 use crate::brdf::{Space, Table};
 
-/// Two rows differ when they are farther apart than this...
+/// Two rows differ if their distance exceeds this.
 pub(super) const DIFFERENT: f64 = 0.03;
-/// ...and are merged when they are printed at less than this share of it.
+/// Two rows that differ are merged if they are printed at less than this share of their distance.
 pub(super) const MERGED: f64 = 0.25;
 
-/// Whether some bases that differ are printed alike.
+/// The number of pairs of different bases that are printed alike.
 pub(super) fn merges(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> usize {
     let mut merged = 0;
     for i in 0..targets.len() {
@@ -38,7 +38,7 @@ pub(super) fn scaled(rows: &Table, factor: f64) -> Table {
     out
 }
 
-/// The least reflectance of each channel: what is not gloss.
+/// The minimum of each channel: the part that is not gloss.
 fn base(row: &[f64]) -> [f64; 3] {
     let mut base = [f64::INFINITY; 3];
     for (j, &f) in row.iter().enumerate() {
@@ -47,14 +47,14 @@ fn base(row: &[f64]) -> [f64; 3] {
     base.map(f64::abs)
 }
 
-/// The factor in 0.02..=1 on the gloss of all bases by which the most extreme of them is printed.
+/// The factor (0.02..=1) on the gloss of all bases that brings the most extreme one into the gamut.
 pub(super) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f64 {
     let mut least = 1.0f64;
     for (i, printed) in printed.iter().enumerate() {
         let mut one = Table::new(targets.columns());
         one.push(targets.row(i));
         let miss = |log: f64| space.distance(scaled(&one, log.exp()).row(0), printed);
-        // Golden section on the logarithm; the distance has one valley along the factor.
+        // Golden-section search on the logarithm; the distance has a single minimum along the factor.
         let golden = 0.618_033_988_749_895;
         let (mut low, mut high) = (0.02f64.ln(), 0.0);
         let (mut x, mut y) = (high - golden * (high - low), low + golden * (high - low));
@@ -70,7 +70,7 @@ pub(super) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f6
                 at_y = miss(y);
             }
         }
-        // At the end of the range the valley lies beyond it: the gloss is printed in full.
+        // If the minimum lies beyond the end of the range, the gloss is printed in full.
         let found = 0.5 * (low + high);
         let full = miss(0.0);
         if miss(found) < full - 1e-9 {

@@ -1,52 +1,52 @@
-//! The mapped document as the halftoner reads it.
+//! The mapped document in the form the halftoner reads.
 
 use inks::Stack;
 use protocol::ink::Ink;
 
 use crate::weights::{ONE, WeightMaps};
 
-/// What the halftoner reads: at a pixel with weights `a`, stack q has the share `sum_i a_i matrix[i][q]`.
+/// The input of the halftoner: at a pixel with weights `a`, stack q has the weight `sum_i a_i matrix[i][q]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InkMix {
-    /// The stacks in use. The bare substrate is always the first, even where it has no share.
+    /// The stacks in use. The bare substrate is always the first, even if it has no weight.
     pub stacks: Vec<Stack>,
-    /// Weights over the rows of `matrix`, at the document's own resolution.
+    /// Weights over the rows of `matrix`, at the resolution of the document.
     pub maps: WeightMaps,
-    /// One row of `stacks.len()` shares for each channel of `maps`; each row sums to [`crate::weights::ONE`].
+    /// One row of `stacks.len()` weights per channel of `maps`; each row sums to [`crate::weights::ONE`].
     pub matrix: Vec<Vec<u16>>,
 }
 
-/// Which rule of mixes is broken.
+/// Why some parts are not a mix.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MixError {
-    /// The substrate is first and only there, no stack comes twice, and there are 256 at most.
-    #[error("stack {index} (`{stack}`): a mix has the substrate first, then at most 255 different stacks")]
+    /// The substrate must come first and only there, no stack may occur twice, and there can be at most 256.
+    #[error("stack {index} (`{stack}`): expected the substrate first, then at most 255 different stacks")]
     Stacks {
         /// Position in the list.
         index: usize,
         /// The stack.
         stack: Stack,
     },
-    /// As many rows as weight maps.
-    #[error("{rows} rows of shares for {channels} weight maps; one each is needed")]
+    /// The number of rows differs from the number of weight maps.
+    #[error("the matrix has {rows} rows for {channels} weight maps; expected one each")]
     Rows {
         /// Rows found.
         rows: usize,
         /// Weight maps.
         channels: usize,
     },
-    /// A row has a share for each stack.
-    #[error("row {row} has {found} shares for {stacks} stacks; one each is needed")]
+    /// The length of a row differs from the number of stacks.
+    #[error("row {row} of the matrix has {found} weights for {stacks} stacks; expected one each")]
     Shares {
         /// The row.
         row: usize,
-        /// Shares found.
+        /// Weights found.
         found: usize,
         /// Stacks.
         stacks: usize,
     },
-    /// The shares of a row sum to one.
-    #[error("the shares of row {row} sum to {sum}, not {ONE}")]
+    /// The weights of a row do not sum to one.
+    #[error("the weights in row {row} of the matrix sum to {sum}, not {ONE}")]
     Sum {
         /// The row.
         row: usize,
@@ -56,14 +56,14 @@ pub enum MixError {
 }
 
 impl InkMix {
-    /// A mix from its parts, if they keep the rules.
+    /// A mix from its parts, if they are valid.
     pub fn new(stacks: Vec<Stack>, maps: WeightMaps, matrix: Vec<Vec<u16>>) -> Result<InkMix, MixError> {
         let mix = InkMix { stacks, maps, matrix };
         mix.check()?;
         Ok(mix)
     }
 
-    /// Whether the parts keep the rules of a mix.
+    /// Checks that the parts are valid.
     pub fn check(&self) -> Result<(), MixError> {
         if self.stacks.is_empty() {
             return Err(MixError::Stacks { index: 0, stack: Stack::SUBSTRATE });
@@ -91,14 +91,14 @@ impl InkMix {
         Ok(())
     }
 
-    /// The share of each stack at a pixel, in 0..=1; `out` has a place for each stack. They sum to 1 to rounding.
+    /// The weight of each stack at a pixel, in 0..=1; `out` has one place per stack. The weights sum to 1 up to rounding.
     pub fn shares(&self, pixel: usize, out: &mut [f64]) {
         out.fill(0.0);
         let unit = 1.0 / (f64::from(ONE) * f64::from(ONE));
         for (&weight, row) in self.maps.at(pixel).iter().zip(&self.matrix) {
             if weight > 0 {
                 for (out, &share) in out.iter_mut().zip(row) {
-                    // Exact: products of two weights are whole numbers below 2^31, and so are their sums.
+                    // Exact, because products of two weights are integers up to 2^30, and so are their sums.
                     *out += f64::from(u32::from(weight) * u32::from(share));
                 }
             }
@@ -106,7 +106,7 @@ impl InkMix {
         out.iter_mut().for_each(|share| *share *= unit);
     }
 
-    /// The inks of the stacks that have a share anywhere, in the order of the ink codes.
+    /// The inks of the stacks with any weight, in the order of their codes.
     pub fn inks(&self) -> Vec<Ink> {
         let used =
             |q: &usize| self.matrix.iter().any(|row| row[*q] > 0) && !self.stacks[*q].layers().is_empty();

@@ -1,4 +1,4 @@
-//! A sample of pixels: what cartridges and intent are chosen by before the whole picture is mapped.
+//! A sample of pixels, by which cartridges and intent are chosen before the whole document is mapped.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,12 +6,12 @@ use rand_chacha::ChaCha8Rng;
 use super::gloss::{DIFFERENT, MERGED};
 use super::mix::InkMix;
 use crate::brdf::{Space, Table};
-use crate::document::Materials;
+use crate::materials::Materials;
 
-/// Pairs of pixels that are compared.
+/// Number of pairs of pixels that are compared.
 const PAIRS: usize = 20_000;
 
-/// Pixels drawn one from each of equal stretches of the picture.
+/// Draws one pixel from each of equal stretches of the document.
 pub(super) fn pixels(total: usize, most: usize, seed: u64) -> Vec<usize> {
     let n = most.min(total);
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -19,7 +19,7 @@ pub(super) fn pixels(total: usize, most: usize, seed: u64) -> Vec<usize> {
     (0..n).map(|i| random.random_range(edge(i)..edge(i + 1))).collect()
 }
 
-/// The reflectance of some pixels, one a row.
+/// The reflectance of some pixels, one per row.
 pub(super) fn rows(materials: &dyn Materials, pixels: &[usize]) -> Table {
     let columns = materials.space().columns();
     let mut buffer = vec![0f32; columns];
@@ -33,7 +33,7 @@ pub(super) fn rows(materials: &dyn Materials, pixels: &[usize]) -> Table {
     out
 }
 
-/// What a mix prints at some pixels, one a row; `curves` are those of its stacks.
+/// The printed reflectance of a mix at some pixels, one per row; `curves` are those of its stacks.
 pub(super) fn printed(mix: &InkMix, curves: &Table, pixels: &[usize]) -> Table {
     let mut shares = vec![0.0; mix.stacks.len()];
     let mut row = vec![0.0; curves.columns()];
@@ -51,16 +51,16 @@ pub(super) fn printed(mix: &InkMix, curves: &Table, pixels: &[usize]) -> Table {
     out
 }
 
-/// Share of random pairs of rows that differ (d > 0.03) and are printed at less than a quarter of that.
+/// Share of random pairs of rows that differ (d > 0.03) but are printed at less than a quarter of that distance.
 ///
-/// `targets` and `printed` have the same rows. Fewer than two rows have no pairs: 0.
-pub fn merged_share(space: &Space, targets: &Table, printed: &Table, seed: u64) -> f64 {
+/// `targets` and `printed` have corresponding rows. The share is 0 for fewer than two rows.
+pub(super) fn merged_share(space: &Space, targets: &Table, printed: &Table, seed: u64) -> f64 {
     let n = targets.len().min(printed.len());
     if n < 2 {
         return 0.0;
     }
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    // Rows come up in many pairs; their cube roots cost most.
+    // Every row is in many pairs, and its cube roots cost most.
     let seen = |table: &Table| table.rows().map(|row| space.seen(row)).collect::<Vec<_>>();
     let (targets, printed) = (seen(targets), seen(printed));
     let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
@@ -88,8 +88,7 @@ mod tests {
         assert_eq!(pixels(7, 1000, 4), (0..7).collect::<Vec<_>>());
     }
 
-    /// Half of the rows are printed alike though they differ: sampling finds the share that counting all ordered
-    /// pairs gives.
+    /// Half of the rows are printed alike though they differ. Sampling finds the same share as counting all ordered pairs.
     #[test]
     fn merged_pairs_are_counted() {
         let space = Space::half_angle(8);

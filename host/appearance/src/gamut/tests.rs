@@ -6,8 +6,8 @@ use protocol::ink::Ink;
 
 use super::*;
 use crate::brdf::{Space, Table};
-use crate::document::Surface;
-use crate::weights::quantise;
+use crate::materials::{Factored, Materials, Surface};
+use crate::weights::{ONE, WeightMaps, quantise};
 use observe::Silent;
 
 fn space() -> Space {
@@ -170,7 +170,7 @@ fn ladder(space: &Space) -> (Printable, Vec<Curve>) {
     (Printable { stacks, curves }, [1.0, 0.8, 0.5, 0.1].map(gloss).to_vec())
 }
 
-/// The share of the gloss coat in each pixel of a four-pixel picture of the ladder.
+/// The weight of the gloss coat in each pixel of a four-pixel image of the ladder.
 fn rungs(bases: &[usize], weight: impl Fn(usize, usize) -> f64, settings: &Settings) -> (Vec<f64>, Report) {
     let space = space();
     let (printable, curves) = ladder(&space);
@@ -209,7 +209,7 @@ fn without_scaling_the_upper_rungs_are_clamped_together() {
     assert_eq!(report.gloss_scale, None);
 }
 
-/// The paper's own case: the extremes are the bases, and the rungs between them keep their relative places.
+/// The case of the paper: the extremes are the bases, and the steps between them keep their relative positions.
 #[test]
 fn the_ladder_stays_a_ladder_when_its_ends_are_the_bases() {
     let gloss = [1.0, 0.8, 0.5, 0.1];
@@ -259,7 +259,7 @@ fn reports_say_what_the_mix_prints() {
     }
 }
 
-/// Seven cartridges do, five do, one does, and with none there is only paper; each limit costs distance.
+/// Seven, five, one and no cartridges (only paper) all work; each limit costs distance.
 #[test]
 fn fewer_cartridges_are_kept_to_and_cost_distance() {
     let space = space();
@@ -321,7 +321,7 @@ fn field(space: &Space, width: usize, height: usize) -> Field {
     Field { space: space.clone(), width, surfaces }
 }
 
-/// Clamped pixels are each as near as eq. 1 from all starts gets, whatever their neighbours were.
+/// Each clamped pixel is as near as eq. 1 gets from all starts, whatever its neighbours.
 #[test]
 fn every_clamped_pixel_is_its_own_best() {
     let space = space();
@@ -346,7 +346,7 @@ fn every_clamped_pixel_is_its_own_best() {
     assert!(report.gap <= 1e-7 && report.rms <= report.max && report.p95 <= report.max, "{report:?}");
 }
 
-/// Any number of threads, the same bits.
+/// The result is equal bit for bit for any number of threads.
 #[test]
 fn mapping_is_the_same_with_any_number_of_threads() {
     let space = space();
@@ -363,7 +363,7 @@ fn mapping_is_the_same_with_any_number_of_threads() {
     is_printable(&one.mix, 7);
 }
 
-/// The blend is the clamped mix where that is near, and its reported part lies between none and all.
+/// The blend equals the clamped mix where that is near, and its reported weight lies between 0 and 1.
 #[test]
 fn blending_follows_the_clamped_mix_inside_the_gamut() {
     let space = space();
@@ -384,7 +384,7 @@ fn blending_follows_the_clamped_mix_inside_the_gamut() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_named() {
+fn inconsistent_inputs_are_errors() {
     let space = space();
     let printable = everything(&space);
     let document = document(&space, &four(), pattern(4, 4));
@@ -410,6 +410,6 @@ fn what_does_not_fit_together_is_named() {
     assert_eq!(fails(&fewer, None, &printable), GamutError::Channels { bases: 1, channels: 4 });
     let mut bad = document.clone();
     bad.bases.row_mut(2)[5] = f64::NAN;
-    let error = fails(&bad, None, &printable).to_string();
+    let error = observe::with_causes(&fails(&bad, None, &printable));
     assert!(error.contains("basis 2") && error.contains("column 5"), "{error}");
 }

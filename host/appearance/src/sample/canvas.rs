@@ -1,16 +1,16 @@
-//! What the samples are drawn with: noise, shapes as distances, and materials laid over each other.
+//! Tools for drawing the samples: noise, shapes as distances, and layers of materials.
 //!
-//! Shapes are signed distances in pixels (negative inside), so that one number gives edges, rims and shadows.
-//! Strokes are stamped: each segment touches only the pixels near it.
+//! Shapes are signed distances in pixels (negative inside), so that one number gives edges, rims and shadows. Each segment
+//! of a stroke changes only the pixels near it.
 
 use rayon::prelude::*;
 
-use super::{Finish, Painting};
+use super::painting::{Finish, Painting};
 
 /// A point or a vector, in pixels, y down.
 pub type Point = [f32; 2];
 
-/// A material while it is being mixed; colours are linear.
+/// A material during drawing; colours are linear.
 #[derive(Clone, Copy, Debug)]
 pub struct Coat {
     /// Base colour, linear.
@@ -27,7 +27,7 @@ impl Coat {
         Coat { base: colour(hex), roughness, metallic }
     }
 
-    /// `share` (0 to 1) of another coat over this one.
+    /// This coat under `share` (0 to 1) of another.
     pub fn under(self, other: Coat, share: f32) -> Coat {
         let share = share.clamp(0.0, 1.0);
         Coat {
@@ -46,33 +46,33 @@ impl Coat {
 
 /// An sRGB colour as linear values.
 pub fn colour(hex: u32) -> [f32; 3] {
-    [hex >> 16, hex >> 8, hex].map(|v| crate::document::picture::decode_srgb((v & 255) as f32 / 255.0))
+    [hex >> 16, hex >> 8, hex].map(|v| crate::srgb::decode((v & 255) as f32 / 255.0))
 }
 
-/// From `a` to `b`.
+/// Interpolates from `a` to `b`.
 pub fn mix(a: f32, b: f32, s: f32) -> f32 {
     a + (b - a) * s
 }
 
-/// From `a` to `b`, colour by colour.
+/// Interpolates from `a` to `b`, channel by channel.
 pub fn mix3(a: [f32; 3], b: [f32; 3], s: f32) -> [f32; 3] {
     std::array::from_fn(|c| mix(a[c], b[c], s))
 }
 
-/// 0 below `low`, 1 above `high`, smooth between; `low > high` falls instead.
+/// 0 below `low`, 1 above `high`, smooth between; falls if `low > high`.
 pub fn smooth(low: f32, high: f32, v: f32) -> f32 {
     let s = ((v - low) / (high - low)).clamp(0.0, 1.0);
     s * s * (3.0 - 2.0 * s)
 }
 
-/// How much of a pixel at that signed distance lies inside the shape.
+/// The share of a pixel that lies inside a shape at this signed distance.
 pub fn inside(distance: f32) -> f32 {
     smooth(0.7, -0.7, distance)
 }
 
-/// A number in 0..1 for a place on a grid.
+/// A pseudo-random number in 0..1 for a grid point.
 pub fn hash(x: i32, y: i32, seed: u32) -> f32 {
-    // Integer finaliser of two rounds; any good mixing serves.
+    // An integer finaliser with two rounds; any good mixing function would do.
     let mut v = (x as u32).wrapping_mul(0x9E37_79B1)
         ^ (y as u32).wrapping_mul(0x85EB_CA77)
         ^ seed.wrapping_mul(0xC2B2_AE3D);
@@ -93,7 +93,7 @@ pub fn noise(x: f32, y: f32, seed: u32) -> f32 {
     mix(top, bottom, sy)
 }
 
-/// Octaves of noise, each half as strong and twice as fine, 0 to 1.
+/// Octaves of noise, each with half the amplitude and about twice the frequency, 0 to 1.
 pub fn clouds(x: f32, y: f32, octaves: u32, seed: u32) -> f32 {
     let (mut sum, mut weight, mut scale) = (0.0, 0.5, 1.0);
     for octave in 0..octaves {
@@ -104,7 +104,7 @@ pub fn clouds(x: f32, y: f32, octaves: u32, seed: u32) -> f32 {
     sum / (1.0 - 0.5f32.powi(octaves as i32))
 }
 
-/// Distances to the nearest and second nearest of points scattered one to a unit cell.
+/// Distances to the nearest and the second nearest of random points, one per unit cell.
 pub fn cells(x: f32, y: f32, seed: u32) -> (f32, f32) {
     let (fx, fy) = (x.floor(), y.floor());
     let (mut first, mut second) = (9.0f32, 9.0f32);
@@ -125,7 +125,7 @@ pub fn cells(x: f32, y: f32, seed: u32) -> (f32, f32) {
     (first.sqrt(), second.sqrt())
 }
 
-/// Distance from a point to a segment whose radius goes from `ra` to `rb`.
+/// Distance from a point to a segment whose radius changes from `ra` to `rb`.
 pub fn capsule(p: Point, a: Point, b: Point, ra: f32, rb: f32) -> f32 {
     let (pa, ba) = ([p[0] - a[0], p[1] - a[1]], [b[0] - a[0], b[1] - a[1]]);
     let length = (ba[0] * ba[0] + ba[1] * ba[1]).max(1e-9);
@@ -134,7 +134,7 @@ pub fn capsule(p: Point, a: Point, b: Point, ra: f32, rb: f32) -> f32 {
     (dx * dx + dy * dy).sqrt() - mix(ra, rb, s)
 }
 
-/// The union of two shapes with the crease between them filled over about `k` pixels.
+/// The union of two shapes, with the crease between them filled over about `k` pixels.
 pub fn blend(a: f32, b: f32, k: f32) -> f32 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.min(b) - h * h * k * 0.25
@@ -156,7 +156,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Nothing drawn; distances are capped at `reach`.
+    /// An empty shape; distances are limited to `reach`.
     pub fn new(width: usize, height: usize, reach: f32) -> Shape {
         Shape { width, height, reach, distance: vec![reach; width * height] }
     }
@@ -192,7 +192,7 @@ impl Shape {
         self.stroke(centre, centre, radius, radius);
     }
 
-    /// A stroke through points, with a radius for the share of its length passed (0 to 1).
+    /// A stroke through points, with the radius as a function of the position along it (0 to 1).
     pub fn line(&mut self, points: &[Point], radius: impl Fn(f32) -> f32) {
         let last = (points.len().max(2) - 1) as f32;
         for (i, pair) in points.windows(2).enumerate() {
@@ -228,7 +228,7 @@ impl Shape {
     }
 }
 
-/// Paints every pixel, on all cores: `coat` gets the pixel's number and its centre.
+/// Paints every pixel, on all cores; `coat` receives the index of the pixel and its centre.
 pub fn paint(
     width: usize,
     height: usize,
@@ -256,18 +256,17 @@ pub fn paint(
     }
 }
 
-/// 0 to 1 as a byte.
+/// Converts 0..1 to a byte.
 pub fn byte(v: f32) -> u8 {
     (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
 /// A linear value as an sRGB byte.
 pub fn encode(v: f32) -> u8 {
-    use palette::encoding::{FromLinear, Srgb};
-    byte(<Srgb as FromLinear<f32, f32>>::from_linear(v.clamp(0.0, 1.0)))
+    byte(crate::srgb::encode(v))
 }
 
-/// A smooth function of the place, sampled every few pixels and linear between.
+/// A smooth function of the position, sampled every few pixels and interpolated linearly.
 pub struct Coarse {
     across: usize,
     down: usize,
@@ -276,7 +275,7 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// Samples `f` every `step` pixels over a picture, on all cores.
+    /// Samples `f` every `step` pixels, on all cores.
     pub fn sample(width: usize, height: usize, step: usize, f: impl Fn(Point) -> f32 + Sync) -> Coarse {
         let (across, down) = (width / step + 2, height / step + 2);
         let values = (0..across * down)
@@ -287,7 +286,7 @@ impl Coarse {
         Coarse { across, down, step: step as f32, values }
     }
 
-    /// The value at a place; places outside count as the border's.
+    /// The value at a point; points outside take the value at the border.
     pub fn at(&self, p: Point) -> f32 {
         let cell = |v: f32, n: usize| {
             let v = (v / self.step).clamp(0.0, (n - 1) as f32);

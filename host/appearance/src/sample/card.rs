@@ -2,8 +2,8 @@
 
 use std::f32::consts::TAU;
 
-use super::Painting;
 use super::canvas::{Coat, Point, Shape, bezier, clouds, hash, inside, mix, noise, paint, smooth};
+use super::painting::Painting;
 
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 1443;
@@ -96,8 +96,8 @@ fn star(shape: &mut Shape, centre: Point, radius: f32, turn: f32) {
     }
 }
 
-/// Draws the card.
-pub fn draw() -> Painting {
+/// The word, the border and its flourishes.
+fn gilding() -> Shape {
     let (width, height) = (WIDTH as f32, HEIGHT as f32);
     let mut gold = Shape::new(WIDTH, HEIGHT, 6.0);
     pen(&mut gold, &WORD, [268.0, 560.0], 142.0, 2.6, 13.0);
@@ -117,7 +117,12 @@ pub fn draw() -> Painting {
         let strokes = FLOURISH.map(|stroke| stroke.map(|p| [x * p[0], y * p[1]]));
         pen(&mut gold, &strokes, corner, 112.0, 1.6, 4.6);
     }
+    gold
+}
 
+/// Stars and dots.
+fn sky() -> Shape {
+    let width = WIDTH as f32;
     let mut silver = Shape::new(WIDTH, HEIGHT, 4.0);
     let stars = [
         ([268.0, 300.0], 74.0),
@@ -140,28 +145,39 @@ pub fn draw() -> Painting {
         let at = |k: i32, low: f32, high: f32| mix(low, high, hash(i, k, 12));
         silver.disc([at(0, 90.0, width - 90.0), at(1, 110.0, 1010.0)], at(2, 0.9, 2.8));
     }
+    silver
+}
 
-    // From the back: a pair of leaves to each layer.
-    let layers = [(-62.0, 190.0), (-20.0, 310.0), (14.0, 262.0)].map(|(degrees, length)| {
+/// The leaves and their veins in layers, the lowest first, with a pair of leaves in each.
+fn sprig() -> [(Shape, Shape); 3] {
+    [(-62.0, 190.0), (-20.0, 310.0), (14.0, 262.0)].map(|(degrees, length)| {
         let (mut leaves, mut veins) = (Shape::new(WIDTH, HEIGHT, 26.0), Shape::new(WIDTH, HEIGHT, 4.0));
         holly(&mut leaves, &mut veins, [530.0, 1200.0], degrees, length);
         holly(&mut leaves, &mut veins, [494.0, 1200.0], 180.0 - degrees, length);
         (leaves, veins)
-    });
-    let berries: [(Point, f32); 5] = [
-        ([470.0, 1196.0], 37.0),
-        ([548.0, 1186.0], 40.0),
-        ([508.0, 1246.0], 38.0),
-        ([508.0, 1136.0], 30.0),
-        ([590.0, 1240.0], 27.0),
-    ];
-    let berry = |p: Point| {
-        berries.iter().fold((f32::MAX, 0), |best, (c, r)| {
-            let d = ((p[0] - c[0]).powi(2) + (p[1] - c[1]).powi(2)).sqrt() - r;
-            if d < best.0 { (d, (*r * 8.0) as u32) } else { best }
-        })
-    };
+    })
+}
 
+/// Centres and radii of the berries.
+const BERRIES: [(Point, f32); 5] = [
+    ([470.0, 1196.0], 37.0),
+    ([548.0, 1186.0], 40.0),
+    ([508.0, 1246.0], 38.0),
+    ([508.0, 1136.0], 30.0),
+    ([590.0, 1240.0], 27.0),
+];
+
+/// The signed distance to the nearest berry, and its radius in eighths of a pixel.
+fn berry(p: Point) -> (f32, u32) {
+    BERRIES.iter().fold((f32::MAX, 0), |best, (c, r)| {
+        let d = ((p[0] - c[0]).powi(2) + (p[1] - c[1]).powi(2)).sqrt() - r;
+        if d < best.0 { (d, (*r * 8.0) as u32) } else { best }
+    })
+}
+
+/// Draws the card.
+pub fn draw() -> Painting {
+    let (gold, silver, layers) = (gilding(), sky(), sprig());
     let paper = Coat::new(0x1D3B34, 0.95, 0.0);
     let (gold_coat, silver_coat) = (Coat::new(0xE8B955, 0.22, 1.0), Coat::new(0xE2E4E6, 0.2, 1.0));
     let (leaf, vein) = (Coat::new(0x4F9A4B, 0.36, 0.0), Coat::new(0xA9CE8C, 0.45, 0.0));

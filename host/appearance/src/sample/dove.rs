@@ -1,19 +1,19 @@
 //! A dove in silver with a glossy olive twig, on matte blue.
 
-use super::Painting;
 use super::canvas::{Coat, Point, Shape, bezier, clouds, inside, mix, noise, paint, smooth};
+use super::painting::Painting;
 
 const WIDTH: usize = 1280;
 const HEIGHT: usize = 960;
 
-/// How far below the coordinates everything is drawn.
+/// Vertical offset of everything drawn.
 const DROP: f32 = 118.0;
 
 fn dropped(p: Point) -> Point {
     [p[0], p[1] + DROP]
 }
 
-/// The outline of closed curves: each entry goes on from the end of the one before.
+/// A closed outline of curves: each entry continues from the end of the one before.
 fn closed(start: Point, curves: &[[Point; 3]]) -> Vec<Point> {
     let mut points = Vec::new();
     let mut from = start;
@@ -39,7 +39,7 @@ const BODY: [[Point; 3]; 8] = [
 /// A wing: a fan of feathers from a shoulder.
 struct Wing {
     shoulder: Point,
-    /// Where the feathers begin along the arm, from the shoulder to the wrist.
+    /// The end of the arm; feathers start along it from the shoulder.
     wrist: Point,
     /// Angles of the first and the last feather in degrees, y down.
     fan: (f32, f32),

@@ -1,9 +1,9 @@
-//! A rusted steel flange: a turned ring with bolt holes, bare metal where it was wiped, rust where it was not.
+//! A rusted steel flange: a turned ring with bolt holes, partly bare metal and partly rust.
 
 use std::f32::consts::TAU;
 
-use super::Painting;
 use super::canvas::{Coat, Point, cells, clouds, hash, inside, mix, noise, paint, smooth};
+use super::painting::Painting;
 
 const SIDE: usize = 1024;
 const CENTRE: Point = [512.0, 512.0];
@@ -62,7 +62,7 @@ pub fn draw() -> Painting {
         let scratch = smooth(1.4, 0.2, (across + 30.0 * (wear - 0.5)).abs());
         metal.roughness += 0.2 * scratch;
 
-        // Rust starts at rims, in holes and at the step of the face, and eats its way in.
+        // Rust starts at rims, in holes and at the step of the face, and spreads from there.
         let step = (radius - FACE).abs();
         let near =
             smooth(70.0, 0.0, -edge) * 0.22 + smooth(46.0, 0.0, hole) * 0.16 + smooth(26.0, 0.0, step) * 0.14

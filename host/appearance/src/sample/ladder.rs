@@ -1,18 +1,18 @@
 //! Four steps of gloss over one colour: figure 5 of the paper as a document.
 //!
-//! The specular part is 100, 80, 50 and 10 percent of one lobe, the diffuse part the same in all: only a map that
-//! keeps relative gloss keeps four steps.
+//! The specular part is 100, 80, 50 and 10 percent of one lobe, and the diffuse part is the same in all steps. Only a
+//! mapping that preserves relative gloss preserves four steps.
 
 use super::canvas::{Point, byte, encode, inside, mix};
-use super::{Finish, Painting};
+use super::painting::{Finish, Painting};
 
 /// Shares of the full gloss, from the left.
-pub const STEPS: [f32; 4] = [1.0, 0.8, 0.5, 0.1];
+const STEPS: [f32; 4] = [1.0, 0.8, 0.5, 0.1];
 
-/// Reflectance at normal incidence of the full gloss.
-pub const FULL: f32 = 0.6;
+/// Reflectance at normal incidence for full gloss.
+const FULL: f32 = 0.6;
 
-/// What the surface reflects diffusely, linear.
+/// The diffuse albedo, linear.
 const DIFFUSE: [f32; 3] = [0.05, 0.10, 0.17];
 
 const WIDTH: usize = 1024;
@@ -37,9 +37,9 @@ pub fn draw() -> Painting {
         let step = (p[0] as usize / 256).min(3);
         let centre = [step as f32 * 256.0 + 128.0, HEIGHT as f32 / 2.0];
         let share = inside(square(p, centre, 104.0, 14.0));
-        // Around the steps matte white, so that the sheet shows where the paper is.
+        // Matte white around the steps shows the paper.
         let specular = mix(0.04, STEPS[step] * FULL, share);
-        // The reader dims the diffuse part by 1 - f0; asking for more keeps it the same in all steps.
+        // Readers dim the diffuse part by 1 - f0; dividing by it first gives all steps the same diffuse part.
         base.push(DIFFUSE.map(|v| encode(mix(0.8, v / (1.0 - STEPS[step] * FULL), share))));
         f0.push([encode(specular); 3]);
         glossiness.push(byte(mix(0.1, 0.65, share)));

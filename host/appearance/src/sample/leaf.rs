@@ -1,13 +1,13 @@
 //! An autumn oak leaf: waxy gloss that varies, veins of metallic silver, on matte paper.
 //!
-//! The outline is a union of lobes, each a bent capsule around its own vein, with the creases between them filled
-//! so that lobes and bays are round. Finer veins leave the lobes' veins at an angle and bend towards the tip.
+//! The outline is a union of lobes, each a bent capsule around its own vein, with the creases between them filled so that
+//! lobes and bays are round. Finer veins branch off the veins of the lobes and bend toward the tip.
 
-use super::Painting;
 use super::canvas::{
     Coarse, Coat, Point, Shape, bezier, blend, capsule, cells, clouds, colour, hash, inside, mix, mix3,
     paint, smooth,
 };
+use super::painting::Painting;
 
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 1448;

@@ -1,6 +1,6 @@
-//! The matrix of inner products of a set of rows: all that least squares on their hull needs to know of them.
+//! The matrix of inner products of a set of rows: all that least squares on their hull needs to know about them.
 //!
-//! Cost: `n^2 / 2` inner products to form. Limits: dense and symmetric; meant for up to a few hundred rows.
+//! Cost: `n^2 / 2` inner products to build. Limits: dense and symmetric; meant for up to a few hundred rows.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -15,41 +15,13 @@ pub struct Gram {
     values: Vec<f64>,
     largest: f64,
     shift: f64,
-    /// Another one whenever the values change, in all the program.
+    /// Changes with the values; unique in the process.
     edition: u64,
 }
 
-/// Why numbers are not a Gram matrix.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GramError {
-    /// The numbers do not fill a square.
-    #[error("a {n} x {n} matrix of inner products needs {} values, not {found}", n * n)]
-    Size {
-        /// Rows.
-        n: usize,
-        /// Values given.
-        found: usize,
-    },
-    /// An entry is not finite, differs from its mirror image, or is negative on the diagonal.
-    #[error(
-        "entry ({row}, {column}) of a matrix of inner products is {value} and its mirror image {mirror}; they must \
-         be finite and equal, and not negative on the diagonal"
-    )]
-    Entry {
-        /// Row.
-        row: usize,
-        /// Column.
-        column: usize,
-        /// The entry.
-        value: f64,
-        /// The entry with row and column exchanged.
-        mirror: f64,
-    },
-}
-
 impl Gram {
-    /// An empty matrix to be filled with [`Gram::refill`].
-    pub fn empty() -> Gram {
+    /// An empty matrix, to be filled by [`Gram::refill`].
+    pub(crate) fn empty() -> Gram {
         Gram { n: 0, values: Vec::new(), largest: 0.0, shift: 1.0, edition: 0 }
     }
 
@@ -60,31 +32,9 @@ impl Gram {
         gram
     }
 
-    /// A matrix given as numbers, row by row: `n * n` of them, symmetric to one part in 1e9. Positive
-    /// semidefiniteness is the caller's promise; without it the solver still ends, with an honest gap.
-    pub fn from_values(n: usize, values: Vec<f64>) -> Result<Gram, GramError> {
-        if n.checked_mul(n) != Some(values.len()) || n == 0 {
-            return Err(GramError::Size { n, found: values.len() });
-        }
-        let mut gram = Gram { n, values, largest: 0.0, shift: 1.0, edition: 0 };
-        for row in 0..n {
-            for column in 0..=row {
-                let (value, mirror) = (gram.values[row * n + column], gram.values[column * n + row]);
-                let sound =
-                    value.is_finite() && (value - mirror).abs() <= 1e-9 * (value.abs() + mirror.abs());
-                if !sound || (row == column && value < 0.0) {
-                    return Err(GramError::Entry { row, column, value, mirror });
-                }
-                gram.values[column * n + row] = value;
-            }
-        }
-        gram.measure();
-        Ok(gram)
-    }
-
-    /// Replaces the matrix by the inner products of `n` rows of equal length, without allocating when it has
-    /// held as many before.
-    pub fn refill<'a>(&mut self, n: usize, row: impl Fn(usize) -> &'a [f64]) {
+    /// Replaces the matrix by the inner products of `n` rows of equal length. Does not allocate if it has held as many
+    /// rows before.
+    pub(crate) fn refill<'a>(&mut self, n: usize, row: impl Fn(usize) -> &'a [f64]) {
         self.n = n;
         self.values.clear();
         self.values.resize(n * n, 0.0);
@@ -99,9 +49,9 @@ impl Gram {
         self.measure();
     }
 
-    /// Replaces the matrix by `n * n` inner products computed elsewhere, in single precision say: `product(i, j)`
-    /// is asked for `j <= i` only and must be finite. Allocates no more than [`Gram::refill`].
-    pub fn refill_products(&mut self, n: usize, product: impl Fn(usize, usize) -> f64) {
+    /// Replaces the matrix by `n * n` inner products computed elsewhere, for example in single precision. `product(i, j)` is
+    /// called for `j <= i` only and must be finite. Allocates no more than [`Gram::refill`].
+    pub(crate) fn refill_products(&mut self, n: usize, product: impl Fn(usize, usize) -> f64) {
         self.n = n;
         self.values.clear();
         self.values.resize(n * n, 0.0);
@@ -138,30 +88,32 @@ impl Gram {
         &self.values[i * self.n..][..self.n]
     }
 
-    /// The largest squared length of a row: the scale rounding errors are measured by.
-    pub fn largest(&self) -> f64 {
+    /// The largest squared length of a row: the scale of rounding errors.
+    pub(super) fn largest(&self) -> f64 {
         self.largest
     }
 
-    /// A number that no matrix of other values has, so that a solver knows one it has met; 0 if there are no rows.
+    /// A number that differs between matrices of different values, so that a solver recognises one it has seen; 0 if there
+    /// are no rows.
     pub(super) fn edition(&self) -> u64 {
         self.edition
     }
 
-    /// What may be added to every entry without changing the problem on the simplex, where the weights sum to
-    /// one. It turns affinely independent rows into linearly independent ones.
+    /// A constant to add to every entry. It does not change the problem on the simplex, where the weights sum to one, but
+    /// turns affinely independent rows into linearly independent ones.
     pub(super) fn shift(&self) -> f64 {
         self.shift
     }
 }
 
-/// `h_i = a_i . x` for the rows of a table; `x` is as long as a row, `h` has at most a place for each row.
+/// `h_i = a_i . x` for the rows of a table; `x` is as long as a row, and `h` is at most as long as the table.
 ///
-/// Uses the widest vectors the machine has; the order of additions is the same with any, so the result is too.
+/// Uses the widest vectors of the processor. The order of additions does not depend on the width, and neither does the
+/// result.
 pub fn inner_products(rows: &Table, x: &[f64], h: &mut [f64]) {
     #[cfg(target_arch = "x86_64")]
     {
-        /// The same code, compiled for AVX: it multiplies and adds one after the other, so equal bit for bit.
+        /// The same code, compiled for AVX. It multiplies and adds in separate steps, so results are equal bit for bit.
         #[target_feature(enable = "avx")]
         fn wide(rows: &Table, x: &[f64], h: &mut [f64]) {
             products(rows, x, h);
@@ -212,14 +164,5 @@ mod tests {
             inner_products(&table, &x, &mut widest);
             prop_assert_eq!(plain, widest);
         }
-    }
-
-    #[test]
-    fn what_is_no_gram_matrix_is_named() {
-        assert!(Gram::from_values(2, vec![1.0; 3]).is_err());
-        let error = Gram::from_values(2, vec![1.0, 0.5, 0.4, 1.0]).unwrap_err();
-        assert_eq!(error, GramError::Entry { row: 1, column: 0, value: 0.4, mirror: 0.5 });
-        assert!(Gram::from_values(1, vec![-1.0]).is_err());
-        assert!(Gram::from_values(1, vec![f64::NAN]).is_err());
     }
 }

@@ -1,10 +1,10 @@
-//! The two sides of equation 1 as the metric sees them: the stacks that can be mixed, and a target.
+//! The two sides of equation 1 in the form the metric needs: the stacks that can be mixed, and a target.
 //!
 //! Problem: the metric compares cube roots of reflected radiance, weighted by column; tables hold reflectance.
-//! Method: both are brought to radiance once, targets to their cube roots too, and checked, so that the solver
-//! ([`super::mixture`]) meets only finite numbers of 0 or more.
-//! Cost: one multiplication a number and one cube root a column of a target. Limits: what is darker than
-//! a trillionth of the brightest stack is as dark as that, since the cube root has no slope at 0.
+//! Method: both are converted to radiance once, targets also to cube roots, and checked, so that the solver
+//! ([`super::Mixer`]) receives only finite numbers of 0 or more.
+//! Cost: one multiplication per number and one cube root per column of a target. Limits: radiance below a trillionth of
+//! the brightest stack counts as that much, since the cube root has no finite slope at 0.
 //! Source: the appendix of the 2009 paper.
 
 use crate::brdf::{Space, Table};
@@ -13,30 +13,30 @@ use super::root::inverse_cbrt;
 use super::simplex::SimplexError;
 use super::vector::add_scaled;
 
-/// Price of one layer of ink, in units of squared distance: what a tie is decided by.
-pub const LAYER_PRICE: f64 = 1e-6;
+/// Price of one layer of ink, in units of squared distance. It decides ties.
+pub(crate) const LAYER_PRICE: f64 = 1e-6;
 
-/// Darkest radiance told apart from black, relative to the brightest of any stack.
+/// Darkest radiance that differs from black, relative to the brightest radiance of any stack.
 pub(super) const DARKEST: f64 = 1e-12;
 
 /// Why there is no mixture.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MixtureError {
-    /// There is nothing to mix.
+    /// There are no stacks.
     #[error("there is no stack to mix from")]
     NoStacks,
-    /// The stacks or the target are in another tabulation.
-    #[error("{what} has {found} columns where the space has {expected}")]
+    /// The stacks or the target belong to another tabulation.
+    #[error("{what} has {found} columns, but the space has {expected}")]
     Columns {
-        /// What was given.
+        /// A stack or the target.
         what: &'static str,
         /// Columns of the space.
         expected: usize,
         /// Columns found.
         found: usize,
     },
-    /// As many prices as stacks are needed.
-    #[error("{stacks} stacks need as many prices and weights, not {found}")]
+    /// The number of prices or weights differs from the number of stacks.
+    #[error("{stacks} stacks need one price and one weight each; found {found}")]
     Length {
         /// Stacks.
         stacks: usize,
@@ -44,21 +44,21 @@ pub enum MixtureError {
         found: usize,
     },
     /// A reflectance is not a number, infinite or negative.
-    #[error("{what}, column {column}: a reflectance of {value} is not a finite number of 0 or more")]
+    #[error("{what}, column {column}: the reflectance {value} is not a finite number of 0 or more")]
     Value {
-        /// What was given.
+        /// A stack or the target.
         what: &'static str,
         /// The column.
         column: usize,
         /// The value.
         value: f64,
     },
-    /// The numbers are so large or small that products of them overflow.
+    /// Products of the numbers overflow.
     #[error(transparent)]
     Simplex(#[from] SimplexError),
 }
 
-/// The stacks as the metric sees them: reflected radiance, weights of the columns, prices.
+/// Stacks that can be mixed: reflected radiance, weights of the columns, prices.
 #[derive(Clone, Debug)]
 pub struct Hull {
     radiance: Vec<f64>,
@@ -68,7 +68,7 @@ pub struct Hull {
     pub(super) darkest: f64,
 }
 
-/// A target as the metric sees it.
+/// A target: its radiance and the cube roots of it.
 #[derive(Clone, Debug, Default)]
 pub struct Target {
     pub(super) radiance: Vec<f64>,
@@ -77,14 +77,14 @@ pub struct Target {
 
 impl Target {
     /// Integral of the cube root of the target's radiance over the metric's measure, all channels.
-    pub fn brightness(&self, hull: &Hull) -> f64 {
+    pub(crate) fn brightness(&self, hull: &Hull) -> f64 {
         self.root.iter().zip(&hull.weight).map(|(root, w)| root * w * w).sum()
     }
 }
 
 impl Hull {
-    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared
-    /// distance: [`LAYER_PRICE`] times its layers, or 0.
+    /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared distance.
+    /// Prices decide ties; 0 for none.
     pub fn new(space: &Space, curves: &Table, price: &[f64]) -> Result<Hull, MixtureError> {
         let m = space.columns();
         if curves.is_empty() {
@@ -120,7 +120,7 @@ impl Hull {
     }
 
     /// The hull of some of the stacks.
-    pub fn subset(&self, stacks: &[usize]) -> Hull {
+    pub(crate) fn subset(&self, stacks: &[usize]) -> Hull {
         let mut rows = Table::new(self.rows.columns());
         stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
         let price = stacks.iter().map(|&k| self.price[k]).collect();
@@ -132,13 +132,13 @@ impl Hull {
         self.rows.len()
     }
 
-    /// Never: a hull has at least one stack.
+    /// Always false: a hull has at least one stack.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Number of columns.
-    pub fn columns(&self) -> usize {
+    pub(super) fn columns(&self) -> usize {
         self.rows.columns()
     }
 
@@ -149,8 +149,8 @@ impl Hull {
         Ok(target)
     }
 
-    /// The same into an existing target, without allocating when it has been used before.
-    pub fn aim(
+    /// Like [`Hull::target`], but reuses the memory of an existing target.
+    pub(crate) fn aim(
         &self,
         reflectance: impl ExactSizeIterator<Item = f64>,
         target: &mut Target,
@@ -166,7 +166,7 @@ impl Hull {
         target.root.clear();
         target.root.resize(m, 0.0);
         for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
-            // Zero and what is too small for the root are black.
+            // Values too small for the root count as black.
             let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));
             *root = t * r * r;
         }
@@ -178,8 +178,8 @@ impl Hull {
         }
     }
 
-    /// The distance d of a mixture to a target.
-    pub fn distance(&self, weights: &[f64], target: &Target) -> f64 {
+    /// The distance d between a mixture and a target.
+    pub(super) fn distance(&self, weights: &[f64], target: &Target) -> f64 {
         let mut mix = vec![0.0; self.columns()];
         self.mix(weights, &mut mix);
         let mut sum = 0.0;
@@ -192,7 +192,7 @@ impl Hull {
         sum.sqrt()
     }
 
-    /// Reflected radiance of a mixture.
+    /// The reflected radiance of a mixture.
     pub(super) fn mix(&self, weights: &[f64], out: &mut [f64]) {
         out.fill(0.0);
         for (k, &w) in weights.iter().enumerate() {

@@ -1,17 +1,16 @@
 //! Equation 1: the mixture of printable stacks that looks most like a target.
 //!
 //! Problem: minimise `E(a) = sum_j W_j^2 (cbrt((Aa)_j) - cbrt(t_j))^2 + p'a` over the simplex, where the rows of A
-//! are the stacks' reflected radiances, t the target's, W the metric's weights and p a small price of each stack
+//! are the stacks' reflected radiances, t is the target's, W are the metric's weights and p is a small price of each stack
 //! that breaks ties toward fewer layers.
-//! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, its second
-//! derivative corrected to the exact one where that is positive; the model is minimised exactly by
-//! [`Simplex`] over the stacks in use and those whose gradient says they would help; Armijo's rule
-//! halves the step. It ends when the gap is as small as asked or the
-//! objective drops by less than 1e-12 of itself. All stacks are priced in
-//! every step, only a dozen enter the quadratic.
-//! Cost: K m multiplications a step for the prices (K stacks, m columns), about 5 steps from the tangent start and
-//! 2 from a neighbour's answer; no allocation. Limits: E is convex where no sample of the mixture is more than 8
-//! times the target; there the gap bounds the error, elsewhere several starts are the only assurance.
+//! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, with the exact second
+//! derivative where that is positive. [`Simplex`] minimises the model exactly over the stacks in use and those whose
+//! gradient shows that they would help; Armijo's rule halves the step. The search ends when the gap is small enough or the
+//! objective falls by less than 1e-12 of itself. Every step computes the gradient of all stacks; only a dozen enter the
+//! quadratic.
+//! Cost: K m multiplications per step for the gradient (K stacks, m columns), about 5 steps from the tangent start and 2
+//! from a neighbour's solution; no allocation. Limits: E is convex where no sample of the mixture exceeds 8 times the
+//! target. There the gap bounds the error; elsewhere several starts are the only assurance.
 //! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
 
 use super::gram::{Gram, inner_products};
@@ -22,47 +21,47 @@ use super::vector::{add_scaled, dot};
 
 /// Relative drop of the objective below which the search ends.
 const DROP: f64 = 1e-12;
-/// Steps taken at most; ten times what the slowest of a thousand random problems needs.
+/// The most steps; ten times as many as the slowest of a thousand random problems needs.
 const MOST_STEPS: u32 = 100;
-/// Halvings of a step before it counts as none.
+/// Halvings of a step before the search gives up.
 const MOST_HALVINGS: u32 = 30;
-/// Stacks that may join the mixture in one step.
+/// The most stacks that join the mixture in one step.
 const MOST_JOINING: usize = 12;
-/// Two starts agree when their distances differ by less than this.
+/// Two starts agree if their distances differ by less than this.
 const AGREEMENT: f64 = 1e-6;
 
-/// What is known of a mixture.
+/// How good a mixture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Distance d of mixture and target.
+    /// Distance d between mixture and target.
     pub distance: f64,
-    /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has `d^2 + p'a` lower by more than this.
+    /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has a value of `d^2 + p'a` lower by more than this.
     pub gap: f64,
     /// Steps taken.
     pub steps: u32,
-    /// No sample of the mixture is above 8 times the target, so E is convex around it and the gap is a bound.
+    /// No sample of the mixture exceeds 8 times the target, so E is convex around it and the gap is a bound.
     pub convex: bool,
 }
 
 /// The best mixture over several starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Best {
-    /// One weight for each stack, 0 or more, sum 1.
+    /// One weight per stack; 0 or more, with sum 1.
     pub weights: Vec<f64>,
-    /// Its certificate.
+    /// How good it is.
     pub fit: Fit,
     /// Starts tried.
     pub starts: usize,
-    /// How many of them reached the same distance, within 1e-6.
+    /// How many starts reached the same distance within 1e-6.
     pub agreeing: usize,
 }
 
-/// The solver of equation 1 and its workspace. One for each thread.
+/// The solver of equation 1 and its workspace. Each thread needs its own.
 #[derive(Clone, Debug)]
 pub struct Mixer {
     simplex: Simplex,
     gram: Gram,
-    /// Radiance of the mixture, its change over the full step, and the mixture looked at.
+    /// Radiance of the mixture, its change over the full step, and the trial mixture.
     mix: Vec<f64>,
     change: Vec<f64>,
     trial: Vec<f64>,
@@ -72,11 +71,11 @@ pub struct Mixer {
     /// Per column: residual times slope, and the root of the model's curvature.
     pull: Vec<f64>,
     stiffness: Vec<f64>,
-    /// Half the gradient, one for each stack.
+    /// Half the gradient, one value per stack.
     slope: Vec<f64>,
-    /// Which stacks may not be used.
+    /// Whether each stack is excluded.
     closed: Vec<bool>,
-    /// The stacks of the quadratic, their stiffness-scaled rows, slopes and weights.
+    /// The stacks of the quadratic, and their stiffness-scaled rows, slopes and weights.
     working: Vec<usize>,
     scaled: Vec<f64>,
     working_slope: Vec<f64>,
@@ -90,7 +89,7 @@ impl Default for Mixer {
 }
 
 impl Mixer {
-    /// A solver; it allocates when it first meets a problem of a size, and no more after that.
+    /// A solver. It allocates for the first problem of a given size and not afterwards.
     pub fn new() -> Mixer {
         Mixer {
             simplex: Simplex::new(),
@@ -128,8 +127,8 @@ impl Mixer {
         self.scaled.resize(k * m, 0.0);
     }
 
-    /// The minimum over all sensible starts: the tangent start, the linear start (least squares without the cube
-    /// root), equal parts of everything, and the four nearest single stacks.
+    /// The minimum over several starts: the tangent start, the linear start (least squares without the cube root), equal
+    /// weights, and the four nearest single stacks.
     pub fn best(&mut self, hull: &Hull, target: &Target) -> Result<Best, MixtureError> {
         let k = hull.len();
         let mut starts = Vec::new();
@@ -157,13 +156,13 @@ impl Mixer {
         let starts = results.len();
         let least = results.iter().map(|(_, fit, _)| fit.distance).fold(f64::INFINITY, f64::min);
         let agreeing = results.iter().filter(|(_, fit, _)| fit.distance - least < AGREEMENT).count();
-        // Ties go to the earlier start. There is always one, so the fallback is never used.
+        // Ties go to the earlier start. There is always at least one start, so the error cannot happen.
         let best = results.into_iter().reduce(|best, other| if other.0 < best.0 { other } else { best });
         let Some((_, fit, weights)) = best else { return Err(MixtureError::NoStacks) };
         Ok(Best { weights, fit, starts, agreeing })
     }
 
-    /// The tangent start: least squares in the metric's tangent at the target.
+    /// The tangent start: least squares in the tangent of the metric at the target.
     pub fn tangent(&mut self, hull: &Hull, target: &Target, a: &mut [f64]) -> Result<(), MixtureError> {
         self.linear(hull, target, Linear::Tangent, a)
     }
@@ -178,7 +177,7 @@ impl Mixer {
         check(hull, target, a)?;
         self.resize(hull);
         let (k, m) = (hull.len(), hull.columns());
-        // The tangent at black is vertical: darker targets share that of a millionth of the brightest stack.
+        // The tangent at black is vertical: targets below a millionth of the brightest stack use the tangent there.
         let floor = hull.darkest / DARKEST * 1e-6;
         for (j, s) in self.stiffness.iter_mut().enumerate() {
             let root = inverse_cbrt(target.radiance[j].max(floor));
@@ -202,8 +201,8 @@ impl Mixer {
         Ok(())
     }
 
-    /// Refines a start until the gap (in squared distance) is at most `enough`; 0: as far as it goes. `a` is the start, a
-    /// point of the simplex, and receives the weights.
+    /// Refines a start until the gap (in squared distance) is at most `enough`; 0 means as far as possible. `a` is the start,
+    /// a point of the simplex, and receives the weights.
     pub fn refine(
         &mut self,
         hull: &Hull,
@@ -214,8 +213,8 @@ impl Mixer {
         self.descend(hull, target, a, Reach::All, enough)
     }
 
-    /// The same with the stacks alone that have weight in `a`; the gap is over these.
-    pub fn polish(
+    /// Like [`Mixer::refine`], but uses only the stacks that have weight in `a`; so does the gap.
+    pub(crate) fn polish(
         &mut self,
         hull: &Hull,
         target: &Target,
@@ -235,7 +234,6 @@ impl Mixer {
     ) -> Result<Fit, MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
-        let m = hull.columns();
         self.closed.clear();
         self.closed.extend(a.iter().map(|&w| matches!(reach, Reach::Support) && w <= 0.0));
         hull.mix(a, &mut self.mix);
@@ -245,79 +243,32 @@ impl Mixer {
         let mut stalled = false;
 
         let gap = loop {
-            inner_products(&hull.rows, &self.pull, &mut self.slope);
-            for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
-                *slope += 0.5 * price;
-            }
-            for (slope, &closed) in self.slope.iter_mut().zip(&self.closed) {
-                if closed {
-                    // So dear that it never joins.
-                    *slope = f64::MAX;
-                }
-            }
+            self.price(hull);
             let gap = 2.0 * frank_wolfe_gap(&self.slope, a);
             if stalled || steps >= MOST_STEPS || gap <= enough || gap.is_nan() {
                 break gap;
             }
             steps += 1;
             self.choose(a);
-            let w = self.working.len();
-
-            for (i, &k) in self.working.iter().enumerate() {
-                let scaled = &mut self.scaled[i * m..][..m];
-                for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
-                    *x = f * s;
-                }
-            }
-            let scaled = &self.scaled;
-            self.gram.refill(w, |i| &scaled[i * m..][..m]);
-            self.working_slope.clear();
-            self.working_slope.extend(self.working.iter().map(|&k| self.slope[k]));
-            self.working_weights.clear();
-            self.working_weights.extend(self.working.iter().map(|&k| a[k]));
-            self.simplex.descend(&self.gram, &mut self.working_slope, &mut self.working_weights)?;
-
-            // Weights become the full step; the mixture moves along it as far as the objective agrees.
-            self.change.fill(0.0);
-            let mut promised = 0.0;
-            for (&k, w) in self.working.iter().zip(&mut self.working_weights) {
-                *w -= a[k];
-                promised += 2.0 * *w * self.slope[k];
-                if *w != 0.0 {
-                    add_scaled(&mut self.change, *w, hull.rows.row(k));
-                }
-            }
-            let price = |working: &[usize], step: &[f64]| -> f64 {
-                working.iter().zip(step).map(|(&k, w)| w * hull.price[k]).sum()
-            };
-            let priced = price(&self.working, &self.working_weights);
+            self.solve_model(hull, a)?;
+            let (promised, priced) = self.full_step(hull, a);
             let before = squared;
-            let mut length = 1.0;
-            let mut accepted = false;
-            for _ in 0..MOST_HALVINGS {
-                for ((trial, mix), change) in self.trial.iter_mut().zip(&self.mix).zip(&self.change) {
-                    *trial = mix + length * change;
+            match self.search(hull, target, before, promised, priced) {
+                Some((length, value)) => {
+                    squared = value;
+                    std::mem::swap(&mut self.mix, &mut self.trial);
+                    for (&k, w) in self.working.iter().zip(&self.working_weights) {
+                        a[k] = (a[k] + length * w).max(0.0);
+                    }
+                    let drop = before - squared - length * priced;
+                    stalled = drop <= DROP * before;
                 }
-                // The model of the next step comes with the value: a step that is taken is not looked at twice.
-                squared = self.linearise(hull, target);
-                if squared + length * priced <= before + 1e-4 * length * promised.min(0.0) {
-                    accepted = true;
-                    break;
+                None => {
+                    stalled = true;
+                    self.trial.copy_from_slice(&self.mix);
+                    squared = self.linearise(hull, target);
                 }
-                length *= 0.5;
             }
-            if !accepted {
-                stalled = true;
-                self.trial.copy_from_slice(&self.mix);
-                squared = self.linearise(hull, target);
-                continue;
-            }
-            std::mem::swap(&mut self.mix, &mut self.trial);
-            for (&k, w) in self.working.iter().zip(&self.working_weights) {
-                a[k] = (a[k] + length * w).max(0.0);
-            }
-            let drop = before - squared - length * priced;
-            stalled = drop <= DROP * before;
         };
         if !gap.is_finite() {
             return Err(SimplexError::NotFinite.into());
@@ -326,7 +277,80 @@ impl Mixer {
         Ok(Fit { distance: squared.sqrt(), gap: gap.max(0.0), steps, convex })
     }
 
-    /// The stacks in use and those that would help most.
+    /// Half the gradient for every stack, its price included; closed stacks get one so large that they never join.
+    fn price(&mut self, hull: &Hull) {
+        inner_products(&hull.rows, &self.pull, &mut self.slope);
+        for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
+            *slope += 0.5 * price;
+        }
+        for (slope, &closed) in self.slope.iter_mut().zip(&self.closed) {
+            if closed {
+                *slope = f64::MAX;
+            }
+        }
+    }
+
+    /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights.
+    fn solve_model(&mut self, hull: &Hull, a: &[f64]) -> Result<(), SimplexError> {
+        let m = hull.columns();
+        for (i, &k) in self.working.iter().enumerate() {
+            let scaled = &mut self.scaled[i * m..][..m];
+            for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
+                *x = f * s;
+            }
+        }
+        let scaled = &self.scaled;
+        self.gram.refill(self.working.len(), |i| &scaled[i * m..][..m]);
+        self.working_slope.clear();
+        self.working_slope.extend(self.working.iter().map(|&k| self.slope[k]));
+        self.working_weights.clear();
+        self.working_weights.extend(self.working.iter().map(|&k| a[k]));
+        self.simplex.descend(&self.gram, &mut self.working_slope, &mut self.working_weights)?;
+        Ok(())
+    }
+
+    /// Turns `working_weights` into the full step from `a`, and sets the change of the mixture along it. Returns the
+    /// decrease the gradient promises (negative) and the change in price, both for the full step.
+    fn full_step(&mut self, hull: &Hull, a: &[f64]) -> (f64, f64) {
+        self.change.fill(0.0);
+        let mut promised = 0.0;
+        for (&k, w) in self.working.iter().zip(&mut self.working_weights) {
+            *w -= a[k];
+            promised += 2.0 * *w * self.slope[k];
+            if *w != 0.0 {
+                add_scaled(&mut self.change, *w, hull.rows.row(k));
+            }
+        }
+        let priced = self.working.iter().zip(&self.working_weights).map(|(&k, w)| w * hull.price[k]).sum();
+        (promised, priced)
+    }
+
+    /// Halves the step until the objective falls enough (Armijo's rule). Returns the share of the full step taken and the
+    /// squared distance there, or `None` if no share helps.
+    fn search(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        before: f64,
+        promised: f64,
+        priced: f64,
+    ) -> Option<(f64, f64)> {
+        let mut length = 1.0;
+        for _ in 0..MOST_HALVINGS {
+            for ((trial, mix), change) in self.trial.iter_mut().zip(&self.mix).zip(&self.change) {
+                *trial = mix + length * change;
+            }
+            // This also sets up the model of the next step, so an accepted mixture is evaluated only once.
+            let squared = self.linearise(hull, target);
+            if squared + length * priced <= before + 1e-4 * length * promised.min(0.0) {
+                return Some((length, squared));
+            }
+            length *= 0.5;
+        }
+        None
+    }
+
+    /// Selects the working stacks: those in use and those that would help most.
     fn choose(&mut self, a: &[f64]) {
         self.working.clear();
         let level = dot(&self.slope, a);
@@ -346,12 +370,12 @@ impl Mixer {
         }
     }
 
-    /// The squared distance of the trial mixture, and the model of it: `pull` and `stiffness`.
+    /// Returns the squared distance of the trial mixture and sets up the model around it: `pull` and `stiffness`.
     fn linearise(&mut self, hull: &Hull, target: &Target) -> f64 {
         let m = self.trial.len();
         let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);
         let (pull, stiffness) = (&mut self.pull[..m], &mut self.stiffness[..m]);
-        // Passes without sums: the compiler puts neighbouring columns side by side.
+        // Loops without sums, so that the compiler can vectorise over the columns.
         let inverse = &mut self.inverse[..m];
         for (r, f) in inverse.iter_mut().zip(mix) {
             *r = inverse_cbrt(if *f > hull.darkest { *f } else { hull.darkest });
@@ -363,7 +387,7 @@ impl Mixer {
             let f = if mix[j] > hull.darkest { mix[j] } else { hull.darkest };
             residual[j] = weight[j] * (f * r2 - t[j]);
             let tangent = weight[j] * r2 * (1.0 / 3.0);
-            // Second derivative over Gauss-Newton's: (2 cbrt t - cbrt f) / cbrt f, kept within reason.
+            // The second derivative relative to Gauss-Newton's, (2 cbrt t - cbrt f) / cbrt f, limited to 0.25..9.
             let exact = 2.0 * t[j] * r - 1.0;
             let exact = if exact > 0.25 { exact } else { 0.25 };
             let exact = if exact < 9.0 { exact } else { 9.0 };
@@ -374,13 +398,14 @@ impl Mixer {
     }
 }
 
-/// Which stacks may get weight.
+/// Which stacks can receive weight.
 #[derive(Clone, Copy)]
 enum Reach {
     All,
     Support,
 }
 
+/// The metric of a linear start.
 #[derive(Clone, Copy)]
 enum Linear {
     Tangent,

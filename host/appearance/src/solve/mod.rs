@@ -1,16 +1,17 @@
-//! Constrained least squares: the one problem under factoring, gamut mapping and clamping.
+//! Constrained least squares, the problem behind factoring, gamut mapping and clamping.
 //!
-//! [`simplex`] solves the convex quadratic exactly, [`mixture`] the perceptual problem (eq. 1) by a short
+//! [`Simplex`] solves the convex quadratic problem exactly. [`Mixer`] solves the perceptual problem (eq. 1) by a short
 //! sequence of such quadratics.
 
-pub mod gram;
-pub mod hull;
-pub mod mixture;
-pub mod root;
-pub mod simplex;
-pub mod vector;
+mod gram;
+mod hull;
+mod mixture;
+mod root;
+mod simplex;
+pub(crate) mod vector;
 
-pub use gram::{Gram, GramError};
+pub use gram::{Gram, inner_products};
+pub(crate) use hull::LAYER_PRICE;
 pub use hull::{Hull, MixtureError, Target};
 pub use mixture::{Best, Fit, Mixer};
 pub use simplex::{Certificate, Simplex, SimplexError};

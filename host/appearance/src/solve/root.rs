@@ -1,17 +1,17 @@
-//! The inverse cube root, the metric's inner loop.
+//! The inverse cube root, the inner loop of the metric.
 //!
-//! Problem: eq. 1 takes hundreds of cube roots a step, and the platform's differ in the last bit between systems.
-//! Method: a third of the exponent by integer arithmetic (10 % off at most), then two fourth-order Newton steps
-//! on `1 - x r^3`, which need no division. `cbrt x = x r^2` and `x^(-2/3) = r^2` come from the same root.
-//! Accuracy: 1e-15 relative (tested). Cost: 20 multiplications and additions, in lanes where the machine has
-//! them; only exactly rounded operations, so every machine gives the same bits.
+//! Problem: eq. 1 needs hundreds of cube roots per step, and library functions differ in the last bit between systems.
+//! Method: integer arithmetic gives a third of the exponent (relative error 10 % at most), then two fourth-order Newton
+//! steps on `1 - x r^3`, which need no division. `cbrt x = x r^2` and `x^(-2/3) = r^2` come from the same root.
+//! Accuracy: 1e-15 relative (tested). Cost: 20 multiplications and additions, which the compiler can vectorise; all are
+//! correctly rounded operations, so the result is the same on every processor.
 
-/// `x^(-1/3)` for normal positive x; anything else gives some number or NaN, never a panic.
+/// `x^(-1/3)` for normal positive x. Other inputs give some number or NaN; nothing panics.
 #[inline]
-pub fn inverse_cbrt(x: f64) -> f64 {
+pub(super) fn inverse_cbrt(x: f64) -> f64 {
     // Thirds of the upper half: 0x5555_5556 / 2^32 is 1/3 to 2^-33.
     let third = ((x.to_bits() >> 32) * 0x5555_5556) >> 32;
-    // 4/3 of the exponent bias, less what balances the error of the straight line between powers of two.
+    // 4/3 of the exponent bias, minus a constant that balances the error of the straight line between powers of two.
     let mut r = f64::from_bits(0x553e_e960_u64.wrapping_sub(third) << 32);
     for _ in 0..2 {
         let e = 1.0 - x * (r * r) * r;

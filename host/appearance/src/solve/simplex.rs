@@ -2,30 +2,30 @@
 //!
 //! Problem: minimise `1/2 a'Ga - h'a` over `a >= 0, sum a = 1`, with G the Gram matrix of the hull's points and
 //! h their inner products with the target.
-//! Method: primal active set. The weights that may be positive (the support) are stepped to their joint optimum
-//! through a Cholesky factor of G on the support; a step that would make a weight negative stops at the boundary
-//! and drops it; at the optimum the point with the steepest reduced gradient joins, until none descends. Every
-//! step starts from the gradient at the current point, so errors of the factor correct themselves. A point that
-//! depends on the support (a duplicate, a point inside its hull) joins by exchange: weight moves along the flat
-//! direction until some point has none left and makes room. So the support is always affinely independent.
-//! Cost: O(n p) for each change of a support of p of n points, no allocation; a warm start from a similar target
-//! changes few. Limits: at most `20 n + 100` steps are taken, more than the finite method has ever been seen to
-//! need by a factor of ten; whenever it ends, the weights are feasible and the certificate bounds what is left.
-//! Source: Lawson & Hanson 1974, chapter 23, with the equality kept exactly instead of by a heavy row.
+//! Method: primal active set. A Cholesky factor of G on the support (the points with positive weight) gives the step to
+//! their joint optimum. A step that would make a weight negative stops at the boundary and drops the point. At the optimum
+//! the point with the steepest reduced gradient joins, until no point descends. Every step starts from the gradient at the
+//! current point, so errors of the factor correct themselves. A point that depends on the support (a duplicate, or a point
+//! inside its hull) joins by exchange: weight moves along the flat direction until some point has none left and leaves. So
+//! the support is always affinely independent.
+//! Cost: O(n p) for each change of a support of p of n points, no allocation; a warm start from a similar target needs few
+//! changes. Limits: at most `20 n + 100` steps, ten times as many as the method has ever needed; whenever it ends, the
+//! weights are feasible and the certificate bounds the remaining error.
+//! Source: Lawson & Hanson 1974, chapter 23, with the equality kept exactly instead of by a heavily weighted row.
 
 use super::gram::Gram;
 use super::vector::{add_scaled, dot, dot_short};
 
-/// Reduced gradients within this share of the problem's scale count as zero: some hundred roundings.
+/// Reduced gradients within this share of the problem's scale count as zero: about a hundred roundings.
 const TOLERANCE: f64 = 4e-14;
 /// Squared relative distance to the hull of the support below which a point counts as dependent on it.
 const PIVOT_FLOOR: f64 = 1e-14;
 
-/// How good a solution is known to be.
+/// A bound on the error of a solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certificate {
-    /// The Frank-Wolfe gap `max_k grad.(a - e_k)`: no weights have an objective lower by more than this. In units
-    /// of the objective, of the order of 1e-14 of the Gram matrix's largest entry for a solved problem.
+    /// The Frank-Wolfe gap `max_k grad.(a - e_k)`: no weights have an objective lower by more than this. In units of the
+    /// objective; for a solved problem, about 1e-14 of the largest entry of the Gram matrix.
     pub gap: f64,
     /// Steps taken.
     pub steps: u32,
@@ -34,9 +34,10 @@ pub struct Certificate {
 /// Why there is no solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SimplexError {
-    /// Lengths disagree or are zero.
+    /// Lengths differ or are zero.
     #[error(
-        "a hull of {points} points needs {points} inner products and weights (at least one), not {products} and {weights}"
+        "a hull of {points} points needs as many inner products and weights, and at least one; found {products} inner \
+         products and {weights} weights"
     )]
     Size {
         /// Points of the hull.
@@ -47,7 +48,7 @@ pub enum SimplexError {
         weights: usize,
     },
     /// Some number is infinite or not a number.
-    #[error("the least-squares problem holds a number that is infinite or not a number")]
+    #[error("the least-squares problem contains an infinite or undefined number")]
     NotFinite,
 }
 
@@ -56,11 +57,11 @@ enum Place {
     Out,
     /// On the support.
     In,
-    /// Off the support, and refused until the weights have moved: it joined and could not grow.
+    /// Off the support, and not accepted again until the weights have moved: it joined and could not grow.
     Refused,
 }
 
-/// The solver and its workspace. One for each thread.
+/// The solver and its workspace. Each thread needs its own.
 #[derive(Clone, Debug, Default)]
 pub struct Simplex {
     n: usize,
@@ -75,25 +76,26 @@ pub struct Simplex {
     ones: Vec<f64>,
     step: Vec<f64>,
     gradient: Vec<f64>,
-    /// The matrix that the factor on the support belongs to.
+    /// The edition of the matrix that the factor on the support belongs to.
     edition: u64,
 }
 
 impl Simplex {
-    /// A solver; it allocates when it first meets a problem of a size, and no more after that.
+    /// A solver. It allocates for the first problem of a given size and not afterwards.
     pub fn new() -> Simplex {
         Simplex::default()
     }
 
-    /// Minimises `1/2 a'Ga - h'a` over the simplex. `a` is the warm start, ideally the solution of a similar
-    /// problem, and receives the solution; a start that is no point of the simplex (all zero, say) is a cold
-    /// start. `h` and `a` have as many places as the Gram matrix has rows.
+    /// Minimises `1/2 a'Ga - h'a` over the simplex. `a` is the warm start, ideally the solution of a similar problem, and
+    /// receives the solution. A start that is not a point of the simplex (for example all zeros) is a cold start. `h` and
+    /// `a` have one value per row of the Gram matrix.
     ///
-    /// Uses the widest vectors the machine has; the order of additions is the same with any, so the result is too.
+    /// Uses the widest vectors of the processor. The order of additions does not depend on the width, and neither does the
+    /// result.
     pub fn solve(&mut self, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
         #[cfg(target_arch = "x86_64")]
         {
-            /// The same code, compiled for AVX: it multiplies and adds one after the other, so equal bit for bit.
+            /// The same code, compiled for AVX. It multiplies and adds in separate steps, so results are equal bit for bit.
             #[target_feature(enable = "avx")]
             fn wide(
                 it: &mut Simplex,
@@ -119,7 +121,7 @@ impl Simplex {
             return Err(SimplexError::Size { points: n, products: h.len(), weights: a.len() });
         }
         if !normalise(a) {
-            // The vertex of least objective; `total_cmp` keeps the order total when numbers are not finite.
+            // The vertex with the lowest objective; `total_cmp` orders numbers that are not finite too.
             let value = |k: usize| 0.5 * gram.row(k)[k] - h[k];
             let best = (0..n).min_by(|&i, &j| value(i).total_cmp(&value(j))).unwrap_or(0);
             a.fill(0.0);
@@ -130,7 +132,7 @@ impl Simplex {
         let mut gradient = std::mem::take(&mut self.gradient);
         let mut steps = 0;
         let gap = loop {
-            // Afresh each time round: the running gradient of the search has gathered rounding errors.
+            // Recomputed every time, because the running gradient of the search accumulates rounding errors.
             evaluate(gram, h, a, &mut gradient);
             let gap = frank_wolfe_gap(&gradient, a);
             if steps > 0 && (gap <= 2.0 * TOLERANCE * scale || steps >= most_steps(n)) || gap.is_nan() {
@@ -139,7 +141,7 @@ impl Simplex {
             let before = steps;
             steps += self.search(gram, &mut gradient, a, TOLERANCE * scale, most_steps(n) - steps);
             if steps == before + 1 && before > 0 {
-                // Nothing moved: this is as good as the numbers allow.
+                // Nothing moved: this is as accurate as the numbers allow.
                 evaluate(gram, h, a, &mut gradient);
                 break frank_wolfe_gap(&gradient, a);
             }
@@ -148,11 +150,11 @@ impl Simplex {
         finish(gap, steps)
     }
 
-    /// The same problem around a point: minimises `q'(y - a) + 1/2 (y - a)'G(y - a)` over y in the simplex, where
-    /// `q` is the gradient at `a`, a point of the simplex. `a` becomes y and `q` the gradient there.
+    /// Solves the same problem around a point: minimises `q'(y - a) + 1/2 (y - a)'G(y - a)` over y in the simplex, where `q`
+    /// is the gradient at `a`, a point of the simplex. `a` becomes y and `q` the gradient there.
     ///
-    /// When `a` is nearly the answer, `q` carries digits that `h = Ga - q` would lose.
-    pub fn descend(
+    /// Near the solution, `q` has digits that `h = Ga - q` would lose.
+    pub(crate) fn descend(
         &mut self,
         gram: &Gram,
         q: &mut [f64],
@@ -187,8 +189,7 @@ impl Simplex {
         self.refused.reserve(n);
     }
 
-    /// Walks from `a`, where the gradient is `g`, to the optimum; keeps both up to date. Returns the steps taken,
-    /// at least 1.
+    /// Moves from `a`, where the gradient is `g`, to the optimum and updates both. Returns the number of steps, at least 1.
     #[inline(always)]
     fn search(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64], tolerance: f64, most: u32) -> u32 {
         self.take_support(gram, g, a);
@@ -213,7 +214,7 @@ impl Simplex {
                     entered = None;
                     continue;
                 }
-                // A badly conditioned factor may leave the support uneven; a second step evens it.
+                // With a badly conditioned factor the gradient may still differ over the support; another step corrects it.
                 if repeats < 2 && self.unevenness(g) > tolerance {
                     repeats += 1;
                     continue;
@@ -235,18 +236,18 @@ impl Simplex {
                 self.refuse(k);
             }
         }
-        // What rounding has taken from or added to the sum.
+        // Rounding may have changed the sum.
         normalise(a);
         steps
     }
 
-    /// Point `k` may not join before the weights have moved.
+    /// Keeps point `k` from joining until the weights have moved.
     fn refuse(&mut self, k: usize) {
         self.place[k] = Place::Refused;
         self.refused.push(k);
     }
 
-    /// Makes the points with weight the support. Neighbours in a picture mostly have the same, with its factor.
+    /// Makes the points with weight the support. Neighbouring pixels often have the same support; then its factor is kept.
     #[inline(always)]
     fn take_support(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) {
         self.place.fill(Place::Out);
@@ -267,8 +268,8 @@ impl Simplex {
         }
     }
 
-    /// Moves to the optimum on the support, or along the way until the first weight is used up: that one leaves.
-    /// Returns the share of the way gone and whether a weight left.
+    /// Moves toward the optimum on the support until the first weight reaches zero; that point leaves. Returns the share of
+    /// the way taken and whether a point left.
     #[inline(always)]
     fn step_on_support(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) -> (f64, bool) {
         let p = self.support.len();
@@ -313,8 +314,8 @@ impl Simplex {
         (length, true)
     }
 
-    /// Takes point `k` into the support. If it depends on the points there, weight is exchanged along the flat
-    /// direction, downhill if it slopes, until one of them is used up and leaves. False if `k` itself was.
+    /// Adds point `k` to the support. If it depends on the points there, weight is exchanged along the flat direction
+    /// (downhill, if it slopes) until one of the points has none left and leaves. Returns false if that is `k` itself.
     #[inline(always)]
     fn join(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64], k: usize) -> bool {
         self.pending.push(k);
@@ -322,8 +323,8 @@ impl Simplex {
         self.place[k] == Place::In
     }
 
-    /// Takes the pending points into the support, the last first. Every exchange removes a point from both lists
-    /// for good, so this ends.
+    /// Adds the pending points to the support, the last first. This ends, because every exchange removes a point from both
+    /// lists.
     #[inline(always)]
     fn join_pending(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) {
         while let Some(k) = self.pending.pop() {
@@ -340,12 +341,12 @@ impl Simplex {
         }
     }
 
-    /// The last point of the support depends on the others: moves weight along the direction that changes
-    /// nothing else, and returns the position of the point that has none left.
+    /// The last point of the support depends on the others. Moves weight along the direction that leaves the mixture
+    /// unchanged, and returns the position of the point that has none left.
     fn exchange(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) -> usize {
         let n = self.n;
         let last = self.support.len() - 1;
-        // The affine combination of the others nearest to it, exchanged for it: d_last = 1, sum d = 0.
+        // Exchanges the nearest affine combination of the others for it: d_last = 1, sum d = 0.
         let row = &self.factor[last * n..][..last];
         let ones = &self.ones[..last];
         let level = (dot_short(ones, row) - 1.0) / dot_short(ones, ones);
@@ -355,7 +356,7 @@ impl Simplex {
         self.solve_transposed(last);
         self.step[last] = 1.0;
         let slope: f64 = self.support.iter().zip(&self.step).map(|(&k, d)| g[k] * d).sum();
-        // From nothing, the last can only gain.
+        // With no weight yet, the last point can only gain.
         let sign = if slope <= 0.0 || a[self.support[last]] <= 0.0 { 1.0 } else { -1.0 };
         let (mut reach, mut blocking) = (f64::INFINITY, last);
         for (i, (&k, d)) in self.support.iter().zip(&self.step).enumerate() {
@@ -363,7 +364,7 @@ impl Simplex {
                 (reach, blocking) = (a[k] / -(sign * d), i);
             }
         }
-        // The direction sums to zero, so something blocks, unless numbers have overflowed.
+        // The direction sums to zero, so some weight reaches zero, unless numbers have overflowed.
         if reach.is_finite() {
             for (&k, d) in self.support.iter().zip(&self.step) {
                 let d = sign * reach * d;
@@ -374,13 +375,13 @@ impl Simplex {
         blocking
     }
 
-    /// Removes a position of the support; the points after it await their new rows of the factor.
+    /// Removes a position of the support; the points after it need new rows of the factor.
     fn leave(&mut self, position: usize) {
         self.pending.extend(self.support[position + 1..].iter().rev());
         self.support.truncate(position);
     }
 
-    /// `step = factor^-T step` on the first `p` places.
+    /// `step = factor^-T step` on the first `p` elements.
     #[inline(always)]
     fn solve_transposed(&mut self, p: usize) {
         for i in (0..p).rev() {
@@ -391,7 +392,7 @@ impl Simplex {
         }
     }
 
-    /// Computes row `i` of the Cholesky factor; false if the point depends on those before it.
+    /// Computes row `i` of the Cholesky factor. Returns false if the point depends on those before it.
     #[inline(always)]
     fn factor_row(&mut self, gram: &Gram, i: usize) -> bool {
         let n = self.n;
@@ -412,7 +413,7 @@ impl Simplex {
         pivot > floor
     }
 
-    /// How far the gradient differs over the support; 0 at its optimum.
+    /// The range of the gradient over the support; 0 at its optimum.
     #[inline(always)]
     fn unevenness(&self, g: &[f64]) -> f64 {
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -445,14 +446,14 @@ fn evaluate(gram: &Gram, h: &[f64], a: &[f64], g: &mut [f64]) {
     }
 }
 
-/// `max_k g.(a - e_k)` for a point of the simplex; not a number if any part is not.
+/// `max_k g.(a - e_k)` for a point of the simplex; NaN if any part is NaN.
 #[inline(always)]
 pub(super) fn frank_wolfe_gap(g: &[f64], a: &[f64]) -> f64 {
     // A gradient that is not finite makes the inner product NaN, even where the weight is zero.
     dot(g, a) - g.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// Scales weights to sum 1; false if they are no point of the simplex to begin with.
+/// Scales weights to sum 1. Returns false if they cannot be: a weight is negative or not finite, or all are zero.
 #[inline(always)]
 fn normalise(a: &mut [f64]) -> bool {
     let sum: f64 = a.iter().sum();

@@ -1,9 +1,9 @@
 //! Inner products and updates of short vectors, in a fixed order.
 //!
-//! Eight running sums, added pairwise at the end: any vector unit can use them, and the result is the same bit
-//! for bit whichever does, because nothing depends on the machine's width.
+//! Eight running sums are added pairwise at the end. Every vector unit can use them, and the result is the same bit for bit,
+//! because the order of additions does not depend on the width of the vectors.
 
-/// The inner product of two vectors (the shorter length counts).
+/// The inner product of two vectors, over the shorter length.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let n = a.len().min(b.len());
@@ -23,7 +23,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
 }
 
-/// The same for vectors of a dozen elements, which a plain loop has added before eight sums are set up.
+/// The inner product of vectors of about a dozen elements, where a plain loop is faster than eight sums.
 #[inline(always)]
 pub fn dot_short(a: &[f64], b: &[f64]) -> f64 {
     let mut sum = 0.0;

@@ -13,6 +13,7 @@ use crate::send::journal::{Journal, JournalError, OpenJob};
 use crate::send::query::{Query, Reply, is_alps};
 use crate::send::session::{Bridge, Outcome, Phase, Record, Session, SessionError};
 use crate::send::{self, Address, Event, RunError, Wish, find, streams};
+use observe::with_causes;
 
 /// How long a bridge may take to answer.
 const BRIDGE: Duration = Duration::from_secs(3);
@@ -48,7 +49,7 @@ pub fn find_cartridges(address: &Address, inks: &[Ink]) -> Cartridges {
     };
     match ask() {
         Ok(reply) => Cartridges::read(reply, inks),
-        Err(failure) => Cartridges::Unknown(failure.to_string()),
+        Err(failure) => Cartridges::Unknown(with_causes(&failure)),
     }
 }
 
@@ -291,7 +292,7 @@ impl Delivery<'_> {
     /// each change. Nothing that happens here changes that the job was sent.
     pub fn await_sheet(&self, address: &Address, watch: &mut dyn FnMut(&[String])) -> Sheet {
         await_sheet(&mut || address.open(), finish::EVERY, watch)
-            .unwrap_or_else(|error| Sheet::Unknown(error.to_string()))
+            .unwrap_or_else(|error| Sheet::Unknown(with_causes(&error)))
     }
 }
 
@@ -387,7 +388,7 @@ impl<'d, 'a> Watcher<'d, 'a> {
                 if !self.delivery.printers.knows(&printer, &self.job)
                     && let Err(error) = self.delivery.printers.begin(&printer, &self.job, None)
                 {
-                    self.delivery.note(&error.to_string());
+                    self.delivery.note(&with_causes(&error));
                 }
             }
         }

@@ -36,7 +36,7 @@ use crate::send::raw::RawError;
 use crate::send::session::{Outcome, SessionError};
 use crate::send::status::Status;
 use crate::send::{Address, Checked, Event, OpenError, Wish, streams, words};
-use observe::Observer;
+use observe::{Observer, with_causes};
 
 pub use bridge::{Met, find_cartridges, reset};
 
@@ -221,7 +221,7 @@ impl Cartridges {
             Reply::Silent => Cartridges::Unknown("the printer did not answer".into()),
             Reply::Stopped(fault) => Cartridges::Unknown(words::fault(fault, None)),
             Reply::Bytes(answer) => match Status::read(&answer) {
-                Err(error) => Cartridges::Unknown(error.to_string()),
+                Err(error) => Cartridges::Unknown(with_causes(&error)),
                 Ok(status) => {
                     let found = cartridges::find(&status, inks);
                     Cartridges::Known { answer, status, found }
@@ -338,14 +338,14 @@ impl<'a> Delivery<'a> {
     /// Without a ledger a job is printed all the same, and that it is not counted is told.
     fn note_in_ledger(&self, event: ledger::Event) {
         if let Err(error) = self.ledger.append(event) {
-            self.note(&format!("{error}; this job is not counted there"));
+            self.note(&format!("{}; this job is not counted there", with_causes(&error)));
         }
     }
 
     /// The printer holds nothing of this job any more. If that cannot be written down, the next job asks for a needless reset.
     fn close(&self, printer: &Printer, job: &str) {
         if let Err(error) = self.printers.close(printer, job) {
-            self.note(&error.to_string());
+            self.note(&with_causes(&error));
         }
     }
 

@@ -1,7 +1,7 @@
-//! The board's drive: a boot loader without permission or driver is still a disk that takes a UF2 file.
+//! The board's drive: even without permission or driver for the boot loader, its disk takes a UF2 file.
 //!
-//! Limits: the drive takes whatever it is given and says nothing about it; that the image arrived whole is known when
-//! the bridge is back with its version. The board restarts with the last block, so the drive vanishes under the file.
+//! Limits: the drive accepts any file without an answer; only a bridge that is back with the new version shows that the image
+//! arrived complete. The board restarts with the last block, so the drive disappears while the file is still open.
 
 use std::fs::{self, File};
 use std::io::{self, Read as _, Write as _};
@@ -9,17 +9,17 @@ use std::path::{Path, PathBuf};
 
 use observe::Observer;
 
-/// The file that says what board a drive belongs to, and what is in it for an RP2040.
+/// The file that names the board of a drive, and its entry for an RP2040.
 const INFO: &str = "INFO_UF2.TXT";
 const BOARD: &str = "RPI-RP2";
 const NAME: &str = "foilpress-bridge.uf2";
 const PIECE: usize = 16 * 1024;
 
-/// Why the drive did not take the file.
+/// Why the file was not copied to the drive.
 #[derive(Debug, thiserror::Error)]
 pub enum DriveError {
-    /// The drive is still there, but does not take the file.
-    #[error("{} does not take the firmware", .drive.display())]
+    /// The drive is still mounted, but the file cannot be written.
+    #[error("cannot write the firmware to {}", .drive.display())]
     Refused {
         /// The drive.
         drive: PathBuf,
@@ -27,8 +27,8 @@ pub enum DriveError {
         #[source]
         source: io::Error,
     },
-    /// Gone too early.
-    #[error("{} went away after {written} of {length} bytes; plug the board in, its BOOTSEL button held, and flash it again", .drive.display())]
+    /// The drive disappeared before it had the whole file.
+    #[error("{} disappeared after {written} of {length} bytes; hold the board's BOOTSEL button while plugging it in, then flash it again", .drive.display())]
     Gone {
         /// The drive.
         drive: PathBuf,
@@ -105,7 +105,7 @@ fn mounted() -> Vec<PathBuf> {
     Vec::new()
 }
 
-/// Copies the file to the drive, down to the board.
+/// Copies the file to the drive and makes sure that the board has it.
 pub fn copy(drive: &Path, file: &[u8], observer: &dyn Observer) -> Result<(), DriveError> {
     observer.begin("copying the firmware to the drive", file.len() as u64);
     let mut written = 0;

@@ -1,7 +1,7 @@
-//! The firmware in a file: read, and refused before anything is erased if it is damaged or not the bridge's.
+//! The firmware in a file, checked before anything is erased: a damaged file or another program is refused.
 //!
-//! What a program for the RP2040 is called stands in its *binary info*, where the board's own tools look for it too: a
-//! header in the first sector points to a table of entries, some of which are strings with an identifier.
+//! A program for the RP2040 states its name in its *binary info*, which the tools of the board read too: a header in the
+//! first sector points to a table of entries, some of which are strings with an identifier.
 //! Source: RP2040 C/C++ SDK, `pico_binary_info`.
 
 use uf2::{Image, Uf2Error};
@@ -14,20 +14,19 @@ const STRING: u16 = 6;
 const TAG: u16 = u16::from_le_bytes(*b"RP");
 const PROGRAM_NAME: u32 = 0x0203_1c86;
 const PROGRAM_VERSION: u32 = 0x11a9_bc3a;
-/// More entries than any program has, and longer strings: the file is not to be trusted.
+/// Limits above what any program has, because the file is not to be trusted.
 const MOST_ENTRIES: u32 = 1024;
 const LONGEST_STRING: usize = 120;
 
 /// Why a file is not flashed. Nothing was erased.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImageError {
-    /// Damaged, or for another board.
-    #[error("not flashed: {0}")]
+    /// The file is damaged, or made for another board.
+    #[error("not flashed: the file is not a valid firmware image")]
     Damaged(#[from] Uf2Error),
-    /// A whole program for the board, but another one.
+    /// The file is a complete program for the board, but not the bridge's firmware.
     #[error(
-        "not flashed: this is {}, not the bridge's firmware; to put it on the board all the same, copy the file to the \
-         board's drive", named(.0)
+        "not flashed: this is {}, not the bridge's firmware; to install it anyway, copy the file to the board's drive", named(.0)
     )]
     OtherProgram(Option<String>),
 }
@@ -39,7 +38,7 @@ fn named(program: &Option<String>) -> String {
     }
 }
 
-/// A whole image of the bridge's firmware.
+/// A complete image of the bridge's firmware.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Firmware {
     image: Image,
@@ -59,27 +58,27 @@ impl Firmware {
         Ok(Firmware { image, version })
     }
 
-    /// The firmware that came with this program, if one did.
+    /// The firmware included in this program, if any.
     pub fn embedded() -> Option<Result<Firmware, ImageError>> {
         Firmware::embedded_file().map(Firmware::read)
     }
 
-    /// Its file. Released programs are built with `FOILPRESS_FIRMWARE` naming what `cargo xtask firmware` writes.
+    /// The file of that firmware. Released programs are built with `FOILPRESS_FIRMWARE` naming what `cargo xtask firmware` writes.
     pub fn embedded_file() -> Option<&'static [u8]> {
         FILE
     }
 
-    /// The program it was made of, as the linker left it (ELF): what its log is read with.
+    /// The ELF file it was made from, which is needed to decode its log.
     pub fn embedded_program() -> Option<&'static [u8]> {
         PROGRAM
     }
 
-    /// What goes into the flash.
+    /// The image for the flash.
     pub fn image(&self) -> &Image {
         &self.image
     }
 
-    /// Its version, as the bridge will tell it.
+    /// Its version, as the bridge will report it.
     pub fn version(&self) -> &str {
         &self.version
     }

@@ -1,10 +1,10 @@
 //! New firmware for a bridge.
 //!
-//! Problem: bring a board from whatever it runs to the firmware in a file, so that it can always be tried again.
-//! Method: read and check the file; bring the bridge into its boot loader by a message of the link, or take a board that
-//! is there already; write through [PICOBOOT](picoboot) and read back, or copy to the board's [drive] where the
-//! boot loader may not be opened; wait until the bridge is back and says its version.
-//! Limits: one board in its boot loader at a time, since these cannot be told apart.
+//! Problem: install the firmware of a file on a board, whatever it runs now, so that an interrupted attempt can be repeated.
+//! Method: read and check the file; bring the bridge into its boot loader by a message of the link, or use a board that is
+//! already there; write through [PICOBOOT](picoboot) and read back, or copy to the board's [drive] where the boot loader may
+//! not be opened; wait until the bridge is back and reports its version.
+//! Limits: one board in its boot loader at a time, since such boards cannot be told apart.
 
 pub mod drive;
 pub mod image;
@@ -28,58 +28,58 @@ use image::Firmware;
 use observe::Observer;
 use picoboot::{Picoboot, Pipe, WriteError};
 
-/// Between two looks at what is plugged in.
-const LOOK: Duration = Duration::from_millis(250);
-/// A board needs a second or two to show itself; slow hubs and virus scanners make it more.
+/// Time between two checks of what is plugged in.
+const POLL: Duration = Duration::from_millis(250);
+/// Time for a board to appear: a second or two, more with slow hubs and virus scanners.
 const LOADER_PATIENCE: Duration = Duration::from_secs(10);
-/// Until the system has mounted the board's drive.
+/// Time for the system to mount the board's drive.
 const DRIVE_PATIENCE: Duration = Duration::from_secs(6);
-/// Until the bridge is back with its new firmware; a drive that is copied to in the background takes longest.
+/// Time for the bridge to come back with its new firmware; longest when its drive is written in the background.
 const BACK_PATIENCE: Duration = Duration::from_secs(30);
-/// How long a bridge may take to answer.
+/// Time for a bridge to answer.
 const ANSWER_PATIENCE: Duration = Duration::from_secs(3);
 
 /// Why a bridge does not have the new firmware.
 #[derive(Debug, thiserror::Error)]
 pub enum FlashError {
-    /// Nothing to flash.
+    /// There is nothing to flash.
     #[error(
-        "no bridge and no board in its boot loader is plugged in. For a board without working firmware: hold its BOOTSEL \
-         button while plugging it in"
+        "found no bridge and no board in its boot loader; for a board without working firmware, hold its BOOTSEL button while \
+         plugging it in"
     )]
     Nothing,
-    /// Which one?
-    #[error("several bridges: choose one with --to: {}", .0.join(", "))]
+    /// Several bridges run, and none was named.
+    #[error("several bridges are connected: {}", .0.join(", "))]
     SeveralBridges(Vec<String>),
     /// Boards in their boot loader all look the same.
     #[error("{0} boards are in their boot loader and cannot be told apart; unplug all but one")]
     SeveralBoards(usize),
     /// A board waits, but a bridge was asked for.
-    #[error("another board is in its boot loader already; flash that one first (without --to) or unplug it")]
+    #[error(
+        "another board is already in its boot loader; flash that one first, without naming a bridge, or unplug it"
+    )]
     AnotherBoard,
     /// The bridge's link cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// It does not answer, or has something better to do.
-    #[error(
-        "the bridge cannot be brought into its boot loader: {0}. By hand: hold its BOOTSEL button while plugging it in"
-    )]
+    /// The bridge does not answer, or refuses.
+    #[error("the bridge cannot enter its boot loader (hold its BOOTSEL button while plugging it in instead)")]
     Enter(#[source] QueryError),
-    /// It prints.
+    /// The bridge is printing a job.
     #[error(
         "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
     )]
     Printing(u32),
-    /// It did not show itself.
+    /// No board appeared in its boot loader.
     #[error(
-        "the bridge was asked into its boot loader but no board came up there; plug it in again, its BOOTSEL button held, \
-         and repeat this command"
+        "the bridge was told to enter its boot loader, but no board appeared there; hold its BOOTSEL button while plugging it in \
+         again, then repeat this command"
     )]
     NoLoader,
-    /// Neither way into the board is open.
+    /// Neither the boot loader nor the drive of the board can be opened.
     #[error(
-        "the board in its boot loader cannot be opened, and its drive RPI-RP2 is not mounted; `foilpress doctor` says what to \
-         set up, or open the drive and repeat this command"
+        "cannot open the board in its boot loader, and its drive RPI-RP2 is not mounted (`foilpress doctor` says what to set up; \
+         or mount the drive and repeat this command)"
     )]
     Closed(#[source] io::Error),
     /// Writing failed.
@@ -88,14 +88,14 @@ pub enum FlashError {
     /// Copying failed.
     #[error(transparent)]
     Drive(#[from] DriveError),
-    /// Written, but not seen again.
+    /// The firmware was written, but the bridge did not come back.
     #[error(
-        "the firmware was written, but the bridge has not come back; unplug it and plug it in again, then `foilpress bridge \
-         list` shows it"
+        "the firmware was written, but the bridge has not come back; unplug it and plug it in again, then check it with \
+         `foilpress bridge list`"
     )]
     NotBack,
-    /// Written, but something else runs.
-    #[error("firmware {expected} was written, but the bridge says it runs {found}; flash it again")]
+    /// The firmware was written, but another version runs.
+    #[error("firmware {expected} was written, but the bridge reports firmware {found}; flash it again")]
     OtherVersion {
         /// What was written.
         expected: String,
@@ -104,7 +104,7 @@ pub enum FlashError {
     },
 }
 
-/// What flashing needs of the computer.
+/// What flashing needs from the computer.
 pub trait Computer {
     /// A way to a board in its boot loader.
     type Board: Pipe;
@@ -117,16 +117,16 @@ pub trait Computer {
     fn open(&mut self) -> io::Result<Self::Board>;
     /// The mounted drives of such boards.
     fn drives(&mut self) -> Vec<PathBuf>;
-    /// Asks a bridge to go to its boot loader; tells its number.
+    /// Tells a bridge to enter its boot loader; returns its number.
     fn enter(&mut self, bridge: &Candidate) -> Result<u64, FlashError>;
-    /// Who answers there, if somebody does.
+    /// The bridge that answers there, if one does.
     fn greet(&mut self, candidate: &Candidate) -> Option<Bridge>;
-    /// Lets time pass.
+    /// Waits.
     fn wait(&mut self, time: Duration);
 }
 
-/// Puts `firmware`, read from `file`, onto the bridge at `to`, or onto the only board there is. Returns the bridge as it
-/// introduces itself afterwards.
+/// Installs `firmware`, read from `file`, on the bridge at `to`, or on the only board. Returns the bridge as it introduces
+/// itself afterwards.
 pub fn run(
     firmware: &Firmware,
     file: &[u8],
@@ -154,7 +154,7 @@ pub fn run(
         },
     };
     write(firmware, file, computer, observer)?;
-    observer.note("waiting for the bridge to come back");
+    observer.note("waiting for the bridge to restart");
     let known: Vec<u64> = bridges.iter().filter_map(Candidate::number).collect();
     let expected = |found: u64| match number {
         Some(number) => found == number,
@@ -162,7 +162,7 @@ pub fn run(
     };
     let back = until(computer, BACK_PATIENCE, |computer| {
         let mut bridges = computer.bridges();
-        // Other bridges are not to be disturbed.
+        // Other bridges are left alone.
         bridges.retain(|bridge| bridge.number().is_none_or(&expected));
         bridges.iter().filter_map(|bridge| computer.greet(bridge)).find(|bridge| expected(bridge.serial))
     });
@@ -175,14 +175,14 @@ pub fn run(
     }
 }
 
-/// Brings a bridge into its boot loader and waits until the board shows itself there; tells the bridge's number.
+/// Brings a bridge into its boot loader and waits until the board appears there; returns the bridge's number.
 fn enter(
     bridge: &Candidate,
     computer: &mut impl Computer,
     observer: &dyn Observer,
 ) -> Result<u64, FlashError> {
     let number = computer.enter(bridge)?;
-    observer.note(&format!("bridge {number:016x} goes to its boot loader"));
+    observer.note(&format!("bridge {number:016x} is entering its boot loader"));
     let there = |computer: &mut _| (waiting_boards(computer) > 0).then_some(());
     until(computer, LOADER_PATIENCE, there).ok_or(FlashError::NoLoader)?;
     Ok(number)
@@ -199,7 +199,7 @@ fn write(
     observer: &dyn Observer,
 ) -> Result<(), FlashError> {
     let closed = match computer.boards() {
-        // Where the USB library cannot even list the board its drive may still be there.
+        // Even if the USB library cannot list the board, its drive may be mounted.
         0 => io::Error::from(ErrorKind::NotFound),
         1 => match computer.open() {
             Ok(board) => return Ok(Picoboot::write(board, firmware.image(), observer)?),
@@ -224,22 +224,22 @@ fn write(
     }
 }
 
-/// Looks again and again until something is found or `patience` is over.
+/// Repeats `check` until it finds something or `patience` is over.
 fn until<C: Computer, T>(
     computer: &mut C,
     patience: Duration,
-    mut look: impl FnMut(&mut C) -> Option<T>,
+    mut check: impl FnMut(&mut C) -> Option<T>,
 ) -> Option<T> {
     let mut waited = Duration::ZERO;
     loop {
-        if let Some(found) = look(computer) {
+        if let Some(found) = check(computer) {
             return Some(found);
         }
         if waited >= patience {
             return None;
         }
-        computer.wait(LOOK);
-        waited += LOOK;
+        computer.wait(POLL);
+        waited += POLL;
     }
 }
 

@@ -1,11 +1,10 @@
 //! PICOBOOT: writing a board's flash through its boot ROM.
 //!
-//! Problem: put an image into the flash and be sure that it is there; and whatever is interrupted where, the board must
-//! be able to be flashed again, without its BOOTSEL button where possible.
-//! Method: the boot ROM starts what is in flash only if the checksum of the first page is right, and waits in its
-//! boot loader otherwise. So the sector with that page is erased first and the page itself is written last, after
-//! everything else was read back and found right. An interruption leaves the old program, the boot loader, or the whole
-//! new program.
+//! Problem: write an image to the flash and verify it; after an interruption at any point it must be possible to flash the
+//! board again, without its BOOTSEL button where possible.
+//! Method: the boot ROM starts the program in flash only if the checksum of the first page is right, and waits in its boot
+//! loader otherwise. So the sector with that page is erased first and the page itself is written last, after everything else
+//! was read back and compared. An interruption leaves the old program, the boot loader, or the whole new program.
 //! Cost: an erase (some 50 ms) and a write for each 4096 bytes, 25 of them for the bridge's firmware; then a read.
 //! Limits: the image's own sectors; nothing else in the flash is touched.
 //! Source: RP2040 data sheet, 2.8.5.
@@ -30,10 +29,10 @@ pub trait Pipe {
     /// Receives one transfer of at most the buffer's length.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
-    /// What came of the last command (GET_COMMAND_STATUS).
+    /// The result of the last command (GET_COMMAND_STATUS).
     fn status(&mut self) -> io::Result<[u8; 16]>;
 
-    /// Brings the interface back to its beginning (INTERFACE_RESET), stalled endpoints included.
+    /// Resets the interface (INTERFACE_RESET), including stalled endpoints.
     fn reset(&mut self) -> io::Result<()>;
 }
 
@@ -58,7 +57,7 @@ impl Pipe for Box<dyn Pipe> {
 /// A command, as messages name it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Command {
-    /// Keep the drive from writing.
+    /// Take exclusive access, so that the drive cannot write.
     Exclusive,
     /// Start the program.
     Reboot,
@@ -86,7 +85,7 @@ impl Command {
 
     fn words(self) -> &'static str {
         match self {
-            Command::Exclusive => "to give the flash to this program",
+            Command::Exclusive => "to give this program exclusive access",
             Command::Reboot => "to restart",
             Command::Erase => "to erase",
             Command::Read => "to read",
@@ -96,11 +95,11 @@ impl Command {
     }
 }
 
-/// Why the board does not have the new firmware. It is in its boot loader, or can be brought there, and flashing can be repeated.
+/// Why the board does not have the new firmware. It is in its boot loader or can enter it again, so flashing can be repeated.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The cable went, or the board does not answer.
-    #[error("the board went away while it was {doing}; plug it in and flash it again")]
+    /// The board was unplugged or does not answer.
+    #[error("the board disappeared while it was {doing}; plug it in and flash it again")]
     Gone {
         /// What it was doing.
         doing: String,
@@ -120,8 +119,8 @@ pub enum WriteError {
     },
     /// The flash does not hold what was written.
     #[error(
-        "the flash has {found:#04x} at {address:#010x} where {expected:#04x} was written; flash it again, and if that does \
-         not help, the board's flash is worn out"
+        "the flash holds {found:#04x} at {address:#010x} where {expected:#04x} was written; flash it again, and if that does not \
+         help, the board's flash is worn out"
     )]
     Different {
         /// Where.
@@ -135,12 +134,12 @@ pub enum WriteError {
 
 fn status_words(status: u32) -> String {
     let words = match status {
-        1 => "it does not know the command",
-        2 | 3 => "it does not like the length",
-        4 => "there is no such address",
-        5 => "the address is no beginning of a sector or page",
-        6 => "the drive is being written too",
-        7 => "it is restarting",
+        1 => "unknown command",
+        2 | 3 => "invalid length",
+        4 => "invalid address",
+        5 => "the address is not the start of a sector or page",
+        6 => "the drive is being written at the same time",
+        7 => "the board is restarting",
         _ => return format!("status {status}"),
     };
     words.into()
@@ -165,7 +164,7 @@ impl<P: Pipe> Picoboot<P> {
         let mut board = Picoboot { pipe, token: 0 };
         let result = board.write_all(image, observer);
         if result.is_err() {
-            // So that the drive can be used instead. If the board is gone, so is what it was told.
+            // Gives the drive back, so that it can be used instead. A board that has gone forgets the lock by itself.
             let _ = board.pipe.reset();
             let _ = board.command(Command::Exclusive, 0, &[0], Data::None);
         }
@@ -173,14 +172,14 @@ impl<P: Pipe> Picoboot<P> {
     }
 
     fn write_all(&mut self, image: &Image, observer: &dyn Observer) -> Result<(), WriteError> {
-        self.pipe.reset().map_err(|source| WriteError::Gone { doing: "being greeted".into(), source })?;
+        self.pipe.reset().map_err(|source| WriteError::Gone { doing: "being contacted".into(), source })?;
         self.command(Command::Exclusive, 0, &[1], Data::None)?;
         self.command(Command::ExitXip, 0, &[], Data::None)?;
 
         let sectors: Vec<u32> = image.sectors().into_iter().collect();
         let steps = sectors.len() as u64;
         observer.begin("writing the firmware", steps);
-        // First the one that makes the board start the old program.
+        // First the sector without which the board does not start the old program.
         self.erase(FLASH.start)?;
         for &sector in &sectors {
             let bytes = contents(image, sector);
@@ -194,7 +193,7 @@ impl<P: Pipe> Picoboot<P> {
         }
         observer.end();
 
-        observer.begin("reading it back", steps);
+        observer.begin("verifying the firmware", steps);
         for &sector in &sectors {
             let mut expected = contents(image, sector);
             if sector == FLASH.start {
@@ -260,7 +259,7 @@ impl<P: Pipe> Picoboot<P> {
         match data {
             Data::In(buffer) => {
                 if self.pipe.receive(buffer)? != buffer.len() {
-                    return Err(wrong("the board sent less than it was asked for"));
+                    return Err(wrong("the board sent less data than it was asked for"));
                 }
                 return self.pipe.send(&[]);
             }
@@ -269,7 +268,7 @@ impl<P: Pipe> Picoboot<P> {
         }
         match self.pipe.receive(&mut [0; PAGE])? {
             0 => Ok(()),
-            _ => Err(wrong("the board sent data that nobody asked for")),
+            _ => Err(wrong("the board sent unexpected data")),
         }
     }
 

@@ -13,7 +13,7 @@ use press::job::ribbon;
 #[derive(Debug, thiserror::Error)]
 pub enum Unsendable {
     /// Not one whole legal job.
-    #[error("not sent: the file is not one complete job: {0}; `foilpress inspect` shows what is in it")]
+    #[error("not sent: the file is not one complete job")]
     Illegal(#[from] StreamError),
     /// More than positions on the link can say.
     #[error("not sent: {0} bytes are more than 2 GB")]

@@ -12,6 +12,7 @@ use super::address::{Address, OpenError};
 use super::find;
 use super::session::{Bridge, Outcome, Record, Session, SessionError};
 use super::transport::Transport;
+use observe::with_causes;
 
 /// How long to wait for bytes when there is nothing to send.
 const IDLE: Duration = Duration::from_millis(20);
@@ -138,7 +139,7 @@ fn reopen(
             Ok(link) => return Some(link),
             Err(_) if wish() == Wish::Leave => return None,
             Err(error) => {
-                let text = error.to_string();
+                let text = with_causes(&error);
                 if text != told {
                     watch(Event::Away(&text));
                     told = text;

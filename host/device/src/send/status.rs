@@ -104,13 +104,13 @@ fn words(complaint: Complaint) -> String {
         Complaint::RibbonEnd => "a ribbon is at its end; load a new cartridge".into(),
         Complaint::RibbonBreak => "a ribbon is torn; take the cartridge out and look".into(),
         Complaint::PlaceOccupied => "a cartridge holder is occupied; take a cartridge out".into(),
-        Complaint::WrongCassette { wanted } => match Ink::from_barcode(wanted) {
+        Complaint::WrongCartridge { wanted } => match Ink::from_barcode(wanted) {
             Some(ink) => {
                 format!("it wants the {} cartridge ({}, barcode {wanted}); load it", ink.name(), ink.part())
             }
             None => format!("it wants a cartridge with barcode {wanted}"),
         },
-        Complaint::Cassette => "it reports a fault of a cartridge".into(),
+        Complaint::Cartridge => "it reports a fault of a cartridge".into(),
     }
 }
 

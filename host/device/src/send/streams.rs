@@ -77,7 +77,7 @@ pub fn expand(streams: &[u8], put: &mut dyn FnMut(&[u8]) -> bool) -> Result<(), 
     let (header, length) = Header::read(streams).ok().flatten().ok_or(NoStreams::Header)?;
     let mut left = &streams[length..];
     let (columns, stride) = (header.columns(), stride(header.columns()));
-    let mut writer = JobWriter::new(*header.setup(), header.rows())?;
+    let mut writer = JobWriter::new(header.setup().clone(), header.rows())?;
     let mut decoder = Decoder::new(columns, header.rows());
     let mut memory = vec![0; band_bytes(columns)];
     let mut out = vec![0; COMMAND_ROOM.max(ROW_ROOM + stride)];

@@ -1,4 +1,4 @@
-//! Where one machine begins to print and how far it feeds, to be measured with a ruler.
+//! Where one printer starts and how far it feeds, to be measured with a ruler.
 //!
 //! Two crosses, one below the other. Where the first one is from the edges of the sheet gives the offset, how far the second
 //! is from it the feed: row `r` of the stream lands at `top + offset + feed r`.
@@ -7,15 +7,15 @@ use inks::Stack;
 use protocol::ink::Ink;
 use protocol::paper::{LEFT, Paper};
 
-use super::ChartError;
+use super::error::ChartError;
 use super::sketch::{Sketch, mm};
 use crate::layout::{Mm, Point, Profile};
-use crate::sheet::Piece;
+use crate::sheet::DotMap;
 
 /// Where the middle of the first cross belongs, in millimetres from the left and the top edge of the sheet.
-pub const CROSS: (f64, f64) = (20.0, 30.0);
+const CROSS: (f64, f64) = (20.0, 30.0);
 /// From the first cross to the second, in millimetres.
-pub const DISTANCE: f64 = 200.0;
+const DISTANCE: f64 = 200.0;
 /// The top margin of the papers that are long enough, in millimetres.
 const TOP: f64 = 284.0 * 25.4 / 600.0;
 
@@ -23,8 +23,12 @@ const TOP: f64 = 284.0 * 25.4 / 600.0;
 const ARM: f64 = 7.0;
 const LINE: f64 = 0.2;
 
-/// The chart, as large as the printable area of the paper, in one ink.
-pub fn calibration(ink: Ink, paper: Paper) -> Result<Piece, ChartError> {
+/// The chart, as large as the printable area of the paper, in one ink. `next` are lines that say what to do with the two
+/// measurements; they are printed below the instructions.
+///
+/// # Errors
+/// A paper that is too small.
+pub fn calibration(ink: Ink, paper: Paper, next: &[&str]) -> Result<DotMap, ChartError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     let at = (mm(CROSS.0) - usize::from(LEFT), mm(CROSS.1) - usize::from(paper.top()).min(mm(CROSS.1)));
     let room = (mm(110.0), at.1 + mm(DISTANCE) + mm(ARM));
@@ -45,16 +49,14 @@ pub fn calibration(ink: Ink, paper: Paper) -> Result<Piece, ChartError> {
         format!("   from the left edge of the sheet ({:.1} mm)", CROSS.0),
         format!("   from the top edge ({:.1} mm)", CROSS.1),
         format!("2. From cross to cross ({DISTANCE:.1} mm)"),
-        "3. foilpress profile set default --cross X,Ymm \\".to_string(),
-        "       --distance Dmm".to_string(),
     ];
-    for (i, words) in words.iter().enumerate() {
+    for (i, words) in words.iter().map(String::as_str).chain(next.iter().copied()).enumerate() {
         sketch.text(at.0 + mm(15.0), at.1 + mm(10.0) + i * mm(5.0), 4, &ink, words);
     }
     Ok(sketch.finish()?)
 }
 
-/// The machine that printed the crosses where they were measured.
+/// The profile of the printer whose crosses were measured there.
 pub fn profile(cross: Point, distance: Option<Mm>) -> Profile {
     let feed = distance.map_or(1.0, |distance| distance.0 / DISTANCE);
     let row = CROSS.1 - TOP;

@@ -1,72 +1,19 @@
-//! Charts: pieces made by the program itself, to look at inks, to measure them, and to measure the machine.
+//! Charts: dot maps made by the program itself, to look at inks, to measure them, and to measure the printer.
 //!
 //! [`ramp`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
-//! [`registration()`] shows how far passes are apart, [`calibration()`] where the machine begins and how far it feeds. Each gives
-//! a [`Piece`](crate::sheet::Piece) that goes the way of every other print.
+//! [`registration()`] shows how far passes are apart, [`calibration()`] where the printer starts and how far it feeds. Each gives
+//! a [`DotMap`](crate::sheet::DotMap) that is laid out and printed like any other.
 
 pub mod calibration;
-pub mod registration;
+mod error;
+mod registration;
 mod sketch;
-pub mod steps;
+mod steps;
 
 pub use calibration::calibration;
+pub use error::ChartError;
 pub use registration::registration;
 pub use steps::{ladder, ramp, stacks};
-
-use inks::Stack;
-
-use crate::halftone::HalftoneError;
-use crate::sheet::SheetError;
-use appearance::weights::WeightError;
-
-/// Why there is no chart.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ChartError {
-    /// Nothing to show a difference of.
-    #[error("a {chart} needs two different stacks; both are `{stack}`")]
-    Same {
-        /// Name of the chart.
-        chart: &'static str,
-        /// The stack.
-        stack: Stack,
-    },
-    /// Too few inks.
-    #[error("registration is between passes: at least two inks are needed")]
-    OneInk,
-    /// More than a chart shows.
-    #[error("{found} {what}; at most {most} have room on this paper, choose fewer with --inks")]
-    TooMany {
-        /// What.
-        what: &'static str,
-        /// How many.
-        found: usize,
-        /// How many there can be.
-        most: usize,
-    },
-    /// The paper is too small.
-    #[error(
-        "the {chart} chart needs {width:.0} x {length:.0} mm to print on, and {paper} has less; take a4 or letter"
-    )]
-    Paper {
-        /// Name of the chart.
-        chart: &'static str,
-        /// Width needed in mm.
-        width: u32,
-        /// Length needed in mm.
-        length: u32,
-        /// Name of the paper.
-        paper: &'static str,
-    },
-    /// A ramp without places. A bug if it is ever seen.
-    #[error(transparent)]
-    Weights(#[from] WeightError),
-    /// The halftone refused.
-    #[error(transparent)]
-    Halftone(#[from] HalftoneError),
-    /// What was drawn is no piece. A bug if it is ever seen.
-    #[error(transparent)]
-    Sheet(#[from] SheetError),
-}
 
 #[cfg(test)]
 mod tests;

@@ -9,14 +9,15 @@ use inks::Stack;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
-use super::ChartError;
+use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
-use crate::sheet::Piece;
+use crate::layout::Mm;
+use crate::sheet::DotMap;
 
 /// From line to line in the first ink, in dots.
-pub const PITCH: usize = 24;
+const PITCH: usize = 24;
 /// Lines on each side of the middle: the dots that can be read.
-pub const REACH: usize = 10;
+const REACH: usize = 10;
 /// Width of a line in dots.
 const WIDTH: usize = 8;
 /// Length of a line in dots.
@@ -52,7 +53,7 @@ fn vernier(sketch: &mut Sketch, (x, y): (usize, usize), down: bool, first: &Stac
 }
 
 /// The first ink against each of the others, on the whole printable area of the paper.
-pub fn registration(inks: &[Ink], paper: Paper) -> Result<Piece, ChartError> {
+pub fn registration(inks: &[Ink], paper: Paper) -> Result<DotMap, ChartError> {
     let [first, others @ ..] = inks else { return Err(ChartError::OneInk) };
     if others.is_empty() {
         return Err(ChartError::OneInk);
@@ -64,7 +65,7 @@ pub fn registration(inks: &[Ink], paper: Paper) -> Result<Piece, ChartError> {
     if others.len() > most || length < 3 * block {
         if most < 1 || length < 3 * block {
             // Whole millimetres, rounded up.
-            let needed = |dots: usize| (dots as f64 * 25.4 / 600.0).ceil() as u32;
+            let needed = |dots: usize| Mm::of_dots(dots as i64).0.ceil() as u32;
             let (width, length) = (needed(column), needed(3 * block));
             return Err(ChartError::Paper { chart: "registration", width, length, paper: paper.name() });
         }

@@ -1,4 +1,4 @@
-//! A piece to draw rectangles, letters and halftoned patches on.
+//! A dot map to draw rectangles, letters and halftoned patches on.
 
 use std::convert::Infallible;
 
@@ -8,12 +8,11 @@ use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, Size};
 use embedded_graphics::text::{Baseline, Text};
 use inks::{Library, Stack};
-use protocol::paper::Paper;
 
-use super::ChartError;
-use crate::halftone::{self, Placement};
+use super::error::ChartError;
+use crate::halftone::{self, halftone};
 use crate::layout::Mm;
-use crate::sheet::{Piece, SheetError};
+use crate::sheet::{DotMap, SheetError};
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
 use observe::Observer;
@@ -44,11 +43,11 @@ impl Sketch {
         Sketch { width, length, stacks: vec![Stack::SUBSTRATE], index: vec![0; width * length] }
     }
 
-    pub(super) fn finish(self) -> Result<Piece, SheetError> {
-        Piece::new(self.width, self.length, self.stacks, self.index)
+    pub(super) fn finish(self) -> Result<DotMap, SheetError> {
+        DotMap::new(self.width, self.length, self.stacks, self.index)
     }
 
-    /// The number of a stack. Charts have far fewer than 256; the check is [`Piece::new`]'s.
+    /// The number of a stack. Charts have far fewer than 256; the check is [`DotMap::new`]'s.
     fn number(&mut self, stack: &Stack) -> u8 {
         let known = self.stacks.iter().position(|known| known == stack);
         known.unwrap_or_else(|| {
@@ -116,17 +115,10 @@ impl Sketch {
         let (wide, long) = (width as u16, length as u16);
         let maps = WeightMaps::new(share.len(), 1, 2, weights)?;
         let mix = InkMix { stacks, maps, matrix };
-        let minimum = mix.stacks.iter().map(|stack| library.minimum_cluster(stack)).collect();
-        let place = Placement {
-            paper: Paper::Custom { width: wide, length: long },
-            x: 0,
-            y: 0,
-            width: wide,
-            height: long,
-        };
-        let sheet = halftone::halftone(&mix, &place, &halftone::Settings { minimum }, observer)?;
+        let settings = halftone::Settings::from_library(&mix.stacks, library);
+        let patch = halftone(&mix, (wide, long), &settings, observer)?;
         let numbers: Vec<u8> = mix.stacks.iter().map(|stack| self.number(stack)).collect();
-        for (row, dots) in sheet.index().chunks_exact(width).enumerate() {
+        for (row, dots) in patch.index().chunks_exact(width).enumerate() {
             for (column, &dot) in dots.iter().enumerate() {
                 self.put(x + column, y + row, numbers[usize::from(dot)]);
             }

@@ -4,10 +4,10 @@ use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::Paper;
 
-use super::ChartError;
+use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::separate::MOST_CARTRIDGES;
-use crate::sheet::Piece;
+use crate::sheet::DotMap;
 use observe::Observer;
 
 /// Scale of labels: letters 3.4 mm high.
@@ -16,9 +16,9 @@ const LABEL: usize = 4;
 const STEPS: usize = 1024;
 
 /// The four gloss levels of figure 5, relative to the highest.
-pub const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
+const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
 /// The gloss of the two inks of figure 5.
-pub const INKS: [f64; 2] = [0.5, 0.1];
+const INKS: [f64; 2] = [0.5, 0.1];
 
 /// What labels and checkerboards are printed in: black, unless the stacks fill all seven places without it.
 fn pen(stacks: &[&Stack]) -> Stack {
@@ -40,7 +40,7 @@ fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), ChartError> {
 
 /// Figure 2: all of `a` at the left, all of `b` at the right, 150 mm apart; below it a checkerboard to cut out and hold so
 /// that the ramp reflects it.
-pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) -> Result<Piece, ChartError> {
+pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) -> Result<DotMap, ChartError> {
     two("ramp", a, b)?;
     let (width, strip) = (mm(150.0), mm(30.0));
     let line = LINE * LABEL;
@@ -70,7 +70,7 @@ pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) ->
 
 /// The share of the glossier ink that shows a gloss: clamped to the nearest ink, or with all levels brought between the inks
 /// so that their relative differences stay.
-pub fn ladder_shares(gloss: f64) -> [f64; 2] {
+fn ladder_shares(gloss: f64) -> [f64; 2] {
     let [high, low] = INKS;
     let clamped = ((gloss - low) / (high - low)).clamp(0.0, 1.0);
     let least = GLOSS[GLOSS.len() - 1];
@@ -84,7 +84,7 @@ pub fn ladder(
     dull: &Stack,
     library: &Library,
     observer: &dyn Observer,
-) -> Result<Piece, ChartError> {
+) -> Result<DotMap, ChartError> {
     two("ladder", glossy, dull)?;
     let (patch, gap, line) = (mm(30.0), mm(4.0), LINE * LABEL);
     let pen = pen(&[glossy, dull]);
@@ -108,7 +108,7 @@ pub fn ladder(
 /// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera.
 ///
 /// Errors: more than the paper has room for.
-pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<Piece, ChartError> {
+pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<DotMap, ChartError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     let (patch, gap) = (mm(20.0), mm(4.0));
     let cell = (patch + gap, patch + mm(1.0) + LINE * 3 + mm(3.0));

@@ -1,7 +1,7 @@
 use super::*;
 use crate::layout::{Layout, Mm, Point, Profile, arrange};
-use crate::sheet::Piece;
-use inks::Library;
+use crate::sheet::DotMap;
+use inks::{Library, Stack};
 use observe::Silent;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
@@ -11,11 +11,11 @@ fn stack(text: &str) -> Stack {
 }
 
 /// Dots of each stack in a rectangle, by name.
-fn count(piece: &Piece, (x, y, width, length): (usize, usize, usize, usize), wanted: &str) -> usize {
-    let number = piece.stacks().iter().position(|s| *s == stack(wanted));
+fn count(chart: &DotMap, (x, y, width, length): (usize, usize, usize, usize), wanted: &str) -> usize {
+    let number = chart.stacks().iter().position(|s| *s == stack(wanted));
     (y..y + length)
         .map(|row| {
-            let row = &piece.index()[row * piece.width() + x..][..width];
+            let row = &chart.index()[row * chart.width() + x..][..width];
             row.iter().filter(|&&dot| Some(usize::from(dot)) == number).count()
         })
         .sum()
@@ -23,28 +23,28 @@ fn count(piece: &Piece, (x, y, width, length): (usize, usize, usize, usize), wan
 
 #[test]
 fn a_ramp_has_the_tone_of_its_place() {
-    let piece = ramp(&stack("MS"), &stack("MS+C"), &Library::builtin(), &Silent).unwrap();
-    let top = piece.index().chunks(piece.width()).position(|row| row.iter().all(|&dot| dot != 0)).unwrap();
+    let chart = ramp(&stack("MS"), &stack("MS+C"), &Library::builtin(), &Silent).unwrap();
+    let top = chart.index().chunks(chart.width()).position(|row| row.iter().all(|&dot| dot != 0)).unwrap();
     let length = 30 * 600 / 25;
     for tenth in 0..10 {
-        let width = piece.width() / 10;
+        let width = chart.width() / 10;
         let place = (tenth * width, top, width, length.min(700));
-        let share = count(&piece, place, "MS") as f64 / (width * length.min(700)) as f64;
+        let share = count(&chart, place, "MS") as f64 / (width * length.min(700)) as f64;
         let want = 0.95 - 0.1 * tenth as f64;
         assert!((share - want).abs() < 0.01, "{tenth}: {share} {want}");
     }
-    assert_eq!(count(&piece, (0, top, piece.width(), 700), "substrate"), 0);
+    assert_eq!(count(&chart, (0, top, chart.width(), 700), "substrate"), 0);
 }
 
 #[test]
 fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
-    let piece = ladder(&stack("SF"), &stack("MS"), &Library::builtin(), &Silent).unwrap();
+    let chart = ladder(&stack("SF"), &stack("MS"), &Library::builtin(), &Silent).unwrap();
     let (patch, gap) = (709, 94);
     let share = |row: usize, column: usize| {
         // In the middle of the patch, clear of its labels.
-        let block = piece.length() / 2;
+        let block = chart.length() / 2;
         let place = (column * (patch + gap), row * block + 80 + 24 + 2, patch, patch - 4);
-        count(&piece, place, "SF") as f64 / (patch * (patch - 4)) as f64
+        count(&chart, place, "SF") as f64 / (patch * (patch - 4)) as f64
     };
     let clamped: Vec<f64> = (0..4).map(|column| share(0, column)).collect();
     let mapped: Vec<f64> = (0..4).map(|column| share(1, column)).collect();
@@ -60,10 +60,10 @@ fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
 #[test]
 fn every_stack_has_a_patch_of_its_own_that_is_solid() {
     let all: Vec<Stack> = ["substrate", "C", "K", "MS", "MS+C", "MS+C+F"].map(stack).to_vec();
-    let piece = stacks(&all, Paper::A4).unwrap();
+    let chart = stacks(&all, Paper::A4).unwrap();
     for wanted in &all[1..] {
-        let number = piece.stacks().iter().position(|s| s == wanted).unwrap() as u8;
-        let dots = piece.index().iter().filter(|&&dot| dot == number).count();
+        let number = chart.stacks().iter().position(|s| s == wanted).unwrap() as u8;
+        let dots = chart.index().iter().filter(|&&dot| dot == number).count();
         // A patch of 20 x 20 mm; black also writes the labels.
         assert!(
             if wanted.to_string() == "K" { dots > 472 * 472 } else { dots == 472 * 472 },
@@ -71,25 +71,25 @@ fn every_stack_has_a_patch_of_its_own_that_is_solid() {
         );
     }
     let many: Vec<Stack> = (1..200).map(|n| Stack::new(vec![Ink::White; n])).collect();
-    assert!(stacks(&many, Paper::A4).unwrap_err().to_string().contains("--inks"));
+    assert!(stacks(&many, Paper::A4).unwrap_err().to_string().contains("choose fewer inks"));
 }
 
 #[test]
 fn lines_of_a_vernier_meet_in_the_middle_and_a_dot_apart_for_each_line_from_it() {
-    let piece = registration(&[Ink::Black, Ink::White], Paper::A4).unwrap();
+    let chart = registration(&[Ink::Black, Ink::White], Paper::A4).unwrap();
     let row_of = |text: &str, from: usize| -> Vec<usize> {
-        let number = piece.stacks().iter().position(|s| *s == stack(text)).unwrap() as u8;
-        let row = &piece.index()[from * piece.width()..][..piece.width()];
+        let number = chart.stacks().iter().position(|s| *s == stack(text)).unwrap() as u8;
+        let row = &chart.index()[from * chart.width()..][..chart.width()];
         (1..row.len()).filter(|&x| row[x] == number && row[x - 1] != number).collect()
     };
     // The first row that has 21 lines of white at each side; 10 rows above it the black ones.
-    let white = (0..piece.length()).find(|&y| row_of("W", y).len() == 42).unwrap();
+    let white = (0..chart.length()).find(|&y| row_of("W", y).len() == 42).unwrap();
     let (other, first) = (row_of("W", white), row_of("K", white - 10));
     assert_eq!(first.len(), 42);
     for i in 0..42 {
         assert_eq!(other[i] as i64 - first[i] as i64, (i % 21) as i64 - 10);
     }
-    assert!(other[20] < piece.width() / 4 && other[21] > piece.width() / 4 * 3);
+    assert!(other[20] < chart.width() / 4 && other[21] > chart.width() / 4 * 3);
     assert!(matches!(registration(&[Ink::Black], Paper::A4), Err(ChartError::OneInk)));
     assert!(registration(&Ink::ALL, Paper::A4).is_err());
 }
@@ -100,9 +100,9 @@ fn a_machine_that_is_measured_and_corrected_prints_the_crosses_where_they_belong
     for real in
         [Profile { offset_mm: [0.5, -0.8], feed: 1.004 }, Profile { offset_mm: [-1.0, 2.0], feed: 0.99 }]
     {
-        let chart = calibration(Ink::Black, Paper::A4).unwrap();
-        let lands = |piece: &Piece, layout: &Layout| -> Vec<(f64, f64)> {
-            let sheet = arrange(piece, layout, &Silent).unwrap().sheet;
+        let chart = calibration(Ink::Black, Paper::A4, &[]).unwrap();
+        let lands = |chart: &DotMap, layout: &Layout| -> Vec<(f64, f64)> {
+            let sheet = arrange(chart, layout, &Silent).unwrap().sheet;
             let width = sheet.width();
             // Rows of ink 14 mm long are the level arms of the crosses.
             let arm = 14 * 600 / 26;
@@ -144,6 +144,6 @@ fn a_machine_that_is_measured_and_corrected_prints_the_crosses_where_they_belong
 fn charts_refuse_what_shows_nothing() {
     let library = Library::builtin();
     assert!(matches!(ramp(&stack("C"), &stack("C"), &library, &Silent), Err(ChartError::Same { .. })));
-    let small = calibration(Ink::Black, Paper::Postcard).unwrap_err().to_string();
+    let small = calibration(Ink::Black, Paper::Postcard, &[]).unwrap_err().to_string();
     assert!(small.contains("postcard") && small.contains("a4"), "{small}");
 }

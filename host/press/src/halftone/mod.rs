@@ -1,28 +1,27 @@
 //! One stack for every dot, in clusters no smaller than the inks can hold (section 4.2 of the 2009 paper).
 //!
-//! Problem: a continuous mix of stacks becomes a [`Sheet`] whose local means are the mix, with no cluster
+//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, with no cluster
 //! smaller than a stack's minimum.
-//! Method: error diffusion along the band walk ([`protocol::walk`]) of the rectangle the document is printed
-//! on, by the rule in `rule` on the mix sampled by `mix`. The walk is cut into strips of 16 bands, each
+//! Method: error diffusion along the band walk ([`protocol::walk`]) of the document's own rectangle, by the rule in `rule` on the mix sampled by `mix`. The walk is cut into strips of 16 bands, each
 //! diffused by itself, so that both cores work and the result does not depend on how many there are; a strip
 //! forgets a few dots of debt at its end.
-//! Cost: under 10 ns a dot on one core for 8 stacks, 20 ns for 57. Memory: the sheet, one byte a dot, and a few
+//! Cost: under 10 ns a dot on one core for 8 stacks, 20 ns for 57. Memory: the map, one byte a dot, and a few
 //! kilobytes a thread. Limits: minima of 1 to [`LARGEST`] dots.
-//! Guarantees: every dot of the rectangle has a stack that has weight in the document; all others are substrate; no
+//! Guarantees: every dot has a stack that has weight in the document; no
 //! run along the rectangle's walk, hence no 4-connected cluster, is smaller than its stack's minimum (unless the
-//! whole rectangle is); the same input gives the same sheet on any machine with any number of threads.
+//! whole rectangle is); the same input gives the same map on any machine with any number of threads.
 
 pub mod metrics;
 mod mix;
 mod rule;
 
-use inks::Stack;
+use inks::{Library, Stack};
 use protocol::ink::Ink;
-use protocol::paper::{LARGEST as LARGEST_PAGE, Paper};
+use protocol::paper::LARGEST as LARGEST_PAGE;
 use protocol::walk::{Band, MOST, Tile, Walk};
 use rayon::prelude::*;
 
-use crate::sheet::{Sheet, SheetError};
+use crate::sheet::{DotMap, SheetError};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 use observe::Observer;
@@ -32,21 +31,6 @@ pub const LARGEST: u16 = 64;
 
 /// Bands in a strip; the last strip has up to twice as many.
 const STRIP: usize = 16;
-
-/// Where on which paper a document is printed, in dots of 1/600 inch of the printable area.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Placement {
-    /// The paper.
-    pub paper: Paper,
-    /// First column.
-    pub x: u16,
-    /// First row.
-    pub y: u16,
-    /// Dots across.
-    pub width: u16,
-    /// Rows.
-    pub height: u16,
-}
 
 /// What the halftone may be told.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -61,6 +45,11 @@ impl Settings {
         Settings { minimum: vec![minimum; stacks] }
     }
 
+    /// The minima of these stacks in an ink library.
+    pub fn from_library(stacks: &[Stack], library: &Library) -> Settings {
+        Settings { minimum: stacks.iter().map(|stack| library.minimum_cluster(stack)).collect() }
+    }
+
     /// A stack's minimum is the largest of its layers'; `bare` is that of the substrate.
     pub fn of(stacks: &[Stack], bare: u16, ink: impl Fn(Ink) -> u16) -> Settings {
         let minimum = |stack: &Stack| stack.layers().iter().map(|&layer| ink(layer)).max().unwrap_or(bare);
@@ -71,33 +60,15 @@ impl Settings {
 /// Why a mix cannot be halftoned.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum HalftoneError {
-    /// The rectangle is empty or leaves the printable area.
+    /// The rectangle has no dots, or more than the largest sheet of paper.
     #[error(
-        "a document of {width} x {height} dots at ({x}, {y}) does not fit the {page_width} x {page_length} dots of {paper}; \
-         print it smaller or on larger paper"
+        "a document of {width} x {length} dots cannot be halftoned; a side has 1 dot at least, the largest sheet of paper \
+         {} x {}", LARGEST_PAGE.0, LARGEST_PAGE.1
     )]
-    Placement {
-        /// First column.
-        x: u16,
-        /// First row.
-        y: u16,
+    Size {
         /// Dots across.
         width: u16,
         /// Rows.
-        height: u16,
-        /// The paper's name.
-        paper: &'static str,
-        /// Printable dots across.
-        page_width: u16,
-        /// Printable rows.
-        page_length: u16,
-    },
-    /// The paper is larger than any the machine takes.
-    #[error("a page of {width} x {length} dots is larger than any sheet, {} x {} at most", LARGEST_PAGE.0, LARGEST_PAGE.1)]
-    Page {
-        /// Printable dots across.
-        width: u16,
-        /// Printable rows.
         length: u16,
     },
     /// The matrix has another number of rows than the maps have channels.
@@ -142,29 +113,17 @@ pub enum HalftoneError {
         /// What was set.
         minimum: u16,
     },
-    /// A sheet to be judged is not of this mix and paper.
-    #[error("the sheet ({sheet}) is not a halftone of this mix on {place}: its paper or its stacks differ")]
-    OtherSheet {
-        /// The sheet's paper.
-        sheet: &'static str,
-        /// The placement's paper.
-        place: &'static str,
-    },
-    /// The stacks do not make a sheet.
+    /// A dot map to be judged is not a halftone of this mix.
+    #[error("the dot map is not a halftone of this mix: its stacks differ")]
+    OtherStacks,
+    /// The stacks do not make a dot map.
     #[error(transparent)]
     Sheet(#[from] SheetError),
 }
 
-fn check(mix: &InkMix, place: &Placement, settings: &Settings) -> Result<(), HalftoneError> {
-    let (page_width, page_length) = (place.paper.width(), place.paper.length());
-    if page_width > LARGEST_PAGE.0 || page_length > LARGEST_PAGE.1 {
-        return Err(HalftoneError::Page { width: page_width, length: page_length });
-    }
-    let fits = |from: u16, length: u16, most: u16| length > 0 && from <= most && length <= most - from;
-    if !(fits(place.x, place.width, page_width) && fits(place.y, place.height, page_length)) {
-        let &Placement { x, y, width, height, paper } = place;
-        let paper = paper.name();
-        return Err(HalftoneError::Placement { x, y, width, height, paper, page_width, page_length });
+fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Result<(), HalftoneError> {
+    if !(1..=LARGEST_PAGE.0).contains(&width) || !(1..=LARGEST_PAGE.1).contains(&length) {
+        return Err(HalftoneError::Size { width, length });
     }
     let (rows, channels, stacks) = (mix.matrix.len(), mix.maps.channels(), mix.stacks.len());
     if rows != channels {
@@ -190,23 +149,24 @@ fn check(mix: &InkMix, place: &Placement, settings: &Settings) -> Result<(), Hal
     Ok(crate::sheet::check_stacks(&mix.stacks)?)
 }
 
-/// Halftones a mix onto a page. Dots outside the placement are bare substrate.
+/// Halftones a mix onto a rectangle of `size` dots: width, then rows.
 ///
-/// Errors: a placement that does not fit the paper, a mix or settings that contradict themselves.
+/// # Errors
+/// A rectangle without dots or larger than any sheet, a mix or settings that contradict themselves.
 pub fn halftone(
     mix: &InkMix,
-    place: &Placement,
+    size: (u16, u16),
     settings: &Settings,
     observer: &dyn Observer,
-) -> Result<Sheet, HalftoneError> {
-    check(mix, place, settings)?;
-    let walk = Walk::new(place.width, place.height);
+) -> Result<DotMap, HalftoneError> {
+    check(mix, size, settings)?;
+    let walk = Walk::new(size.0, size.1);
     let lattice = mix::Lattice::new(mix, &walk);
     let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| settings.minimum[usize::from(q)]).collect();
 
-    let (width, length) = (usize::from(place.paper.width()), usize::from(place.paper.length()));
+    let (width, length) = (usize::from(size.0), usize::from(size.1));
     let mut index = vec![0u8; width * length];
-    let mut rest = &mut index[usize::from(place.y) * width..];
+    let mut rest = &mut index[..];
     let bands: Vec<Band> = walk.bands().collect();
     let count = (bands.len() / STRIP).max(1);
     let mut strips = Vec::with_capacity(count);
@@ -229,7 +189,6 @@ pub fn halftone(
             observer,
             rows,
             stride: width,
-            left: usize::from(place.x),
             top: bands.first().map_or(0, |band| usize::from(band.y)),
             tiles: tiles(),
             tile: None,
@@ -239,19 +198,18 @@ pub fn halftone(
         rule::walk(&mut rule, &mut source, &mut paint);
     });
     observer.end();
-    Ok(Sheet::new(place.paper, mix.stacks.clone(), index)?)
+    Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
 }
 
 /// Places beyond a tile's end that a short run may be written over.
 const SLACK: usize = 16;
 
-/// Runs along the walk to rows of the page, tile by tile.
+/// Runs along the walk to rows of the map, tile by tile.
 struct Paint<'a, T> {
     lattice: &'a mix::Lattice<'a>,
     observer: &'a dyn Observer,
     rows: &'a mut [u8],
     stride: usize,
-    left: usize,
     top: usize,
     tiles: T,
     tile: Option<Tile>,
@@ -290,7 +248,7 @@ impl<T: Iterator<Item = Tile>> rule::Sink for Paint<'_, T> {
 impl<T> Paint<'_, T> {
     fn lay(&mut self, tile: &Tile) {
         let shape = self.lattice.shape(tile);
-        let (width, x) = (usize::from(tile.w), self.left + usize::from(tile.x));
+        let (width, x) = (usize::from(tile.w), usize::from(tile.x));
         for (row, order) in shape.order.chunks_exact(width).enumerate() {
             let start = (usize::from(tile.y) - self.top + row) * self.stride + x;
             for (dot, &position) in self.rows[start..start + width].iter_mut().zip(order) {

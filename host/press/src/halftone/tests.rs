@@ -14,10 +14,6 @@ fn stacks(count: usize) -> Vec<Stack> {
     all.take(count).collect()
 }
 
-fn custom(width: u16, length: u16) -> Placement {
-    Placement { paper: Paper::Custom { width, length }, x: 0, y: 0, width, height: length }
-}
-
 /// Every channel is one stack.
 fn plain(width: usize, height: usize, count: usize, at: impl Fn(usize, usize) -> Vec<f64>) -> InkMix {
     let mut data = vec![0; width * height * count];
@@ -28,12 +24,12 @@ fn plain(width: usize, height: usize, count: usize, at: impl Fn(usize, usize) ->
     InkMix { stacks: stacks(count), maps: WeightMaps::new(width, height, count, data).unwrap(), matrix }
 }
 
-fn run(mix: &InkMix, place: &Placement, minimum: u16) -> Sheet {
-    halftone(mix, place, &Settings::uniform(mix.stacks.len(), minimum), &Silent).unwrap()
+fn run(mix: &InkMix, size: (u16, u16), minimum: u16) -> DotMap {
+    halftone(mix, size, &Settings::uniform(mix.stacks.len(), minimum), &Silent).unwrap()
 }
 
 /// Sizes of the 4-connected components of equal stacks, by flood fill.
-fn components(sheet: &Sheet) -> Vec<(u8, usize)> {
+fn components(sheet: &DotMap) -> Vec<(u8, usize)> {
     let (width, index) = (sheet.width(), sheet.index());
     let mut seen = vec![false; index.len()];
     let mut found = Vec::new();
@@ -77,7 +73,7 @@ proptest! {
             ((v >> 40) as f64 / (1u64 << 24) as f64).powi(3)
         };
         let mix = plain(9, 7, 5, |x, y| (0..5).map(|q| noise(x, y, q)).collect());
-        let sheet = halftone(&mix, &custom(width, height), &Settings { minimum: minimum.clone() }, &Silent);
+        let sheet = halftone(&mix, (width, height), &Settings { minimum: minimum.clone() }, &Silent);
         let clusters = components(&sheet.unwrap());
         for (stack, size) in &clusters {
             prop_assert!(
@@ -100,7 +96,7 @@ proptest! {
             vec![0.2, 0.8 * t, 0.8 * (1.0 - t)]
         });
         let (width, height) = if coarse { (pw * dw, ph * dh) } else { (pw.div_ceil(dw), ph.div_ceil(dh)) };
-        let sheet = run(&mix, &custom(width as u16, height as u16), 4);
+        let sheet = run(&mix, (width as u16, height as u16), 4);
         let dots = (width * height) as f64;
         // Sampling bilinearly between pixels loses up to a quarter pixel of each border.
         let border = if coarse { 0.25 * 2.0 * (width * dh + height * dw) as f64 } else { 0.0 };
@@ -116,21 +112,15 @@ proptest! {
 }
 
 #[test]
-fn outside_the_rectangle_is_bare_and_inside_only_what_has_weight() {
+fn only_stacks_with_weight_are_on_a_dot() {
     let mix = plain(3, 3, 4, |_, _| vec![0.0, 0.4, 0.0, 0.6]);
-    let place =
-        Placement { paper: Paper::Custom { width: 300, length: 200 }, x: 37, y: 61, width: 101, height: 99 };
-    let sheet = run(&mix, &place, 9);
-    for (dot, &stack) in sheet.index().iter().enumerate() {
-        let (x, y) = (dot % 300, dot / 300);
-        let inside = (37..138).contains(&x) && (61..160).contains(&y);
-        assert_eq!(inside, stack == 1 || stack == 3, "({x}, {y}) is {stack}");
-    }
+    let dots = run(&mix, (101, 99), 9);
+    assert!(dots.index().iter().all(|&stack| stack == 1 || stack == 3));
 }
 
 #[test]
 fn a_page_of_one_stack_is_solid() {
-    let sheet = run(&plain(1, 1, 3, |_, _| vec![0.0, 0.0, 1.0]), &custom(333, 1111), 16);
+    let sheet = run(&plain(1, 1, 3, |_, _| vec![0.0, 0.0, 1.0]), (333, 1111), 16);
     assert!(sheet.index().iter().all(|&stack| stack == 2));
 }
 
@@ -139,8 +129,8 @@ fn a_page_of_one_stack_is_solid() {
 #[test]
 fn bands_and_strips_leave_no_seams() {
     let mix = plain(1, 1, 3, |_, _| vec![0.55, 0.15, 0.3]);
-    let place = custom(1600, 2176);
-    let sheet = run(&mix, &place, 9);
+    let size = (1600, 2176);
+    let sheet = run(&mix, size, 9);
     let tone = |row: usize| {
         let dots = &sheet.index()[row * 1600..(row + 16) * 1600];
         dots.iter().filter(|&&s| s == 2).count() as f64 / dots.len() as f64
@@ -156,7 +146,7 @@ fn the_sheet_does_not_depend_on_the_number_of_threads() {
     let mix = plain(50, 300, 9, |x, y| (0..9).map(|q| ((x * q + y) % 7) as f64 + 0.1).collect());
     let sheet = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| run(&mix, &custom(400, 2500), 9))
+        pool.install(|| run(&mix, (400, 2500), 9))
     };
     assert_eq!(sheet(1), sheet(3));
 }
@@ -165,7 +155,7 @@ fn the_sheet_does_not_depend_on_the_number_of_threads() {
 #[test]
 fn a_checkerboard_finer_than_the_clusters_is_averaged() {
     let mix = plain(120, 120, 2, |x, y| if (x + y) % 2 == 0 { vec![1.0, 0.0] } else { vec![0.0, 1.0] });
-    let sheet = run(&mix, &custom(240, 240), 16);
+    let sheet = run(&mix, (240, 240), 16);
     let census = sheet.census();
     assert!(census[0].abs_diff(census[1]) <= 64, "{census:?}");
     for y in (0..192).step_by(48) {
@@ -182,8 +172,8 @@ fn a_checkerboard_finer_than_the_clusters_is_averaged() {
 #[test]
 fn an_edge_between_solids_stays_within_a_cluster() {
     let mix = plain(64, 64, 2, |x, _| if x < 29 { vec![1.0, 0.0] } else { vec![0.0, 1.0] });
-    let place = custom(512, 512);
-    let sheet = run(&mix, &place, 9);
+    let size = (512, 512);
+    let sheet = run(&mix, size, 9);
     for (dot, &stack) in sheet.index().iter().enumerate() {
         let x = dot % 512;
         if !(29 * 8 - 14..29 * 8 + 14).contains(&x) {
@@ -207,33 +197,30 @@ fn progress_counts_every_dot_once() {
     }
     let count = Count(AtomicU64::new(0), AtomicU64::new(0));
     let mix = plain(4, 4, 2, |x, _| vec![x as f64, 1.0]);
-    halftone(&mix, &custom(130, 1200), &Settings::uniform(2, 4), &count).unwrap();
+    halftone(&mix, (130, 1200), &Settings::uniform(2, 4), &count).unwrap();
     assert_eq!((count.0.into_inner(), count.1.into_inner()), (130 * 1200, 130 * 1200));
 }
 
 #[test]
 fn contradictions_are_named() {
     let mix = plain(2, 2, 2, |_, _| vec![0.5, 0.5]);
-    let (page, settings) = (custom(50, 60), Settings::uniform(2, 9));
-    let error = |mix: &InkMix, place: &Placement, settings: &Settings| {
-        halftone(mix, place, settings, &Silent).unwrap_err().to_string()
+    let (page, settings) = ((50, 60), Settings::uniform(2, 9));
+    let error = |mix: &InkMix, size: (u16, u16), settings: &Settings| {
+        halftone(mix, size, settings, &Silent).unwrap_err().to_string()
     };
-    for place in
-        [Placement { x: 1, ..page }, Placement { height: 0, ..page }, Placement { y: u16::MAX, ..page }]
-    {
-        assert!(error(&mix, &place, &settings).contains("does not fit the 50 x 60"));
+    for size in [(0, 60), (50, 0), (4941, 60), (50, u16::MAX)] {
+        assert!(error(&mix, size, &settings).contains("the largest sheet of paper 4940 x 7760"));
     }
-    assert!(error(&mix, &custom(u16::MAX, u16::MAX), &settings).contains("4940 x 7760 at most"));
-    assert!(error(&mix, &page, &Settings::uniform(3, 9)).contains("3 minimum clusters"));
-    assert!(error(&mix, &page, &Settings::uniform(2, 0)).contains("`substrate` is 0 dots"));
+    assert!(error(&mix, page, &Settings::uniform(3, 9)).contains("3 minimum clusters"));
+    assert!(error(&mix, page, &Settings::uniform(2, 0)).contains("`substrate` is 0 dots"));
     let mut wrong = mix.clone();
     wrong.matrix[1] = vec![5, ONE];
-    assert!(error(&wrong, &page, &settings).contains("row 1"));
+    assert!(error(&wrong, page, &settings).contains("row 1"));
     wrong.matrix[1] = vec![ONE];
-    assert!(error(&wrong, &page, &settings).contains("1 shares for 2 stacks"));
+    assert!(error(&wrong, page, &settings).contains("1 shares for 2 stacks"));
     wrong.matrix.pop();
-    assert!(error(&wrong, &page, &settings).contains("1 rows of shares for 2"));
+    assert!(error(&wrong, page, &settings).contains("1 rows of shares for 2"));
     let mut wrong = mix;
     wrong.stacks[0] = wrong.stacks[1].clone();
-    assert!(error(&wrong, &page, &settings).contains("substrate first"));
+    assert!(error(&wrong, page, &settings).contains("substrate first"));
 }

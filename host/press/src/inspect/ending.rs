@@ -1,81 +1,28 @@
-//! Where a job can be cut short, and how it is then brought to its end.
+//! Cutting a job short where the device takes the printer's bytes as they are.
 //!
-//! Problem: a device that takes the printer's bytes as they are has got a part of a job that is not wanted any more; cut
-//! off anywhere, the machine would take the next job for the rest of a row.
-//! Method: that of the bridge's engine, for a job that is known whole: to the end of the command, past what has to be
-//! followed by a row, then the shortest legal end.
-//! Source: the job's grammar; that of the engine stands in `bridge/src/track.rs`.
+//! Problem: part of a job that is no longer wanted has been sent. Cut off anywhere, the printer would read the next job
+//! as the rest of a row.
+//! Method: to the end of the command under way, past what must be followed by a row, then the shortest legal ending,
+//! both by [`protocol::rgl::Track`], as in the bridge.
 
-use protocol::ink::Ink;
-use protocol::rgl::encode::encode_into;
-use protocol::rgl::{Command, Step, parse};
-
-use super::ghostscript;
+use protocol::rgl::Track;
 
 /// The bytes to send behind the first `at` bytes of a legal job so that the sheet, if one has begun, comes out and the
 /// printer is ready for the next job. Nothing if the job had not begun or was already over.
 pub fn ending(job: &[u8], at: usize) -> Vec<u8> {
-    let foreign = ghostscript::begins(job);
-    let (mut selected, mut raster, mut ejected, mut any_row) = (false, false, false, false);
-    let mut pass: Option<(Ink, bool)> = None;
-    let (mut back_fed, mut settled) = (false, true);
-    let mut end = 0;
-    while end < at || !settled {
-        let rest = &job[end.min(job.len())..];
-        let known = if foreign {
-            ghostscript::command(rest)
-        } else {
-            match parse(rest) {
-                Ok(Step::Command(command, length)) => Some((Some(command), length)),
-                _ => None,
-            }
-        };
-        // What is no legal job is sent as it is.
-        let Some((command, length)) = known else { return job[at.min(job.len())..].to_vec() };
-        end += length;
-        settled = true;
-        match command {
-            Some(Command::Reset | Command::LeaveRgl) => (selected, raster, pass) = (false, false, None),
-            Some(Command::SelectRgl) => selected = true,
-            Some(Command::RasterStart) => raster = true,
-            Some(Command::RasterEnd) => raster = false,
-            Some(Command::FormFeed) => ejected = true,
-            Some(Command::InkSelect { ink, last }) => (pass, back_fed) = (Some((ink, last)), false),
-            Some(Command::BackFeed) => (back_fed, settled) = (true, false),
-            Some(Command::Compression(_) | Command::Skip(_)) => settled = false,
-            Some(Command::Row { .. }) | None if raster => any_row = true,
-            _ => {}
-        }
+    let at = at.min(job.len());
+    let mut track = Track::new();
+    let mut end = at;
+    let mut can_end = at == 0 || track.follow(&job[..at]) == Some(at);
+    while !can_end && end < job.len() {
+        can_end = track.follow(&job[end..=end]).is_some();
+        end += 1;
     }
-    let mut out = job[at.min(end)..end].to_vec();
-    if !selected {
-        return out;
+    // What is no legal job is sent as it is.
+    if !can_end || track.is_foreign() {
+        return job[at..].to_vec();
     }
-    let mut tail = Vec::new();
-    if raster {
-        if let Some((ink, false)) = pass
-            && !ejected
-        {
-            if !back_fed {
-                tail.push(Command::BackFeed);
-            }
-            // The same ink, so that no cassette is changed.
-            tail.push(Command::InkSelect { ink, last: true });
-        }
-        tail.push(Command::RasterEnd);
-    }
-    if any_row && !ejected {
-        tail.push(Command::FormFeed);
-    }
-    tail.extend([Command::LeaveRgl, Command::Reset]);
-    let mut room = [0; 16];
-    for command in tail {
-        // None of them is longer than five bytes.
-        if let Ok(length) = encode_into(&command, &mut room) {
-            out.extend_from_slice(&room[..length]);
-        }
-    }
-    out
+    [&job[at..end], &track.ending()[..]].concat()
 }
 
 #[cfg(test)]
@@ -86,6 +33,7 @@ mod tests {
     use crate::separate::{Pass, Plane};
     use observe::Silent;
     use proptest::prelude::*;
+    use protocol::ink::Ink;
     use protocol::paper::Paper;
     use protocol::rgl::Page;
 

@@ -73,14 +73,6 @@ fn step(bytes: &[u8]) -> Result<(Item<'_>, usize), (Fault, usize)> {
     }
 }
 
-/// The command at the start of `bytes`, none for one the usual dialect does not have, and its length.
-pub(super) fn command(bytes: &[u8]) -> Option<(Option<Command<'_>>, usize)> {
-    match step(bytes).ok()? {
-        (Item::Known(command), length) => Some((Some(command), length)),
-        (Item::Offset(..) | Item::Aside, length) => Some((None, length)),
-    }
-}
-
 /// The length of the first sheet's job in a stream, if it comes to its end: up to and with the command that leaves the
 /// printer's language.
 pub(super) fn first_sheet(stream: &[u8]) -> Option<usize> {
@@ -186,7 +178,7 @@ impl Reader {
             (Setup, Command::Length(rows)) if setup.length == 0 && rows > 0 => setup.length = rows,
             (Setup, Command::Mode(mode)) => once(&mut setup.mode, mode_name(mode))?,
             (Setup, Command::CurlCorrection(on)) => once(&mut setup.curl_correction, on)?,
-            (Setup, Command::Cassettes(list)) => {
+            (Setup, Command::Cartridges(list)) => {
                 once(&mut setup.cassettes, list.inks().iter().map(|ink| ink.name()).collect())?;
             }
             (Setup, Command::RasterStart) => self.start()?,

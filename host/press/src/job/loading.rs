@@ -1,17 +1,17 @@
-//! Which cartridges to load, and which to change for which, when a job wants more than the machine holds.
+//! Which cartridges to load, and which to replace on the way, when a job needs more than the printer holds.
 //!
-//! Method: the machine starts with the cartridges wanted first; before a pass whose cartridge is not in, the one goes out
-//! that is wanted again last, or never. No other choice needs fewer changes (Belady, 1966).
+//! Method: the printer starts with the cartridges needed first; before a pass whose cartridge is missing, the one goes out
+//! that is needed again last, or never. No other choice needs fewer changes (Belady, 1966).
 //! Cost: negligible.
 
 use protocol::ink::Ink;
 
 use crate::separate::MOST_CARTRIDGES;
 
-/// A cartridge to change in the course of a job.
+/// A cartridge to replace in the course of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Change {
-    /// The pass before which the machine stops and asks, from 1.
+pub(super) struct Change {
+    /// The pass before which the printer pauses and asks, from 1.
     pub before_pass: usize,
     /// The one to take out.
     pub out: Ink,
@@ -20,7 +20,7 @@ pub struct Change {
 }
 
 /// The cartridges to load before the first pass, in the order of their first use, and the changes on the way.
-pub fn loading(passes: &[Ink]) -> (Vec<Ink>, Vec<Change>) {
+pub(super) fn loading(passes: &[Ink]) -> (Vec<Ink>, Vec<Change>) {
     let mut loaded: Vec<Ink> = Vec::new();
     for &ink in passes {
         if loaded.len() < MOST_CARTRIDGES && !loaded.contains(&ink) {
@@ -34,7 +34,7 @@ pub fn loading(passes: &[Ink]) -> (Vec<Ink>, Vec<Change>) {
             continue;
         }
         let next = |ink: Ink| passes[at..].iter().position(|&pass| pass == ink).unwrap_or(usize::MAX);
-        // The machine is full here, or the cartridge would have been loaded at the start.
+        // The printer is full here, or the cartridge would have been loaded at the start.
         if let Some(place) = (0..loaded.len()).max_by_key(|&place| next(loaded[place])) {
             changes.push(Change { before_pass: at + 1, out: loaded[place], wanted });
             loaded[place] = wanted;

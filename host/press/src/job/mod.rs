@@ -1,9 +1,28 @@
-//! The size of a document on paper, the plan in words, figures and as a page, and the bytes of a job.
+//! The plan of a job in words, in figures and as a page, and the bytes of a job.
 
-pub mod loading;
+pub(crate) mod fault;
+mod loading;
 pub mod page;
-pub mod placement;
 pub mod plan;
 pub mod ribbon;
 pub mod stream;
 mod thin;
+
+use protocol::paper::Paper;
+use protocol::rgl::{Media, Page};
+
+/// How the printer is told to treat the sheet.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Handling {
+    /// The printer's media type, which sets its heat.
+    pub media: Media,
+    /// Whether the printer corrects the sheet's curl.
+    pub curl_correction: bool,
+}
+
+impl Handling {
+    /// A page of this paper in the printer's language.
+    pub(crate) fn page(self, paper: Paper) -> Page {
+        Page { media: self.media, curl_correction: self.curl_correction, ..Page::plain(paper) }
+    }
+}

@@ -1,4 +1,4 @@
-//! The plan as one page to print and lay beside the machine: HTML that needs nothing but itself.
+//! The plan as one page to print and lay beside the printer: a single HTML file that loads nothing else.
 
 use std::fmt::Write as _;
 use std::io::Cursor;
@@ -11,6 +11,9 @@ use super::plan::{Plan, grouped};
 use super::ribbon;
 
 /// The plan with a picture of the sheet, for a sheet of A4 or letter.
+///
+/// # Errors
+/// When the picture cannot be compressed.
 pub fn html(plan: &Plan, picture: &RgbImage) -> Result<String, image::ImageError> {
     let mut png = Cursor::new(Vec::new());
     picture.write_to(&mut png, ImageFormat::Png)?;
@@ -20,7 +23,7 @@ pub fn html(plan: &Plan, picture: &RgbImage) -> Result<String, image::ImageError
     Ok(page)
 }
 
-/// Text as it stands in HTML: names come from anybody's files.
+/// Text as it stands in HTML: names come from untrusted files.
 fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -53,12 +56,12 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
     )?;
     let (width, height) = plan.size_mm;
     write!(page, "<p>{width:.1} &times; {height:.1} mm on {}", plan.paper)?;
-    if plan.pieces != (1, 1) {
-        write!(page, ", {} &times; {} times", plan.pieces.0, plan.pieces.1)?;
+    if plan.copies != (1, 1) {
+        write!(page, ", {} &times; {} copies", plan.copies.0, plan.copies.1)?;
     }
     writeln!(
         page,
-        "; its corner {:.1} mm from the left and {:.1} mm from the top edge of the sheet.</p>\n\
+        "; top left corner at {:.1} mm, {:.1} mm.</p>\n\
          <p>Media <b>{}</b>, curl correction <b>{}</b>.</p>\n<p>About <b>{}</b> <small>({})</small></p>",
         plan.from_edge_mm.0,
         plan.from_edge_mm.1,
@@ -67,6 +70,14 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         ribbon::duration(plan.seconds_estimated),
         Plan::TIME_NOTE
     )?;
+    write_cartridges(plan, page)?;
+    write_passes(plan, page)?;
+    write_checks(plan, page)?;
+    writeln!(page, "</body></html>")
+}
+
+/// What to load, and what to replace on the way.
+fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
         "<h2>Load</h2>\n<table><tr><th></th><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
@@ -77,7 +88,7 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         if place == now.len() {
             writeln!(
                 page,
-                "<tr><td colspan=\"6\">The machine holds no more; these have no place:</td></tr>"
+                "<tr><td colspan=\"6\">The printer holds no more; these have no place:</td></tr>"
             )?;
         }
         writeln!(
@@ -93,20 +104,25 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
     }
     writeln!(page, "</table>")?;
     if !plan.changes.is_empty() {
-        writeln!(page, "<p>The machine would stop in the middle of the sheet:</p>\n<ul>")?;
+        writeln!(page, "<p>The printer would stop in the middle of the sheet:</p>\n<ul>")?;
         for change in &plan.changes {
             writeln!(
                 page,
-                "<li>before pass <b>{}</b>, to have {} changed for <b>{}</b></li>",
+                "<li>before pass <b>{}</b>: replace {} with <b>{}</b></li>",
                 change.before_pass, change.take_out, change.put_in
             )?;
         }
         writeln!(page, "</ul>")?;
     }
+    Ok(())
+}
+
+/// The passes and what they use.
+fn write_passes(plan: &Plan, page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
-        "<p><small>A cartridge that is not loaded: the machine stops before its pass, asks for it, and goes on \
-         when it is in.</small></p>\n<h2>Passes</h2>\n<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
+        "<p><small>If a cartridge is missing, the printer pauses before that pass and continues once it is \
+         loaded.</small></p>\n<h2>Passes</h2>\n<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
          <th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>"
     )?;
     for pass in &plan.passes {
@@ -122,6 +138,11 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         )?;
     }
     writeln!(page, "</table>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
+    Ok(())
+}
+
+/// What the rules say.
+fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
     if !plan.checks.is_empty() {
         writeln!(page, "<h2>Before you print</h2>\n<ul>")?;
         for check in &plan.checks {
@@ -129,7 +150,7 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
         }
         writeln!(page, "</ul>")?;
     }
-    writeln!(page, "</body></html>")
+    Ok(())
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 
 use std::fmt::{self, Write as _};
 
-use inks::Library;
+use inks::{Certainty, Library, Severity};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Page;
@@ -14,18 +14,17 @@ use super::loading;
 use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
-use crate::preview::Area;
-use crate::separate::{Certainty, Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation, Severity};
-use crate::sheet::Sheet;
+use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
 use crate::sheet::colours::colours;
+use crate::sheet::{Area, Sheet};
 
 /// Lines of foil thinner than this many dots (0.17 mm) may not stick: foil fails on screens finer than about 100 an inch,
 /// whose smaller dots are of this size.
 const FOIL_LINE: usize = 4;
-/// The share of foil in thinner lines that is worth a word: corners and rounding always have a little.
+/// The share of foil in thinner lines that is worth a warning: corners and rounding always have a little.
 const FOIL_SHARE: f64 = 0.01;
 
-/// What will be printed, from what, and what to think of it.
+/// What will be printed, with which cartridges, and what to watch for.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// Name of the document.
@@ -36,31 +35,31 @@ pub struct Plan {
     pub sheet_mm: (f64, f64),
     /// The printer's media type.
     pub media: &'static str,
-    /// Whether the machine corrects the sheet's curl.
+    /// Whether the printer corrects the sheet's curl.
     pub curl_correction: bool,
-    /// Width and height of one piece on paper in millimetres.
+    /// Width and height of one copy on paper in millimetres.
     pub size_mm: (f64, f64),
     /// The same in dots of 1/600 inch.
     pub size_dots: (u16, u16),
-    /// Where the corner of the first piece lies in the printable area, in dots.
+    /// Top left corner of the first copy in the printable area, in dots.
     pub origin_dots: (u16, u16),
     /// The same from the corner of the sheet of paper, in millimetres.
     pub from_edge_mm: (f64, f64),
-    /// Columns and rows of pieces on the sheet.
-    pub pieces: (u16, u16),
+    /// Columns and rows of copies on the sheet.
+    pub copies: (u16, u16),
     /// What the layout cuts off.
     pub cut: Option<Cut>,
     /// The cartridges to load, in the order of first use.
     pub cartridges: Vec<Cartridge>,
-    /// What to change on the way, when there are more than the machine holds.
+    /// What to replace on the way, when there are more than the printer holds.
     pub changes: Vec<Change>,
     /// The passes, first printed (lowest) first.
     pub passes: Vec<Pass>,
     /// Time in seconds, an estimate.
     pub seconds_estimated: f64,
-    /// The stacks in use, most dots first; shares are of the pieces' dots.
+    /// The stacks in use, most dots first; shares are of the copies' dots.
     pub stacks: Vec<Share>,
-    /// What the machine's rules say of the job.
+    /// What the rules say of the job, most severe first.
     pub checks: Vec<Check>,
 }
 
@@ -75,16 +74,16 @@ pub struct Cartridge {
     pub part: &'static str,
     /// The barcode on it.
     pub barcode: u8,
-    /// The pass before which the machine fetches it for the first time, and stops to ask for it if it is not there.
+    /// The first pass with it; the printer pauses before that pass if it is missing.
     pub first_pass: usize,
-    /// Ribbon it gives in all passes, in millimetres, an estimate.
+    /// Ribbon used in all its passes, in millimetres, an estimate.
     pub ribbon_mm_estimated: f64,
 }
 
-/// A cartridge to change in the course of the job.
+/// A cartridge to replace in the course of the job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Change {
-    /// The pass before which the machine stops and asks, from 1.
+    /// The pass before which the printer pauses and asks, from 1.
     pub before_pass: usize,
     /// The ink of the cartridge to take out.
     pub take_out: &'static str,
@@ -101,24 +100,24 @@ pub struct Pass {
     pub ink: &'static str,
     /// Dots with ink.
     pub dots: u64,
-    /// Dots as a share of the pieces'.
+    /// Dots as a share of the copies'.
     pub share: f64,
     /// Runs of the carriage, ribbon and time, estimates.
     pub estimate: Use,
 }
 
-/// A stack and how much of the document it is.
+/// A stack and how much of the print it is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Share {
     /// The stack, short names from the bottom.
     pub stack: String,
-    /// The same in the words of the boxes.
+    /// The same by the names on the cartridges.
     pub words: String,
     /// Its false colour in the separation picture, sRGB as `#rrggbb`.
     pub colour: String,
     /// Dots.
     pub dots: u64,
-    /// Dots as a share of the pieces'.
+    /// Dots as a share of the copies'.
     pub share: f64,
 }
 
@@ -160,8 +159,8 @@ impl Plan {
     pub fn new(subject: &Subject<'_>, library: &Library) -> Plan {
         let Subject { sheet, laid, .. } = *subject;
         let paper = subject.page.paper;
-        let first = laid.pieces.first().copied().unwrap_or(laid.area);
-        let area: u64 = laid.pieces.iter().map(|piece| (piece.width * piece.length) as u64).sum();
+        let first = laid.copies.first().copied().unwrap_or(laid.area);
+        let area: u64 = laid.copies.iter().map(|copy| (copy.width * copy.length) as u64).sum();
         let share = |dots: u64| dots as f64 / area.max(1) as f64;
         let dpi = subject.page.resolution.dpi();
         let passes: Vec<Pass> = (1..)
@@ -187,7 +186,7 @@ impl Plan {
             size_dots: dots((first.width, first.length)),
             origin_dots: dots((first.left, first.top)),
             from_edge_mm: from_edge(paper, first),
-            pieces: laid.grid,
+            copies: laid.grid,
             cut: laid.cut,
             cartridges: cartridges(subject.planned, &passes, library),
             changes: changes(subject.planned),
@@ -238,7 +237,7 @@ fn changes(planned: &[Planned]) -> Vec<Change> {
     loading::loading(&inks).1.into_iter().map(named).collect()
 }
 
-/// The stacks on the pieces; what marks take stands in the passes only.
+/// The stacks on the copies; what marks take is in the passes only.
 fn shares(sheet: &Sheet, laid: &Laid, library: &Library) -> Vec<Share> {
     let census = laid.census(sheet);
     let area = census.iter().sum::<u64>().max(1);
@@ -267,12 +266,12 @@ fn checks(subject: &Subject<'_>) -> Vec<Check> {
         checks.push(Check { rule: rule.into(), severity, certainty, text, stacks: Vec::new() });
     };
     if let Some(cut) = &subject.laid.cut {
-        let text = format!("what lies beyond the printable area is cut off: {cut}");
+        let text = format!("cut off beyond the printable area: {cut}");
         add("cut", Severity::Warning, Certainty::Measured, text);
     }
     if subject.laid.marks_left_out > 0 {
         let text = format!(
-            "{} marks had no room inside the printable area and are left out; move the print or leave it more room",
+            "{} marks have no room in the printable area and were left out; move the print or leave more room around it",
             subject.laid.marks_left_out
         );
         add("marks", Severity::Note, Certainty::Measured, text);
@@ -295,19 +294,17 @@ fn checks(subject: &Subject<'_>) -> Vec<Check> {
 }
 
 impl Plan {
-    /// How the time was estimated, in a sentence for people.
-    pub const TIME_NOTE: &'static str = "an estimate: short passes were timed, full pages never were";
+    /// How the time was estimated.
+    pub const TIME_NOTE: &'static str = "an estimate: only short passes have been timed, never a full page";
     /// How the ribbon was estimated.
-    pub const RIBBON_NOTE: &'static str = "an estimate, rather too low: the ribbon runs from the first to the last dot of each band of 10 mm, however few dots";
+    pub const RIBBON_NOTE: &'static str = "an estimate, rather low: in each band of 10 mm the ribbon runs from the first dot to the last, however few there are";
 
     /// Ribbon of all passes in millimetres, an estimate.
     pub fn ribbon_mm(&self) -> f64 {
         self.passes.iter().map(|pass| pass.estimate.ribbon_mm).sum()
     }
-}
 
-impl Plan {
-    /// The cartridges to load before the first pass, and those that the machine has no place for then.
+    /// The cartridges to load before the first pass, and those for which the printer has no place then.
     pub fn loaded(&self) -> (&[Cartridge], &[Cartridge]) {
         self.cartridges.split_at(self.cartridges.len().min(MOST_CARTRIDGES))
     }
@@ -317,47 +314,35 @@ impl fmt::Display for Cartridge {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{:<22} {}, barcode {:<2}  wanted from pass {}",
+            "{:<22} {}, barcode {:<2}  first used in pass {}",
             self.sold_as, self.part, self.barcode, self.first_pass
         )
     }
 }
 
-impl fmt::Display for Plan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (width, height) = self.size_mm;
-        writeln!(
-            f,
-            "{}: {width:.1} x {height:.1} mm ({} x {} dots) on {}",
-            self.document, self.size_dots.0, self.size_dots.1, self.paper
-        )?;
-        let (columns, rows) = self.pieces;
-        if (columns, rows) != (1, 1) {
-            writeln!(f, "{columns} x {rows} times on the sheet")?;
-        }
-        writeln!(
-            f,
-            "its corner {:.1} mm from the left and {:.1} mm from the top edge of the sheet; media {}, curl correction {}",
-            self.from_edge_mm.0,
-            self.from_edge_mm.1,
-            self.media,
-            if self.curl_correction { "on" } else { "off" }
-        )?;
+impl Plan {
+    /// What to load, and what to replace on the way.
+    fn write_cartridges(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (now, later) = self.loaded();
         writeln!(f, "\nLoad {} cartridge{}:", now.len(), plural(now.len()))?;
         now.iter().try_for_each(|cartridge| writeln!(f, "    {cartridge}"))?;
         if !later.is_empty() {
-            writeln!(f, "The machine holds no more. These have no place:")?;
+            writeln!(f, "The printer holds no more. These have no place:")?;
             later.iter().try_for_each(|cartridge| writeln!(f, "    {cartridge}"))?;
             writeln!(f, "It would stop in the middle of the sheet:")?;
             for Change { before_pass, take_out, put_in } in &self.changes {
-                writeln!(f, "    before pass {before_pass}, to have {take_out} changed for {put_in}")?;
+                writeln!(f, "    before pass {before_pass}: replace {take_out} with {put_in}")?;
             }
         }
         writeln!(
             f,
-            "One that is not loaded: the machine stops before that pass, asks for it, and goes on when it is in."
+            "If a cartridge is missing, the printer pauses before that pass and continues once it is loaded."
         )?;
+        Ok(())
+    }
+
+    /// The passes and what they use.
+    fn write_passes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
             "\n{} pass{} over the sheet, in this order:",
@@ -375,9 +360,14 @@ impl fmt::Display for Plan {
                 ribbon::length(pass.estimate.ribbon_mm)
             )?;
         }
-        writeln!(f, "Ribbon about {} in all ({}).", ribbon::length(self.ribbon_mm()), Plan::RIBBON_NOTE)?;
-        writeln!(f, "Time about {} ({}).", ribbon::duration(self.seconds_estimated), Plan::TIME_NOTE)?;
-        writeln!(f, "\nThe print's dots are:")?;
+        writeln!(f, "Ribbon: about {} in all ({}).", ribbon::length(self.ribbon_mm()), Plan::RIBBON_NOTE)?;
+        writeln!(f, "Time: about {} ({}).", ribbon::duration(self.seconds_estimated), Plan::TIME_NOTE)?;
+        Ok(())
+    }
+
+    /// The stacks; what would read 0.0 % is summed up.
+    fn write_stacks(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "\nStacks, by share of the print's dots:")?;
         // Sorted, so that what would read 0.0 % stands together at the end.
         let shown = self.stacks.partition_point(|stack| stack.share >= 0.0005);
         for stack in &self.stacks[..shown] {
@@ -388,6 +378,33 @@ impl fmt::Display for Plan {
             let share: f64 = rest.iter().map(|stack| stack.share).sum();
             writeln!(f, "    {:>5.1} %  {} other{}", 100.0 * share, rest.len(), plural(rest.len()))?;
         }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (width, height) = self.size_mm;
+        writeln!(
+            f,
+            "{}: {width:.1} x {height:.1} mm ({} x {} dots) on {}",
+            self.document, self.size_dots.0, self.size_dots.1, self.paper
+        )?;
+        let (columns, rows) = self.copies;
+        if (columns, rows) != (1, 1) {
+            writeln!(f, "{columns} x {rows} copies on the sheet")?;
+        }
+        writeln!(
+            f,
+            "top left corner at {:.1} mm, {:.1} mm; media {}, curl correction {}",
+            self.from_edge_mm.0,
+            self.from_edge_mm.1,
+            self.media,
+            if self.curl_correction { "on" } else { "off" }
+        )?;
+        self.write_cartridges(f)?;
+        self.write_passes(f)?;
+        self.write_stacks(f)?;
         if !self.checks.is_empty() {
             writeln!(f, "\nBefore you print:")?;
             for check in &self.checks {

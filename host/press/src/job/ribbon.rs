@@ -1,19 +1,19 @@
 //! How much ribbon and time a pass takes, by estimate.
 //!
-//! Problem: ribbons are no longer made, and nobody knows from a file how much one is used up.
+//! Problem: ribbons are no longer made, and a file does not say how much of one it uses up.
 //! Method: the head prints a band of 240 rows (10.16 mm) in one run across the paper. The ribbon runs along with the
-//! carriage, however few dots it gives off, so a band takes as much ribbon as lies between its first and its last dot.
+//! carriage, however few dots it prints, so a band takes as much ribbon as lies between its first and its last dot.
 //! Bands begin at the first row with ink and follow each other; blank rows between them are passed over.
-//! Limits: an estimate. 240 rows is the number of elements in the head, read from the machine's device ID. How far the
+//! Limits: an estimate. 240 rows is the number of elements in the head, read from the printer's device ID. How far the
 //! ribbon runs before the first and after the last dot is not known, so the true figure is higher. Times rest on one
-//! recording of four nearly empty passes (6 to 9 s each, cassette change included); that a band takes 2 s is a guess.
+//! recording of four nearly empty passes (6 to 9 s each, cartridge change included); that a band takes 2 s is a guess.
 
 use crate::layout::Mm;
 use crate::separate::Plane;
 
 /// Rows the head prints at once at 600 dpi.
-pub const BAND: usize = 240;
-/// Changing the cassette and pulling back the sheet.
+const BAND: usize = 240;
+/// Changing the cartridge and pulling back the sheet.
 const PASS_SECONDS: f64 = 5.0;
 /// One run of the carriage.
 const BAND_SECONDS: f64 = 2.0;
@@ -67,8 +67,8 @@ fn ends(row: &[u8]) -> Option<(usize, usize)> {
     ))
 }
 
-/// A duration as it is said: `40 s`, `6 min`, `1 h 20 min`.
-pub fn duration(seconds: f64) -> String {
+/// A duration in a fitting unit: `40 s`, `6 min`, `1 h 20 min`.
+pub(super) fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;
     match minutes {
         _ if seconds < 90.0 => format!("{seconds:.0} s"),
@@ -77,7 +77,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// A length of ribbon as it is said: millimetres below a metre.
+/// A length of ribbon: millimetres below a metre, metres above.
 pub fn length(mm: f64) -> String {
     if mm < 995.0 { format!("{mm:.0} mm") } else { format!("{:.2} m", mm / 1000.0) }
 }

@@ -1,7 +1,7 @@
 //! The bytes of a job.
 //!
 //! Passes go row by row through the writer the bridge uses; a page is never held in a second form. Passes without a
-//! dot are left out: what the machine does with them was never measured, and they would cost a cassette change.
+//! dot are left out: what the printer does with them was never measured, and they would cost a cartridge change.
 
 use std::io::{self, Write};
 
@@ -9,8 +9,8 @@ use protocol::ink::Ink;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{Fault, FoilConsent, JobSetup, JobWriter, Page};
 
+use super::fault::words;
 use crate::separate::Pass;
-use crate::simulate::words;
 use observe::Observer;
 
 /// Why a job cannot be written.
@@ -35,7 +35,7 @@ pub enum StreamError {
         /// The page's rows.
         page_length: usize,
     },
-    /// The job is one that must not be sent.
+    /// The printer's language or the rules on foil forbid the job.
     #[error("this job must not be sent: {}", words(*.0))]
     Forbidden(Fault),
     /// A row cannot be sent.
@@ -64,18 +64,8 @@ pub struct Written {
     pub bytes: u64,
 }
 
-/// Writes the job that prints `passes` in this order. Planes are the page's size at the page's resolution; rows that
-/// the page's shift would push off the sheet must be blank. A pass without a dot is left out.
-pub fn write_job(
-    page: Page,
-    foil: Option<FoilConsent>,
-    passes: &[Pass],
-    out: &mut impl Write,
-    observer: &dyn Observer,
-) -> Result<Written, StreamError> {
-    /// Bytes gathered before they go out.
-    const CHUNK: usize = 1 << 16;
-
+/// Whether every plane is the page's size.
+fn fits(page: Page, passes: &[Pass]) -> Result<(), StreamError> {
     let (width, length) = (usize::from(page.width()), usize::from(page.length()));
     let stride = width.div_ceil(8);
     for (i, pass) in passes.iter().enumerate() {
@@ -93,6 +83,26 @@ pub fn write_job(
             });
         }
     }
+    Ok(())
+}
+
+/// Writes the job that prints `passes` in this order. Planes are the page's size at the page's resolution; rows that
+/// the page's shift would push off the sheet must be blank. A pass without a dot is left out.
+///
+/// # Errors
+/// Nothing to print, a plane or a row that does not fit the page, a job that must not be sent, or an output that fails.
+pub fn write_job(
+    page: Page,
+    foil: Option<FoilConsent>,
+    passes: &[Pass],
+    out: &mut impl Write,
+    observer: &dyn Observer,
+) -> Result<Written, StreamError> {
+    /// Bytes gathered before they go out.
+    const CHUNK: usize = 1 << 16;
+
+    fits(page, passes)?;
+    let (length, stride) = (usize::from(page.length()), usize::from(page.width()).div_ceil(8));
     let printing: Vec<(usize, &Pass)> =
         passes.iter().enumerate().filter(|(_, pass)| pass.plane.bits.iter().any(|&byte| byte != 0)).collect();
     if printing.is_empty() {

@@ -6,7 +6,7 @@
 use crate::separate::Plane;
 
 /// How many dots lie in no solid square of this side (at least 1), and how many there are.
-pub fn thin(plane: &Plane, side: usize) -> (u64, u64) {
+pub(super) fn thin(plane: &Plane, side: usize) -> (u64, u64) {
     let (width, length, stride) = (plane.width, plane.length, plane.stride);
     let has = |row: &[u8], x: usize| row[x / 8] << (x % 8) & 0x80 != 0;
     // heights[x]: how many dots with ink stand above each other ending in this row, `side` at most.

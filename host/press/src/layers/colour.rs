@@ -18,13 +18,11 @@ use image::DynamicImage;
 use inks::{InkSet, Library, Stack};
 use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
 use protocol::ink::{Ink, Kind};
-use protocol::paper::Paper;
 use rayon::prelude::*;
 
 use super::raster::{self, Density, Unstated, io, wrong};
 use super::{Artwork, LayersError, Options, bits, reserved};
-use crate::halftone::Placement;
-use crate::pipeline;
+use crate::halftone::{self, halftone};
 use crate::separate::Plane;
 use appearance::brdf::{Space, Table};
 use appearance::document::{Materials, SAMPLES};
@@ -209,9 +207,7 @@ impl Colour {
         }
         // Sums of linear light, 16 bits a channel: exact enough for 8-bit sRGB to come back as it was.
         let linear: Vec<u32> = (0..=255u8)
-            .map(|v| {
-                (65535.0 * appearance::document::picture::decode_srgb(f32::from(v) / 255.0)).round() as u32
-            })
+            .map(|v| (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32)
             .collect();
         let coded: Vec<u8> = (0..=65535)
             .map(|light| {
@@ -257,9 +253,8 @@ impl Colour {
         let mix = self.mix(inks, library, observer)?;
         // Art is refused before if it is larger than any page.
         let (width, height) = (dots.0 as u16, dots.1 as u16);
-        let place = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-        let sheet = pipeline::halftone_mix(&mix, library, &place, observer)?;
-        Ok(sheet.into_parts())
+        let settings = halftone::Settings::from_library(&mix.stacks, library);
+        Ok(halftone(&mix, (width, height), &settings, observer)?.into_parts())
     }
 
     /// The mixture of stacks at every pixel.
@@ -382,9 +377,8 @@ impl Lattice {
         let darkest = black.or(darkest).unwrap_or(0);
         let paper = printable.curves.row(bare).to_vec();
         let black = printable.curves.row(darkest).to_vec();
-        let light = std::array::from_fn(|i| {
-            f64::from(appearance::document::picture::decode_srgb(i as f32 / (NODES - 1) as f32))
-        });
+        let light =
+            std::array::from_fn(|i| f64::from(appearance::srgb::decode(i as f32 / (NODES - 1) as f32)));
         Lattice { space, paper, black, light }
     }
 }
@@ -431,7 +425,7 @@ mod tests {
         let mut shares = vec![0.0; mix.stacks.len()];
         for (pixel, &v) in greys.iter().enumerate() {
             mix.shares(pixel, &mut shares);
-            let light = f64::from(appearance::document::picture::decode_srgb(f32::from(v) / 255.0));
+            let light = f64::from(appearance::srgb::decode(f32::from(v) / 255.0));
             // The raking half of the curve: the body's colour without the surface's gloss.
             let at = 3 * (SAMPLES - 1) + 1;
             let printed: f64 = mix

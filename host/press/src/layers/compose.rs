@@ -14,15 +14,14 @@ mod suggest;
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::{Ink, Kind};
-use protocol::paper::Paper;
 use serde::Serialize;
 
 use super::raster::MM;
 use super::{Artwork, LayersError, Shape, White, bits};
-use crate::halftone::Placement;
-use crate::pipeline;
-use crate::separate::{MOST_PASSES, Plane, customary, pack};
-use crate::sheet::Piece;
+use crate::halftone::{self, halftone};
+use crate::separate::{MOST_PASSES, Plane, pack};
+use crate::sheet::DotMap;
+use crate::sheet::order::customary;
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
 use observe::Observer;
@@ -109,7 +108,7 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Composed {
     /// The dots.
-    pub piece: Piece,
+    pub dots: DotMap,
     /// What was composed.
     pub report: Report,
     /// What the art needs.
@@ -262,9 +261,9 @@ fn tone(
     let stacks = vec![Stack::SUBSTRATE, Stack::new([ink])];
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
-    let place = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-    let sheet = pipeline::halftone_mix(&mix, library, &place, observer)?;
-    Ok(bits::from_bytes(art.width, sheet.index(), |stack| stack == 1))
+    let settings = halftone::Settings::from_library(&mix.stacks, library);
+    let dots = halftone(&mix, (width, height), &settings, observer)?;
+    Ok(bits::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 
 /// The layers of a dot that has the slots of `mask`.
@@ -306,22 +305,22 @@ fn stack_up(
     let planes: Vec<&Plane> = slots.iter().map(|slot| &slot.plane).collect();
     let census = pack::census(&planes, width, length);
     let mut stacks = vec![Stack::SUBSTRATE];
-    let mut dots = vec![0u64];
+    let mut counts = vec![0u64];
     let mut stack_of = vec![0u16; census.len()];
     for (mask, &count) in census.iter().enumerate().filter(|(_, count)| **count > 0) {
         let stack = Stack::new(layers(slots, mask, settings));
         let number = stacks.iter().position(|known| *known == stack).unwrap_or_else(|| {
             stacks.push(stack);
-            dots.push(0);
+            counts.push(0);
             stacks.len() - 1
         });
-        dots[number] += count;
-        // More than 256 stacks are refused below, by the piece.
+        counts[number] += count;
+        // More than 256 stacks are refused below, by the dot map.
         stack_of[mask] = number.min(256) as u16;
     }
     // No entry of the table says there is no stack, so there is no such dot.
     let index = pack::unpack(&planes, width, length, &stack_of).unwrap_or_default();
-    let piece = Piece::new(width, length, stacks, index)?;
+    let dots = DotMap::new(width, length, stacks, index)?;
     let laid: Vec<Laid> = slots
         .iter()
         .enumerate()
@@ -338,10 +337,10 @@ fn stack_up(
         })
         .collect();
     let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
-    let mut suggestions = suggest::suggest(piece.stacks(), &dots, &order);
+    let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
     suggestions.extend(suggest::rare(&laid, &settings.inks));
     let size_mm = (width as f64 * MM, length as f64 * MM);
-    Ok(Composed { report: Report { size_mm, laid, bare: dots[0], notes }, piece, suggestions })
+    Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
 }
 
 #[cfg(test)]

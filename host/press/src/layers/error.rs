@@ -12,7 +12,7 @@ use appearance::gamut::GamutError;
 #[derive(Debug, thiserror::Error)]
 pub enum LayersError {
     /// The system refused.
-    #[error("{}: cannot {attempt}: {source}", path.display())]
+    #[error("{}: cannot {attempt}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -157,12 +157,12 @@ pub enum LayersError {
         install: &'static str,
     },
     /// Fitting colours to the process inks.
-    #[error("fitting colours to the process inks: {0}")]
+    #[error("cannot fit the colours to the process inks")]
     Gamut(#[from] GamutError),
     /// Halftoning.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),
-    /// The stacks make no piece.
+    /// The stacks do not make a dot map.
     #[error(transparent)]
     Sheet(#[from] SheetError),
 }

@@ -1,4 +1,4 @@
-//! Spot-colour art to a [`Piece`](crate::sheet::Piece): flat layers in named inks, white beneath, finish on top.
+//! Spot-colour art to a [`DotMap`](crate::sheet::DotMap): flat layers in named inks, white beneath, finish on top.
 //!
 //! Problem: most sheets are decals and cards, drawn as one picture for each ink, as one picture in reserved colours,
 //! or as a drawing with named layers; each dot must end as one stack of inks.
@@ -30,7 +30,7 @@ use inks::InkSet;
 use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
-use crate::job::placement::Size;
+use crate::layout::Size;
 use crate::separate::Plane;
 use observe::Observer;
 

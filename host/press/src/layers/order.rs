@@ -9,7 +9,7 @@
 use inks::{Library, Severity, Stack};
 use protocol::ink::Ink;
 
-use crate::separate::customary;
+use crate::sheet::order::customary;
 
 /// The most inks whose orders are all tried.
 const MOST_TRIED: usize = 8;

@@ -15,7 +15,7 @@ use image::{DynamicImage, GrayImage, ImageDecoder, ImageFormat};
 
 use super::error::resolution;
 use super::{LayersError, Options};
-use crate::job::placement::Size;
+use crate::layout::Size;
 
 /// The most pixels of a picture: a page at 1200 dpi.
 pub const MOST_PIXELS: u64 = 1 << 28;

@@ -1,88 +1,19 @@
-//! Where the pieces go: columns and rows in the room a machine has, and what lies beyond it.
+//! Where the copies go: columns and rows in the room a printer has, and what lies beyond it.
 
 use protocol::paper::LEFT;
 
-use super::{Layout, LayoutError, MOST_REPEATS, Mm, Point, Position, Repeat};
+use super::length::{Mm, Point};
+use super::rect::{Cut, Rect};
+use super::settings::{Layout, LayoutError, MOST_REPEATS, Position, Repeat};
 
-/// A rectangle on the ideal page: dots from the corner of the printable area, `right` and `bottom` one past the last.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) struct Rect {
-    pub left: i64,
-    pub top: i64,
-    pub right: i64,
-    pub bottom: i64,
-}
-
-impl Rect {
-    pub fn width(&self) -> i64 {
-        self.right - self.left
-    }
-
-    pub fn length(&self) -> i64 {
-        self.bottom - self.top
-    }
-
-    pub fn meet(&self, other: Rect) -> Rect {
-        Rect {
-            left: self.left.max(other.left),
-            top: self.top.max(other.top),
-            right: self.right.min(other.right),
-            bottom: self.bottom.min(other.bottom),
-        }
-    }
-
-    pub fn contains(&self, x: i64, y: i64) -> bool {
-        (self.left..self.right).contains(&x) && (self.top..self.bottom).contains(&y)
-    }
-}
-
-/// What lies beyond the printable area, in millimetres on each side.
-#[derive(Clone, Copy, PartialEq, Debug, Default, serde::Serialize)]
-pub struct Cut {
-    /// At the left.
-    pub left: f64,
-    /// At the top.
-    pub top: f64,
-    /// At the right.
-    pub right: f64,
-    /// At the bottom.
-    pub bottom: f64,
-}
-
-impl Cut {
-    fn of(block: Rect, room: Rect) -> Option<Cut> {
-        let beyond = |dots: i64| Mm::of_dots(dots.max(0)).0;
-        let cut = Cut {
-            left: beyond(room.left - block.left),
-            top: beyond(room.top - block.top),
-            right: beyond(block.right - room.right),
-            bottom: beyond(block.bottom - room.bottom),
-        };
-        (cut != Cut::default()).then_some(cut)
-    }
-}
-
-impl std::fmt::Display for Cut {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let sides = [("left", self.left), ("top", self.top), ("right", self.right), ("bottom", self.bottom)];
-        let said: Vec<String> = sides
-            .iter()
-            .filter(|(_, mm)| *mm > 0.0)
-            // A single dot is not nothing.
-            .map(|(side, mm)| format!("{:.1} mm at the {side}", mm.max(0.1)))
-            .collect();
-        f.write_str(&said.join(", "))
-    }
-}
-
-/// All pieces on the ideal page.
+/// All copies on the ideal page.
 pub(super) struct Block {
-    /// What the machine can print on.
+    /// What the printer reaches.
     pub room: Rect,
-    /// All pieces and what is between them.
+    /// All copies and what is between them.
     pub place: Rect,
     pub grid: (u16, u16),
-    /// First and one past the last dot of each column of pieces, and of each row.
+    /// First and one past the last dot of each column of copies, and of each row.
     pub columns: Vec<(i64, i64)>,
     pub rows: Vec<(i64, i64)>,
     pub cut: Option<Cut>,
@@ -91,14 +22,14 @@ pub(super) struct Block {
 impl Block {
     pub fn of(size: (usize, usize), layout: &Layout) -> Result<Block, LayoutError> {
         if let Some(problem) = layout.profile.problem() {
-            return Err(LayoutError::Setting(format!("machine profile: {problem}")));
+            return Err(LayoutError::Setting(format!("printer profile: {problem}")));
         }
         let gap = (layout.gap.0.dots(), layout.gap.1.dots());
         if gap.0 < 0 || gap.1 < 0 {
-            return Err(LayoutError::Setting("the gap between pieces cannot be negative".into()));
+            return Err(LayoutError::Setting("the gap between copies cannot be negative".into()));
         }
         let room = layout.room();
-        // Pieces are held in memory: their sides are far below the limits of i64.
+        // Dot maps are held in memory: their sides are far below the limits of i64.
         let size = (size.0 as i64, size.1 as i64);
         let grid = grid(layout, size, gap, room)?;
         let extent = |count: u16, side: i64, gap: i64| i64::from(count) * (side + gap) - gap;
@@ -130,7 +61,8 @@ fn grid(layout: &Layout, size: (i64, i64), gap: (i64, i64), room: Rect) -> Resul
     match layout.repeat {
         Repeat::Grid(columns, rows) => {
             if !(1..=MOST_REPEATS).contains(&columns) || !(1..=MOST_REPEATS).contains(&rows) {
-                let words = format!("{columns} x {rows} pieces; each is 1 to {MOST_REPEATS}");
+                let words =
+                    format!("{columns} x {rows} copies; columns and rows are 1 to {MOST_REPEATS} each");
                 return Err(LayoutError::Setting(words));
             }
             Ok((columns, rows))
@@ -167,7 +99,7 @@ fn corner(layout: &Layout, (width, length): (i64, i64), room: Rect) -> (i64, i64
         }
         Position::FromPrintable(Point(x, y)) => (x.dots(), y.dots()),
         Position::Centred => {
-            // In the middle of the paper's own area, as far as the machine reaches.
+            // In the middle of the paper's own area, as far as the printer reaches.
             let middle = |most: u16, size: i64, low: i64, high: i64| {
                 let at = (i64::from(most) - size).div_euclid(2);
                 if size <= high - low { at.clamp(low, high - size) } else { at }

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::job::placement::DOTS_PER_MM;
+use crate::sheet::DOTS_PER_MM;
 
 /// A length in millimetres.
 #[derive(Clone, Copy, PartialEq, PartialOrd, Debug, Default)]
@@ -16,10 +16,10 @@ pub struct Point(pub Mm, pub Mm);
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoLength {
     /// Not a single length.
-    #[error("`{0}` is no length; write it like 2mm, 1.5cm or 0.25in")]
+    #[error("`{0}` is not a length; write it like 2mm, 1.5cm or 0.25in")]
     Length(String),
     /// Not a pair.
-    #[error("`{0}` is no pair of lengths; write it like 20x30mm, 20mm,30mm or 1x2in (across, then down)")]
+    #[error("`{0}` is not a pair of lengths; write it like 20x30mm, 20mm,30mm or 1x2in (across, then down)")]
     Pair(String),
 }
 
@@ -56,7 +56,7 @@ impl FromStr for Mm {
 
     fn from_str(text: &str) -> Result<Mm, NoLength> {
         let lower = text.trim().to_ascii_lowercase();
-        // Nothing has no unit to be wrong about.
+        // Zero is zero in every unit.
         if lower == "0" {
             return Ok(Mm(0.0));
         }

@@ -1,4 +1,4 @@
-//! Crop marks and registration marks around a block of pieces.
+//! Crop marks and registration marks around a block of copies.
 //!
 //! Crop marks are ticks outside the block in line with every edge that is cut. Registration marks are a cross in a ring in
 //! the middle of each side, printed by every pass on the same place, so that a pass that is off shows beside the others.
@@ -7,10 +7,11 @@
 use inks::Stack;
 use protocol::ink::Ink;
 
-use super::block::{Block, Rect};
+use super::block::Block;
 use super::length::Mm;
-use super::{Layout, LayoutError};
-use crate::separate;
+use super::rect::Rect;
+use super::settings::{Layout, LayoutError};
+use crate::sheet::order::passes_of;
 
 /// From the block to a mark, in millimetres.
 const AWAY: f64 = 1.5;
@@ -128,6 +129,7 @@ pub(super) fn registration(block: Rect, room: Rect, ticks: bool) -> (Vec<Mark>, 
     let missing = places.len() - marks.len();
     (marks, missing)
 }
+
 /// The ink in use that shows best on most grounds.
 fn best(inks: &[Ink]) -> Option<Ink> {
     const ORDER: [Ink; 13] = [
@@ -148,12 +150,12 @@ fn best(inks: &[Ink]) -> Option<Ink> {
     ORDER.into_iter().find(|ink| inks.contains(ink))
 }
 
-/// Chosen inks in the order of the passes they join, those the piece does not have where they customarily go.
+/// Chosen inks in the order of the passes they join, those the dots do not have where they customarily go.
 fn in_order(chosen: &[Ink], in_use: &[Ink]) -> Vec<Ink> {
     let mut stacks: Vec<Stack> = chosen.iter().map(|&ink| Stack::new([ink])).collect();
     stacks.push(Stack::new(in_use));
     let mut order: Vec<Ink> = Vec::new();
-    for ink in separate::passes_of(&stacks) {
+    for ink in passes_of(&stacks) {
         if chosen.contains(&ink) && !order.contains(&ink) {
             order.push(ink);
         }
@@ -162,7 +164,7 @@ fn in_order(chosen: &[Ink], in_use: &[Ink]) -> Vec<Ink> {
 }
 
 /// The marks, each with the number of its stack, which is added to `stacks`; and how many had no room. `in_use` are the
-/// inks of the piece in the order of passes.
+/// inks of the dots in the order of passes.
 pub(super) fn marks_of(
     layout: &Layout,
     in_use: &[Ink],

@@ -1,17 +1,17 @@
-//! The ideal page, row by row as a machine that is a little off must be sent it.
+//! The ideal page, row by row as it must be sent to a printer that is slightly off.
 
 use rayon::prelude::*;
 
-use super::Layout;
-use super::block::{Block, Rect};
+use super::block::Block;
 use super::marks::Mark;
-use crate::preview::Area;
-use crate::sheet::Piece;
+use super::rect::Rect;
+use super::settings::Layout;
+use crate::sheet::{Area, DotMap};
 use observe::Observer;
 
 /// The ideal page.
 pub(super) struct Page<'a> {
-    pub piece: &'a Piece,
+    pub dots: &'a DotMap,
     pub layout: &'a Layout,
     pub block: &'a Block,
     pub marks: &'a [(Mark, u8)],
@@ -39,9 +39,9 @@ impl Page<'_> {
         let offset = self.layout.profile.offset().0;
         let fits = |left: i64, right: i64| (left.max(self.block.room.left), right.min(self.block.room.right));
         if let Some(&(top, _)) = self.block.rows.iter().find(|(top, bottom)| (*top..*bottom).contains(&y)) {
-            // Within the piece, by the line above.
-            let start = (y - top) as usize * self.piece.width();
-            let dots = &self.piece.index()[start..start + self.piece.width()];
+            // Within the dot map, by the line above.
+            let start = (y - top) as usize * self.dots.width();
+            let dots = &self.dots.index()[start..start + self.dots.width()];
             for &(left, right) in &self.block.columns {
                 let (from, to) = fits(left, right);
                 if from >= to {

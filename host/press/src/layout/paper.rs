@@ -1,6 +1,6 @@
-//! Sheets of paper: their size, and how near to each edge the machine prints.
+//! Sheets of paper: their size, and how near to each edge the printer prints.
 //!
-//! The machine itself keeps the left and the top margin; the others are what the printable area leaves of the sheet.
+//! The printer itself keeps the left and the top margin; the others are what the printable area leaves of the sheet.
 //! Source: sizes are the standards'; printable areas the established open driver's; which margins were measured on
 //! hardware is said with each. Custom sheets get the margins measured on A4.
 
@@ -12,7 +12,7 @@ use super::length::{Mm, Point};
 const RIGHT: i64 = 80;
 const BOTTOM: i64 = 360;
 
-/// The smallest printable side of a custom sheet, in dots: 10 mm, so that a slip of the finger is noticed.
+/// The smallest printable side of a custom sheet, in dots: 10 mm, so that a typing error is noticed.
 const LEAST: i64 = 236;
 
 /// A sheet and its margins, all in millimetres.
@@ -26,7 +26,7 @@ pub struct Known {
     pub printable_mm: (f64, f64),
     /// Margins: left, top, right, bottom.
     pub margins_mm: [f64; 4],
-    /// How well they are known.
+    /// How well the margins are known.
     pub known: &'static str,
 }
 
@@ -38,6 +38,25 @@ const TABLE: [(Paper, (f64, f64), &str); 6] = [
     (Paper::B5, (182.0, 257.0), "printed, margins not measured"),
     (Paper::Postcard, (100.0, 148.0), "top and right measured; a mark 21 mm above the lower edge printed"),
 ];
+
+/// The size of a sheet of paper, in 1/600 inch.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Stock {
+    /// From its left to its right edge.
+    pub width: u16,
+    /// From its top to its bottom edge.
+    pub length: u16,
+}
+
+impl Stock {
+    /// The sheet sold under that name; for a custom size one with the usual margins around the printable area.
+    pub fn of(paper: Paper) -> Stock {
+        let (width, length) = sheet_mm(paper);
+        // Saturates: a stream may declare a page larger than any sheet.
+        let dots = |mm: f64| Mm(mm).dots().clamp(0, u16::MAX.into()) as u16;
+        Stock { width: dots(width), length: dots(length) }
+    }
+}
 
 /// Every paper with a name.
 pub fn table() -> impl Iterator<Item = Known> {
@@ -67,7 +86,8 @@ pub fn sheet_mm(paper: Paper) -> (f64, f64) {
 
 /// The paper meant by a name, or by the size of a sheet such as `120x180mm`.
 ///
-/// Errors, in words: neither, or a sheet that the machine cannot take.
+/// # Errors
+/// In words: neither, or a sheet that the printer cannot take.
 pub fn read(text: &str) -> Result<Paper, String> {
     if let Some(paper) = Paper::from_name(text) {
         return Ok(paper);
@@ -81,7 +101,8 @@ pub fn read(text: &str) -> Result<Paper, String> {
 
 /// A sheet of a size of its own.
 ///
-/// Errors, in words: one that the machine cannot take.
+/// # Errors
+/// In words: one that the printer cannot take.
 pub fn custom(width: Mm, length: Mm) -> Result<Paper, String> {
     let inner = |top: i64| (width.dots() - i64::from(LEFT) - RIGHT, length.dots() - top - BOTTOM);
     let (across, along) = inner(Paper::Custom { width: 0, length: 0 }.top().into());
@@ -99,7 +120,7 @@ pub fn custom(width: Mm, length: Mm) -> Result<Paper, String> {
     if across > most || along > longest {
         let (width_mm, length_mm) = (sheet_mm(Paper::Letter).0, sheet_mm(Paper::Legal).1);
         return Err(format!(
-            "a sheet of {:.1} x {:.1} mm does not go in: {width_mm} x {length_mm} mm is the most",
+            "a sheet of {:.1} x {:.1} mm is too large; the printer takes {width_mm} x {length_mm} mm at most",
             width.0, length.0
         ));
     }
@@ -134,6 +155,20 @@ mod tests {
         }
         assert!(table().all(|known| known.margins_mm.iter().all(|&margin| margin > 2.9)));
         assert_eq!(table().count(), Paper::named().count());
+    }
+
+    #[test]
+    fn stock_is_the_whole_sheet_in_dots() {
+        let size = |paper| {
+            let Stock { width, length } = Stock::of(paper);
+            (width, length)
+        };
+        assert_eq!(size(Paper::A4), (4961, 7016));
+        assert_eq!(size(Paper::Legal), (5100, 8400));
+        assert_eq!(size(Paper::B5), (4299, 6071));
+        assert_eq!(size(Paper::Postcard), (2362, 3496));
+        assert_eq!(size(Paper::Custom { width: 1000, length: 2000 }), (1160, 2000 + 284 + 360));
+        assert_eq!(size(Paper::Custom { width: u16::MAX, length: u16::MAX }), (u16::MAX, u16::MAX));
     }
 
     #[test]

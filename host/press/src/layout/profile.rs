@@ -1,4 +1,4 @@
-//! What one machine does differently from the others: where it begins, and how far it feeds.
+//! The calibration of one printer: where it begins, and how far it feeds.
 //!
 //! Both are corrected in the dots. The printer's language has commands for them, but shifts there cannot be negative and
 //! the line-feed command was never tried on hardware.
@@ -8,41 +8,40 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::length::Mm;
-use crate::sheet::FileError;
-use crate::sheet::picture::{read_toml, write_toml};
+use crate::files::{FileError, read_toml, write_toml};
 
-/// The largest offset that is a machine's and not a mistake, in millimetres.
+/// The largest offset that is a printer's and not a mistake, in millimetres.
 const MOST_OFFSET: f64 = 10.0;
-/// The largest error of the feed that is a machine's.
+/// The largest error of the feed that is a printer's.
 const MOST_FEED: f64 = 0.02;
 
-/// A machine, measured with `foilpress chart calibration`.
+/// A printer as measured with the calibration chart.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
-    /// How far to the right and how far down of its place the machine prints, in millimetres.
+    /// How far to the right and how far down of the requested position the printer starts, in millimetres.
     pub offset_mm: [f64; 2],
-    /// What is printed 1 mm long measures this many millimetres along the feed.
+    /// How many millimetres a line of 1 mm along the feed measures on paper.
     pub feed: f64,
 }
 
 impl Default for Profile {
-    /// A machine that prints everything where it should.
+    /// A printer that prints everything where it should.
     fn default() -> Profile {
         Profile { offset_mm: [0.0, 0.0], feed: 1.0 }
     }
 }
 
 impl Profile {
-    /// What is wrong with it, if anything.
+    /// What is wrong with it, if anything, with the field.
     pub fn problem(&self) -> Option<String> {
         let [x, y] = self.offset_mm;
         if !(x.abs() <= MOST_OFFSET && y.abs() <= MOST_OFFSET) {
-            return Some(format!("offset_mm: {x}, {y}; no machine is more than {MOST_OFFSET} mm off"));
+            return Some(format!("offset_mm: {x}, {y}; no printer is more than {MOST_OFFSET} mm off"));
         }
         if (self.feed - 1.0).abs() > MOST_FEED || self.feed.is_nan() {
             return Some(format!(
-                "feed: {}; it is the length on paper of what should be 1 mm, between {} and {}",
+                "feed: {}; the measured length of 1 mm must be between {} and {}",
                 self.feed,
                 1.0 - MOST_FEED,
                 1.0 + MOST_FEED

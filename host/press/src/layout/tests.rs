@@ -1,12 +1,14 @@
 use super::*;
 use observe::Silent;
 use proptest::prelude::*;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
 
-fn piece(width: usize, length: usize, stacks: u8, seed: u32) -> Piece {
+fn random(width: usize, length: usize, stacks: u8, seed: u32) -> DotMap {
     let random = |i: usize| ((i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 9) % u32::from(stacks);
     let index = (0..width * length).map(|i| random(i) as u8).collect();
     let all = ["substrate", "W", "W+C", "MS", "K"].map(|text| text.parse().unwrap());
-    Piece::new(width, length, all[..usize::from(stacks)].to_vec(), index).unwrap()
+    DotMap::new(width, length, all[..usize::from(stacks)].to_vec(), index).unwrap()
 }
 
 /// Lengths whose dots are known: 600 an inch.
@@ -16,14 +18,14 @@ fn dots(across: i64, down: i64) -> Point {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
-    /// Every dot of the page against a walk over all pieces, with nothing shared but the numbers.
+    /// Every dot of the page against a walk over all copies, with nothing shared but the numbers.
     #[test]
-    fn every_dot_is_that_of_the_piece_that_covers_it(
+    fn every_dot_is_that_of_the_copy_that_covers_it(
         size in (1usize..40, 1usize..40), page in (60u16..150, 60u16..150), at in (-30i64..120, -30i64..120),
         repeat in (1u16..4, 1u16..4), gap in (0i64..9, 0i64..9), mirror: bool, seed: u32,
         offset in (-12i64..12, -12i64..12), feed in prop_oneof![Just(1.0f64), 0.98f64..1.02],
     ) {
-        let piece = piece(size.0, size.1, 5, seed);
+        let artwork = random(size.0, size.1, 5, seed);
         let layout = Layout {
             position: Position::FromPrintable(dots(at.0, at.1)),
             repeat: Repeat::Grid(repeat.0, repeat.1),
@@ -47,7 +49,7 @@ proptest! {
                     let dy = y - at.1 - row * (h + gap.1);
                     if (0..w).contains(&dx) && (0..h).contains(&dy) {
                         let dx = if mirror { w - 1 - dx } else { dx };
-                        return piece.index()[(dy * w + dx) as usize];
+                        return artwork.index()[(dy * w + dx) as usize];
                     }
                 }
             }
@@ -57,7 +59,7 @@ proptest! {
             .flat_map(|y| (0..wide).map(move |x| (x, y)))
             .map(|(x, y)| ideal(x + offset.0, offset.1 + (y as f64 * feed).round() as i64))
             .collect();
-        match arrange(&piece, &layout, &Silent) {
+        match arrange(&artwork, &layout, &Silent) {
             Ok(arranged) => {
                 prop_assert!(arranged.sheet.index() == want);
                 // Whatever has ink lies in the area that is said to be printed.
@@ -77,17 +79,17 @@ proptest! {
     fn what_is_not_cut_is_all_there(
         size in (1usize..60, 1usize..60), repeat in (1u16..4, 1u16..4), gap in 0i64..9, seed: u32,
     ) {
-        let piece = piece(size.0, size.1, 4, seed);
+        let artwork = random(size.0, size.1, 4, seed);
         let paper = Paper::Custom { width: 150, length: 140 };
         let layout = Layout { repeat: Repeat::Grid(repeat.0, repeat.1), gap: dots(gap, gap), ..Layout::centred(paper) };
         let wide = i64::from(repeat.0) * (size.0 as i64 + gap) - gap;
         let long = i64::from(repeat.1) * (size.1 as i64 + gap) - gap;
-        match arrange(&piece, &layout, &Silent) {
+        match arrange(&artwork, &layout, &Silent) {
             Ok(arranged) => {
                 let count = usize::from(repeat.0 * repeat.1);
-                prop_assert_eq!(arranged.laid.pieces.len(), count);
+                prop_assert_eq!(arranged.laid.copies.len(), count);
                 let inked = |index: &[u8]| index.iter().filter(|&&dot| dot != 0).count();
-                prop_assert_eq!(inked(arranged.sheet.index()), count * inked(piece.index()));
+                prop_assert_eq!(inked(arranged.sheet.index()), count * inked(artwork.index()));
                 prop_assert_eq!(arranged.laid.cut, None);
                 let area = arranged.laid.area;
                 prop_assert_eq!((area.left as i64, area.width as i64), ((150 - wide) / 2, wide));
@@ -99,65 +101,65 @@ proptest! {
     }
 }
 
-/// A solid piece of this stack.
-fn solid(width: usize, length: usize, stack: &str) -> Piece {
+/// A solid rectangle of this stack.
+fn solid(width: usize, length: usize, stack: &str) -> DotMap {
     let stacks = vec![Stack::SUBSTRATE, stack.parse().unwrap()];
-    Piece::new(width, length, stacks, vec![1; width * length]).unwrap()
+    DotMap::new(width, length, stacks, vec![1; width * length]).unwrap()
 }
 
 #[test]
 fn a_position_from_the_edge_of_the_paper_is_what_a_ruler_measures() {
     // 80 dots and 284 rows lie outside of the printable area of A4.
-    let piece = solid(30, 20, "K");
+    let artwork = solid(30, 20, "K");
     let at = Position::FromEdge(dots(600, 1200));
     let layout = Layout { position: at, ..Layout::centred(Paper::A4) };
-    let area = arrange(&piece, &layout, &Silent).unwrap().laid.area;
+    let area = arrange(&artwork, &layout, &Silent).unwrap().laid.area;
     assert_eq!((area.left, area.top, area.width, area.length), (520, 916, 30, 20));
     let postcard = Layout { paper: Paper::Postcard, ..layout };
-    assert_eq!(arrange(&piece, &postcard, &Silent).unwrap().laid.area.top, 1200 - 71);
+    assert_eq!(arrange(&artwork, &postcard, &Silent).unwrap().laid.area.top, 1200 - 71);
 }
 
 #[test]
 fn what_would_be_cut_is_said_in_mm_and_cut_only_when_asked() {
-    let piece = solid(1200, 600, "C");
+    let artwork = solid(1200, 600, "C");
     let at = Position::FromPrintable(dots(-236, 6372 - 600 + 118));
     let layout = Layout { position: at, ..Layout::centred(Paper::A4) };
-    let said = arrange(&piece, &layout, &Silent).unwrap_err().to_string();
+    let said = arrange(&artwork, &layout, &Silent).unwrap_err().to_string();
     assert!(said.contains("10.0 mm at the left, 5.0 mm at the bottom of 50.8 x 25.4 mm"), "{said}");
-    assert!(said.contains("--crop") && said.contains("203.2 x 269.7"), "{said}");
-    let arranged = arrange(&piece, &Layout { cut: true, ..layout.clone() }, &Silent).unwrap();
+    assert!(said.contains("move it") && said.contains("203.2 x 269.7"), "{said}");
+    let arranged = arrange(&artwork, &Layout { cut: true, ..layout.clone() }, &Silent).unwrap();
     assert_eq!(arranged.sheet.census()[1], (1200 - 236) * (600 - 118));
     assert!(arranged.laid.cut.is_some_and(|cut| (cut.left - 9.99).abs() < 0.01 && cut.right == 0.0));
     let away = Position::FromPrintable(dots(9000, 0));
-    let nothing = arrange(&piece, &Layout { position: away, cut: true, ..layout }, &Silent);
+    let nothing = arrange(&artwork, &Layout { position: away, cut: true, ..layout }, &Silent);
     assert!(matches!(nothing, Err(LayoutError::Nothing { .. })));
 }
 
 #[test]
 fn filling_takes_as_many_as_fit_and_one_more_would_not() {
-    let piece = solid(700, 900, "W");
+    let artwork = solid(700, 900, "W");
     let layout = Layout { repeat: Repeat::Fill, gap: dots(50, 60), ..Layout::centred(Paper::A4) };
-    let arranged = arrange(&piece, &layout, &Silent).unwrap();
+    let arranged = arrange(&artwork, &layout, &Silent).unwrap();
     // 6 x 700 + 5 x 50 = 4450 of 4800, 6 x 900 + 5 x 60 = 5700 of 6372.
     assert_eq!(arranged.laid.grid, (6, 6));
     let more = |grid| Layout { repeat: grid, ..layout.clone() };
-    assert!(arrange(&piece, &more(Repeat::Grid(7, 1)), &Silent).is_err());
-    assert!(arrange(&piece, &more(Repeat::Grid(1, 7)), &Silent).is_err());
+    assert!(arrange(&artwork, &more(Repeat::Grid(7, 1)), &Silent).is_err());
+    assert!(arrange(&artwork, &more(Repeat::Grid(1, 7)), &Silent).is_err());
     let large = solid(4801, 10, "W");
     assert!(matches!(arrange(&large, &layout, &Silent), Err(LayoutError::FillsNothing { .. })));
-    assert!(arrange(&piece, &more(Repeat::Grid(0, 1)), &Silent).is_err());
+    assert!(arrange(&artwork, &more(Repeat::Grid(0, 1)), &Silent).is_err());
 }
 
 #[test]
 fn ticks_stand_outside_in_line_with_the_edges_and_in_one_ink() {
-    let piece = solid(600, 480, "W+C+K");
+    let artwork = solid(600, 480, "W+C+K");
     let layout = Layout {
         repeat: Repeat::Grid(2, 1),
         crop_marks: true,
         position: Position::FromPrintable(dots(1000, 1000)),
         ..Layout::centred(Paper::A4)
     };
-    let arranged = arrange(&piece, &layout, &Silent).unwrap();
+    let arranged = arrange(&artwork, &layout, &Silent).unwrap();
     let sheet = &arranged.sheet;
     let black: Stack = "K".parse().unwrap();
     let number = sheet.stacks().iter().position(|stack| *stack == black).unwrap() as u8;
@@ -174,17 +176,17 @@ fn ticks_stand_outside_in_line_with_the_edges_and_in_one_ink() {
         assert!(beside || level, "({x}, {y})");
     }
     assert_eq!(arranged.laid.marks_left_out, 0);
-    assert_eq!(sheet.census()[1], 2 * 600 * 480, "nothing of the pieces is covered");
+    assert_eq!(sheet.census()[1], 2 * 600 * 480, "nothing of the copies is covered");
 }
 
 #[test]
 fn registration_marks_have_every_pass_and_the_ink_can_be_chosen() {
     let mut layout = Layout { registration_marks: true, ..Layout::centred(Paper::Postcard) };
-    let piece = piece(600, 600, 5, 7);
-    let arranged = arrange(&piece, &layout, &Silent).unwrap();
+    let artwork = random(600, 600, 5, 7);
+    let arranged = arrange(&artwork, &layout, &Silent).unwrap();
     assert_eq!(arranged.sheet.stacks().last().unwrap().to_string(), "W+MS+C+K");
     layout.mark_inks = vec![Ink::Magenta];
-    let arranged = arrange(&piece, &layout, &Silent).unwrap();
+    let arranged = arrange(&artwork, &layout, &Silent).unwrap();
     let census = arranged.sheet.census();
     assert_eq!(arranged.sheet.stacks().last().unwrap().to_string(), "M");
     // Four rings with crosses, alike: the paper's own symmetry.
@@ -202,15 +204,15 @@ fn marks_without_room_are_left_out_and_counted_never_beyond_the_area() {
 }
 
 #[test]
-fn without_anything_asked_the_page_is_the_piece_in_its_middle() {
-    let piece = piece(301, 200, 3, 5);
-    let arranged = arrange(&piece, &Layout::centred(Paper::A4), &Silent).unwrap();
+fn without_anything_asked_the_page_is_the_artwork_in_its_middle() {
+    let artwork = random(301, 200, 3, 5);
+    let arranged = arrange(&artwork, &Layout::centred(Paper::A4), &Silent).unwrap();
     assert_eq!(arranged.laid.area, Area { left: 2249, top: 3086, width: 301, length: 200 });
-    assert_eq!(arranged.sheet.stacks(), piece.stacks());
-    // A machine that is off moves its own room, not the middle, while there is room.
+    assert_eq!(arranged.sheet.stacks(), artwork.stacks());
+    // A printer that is off moves its own room, not the middle, while there is room.
     let profile = Profile { offset_mm: [2.54, 0.0], feed: 1.0 };
     let layout = Layout { profile, ..Layout::centred(Paper::A4) };
-    assert_eq!(arrange(&piece, &layout, &Silent).unwrap().laid.area.left, 2249 - 60);
+    assert_eq!(arrange(&artwork, &layout, &Silent).unwrap().laid.area.left, 2249 - 60);
     assert_eq!(layout.largest(), (4740, 6372));
     let grid = Layout { repeat: Repeat::Grid(2, 3), gap: dots(40, 72), ..layout.clone() };
     assert_eq!(grid.largest(), (2350, 2076));
@@ -231,5 +233,5 @@ fn what_is_too_large_is_told_what_fits_and_what_is_beside_the_page_is_told_to_mo
         "{said}"
     );
     let beside = Layout { position: Position::FromPrintable(dots(-1, 0)), ..layout };
-    assert!(check(100, 100, &beside).unwrap_err().to_string().contains("here; move it, take"));
+    assert!(check(100, 100, &beside).unwrap_err().to_string().contains("mm; move it"));
 }

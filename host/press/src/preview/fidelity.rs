@@ -11,14 +11,12 @@
 
 use rayon::prelude::*;
 
+use crate::sheet::DOTS_PER_MM;
 use appearance::brdf::Space;
 use observe::Observer;
 
 use super::PreviewError;
 use super::source::{Lines, Scratch, Source};
-
-/// Dots to a millimetre of every sheet.
-const DOTS_PER_MM: f64 = 600.0 / 25.4;
 
 /// Lines of cells to a parallel task; fixed, so that sums are taken in one order on any number of threads.
 const CHUNK: usize = 16;
@@ -181,9 +179,8 @@ fn blurred(lines: &Lines, first: usize, count: usize) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::source::Area;
     use super::*;
-    use crate::sheet::Sheet;
+    use crate::sheet::{Area, Sheet};
     use appearance::brdf::Table;
     use appearance::document::Materials;
     use inks::Stack;
@@ -229,7 +226,8 @@ mod tests {
 
     fn report(space: &Space, rows: &Table, target: Vec<f64>, sheet: &Sheet, metres: f64) -> Report {
         let target = Uniform(space.clone(), target);
-        let print = Source::Print { sheet, space, stacks: rows, area: Area::whole(sheet) };
+        let print =
+            Source::Print { dots: sheet.dots(), space, stacks: rows, area: Area::whole(sheet.dots()) };
         fidelity(&Source::Document(&target), &print, print.size(), metres, &Silent).unwrap()
     }
 
@@ -328,7 +326,12 @@ mod tests {
         let rows = stacks(&other);
         let sheet = sheet(20, |_| false);
         let target = Uniform(space.clone(), vec![0.1; 12]);
-        let print = Source::Print { sheet: &sheet, space: &other, stacks: &rows, area: Area::whole(&sheet) };
+        let print = Source::Print {
+            dots: sheet.dots(),
+            space: &other,
+            stacks: &rows,
+            area: Area::whole(sheet.dots()),
+        };
         let result = fidelity(&Source::Document(&target), &print, (20, 20), 0.5, &Silent);
         assert!(matches!(result, Err(PreviewError::Shape { expected: 12, found: 15, .. })));
     }

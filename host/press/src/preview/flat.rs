@@ -135,9 +135,8 @@ pub fn flat(
 
 #[cfg(test)]
 mod tests {
-    use super::super::source::Area;
     use super::*;
-    use crate::sheet::Sheet;
+    use crate::sheet::{Area, Sheet};
     use appearance::brdf::{Space, Table};
     use inks::{Curve, Stack};
     use observe::Silent;
@@ -162,7 +161,7 @@ mod tests {
     }
 
     fn lit(sheet: &Sheet, space: &Space, stacks: &Table, lights: &[Light]) -> Vec<Radiance> {
-        let print = Source::Print { sheet, space, stacks, area: Area::whole(sheet) };
+        let print = Source::Print { dots: sheet.dots(), space, stacks, area: Area::whole(sheet.dots()) };
         flat(&print, lights, sheet.width(), sheet.length(), &Silent).unwrap()
     }
 
@@ -225,7 +224,12 @@ mod tests {
         let quarter = sheet(80, 40, |x, y| (x + 2 * y) % 4 == 0);
         let lights = [Light::Point([0.2, 0.1, 1.0]), Light::Far([-1.0, 0.5, 1.0])];
         let picture = |sheet: &Sheet| {
-            let print = Source::Print { sheet, space: &space, stacks: &rows, area: Area::whole(sheet) };
+            let print = Source::Print {
+                dots: sheet.dots(),
+                space: &space,
+                stacks: &rows,
+                area: Area::whole(sheet.dots()),
+            };
             flat(&print, &lights, 20, 10, &Silent).unwrap()
         };
         let (mixed, none, all) =
@@ -255,11 +259,21 @@ mod tests {
         let space = Space::half_angle(2);
         let rows = rows(&space, [&|_| 1.0, &|_| 1.0]);
         let sheet = sheet(2, 2, |_, _| false);
-        let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area: Area::whole(&sheet) };
+        let print = Source::Print {
+            dots: sheet.dots(),
+            space: &space,
+            stacks: &rows,
+            area: Area::whole(sheet.dots()),
+        };
         let lights = [Light::Far([0.0, 0.0, 1.0]), Light::Point([0.0, 0.0, -1.0])];
         assert!(matches!(flat(&print, &lights, 2, 2, &Silent), Err(PreviewError::Light { light: 1, .. })));
         let bare = Space::tabulated(&[1.0, 1.0], &[1.0, 1.0]).unwrap();
-        let print = Source::Print { sheet: &sheet, space: &bare, stacks: &rows, area: Area::whole(&sheet) };
+        let print = Source::Print {
+            dots: sheet.dots(),
+            space: &bare,
+            stacks: &rows,
+            area: Area::whole(sheet.dots()),
+        };
         assert!(matches!(flat(&print, &[], 2, 2, &Silent), Err(PreviewError::NoAngles { columns: 6 })));
     }
 }

@@ -10,11 +10,11 @@ use std::str::FromStr;
 
 use image::RgbImage;
 
-use super::Area;
+use crate::files::FileError;
 use crate::separate::Pass;
 use crate::sheet::colours::{label, upon};
-use crate::sheet::picture::{FileError, Kind, write_png};
-use crate::sheet::{Sheet, picture};
+use crate::sheet::picture::{Kind, write_png};
+use crate::sheet::{Area, Sheet};
 
 /// A ground to print on, sRGB.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -74,7 +74,7 @@ pub fn save_pass(pass: &Pass, area: Area, ground: Ground, path: &Path) -> Result
     let dots: Vec<u8> = rows
         .flat_map(|row| (area.left..area.left + area.width).map(|x| row[x / 8] >> (7 - x % 8) & 1))
         .collect();
-    write_png(path, (area.width, area.length), picture::Kind::Indexed(&palette), &dots)
+    write_png(path, (area.width, area.length), Kind::Indexed(&palette), &dots)
 }
 
 /// The whole sheet small, `longest` pixels on its longer side at most: each pixel is the mean of its dots on the ground.

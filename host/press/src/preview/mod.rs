@@ -26,9 +26,11 @@ pub use flat::{Light, flat};
 pub use materials_picture::{Swatch, materials_picture, mix_in_words};
 pub use probe::Probe;
 pub use sheet_picture::{STANDARD_LIGHTS, sheet_picture};
-pub use source::{Area, Source};
+pub use source::{Source, stack_table};
 
 use std::path::PathBuf;
+
+use crate::sheet::Area;
 
 /// The longest side of any picture made here, in pixels: larger than every sheet in dots.
 pub const LONGEST_SIDE: usize = 8192;

@@ -6,12 +6,12 @@
 
 use image::RgbImage;
 
-use crate::sheet::Sheet;
+use crate::sheet::{Area, DotMap};
 use observe::Observer;
 
 use super::canvas::{Canvas, FAINT, INK, Letters};
 use super::tone::Exposure;
-use super::{Area, Light, PreviewError, Radiance, Source, check_size, flat};
+use super::{Light, PreviewError, Radiance, Source, check_size, flat};
 
 /// The lights of the usual picture: over the middle, beside it, and low enough to show the body colour alone.
 pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
@@ -87,19 +87,19 @@ fn close_up(
     height: usize,
     observer: &dyn Observer,
 ) -> Result<Option<Vec<Radiance>>, PreviewError> {
-    let &Source::Print { sheet, space, stacks, area } = print else { return Ok(None) };
+    let &Source::Print { dots, space, stacks, area } = print else { return Ok(None) };
     let (across, down) = (width / MAGNIFIED, height / MAGNIFIED);
     if across == 0 || down == 0 || area.width < 2 * across || area.length < 2 * down {
         return Ok(None);
     }
-    let part = most_varied(sheet, area, across, down);
+    let part = most_varied(dots, area, across, down);
     let longest = area.width.max(area.length) as f64;
     let x = ((part.left - area.left) as f64 + 0.5 * (across as f64 - area.width as f64)) / longest;
     let y = (0.5 * (area.length as f64 - down as f64) - (part.top - area.top) as f64) / longest;
     // So small a part sees every light in one direction, as bright as there.
     let near: Vec<Light> = lights.iter().map(|light| Light::Far(light.direction(x, y))).collect();
     let mut panels =
-        flat(&Source::Print { sheet, space, stacks, area: part }, &near, width, height, observer)?;
+        flat(&Source::Print { dots, space, stacks, area: part }, &near, width, height, observer)?;
     for ((panel, light), near) in panels.iter_mut().zip(lights).zip(&near) {
         let gain = (light.at(x, y).1 / near.at(0.0, 0.0).1) as f32;
         panel.pixels.iter_mut().for_each(|p| (0..3).for_each(|c| p[c] *= gain));
@@ -108,15 +108,15 @@ fn close_up(
 }
 
 /// The part of `width` x `length` dots whose stacks have the greatest entropy among evenly spread places.
-fn most_varied(sheet: &Sheet, area: Area, width: usize, length: usize) -> Area {
+fn most_varied(dots: &DotMap, area: Area, width: usize, length: usize) -> Area {
     let mut best = (f64::NEG_INFINITY, area);
-    let mut counts = vec![0u32; sheet.stacks().len()];
+    let mut counts = vec![0u32; dots.stacks().len()];
     for place in 0..PLACES * PLACES {
         let left = area.left + (area.width - width) * (place % PLACES) / (PLACES - 1);
         let top = area.top + (area.length - length) * (place / PLACES) / (PLACES - 1);
         counts.fill(0);
         for row in top..top + length {
-            for &dot in &sheet.index()[row * sheet.width() + left..][..width] {
+            for &dot in &dots.index()[row * dots.width() + left..][..width] {
                 counts[usize::from(dot)] += 1;
             }
         }
@@ -140,7 +140,6 @@ pub(super) fn shortened(text: &str, room: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preview::Area;
     use crate::sheet::Sheet;
     use appearance::brdf::{Space, Table};
     use inks::Stack;
@@ -156,7 +155,12 @@ mod tests {
         let mut rows = Table::new(space.columns());
         rows.push(&vec![0.27; space.columns()]);
         rows.push(&vec![0.05; space.columns()]);
-        let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area: Area::whole(&sheet) };
+        let print = Source::Print {
+            dots: sheet.dots(),
+            space: &space,
+            stacks: &rows,
+            area: Area::whole(sheet.dots()),
+        };
         let notes = ["a note".to_string()];
         let picture =
             sheet_picture(&print, &print, &STANDARD_LIGHTS, 60, "a sheet", &notes, &Silent).unwrap();
@@ -183,7 +187,7 @@ mod tests {
         let paper = Paper::Custom { width: 200, length: 100 };
         let sheet = Sheet::new(paper, stacks, index.collect()).unwrap();
         let area = Area { left: 10, top: 10, width: 180, length: 80 };
-        let part = most_varied(&sheet, area, 20, 16);
+        let part = most_varied(sheet.dots(), area, 20, 16);
         assert!(part.left.abs_diff(60) < 8 && part.top.abs_diff(42) < 8, "{part:?}");
         assert_eq!((part.width, part.length), (20, 16));
     }
@@ -196,7 +200,12 @@ mod tests {
         let sheet = Sheet::new(paper, vec![Stack::SUBSTRATE], vec![0; 300 * 200]).unwrap();
         let mut rows = Table::new(space.columns());
         rows.push(&space.row(&inks::Curve::sampled(space.angles(), |t| [0.2 + inks::ggx::lobe(t, 0.3); 3])));
-        let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area: Area::whole(&sheet) };
+        let print = Source::Print {
+            dots: sheet.dots(),
+            space: &space,
+            stacks: &rows,
+            area: Area::whole(sheet.dots()),
+        };
         let lights = STANDARD_LIGHTS.map(|l| l.1);
         let (width, height) = (150, 100);
         let panels = close_up(&print, &lights, width, height, &Silent).unwrap().unwrap();

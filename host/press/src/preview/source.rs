@@ -8,41 +8,14 @@
 //! Cost: one increment a dot, then one multiply-add for each column and stack present in the pixel.
 //! Limits: averaging is linear in reflectance, as section 4.2 of the 2009 paper assumes of halftones.
 
-use crate::halftone::Placement;
-use crate::sheet::Sheet;
+use crate::sheet::{Area, DotMap};
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::factor::Factored;
 use appearance::weights::ONE;
+use inks::{Library, Stack};
 
 use super::{PreviewError, check_size};
-
-/// A rectangle of a sheet, in dots.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Area {
-    /// First column.
-    pub left: usize,
-    /// First row.
-    pub top: usize,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub length: usize,
-}
-
-impl Area {
-    /// The area a document was placed on.
-    pub fn of(placement: &Placement) -> Area {
-        let [left, top, width, length] =
-            [placement.x, placement.y, placement.width, placement.height].map(usize::from);
-        Area { left, top, width, length }
-    }
-
-    /// All of a sheet.
-    pub fn whole(sheet: &Sheet) -> Area {
-        Area { left: 0, top: 0, width: sheet.width(), length: sheet.length() }
-    }
-}
 
 /// Something a flat picture can be made of.
 #[derive(Clone, Copy)]
@@ -51,15 +24,15 @@ pub enum Source<'a> {
     Document(&'a dyn Materials),
     /// The target, factored.
     Factored(&'a Factored),
-    /// An area of a printed sheet.
+    /// An area of printed dots.
     Print {
-        /// The sheet.
-        sheet: &'a Sheet,
+        /// The dots.
+        dots: &'a DotMap,
         /// The tabulation of `stacks`.
         space: &'a Space,
-        /// The reflectance (1/sr) of the sheet's stacks: one row for each of [`Sheet::stacks`], in their order.
+        /// The reflectance (1/sr) of the dots' stacks: one row for each of [`DotMap::stacks`], in their order.
         stacks: &'a Table,
-        /// The part of the sheet to show.
+        /// The part of the dots to show.
         area: Area,
     },
 }
@@ -113,15 +86,12 @@ impl<'a> Source<'a> {
                 same("bases of the factored document", factored.maps.channels(), factored.bases.len())?;
                 Some(&factored.bases)
             }
-            Source::Print { sheet, stacks, area, .. } => {
-                let fits = |start: usize, size: usize, all: usize| {
-                    size > 0 && start.checked_add(size).is_some_and(|end| end <= all)
-                };
-                let (width, length) = (sheet.width(), sheet.length());
-                if !(fits(area.left, area.width, width) && fits(area.top, area.length, length)) {
+            Source::Print { dots, stacks, area, .. } => {
+                let (width, length) = (dots.width(), dots.length());
+                if !area.fits(width, length) {
                     return Err(PreviewError::Area { area: *area, width, length });
                 }
-                same("rows of the stacks' reflectance", sheet.stacks().len(), stacks.len())?;
+                same("rows of the stacks' reflectance", dots.stacks().len(), stacks.len())?;
                 Some(*stacks)
             }
         };
@@ -131,6 +101,21 @@ impl<'a> Source<'a> {
         let rows = table.map_or_else(Vec::new, |t| t.rows().flatten().map(|&v| v as f32).collect());
         Ok(Lines { source: *self, width, height, samples: samples.max(1), columns, rows })
     }
+}
+
+/// What the stacks of a dot map reflect (1/sr), one row a stack, as the library has it.
+///
+/// A stack the library does not know shows as its longest part from the top that it does know: the uppermost
+/// layers decide most of what is seen.
+pub fn stack_table(dots: &DotMap, library: &Library, space: &Space) -> Table {
+    let mut table = Table::new(space.columns());
+    for stack in dots.stacks() {
+        let layers = stack.layers();
+        let known = (0..=layers.len()).find_map(|below| library.entry(&Stack::new(&layers[below..])));
+        let row = known.map(|entry| space.row(&entry.curve_at(space.angles())));
+        table.push(&row.unwrap_or_else(|| vec![0.0; space.columns()]));
+    }
+    table
 }
 
 fn same(what: &'static str, expected: usize, found: usize) -> Result<(), PreviewError> {
@@ -199,17 +184,17 @@ impl Lines<'_> {
                     self.mix(scratch.sums.iter().map(|&s| s as f32 * scale), out);
                 }
             }
-            Source::Print { sheet, area, .. } => {
-                let stacks = sheet.stacks().len();
+            Source::Print { dots, area, .. } => {
+                let stacks = dots.stacks().len();
                 scratch.counts.clear();
                 scratch.counts.resize(self.width * stacks, 0);
                 let (y0, y1) = span(y, self.height, area.length);
                 for row in y0..y1 {
-                    let start = (area.top + row) * sheet.width() + area.left;
-                    let dots = &sheet.index()[start..start + area.width];
+                    let start = (area.top + row) * dots.width() + area.left;
+                    let line = &dots.index()[start..start + area.width];
                     for (x, counts) in scratch.counts.chunks_exact_mut(stacks).enumerate() {
                         let (x0, x1) = span(x, self.width, area.width);
-                        for &dot in &dots[x0..x1] {
+                        for &dot in &line[x0..x1] {
                             counts[usize::from(dot)] += 1;
                         }
                     }
@@ -260,8 +245,8 @@ impl Lines<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sheet::Sheet;
     use appearance::weights::{WeightMaps, quantise};
-    use inks::Stack;
     use proptest::prelude::*;
     use protocol::paper::Paper;
 
@@ -291,7 +276,7 @@ mod tests {
             let paper = Paper::Custom { width: 12, length: 9 };
             let sheet = Sheet::new(paper, stacks, dots.clone()).unwrap();
             let area = Area { left: 2, top: 1, width: 9, length: 7 };
-            let print = Source::Print { sheet: &sheet, space: &space, stacks: &rows, area };
+            let print = Source::Print { dots: sheet.dots(), space: &space, stacks: &rows, area };
             let lines = print.lines(width, height, 1).unwrap();
             let mut out = vec![0.0; width * 6];
             let mut scratch = Scratch::default();
@@ -368,16 +353,16 @@ mod tests {
             Sheet::new(Paper::Custom { width: 4, length: 4 }, vec![Stack::SUBSTRATE], vec![0; 16]).unwrap();
         let mut one = Table::new(6);
         one.push(&[0.1; 6]);
-        let print = |stacks, area| Source::Print { sheet: &sheet, space: &space, stacks, area };
+        let print = |stacks, area| Source::Print { dots: sheet.dots(), space: &space, stacks, area };
         let outside = Area { left: 2, top: 0, width: 3, length: 4 };
         let error = print(&one, outside).lines(4, 4, 1).err().unwrap().to_string();
         assert!(error.contains("(2, 0)") && error.contains("4 x 4"), "{error}");
         let none = Table::new(6);
-        let error = print(&none, Area::whole(&sheet)).lines(4, 4, 1).err().unwrap().to_string();
+        let error = print(&none, Area::whole(sheet.dots())).lines(4, 4, 1).err().unwrap().to_string();
         assert!(error.contains("expected 1, found 0"), "{error}");
         let narrow = Table::new(3);
-        assert!(print(&narrow, Area::whole(&sheet)).lines(4, 4, 1).is_err());
-        let error = print(&one, Area::whole(&sheet)).lines(0, 1 << 20, 1).err().unwrap().to_string();
+        assert!(print(&narrow, Area::whole(sheet.dots())).lines(4, 4, 1).is_err());
+        let error = print(&one, Area::whole(sheet.dots())).lines(0, 1 << 20, 1).err().unwrap().to_string();
         assert!(error.contains("0 x 1048576"), "{error}");
     }
 }

@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{MOST_PASSES, Pass, Plane, Separation};
+use crate::files::{FileError, read_toml, write_toml};
 use crate::sheet::files::{PaperText, check_format};
-use crate::sheet::picture::{FileError, Kind, read_png, read_toml, write_png, write_toml};
+use crate::sheet::picture::{Kind, read_png, write_png};
 
 /// The text beside the pictures.
-pub const TEXT: &str = "passes.toml";
+pub(super) const TEXT: &str = "passes.toml";
 
 /// Number of the format, raised when old files can no longer be read.
 const FORMAT: u32 = 1;

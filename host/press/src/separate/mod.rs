@@ -1,86 +1,28 @@
-//! A sheet as the fewest ordered one-bit passes, and what the printer thinks of them.
+//! A sheet as the fewest ordered one-bit passes, and what the rules say of them.
 //!
 //! Problem: a stack is several layers, a pass is one ink over the whole page, and a page should take few passes.
-//! Method: the shortest list of inks in which every stack in use finds its layers in order (`order`), one plane for
-//! each (`pack`), the rules on stacks and pages as checks ([`rules`]). Overlap is wanted: a dot is in as many passes as
+//! Method: the shortest list of inks in which every stack in use finds its layers in order (`sheet::order`), one plane
+//! for each (`pack`), the rules on stacks and pages as checks (`rules`). Overlap is wanted: a dot is in as many passes as
 //! its stack has layers. [`compose`] is the way back.
-//! Cost: one pass over the dots for all planes. Limits: [`MOST_PASSES`] passes, [`MOST_LAYERS`] layers.
+//! Cost: one pass over the dots for all planes. Limits: `MOST_PASSES` passes, `MOST_LAYERS` layers.
 
 pub mod files;
-mod order;
 pub(crate) mod pack;
-pub mod rules;
+mod passes;
+mod rules;
 
 use std::collections::HashMap;
 
-use inks::{Rule, Stack};
+use inks::{Rule, Severity, Stack};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 
-use crate::sheet::{Sheet, SheetError};
+use crate::sheet::{Sheet, SheetError, order};
 use observe::Observer;
 
-pub use inks::{Certainty, Severity};
-pub use order::place as customary;
+pub use passes::{MOST_CARTRIDGES, Pass, Plan, Plane, Planned};
+pub(crate) use passes::{MOST_LAYERS, MOST_PASSES};
 pub use rules::Check;
-
-/// Cartridges the machine holds.
-pub const MOST_CARTRIDGES: usize = 7;
-
-/// Most passes over one sheet. The longest job known on hardware had 7.
-pub const MOST_PASSES: usize = 16;
-
-/// Most layers in a stack.
-pub const MOST_LAYERS: usize = 16;
-
-/// One bit for each dot of the printable area, 8 dots to a byte, most significant bit left, 1 = ink.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Plane {
-    /// Dots across.
-    pub width: usize,
-    /// Rows.
-    pub length: usize,
-    /// Bytes a row, `width / 8` rounded up; the spare bits at the right are 0.
-    pub stride: usize,
-    /// The rows from the top.
-    pub bits: Vec<u8>,
-}
-
-impl Plane {
-    /// How many dots have ink.
-    pub fn dots(&self) -> u64 {
-        self.bits.iter().map(|byte| u64::from(byte.count_ones())).sum()
-    }
-}
-
-/// One pass of the carriage over the whole page with one ink.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pass {
-    /// The ink.
-    pub ink: Ink,
-    /// Where it goes.
-    pub plane: Plane,
-}
-
-/// One pass in the plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Planned {
-    /// The ink.
-    pub ink: Ink,
-    /// Dots with ink.
-    pub dots: u64,
-}
-
-/// What is printed in which order, and what must be in the machine.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Plan {
-    /// The passes, first printed (lowest) first.
-    pub passes: Vec<Planned>,
-    /// The cartridges, in the order of their first use.
-    pub cartridges: Vec<Ink>,
-    /// Whether it is certain that fewer passes cannot do.
-    pub fewest: bool,
-}
 
 /// A sheet ready for the printer's language.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,13 +40,13 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// Takes back what the checks say of stacks without a dot on the pieces: marks are cut off. What must not be printed
+    /// Takes back what the checks say of stacks without a dot on the copies: marks are cut off. What must not be printed
     /// stays so wherever it is.
-    pub fn spare_marks(&mut self, on_pieces: impl Fn(&Stack) -> bool) {
+    pub(crate) fn spare_marks(&mut self, on_copies: impl Fn(&Stack) -> bool) {
         self.checks.retain_mut(|check| {
             let all = check.stacks.len();
             if check.severity != Severity::Error {
-                check.stacks.retain(&on_pieces);
+                check.stacks.retain(&on_copies);
             }
             all == 0 || !check.stacks.is_empty()
         });
@@ -155,7 +97,7 @@ pub enum SeparateError {
         length: usize,
     },
     /// The inks on a dot are none of the stacks.
-    #[error("the passes put `{stack}` on dot ({x}, {y}), which is none of the sheet's {stacks} stacks")]
+    #[error("the passes put `{stack}` on dot ({x}, {y}); none of the sheet's {stacks} stacks is like that")]
     Unknown {
         /// Column.
         x: usize,
@@ -175,24 +117,20 @@ fn names(inks: &[Ink]) -> String {
     inks.iter().map(|ink| ink.name()).collect::<Vec<_>>().join(", ")
 }
 
-/// The passes that lay down all of these stacks, lowest first: what [`separate`] does when all are in use.
-pub fn passes_of(stacks: &[Stack]) -> Vec<Ink> {
-    order::order(&stacks.iter().map(Stack::layers).collect::<Vec<_>>()).inks
-}
-
 /// What the rules on stacks and pages say of a sheet that is printed in these passes, most severe first.
-pub fn check(sheet: &Sheet, passes: &[Planned], order: &[Rule]) -> Vec<Check> {
+pub fn check(sheet: &Sheet, passes: &[Planned], rules: &[Rule]) -> Vec<Check> {
     let plan = Plan { passes: passes.to_vec(), cartridges: Vec::new(), fewest: false };
-    rules::check(sheet, &sheet.census(), &plan, order)
+    rules::check(sheet, &sheet.census(), &plan, rules)
 }
 
-/// Separates a sheet into passes. Only stacks that occur on a dot count. `order` are the ink library's rules on the
+/// Separates a sheet into passes. Only stacks that occur on a dot count. `rules` are the ink library's rules on the
 /// order of layers ([`inks::Library::rules`]).
 ///
 /// More than [`MOST_CARTRIDGES`] inks are planned, with a check that forbids to send them.
 ///
-/// Errors: more than [`MOST_PASSES`] passes or [`MOST_LAYERS`] layers.
-pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
+/// # Errors
+/// More than `MOST_PASSES` passes or `MOST_LAYERS` layers.
+pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Result<Separation, SeparateError> {
     observer.begin("separate", 2);
     let census = sheet.census();
     let used: Vec<(usize, &Stack)> =
@@ -225,7 +163,7 @@ pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Resul
     let plan = Plan { passes: planned, cartridges, fewest: shortest };
     let (planes, checks) = rayon::join(
         || pack::pack(sheet.width(), sheet.index(), &passes_of, inks.len()),
-        || rules::check(sheet, &census, &plan, order),
+        || rules::check(sheet, &census, &plan, rules),
     );
     observer.advance(1);
     observer.end();
@@ -241,7 +179,8 @@ pub fn separate(sheet: &Sheet, order: &[Rule], observer: &dyn Observer) -> Resul
 /// The sheet that passes print: each dot has the inks of the passes that have it, lowest first. `stacks` are the
 /// stacks to expect, numbered as the sheet will number them.
 ///
-/// Errors: planes of another size than the paper, more than [`MOST_PASSES`], a dot with inks that are no stack.
+/// # Errors
+/// Planes of another size than the paper, more than `MOST_PASSES`, a dot with inks that are no stack.
 pub fn compose(paper: Paper, passes: &[Pass], stacks: &[Stack]) -> Result<Sheet, SeparateError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     if passes.len() > MOST_PASSES {

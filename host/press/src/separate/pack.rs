@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::Plane;
+use super::passes::Plane;
 
 /// Rows handed out together.
 const ROWS: usize = 64;

@@ -1,6 +1,6 @@
 //! What is known about pages that hold, show and do not jam the ribbon, as data.
 //!
-//! Problem: the machine prints anything; some pages disappoint. Knowledge is uneven, so each rule says how it is
+//! Problem: the printer prints anything; some pages disappoint. Knowledge is uneven, so each rule says how it is
 //! known, and how much it matters.
 //! Method: the rules on the order of layers in a stack are the ink library's ([`inks::Rule`]); `PAGE_RULES` is a
 //! table of conditions on what only the page knows: how small the dots are, how much an ink covers, what is used.
@@ -16,9 +16,9 @@ use inks::{Certainty, Rule, Severity, Stack};
 use protocol::ink::Kind;
 use serde::Serialize;
 
-use super::{MOST_CARTRIDGES, Plan};
-use crate::halftone::metrics::smallest_clusters;
+use super::passes::{MOST_CARTRIDGES, Plan};
 use crate::sheet::Sheet;
+use crate::sheet::clusters::smallest_clusters;
 
 /// A rule that a sheet touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -51,7 +51,7 @@ impl Check {
         }
         match names.as_slice() {
             [] => self.text.clone(),
-            names => format!("{}; it is about {}", self.text, names.join(", ")),
+            names => format!("{} (stacks: {})", self.text, names.join(", ")),
         }
     }
 }
@@ -102,21 +102,21 @@ const PAGE_RULES: [PageRule; 9] = [
         Severity::Warning,
         Certainty::Vendor,
         When::Finer(Kind::Foil, 16),
-        "foil does not take fine dots: clusters under 4 x 4 dots are uncertain; raise the minimum cluster of foil",
+        "foil in clusters of fewer than 4 x 4 dots may not stick; raise the minimum cluster of foil",
     ),
     rule(
         "foil-code",
         Severity::Warning,
         Certainty::Inferred,
         When::Uses(Kind::Foil),
-        "the ink codes of the foils are inferred, no captured stream confirms them; try a small patch first",
+        "the ink codes of the foils are inferred and no captured stream confirms them; print a small patch first",
     ),
     rule(
         "primer-ribbon",
         Severity::Note,
         Certainty::Reported,
         When::Uses(Kind::Primer),
-        "primer can tear its ribbon on plain paper settings; the cardboard setting cured it",
+        "primer can tear its ribbon with the media setting for plain paper; with the setting for cardboard it did not",
     ),
     rule(
         "white-thin",
@@ -130,117 +130,148 @@ const PAGE_RULES: [PageRule; 9] = [
         Severity::Warning,
         Certainty::Published,
         When::Finer(Kind::Metallic, 8),
-        "metallic flakes need clusters of 8 to 16 dots; raise their minimum cluster",
+        "metallic inks need clusters of 8 to 16 dots; raise their minimum cluster",
     ),
     rule(
         "finish-partial",
         Severity::Note,
         Certainty::Driver,
         When::Partial(Kind::Finish),
-        "the driver prints finish solid or not at all; here it covers a part of the page, dot by dot",
+        "the vendor's driver prints finish over the whole page or not at all; here it covers some dots only",
     ),
     rule(
         "primer-partial",
         Severity::Note,
         Certainty::Driver,
         When::Partial(Kind::Primer),
-        "the driver prints primer solid or not at all; here it covers a part of the page, dot by dot",
+        "the vendor's driver prints primer over the whole page or not at all; here it covers some dots only",
     ),
     rule(
         "finish-pass-last",
         Severity::Note,
         Certainty::Driver,
         When::NotLast(Kind::Finish),
-        "other inks are printed after finish; harmless on dots that do not share it",
+        "other inks are printed after finish; this is harmless where they share no dot with it",
     ),
 ];
 
+/// What the conditions are tried on.
+struct Page<'a> {
+    plan: &'a Plan,
+    /// The stacks on a dot, and how many dots each has.
+    used: Vec<(&'a Stack, u64)>,
+    /// Dots of the whole page.
+    dots: u64,
+    /// Dots of the smallest cluster of each kind of ink that is used and has a rule on it.
+    finest: Vec<(Kind, u32)>,
+}
+
+fn layers(stack: &Stack, kind: Kind) -> usize {
+    stack.layers().iter().filter(|ink| ink.kind() == kind).count()
+}
+
+impl<'a> Page<'a> {
+    fn new(sheet: &'a Sheet, census: &[u64], plan: &'a Plan) -> Page<'a> {
+        let finest = [Kind::Foil, Kind::Metallic].into_iter().filter_map(|kind| {
+            let mut label = [0; 256];
+            for (q, stack) in sheet.stacks().iter().enumerate() {
+                label[q] = u8::from(census[q] > 0 && layers(stack, kind) > 0);
+            }
+            let any = label.contains(&1);
+            any.then(|| (kind, smallest_clusters(sheet.width(), sheet.index(), &label)[1]))
+        });
+        Page {
+            plan,
+            used: sheet.stacks().iter().zip(census.iter().copied()).filter(|(_, dots)| *dots > 0).collect(),
+            dots: sheet.index().len() as u64,
+            finest: finest.collect(),
+        }
+    }
+
+    /// The stacks on a dot for which this holds.
+    fn stacks(&self, holds: impl Fn(&Stack) -> bool) -> Vec<Stack> {
+        self.used.iter().filter(|(stack, _)| holds(stack)).map(|(stack, _)| (*stack).clone()).collect()
+    }
+
+    fn least(&self, kind: Kind) -> Option<u32> {
+        self.finest.iter().find(|(of, _)| *of == kind).map(|(_, least)| *least)
+    }
+
+    /// The stacks a condition is about, none for the page as a whole; `None` if it does not hold.
+    fn touched(&self, when: &When) -> Option<Vec<Stack>> {
+        let having = |kind: Kind| self.stacks(|stack| layers(stack, kind) > 0);
+        match *when {
+            When::Single(kind) => {
+                Some(self.stacks(|stack| layers(stack, kind) == 1)).filter(|s| !s.is_empty())
+            }
+            When::Uses(kind) => Some(having(kind)).filter(|stacks| !stacks.is_empty()),
+            When::Finer(kind, dots) => self.least(kind).filter(|&least| least < dots).map(|_| having(kind)),
+            When::Partial(kind) => {
+                let covered: u64 =
+                    self.used.iter().filter(|(stack, _)| layers(stack, kind) > 0).map(|(_, dots)| dots).sum();
+                (covered > 0 && covered < self.dots).then(|| having(kind))
+            }
+            When::NotLast(kind) => {
+                let mut kinds =
+                    self.plan.passes.iter().map(|pass| pass.ink.kind()).skip_while(|&other| other != kind);
+                kinds.any(|other| other != kind).then(Vec::new)
+            }
+        }
+    }
+}
+
 /// The rules a sheet touches, most severe first, those on layers before those on the page. `census` counts the dots
 /// of each stack.
-pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, order: &[Rule]) -> Vec<Check> {
-    let used: Vec<(usize, &Stack)> =
-        sheet.stacks().iter().enumerate().filter(|(q, _)| census[*q] > 0).collect();
-    let layers = |stack: &Stack, kind: Kind| stack.layers().iter().filter(|ink| ink.kind() == kind).count();
-    let concerned = |touches: &dyn Fn(&Stack) -> bool| -> Vec<Stack> {
-        used.iter().filter(|(_, stack)| touches(stack)).map(|(_, stack)| (*stack).clone()).collect()
-    };
+pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, rules: &[Rule]) -> Vec<Check> {
+    let page = Page::new(sheet, census, plan);
     let mut checks = Vec::new();
-    for rule in order {
-        let stacks = concerned(&|stack| rule.broken_by(stack));
+    for rule in rules {
+        let stacks = page.stacks(|stack| rule.broken_by(stack));
         if !stacks.is_empty() {
             let Rule { name, says, severity, certainty, .. } = rule.clone();
             checks.push(Check { rule: name, severity, certainty, text: says, stacks });
         }
     }
-    let finest: Vec<(Kind, u32)> = [Kind::Foil, Kind::Metallic]
-        .into_iter()
-        .filter(|&kind| used.iter().any(|(_, stack)| layers(stack, kind) > 0))
-        .map(|kind| {
-            let mut label = [0; 256];
-            for (q, _) in used.iter().filter(|(_, stack)| layers(stack, kind) > 0) {
-                label[*q] = 1;
-            }
-            (kind, smallest_clusters(sheet.width(), sheet.index(), &label)[1])
-        })
-        .collect();
     for rule in &PAGE_RULES {
-        let having = |kind: Kind| concerned(&|stack| layers(stack, kind) > 0);
-        let mut text = rule.text.to_string();
-        let (touched, stacks) = match rule.when {
-            When::Single(kind) => {
-                let stacks = concerned(&|stack| layers(stack, kind) == 1);
-                (!stacks.is_empty(), stacks)
-            }
-            When::Uses(kind) => {
-                let stacks = having(kind);
-                (!stacks.is_empty(), stacks)
-            }
-            When::Finer(kind, dots) => {
-                let least = finest.iter().find(|(of, _)| *of == kind).map_or(u32::MAX, |(_, least)| *least);
-                text = format!("{text} (smallest cluster: {least} dots)");
-                (least < dots, having(kind))
-            }
-            When::Partial(kind) => {
-                let with_kind = used.iter().filter(|(_, stack)| layers(stack, kind) > 0);
-                let covered: u64 = with_kind.map(|(q, _)| census[*q]).sum();
-                (covered > 0 && covered < sheet.index().len() as u64, having(kind))
-            }
-            When::NotLast(kind) => {
-                let kinds: Vec<Kind> = plan.passes.iter().map(|pass| pass.ink.kind()).collect();
-                let first = kinds.iter().position(|&k| k == kind);
-                (first.is_some_and(|first| kinds[first..].iter().any(|&k| k != kind)), Vec::new())
-            }
-        };
         // The sharper of two rules on the same size is enough.
-        let said =
+        let told =
             rule.name == "foil-fine" && checks.iter().any(|check: &Check| check.rule == "foil-speckle");
-        if touched && !said {
-            let PageRule { severity, certainty, .. } = *rule;
-            checks.push(Check { rule: rule.name.into(), severity, certainty, text, stacks });
-        }
+        let Some(stacks) = page.touched(&rule.when).filter(|_| !told) else { continue };
+        let text = match rule.when {
+            When::Finer(kind, _) => {
+                format!("{} (smallest cluster: {} dots)", rule.text, page.least(kind).unwrap_or_default())
+            }
+            _ => rule.text.to_string(),
+        };
+        let PageRule { severity, certainty, .. } = *rule;
+        checks.push(Check { rule: rule.name.into(), severity, certainty, text, stacks });
     }
-    if plan.cartridges.len() > MOST_CARTRIDGES {
-        let dots = |ink| plan.passes.iter().filter(|pass| pass.ink == ink).map(|pass| pass.dots).sum::<u64>();
-        let least = plan.cartridges.iter().copied().min_by_key(|&ink| dots(ink));
-        checks.push(Check {
-            rule: "cartridges".into(),
-            severity: Severity::Error,
-            certainty: Certainty::Vendor,
-            text: format!(
-                "{} cartridges, and the machine holds {MOST_CARTRIDGES}: one would have to be changed in the middle of the \
-                 sheet, and how long the machine holds it then is not known, so no such job is sent; leave out an ink{}",
-                plan.cartridges.len(),
-                least.map_or_else(String::new, |ink| format!(
-                    ", {} has the fewest dots ({})",
-                    ink.name(),
-                    dots(ink)
-                ))
-            ),
-            stacks: Vec::new(),
-        });
-    }
+    checks.extend(too_many_cartridges(plan));
     checks.sort_by_key(|check| Reverse(check.severity));
     checks
+}
+
+/// More cartridges than the printer holds are an error.
+fn too_many_cartridges(plan: &Plan) -> Option<Check> {
+    if plan.cartridges.len() <= MOST_CARTRIDGES {
+        return None;
+    }
+    let dots = |ink| plan.passes.iter().filter(|pass| pass.ink == ink).map(|pass| pass.dots).sum::<u64>();
+    let least = plan.cartridges.iter().copied().min_by_key(|&ink| dots(ink));
+    let rare = least.map_or_else(String::new, |ink| {
+        format!(", for example {}, which has the fewest dots ({})", ink.name(), dots(ink))
+    });
+    Some(Check {
+        rule: "cartridges".into(),
+        severity: Severity::Error,
+        certainty: Certainty::Vendor,
+        text: format!(
+            "the job needs {} cartridges and the printer holds {MOST_CARTRIDGES}; it would have to stop in the middle of \
+             the sheet for a change, and how long it waits is not known; leave out an ink{rare}",
+            plan.cartridges.len()
+        ),
+        stacks: Vec::new(),
+    })
 }
 
 #[cfg(test)]
@@ -339,7 +370,7 @@ mod tests {
         assert_eq!(mine.text, "finish should not lie over black");
         assert!(said("apart").is_empty(), "no dot has it");
         assert_eq!(checks[0].rule, "never");
-        assert_eq!(checks[0].with_stacks(), "all should not lie over magenta; it is about M+F");
+        assert_eq!(checks[0].with_stacks(), "all should not lie over magenta (stacks: M+F)");
         assert!(said("finish-partial").len() == 1 && checks.len() == 3, "{checks:?}");
     }
 

@@ -46,12 +46,12 @@ const PAPER: [f64; 3] = [0.99, 0.99, 0.98];
 
 /// How a stack looks on a screen upon a ground of this colour, both sRGB. Transparent inks tint what is below them, the
 /// others hide it. Stacks that look alike have the same colour.
-pub fn upon(stack: &Stack, ground: [u8; 3]) -> [u8; 3] {
+pub(crate) fn upon(stack: &Stack, ground: [u8; 3]) -> [u8; 3] {
     bytes(look(stack, fractions(ground), seen))
 }
 
 /// The same for one ink to be seen by itself: clear ones are labelled with a colour that they do not have.
-pub fn label(ink: Ink, ground: [u8; 3]) -> [u8; 3] {
+pub(crate) fn label(ink: Ink, ground: [u8; 3]) -> [u8; 3] {
     bytes(look(&Stack::new([ink]), fractions(ground), tint))
 }
 
@@ -84,7 +84,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// One colour for each stack, all different, sRGB.
-pub fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
+pub(crate) fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
     let grid: Vec<[f64; 3]> =
         (0..4096).map(|i| [i / 256, i / 16 % 16, i % 16].map(|v| f64::from(v) * 17.0)).collect();
     // How far each grid colour is from all colours given away.
@@ -127,7 +127,7 @@ mod tests {
             let entry = library.entry(&stack.parse().unwrap()).unwrap();
             entry.curve_at(&[1.2]).rgb()[0]
         };
-        let light = |v: u8| f64::from(appearance::document::picture::decode_srgb(f32::from(v) / 255.0));
+        let light = |v: u8| f64::from(appearance::srgb::decode(f32::from(v) / 255.0));
         for clear in ["F", "P"] {
             let (film, bare) = (beneath(clear), beneath("substrate"));
             let shown = upon(&clear.parse().unwrap(), [255; 3]);

@@ -1,5 +1,5 @@
-//! A sheet on disk: `sheet.toml` (paper and stacks) and `separation.png`, one byte a dot, whose palette shows the
-//! stacks in false colours.
+//! Dot maps and sheets on disk: `dots.toml` (size and stacks) or `sheet.toml` (paper and stacks), and `separation.png`,
+//! one byte a dot, whose palette shows the stacks in false colours.
 
 use std::path::Path;
 
@@ -8,15 +8,18 @@ use protocol::paper::{LARGEST, Paper};
 use serde::{Deserialize, Serialize};
 
 use super::colours::colours;
-use super::picture::{FileError, Kind, read_png, read_toml, write_png, write_toml};
-use super::{Sheet, check_stacks};
-use crate::preview::Area;
+use super::picture::{Kind, read_png, write_png};
+use super::{Area, DotMap, Sheet, check_stacks};
+use crate::files::{FileError, read_toml, write_toml};
 
-/// The text beside the picture.
-pub const TEXT: &str = "sheet.toml";
+/// The text of a sheet.
+const SHEET: &str = "sheet.toml";
 
-/// The picture.
-pub const PICTURE: &str = "separation.png";
+/// The text of a dot map.
+const DOTS: &str = "dots.toml";
+
+/// The picture beside the text.
+const PICTURE: &str = "separation.png";
 
 /// Number of the format, raised when old files can no longer be read.
 const FORMAT: u32 = 1;
@@ -54,10 +57,7 @@ impl PaperText {
             ));
         }
         if *width == 0 || *length == 0 || *width > LARGEST.0 || *length > LARGEST.1 {
-            return Err(format!(
-                "paper: {width} x {length} dots; a side is at least 1, the largest sheet {} x {}",
-                LARGEST.0, LARGEST.1
-            ));
+            return Err(format!("paper: {}", larger_than_paper((*width).into(), (*length).into())));
         }
         Ok(paper)
     }
@@ -65,11 +65,21 @@ impl PaperText {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Text {
+struct SheetText {
     format: u32,
     picture: String,
     stacks: Vec<Stack>,
     paper: PaperText,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DotsText {
+    format: u32,
+    picture: String,
+    stacks: Vec<Stack>,
+    width: u16,
+    length: u16,
 }
 
 /// The problem, if the number of a format is not ours.
@@ -80,22 +90,101 @@ pub(crate) fn check_format(found: u32, ours: u32) -> Result<(), String> {
     Err(format!("format: {found}, but this program reads {ours}; write the file again with this program"))
 }
 
-impl Sheet {
-    /// Writes [`TEXT`] and [`PICTURE`] into a folder that exists, the text last.
-    pub fn save(&self, folder: &Path) -> Result<(), FileError> {
+/// The problem, if numbers and names are not those of a text of ours.
+fn check(format: u32, picture: &str, stacks: &[Stack]) -> Result<(), String> {
+    check_format(format, FORMAT)?;
+    if picture != PICTURE {
+        return Err(format!("picture: `{picture}`, expected `{PICTURE}`"));
+    }
+    check_stacks(stacks).map_err(|error| format!("stacks: {error}"))
+}
+
+impl DotMap {
+    fn save_picture(&self, folder: &Path) -> Result<(), FileError> {
         let colours = colours(self.stacks());
         let size = (self.width(), self.length());
-        write_png(&folder.join(PICTURE), size, Kind::Indexed(&colours), self.index())?;
-        let text = Text {
+        write_png(&folder.join(PICTURE), size, Kind::Indexed(&colours), self.index())
+    }
+
+    fn load_picture(
+        folder: &Path,
+        (width, length): (u16, u16),
+        stacks: Vec<Stack>,
+    ) -> Result<DotMap, FileError> {
+        let picture = folder.join(PICTURE);
+        let (width, length) = (width.into(), length.into());
+        let index = read_png(&picture, (width, length), Kind::Indexed(&colours(&stacks)))?;
+        DotMap::new(width, length, stacks, index)
+            .map_err(|error| FileError::Text { path: picture, problem: error.to_string() })
+    }
+
+    /// Writes `dots.toml` and `separation.png` into a folder that exists, the text last.
+    ///
+    /// # Errors
+    /// A map larger than any sheet of paper, and what the system refuses.
+    pub fn save(&self, folder: &Path) -> Result<(), FileError> {
+        let path = folder.join(DOTS);
+        let side = |dots: usize, most: u16| u16::try_from(dots).ok().filter(|&dots| dots <= most);
+        let (Some(width), Some(length)) = (side(self.width(), LARGEST.0), side(self.length(), LARGEST.1))
+        else {
+            let problem = larger_than_paper(self.width(), self.length());
+            return Err(FileError::Text { path, problem });
+        };
+        self.save_picture(folder)?;
+        let text = DotsText {
+            format: FORMAT,
+            picture: PICTURE.to_string(),
+            stacks: self.stacks().to_vec(),
+            width,
+            length,
+        };
+        write_toml(&path, &text)
+    }
+
+    /// Reads what [`DotMap::save`] wrote. Anything that does not fit is an error with the file and the field.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or are not what was written.
+    pub fn load(folder: &Path) -> Result<DotMap, FileError> {
+        let path = folder.join(DOTS);
+        let text: DotsText = read_toml(&path)?;
+        let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
+        check(text.format, &text.picture, &text.stacks).map_err(wrong)?;
+        let (width, length) = (text.width, text.length);
+        if !(1..=LARGEST.0).contains(&width) || !(1..=LARGEST.1).contains(&length) {
+            return Err(wrong(larger_than_paper(width.into(), length.into())));
+        }
+        DotMap::load_picture(folder, (width, length), text.stacks)
+    }
+}
+
+fn larger_than_paper(width: usize, length: usize) -> String {
+    let (most, longest) = LARGEST;
+    format!(
+        "{width} x {length} dots; a side has at least 1 dot, the largest sheet of paper {most} x {longest}"
+    )
+}
+
+impl Sheet {
+    /// Writes `sheet.toml` and `separation.png` into a folder that exists, the text last.
+    ///
+    /// # Errors
+    /// What the system refuses.
+    pub fn save(&self, folder: &Path) -> Result<(), FileError> {
+        self.dots().save_picture(folder)?;
+        let text = SheetText {
             format: FORMAT,
             picture: PICTURE.to_string(),
             stacks: self.stacks().to_vec(),
             paper: PaperText::new(self.paper()),
         };
-        write_toml(&folder.join(TEXT), &text)
+        write_toml(&folder.join(SHEET), &text)
     }
 
-    /// Writes an area of the sheet in false colours, one for each stack ([`colours()`]), a pixel a dot.
+    /// Writes an area of the sheet in false colours, one for each stack, a pixel a dot.
+    ///
+    /// # Errors
+    /// What the system refuses.
     ///
     /// # Panics
     /// When the area leaves the sheet: a bug of the caller, never a matter of input.
@@ -106,21 +195,17 @@ impl Sheet {
     }
 
     /// Reads what [`Sheet::save`] wrote. Anything that does not fit is an error with the file and the field.
+    ///
+    /// # Errors
+    /// Files that cannot be read, or are not what was written.
     pub fn load(folder: &Path) -> Result<Sheet, FileError> {
-        let path = folder.join(TEXT);
-        let text: Text = read_toml(&path)?;
+        let path = folder.join(SHEET);
+        let text: SheetText = read_toml(&path)?;
         let wrong = |problem: String| FileError::Text { path: path.clone(), problem };
-        check_format(text.format, FORMAT).map_err(wrong)?;
-        if text.picture != PICTURE {
-            return Err(wrong(format!("picture: `{}`, expected `{PICTURE}`", text.picture)));
-        }
+        check(text.format, &text.picture, &text.stacks).map_err(wrong)?;
         let paper = text.paper.paper().map_err(wrong)?;
-        check_stacks(&text.stacks).map_err(|error| wrong(format!("stacks: {error}")))?;
-        let size = (usize::from(paper.width()), usize::from(paper.length()));
-        let picture = folder.join(PICTURE);
-        let index = read_png(&picture, size, Kind::Indexed(&colours(&text.stacks)))?;
-        Sheet::new(paper, text.stacks, index)
-            .map_err(|error| FileError::Text { path: picture, problem: error.to_string() })
+        let dots = DotMap::load_picture(folder, (paper.width(), paper.length()), text.stacks)?;
+        Ok(Sheet { paper, dots })
     }
 }
 
@@ -151,19 +236,47 @@ mod tests {
     }
 
     #[test]
+    fn a_dot_map_comes_back_and_what_is_no_dot_map_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let dots = sheet(9, 7, 3, 1).dots;
+        dots.save(folder.path()).unwrap();
+        assert_eq!(DotMap::load(folder.path()).unwrap(), dots);
+        assert!(Sheet::load(folder.path()).unwrap_err().to_string().contains(SHEET));
+        let path = folder.path().join(DOTS);
+        let good = std::fs::read_to_string(&path).unwrap();
+        for (from, to, words) in [
+            ("format = 1", "format = 9", "format: 9"),
+            ("width = 9", "width = 8", "expected 8 x 7"),
+            ("width = 9", "width = 0", "at least 1"),
+            ("length = 7", "length = 9000", "largest sheet of paper"),
+            ("length = 7", "length = 7\npaper = 1", "paper"),
+            ("separation.png", "../separation.png", "picture: `../separation.png`"),
+        ] {
+            std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+            let text = DotMap::load(folder.path()).unwrap_err().to_string();
+            assert!(
+                text.contains(words) && text.contains(folder.path().to_str().unwrap()),
+                "{words}: {text}"
+            );
+        }
+        let wide = DotMap::new(5000, 1, vec![Stack::SUBSTRATE], vec![0; 5000]).unwrap();
+        assert!(wide.save(folder.path()).unwrap_err().to_string().contains("5000 x 1 dots"));
+    }
+
+    #[test]
     fn nothing_else_is_left_in_the_folder() {
         let folder = tempfile::tempdir().unwrap();
         sheet(9, 9, 3, 1).save(folder.path()).unwrap();
         let mut names: Vec<_> =
             std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
-        assert_eq!(names, [PICTURE, TEXT]);
+        assert_eq!(names, [PICTURE, SHEET]);
     }
 
     #[test]
     fn a_file_that_does_not_fit_is_named_with_its_field() {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(TEXT);
+        let path = folder.path().join(SHEET);
         sheet(9, 7, 3, 1).save(folder.path()).unwrap();
         let good = std::fs::read_to_string(&path).unwrap();
         let error = |text: String| {

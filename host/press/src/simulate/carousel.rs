@@ -3,7 +3,7 @@
 //! The machine knows a cassette by its barcode, never by its place: the carousel turns.
 
 use protocol::ink::Ink;
-use protocol::rgl::command::MAX_CASSETTES;
+use protocol::rgl::command::MAX_CARTRIDGES;
 
 /// Places in the carousel: upper 1 to 4, lower 1 to 4.
 pub const PLACES: usize = 8;
@@ -69,7 +69,7 @@ impl Carousel {
     /// A carousel with these cassettes, upper places first.
     pub fn new(cassettes: &[Cassette]) -> Result<Carousel, CarouselError> {
         let mut carousel = Carousel::default();
-        if cassettes.len() > MAX_CASSETTES {
+        if cassettes.len() > MAX_CARTRIDGES {
             return Err(CarouselError::TooMany(cassettes.len()));
         }
         cassettes.iter().try_for_each(|&cassette| carousel.insert(cassette))?;
@@ -98,7 +98,7 @@ impl Carousel {
             self.carriage = self.carriage.map(|(_, from)| (cassette, from));
             return Ok(());
         }
-        if self.count() >= MAX_CASSETTES {
+        if self.count() >= MAX_CARTRIDGES {
             return Err(CarouselError::TooMany(self.count() + 1));
         }
         let home = self.carriage.map(|(_, from)| from);

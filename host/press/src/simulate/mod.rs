@@ -14,22 +14,21 @@ mod compose;
 mod printer;
 mod printout;
 mod status;
-mod words;
 
 #[cfg(test)]
 mod tests;
 
-use protocol::rgl::command::MAX_CASSETTES;
+use protocol::rgl::command::MAX_CARTRIDGES;
 use protocol::rgl::{Command, Fault, Step, parse};
 
 use observe::Observer;
 
+pub use crate::layout::paper::Stock;
 pub(crate) use canvas::Canvas;
 pub use carousel::{Carousel, CarouselError, Cassette, Condition, PLACES};
-pub use printer::{Printer, Refused, Stock};
+pub use printer::{Printer, Refused};
 pub use printout::{Difference, Printout, PrintoutError, difference};
 pub use status::{Lever, STATUS_LENGTH, Trouble};
-pub use words::words;
 
 /// What is in the printer before the job comes.
 #[derive(Clone, Debug, Default)]
@@ -68,7 +67,7 @@ pub fn print(job: &[u8], setup: &Setup, observer: &dyn Observer) -> Result<Print
     const CHUNK: usize = 1 << 18;
     // A job that wants more than go in is refused where it asks for the eighth.
     let cassettes =
-        setup.cassettes.clone().unwrap_or_else(|| wanted(job).into_iter().take(MAX_CASSETTES).collect());
+        setup.cassettes.clone().unwrap_or_else(|| wanted(job).into_iter().take(MAX_CARTRIDGES).collect());
     let mut printer = Printer::new(Carousel::new(&cassettes)?, setup.lever);
     if let Some(stock) = setup.stock.or_else(|| declared_stock(job)) {
         printer.load(stock);

@@ -9,39 +9,13 @@ use super::carousel::{Carousel, CarouselError, Cassette, Fetch, PLACES};
 use super::from_dots;
 use super::printout::Printout;
 use super::status::{ASK, Activity, CLEAR, Lever, STATUS_LENGTH, TAKEN, Trouble, answer};
-use super::words;
+use crate::job::fault::words;
+use crate::layout::paper::Stock;
 use crate::separate::Pass;
 
 /// Rows of 1/600 inch the machine needs below the printable area: a little less than what any driver whose pages are
 /// known to print leaves on its paper (14.4 mm; postcard 14.5, A4 in its longest form 14.9).
 const BOTTOM: u16 = 340;
-
-/// A sheet of paper, in 1/600 inch.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Stock {
-    /// From its left to its right edge.
-    pub width: u16,
-    /// From its top to its bottom edge.
-    pub length: u16,
-}
-
-impl Stock {
-    /// The sheet sold under that name; for a custom size one with the usual margins around the printable area.
-    pub fn of(paper: Paper) -> Stock {
-        let (width, length) = match paper {
-            Paper::A4 => (4961, 7016),
-            Paper::Letter => (5100, 6600),
-            Paper::Legal => (5100, 8400),
-            Paper::Executive => (4350, 6300),
-            Paper::B5 => (4299, 6071),
-            Paper::Postcard => (2362, 3496),
-            Paper::Custom { width, length } => {
-                (width.saturating_add(2 * LEFT), length.saturating_add(paper.top() + 360))
-            }
-        };
-        Stock { width, length }
-    }
-}
 
 /// The byte of a stream that is not a legal job's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -296,6 +270,7 @@ impl Printer {
             paper,
             resolution,
             media: declared.media.unwrap_or_default(),
+            curl_correction: declared.curl.unwrap_or(true),
             passes: Vec::new(),
             platen_dots: 0,
             lost_dots: 0,

@@ -17,6 +17,8 @@ pub struct Printout {
     pub resolution: Resolution,
     /// The media type that was declared.
     pub media: Media,
+    /// Whether the job asks the printer to correct curl.
+    pub curl_correction: bool,
     /// The passes in the order of printing, empty ones too. Planes cover the printable area at the job's resolution,
     /// shifts applied.
     pub passes: Vec<Pass>,

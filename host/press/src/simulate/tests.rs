@@ -362,7 +362,7 @@ fn an_eighth_cassette_is_refused_where_it_is_asked_for() {
         .flat_map(|&ink| bytes(&[Command::InkSelect { ink, last: false }, Command::BackFeed]))
         .collect();
     eight.splice(select..select, before.iter().copied());
-    let refused = Refused { offset: (select + before.len()) as u64, fault: Fault::TooManyCassettes };
+    let refused = Refused { offset: (select + before.len()) as u64, fault: Fault::TooManyCartridges };
     assert_eq!(print(&eight, &Setup::default(), &Silent), Err(refused.into()));
 }
 

@@ -8,25 +8,26 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use crate::cli::output;
+use crate::cli::stdio::show;
 use device::flash::image::Firmware;
-use device::flash::{self, ThisComputer};
+use device::flash::{self, FlashError, ThisComputer};
 use device::send::Address;
 use observe::Observer;
 
 /// Arguments of `bridge flash`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress bridge flash                               (the firmware that came with this program)\n  \
+    foilpress bridge flash                               (the firmware included in this program)\n  \
     foilpress bridge flash --from foilpress-bridge.uf2   (the file that `cargo xtask firmware` writes)\n  \
     foilpress bridge flash --to usb:E6614103E7453D2A     (one of several bridges)\n\n\
-    A bridge that runs goes to its boot loader by itself. A new board, or one whose firmware does not answer: hold its \
-    BOOTSEL button while plugging it in. Damaged files and other boards' or programs' are refused before anything is \
-    erased; after an interruption the same command does it again.")]
+    A running bridge enters its boot loader by itself. For a new board, or one whose firmware does not answer, hold the \
+    BOOTSEL button while plugging it in. A file that is damaged, or made for another board or program, is refused before \
+    anything is erased. After an interruption, run the same command again.")]
 pub struct Args {
-    /// Firmware to write [default: what this program was built with]
+    /// Firmware file to install [default: the firmware included in this program]
     #[arg(long, value_name = "FILE.uf2")]
     from: Option<PathBuf>,
-    /// The bridge to flash [default: the only one there is, or the board in its boot loader]
+    /// Bridge to flash [default: the only one, or the board in its boot loader]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
 }
@@ -37,7 +38,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         (Some(path), _) => read(path)?,
         (None, Some(file)) => file.to_vec(),
         (None, None) => bail!(
-            "this program was built without firmware; in the project's folder `cargo xtask firmware` makes it, then \
+            "this program was built without firmware; build it with `cargo xtask firmware` in the project's folder, then run \
              `foilpress bridge flash --from FILE.uf2`"
         ),
     };
@@ -47,17 +48,22 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     })?;
     observer.note(&format!("firmware {}", firmware.version()));
     output::say_on_interrupt(
-        "the board is as it was, or waits in its boot loader; run the same command again, the BOOTSEL button held while \
-         plugging it in if it is not found",
+        "the board is unchanged or waits in its boot loader; run the same command again, and if the board is not found, hold its \
+         BOOTSEL button while plugging it in",
     );
-    let bridge = flash::run(&firmware, &file, args.to.as_ref(), &mut ThisComputer, observer)?;
-    super::super::show(&format!("bridge {:016x} runs firmware {}\n", bridge.serial, bridge.firmware))
+    let bridge =
+        flash::run(&firmware, &file, args.to.as_ref(), &mut ThisComputer, observer).map_err(|error| {
+            let which = matches!(error, FlashError::SeveralBridges(_));
+            let error = anyhow::Error::from(error);
+            if which { error.context("choose a bridge with --to") } else { error }
+        })?;
+    show(&format!("bridge {:016x} runs firmware {}\n", bridge.serial, bridge.firmware))
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {
     let cannot = || format!("cannot read {}", path.display());
     let mut file = Vec::new();
-    // One more than can be right, which the reader then refuses.
+    // One byte more than the largest valid file, so that the reader refuses a larger one.
     let most = uf2::LARGEST_FILE as u64 + 1;
     File::open(path).with_context(cannot)?.take(most).read_to_end(&mut file).with_context(cannot)?;
     Ok(file)

@@ -1,4 +1,4 @@
-//! `foilpress bridge list`: each bridge once, by whatever ways it can be reached.
+//! `foilpress bridge list`: each bridge once, with all its addresses.
 
 use std::io::Write as _;
 
@@ -6,18 +6,21 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 use serde_json::json;
 
-use super::{Found, is_forbidden, newer_firmware, permission};
+use super::found::{Found, ask, doing, newer_firmware};
+use crate::cli::permission;
+use crate::cli::stdio::chain;
 use device::flash::{drive, usb};
 use device::send::find::{self, Candidate};
 use device::send::query::is_alps;
+use device::send::words;
 
 /// Arguments of `bridge list`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress bridge list\n  foilpress bridge list --json\n\n\
-    Each bridge is listed once with all its addresses; any of them can stand after --to. Serial ports of other devices \
-    are listed but not spoken to.")]
+    Each bridge is listed once with all its addresses; --to takes any of them. Serial ports of other devices are listed, \
+    but nothing is sent to them.")]
 pub struct Args {
-    /// As JSON
+    /// Print JSON
     #[arg(long)]
     json: bool,
 }
@@ -51,26 +54,20 @@ pub fn run(args: &Args) -> Result<()> {
         if boards > 0 {
             writeln!(
                 out,
-                "{boards} in the boot loader, without firmware: `foilpress bridge flash` puts it on"
+                "{boards} in the boot loader, without firmware; `foilpress bridge flash` installs it"
             )?;
         }
         for port in &survey.others {
-            writeln!(out, "{}: {}, another device; not asked", port.address, port.product)?;
+            writeln!(out, "{}: {} (another device, not asked)", port.address, port.product)?;
         }
-        if asked.iter().any(|(_, found)| found.as_ref().is_err_and(is_forbidden)) {
-            write!(out, "\n{}", permission())?;
+        if asked.iter().any(|(_, found)| found.as_ref().is_err_and(permission::is_missing)) {
+            write!(out, "\n{}", permission::how_to_give())?;
         }
     }
     if asked.is_empty() && boards == 0 {
-        bail!("no bridge on USB; plug it in, or see `foilpress doctor`");
+        bail!("no bridge found on USB; plug it in, or run `foilpress doctor`");
     }
     Ok(())
-}
-
-/// What a bridge answers on the first of its addresses that can be opened.
-pub fn ask(candidate: &Candidate) -> Result<Found> {
-    let (_, mut link) = candidate.open()?;
-    Found::ask_on(&mut *link)
 }
 
 /// The addresses of a bridge.
@@ -82,8 +79,12 @@ fn ways(candidate: &Candidate) -> String {
 fn write(out: &mut impl std::io::Write, candidate: &Candidate, found: &Result<Found>) -> Result<()> {
     match found {
         Err(error) => {
-            writeln!(out, "bridge {}", candidate.serial_number.as_deref().unwrap_or("without a number"))?;
-            writeln!(out, "    {}\n    {}", ways(candidate), super::super::chain(error))?;
+            writeln!(
+                out,
+                "bridge {}",
+                candidate.serial_number.as_deref().unwrap_or("without a serial number")
+            )?;
+            writeln!(out, "    {}\n    {}", ways(candidate), chain(error))?;
         }
         Ok(found) => {
             writeln!(
@@ -91,14 +92,14 @@ fn write(out: &mut impl std::io::Write, candidate: &Candidate, found: &Result<Fo
                 "bridge {:016x}, firmware {}, {}",
                 found.bridge.serial,
                 found.bridge.firmware,
-                super::doing(&found.progress)
+                doing(&found.progress)
             )?;
             writeln!(out, "    {}", ways(candidate))?;
             match (found.device_id(), found.fault) {
                 (Some(id), _) if is_alps(&id) => writeln!(out, "    printer: {id}")?,
-                (Some(id), _) => writeln!(out, "    printer: {id} (no ALPS)")?,
-                (None, Some(fault)) => writeln!(out, "    {}", super::words::fault(fault, None))?,
-                (None, None) => writeln!(out, "    printer: does not tell what it is")?,
+                (Some(id), _) => writeln!(out, "    printer: {id} (not an ALPS printer)")?,
+                (None, Some(fault)) => writeln!(out, "    {}", words::fault(fault, None))?,
+                (None, None) => writeln!(out, "    printer: does not identify itself")?,
             }
             if let Some(newer) = newer_firmware(&found.bridge) {
                 writeln!(out, "    {newer}")?;
@@ -112,7 +113,7 @@ fn as_json(candidate: &Candidate, found: &Result<Found>) -> serde_json::Value {
     let addresses: Vec<String> = candidate.addresses.iter().map(ToString::to_string).collect();
     let mut value = match found {
         Ok(found) => found.json(),
-        Err(error) => json!({ "error": super::super::chain(error) }),
+        Err(error) => json!({ "error": chain(error) }),
     };
     value["serial_number"] = json!(candidate.serial_number);
     value["addresses"] = json!(addresses);

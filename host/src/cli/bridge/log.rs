@@ -1,4 +1,4 @@
-//! `foilpress bridge log`: what the firmware has noted, in words.
+//! `foilpress bridge log`: the log of the firmware, decoded.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -7,29 +7,29 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args as ClapArgs;
 use serde_json::json;
 
-use super::{PATIENCE, only};
+use super::found::{PATIENCE, only};
 use device::flash::image::Firmware;
 use device::send::Address;
 use device::send::log;
 use device::send::query::Query;
 
-/// A firmware's program is some megabytes.
+/// The ELF file of the firmware has a few megabytes.
 const LARGEST: u64 = 64 << 20;
 
 /// Arguments of `bridge log`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  foilpress bridge log\n  \
     foilpress bridge log --elf target/firmware/foilpress-bridge.elf\n\n\
-    The bridge keeps the last few thousand bytes, over a restart too, so the log tells what came before one. Times are \
-    seconds since the start. It can be read while a job prints.")]
+    The bridge keeps the last few thousand bytes of its log, even across a restart, so the log shows what led to one. Times \
+    are in seconds since the start. The log can be read while a job prints.")]
 pub struct Args {
-    /// Where the bridge is [default: the only one there is]
+    /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// The firmware on the bridge as its linker left it [default: the one that came with this program]
+    /// ELF file of the firmware on the bridge [default: the firmware included in this program]
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
-    /// As JSON, an object for each entry
+    /// Print JSON, one object on a line for each entry
     #[arg(long)]
     json: bool,
 }
@@ -38,17 +38,17 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let program = match &args.elf {
         Some(path) => {
-            let what = || format!("{} cannot be read", path.display());
+            let what = || format!("cannot read {}", path.display());
             if std::fs::metadata(path).with_context(what)?.len() > LARGEST {
-                bail!("{} is far larger than any firmware", path.display());
+                bail!("{} is larger than {} MB, so it is not firmware", path.display(), LARGEST >> 20);
             }
             std::fs::read(path).with_context(what)?
         }
         None => match Firmware::embedded_program() {
             Some(program) => program.to_vec(),
             None => bail!(
-                "this program was built without firmware; name the bridge's with --elf (`cargo xtask firmware` writes \
-                 foilpress-bridge.elf)"
+                "this program was built without firmware; name the ELF file of the bridge's firmware with --elf (`cargo xtask \
+                 firmware` writes foilpress-bridge.elf)"
             ),
         },
     };
@@ -69,18 +69,18 @@ pub fn run(args: &Args) -> Result<()> {
         return Ok(());
     }
     if raw.lost > 0 {
-        writeln!(out, "({} bytes before this are gone: newer entries took their place)", raw.lost)?;
+        writeln!(out, "({} earlier bytes are gone: newer entries have overwritten them)", raw.lost)?;
     }
     for entry in &log.entries {
         write!(out, "{:>12}  {:<5}  {}", entry.time, entry.level.unwrap_or(""), entry.text)?;
         match &entry.place {
-            // Where it happened is of use if something went wrong.
+            // The place in the source helps only with warnings and errors.
             Some(place) if matches!(entry.level, Some("error" | "warn")) => writeln!(out, "  ({place})")?,
             _ => writeln!(out)?,
         }
     }
     if log.unreadable > 0 {
-        writeln!(out, "({} entries cannot be read: is this the firmware on the bridge?)", log.unreadable)?;
+        writeln!(out, "({} entries cannot be decoded: is this the firmware on the bridge?)", log.unreadable)?;
     }
     Ok(())
 }

@@ -1,12 +1,14 @@
-//! `foilpress bridge reset`: a printer that may hold part of a job is made ready for the next one.
+//! `foilpress bridge reset`: make a printer that may hold part of a job ready for the next one.
 //!
-//! The bridge pulls the port's nInit line; or the user has used the printer's own switch. That the printer was reset is noted
-//! for every user and queue of this computer ([`device::printers`]).
+//! A printer that has received half a job takes the next one for the rest of it and prints it as text. A bridge that knows
+//! about the half resets the printer by itself; one that has lost its memory does not. Then the bridge pulls the port's nInit
+//! line when asked to, or the user switches the printer off and on. The reset is recorded for every user and queue of this
+//! computer ([`device::printers`]).
 
 use anyhow::Result;
 use clap::Args as ClapArgs;
 
-use super::PATIENCE;
+use super::found::{PATIENCE, only};
 use device::deliver;
 use device::printers::Printers;
 use device::send::Address;
@@ -15,16 +17,17 @@ use device::send::query::Query;
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress bridge reset                        (the only bridge there is)\n  \
+    foilpress bridge reset                        (the only bridge)\n  \
     foilpress bridge reset --to serial:/dev/ttyACM0\n  \
     foilpress bridge reset --by-hand              (the printer has been switched off and on)\n\n\
-    A bridge that has lost its memory in the middle of a sheet cannot do this by itself. The reset is refused while a job is open. \
-    If a sheet is in the printer and does not come out, switch the printer off and on.")]
+    A bridge that has lost its memory in the middle of a sheet does not reset the printer by itself. The command is refused \
+    while a job is open. It is not known for certain what a printer does with a sheet it holds; if the sheet does not come \
+    out, switch the printer off and on.")]
 pub struct Args {
-    /// Where the bridge is [default: the only one there is]
+    /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// Only note that every printer has been switched off and on
+    /// Reset nothing; only record that every printer has been switched off and on
     #[arg(long, conflicts_with = "to")]
     by_hand: bool,
 }
@@ -37,9 +40,9 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let address = match &args.to {
         Some(address) => address.clone(),
-        None => super::only()?,
+        None => only()?,
     };
     let mut link = address.open()?;
     deliver::reset(&mut Query::new(&mut *link, PATIENCE)?, &printers)?;
-    crate::cli::show("the printer has been reset; if a sheet is still in it, take it out\n")
+    crate::cli::stdio::show("the printer has been reset; if a sheet is still in it, take it out\n")
 }

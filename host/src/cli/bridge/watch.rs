@@ -1,4 +1,4 @@
-//! `foilpress bridge status --watch`: the same again and again, until it is interrupted.
+//! `foilpress bridge status --watch`: the status, refreshed until the program is interrupted.
 
 use std::io::{IsTerminal as _, Write as _};
 use std::thread::sleep;
@@ -9,18 +9,19 @@ use console::Term;
 use protocol::link::message::Ask;
 use serde_json::json;
 
-use super::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
+use super::found::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
+use crate::cli::stdio::chain;
 use device::send::Address;
 use device::send::query::{Query, Reply};
 use device::send::transport::Transport;
 
-/// Between two looks at the bridge.
-const LOOK: Duration = Duration::from_secs(1);
+/// Time between two questions to the bridge.
+const POLL: Duration = Duration::from_secs(1);
 
-/// Between two questions to the printer, which is asked between jobs only.
+/// Time between two questions to the printer, which is asked only between jobs.
 const ASK: Duration = Duration::from_secs(5);
 
-/// Rows a text takes on a terminal that is so many columns wide.
+/// Rows that a text takes on a terminal with so many columns.
 fn rows(text: &str, columns: usize) -> usize {
     text.lines().map(|line| line.chars().count().div_ceil(columns.max(1)).max(1)).sum()
 }
@@ -29,19 +30,19 @@ fn rows(text: &str, columns: usize) -> usize {
 struct Screen {
     json: bool,
     terminal: bool,
-    /// What was shown last, and on how many lines.
+    /// The text that was shown last.
     shown: String,
 }
 
 impl Screen {
-    /// Shows a text in place of the last one; where that cannot be, under it if it is another one.
+    /// Shows a text in place of the last one. Without a terminal it is added below, if it differs.
     fn show(&mut self, text: String) -> std::io::Result<()> {
         if text == self.shown {
             return Ok(());
         }
         let mut out = std::io::stdout().lock();
         if self.terminal && !self.shown.is_empty() {
-            // Up to the first line, and everything below it away.
+            // Moves up to the first line and erases everything below.
             let columns = usize::from(Term::stdout().size().1);
             write!(out, "\x1b[{}F\x1b[J", rows(&self.shown, columns))?;
         } else if !self.json && !self.shown.is_empty() {
@@ -64,14 +65,14 @@ impl Screen {
 
     fn show_loss(&mut self, address: &Address, error: &anyhow::Error) -> Result<()> {
         Ok(self.show(if self.json {
-            format!("{}\n", json!({ "address": address.to_string(), "lost": format!("{error:#}") }))
+            format!("{}\n", json!({ "address": address.to_string(), "lost": chain(error) }))
         } else {
-            format!("{address}: {error:#}; looking again\n")
+            format!("{address}: {}; trying again\n", chain(error))
         })?)
     }
 }
 
-/// Shows how bridge and printer are, for ever. A bridge that goes away is waited for, once it has been there.
+/// Shows bridge and printer for ever. Waits for a bridge that goes away, once it has been connected.
 pub fn run(address: &Address, json: bool) -> Result<()> {
     let mut screen =
         Screen { json, terminal: std::io::stdout().is_terminal() && !json, shown: String::new() };
@@ -88,11 +89,11 @@ pub fn run(address: &Address, json: bool) -> Result<()> {
             Err(error) => return Err(error),
             Ok(never) => match never {},
         }
-        sleep(LOOK);
+        sleep(POLL);
     }
 }
 
-/// Follows one connection to its end, which is an error; one of standard output's is an [`std::io::Error`].
+/// Follows one connection until it fails. An error of standard output is an [`std::io::Error`].
 fn follow(
     link: &mut dyn Transport,
     screen: &mut Screen,
@@ -124,7 +125,7 @@ fn follow(
             (None, false) => {}
         }
         screen.show_found(&found)?;
-        sleep(LOOK);
+        sleep(POLL);
         found.progress = query.ask_progress(PATIENCE)?;
         (found.lines, found.fault) = query.lines(PATIENCE)?;
     }

@@ -3,7 +3,6 @@
 //! Waits without limit for the bridge and the operator, unless the queue belongs to a class and another printer may do the job.
 
 use std::cell::{Cell, RefCell};
-use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -213,7 +212,7 @@ impl<W: Write + Send> Caller for System<'_, W> {
         self.messages.reasons(&[Reason::Connecting, reason]);
         self.messages.info(&format!(
             "{}. Nothing is lost; the job goes on when the printer can be reached",
-            chain(obstacle)
+            observe::with_causes(obstacle)
         ));
         self.pause()
     }
@@ -233,17 +232,6 @@ impl<W: Write + Send> Caller for System<'_, W> {
     fn observer(&self) -> &dyn Observer {
         self.messages
     }
-}
-
-/// An error with its causes.
-pub(super) fn chain(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        text = format!("{text}: {error}");
-        cause = error.source();
-    }
-    text
 }
 
 /// Makes an empty file, durably.

@@ -5,16 +5,15 @@ use std::io::Write;
 use inks::{InkSet, Library};
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
-use protocol::rgl::Page;
 
 use super::{FilterError, io_error};
-use crate::queue::options::{Choices, Spots};
+use crate::queue::options::{Choices, Place, Spots};
 use crate::queue::ppd;
 use observe::Observer;
+use press::job::Handling;
 use press::layers::{self, Artwork, Window};
-use press::layout::{self, Cut, Layout, Mm, Point, Position};
-use press::pipeline;
-use press::separate::{self, Severity};
+use press::layout::{Cut, Layout, Mm, Point, Position};
+use press::pipeline::{self, Request};
 
 /// What makes jobs of pages.
 pub(super) struct Press<'a> {
@@ -74,8 +73,8 @@ impl Press<'_> {
         }
     }
 
-    /// What of a page is printed, and where. `drawn` is the window around everything on it; none if it is blank, which is
-    /// told.
+    /// What of a page is printed, and where. `drawn` is the window around everything on it, none if it is blank. Notes why
+    /// nothing is printed.
     pub(super) fn view(
         &self,
         number: usize,
@@ -85,7 +84,7 @@ impl Press<'_> {
         mirrored: bool,
     ) -> Option<View> {
         let Some(drawn) = drawn else {
-            self.observer.note(&format!("page {number} is blank; no sheet is made of it"));
+            self.observer.note(&format!("page {number} is blank; the page is skipped"));
             return None;
         };
         // A page is turned about its middle, not what is drawn on it.
@@ -93,7 +92,7 @@ impl Press<'_> {
         let view = View::of(self.choices.place, paper, (size, dpi), drawn, whole);
         if view.is_none() {
             self.observer.note(&format!(
-                "all that page {number} has lies on the margins, where this machine cannot print; no sheet is made of it"
+                "everything on page {number} lies on the margins, where the printer cannot print; the page is skipped"
             ));
         }
         view
@@ -125,21 +124,24 @@ impl Press<'_> {
             profile: self.choices.profile,
             ..Layout::centred(paper)
         };
-        let arranged = layout::arrange(&composed.piece, &layout, self.observer)
-            .map_err(|source| FilterError::Layout { page: number, source })?;
+        let handling = Handling { media: self.choices.media, curl_correction: self.choices.curl_correction };
+        let request = Request {
+            name: &art.name,
+            dots: &composed.dots,
+            layout: &layout,
+            handling,
+            allowed: settings.inks,
+            library: self.library,
+        };
+        let job = pipeline::job(&request, self.observer)
+            .map_err(|source| FilterError::Job { page: number, source })?;
         // What a page has on its margins was left out before; what is moved there is cut off now.
         let moved = !matches!(self.choices.place, Place::Page);
-        if let Some(cut) = view.beyond.or(arranged.laid.cut.filter(|_| moved)) {
+        if let Some(cut) = view.beyond.or(job.draft.laid.cut.filter(|_| moved)) {
             self.observer
-                .note(&format!("page {number}: {cut} lies on the margins, where this machine cannot print"));
+                .note(&format!("page {number}: {cut} lies on the margins, where the printer cannot print"));
         }
-        let separation = separate::separate(&arranged.sheet, self.library.rules(), self.observer)?;
-        if let Some(check) = separation.checks.iter().find(|check| check.severity == Severity::Error) {
-            return Err(FilterError::Refused { page: number, why: check.with_stacks() });
-        }
-        let (media, curl_correction) = (self.choices.media, self.choices.curl_correction);
-        let page = Page { media, curl_correction, ..Page::plain(paper) };
-        Ok(pipeline::job_on(page, &separation.passes, &settings.inks, self.observer)?)
+        Ok(job.bytes)
     }
 }
 
@@ -157,17 +159,6 @@ pub(super) fn paper(
         length: mm(height),
         problem,
     })
-}
-
-/// Where what is drawn goes on its sheet.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Place {
-    /// Where the page has it.
-    Page,
-    /// In the middle of the printable area.
-    Centre,
-    /// Its top left corner this far from the corner of the sheet.
-    At(Point),
 }
 
 /// What of a page is printed, and where.

@@ -119,20 +119,20 @@ fn pages_the_machine_does_not_take_are_refused() {
 }
 
 #[test]
-fn the_cassette_list_belongs_to_multi_plane_and_holds_every_ink() {
-    let list = super::Cassettes::new(&[Ink::White, Ink::Black]).unwrap();
+fn the_cartridge_list_belongs_to_multi_plane_and_holds_every_ink() {
+    let list = super::Cartridges::new(&[Ink::White, Ink::Black]).unwrap();
     let with = |mode, ink| {
         let mut commands = setup();
-        commands.insert(6, Cassettes(list));
+        commands.insert(6, Cartridges(list));
         commands[8] = Mode(mode);
         verdict(&[commands, vec![select(ink, true)], end()].concat())
     };
     assert_eq!(with(super::Mode::MultiPlane, Ink::White), Ok(true));
     assert_eq!(with(super::Mode::MultiPlane, Ink::Cyan), Err((10, Fault::InkNotInList)));
-    assert_eq!(with(super::Mode::ColourPlane, Ink::White), Err((8, Fault::UnexpectedCassettes)));
+    assert_eq!(with(super::Mode::ColourPlane, Ink::White), Err((8, Fault::UnexpectedCartridges)));
     let mut without = setup();
     without[7] = Mode(super::Mode::MultiPlane);
-    assert_eq!(verdict(&without), Err((7, Fault::MissingCassettes)));
+    assert_eq!(verdict(&without), Err((7, Fault::MissingCartridges)));
 }
 
 #[test]
@@ -234,12 +234,12 @@ fn the_end_is_one_form_feed_and_nothing_follows_it() {
 }
 
 #[test]
-fn an_eighth_cassette_is_refused() {
+fn an_eighth_cartridge_is_refused() {
     let mut passes = vec![];
     for &ink in &Ink::ALL[..7] {
         passes.extend([select(ink, false), BackFeed]);
     }
     let with = |ink| verdict(&job(&[passes.clone(), vec![select(ink, true)]].concat()));
-    assert_eq!(with(Ink::ALL[0]), Ok(true), "a repeat is no new cassette");
-    assert_eq!(with(Ink::ALL[7]), Err((setup().len() + 14, Fault::TooManyCassettes)));
+    assert_eq!(with(Ink::ALL[0]), Ok(true), "a repeat is no new cartridge");
+    assert_eq!(with(Ink::ALL[7]), Err((setup().len() + 14, Fault::TooManyCartridges)));
 }

@@ -1,17 +1,16 @@
-//! The files of a folder and the role each of them plays.
+//! The files of a folder and their roles.
 
 use std::path::{Path, PathBuf};
 
 use super::settings::{SETTINGS, Settings};
-use crate::document::DocumentError;
-use crate::document::error::list;
+use crate::document::error::{DocumentError, list};
 use crate::document::names::{self, Role};
 use crate::document::source::Source;
 
-/// The most directory entries looked at.
+/// The most directory entries that are examined.
 const MOST_FILES: usize = 10_000;
 
-/// The files of a folder that play a role, with what is needed to complain about them.
+/// The files of a folder by role, and all image files for error messages.
 pub(super) struct Files {
     pub(super) folder: PathBuf,
     seen: Vec<String>,
@@ -69,7 +68,7 @@ impl Files {
         Ok(files)
     }
 
-    /// Two handednesses of one normal map are the same map to us.
+    /// If a folder holds one normal map in both conventions (DirectX and OpenGL), keeps the OpenGL one.
     fn choose_normal(&mut self, source: &mut Source<'_>) {
         let normals = self.all(Role::Normal);
         if normals.len() == 2 {
@@ -83,7 +82,9 @@ impl Files {
                 _ => return,
             };
             self.by_role.retain(|(_, name)| *name != drop);
-            source.note(format!("{drop}: the same normals again in the other convention; not read"));
+            source.note(format!(
+                "{drop}: not read, because the same normals are there in the other convention"
+            ));
         }
     }
 
@@ -95,13 +96,13 @@ impl Files {
         DocumentError::Maps { folder: self.folder.clone(), problem, seen: self.seen.clone() }
     }
 
-    /// The one file of a role, if there is one.
+    /// The file with a role, if there is one; an error if there are several.
     pub(super) fn one(&self, role: Role) -> Result<Option<String>, DocumentError> {
         match &self.all(role)[..] {
             [] => Ok(None),
             [name] => Ok(Some(name.clone())),
             several => Err(self.error(format!(
-                "{} could each be the {} map; name one in [maps] of {SETTINGS}",
+                "{} could each be the {} map; name one of them under [maps] in {SETTINGS}",
                 several.join(" and "),
                 role.name()
             ))),
@@ -113,7 +114,7 @@ fn is_picture(name: &str) -> bool {
     has_extension(name, &["png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr", "rgbe"])
 }
 
-/// Pictures by their name that no decoder here reads.
+/// Whether a file is, by its name, an image that cannot be decoded here.
 fn is_foreign_picture(name: &str) -> bool {
     has_extension(
         name,

@@ -1,17 +1,18 @@
-//! `material.toml`: what the owner of a folder of maps says about it, where their names do not tell.
+//! `material.toml`: facts about a folder of maps that file names cannot tell.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::document::content::{ColourSpace, check_size_mm};
+use crate::document::error::DocumentError;
 use crate::document::names::Role;
 use crate::document::source::Source;
-use crate::document::{ColourSpace, DocumentError};
 
 /// The optional settings file of a folder.
 pub const SETTINGS: &str = "material.toml";
 
-/// Which numbers the maps hold.
+/// What the maps hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Workflow {
@@ -21,11 +22,11 @@ pub enum Workflow {
     SpecularGlossiness,
 }
 
-/// What `material.toml` may say. Everything is optional; unknown keys are errors.
+/// The contents of `material.toml`. Every key is optional; unknown keys are errors.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// What to call the document.
+    /// The name of the document.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Width and height on paper in millimetres.
@@ -34,16 +35,16 @@ pub struct Settings {
     /// Encoding of the colour maps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub colour_space: Option<ColourSpace>,
-    /// Which numbers the maps hold.
+    /// What the maps hold.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub workflow: Option<Workflow>,
-    /// Roughness where there is no map, 0 to 1.
+    /// Roughness if there is no map, 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roughness: Option<f32>,
-    /// Metallic where there is no map, 0 to 1.
+    /// Metallic if there is no map, 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub metallic: Option<f32>,
-    /// Which files to read, where names do not tell.
+    /// The files to read, where their names do not tell.
     #[serde(default, skip_serializing_if = "MapNames::is_empty")]
     pub maps: MapNames,
 }
@@ -51,7 +52,7 @@ pub struct Settings {
 /// The `[maps]` of `material.toml`: file names within the folder.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the names are the roles of `names::Role`")]
+#[allow(missing_docs, reason = "the fields are the roles of `names::Role`")]
 pub struct MapNames {
     #[serde(alias = "base_colour", alias = "diffuse", skip_serializing_if = "Option::is_none")]
     pub base_color: Option<String>,
@@ -89,7 +90,7 @@ impl MapNames {
     }
 }
 
-/// Reads `material.toml`, if the folder has one.
+/// Reads `material.toml` if the folder has one.
 pub(super) fn read(folder: &Path, source: &mut Source<'_>) -> Result<Settings, DocumentError> {
     let path = folder.join(SETTINGS);
     if !path.is_file() {
@@ -109,12 +110,4 @@ pub(super) fn read(folder: &Path, source: &mut Source<'_>) -> Result<Settings, D
         }
     }
     Ok(settings)
-}
-
-/// Whether a size can be meant: from a dot to 10 metres.
-pub(in crate::document) fn check_size_mm(size: [f64; 2]) -> Result<(), String> {
-    match size.iter().find(|mm| !(0.04..=10_000.0).contains(*mm)) {
-        Some(mm) => Err(format!("size_mm: {mm} is no length on paper; expected 0.04 to 10000 millimetres")),
-        None => Ok(()),
-    }
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, LumaA, Rgb, Rgba};
 
-use super::super::{Content, Document, DocumentError, Materials, Options, Surface, Surfaces, open};
-use crate::document::ColourSpace;
+use crate::document::{ColourSpace, Content, Document, DocumentError, Options, open};
+use crate::materials::{Materials, Surface, Surfaces};
 use observe::Silent;
 
 struct Folder(tempfile::TempDir);
@@ -76,7 +76,7 @@ fn noted(notes: &[String], text: &str) {
 }
 
 #[test]
-fn maps_mean_what_the_metallic_workflow_says() {
+fn maps_follow_the_metallic_workflow() {
     let folder = Folder::new()
         .png("albedo.png", rgb(2, 3, [200, 100, 50]))
         .png("roughness.png", grey(2, 3, 128))
@@ -124,7 +124,7 @@ fn sixteen_bits_alpha_and_packed_channels_hold_the_same_numbers() {
 }
 
 #[test]
-fn floating_point_colours_are_linear_unless_told_otherwise() {
+fn floating_point_colours_are_linear_by_default() {
     let picture = ImageBuffer::from_pixel(2, 2, Rgb([0.5f32, 0.25, 0.125]));
     let folder = || Folder::new().png("roughness.png", grey(2, 2, 255)).png("metallic.png", grey(2, 2, 255));
     let f0 = |folder: &Folder| folder.surfaces().0.surface(0).f0;
@@ -178,12 +178,12 @@ fn specular_maps_and_gloss_are_the_other_workflow() {
 }
 
 #[test]
-fn names_lie_and_contents_do_not() {
+fn contents_decide_the_format_of_a_file() {
     let folder = Folder::new()
         .save("albedo.jpg", rgb(2, 2, [10, 20, 30]), ImageFormat::Png)
         .png("roughness.png", grey(2, 2, 9))
         .png("metalness.png", grey(2, 2, 0));
-    noted(&folder.surfaces().1, "PNG picture under another name");
+    noted(&folder.surfaces().1, "read as PNG, which it is despite its name");
 }
 
 #[test]
@@ -202,7 +202,7 @@ fn maps_of_other_sizes_are_resized_and_other_shapes_refused() {
 }
 
 #[test]
-fn relief_widens_the_lobe_and_the_user_is_told() {
+fn relief_widens_the_lobe_and_gives_a_note() {
     // Slopes of 0.3 to the left and right in turn.
     let component = |s: f32| (127.5 + 127.5 * s / (1.0f32 + s * s).sqrt()).round() as u8;
     let ridges =
@@ -221,7 +221,7 @@ fn relief_widens_the_lobe_and_the_user_is_told() {
 }
 
 #[test]
-fn each_mistake_is_named_with_what_to_do() {
+fn each_mistake_has_its_message() {
     let base = || Folder::new().png("albedo.png", grey(2, 2, 128));
     let full = || base().png("roughness.png", grey(2, 2, 9)).png("metallic.png", grey(2, 2, 9));
     let orm_grey = base().png("orm.png", grey(2, 2, 9));
@@ -256,7 +256,7 @@ fn each_mistake_is_named_with_what_to_do() {
 }
 
 #[test]
-fn what_is_not_finite_or_far_too_large_is_refused_before_it_is_decoded() {
+fn values_that_are_not_finite_and_huge_sizes_are_errors() {
     let picture = ImageBuffer::from_pixel(2, 2, Rgb([0.5f32, f32::NAN, 0.1]));
     let folder = Folder::new().save("albedo.exr", picture, ImageFormat::OpenExr);
     let error = folder.error();

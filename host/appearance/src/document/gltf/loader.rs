@@ -1,6 +1,6 @@
-//! The pictures of a glTF file: wherever they are stored, and whether they lie on each other.
+//! The images of a glTF file, wherever they are stored, and the check that they align.
 //!
-//! Pictures come from data URIs, from buffers, or from files in the same folder or below; no path leads out.
+//! Images come from data URIs, from buffers, or from files in the document's folder or below; other paths are errors.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -8,12 +8,13 @@ use ::gltf::json;
 use base64::Engine;
 use percent_encoding::percent_decode_str;
 
+use crate::document::content::ColourSpace;
+use crate::document::error::DocumentError;
 use crate::document::picture::Picture;
 use crate::document::source::{MOST_BYTES, Source};
 use crate::document::texture::Field;
-use crate::document::{ColourSpace, DocumentError};
 
-/// Where a map lies on the surface: offset, rotation, scale, set of coordinates.
+/// The placement of a map on the surface: offset, rotation, scale, set of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Placement {
     offset: [f32; 2],
@@ -38,7 +39,7 @@ impl Placement {
     }
 }
 
-/// A decoded texture and how to call it.
+/// A decoded texture and its name.
 pub(super) struct Loaded {
     pub(super) name: String,
     pub(super) picture: Picture,
@@ -49,7 +50,7 @@ pub(super) struct Loader<'a, 's> {
     pub(super) blob: Option<Vec<u8>>,
     pub(super) path: &'a Path,
     pub(super) source: &'a mut Source<'s>,
-    /// That of the first map read; the others must share it.
+    /// The placement of the first map read; the others must share it.
     pub(super) placement: Option<Placement>,
 }
 
@@ -58,14 +59,14 @@ impl<'a> Loader<'a, '_> {
         DocumentError::Field { path: self.path.to_path_buf(), field: field.into(), problem }
     }
 
-    /// The picture of a map that must lie where the others do.
+    /// The image of a map that must align with the others.
     pub(super) fn load(&mut self, info: &json::texture::Info, field: &str) -> Result<Loaded, DocumentError> {
         let placement = Placement::of(info);
         match self.placement {
             None => {
                 if !placement.is_plain() {
                     self.source.note(format!(
-                        "{}: the texture is printed as it is stored, without its texture transform",
+                        "{}: the texture is printed as it is stored; its texture transform is ignored",
                         self.path.display()
                     ));
                 }
@@ -73,8 +74,8 @@ impl<'a> Loader<'a, '_> {
             }
             Some(first) if first != placement => {
                 let problem =
-                    "placed on the surface otherwise than the material's other maps, which a flat print \
-                               cannot follow; bake the maps to one set of coordinates"
+                    "its placement on the surface differs from that of the material's other maps, which a flat \
+                     print cannot reproduce; bake the maps to one set of coordinates"
                         .into();
                 return Err(self.wrong(field, problem));
             }
@@ -125,9 +126,10 @@ impl<'a> Loader<'a, '_> {
             None => match &self.blob {
                 Some(blob) if number == 0 => blob,
                 _ => {
-                    return Err(
-                        self.wrong(field, format!("buffer {number} has no uri and the file no data chunk"))
-                    );
+                    return Err(self.wrong(
+                        field,
+                        format!("buffer {number} has no uri, and the file has no data chunk"),
+                    ));
                 }
             },
         };
@@ -135,7 +137,7 @@ impl<'a> Loader<'a, '_> {
         let end = start.checked_add(view.byte_length.0).filter(|&end| end <= data.len() as u64);
         let Some(end) = end else {
             let problem = format!(
-                "bufferView {index} asks for {} bytes at {start}, buffer {number} has {}",
+                "bufferView {index} covers {} bytes from {start}, but buffer {number} has {} bytes",
                 view.byte_length.0,
                 data.len()
             );
@@ -144,13 +146,13 @@ impl<'a> Loader<'a, '_> {
         Ok(data[start as usize..end as usize].to_vec())
     }
 
-    /// What a URI stands for: data, or a file in the folder of the document or below.
+    /// The data of a URI: inline data, or a file in the folder of the document or below.
     fn resource(&mut self, uri: &str, field: &str, label: &str) -> Result<(PathBuf, Vec<u8>), DocumentError> {
         if let Some(data) = uri.strip_prefix("data:") {
             let encoded =
                 data.split_once(',').filter(|(kind, _)| kind.ends_with(";base64")).map(|(_, data)| data);
             let Some(encoded) = encoded else {
-                return Err(self.wrong(field, format!("{label}: expected a data URI in base64")));
+                return Err(self.wrong(field, format!("{label}: expected a base64 data URI")));
             };
             let bytes = base64::engine::general_purpose::STANDARD
                 .decode(encoded)
@@ -161,10 +163,8 @@ impl<'a> Loader<'a, '_> {
         let within =
             Path::new(&*file).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         if !within || file.contains([':', '\\', '\0']) || file.is_empty() {
-            return Err(self.wrong(
-                field,
-                format!("{label}: `{uri}` is not a file in the document's folder or below, and nothing else is read"),
-            ));
+            return Err(self
+                .wrong(field, format!("{label}: `{uri}` must be a file in the document's folder or below")));
         }
         let path = self.path.parent().unwrap_or(Path::new("")).join(&*file);
         let bytes = self.source.read(&path, MOST_BYTES)?;
@@ -183,7 +183,7 @@ impl<'a> Loader<'a, '_> {
         let how = if space == ColourSpace::Srgb { "sRGB" } else { "linear" };
         self.source.note(format!("{name}: {field} read as {how}"));
         if picture.has_foreign_profile() {
-            self.source.note(format!("{name}: its colour profile is not applied"));
+            self.source.note(format!("{name}: the colour profile is not applied"));
         }
         Ok(coloured(&picture, factor, space))
     }

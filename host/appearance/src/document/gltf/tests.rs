@@ -1,7 +1,8 @@
 //! Files made here, by hand: each workflow, each way to store a picture, each way out of the folder.
 
 use super::*;
-use crate::document::{Materials, Surface, open};
+use crate::document::open;
+use crate::materials::{Materials, Surface};
 use base64::Engine;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use observe::Silent;
@@ -119,7 +120,7 @@ fn the_older_workflow_is_read() {
 }
 
 #[test]
-fn nothing_outside_the_folder_is_read_and_damage_is_named() {
+fn files_outside_the_folder_and_damage_are_errors() {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("inner");
     std::fs::create_dir(&folder).unwrap();
@@ -134,15 +135,15 @@ fn nothing_outside_the_folder_is_read_and_damage_is_named() {
     let absolute = format!(r#"{{"uri":"{}"}}"#, outer.path().join("secret.png").display());
     for (json, says) in [
         (image(r#"{"uri":"../secret.png"}"#), "secret.png"),
-        (image(r#"{"uri":"%2e%2e/secret.png"}"#), "not a file in the document's folder"),
-        (image(&absolute), "not a file in the document's folder"),
-        (image(r#"{"uri":"file:///etc/passwd"}"#), "not a file in the document's folder"),
+        (image(r#"{"uri":"%2e%2e/secret.png"}"#), "must be a file in the document's folder"),
+        (image(&absolute), "must be a file in the document's folder"),
+        (image(r#"{"uri":"file:///etc/passwd"}"#), "must be a file in the document's folder"),
         (image(r#"{"uri":"missing.png"}"#), "missing.png"),
         (image(r#"{"uri":"data:image/png;base64,@@"}"#), "damaged"),
         (image(r#"{"bufferView":7,"mimeType":"image/png"}"#), "bufferView 7 does not exist"),
         (image("{}"), "neither uri nor bufferView"),
         (image("").replace(r#""index":0"#, r#""index":4"#), "texture 4 does not exist"),
-        (r#"{"asset":{"version":"2.0"}}"#.into(), "no material to print"),
+        (r#"{"asset":{"version":"2.0"}}"#.into(), "no material"),
         ("{".into(), "glTF"),
     ] {
         std::fs::write(&path, &json).unwrap();

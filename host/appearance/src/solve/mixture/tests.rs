@@ -25,7 +25,7 @@ fn mixture(curves: &Table, weights: &[f64]) -> Vec<f64> {
     row
 }
 
-/// The measured materials, or `None` (said aloud) where they are not to be found.
+/// The measured materials, or `None` with a message if they are not available.
 fn measured(space: &Space) -> Option<Vec<(String, Vec<f64>)>> {
     let Some(data) = std::env::var_os("FOILPRESS_DATA") else {
         println!("skipped: FOILPRESS_DATA is not set");
@@ -134,8 +134,8 @@ proptest! {
         prop_assert!(best.fit.distance.powi(2) <= best.fit.gap + 1e-20, "{:?}", best.fit);
     }
 
-    /// Whatever the target: feasible, no vertex and no random mixture is nearer, and where E is convex the gap
-    /// holds against them.
+    /// For any target the result is feasible, no vertex and no random mixture is nearer, and where E is convex the gap bounds
+    /// them.
     #[test]
     fn no_mixture_is_nearer(
         diffuse in prop::array::uniform3(0.0f64..0.4),
@@ -170,7 +170,7 @@ proptest! {
         }
     }
 
-    /// Any start ends in the same valley's bottom, and the gap says how near.
+    /// Any start ends in the same minimum, and the gap bounds the remaining distance.
     #[test]
     fn the_gap_bounds_what_is_left(start in prop::collection::vec(0.0f64..1.0, 57), stack in 0usize..57) {
         let space = Space::half_angle(32);
@@ -207,7 +207,7 @@ fn a_second_minimiser_finds_no_nearer_mixture_of_measured_materials() {
     }
 }
 
-/// The project's prototype saw a mean of 0.0400 with its own rounding of the library, all starts agreeing.
+/// The prototype found a mean of 0.0400 with its own rounding of the library, and all starts agreed.
 #[test]
 fn measured_materials_are_as_far_as_the_prototype_saw() {
     let space = Space::half_angle(32);

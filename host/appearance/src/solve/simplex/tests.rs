@@ -249,7 +249,7 @@ proptest! {
         a in prop::collection::vec(prop::num::f64::ANY, 5),
         g in prop::collection::vec(-1e200f64..1e200, 15),
     ) {
-        let mut values = vec![0.0; 25];
+        let mut values = [0.0; 25];
         let mut next = g.iter();
         for i in 0..5 {
             for j in 0..=i {
@@ -257,7 +257,8 @@ proptest! {
                 (values[5 * i + j], values[5 * j + i]) = if i == j { (v.abs(), v.abs()) } else { (v, v) };
             }
         }
-        let gram = Gram::from_values(5, values).unwrap();
+        let mut gram = Gram::empty();
+        gram.refill_products(5, |i, j| values[5 * i + j]);
         let mut a = a;
         match Simplex::new().solve(&gram, &h, &mut a) {
             Ok(certificate) => {

@@ -29,7 +29,7 @@ fn composed(art: &Artwork, settings: &Settings) -> Composed {
 
 /// The stacks of the dots, row by row.
 fn dots(composed: &Composed) -> Vec<String> {
-    composed.piece.index().iter().map(|&q| composed.piece.stacks()[usize::from(q)].to_string()).collect()
+    composed.dots.index().iter().map(|&q| composed.dots.stacks()[usize::from(q)].to_string()).collect()
 }
 
 fn refused(art: &Artwork, settings: &Settings) -> String {
@@ -182,7 +182,7 @@ fn tones_become_dots_of_their_mean_and_solids_stay_solid() {
     let composed = composed(&art, &with(|_| ()));
     for (quarter, wanted) in [0.0, 64.0 / 255.0, 128.0 / 255.0, 1.0].into_iter().enumerate() {
         let inked = (0..width * length).filter(|dot| dot % width / 100 == quarter);
-        let share = inked.filter(|&dot| composed.piece.index()[dot] > 0).count() as f64 / 30_000.0;
+        let share = inked.filter(|&dot| composed.dots.index()[dot] > 0).count() as f64 / 30_000.0;
         assert!((share - wanted).abs() < 0.01, "quarter {quarter}: {share}, not {wanted}");
     }
 }
@@ -248,12 +248,12 @@ proptest! {
         let passes = vec![(inks[0], times)];
         let settings = with(|s| (s.order, s.passes) = (Order::Inks(inks.clone()), passes.clone()));
         let composed = composed(&art, &settings);
-        for (dot, &q) in composed.piece.index().iter().enumerate() {
+        for (dot, &q) in composed.dots.index().iter().enumerate() {
             let wanted = naive(&art.layers, &inks, &passes, dot % width, dot / width);
-            prop_assert_eq!(composed.piece.stacks()[usize::from(q)].layers(), wanted, "dot {}", dot);
+            prop_assert_eq!(composed.dots.stacks()[usize::from(q)].layers(), wanted, "dot {}", dot);
         }
-        let paper = Paper::Custom { width: width as u16, length: length as u16 };
-        let sheet = Sheet::new(paper, composed.piece.stacks().to_vec(), composed.piece.index().to_vec()).unwrap();
+        let paper = protocol::paper::Paper::Custom { width: width as u16, length: length as u16 };
+        let sheet = Sheet::new(paper, composed.dots.stacks().to_vec(), composed.dots.index().to_vec()).unwrap();
         let separation = separate::separate(&sheet, &[], &Silent).unwrap();
         prop_assert_eq!(separate::compose(paper, &separation.passes, sheet.stacks()).unwrap(), sheet);
         let laid: u64 = composed.report.laid.iter().map(|laid| laid.dots).sum();

@@ -1,0 +1,393 @@
+//! The port's driver: it alone touches the printer, and decides who may use the port and when.
+//!
+//! Problem: one port serves the bytes of jobs, the engine's tasks, and a question of the driver's own; no byte may be lost
+//! or doubled where one ends and the next begins. Method: a state machine that is polled. Each poll reports to the
+//! engine what has been sent and what the lines show, and moves what can be moved. Whoever gets the port gets it with
+//! nothing in flight. The precedence is
+//!
+//! 1. a status question under way, which takes many polls;
+//! 2. a task of the engine; meanwhile the engine gives no bytes;
+//! 3. the question for the device ID, between jobs only;
+//! 4. the bytes of a job, which also end a wiring test.
+//!
+//! Bytes go out through the board's [`Sender`] with the default handshake, and through the [`Port`] on plain pins, by the
+//! processor, with another handshake or when some status lines are not heeded. The port on pins also does everything between
+//! jobs: device ID, status, reset, wiring test.
+//!
+//! Cost: a poll takes well below a millisecond, except when the printer is asked something: each answer of
+//! a slow printer to a step of the negotiation may take 40 ms, and other code waits for as long.
+
+mod board;
+mod introduction;
+mod question;
+mod supply;
+
+pub use board::{Board, Clock, Event, Retained, Sender, TwoBuffers};
+#[cfg(any(test, feature = "simulation"))]
+pub(crate) use question::STATUS;
+
+use self::introduction::{Action, Introduction};
+use self::question::{Outcome as Ended, StatusQuestion, Step};
+use self::supply::Supply;
+use crate::engine::{Engine, Outcome, Task};
+use crate::port::{AckPin, BadSettings, DataBus, Port, ReverseError, Stop, Timing};
+use crate::printer_class::DeviceId;
+use core::convert::Infallible;
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{InputPin, OutputPin};
+use heapless::Vec;
+use protocol::link::message::{Answer, Fault, Handshake, JobState, Lines, PortSettings};
+
+/// What a printer has sent. Device IDs are some hundred bytes long.
+type Text = Vec<u8, 512>;
+
+/// Between two looks at the lines.
+const TICK_US: u32 = 1000;
+
+/// How long to leave alone a printer that is at work on a byte, when the processor sends.
+const BUSY_US: u32 = 100;
+
+/// Bytes the processor sends in one poll: a tenth of a millisecond each at worst.
+const HANDFUL: usize = 32;
+
+/// Who works the pins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Owner {
+    /// The board's sender.
+    Sender,
+    /// The processor.
+    Processor,
+    /// The processor, which has set levels for a wiring test. They stand until there is something to send.
+    WiringTest,
+}
+
+/// What the printer is to send.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Reverse {
+    DeviceId,
+    /// What it has to say, which is the answer to a question.
+    Answer,
+}
+
+/// The driver of a board `B` and of the port on its pins.
+pub struct Driver<B, D, O, I, A, T> {
+    board: B,
+    port: Port<D, O, I, A, T>,
+    owner: Owner,
+    handshake: Handshake,
+    heed: Lines,
+    patience_us: u64,
+    /// When a byte was last sent, or nothing was waiting to be.
+    moved_us: u64,
+    supply: Supply,
+    /// Why the processor could not send.
+    stop: Option<Fault>,
+    introduction: Introduction,
+    question: Option<StatusQuestion>,
+    /// Job and state that were last written to the log.
+    logged: Option<(u32, JobState)>,
+}
+
+impl<B, D, O, I, A, T> Driver<B, D, O, I, A, T>
+where
+    B: Board,
+    D: DataBus,
+    O: OutputPin<Error = Infallible>,
+    I: InputPin<Error = Infallible>,
+    A: AckPin,
+    T: DelayNs,
+{
+    /// A driver with the default settings and the lines at rest.
+    pub fn new(board: B, port: Port<D, O, I, A, T>) -> Self {
+        let now_us = board.now_us();
+        let mut driver = Driver {
+            board,
+            port,
+            owner: Owner::Processor,
+            handshake: Handshake::Busy,
+            heed: Lines::ALL,
+            patience_us: u64::from(Timing::PATIENCE_MS) * 1000,
+            moved_us: now_us,
+            supply: Supply::new(now_us),
+            stop: None,
+            introduction: Introduction::Waiting,
+            question: None,
+            logged: None,
+        };
+        driver.release_pins();
+        driver
+    }
+
+    /// Does what is due. Returns for how many µs there is nothing to do unless the engine gets something for the
+    /// port or the sender has emptied a buffer; 0 asks for the next poll at once.
+    pub fn poll(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId) -> u32 {
+        self.count(engine);
+        if self.question.is_some() {
+            self.go_on_asking(engine);
+        } else if let Some(task) = engine.task() {
+            self.perform(task, engine, id);
+        }
+        let now_us = self.board.now_us();
+        self.look(engine, now_us);
+        self.introduce(engine, id, now_us);
+        if self.owner == Owner::WiringTest && !engine.output().is_empty() {
+            self.release_pins();
+        }
+        let pause_us = match self.owner {
+            Owner::Sender => self.feed(engine),
+            Owner::Processor => self.send(engine),
+            Owner::WiringTest => TICK_US,
+        };
+        self.keep(engine);
+        match &self.question {
+            None => pause_us,
+            Some(question) => pause_us.min(question.pause_us(self.board.now_us())),
+        }
+    }
+
+    /// Reports to the engine what the sender has sent.
+    fn count(&mut self, engine: &mut Engine<'_>) {
+        let sent = self.board.sent();
+        self.consumed(sent, engine);
+        if self.owner == Owner::Sender && self.board.in_flight() == 0 {
+            self.moved_us = self.board.now_us();
+        }
+    }
+
+    fn consumed(&mut self, count: usize, engine: &mut Engine<'_>) {
+        if count > 0 {
+            self.moved_us = self.board.now_us();
+            engine.consumed(count);
+        }
+    }
+
+    /// Keeps where the job stands for the time after a reset, and writes to the log what has changed.
+    fn keep(&mut self, engine: &Engine<'_>) {
+        let checkpoint = engine.checkpoint();
+        self.board.store(checkpoint);
+        let state = (checkpoint.progress.job, checkpoint.progress.state);
+        if self.logged.replace(state) != Some(state) && state.0 != 0 {
+            self.board.log(Event::Job(checkpoint.progress));
+        }
+    }
+
+    /// Hands bytes to the sender until it is full.
+    fn feed(&mut self, engine: &Engine<'_>) -> u32 {
+        while self.board.has_room() {
+            // The oldest bytes of the output are those in flight already.
+            let fresh = engine.output_behind(self.board.in_flight());
+            if fresh.is_empty() || self.board.give(fresh) == 0 {
+                break;
+            }
+        }
+        TICK_US
+    }
+
+    /// Sends some bytes by the processor.
+    fn send(&mut self, engine: &mut Engine<'_>) -> u32 {
+        // The port's clock may wrap.
+        let now_ms = (self.board.now_us() / 1000) as u32;
+        let output = engine.output();
+        let (mut count, mut stop) = (0, None);
+        for byte in &output[..output.len().min(HANDFUL)] {
+            let written = self.port.write(core::slice::from_ref(byte), now_ms);
+            if written.count == 0 {
+                stop = written.stop;
+                break;
+            }
+            self.board.mark();
+            count += 1;
+        }
+        self.consumed(count, engine);
+        self.stop = match stop {
+            Some(Stop::Fault(fault)) => Some(fault),
+            Some(Stop::Busy) => self.stop.filter(|_| count == 0),
+            None => None,
+        };
+        match stop {
+            None if count > 0 => 0,
+            Some(Stop::Busy) => BUSY_US,
+            _ => TICK_US,
+        }
+    }
+
+    /// Reads the lines and tells the engine. If that ends a job, what is in flight is taken back.
+    fn look(&mut self, engine: &mut Engine<'_>, now_us: u64) {
+        let lines = self.board.lines();
+        let heeded = lines.heeding(self.heed);
+        let fault = match self.supply.fault(heeded, now_us) {
+            None if heeded.high(Lines::BUSY) && now_us - self.moved_us >= self.patience_us => {
+                Some(Fault::BusyTooLong)
+            }
+            None => self.stop,
+            fault => fault,
+        };
+        let before = engine.progress().state;
+        engine.port(lines, fault);
+        if before != JobState::Lost && engine.progress().state == JobState::Lost {
+            self.board.stop();
+        }
+    }
+
+    /// Asks a printer that has been switched on for its device ID, when it is time.
+    fn introduce(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId, now_us: u64) {
+        let lines = self.board.lines().heeding(self.heed);
+        let free = self.owner != Owner::WiringTest && engine.is_idle();
+        match self.introduction.look(lines, free, now_us) {
+            Action::Nothing => {}
+            Action::Forget => id.forget(),
+            Action::Ask => {
+                self.take_pins(engine);
+                let mut text = Text::new();
+                // An ID that breaks off is of use all the same.
+                let error = self.read(Reverse::DeviceId, &mut text);
+                let told = matches!(error, None | Some(ReverseError::Silent(_))) && id.learn(&text);
+                self.board.log(if told { Event::DeviceId(text.len()) } else { Event::NoDeviceId });
+                self.release_pins();
+            }
+        }
+    }
+
+    /// Gives the pins to the processor, with nothing in flight.
+    fn take_pins(&mut self, engine: &mut Engine<'_>) {
+        let sent = self.board.stop();
+        self.consumed(sent, engine);
+        match self.owner {
+            Owner::Sender => self.board.disconnect(),
+            Owner::Processor => {}
+            Owner::WiringTest => self.port.rest(),
+        }
+        self.owner = Owner::Processor;
+    }
+
+    /// Puts the lines to rest and gives the pins to whom the settings name.
+    fn release_pins(&mut self) {
+        self.port.rest();
+        self.owner = if self.handshake == Handshake::Busy && self.heed == Lines::ALL {
+            self.board.connect();
+            Owner::Sender
+        } else {
+            Owner::Processor
+        };
+        self.stop = None;
+        self.moved_us = self.board.now_us();
+    }
+
+    /// Performs a task of the engine, or begins to.
+    fn perform(&mut self, task: Task, engine: &mut Engine<'_>, id: &mut DeviceId) {
+        self.take_pins(engine);
+        let mut text = Text::new();
+        let outcome = match task {
+            Task::Configure(settings) => match self.configure(&settings) {
+                Ok(()) => Outcome::Done,
+                Err(BadSettings) => Outcome::BadSettings,
+            },
+            Task::DeviceId => {
+                let error = self.read(Reverse::DeviceId, &mut text);
+                if error.is_none() {
+                    id.learn(&text);
+                }
+                Outcome::Answer(self.reply(&text, error))
+            }
+            Task::PrinterStatus => {
+                self.question = Some(StatusQuestion::new(self.board.now_us()));
+                return self.go_on_asking(engine);
+            }
+            Task::Initialise => {
+                self.port.initialise();
+                Outcome::Done
+            }
+            Task::Bootloader => {
+                self.board.start_boot_loader();
+                Outcome::Done
+            }
+            Task::Drive { data, control } => {
+                self.port.drive(data, control);
+                Outcome::Done
+            }
+            Task::Probe { data, control } => {
+                self.port.drive(data, control);
+                Outcome::Lines(self.board.lines())
+            }
+        };
+        engine.done(outcome);
+        if matches!(task, Task::Drive { .. } | Task::Probe { .. }) {
+            self.owner = Owner::WiringTest;
+        } else {
+            self.release_pins();
+        }
+    }
+
+    fn configure(&mut self, settings: &PortSettings) -> Result<(), BadSettings> {
+        self.port.configure(settings)?;
+        self.board.set_timing(&Timing::from_settings(settings)?);
+        (self.handshake, self.heed) = (settings.handshake, settings.heed);
+        self.patience_us = u64::from(settings.patience_s) * 1_000_000;
+        Ok(())
+    }
+
+    /// Takes the next step of the status question, if it is due.
+    fn go_on_asking(&mut self, engine: &mut Engine<'_>) {
+        let Some(mut question) = self.question.take() else { return };
+        let mut text = Text::new();
+        let now_us = self.board.now_us();
+        let ended = match question.step(now_us) {
+            Step::Write(bytes) => {
+                let written = self.port.write(bytes, (now_us / 1000) as u32);
+                question.written(written, self.board.now_us())
+            }
+            Step::Read => {
+                // Shorter than the text may be.
+                let _ = text.extend_from_slice(question.so_far());
+                let error = self.read(Reverse::Answer, &mut text);
+                question.read(&text, error, self.board.now_us())
+            }
+            Step::Wait => None,
+            Step::Over(ended) => Some(ended),
+        };
+        let answer = match ended {
+            None => {
+                self.question = Some(question);
+                return;
+            }
+            Some(Ended::Answered) => Answer::Bytes(&text),
+            Some(Ended::Failed(error)) => self.reply(&[], Some(error)),
+            Some(Ended::Stopped(fault)) => Answer::Stopped(fault),
+            Some(Ended::Silent) => Answer::Silent,
+        };
+        engine.done(Outcome::Answer(answer));
+        self.release_pins();
+    }
+
+    /// Appends to the text what the printer sends of this, as far as it fits. Returns what has gone wrong.
+    fn read(&mut self, what: Reverse, text: &mut Text) -> Option<ReverseError> {
+        let have = text.len();
+        // To its capacity, which always succeeds.
+        let _ = text.resize(text.capacity(), 0);
+        let room = &mut text[have..];
+        let result = match what {
+            Reverse::DeviceId => self.port.device_id(room),
+            Reverse::Answer => self.port.read(room),
+        };
+        let fresh = match result {
+            Ok(fresh) | Err(ReverseError::Silent(fresh)) => fresh,
+            Err(_) => 0,
+        };
+        text.truncate(have + fresh);
+        result.err()
+    }
+
+    /// What to tell the engine of what was read.
+    fn reply<'t>(&mut self, text: &'t [u8], error: Option<ReverseError>) -> Answer<'t> {
+        match error {
+            None | Some(ReverseError::Silent(_)) if text.is_empty() => Answer::Silent,
+            // Device IDs that break off are of use all the same.
+            None | Some(ReverseError::Silent(_)) => Answer::Bytes(text),
+            Some(ReverseError::OneWay | ReverseError::Refused) => Answer::OneWay,
+            Some(ReverseError::NotIdle) => match self.board.lines().heeding(self.heed).fault() {
+                Some(fault) => Answer::Stopped(fault),
+                None => Answer::Silent,
+            },
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! What has to hold whatever the bytes: each target's `check` panics if it does not.
+//!
+//! The fuzzer calls one of these; the project's ordinary tests call all of them with the corpora.
+
+pub mod engine;
+pub mod frame;
+pub mod rgl;
+pub mod runs;
+pub mod uf2;

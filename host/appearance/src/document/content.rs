@@ -1,0 +1,101 @@
+//! What a document is, and the choices in reading one.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::materials::{Factored, Materials, Surfaces, Uniform};
+
+/// Default number of half-angle samples per curve.
+pub const SAMPLES: usize = 32;
+
+/// Side of the square that a single material fills on paper by default, in millimetres.
+pub(super) const SWATCH_MM: f64 = 50.0;
+
+/// How the numbers of a colour map are encoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ColourSpace {
+    /// The transfer curve of IEC 61966-2-1.
+    Srgb,
+    /// Proportional to reflectance.
+    Linear,
+}
+
+/// The choices in reading a document.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// The material to read from a file with several: its number, counted from 0, or its name.
+    pub material: Option<String>,
+    /// Encoding of the colour maps, where it differs from the usual one of the file format.
+    pub colour_space: Option<ColourSpace>,
+    /// Samples of the half angle, 1 to 4096.
+    pub samples: usize,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { material: None, colour_space: None, samples: SAMPLES }
+    }
+}
+
+/// The pixels of a document.
+#[derive(Debug)]
+pub enum Content {
+    /// A surface for every pixel.
+    Surfaces(Surfaces),
+    /// Bases and their weight maps, already factored.
+    Factored(Factored),
+    /// One material everywhere.
+    Uniform(Uniform),
+}
+
+/// A document of materials. See the module documentation.
+#[derive(Debug)]
+pub struct Document {
+    /// The name of the sample, material or file.
+    pub name: String,
+    /// Its materials.
+    pub content: Content,
+    /// Width and height on paper in millimetres, if the document gives them.
+    pub size_mm: Option<(f64, f64)>,
+    /// What the reader assumed, in sentences.
+    pub notes: Vec<String>,
+    /// SHA-256 over the files read (their names and bytes), in hexadecimal.
+    pub digest: String,
+}
+
+impl Document {
+    /// Its pixels.
+    pub fn materials(&self) -> &dyn Materials {
+        match &self.content {
+            Content::Surfaces(surfaces) => surfaces,
+            Content::Factored(factored) => factored,
+            Content::Uniform(uniform) => uniform,
+        }
+    }
+
+    /// Bases and maps, if the document is already factored.
+    pub fn as_factored(&self) -> Option<&Factored> {
+        match &self.content {
+            Content::Factored(factored) => Some(factored),
+            _ => None,
+        }
+    }
+}
+
+/// The name of a document that is stored at a path.
+pub(super) fn stem(path: &Path) -> String {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    whole.file_stem().map_or_else(|| "document".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Checks that a size on paper is plausible: from one dot to 10 metres.
+pub(super) fn check_size_mm(size: [f64; 2]) -> Result<(), String> {
+    match size.iter().find(|mm| !(0.04..=10_000.0).contains(*mm)) {
+        Some(mm) => {
+            Err(format!("size_mm: {mm} is not a length on paper; expected 0.04 to 10000 millimetres"))
+        }
+        None => Ok(()),
+    }
+}

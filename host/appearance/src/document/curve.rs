@@ -1,0 +1,43 @@
+//! A single half-angle curve as a document of one material.
+
+use std::path::Path;
+
+use inks::Curve;
+
+use super::content::{Content, Document, SWATCH_MM, stem};
+use super::error::DocumentError;
+use super::source::Source;
+use crate::brdf::Space;
+use crate::materials::Uniform;
+
+/// The longest curve file, in bytes.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// Opens a curve file.
+pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
+    let bytes = source.read(path, MOST_BYTES)?;
+    let curve = Curve::from_csv(&bytes[..], path)?;
+    document(&curve, path, space, source)
+}
+
+/// The document of a curve read from `path`: a square of [`SWATCH_MM`] on a side.
+pub(super) fn document(
+    curve: &Curve,
+    path: &Path,
+    space: Space,
+    source: Source<'_>,
+) -> Result<Document, DocumentError> {
+    let uniform = Uniform::new(space, curve).map_err(|error| DocumentError::Field {
+        path: path.to_path_buf(),
+        field: "reflectance".into(),
+        problem: error.to_string(),
+    })?;
+    let (notes, digest) = source.finish();
+    Ok(Document {
+        name: stem(path),
+        content: Content::Uniform(uniform),
+        size_mm: Some((SWATCH_MM, SWATCH_MM)),
+        notes,
+        digest,
+    })
+}

@@ -1,0 +1,102 @@
+//! A sample as a document: opened from memory, or written as a folder of texture maps.
+
+use std::path::Path;
+
+use image::{ImageEncoder, codecs::png::PngEncoder};
+use observe::Observer;
+
+use super::content::{ColourSpace, Content, Document};
+use super::error::DocumentError;
+use super::folder::{SETTINGS, Settings, Workflow};
+use super::source::Source;
+use crate::brdf::Space;
+use crate::sample::{Finish, Sample};
+
+/// Writes a sample as a folder of texture maps. The folder must exist and hold none of the files.
+pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError> {
+    let io = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| DocumentError::Io { path, attempt: "write", source }
+    };
+    let painting = sample.draw();
+    for (file, data, colour) in painting.maps() {
+        let path = folder.join(file);
+        let output = std::fs::File::create_new(&path).map_err(io(&path))?;
+        PngEncoder::new(std::io::BufWriter::new(output))
+            .write_image(&data, painting.width as u32, painting.height as u32, colour)
+            .map_err(|error| io(&path)(std::io::Error::other(error)))?;
+    }
+    let settings = Settings {
+        name: Some(sample.name.into()),
+        size_mm: Some(painting.size_mm()),
+        colour_space: Some(ColourSpace::Srgb),
+        workflow: Some(match painting.finish {
+            Finish::Metallic { .. } => Workflow::MetallicRoughness,
+            Finish::Specular { .. } => Workflow::SpecularGlossiness,
+        }),
+        ..Settings::default()
+    };
+    let path = folder.join(SETTINGS);
+    let text = toml::to_string(&settings).map_err(|error| io(&path)(std::io::Error::other(error)))?;
+    std::fs::write(&path, text).map_err(io(&path))
+}
+
+/// Opens a sample without touching the disk.
+pub(super) fn open(name: &str, space: Space, observer: &dyn Observer) -> Result<Document, DocumentError> {
+    let sample = Sample::named(name)?;
+    let mut source = Source::new(observer);
+    observer.begin("drawing", 1);
+    let painting = sample.draw();
+    for (file, data, _) in painting.maps() {
+        source.take_in(file, &data);
+    }
+    let surfaces = painting.surfaces(space);
+    observer.advance(1);
+    observer.end();
+    let (notes, digest) = source.finish();
+    let [width, height] = painting.size_mm();
+    Ok(Document {
+        name: sample.name.into(),
+        content: Content::Surfaces(surfaces),
+        size_mm: Some((width, height)),
+        notes,
+        digest,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::content::Options;
+    use crate::document::open::open;
+    use crate::materials::Materials;
+    use crate::sample::SAMPLES;
+    use observe::Silent;
+
+    /// Each sample is drawn twice here, so the test also shows that drawing is deterministic.
+    #[test]
+    fn every_sample_opens_the_same_from_memory_and_from_its_folder() {
+        for sample in SAMPLES {
+            let folder = tempfile::tempdir().unwrap();
+            write_sample(&sample, folder.path()).unwrap();
+            let options = Options::default();
+            let file = open(folder.path().to_str().unwrap(), &options, &Silent).unwrap();
+            let memory = open(&format!("sample:{}", sample.name), &options, &Silent).unwrap();
+            assert_eq!((&file.name, file.size_mm), (&memory.name, memory.size_mm));
+            let (Content::Surfaces(file), Content::Surfaces(memory)) = (&file.content, &memory.content)
+            else {
+                panic!("a sample is made of surfaces")
+            };
+            assert_eq!((file.width(), file.height()), (memory.width(), memory.height()));
+            for pixel in 0..file.width() * file.height() {
+                assert_eq!(file.surface(pixel), memory.surface(pixel), "{} pixel {pixel}", sample.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_error_for_an_unknown_sample_lists_the_known_ones() {
+        let error = open("sample:laef", &Options::default(), &Silent).unwrap_err().to_string();
+        assert!(error.contains("laef") && error.contains("ladder"), "{error}");
+    }
+}

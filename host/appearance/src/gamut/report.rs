@@ -1,0 +1,86 @@
+//! The result of a mapping, and facts about it.
+
+use inks::Stack;
+use protocol::ink::Ink;
+
+use super::mix::InkMix;
+use super::settings::Intent;
+
+/// A mapped document and the report of the mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mapped {
+    /// The input of the halftoner.
+    pub mix: InkMix,
+    /// The report.
+    pub report: Report,
+}
+
+/// The report of a mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// The intent used: never [`Intent::Auto`].
+    pub intent: Intent,
+    /// The inks of the result, in the order of their codes.
+    pub cartridges: Vec<Ink>,
+    /// Inks left out because of the number of cartridges, in the order of leaving out.
+    pub given_up: Vec<GivenUp>,
+    /// The factor on the gloss of all bases, if it was scaled.
+    pub gloss_scale: Option<f64>,
+    /// Each basis before and after mapping.
+    pub bases: Vec<BasisReport>,
+    /// The pixels, for the intents that map them.
+    pub pixels: Option<PixelReport>,
+}
+
+/// An ink that was left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GivenUp {
+    /// The ink.
+    pub ink: Ink,
+    /// Root mean square distance between targets and mixtures with the ink.
+    pub before: f64,
+    /// The same without the ink.
+    pub after: f64,
+}
+
+/// One basis before and after mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BasisReport {
+    /// The target (1/sr), with scaled gloss if [`Report::gloss_scale`] is set.
+    pub target: Vec<f64>,
+    /// The reflectance of the mixture (1/sr), from the weights as rounded for the halftoner.
+    pub printed: Vec<f64>,
+    /// Distance d between the two.
+    pub distance: f64,
+    /// Distance d between the printed row and the basis with its original gloss.
+    pub unscaled_distance: f64,
+    /// The stacks of the mixture and their weights, largest first.
+    pub weights: Vec<(Stack, f64)>,
+    /// Gap of the optimum before pruning, in squared distance; see [`crate::solve::Fit`].
+    pub gap: f64,
+    /// Whether the gap is a proven bound.
+    pub convex: bool,
+    /// Starts tried.
+    pub starts: usize,
+    /// Starts that reached the same distance.
+    pub agreeing: usize,
+    /// Increase of the distance by leaving out weights below 0.5 %.
+    pub pruning_cost: f64,
+}
+
+/// The pixels of a clamped or blended mapping.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelReport {
+    /// Root mean square distance between pixels and their clamped mixtures.
+    pub rms: f64,
+    /// The distance that 95 % of the pixels do not exceed.
+    pub p95: f64,
+    /// The largest distance.
+    pub max: f64,
+    /// The largest gap of any pixel before pruning, in squared distance.
+    pub gap: f64,
+    /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
+    pub merged: f64,
+    /// Mean weight of the clamped mixture in the result: 1 for clamp.
+    pub clamped: f64,
+}

@@ -1,0 +1,49 @@
+//! The choices in mapping.
+
+use serde::Serialize;
+
+/// What to do with materials outside the printer's gamut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Intent {
+    /// Clamp, unless that merges more than 1 % of the pairs of different materials; then blend.
+    #[default]
+    Auto,
+    /// Map the bases and keep the weights: relative differences survive.
+    Basis,
+    /// Map each pixel on its own: lowest error, but differences outside the gamut are lost.
+    Clamp,
+    /// Clamped pixels where they are close to the target, the mapped bases elsewhere.
+    Blend,
+}
+
+/// How the gloss of the bases is treated before they are mapped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Gloss {
+    /// Scale if mapping would otherwise merge different bases and scaling helps.
+    #[default]
+    WhereMerged,
+    /// Keep the gloss.
+    Keep,
+    /// Scale the gloss of all bases by one factor, so that the most extreme basis just reaches the gamut.
+    Scale,
+}
+
+/// Settings of the gamut mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// What to do with materials outside the gamut.
+    pub intent: Intent,
+    /// How the gloss of the bases is treated.
+    pub gloss: Gloss,
+    /// The most cartridges in the result; the printer holds 7.
+    pub most_cartridges: usize,
+    /// Seed of the sample of pixels that the cartridges and the intent are chosen by.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings { intent: Intent::Auto, gloss: Gloss::WhereMerged, most_cartridges: 7, seed: 1 }
+    }
+}

@@ -1,0 +1,179 @@
+//! A surface for every pixel, evaluated through a table of lobes.
+//!
+//! Problem: the factor stage reads millions of rows `diffuse / pi + f0 lobe(theta_n; alpha)`.
+//! Method: lobes are tabulated over ln(alpha) at the angles of the space. A row interpolates between two table rows and
+//! takes three multiply-adds per sample. The interpolation error is `h^2 / 8` of the lobe's second derivative in
+//! ln(alpha) (at most 4 times the lobe), `h = ln(1 / 0.02) / 255`: about 1e-4 of the lobe.
+//! Cost: 28 bytes per pixel; 8 operations per sample, no root, no trigonometry.
+
+use rayon::prelude::*;
+
+use super::pixels::Materials;
+use super::surface::Surface;
+use crate::brdf::Space;
+
+/// The narrowest lobe that is kept; the peak of a narrower one is finer than any printable foil shows.
+const LEAST_ALPHA: f32 = 0.02;
+
+const LEVELS: usize = 256;
+
+/// Pixels handed to a thread at a time.
+const CHUNK: usize = 1 << 14;
+
+/// Lobes for unit f0 at the angles of a space, over ln(alpha).
+#[derive(Clone, Debug)]
+struct Lobes {
+    samples: usize,
+    table: Vec<f32>,
+}
+
+impl Lobes {
+    fn new(space: &Space) -> Lobes {
+        let table = (0..LEVELS)
+            .flat_map(|level| {
+                let s = level as f64 / (LEVELS - 1) as f64;
+                let alpha = f64::from(LEAST_ALPHA).powf(1.0 - s);
+                space.angles().iter().map(move |&t| inks::ggx::lobe(t, alpha) as f32)
+            })
+            .collect();
+        Lobes { samples: space.angles().len(), table }
+    }
+
+    /// The position of an alpha in the table, 0 to LEVELS - 1.
+    fn position(alpha: f32) -> f32 {
+        let s = 1.0 - alpha.ln() / LEAST_ALPHA.ln();
+        (s * (LEVELS - 1) as f32).clamp(0.0, (LEVELS - 1) as f32)
+    }
+
+    #[cfg(test)]
+    fn alpha(position: f32) -> f32 {
+        LEAST_ALPHA.powf(1.0 - position / (LEVELS - 1) as f32)
+    }
+
+    /// The two table rows around a position, and the weight of the second.
+    fn around(&self, position: f32) -> (&[f32], &[f32], f32) {
+        let level = (position as usize).min(LEVELS - 2);
+        let below = &self.table[level * self.samples..][..self.samples];
+        let above = &self.table[(level + 1) * self.samples..][..self.samples];
+        (below, above, position - level as f32)
+    }
+}
+
+/// A surface in the form a row needs: diffuse over pi, f0, and the position in the table of lobes.
+#[derive(Clone, Copy, Debug)]
+struct Packed {
+    base: [f32; 3],
+    f0: [f32; 3],
+    position: f32,
+}
+
+/// A surface for every pixel. See the module documentation.
+#[derive(Clone, Debug)]
+pub struct Surfaces {
+    width: usize,
+    height: usize,
+    space: Space,
+    lobes: Lobes,
+    pixels: Vec<Packed>,
+}
+
+impl Surfaces {
+    /// Builds the surfaces pixel by pixel, rows from the top, on all cores. Values are clamped to their ranges, NaN to the
+    /// lowest value. `width` and `height` are at least 1.
+    #[expect(clippy::manual_clamp, reason = "clamp would keep NaN, max drops it")]
+    pub(crate) fn build(
+        width: usize,
+        height: usize,
+        space: Space,
+        surface: impl Fn(usize) -> Surface + Sync,
+    ) -> Surfaces {
+        let mut pixels = vec![Packed { base: [0.0; 3], f0: [0.0; 3], position: 0.0 }; width * height];
+        pixels.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+            for (i, out) in out.iter_mut().enumerate() {
+                let surface = surface(chunk * CHUNK + i);
+                // `max` before `min`: NaN becomes 0.
+                let unit = |v: f32| v.max(0.0).min(1.0);
+                *out = Packed {
+                    base: surface.diffuse.map(|v| unit(v) * std::f32::consts::FRAC_1_PI),
+                    f0: surface.f0.map(unit),
+                    position: Lobes::position(surface.alpha.max(LEAST_ALPHA).min(1.0)),
+                };
+            }
+        });
+        let lobes = Lobes::new(&space);
+        Surfaces { width, height, space, lobes, pixels }
+    }
+
+    /// The surface of pixel `y * width + x`.
+    #[cfg(test)]
+    pub(crate) fn surface(&self, pixel: usize) -> Surface {
+        let packed = self.pixels[pixel];
+        Surface {
+            diffuse: packed.base.map(|v| v * std::f32::consts::PI),
+            f0: packed.f0,
+            alpha: Lobes::alpha(packed.position),
+        }
+    }
+}
+
+impl Materials for Surfaces {
+    fn width(&self) -> usize {
+        self.width
+    }
+
+    fn height(&self) -> usize {
+        self.height
+    }
+
+    fn space(&self) -> &Space {
+        &self.space
+    }
+
+    fn reflectance(&self, pixel: usize, out: &mut [f32]) {
+        let Packed { base, f0, position } = self.pixels[pixel];
+        let (below, above, s) = self.lobes.around(position);
+        for ((out, &below), &above) in out.chunks_exact_mut(3).zip(below).zip(above) {
+            let lobe = below + s * (above - below);
+            out[0] = base[0] + f0[0] * lobe;
+            out[1] = base[1] + f0[1] * lobe;
+            out[2] = base[2] + f0[2] * lobe;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn table_rows_are_the_curve_of_the_surface(
+            diffuse in prop::array::uniform3(0.0f32..1.0), f0 in prop::array::uniform3(0.0f32..1.0),
+            alpha in 0.02f32..1.0,
+        ) {
+            let space = Space::half_angle(48);
+            let surface = Surface { diffuse, f0, alpha };
+            let surfaces = Surfaces::build(1, 1, space.clone(), |_| surface);
+            let mut row = vec![0.0; space.columns()];
+            surfaces.reflectance(0, &mut row);
+            let expected = space.row(&surface.curve(space.angles()));
+            for (&found, &expected) in row.iter().zip(&expected) {
+                let found = f64::from(found);
+                prop_assert!((found - expected).abs() <= 2e-4 * expected + 1e-6, "{} {}", found, expected);
+            }
+            prop_assert!((surfaces.surface(0).alpha / alpha - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn wild_values_become_legal_ones() {
+        let space = Space::half_angle(8);
+        let wild =
+            Surface { diffuse: [f32::NAN, -3.0, 9.0], f0: [f32::INFINITY, f32::NAN, -1.0], alpha: f32::NAN };
+        let surfaces = Surfaces::build(1, 1, space.clone(), |_| wild);
+        let mut row = vec![f32::NAN; space.columns()];
+        surfaces.reflectance(0, &mut row);
+        assert!(row.iter().all(|v| v.is_finite() && *v >= 0.0), "{row:?}");
+    }
+}

@@ -1,0 +1,101 @@
+//! From a document to its dots: bases and weight maps, the mixture of stacks, the halftone.
+//!
+//! Nothing is decided here that a stage does not decide; this is only their order, and the values between them, kept
+//! for those who want to look.
+
+use inks::{InkSet, Library};
+
+use crate::halftone::{self, HalftoneError, halftone};
+use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
+use crate::sheet::DotMap;
+use appearance::document::Document;
+use appearance::factor::{self, FactorError, Factored};
+use appearance::gamut::{self, GamutError, Mapped, Printable};
+use observe::Observer;
+
+/// What the user may choose.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// How the document is factored.
+    pub factor: factor::Settings,
+    /// How it is mapped to the printer's gamut.
+    pub gamut: gamut::Settings,
+    /// The inks at hand.
+    pub inks: InkSet,
+    /// Size on paper.
+    pub size: Option<Size>,
+}
+
+/// A document as dots, and what it went through.
+pub struct Halftoned {
+    /// The document in bases and weight maps.
+    pub factored: Factored,
+    /// What the factoring reports; absent when the document came factored.
+    pub factoring: Option<factor::Report>,
+    /// The mixture of stacks, and what the mapping reports.
+    pub mapped: Mapped,
+    /// The dots.
+    pub dots: DotMap,
+}
+
+/// Why a document does not become dots: the error of the stage that refused.
+#[derive(Debug, thiserror::Error)]
+pub enum StageError {
+    /// Its size on paper.
+    #[error(transparent)]
+    Size(#[from] SizeError),
+    /// Its place on the page.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// Factoring.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+    /// Gamut mapping.
+    #[error(transparent)]
+    Gamut(#[from] GamutError),
+    /// Halftoning.
+    #[error(transparent)]
+    Halftone(#[from] HalftoneError),
+}
+
+/// Halftones a document at the size it will have on a page of this layout.
+///
+/// # Errors
+/// Those of the stages; a size or a layout without room is refused before the long work.
+pub fn halftoned(
+    document: &Document,
+    library: &Library,
+    settings: &Settings,
+    layout: &Layout,
+    observer: &dyn Observer,
+) -> Result<Halftoned, StageError> {
+    let materials = document.materials();
+    let pixels = (materials.width(), materials.height());
+    let (width, height) = size::dots(pixels, document.size_mm, settings.size, layout)?;
+    layout::check(width.into(), height.into(), layout)?;
+    let (factored, factoring) = factored(document, &settings.factor, observer)?;
+    if let Some(report) = &factoring {
+        observer.note(&report.to_string());
+    }
+    let printable = Printable::from_library(library, &settings.inks, &factored.space);
+    let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
+    let minima = halftone::Settings::from_library(&mapped.mix.stacks, library);
+    let dots = halftone(&mapped.mix, (width, height), &minima, observer)?;
+    Ok(Halftoned { factored, factoring, mapped, dots })
+}
+
+/// A document's bases and maps: its own if it came factored.
+///
+/// # Errors
+/// Those of the factoring.
+pub fn factored(
+    document: &Document,
+    settings: &factor::Settings,
+    observer: &dyn Observer,
+) -> Result<(Factored, Option<factor::Report>), FactorError> {
+    if let Some(factored) = document.as_factored() {
+        return Ok((factored.clone(), None));
+    }
+    let factoring = factor::factor(document.materials(), settings, observer)?;
+    Ok((factoring.factored, Some(factoring.report)))
+}

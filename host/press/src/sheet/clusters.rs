@@ -1,0 +1,155 @@
+//! The smallest connected clusters of a dot map.
+//!
+//! Problem: whether foil and metallic ink stick is decided by their smallest clusters.
+//! Method: clusters are 4-connected components, found by joining the runs of neighbouring rows (union-find).
+//! Cost: 20 ns a run. Memory: 12 bytes a run of a row, 12 bytes a cluster.
+
+/// How many dots are like the first; `row` is not empty. Eight at a time, as most runs are about that long.
+fn run(row: &[u8]) -> usize {
+    let first = u64::from_ne_bytes([row[0]; 8]);
+    let (words, rest) = row.as_chunks::<8>();
+    for (i, &word) in words.iter().enumerate() {
+        let differ = u64::from_le_bytes(word) ^ first;
+        if differ != 0 {
+            return 8 * i + differ.trailing_zeros() as usize / 8;
+        }
+    }
+    8 * words.len() + rest.iter().take_while(|&&dot| dot == row[0]).count()
+}
+
+/// Clusters that may turn out to be one: a forest of parents.
+#[derive(Default)]
+struct Clusters {
+    parent: Vec<u32>,
+    /// Dots, counted at the root of a tree.
+    size: Vec<u32>,
+    label: Vec<u8>,
+}
+
+impl Clusters {
+    fn new_one(&mut self, label: u8) -> u32 {
+        // Fewer clusters than dots, whose number fits.
+        let number = self.parent.len() as u32;
+        self.parent.push(number);
+        self.size.push(0);
+        self.label.push(label);
+        number
+    }
+
+    fn root(&mut self, mut i: u32) -> u32 {
+        while self.parent[i as usize] != i {
+            // Halving the path keeps the trees flat.
+            self.parent[i as usize] = self.parent[self.parent[i as usize] as usize];
+            i = self.parent[i as usize];
+        }
+        i
+    }
+
+    /// Makes one cluster of two roots; the older takes the younger.
+    fn join(&mut self, a: u32, b: u32) -> u32 {
+        let (old, young) = (a.min(b), a.max(b));
+        if old != young {
+            self.parent[young as usize] = old;
+            self.size[old as usize] += std::mem::take(&mut self.size[young as usize]);
+        }
+        old
+    }
+
+    /// The smallest cluster of each label, 0 for a label without one.
+    fn smallest(&self) -> [u32; 256] {
+        let mut least = [0; 256];
+        for (i, &label) in self.label.iter().enumerate() {
+            let least = &mut least[usize::from(label)];
+            if self.parent[i] as usize == i && (*least == 0 || self.size[i] < *least) {
+                *least = self.size[i];
+            }
+        }
+        least
+    }
+}
+
+/// Dots of the smallest 4-connected cluster of each label, 0 for a label that does not occur. `label` groups stacks:
+/// equal numbers belong together. Rows of `width` dots.
+pub(crate) fn smallest_clusters(width: usize, index: &[u8], label: &[u8; 256]) -> [u32; 256] {
+    struct Run {
+        end: u32,
+        cluster: u32,
+        label: u8,
+    }
+    let mut clusters = Clusters::default();
+    let (mut above, mut here): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
+    let mut row = vec![0; width];
+    for dots in index.chunks_exact(width.max(1)) {
+        for (own, &dot) in row.iter_mut().zip(dots) {
+            *own = label[usize::from(dot)];
+        }
+        here.clear();
+        let (mut start, mut over) = (0, 0);
+        while start < row.len() {
+            let own = row[start];
+            let length = run(&row[start..]);
+            let end = start + length;
+            let mut cluster = None;
+            // Runs above that end before this one starts cannot touch it or any later one.
+            while over < above.len() && above[over].end as usize <= start {
+                over += 1;
+            }
+            for run in &above[over..] {
+                if run.label == own {
+                    let other = clusters.root(run.cluster);
+                    cluster = Some(cluster.map_or(other, |mine| clusters.join(mine, other)));
+                }
+                if run.end as usize >= end {
+                    break;
+                }
+            }
+            let cluster = cluster.unwrap_or_else(|| clusters.new_one(own));
+            clusters.size[cluster as usize] += length as u32;
+            here.push(Run { end: end as u32, cluster, label: own });
+            start = end;
+        }
+        std::mem::swap(&mut above, &mut here);
+    }
+    clusters.smallest()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Labels spread from dot to neighbour until nothing changes.
+    fn by_spreading(width: usize, index: &[u8]) -> [u32; 256] {
+        let mut cluster: Vec<usize> = (0..index.len()).collect();
+        let mut changed = true;
+        while std::mem::take(&mut changed) {
+            for dot in 0..index.len() {
+                let right = (dot % width + 1 < width).then_some(dot + 1);
+                let below = (dot + width < index.len()).then_some(dot + width);
+                for next in [right, below].into_iter().flatten().filter(|&n| index[n] == index[dot]) {
+                    let least = cluster[dot].min(cluster[next]);
+                    changed |= cluster[dot] != least || cluster[next] != least;
+                    (cluster[dot], cluster[next]) = (least, least);
+                }
+            }
+        }
+        let mut least = [0; 256];
+        for (dot, &own) in index.iter().enumerate() {
+            let size = cluster.iter().filter(|&&c| c == dot).count() as u32;
+            let least = &mut least[usize::from(own)];
+            if size > 0 && (*least == 0 || size < *least) {
+                *least = size;
+            }
+        }
+        least
+    }
+
+    proptest! {
+        #[test]
+        fn joined_runs_are_the_connected_clusters(width in 1usize..14, index in prop::collection::vec(0u8..3, 1..150)) {
+            let index = &index[..index.len() / width * width];
+            let least = smallest_clusters(width, index, &std::array::from_fn(|s| s as u8));
+            prop_assert_eq!(least, by_spreading(width, index));
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! From dots to everything a print is: page, passes, job, pictures, plan, and the way to the printer.
+//!
+//! What everything that is printed has in common, whatever made the dots.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use inks::{InkSet, Library};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::deliver::DeliverArgs;
+use super::layout::{LayoutArgs, MediaArgs};
+use super::output::{self, Kind, Staged};
+use observe::Observer;
+use press::job::page;
+use press::layout::Layout;
+use press::pipeline::{self, Draft, Job, Request};
+use press::preview::inks::{Ground, save_pass, save_sheet, thumbnail};
+use press::separate;
+use press::sheet::DotMap;
+
+/// Pixels of the longer side of the sheet on the plan's page.
+pub const THUMBNAIL: usize = 640;
+
+/// What is made of dots, and where it goes.
+#[derive(Args, Debug)]
+pub struct JobArgs {
+    #[command(flatten)]
+    pub layout: LayoutArgs,
+    #[command(flatten)]
+    pub media: MediaArgs,
+    #[command(flatten)]
+    pub result: ResultArgs,
+    #[command(flatten)]
+    pub deliver: DeliverArgs,
+}
+
+/// Where results go and how they look.
+#[derive(Args, Debug)]
+pub struct ResultArgs {
+    /// Background colour of the previews: black, white, clear, or a value such as #204080
+    #[arg(long, value_name = "COLOUR")]
+    pub background: Option<Ground>,
+    /// Folder to write [default: NAME.print in the current folder]
+    ///
+    /// A folder that this command wrote before is replaced; any other folder is left alone and reported as an error.
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Print the report as JSON instead of the plan in words
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The places a print is written to, prepared before the work so that a wrong one is reported early.
+pub struct Places {
+    target: PathBuf,
+    folder: Staged,
+    also: Option<Staged>,
+}
+
+impl Places {
+    /// Prepares the folder for something of this name, and the file the job goes to if it goes to one.
+    pub fn new(name: &str, result: &ResultArgs, deliver: &DeliverArgs) -> Result<Places> {
+        let usual = || format!("{}.print", output::file_name(name)).into();
+        let target = result.output.clone().unwrap_or_else(usual);
+        let also = deliver.file();
+        if let Some(to) = also
+            && absolute(to)?.starts_with(absolute(&target)?)
+        {
+            bail!(
+                "--to {} lies in {}, which is written as a whole; choose another place",
+                to.display(),
+                target.display()
+            );
+        }
+        let folder = Staged::folder(&target, Kind::Print)?;
+        let also = also.map(Staged::file).transpose()?;
+        Ok(Places { target, folder, also })
+    }
+
+    /// Everything appears.
+    fn commit(self, job: &[u8]) -> Result<()> {
+        if let Some(also) = &self.also {
+            write(also.path(), job)?;
+        }
+        self.folder.commit()?;
+        match self.also {
+            Some(also) => also.commit(),
+            None => Ok(()),
+        }
+    }
+}
+
+fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).with_context(|| format!("`{}` is not a path", path.display()))
+}
+
+/// Writes a file of a print.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// A job that was proved on the simulated printer and written where it will appear.
+pub struct Made {
+    /// The job.
+    pub job: Job,
+    /// The folder it was written to, which has another name yet.
+    pub folder: PathBuf,
+    places: Places,
+}
+
+/// Makes a job, proves it, and writes what every print has: the job, its passes, the plan as a page, and the dots as the
+/// simulated printer printed them: all inks on the ground, and each pass by itself.
+pub fn make(request: &Request<'_>, places: Places, ground: Ground, observer: &dyn Observer) -> Result<Made> {
+    let job = pipeline::job(request, observer)?;
+    let printout = job.prove(observer)?;
+    let Draft { sheet, laid, separation, plan } = &job.draft;
+    let folder = places.folder.create()?.to_path_buf();
+    write(&folder.join("job.rgl"), &job.bytes)?;
+    let picture = thumbnail(sheet, ground, THUMBNAIL);
+    write(&folder.join("plan.html"), page::html(plan, &picture)?.as_bytes())?;
+    // The page is the simulated sheet, dot for dot.
+    save_sheet(sheet, laid.area, ground, &folder.join("preview.png"))?;
+    printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
+        let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
+        save_pass(pass, laid.area, ground, &folder.join(name))
+    })?;
+    let passes = folder.join("passes");
+    fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
+    separate::files::save(separation, &passes)?;
+    sheet.save_colours(laid.area, &folder.join("separation.png"))?;
+    Ok(Made { job, folder, places })
+}
+
+impl Made {
+    /// Writes the report, makes everything appear, shows the plan and sends the job. `more` is what else the report
+    /// holds, `advice` what else to say below the plan, and `picture` the file to look at.
+    pub fn finish(
+        self,
+        more: Value,
+        (advice, picture): (&str, &str),
+        result: &ResultArgs,
+        deliver: &DeliverArgs,
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        let Made { job: Job { draft: Draft { plan, .. }, bytes }, folder, places } = self;
+        let mut report = json!({
+            "program": concat!("foilpress ", env!("CARGO_PKG_VERSION")),
+            "document": { "name": plan.document },
+            "plan": plan,
+            "job": { "bytes": bytes.len() },
+            // `Job::prove` compared the sheets dot for dot.
+            "simulated": { "equal": true },
+        });
+        if let Value::Object(more) = more {
+            for (name, value) in more {
+                report[name] = value;
+            }
+        }
+        let report = serde_json::to_string_pretty(&report)?;
+        write(&folder.join("report.json"), report.as_bytes())?;
+        let target = places.target.clone();
+        places.commit(&bytes)?;
+        if result.json {
+            super::stdio::show(&format!("{report}\n"))?;
+        } else {
+            super::stdio::show(&format!(
+                "{plan}{advice}\nThe simulated printer made exactly this sheet. See {}; {} is the plan on one page.\n",
+                target.join(picture).display(),
+                target.join("plan.html").display()
+            ))?;
+        }
+        deliver.send(&plan.document, &bytes, observer)
+    }
+}
+
+/// Flat art or a chart that is to be printed.
+pub struct Artwork<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its dots.
+    pub dots: &'a DotMap,
+    /// The inks the user allowed; a foil among them is consent to print it.
+    pub allowed: InkSet,
+    /// The library.
+    pub library: &'a Library,
+    /// What else the report should hold: an object, or null for nothing.
+    pub report: Value,
+    /// What else to say below the plan; empty for nothing.
+    pub advice: String,
+}
+
+impl<'a> Artwork<'a> {
+    /// The job to make of it.
+    pub fn request(&self, layout: &'a Layout, media: &MediaArgs) -> Request<'a> {
+        let Artwork { name, dots, allowed, library, .. } = *self;
+        Request { name, dots, layout, handling: media.handling(), allowed, library }
+    }
+
+    /// Makes a job of it, writes everything, shows the plan and sends the job.
+    pub fn print(
+        &self,
+        layout: &'a Layout,
+        media: &MediaArgs,
+        result: &ResultArgs,
+        deliver: &DeliverArgs,
+        observer: &dyn Observer,
+    ) -> Result<()> {
+        let places = Places::new(self.name, result, deliver)?;
+        let ground = result.background.unwrap_or_default();
+        let made = make(&self.request(layout, media), places, ground, observer)?;
+        made.finish(self.report.clone(), (&self.advice, "preview.png"), result, deliver, observer)
+    }
+}
