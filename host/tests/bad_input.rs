@@ -115,6 +115,7 @@ fn files_that_only_claim_to_be_large_are_answered_within_bounds_of_memory() {
         let program = testing::program::path().display();
         shell.args(["-c", &format!("ulimit -v 2000000; exec {program} {command}")]);
         shell.env("FOILPRESS_CONFIG", bench.path("config")).env("FOILPRESS_JOBS", bench.path("jobs"));
+        shell.env("FOILPRESS_PRINTERS", bench.path("printers"));
         let output = shell.current_dir(bench.path("")).stdin(Stdio::null()).output().unwrap();
         let said = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{command}, {name}: {said}");

@@ -3,6 +3,7 @@
 use std::fs;
 use std::process::{Command, Output, Stdio};
 
+use device::printers::{Printer, Printers};
 use device::send::journal::{Journal, NewJob};
 use observe::Silent;
 use press::job::stream::write_job;
@@ -36,6 +37,7 @@ impl Bench {
             .args(args.split_whitespace())
             .current_dir(self.folder.path())
             .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
+            .env("FOILPRESS_PRINTERS", self.folder.path().join("printers"))
             .env("FOILPRESS_CONFIG", self.folder.path().join("config"))
             .stdin(Stdio::null())
             .output()
@@ -75,9 +77,9 @@ fn a_file_and_a_raw_device_get_the_job_byte_for_byte() {
     bench.says(0, "send job.rgl --to file:copy.rgl");
     fs::write(bench.folder.path().join("port"), "").unwrap();
     let said = bench.says(0, "send job.rgl --to raw:port");
-    assert!(said.contains("white (MDC-SCWH)"), "the cassette is named: {said}");
+    assert!(said.contains("white (MDC-SCWH)"), "the cartridge is named: {said}");
     assert!(
-        said.contains("whether they are printed only the printer shows"),
+        said.contains("whether they are printed, only the printer shows"),
         "queued is not printed: {said}"
     );
     for name in ["copy.rgl", "port"] {
@@ -111,9 +113,9 @@ fn a_job_whose_bridge_is_gone_waits_and_can_be_cancelled_without_it() {
     let said = bench.says(1, "resume");
     assert!(said.contains("nothing is there"), "{said}");
     let said = bench.says(0, &format!("cancel {number}"));
-    assert!(said.contains("had not taken a byte"), "{said}");
+    assert!(said.contains("has not received any of it"), "{said}");
     assert!(bench.says(1, "resume").contains("no job waits"));
-    assert!(bench.says(1, &format!("resume {number}")).contains("is over"));
+    assert!(bench.says(1, &format!("resume {number}")).contains("has ended"));
     assert!(bench.says(1, "cancel 12345678").contains("no job 12345678"));
 }
 
@@ -124,4 +126,21 @@ fn a_wrong_destination_is_wrong_usage_and_the_right_ones_are_shown() {
         bench.says(2, args);
     }
     assert!(bench.says(2, "send job.rgl --to paper").contains("serial:/dev/ttyACM0"));
+}
+
+#[test]
+fn a_device_that_may_hold_part_of_a_job_gets_nothing_until_its_switch_was_used() {
+    let bench = Bench::new();
+    let port = bench.folder.path().join("port");
+    fs::write(&port, "").unwrap();
+    let printers = Printers::at(&bench.folder.path().join("printers")).unwrap();
+    // As it is left by a process that was killed.
+    printers.begin(&Printer::Device(port.clone()), "raw-1-1", None).unwrap();
+    let said = bench.says(1, "send job.rgl --to raw:port");
+    assert!(said.contains("not sent") && said.contains("bridge reset --by-hand"), "{said}");
+    assert!(fs::read(&port).unwrap().is_empty(), "something was sent");
+    bench.says(0, "bridge reset --by-hand");
+    bench.says(0, "send job.rgl --to raw:port");
+    assert!(fs::read(&port).unwrap() == bench.job);
+    bench.says(0, "send job.rgl --to raw:port");
 }

@@ -31,8 +31,16 @@ pub struct Port {
     pub open_cover: AtomicBool,
     /// The maker its device ID names; none for a port that does not talk back.
     pub maker: Mutex<Option<&'static str>>,
+    /// The printer does not say how it is.
+    pub one_way: AtomicBool,
     /// How often the printer was reset.
     pub resets: AtomicUsize,
+    /// How many bytes had crossed the port at each reset.
+    pub reset_at: Mutex<Vec<usize>>,
+    /// The link is cut.
+    pub cut: AtomicBool,
+    /// Something that is no message comes out of the link at both ends.
+    pub garbage: AtomicBool,
     /// The bridge's power goes, and its memory with it.
     pub forget: AtomicBool,
     /// The cassettes that are in.
@@ -53,7 +61,11 @@ impl Port {
             off: false.into(),
             open_cover: false.into(),
             maker: Mutex::default(),
+            one_way: false.into(),
             resets: 0.into(),
+            reset_at: Mutex::default(),
+            cut: false.into(),
+            garbage: false.into(),
             forget: false.into(),
             cassettes: cassettes.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
@@ -156,6 +168,18 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
             reader.reset();
             link = Some(opened);
         }
+        if port.cut.swap(false, Ordering::Relaxed) {
+            link = None;
+        }
+        if port.garbage.swap(false, Ordering::Relaxed) {
+            let garbage: Vec<u8> =
+                (0..3000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+            engine.receive(&mut reader, &garbage);
+            if let Some(open) = &mut link {
+                // What does not go at once is lost, as on a cable.
+                let _ = open.send(&garbage);
+            }
+        }
         match link.as_mut().map(|link| link.receive(&mut buffer, Duration::from_millis(1))) {
             Some(Ok(count)) => engine.receive(&mut reader, &buffer[..count]),
             Some(Err(_)) => link = None,
@@ -164,9 +188,14 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
         if let Some(task) = engine.task() {
             // What the board would do at the port.
             let status = port.status();
-            port.resets.fetch_add(usize::from(task == Task::Initialise), Ordering::Relaxed);
+            if task == Task::Initialise {
+                port.resets.fetch_add(1, Ordering::Relaxed);
+                let printed = port.printed.lock().expect("no test panicked with it").len();
+                port.reset_at.lock().expect("no test panicked with it").push(printed);
+            }
             let id = port.maker.lock().ok().and_then(|maker| maker.map(device_id));
             engine.done(match (task, &id) {
+                (Task::PrinterStatus, _) if is(&port.one_way) => Outcome::Answer(Answer::OneWay),
                 (Task::PrinterStatus, _) => Outcome::Answer(Answer::Bytes(&status)),
                 (Task::DeviceId, Some(id)) => Outcome::Answer(Answer::Bytes(id)),
                 (Task::DeviceId, None) => Outcome::Answer(Answer::OneWay),

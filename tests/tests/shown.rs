@@ -160,6 +160,7 @@ impl Desk {
             .env("PATH", format!("{}:{path}", self.folder.path().join("bin").display()))
             .env("FOILPRESS_CONFIG", self.folder.path().join("config"))
             .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
+            .env("FOILPRESS_PRINTERS", self.folder.path().join("printers"))
             .stdin(Stdio::null())
             .output()
             .unwrap();

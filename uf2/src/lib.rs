@@ -18,7 +18,6 @@
     clippy::cast_precision_loss,
     clippy::cast_sign_loss
 )]
-#![forbid(unsafe_code)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;

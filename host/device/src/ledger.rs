@@ -1,13 +1,16 @@
-//! How much ribbon has gone, cartridge by cartridge, failed jobs counted too.
+//! How much ribbon each cartridge has used, failed jobs counted too.
 //!
-//! Problem: ribbons are no longer made and say nothing of what is left on them.
-//! Method: a file that only grows, a line of JSON for each thing that happens: a job is sent, its end is known, a new
-//! cartridge is put in. A line is written at once and made durable; half a line, after a crash, is passed over. Totals are
-//! taken from the lines whenever they are asked for.
+//! Problem: ribbons are no longer made and do not tell how much is left on them.
+//! Method: files that only grow, a line of JSON for each thing that happens: a job is sent, its end is known, a new
+//! cartridge is put in. A line is written at once and made durable; half a line, after a crash, is skipped. Totals are
+//! computed from the lines whenever they are asked for.
+//! A cartridge belongs to a printer, not to whoever prints, so the ledger is that of the computer, beside
+//! [what is known of its printers](crate::printers). Each user appends to a file of their own, which nobody else can change;
+//! totals are taken from all of them. The lines name no document: everyone can read them.
 //! Limits: what a pass takes is an estimate ([`press::job::ribbon`]); a pass that was begun counts by the bytes of it
-//! that were printed. Only what this program sends is seen.
+//! that were printed. Only what this program sends is seen. Two printers of one computer share the ledger.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufRead as _, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -15,8 +18,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use protocol::ink::Ink;
 use serde::{Deserialize, Serialize};
 
-/// Name of the file.
-const FILE: &str = "ledger.jsonl";
+/// Names of the files: this, the user, and `.jsonl`.
+const PREFIX: &str = "ribbon-";
 /// More than a lifetime of jobs.
 const LARGEST: u64 = 64 << 20;
 
@@ -43,8 +46,6 @@ pub enum Event {
     Job {
         /// Its number, or any text no other job has.
         job: String,
-        /// What people call it.
-        name: String,
         /// Its passes.
         passes: Vec<PassUse>,
     },
@@ -89,7 +90,7 @@ pub struct Total {
 
 /// Why the ledger cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[error("the ledger of ribbons, {}: cannot be {what}", path.display())]
+#[error("the ribbon ledger {} cannot be {what}", path.display())]
 pub struct LedgerError {
     what: &'static str,
     path: PathBuf,
@@ -97,19 +98,21 @@ pub struct LedgerError {
     source: io::Error,
 }
 
-/// The file.
+/// The ledger of a computer.
 #[derive(Clone, Debug)]
 pub struct Ledger {
+    folder: PathBuf,
+    /// This user's file.
     path: PathBuf,
 }
 
 impl Ledger {
     /// The ledger in this folder.
     pub fn in_folder(folder: &Path) -> Ledger {
-        Ledger { path: folder.join(FILE) }
+        Ledger { folder: folder.to_path_buf(), path: folder.join(format!("{PREFIX}{}.jsonl", user())) }
     }
 
-    /// Where it is.
+    /// This user's file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -126,7 +129,7 @@ impl Ledger {
     }
 
     fn write(&self, line: &Line) -> io::Result<()> {
-        let mut file = OpenOptions::new().read(true).append(true).create(true).open(&self.path)?;
+        let mut file = self.open()?;
         // Two programs may be at it; the lock goes with the file.
         file.lock()?;
         let mut text = serde_json::to_vec(line)?;
@@ -144,12 +147,59 @@ impl Ledger {
         file.sync_all()
     }
 
-    /// All lines that can be read, and how many cannot.
+    /// Opens this user's file, which is made if need be. In a folder that everyone may write to, somebody else may have put a
+    /// link or a file of theirs in its place: neither is written to.
+    fn open(&self) -> io::Result<File> {
+        let mut options = OpenOptions::new();
+        options.read(true).append(true).create(true);
+        #[cfg(unix)]
+        {
+            use rustix::fs::OFlags;
+            use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _};
+            let flags = OFlags::NOFOLLOW | OFlags::NONBLOCK;
+            let file = options.mode(0o644).custom_flags(flags.bits().cast_signed()).open(&self.path)?;
+            let found = file.metadata()?;
+            if !found.is_file() || found.uid() != rustix::process::geteuid().as_raw() {
+                return Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is another user's"));
+            }
+            if found.len() == 0 {
+                // Readable for everyone, whatever this user's mask is.
+                file.set_permissions(fs::Permissions::from_mode(0o644))?;
+            }
+            Ok(file)
+        }
+        #[cfg(not(unix))]
+        options.open(&self.path)
+    }
+
+    /// All lines of all users that can be read, oldest first, and how many cannot be read.
     pub fn lines(&self) -> Result<(Vec<Line>, usize), LedgerError> {
-        let file = match File::open(&self.path) {
+        let listing = match fs::read_dir(&self.folder) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok((Vec::new(), 0)),
-            file => file.map_err(self.error("read"))?,
+            listing => listing.map_err(self.error("read"))?,
         };
+        let mut paths: Vec<PathBuf> = listing
+            .filter_map(|item| Some(item.ok()?.path()))
+            .filter(|path| {
+                let name = path.file_name().and_then(|name| name.to_str());
+                name.is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(".jsonl"))
+                    && path.symlink_metadata().is_ok_and(|found| found.is_file())
+            })
+            .collect();
+        paths.sort();
+        let (mut lines, mut damaged) = (Vec::new(), 0);
+        for path in paths {
+            let (mut its, torn) = self.lines_of(&path)?;
+            lines.append(&mut its);
+            damaged += torn;
+        }
+        // Stable: what one user did within a second stays in order.
+        lines.sort_by_key(|line: &Line| line.at);
+        Ok((lines, damaged))
+    }
+
+    fn lines_of(&self, path: &Path) -> Result<(Vec<Line>, usize), LedgerError> {
+        let file = File::open(path).map_err(self.error("read"))?;
         let (mut lines, mut damaged) = (Vec::new(), 0);
         for text in BufReader::new(file.take(LARGEST)).split(b'\n') {
             let text = text.map_err(self.error("read"))?;
@@ -163,6 +213,19 @@ impl Ledger {
         }
         Ok((lines, damaged))
     }
+}
+
+/// Who prints, as a part of a file's name.
+fn user() -> String {
+    #[cfg(unix)]
+    return rustix::process::geteuid().as_raw().to_string();
+    #[cfg(not(unix))]
+    std::env::var("USERNAME")
+        .unwrap_or_default()
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .take(40)
+        .collect()
 }
 
 /// What has gone of each ink. `known` says how many bytes were printed of a job whose end never came to the ledger.
@@ -217,7 +280,7 @@ mod tests {
     }
 
     fn job(number: &str, passes: Vec<PassUse>) -> Event {
-        Event::Job { job: number.into(), name: "leaf".into(), passes }
+        Event::Job { job: number.into(), passes }
     }
 
     fn printed(number: &str, bytes: u64, whole: bool) -> Event {
@@ -288,6 +351,26 @@ mod tests {
             let white = totals(&lines, |_| None).remove(0);
             assert!(white.ribbon_mm >= 10.0, "cut at {cut}: {white:?}");
         }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn every_users_jobs_count_and_nothing_is_written_through_a_link_of_somebody_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let ledger = Ledger::in_folder(folder.path());
+        let lines = |event: Event| format!("{}\n", serde_json::to_string(&Line { at: 1, event }).unwrap());
+        let other = lines(job("a", vec![pass(Ink::White, 0, 10, 10.0)])) + &lines(printed("a", 10, true));
+        fs::write(folder.path().join("ribbon-someone.jsonl"), other).unwrap();
+        ledger.append(job("b", vec![pass(Ink::White, 0, 10, 5.0)])).unwrap();
+        ledger.append(printed("b", 10, true)).unwrap();
+        assert_eq!(of(&ledger, Ink::White), Some((15.0, 2, 0)));
+        fs::remove_file(ledger.path()).unwrap();
+        let precious = folder.path().join("precious");
+        fs::write(&precious, "").unwrap();
+        std::os::unix::fs::symlink(&precious, ledger.path()).unwrap();
+        assert!(ledger.append(printed("b", 10, true)).is_err());
+        assert_eq!(fs::read(&precious).unwrap(), b"");
+        assert_eq!(of(&ledger, Ink::White), Some((10.0, 1, 0)), "nor is a link read");
     }
 
     #[test]

@@ -1,8 +1,18 @@
 //! Everything that talks to a bridge or a printer.
 //!
-//! [`send`] brings a job to a printer, [`flash`] new firmware to a bridge, and [`ledger`] counts the ribbon that was used.
+//! [`deliver`] takes a job to a printer, whoever has it sent, and stands on [`send`], the ways to a bridge and a printer.
+//! [`printers`] keeps which printers need a reset, [`ledger`] the ribbon that was used, and [`flash`] puts firmware on a bridge.
 #![forbid(unsafe_code)]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "lengths are bounded before they are cast: jobs by `send::check`, frames by their size; figures for people may be rounded"
+)]
 
+pub mod deliver;
 pub mod flash;
 pub mod ledger;
+pub mod printers;
 pub mod send;

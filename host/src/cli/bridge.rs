@@ -10,14 +10,10 @@ mod test;
 mod watch;
 
 pub use found::{Found, PATIENCE, ask, doing, only};
-pub use reset::before_sending;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
 
-use device::send::Address;
-use device::send::query::{Query, is_alps};
-use found::PRINTER_PATIENCE;
 use observe::Observer;
 
 /// Arguments of `bridge`.
@@ -63,25 +59,5 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::Test(args) => test::run(args),
         Command::Log(args) => log::run(args),
         Command::Reset(args) => reset::run(args),
-    }
-}
-
-/// Makes sure that a bridge is there and that its printer identifies itself as an ALPS printer, if it identifies itself at
-/// all; with `force` another printer is only noted. So a mistyped address or a missing permission leaves no waiting job behind.
-pub fn expect_alps(address: &Address, force: bool, observer: &dyn Observer) -> Result<()> {
-    let mut link = address.open().context("not sent")?;
-    let mut query = Query::new(&mut *link, PATIENCE).context("not sent")?;
-    match query.device_id(PATIENCE, PRINTER_PATIENCE) {
-        Some(id) if !is_alps(&id) && force => {
-            observer.note(&format!("the device does not identify itself as an ALPS printer: {id}"));
-            Ok(())
-        }
-        Some(id) if !is_alps(&id) => {
-            bail!(
-                "not sent: the device does not identify itself as an ALPS printer: {id}; check where the cable leads, or pass \
-                 --force to send anyway"
-            )
-        }
-        _ => Ok(()),
     }
 }

@@ -1,24 +1,20 @@
-//! From a plan to the printer: which cassettes are in, the word of the person who looked at the plan, and copies.
+//! From a job to its destination, for every command that has one: the plan's confirmation, copies, and how it ended.
 
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::path::Path;
-use std::time::Duration;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
-use protocol::ink::Ink;
-use protocol::link::message::Ask;
 
-use super::send;
-use device::send::cassettes::{self, Found};
-use device::send::query::{Query, Reply};
-use device::send::status::Status;
+use super::output::{self, Staged};
+use super::terminal::{Terminal, cartridges_needed, cartridges_text};
+use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
+use device::printers::Printers;
+use device::send::finish::Sheet;
+use device::send::journal::{Journal, OpenJob};
+use device::send::session::Outcome;
 use device::send::{Address, Destination};
 use observe::Observer;
-
-/// How long to wait for a bridge, and for the printer behind it.
-const BRIDGE: Duration = Duration::from_secs(3);
-const PRINTER: Duration = Duration::from_secs(8);
 
 /// Where a job goes, how often, and whether it was asked for.
 #[derive(Args, Debug)]
@@ -52,61 +48,219 @@ impl DeliverArgs {
     }
 
     /// Sends a job whose plan was shown. A job for a file was written with everything else.
-    pub fn send(&self, name: &str, job: &[u8], observer: &dyn Observer) -> Result<()> {
+    pub fn send(&self, name: &str, bytes: &[u8], observer: &dyn Observer) -> Result<()> {
         let to = match &self.to {
             None | Some(Destination::File(_)) => return Ok(()),
             Some(to) => to,
         };
-        let checked = device::send::check(job, observer)?;
+        let checked = device::send::check(bytes, observer)?;
         if let Destination::Bridge(address) = to {
-            super::show(&format!("{}\n", loaded(address, &checked.inks)))?;
+            let cartridges = find_cartridges(address, &checked.inks);
+            super::show(&format!("{}\n", cartridges_text(&cartridges)))?;
         }
         if !self.yes {
             confirm(name)?;
         }
-        send::deliver(name, job, &checked, to, self.copies, self.force, observer)
+        let order = Order { copies: self.copies, force: self.force, cartridges_shown: true };
+        deliver(Job { name, bytes, checked: &checked }, to, order, observer)
     }
 }
 
-/// What the printer says of the cassettes, in words. The bridge may not answer; then the job will not go either.
-pub fn loaded(address: &Address, inks: &[Ink]) -> String {
-    let unknown = |why: &str| format!("Which cassettes are in is not known: {why}");
-    let ask = || -> Result<Reply> {
-        let mut link = address.open()?;
-        let mut query = Query::new(&mut *link, BRIDGE)?;
-        let (_, fault) = query.lines(BRIDGE)?;
-        match fault {
-            Some(fault) => Ok(Reply::Stopped(fault)),
-            None => Ok(query.printer(Ask::Printer, PRINTER)?),
-        }
-    };
-    match ask() {
-        Err(error) => unknown(&format!("{error:#}")),
-        Ok(Reply::NotNow) => unknown("the bridge has a job under way"),
-        Ok(Reply::OneWay) => unknown("the printer's port is one-way"),
-        Ok(Reply::Silent) => unknown("the printer did not answer"),
-        Ok(Reply::Stopped(fault)) => unknown(&device::send::words::fault(fault, None)),
-        Ok(Reply::Bytes(bytes)) => match Status::read(&bytes) {
-            Err(error) => unknown(&error.to_string()),
-            Ok(status) => match cassettes::find(&status, inks) {
-                Found::All => "All cassettes of the job are in the printer.".into(),
-                Found::Stale => unknown("the printer reports an error; `foilpress bridge status` shows it"),
-                Found::Missing(missing) => {
-                    let names: Vec<String> = missing.iter().map(ToString::to_string).collect();
-                    format!(
-                        "Not in the printer: {}.\nPut in what is missing now, or wait until the machine stops and asks for it.",
-                        names.join(", ")
-                    )
-                }
-            },
-        },
+/// How a job is to be delivered.
+#[derive(Clone, Copy)]
+pub struct Order {
+    /// Sheets to print.
+    pub copies: u16,
+    /// Whether it may go to a device that does not identify itself as an ALPS printer.
+    pub force: bool,
+    /// Whether the user has already seen which cartridges are loaded.
+    pub cartridges_shown: bool,
+}
+
+/// Takes a job to its destination, once for each copy.
+pub fn deliver(job: Job<'_>, to: &Destination, order: Order, observer: &dyn Observer) -> Result<()> {
+    if let Some(driver) = job.checked.dialect {
+        observer.note(&format!(
+            "{} is in the dialect of {driver}'s drivers, which nobody has tried; it is sent unchanged",
+            job.name
+        ));
     }
+    match to {
+        Destination::File(path) => {
+            let staged = Staged::file(path)?;
+            std::fs::write(staged.path(), job.bytes)
+                .with_context(|| format!("cannot write {}", path.display()))?;
+            staged.commit()
+        }
+        Destination::Raw(path) => to_device(job, path, order, observer),
+        Destination::Bridge(address) => to_bridge(job, address, order, observer),
+    }
+}
+
+fn to_device(job: Job<'_>, path: &Path, order: Order, observer: &dyn Observer) -> Result<()> {
+    let printers = Printers::of_system()?;
+    let terminal = Terminal::new(order.force, order.cartridges_shown, observer);
+    let delivery = Delivery::new(&printers, &terminal);
+    observer.note(&cartridges_needed(&job.checked.inks));
+    for copy in 1..=order.copies {
+        delivery.send_raw(job, path).map_err(|failure| not_sent(failure, None))?;
+        observer.note(&format!(
+            "{}: the system has taken all {} bytes for the printer; whether they are printed, only the printer shows",
+            job.name,
+            job.bytes.len()
+        ));
+        if copy < order.copies && !next_sheet(copy, order.copies)? {
+            bail!(
+                "{copy} of {} sheets are sent; send the job again with --copies {} for the others",
+                order.copies,
+                order.copies - copy
+            );
+        }
+    }
+    Ok(())
+}
+
+fn to_bridge(job: Job<'_>, address: &Address, order: Order, observer: &dyn Observer) -> Result<()> {
+    let copies = order.copies;
+    let printers = Printers::of_system()?;
+    let terminal = Terminal::new(order.force, order.cartridges_shown, observer);
+    let delivery = Delivery::new(&printers, &terminal);
+    // Before anything is queued: a mistyped address or a missing permission leaves no job behind.
+    let mut met = Some(
+        delivery
+            .meet(address, None, &job.checked.inks)
+            .map_err(|failure| not_sent(failure, Some(address)))?,
+    );
+    let journal = Journal::of_user()?;
+    journal.tidy()?;
+    let packed = Packed::new(job, observer);
+    observer.note(&cartridges_needed(&job.checked.inks));
+    // All are on disk before the first is sent, so that an interruption between two sheets loses none.
+    let mut queue =
+        vec![delivery.queue(&journal, &packed.named(&copy_name(job.name, 1, copies)), address)?];
+    for copy in 2..=copies {
+        queue.push(delivery.queue(&journal, &packed.named(&copy_name(job.name, copy, copies)), address)?);
+    }
+    for (copy, queued) in (1..).zip(queue) {
+        let kept = kept(&queued);
+        let ended = delivery
+            .send(&journal, queued, address, met.take(), false)
+            .map_err(|failure| advised(failure, Some(address)))
+            .with_context(|| kept)?;
+        finish(&delivery, &ended, address, false, observer)?;
+        if copy < copies && !next_sheet(copy, copies)? {
+            bail!("{copy} of {copies} sheets are sent; `foilpress resume` sends the next one");
+        }
+    }
+    Ok(())
+}
+
+/// Goes on with a job of the journal, or with `cancel` brings it to its end.
+pub fn go_on(
+    journal: &Journal,
+    job: OpenJob,
+    address: &Address,
+    cancel: bool,
+    observer: &dyn Observer,
+) -> Result<()> {
+    let printers = Printers::of_system()?;
+    // Whether the device is the right one was settled when the job was queued; that it is not is told all the same.
+    let terminal = Terminal::new(true, cancel, observer);
+    let delivery = Delivery::new(&printers, &terminal);
+    let kept = kept(&job);
+    let ended = delivery
+        .send(journal, job, address, None, cancel)
+        .map_err(|failure| advised(failure, Some(address)))
+        .with_context(|| kept)?;
+    finish(&delivery, &ended, address, cancel, observer)
+}
+
+/// Says how a job ended, and waits for the sheet if all of it was sent.
+fn finish(
+    delivery: &Delivery<'_>,
+    ended: &Ended,
+    address: &Address,
+    cancel: bool,
+    observer: &dyn Observer,
+) -> Result<()> {
+    let text = ended.in_words();
+    match ended.outcome {
+        Outcome::Printed if cancel => bail!("{text}; it was too late to cancel"),
+        Outcome::Printed => {
+            observer.note(&text);
+            await_sheet(delivery, &ended.entry.name, address, observer);
+            Ok(())
+        }
+        Outcome::Cancelled if cancel => {
+            observer.note(&text);
+            Ok(())
+        }
+        Outcome::Cancelled | Outcome::Broken | Outcome::Lost | Outcome::Forgotten => bail!("{text}"),
+    }
+}
+
+/// Says when the sheet is out, or why that cannot be said. Nothing that happens here changes that the job was sent.
+fn await_sheet(delivery: &Delivery<'_>, name: &str, address: &Address, observer: &dyn Observer) {
+    output::say_on_interrupt("the printer has the whole job and goes on by itself");
+    let mut watch = |troubles: &[String]| match troubles {
+        [] => observer.note("the printer goes on"),
+        troubles => observer.note(&format!("the printer waits: {}", troubles.join("; "))),
+    };
+    match delivery.await_sheet(address, &mut watch) {
+        Sheet::Out => {
+            observer.note(&format!("{name}: printed; the printer says it is done, and the sheet is out"));
+        }
+        Sheet::Unknown(why) => {
+            observer.note(&format!("{name}: {why}; only the printer shows when the sheet is printed"));
+        }
+    }
+}
+
+/// What becomes of a job that is on disk when sending it fails.
+fn kept(job: &OpenJob) -> String {
+    let (number, name) = (job.entry.record.job, &job.entry.name);
+    format!("job {number:08x} ({name}) is kept; `foilpress resume {number:08x}` goes on with it")
+}
+
+/// A failure before anything was queued.
+fn not_sent(failure: Failure, to: Option<&Address>) -> anyhow::Error {
+    advised(failure, to).context("not sent")
+}
+
+/// A failure with what can be done about it on the command line.
+fn advised(failure: Failure, to: Option<&Address>) -> anyhow::Error {
+    let advice = match (&failure, to) {
+        (Failure::ResetOwed(_), Some(to)) => format!(
+            "`foilpress bridge reset --to {to}` resets it through the bridge; if you have switched it off and on: \
+             `foilpress bridge reset --by-hand`"
+        ),
+        (Failure::ResetOwed(_), None) => {
+            "switch it off and on, then confirm that with `foilpress bridge reset --by-hand`".into()
+        }
+        (Failure::NotAlps(_), _) => "connect the right printer, or send with --force".into(),
+        _ => return failure.into(),
+    };
+    anyhow!("{failure}; {advice}")
+}
+
+/// What a copy is called.
+fn copy_name(name: &str, copy: u16, copies: u16) -> String {
+    if copies == 1 { name.into() } else { format!("{name} (sheet {copy} of {copies})") }
+}
+
+/// Whether these are the copies of one job that wait for each other.
+pub fn are_copies(names: &[&str]) -> bool {
+    let stem = |name: &str| name.rfind(" (sheet ").map(|at| name[..at].to_owned());
+    names
+        .first()
+        .and_then(|first| stem(first))
+        .is_some_and(|first| names.iter().all(|name| stem(name).as_deref() == Some(first.as_str())))
 }
 
 /// Asks the person at the terminal. Where there is none, nobody has seen the plan.
 fn confirm(name: &str) -> Result<()> {
     if !io::stdin().is_terminal() {
-        bail!("{name} is not sent: nobody is there to say yes to the plan; look at it and give --yes");
+        bail!("{name} is not sent: there is no terminal to confirm the plan on; review it, then pass --yes");
     }
     write!(io::stderr(), "Send it? [y/N] ")?;
     let mut answer = String::new();
@@ -118,7 +272,7 @@ fn confirm(name: &str) -> Result<()> {
 }
 
 /// Waits for Enter between two sheets; `false` when nobody is there to press it.
-pub fn next_sheet(done: u16, copies: u16) -> Result<bool> {
+fn next_sheet(done: u16, copies: u16) -> Result<bool> {
     write!(io::stderr(), "Sheet {done} of {copies} is sent. Load the next one and press Enter: ")?;
     let mut answer = String::new();
     Ok(io::stdin().lock().read_line(&mut answer)? > 0)

@@ -1,4 +1,4 @@
-//! `foilpress ledger`: what has gone of each ribbon.
+//! `foilpress ledger`: how much ribbon each cartridge has used.
 
 use std::fmt::Write as _;
 
@@ -6,10 +6,9 @@ use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
 use protocol::ink::Ink;
 
-use device::ledger::{Event, Ledger, PassUse, totals};
-use device::send::Checked;
+use device::ledger::{Event, Ledger, totals};
+use device::printers::Printers;
 use device::send::journal::Journal;
-use observe::Observer;
 use press::job::ribbon;
 
 /// Arguments of `ledger`.
@@ -39,7 +38,7 @@ enum Command {
 /// Runs `ledger`.
 pub fn run(args: &Args) -> Result<()> {
     let journal = Journal::of_user()?;
-    let ledger = Ledger::in_folder(journal.folder());
+    let ledger = Ledger::in_folder(Printers::of_system()?.folder());
     if let Some(Command::New { ink }) = &args.command {
         ledger.append(Event::New { ink: ink.name().into() })?;
         return super::show(&format!("{}: a new cartridge, counted from now on\n", ink.name()));
@@ -73,44 +72,10 @@ pub fn run(args: &Args) -> Result<()> {
     if totals.is_empty() {
         text = "no job was sent yet\n".into();
     } else {
-        writeln!(text, "Lengths are estimates, rather too low; `foilpress ledger new INK` begins anew.")?;
+        writeln!(text, "Lengths are estimates, rather too low; `foilpress ledger new INK` starts again.")?;
     }
     if damaged > 0 {
-        writeln!(text, "{damaged} lines of {} cannot be read", ledger.path().display())?;
+        writeln!(text, "{damaged} lines beside {} cannot be read", ledger.path().display())?;
     }
     super::show(&text)
-}
-
-/// The user's ledger; without a place for it nothing is noted, which is no reason not to print.
-fn of_user() -> Option<Ledger> {
-    Journal::of_user().ok().map(|journal| Ledger::in_folder(journal.folder()))
-}
-
-fn note(event: Event, observer: &dyn Observer) {
-    if let Some(ledger) = of_user()
-        && let Err(error) = ledger.append(event)
-    {
-        observer.note(&format!("{error}; this job is not counted there"));
-    }
-}
-
-/// Notes a job that is about to be sent.
-pub fn begun(job: &str, name: &str, checked: &Checked, length: u64, observer: &dyn Observer) {
-    let ends = checked.passes.iter().skip(1).map(|pass| pass.offset).chain([length]);
-    let passes = checked
-        .passes
-        .iter()
-        .zip(ends)
-        .zip(&checked.ribbon_mm)
-        .filter_map(|((pass, end), &ribbon_mm)| {
-            let ink = Ink::from_code(pass.ink)?.name().into();
-            Some(PassUse { ink, begin: pass.offset, end, ribbon_mm })
-        })
-        .collect();
-    note(Event::Job { job: job.into(), name: name.into(), passes }, observer);
-}
-
-/// Notes how much of a job was printed.
-pub fn printed(job: &str, bytes: u64, whole: bool, observer: &dyn Observer) {
-    note(Event::Printed { job: job.into(), bytes, whole }, observer);
 }

@@ -31,6 +31,7 @@ mod sample;
 mod send;
 mod shown;
 mod stdio;
+mod terminal;
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;

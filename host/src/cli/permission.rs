@@ -2,10 +2,10 @@
 
 use std::io;
 
+use device::deliver::Failure;
 use device::flash::FlashError;
-use device::send::journal::JournalError;
+use device::send::OpenError;
 use device::send::usb::UDEV_RULES;
-use device::send::{OpenError, RunError};
 
 /// Whether the operating system refused an access that a rule would allow.
 pub fn is_missing(error: &anyhow::Error) -> bool {
@@ -13,7 +13,7 @@ pub fn is_missing(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.downcast_ref().is_some_and(refused)
             || match cause.downcast_ref() {
-                Some(RunError::<JournalError>::Open(open)) => refused(open),
+                Some(Failure::Open(open)) => refused(open),
                 _ => false,
             }
             || match cause.downcast_ref() {

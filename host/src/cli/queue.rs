@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command as Process, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
@@ -16,6 +16,7 @@ use crate::queue::install::{self, Places};
 use crate::queue::messages::Messages;
 use crate::queue::options::{self, Choices};
 use crate::queue::{backend, filter, listing, ppd, uri};
+use device::printers::{self, Printers};
 use observe::{Observer, with_causes};
 use press::layout::Profile;
 
@@ -152,6 +153,8 @@ fn install(args: &Install, observer: &dyn Observer) -> Result<()> {
             observer.note(&format!("wrote {}", file.path.display()));
         }
     }
+    // Queue and users must share what is known about a printer that needs a reset.
+    printers::make_shared_folder().with_context(as_root)?;
     // The description of a queue holds the calibration profile of its printer.
     let mut description = tempfile::NamedTempFile::new().context("cannot write the printer description")?;
     description
@@ -260,10 +263,14 @@ pub fn backend(args: &Conventional) -> ExitCode {
     if let Err(error) = ctrlc::set_handler(|| STOP.store(true, Ordering::SeqCst)) {
         messages.debug(&format!("cannot watch for signals: {}", with_causes(&error)));
     }
-    let exit = match Call::read(&args.arguments, &|name| std::env::var_os(name)) {
-        Ok(call) => backend::run(&call, &mut io::stdin().lock(), &messages, &|| STOP.load(Ordering::SeqCst)),
+    let call = Call::read(&args.arguments, &|name| std::env::var_os(name)).map_err(Error::from);
+    let exit = match call.and_then(|call| Ok((call, Printers::of_system()?))) {
+        Ok((call, printers)) => {
+            let stop = || STOP.load(Ordering::SeqCst);
+            backend::run(&call, &printers, &mut io::stdin().lock(), &messages, &stop)
+        }
         Err(error) => {
-            messages.error(&with_causes(&error));
+            messages.error(&chain(&error));
             Exit::Stop
         }
     };

@@ -1,4 +1,4 @@
-//! `foilpress resume` and `foilpress cancel`: jobs that are not over.
+//! `foilpress resume` and `foilpress cancel`: jobs that have not ended.
 
 use std::io::Write as _;
 
@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use super::bridge;
-use super::send::{are_copies, go};
+use super::deliver::{are_copies, go_on};
 use device::send::journal::{Entry, Journal};
 use device::send::query::Query;
 use device::send::session::Phase;
@@ -37,7 +37,7 @@ pub struct Resume {
     foilpress cancel                                     (the only unfinished job)\n  \
     foilpress cancel 5f3a9c01\n  \
     foilpress cancel ffffffff                            (whatever the system is printing through the bridge by itself)\n\n\
-    A sheet that has begun is brought to an end and put out; the printer is ready for the next job. Stop a `send` that is \
+    A sheet that has begun comes out unfinished, and the printer is ready for the next job. Stop a `send` that is \
     still running first (Ctrl-C).")]
 pub struct Cancel {
     /// Number of the job [default: the only unfinished job]
@@ -70,7 +70,7 @@ pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
     let job = journal.open(choose(&journal, args.job)?)?;
     let address = address(&job.entry, args.to.as_ref())?;
     let cancel = job.entry.record.cancel;
-    go(job, &journal, &address, cancel, observer)
+    go_on(&journal, job, &address, cancel, observer)
 }
 
 /// Runs `cancel`.
@@ -81,7 +81,7 @@ pub fn cancel(args: &Cancel, observer: &dyn Observer) -> Result<()> {
     let journal = Journal::of_user()?;
     let job = journal.open(choose(&journal, args.job)?)?;
     let address = address(&job.entry, args.to.as_ref())?;
-    go(job, &journal, &address, true, observer)
+    go_on(&journal, job, &address, true, observer)
 }
 
 /// Number of whatever the operating system prints through the bridge as through an ordinary printer.
@@ -103,7 +103,7 @@ fn cancel_plain(to: Option<&Address>) -> Result<()> {
 fn address(entry: &Entry, asked: Option<&Address>) -> Result<Address> {
     match asked {
         Some(address) => Ok(address.clone()),
-        None => entry.to.parse().with_context(|| "the journal names no bridge; say where it is with --to"),
+        None => entry.to.parse().with_context(|| "the journal names no bridge; name it with --to"),
     }
 }
 
@@ -118,7 +118,7 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
         .filter(|entry| !matches!(entry.record.phase, Phase::Ended(_)))
         .collect();
     match &open[..] {
-        [] => bail!("no job waits; every one that was sent is over (`foilpress resume --list`)"),
+        [] => bail!("no job waits; all have ended (`foilpress resume --list`)"),
         [one] => Ok(one.record.job),
         // Sheets of one job wait for each other; any of them is the next.
         several if are_copies(&several.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>()) => {
@@ -127,7 +127,7 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
         }
         several => {
             let lines: Vec<String> = several.iter().map(line).collect();
-            bail!("several jobs are not over; say which:\n{}", lines.join("\n"))
+            bail!("several jobs have not ended; choose one:\n{}", lines.join("\n"))
         }
     }
 }

@@ -6,11 +6,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
+use device::deliver::Failure;
 use device::flash::FlashError;
-use device::send::journal::JournalError;
+use device::send::OpenError;
 use device::send::query::QueryError;
-use device::send::raw::RawError;
-use device::send::{OpenError, RunError};
 use observe::with_causes;
 
 /// The largest stream that is read: several times a page of noise in seven passes.
@@ -42,11 +41,10 @@ pub fn read_job(path: &Path) -> Result<Vec<u8>> {
 /// away is something else.
 pub fn closed_pipe(error: &anyhow::Error) -> bool {
     let device = error.chain().any(|cause| {
-        cause.is::<RawError>()
+        cause.is::<Failure>()
             || cause.is::<QueryError>()
             || cause.is::<OpenError>()
             || cause.is::<FlashError>()
-            || cause.is::<RunError<JournalError>>()
     });
     !device
         && error.chain().any(|cause| {
@@ -68,7 +66,10 @@ mod tests {
     use device::flash::drive::DriveError;
     use device::flash::image::ImageError;
     use device::flash::picoboot::WriteError;
-    use device::send::Unsendable;
+    use device::printers::PrintersError;
+    use device::send::journal::JournalError;
+    use device::send::raw::RawError;
+    use device::send::{RunError, Unsendable};
     use inks::CurveError;
     use press::files::FileError;
     use press::inspect::StreamError;
@@ -150,6 +151,9 @@ mod tests {
             (Box::new(RawError::Open { path: path(), source: disk() }), fire()),
             (Box::new(RawError::Write { path: path(), taken: 1, length: 2, source: disk() }), fire()),
             (Box::new(journal()), fire()),
+            (Box::new(PrintersError::Io { what: "write", path: path(), source: disk() }), fire()),
+            (Box::new(Failure::Query(link())), fire()),
+            (Box::new(Failure::Journal(journal())), fire()),
             (Box::new(RunError::Save(journal())), fire()),
             (Box::new(FilterError::Io { what: "read the document", source: disk() }), fire()),
             (Box::new(FilterError::NoGhostscript(disk())), fire()),

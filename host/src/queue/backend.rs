@@ -2,55 +2,62 @@
 //!
 //! Problem: the print system starts jobs again after a crash of its own, retries what failed, and knows nothing of
 //! ribbons; a sheet must not be printed twice, and a job that is cancelled must leave a printer that is ready.
-//! Method: a job's sheets go one after the other through a [session](device::send::session). Each has a journal of its own
-//! under the job's identity, so a process that takes over knows what was printed and goes on where the printer is. A
-//! sheet that was lost is printed again only when somebody releases the job. SIGTERM ends the sheet at the bridge.
+//! Method: a job's sheets go one after the other to the [delivery](device::deliver), as every command's do. Each has a journal
+//! of its own under the job's identity, so a process that takes over knows what was sent and goes on where the printer is. A
+//! sheet whose outcome is unknown, and a printer that has to be reset, hold the job: nobody can be asked here. Whoever releases
+//! a held job agrees to the reset and to printing the sheet again. SIGTERM ends the sheet at the bridge.
 //! What an earlier job has left open at the bridge is ended first.
+//! The backend ends when the last sheet is *sent*: while the printer prints from its own memory the next job may come.
 //! Limits: jobs of up to 1 GB. A raw device tells nothing, so a job that was interrupted there is held.
 //! Source: backend(7).
 
-mod bridge;
-mod raw;
+mod system;
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::ops::Range;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::call::{Call, Exit};
 use super::messages::Messages;
 use super::uri;
-use device::send::{self, Checked, Destination};
+use device::deliver::{Delivery, Ended, Failure, Job, Packed};
+use device::printers::{Printer, Printers};
+use device::send::journal::{Entry, Journal, OpenJob};
+use device::send::session::{Outcome, Phase, SessionError};
+use device::send::{self, Address, Checked, Destination};
 use observe::Silent;
 use press::inspect::sheets;
+use system::System;
 
 /// The most bytes of a job: dozens of pages.
 const LARGEST: u64 = 1 << 30;
-/// Between two attempts to reach the printer.
-const RETRY: Duration = Duration::from_secs(2);
+/// Records of jobs that ended without success are forgotten after this.
+const FORGET: Duration = Duration::from_secs(30 * 24 * 3600);
 
 /// How the backend stops before all is printed.
 struct Stopped(Exit);
 
 /// A job on its way.
-struct Delivery<'a, W> {
+struct Backend<'a, W> {
     call: &'a Call,
     messages: &'a Messages<W>,
-    /// Whether the print system wants the job ended.
-    stop: &'a (dyn Fn() -> bool + Sync),
-    stopped: Option<Instant>,
+    system: &'a System<'a, W>,
+    delivery: &'a Delivery<'a>,
 }
 
 /// Prints a job. `input` is standard input; `stop` says whether the print system has asked to end.
 pub fn run<W: Write + Send>(
     call: &Call,
+    printers: &Printers,
     input: &mut dyn Read,
     messages: &Messages<W>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Exit {
-    let mut delivery = Delivery { call, messages, stop, stopped: None };
-    match delivery.deliver(input) {
+    let system = System::new(messages, stop, call.in_class);
+    let delivery = Delivery::new(printers, &system);
+    match (Backend { call, messages, system: &system, delivery: &delivery }).deliver(input) {
         Ok(()) => {
             messages.reasons(&[]);
             Exit::Ok
@@ -59,15 +66,15 @@ pub fn run<W: Write + Send>(
     }
 }
 
-impl<W: Write + Send> Delivery<'_, W> {
+impl<W: Write + Send> Backend<'_, W> {
     fn fail(&self, exit: Exit, error: &dyn std::fmt::Display) -> Stopped {
         self.messages.error(&error.to_string());
         Stopped(exit)
     }
 
-    fn deliver(&mut self, input: &mut dyn Read) -> Result<(), Stopped> {
+    fn deliver(&self, input: &mut dyn Read) -> Result<(), Stopped> {
         let job = self.read(input)?;
-        if (self.stop)() {
+        if self.system.stops() {
             return Ok(());
         }
         let places = sheets(&job);
@@ -84,23 +91,26 @@ impl<W: Write + Send> Delivery<'_, W> {
             })
             .collect::<Result<_, _>>()?;
         if checked.iter().any(|sheet| sheet.dialect.is_some()) {
-            self.messages.info("the job is in another driver's dialect; it is sent as it is");
+            self.messages.info("the job is in another driver's dialect; it is sent unchanged");
         }
         let folder = self.call.journal.join(&self.call.identity);
-        self.end_what_was_left(&folder)?;
+        if let Destination::Bridge(address) = &self.call.to {
+            self.end_what_was_left(address, &folder)?;
+        }
         let mut number = 0;
         for _ in 0..self.call.copies {
             for (place, checked) in places.iter().zip(&checked) {
                 number += 1;
-                if (self.stop)() {
+                if self.system.stops() {
                     return Ok(());
                 }
-                if !self.sheet(&job, place, checked, &folder.join(format!("{number:04}")), number)? {
+                if !self.sheet(&job, place, checked, &folder.join(format!("{number:04}")))? {
                     return Ok(());
                 }
+                self.messages.page(number);
             }
         }
-        // Printed whole: should somebody want it again, it is another print.
+        // Sent whole: should somebody want it again, it is another print.
         self.forget(&folder);
         Ok(())
     }
@@ -112,7 +122,7 @@ impl<W: Write + Send> Delivery<'_, W> {
             None => input.take(LARGEST + 1).read_to_end(&mut job),
         };
         match read {
-            Ok(_) if job.is_empty() && !(self.stop)() => {
+            Ok(_) if job.is_empty() && !self.system.stops() => {
                 Err(self.fail(Exit::Cancel, &"there is nothing to print: the job has no bytes"))
             }
             Ok(_) if job.len() as u64 > LARGEST => {
@@ -123,49 +133,201 @@ impl<W: Write + Send> Delivery<'_, W> {
         }
     }
 
-    /// Prints one sheet, unless it is already. False when it was ended early.
+    /// Sends one sheet, unless it is sent already. False when it was ended early.
     fn sheet(
-        &mut self,
+        &self,
         job: &[u8],
         place: &Range<usize>,
         checked: &Checked,
         folder: &Path,
-        number: usize,
     ) -> Result<bool, Stopped> {
-        let data = &job[place.clone()];
-        let whole = match &self.call.to {
-            Destination::Bridge(address) => self.bridge_prints(data, checked, address, folder)?,
-            Destination::Raw(device) => self.raw_prints(data, checked, device, folder)?,
+        let job = Job { name: &self.call.title, bytes: &job[place.clone()], checked };
+        // Whoever releases a job that was held agrees to what it was held for.
+        self.system.released(fs::remove_file(folder.join(HELD)).is_ok());
+        match &self.call.to {
+            Destination::Bridge(address) => self.to_bridge(job, address, folder),
+            Destination::Raw(device) => self.to_device(job, device, folder),
             // A URI never leads to a file.
-            Destination::File(_) => return Err(self.fail(Exit::Stop, &uri::UriError::File)),
-        };
-        if whole {
-            self.messages.page(number);
+            Destination::File(_) => Err(self.fail(Exit::Stop, &uri::UriError::File)),
         }
-        Ok(whole)
     }
 
-    /// Waits a little; false when the print system wants the job ended.
-    fn pause(&self) -> bool {
-        let start = Instant::now();
-        while start.elapsed() < RETRY {
-            if (self.stop)() {
-                return false;
+    fn to_bridge(&self, job: Job<'_>, address: &Address, folder: &Path) -> Result<bool, Stopped> {
+        let failed = |failure: Failure| self.failed(failure, folder);
+        let journal = Journal::at(folder).map_err(|error| failed(error.into()))?;
+        let known = journal.entries().map_err(|error| failed(error.into()))?.pop();
+        let sent = match known {
+            Some(Entry { record, .. }) if record.phase == Phase::Ended(Outcome::Printed) => return Ok(true),
+            Some(Entry { record, .. }) if !matches!(record.phase, Phase::Ended(_)) => {
+                self.messages.info("the job was interrupted; going on where the printer is");
+                journal.open(record.job).map_err(Failure::from)
             }
-            std::thread::sleep(Duration::from_millis(50));
+            // Whoever started a job again whose sheet had ended badly wants another one.
+            _ => {
+                let packed = Packed::new(job, &Silent);
+                self.delivery.queue(&journal, &packed, address)
+            }
         }
-        true
+        .and_then(|queued: OpenJob| self.delivery.send(&journal, queued, address, None, false));
+        match sent {
+            Ok(ended) => self.judge(&ended, folder),
+            Err(Failure::Left) => Ok(false),
+            Err(_) if self.system.stops() => Ok(false),
+            Err(failure) => Err(failed(failure)),
+        }
+    }
+
+    /// Sends a sheet to a device that tells nothing. Beside it stands whether it was begun and whether it was sent.
+    fn to_device(&self, job: Job<'_>, device: &Path, folder: &Path) -> Result<bool, Stopped> {
+        let (begun, done) = (folder.join("begun"), folder.join("done"));
+        if done.exists() {
+            return Ok(true);
+        }
+        if begun.exists() && !self.system.agreed() {
+            let printer = Printer::Device(device.to_path_buf());
+            return Err(self.hold(
+                folder,
+                &format!("the job was interrupted, and {printer} does not tell what it has printed"),
+                SWITCH,
+            ));
+        }
+        let names: Vec<&str> = job.checked.inks.iter().map(|ink| ink.name()).collect();
+        self.messages.info(&format!("cartridges needed, in this order: {}", names.join(", ")));
+        self.system.notes_its_begin_in(&begun);
+        let sent = self.delivery.send_raw(job, device);
+        let cannot = |error: io::Error| {
+            let folder = folder.display();
+            self.fail(Exit::Stop, &format!("cannot keep the job's record in {folder}: {error}"))
+        };
+        if let Some(error) = self.system.could_not_note() {
+            return Err(cannot(error));
+        }
+        match sent {
+            Ok(true) => {
+                system::put(&done).map_err(cannot)?;
+                Ok(true)
+            }
+            Ok(false) => {
+                self.messages.info(
+                    "cancelled; the sheet comes out unfinished and the printer is ready for the next job",
+                );
+                let _ = fs::remove_file(&begun);
+                Ok(false)
+            }
+            Err(_) if self.system.stops() => Ok(false),
+            Err(failure) => Err(self.failed(failure, folder)),
+        }
+    }
+
+    /// What the print system is to do about a failure.
+    fn failed(&self, failure: Failure, folder: &Path) -> Stopped {
+        let text = observe::with_causes(&failure);
+        match failure {
+            failure
+                if self.call.in_class && (failure.may_pass() || matches!(failure, Failure::ResetOwed(_))) =>
+            {
+                self.fail(Exit::Failed, &text)
+            }
+            Failure::ResetOwed(owed) => {
+                let what = if matches!(owed.printer, Printer::Device(_)) { SWITCH } else { RESET };
+                self.hold(folder, &text, what)
+            }
+            Failure::Raw(send::raw::RawError::Write { .. }) => self.hold(folder, &text, SWITCH),
+            Failure::NotAlps(_) => self.fail(
+                Exit::Stop,
+                &format!("not sent: {text}. Connect the right one, then start the queue again (cupsenable)"),
+            ),
+            _ => self.fail(Exit::Stop, &text),
+        }
+    }
+
+    /// Holds the job, and notes that it was, so that a release is known for one.
+    fn hold(&self, folder: &Path, why: &str, what: &str) -> Stopped {
+        if let Err(error) = system::put(&folder.join(HELD)) {
+            // Then it is held again when it is released; `foilpress bridge reset` helps.
+            self.messages.debug(&format!("cannot write in {}: {error}", folder.display()));
+        }
+        self.fail(Exit::Hold, &format!("{why}. The job is held: {what}, or cancel it"))
+    }
+
+    /// What the print system is to do about a sheet that ended so.
+    fn judge(&self, ended: &Ended, folder: &Path) -> Result<bool, Stopped> {
+        let text = ended.in_words();
+        match ended.outcome {
+            Outcome::Printed => {
+                self.messages.info(&text);
+                Ok(true)
+            }
+            Outcome::Cancelled if self.system.stops() => {
+                self.messages.reasons(&[]);
+                self.messages.info(&text);
+                Ok(false)
+            }
+            // By somebody at the bridge, or by another process.
+            Outcome::Cancelled | Outcome::Broken => Err(self.fail(Exit::Cancel, &text)),
+            Outcome::Lost => Err(self.hold(folder, &text, "release it to print this sheet again")),
+            Outcome::Forgotten => Err(self.hold(folder, &text, RESET)),
+        }
+    }
+
+    /// Ends at the bridge what other jobs of this queue have left open there, and forgets old records.
+    fn end_what_was_left(&self, address: &Address, own: &Path) -> Result<(), Stopped> {
+        let Ok(listing) = fs::read_dir(&self.call.journal) else { return Ok(()) };
+        for job in listing.filter_map(|item| Some(item.ok()?.path())).filter(|path| path != own) {
+            let sheets = fs::read_dir(&job).into_iter().flatten().filter_map(|item| Some(item.ok()?.path()));
+            let mut open = false;
+            for folder in sheets.filter(|path| path.is_dir()) {
+                open |= !self.end_sheet(address, &folder)?;
+            }
+            let age =
+                fs::metadata(&job).and_then(|data| data.modified()).ok().and_then(|time| time.elapsed().ok());
+            if !open && age.is_some_and(|age| age > FORGET) {
+                self.forget(&job);
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the jobs of one sheet's journal; whether all have ended.
+    fn end_sheet(&self, address: &Address, folder: &Path) -> Result<bool, Stopped> {
+        let Ok(journal) = Journal::at(folder) else { return Ok(true) };
+        let mut all = true;
+        for entry in journal.entries().unwrap_or_default() {
+            if matches!(entry.record.phase, Phase::Ended(_)) {
+                continue;
+            }
+            // Locked, damaged, or left where the queue led before: not ours to end.
+            let (true, Ok(left)) = (entry.to == address.to_string(), journal.open(entry.record.job)) else {
+                all = false;
+                continue;
+            };
+            self.messages.debug(&format!("ending job {:08x}, which was left open", entry.record.job));
+            match self.delivery.send(&journal, left, address, None, true) {
+                Ok(_) => {}
+                Err(Failure::Left | Failure::Session(SessionError::OtherBridge { .. })) => all = false,
+                Err(_) if self.system.stops() => all = false,
+                Err(failure) => return Err(self.failed(failure, folder)),
+            }
+        }
+        Ok(all)
     }
 
     fn forget(&self, folder: &Path) {
         if let Err(error) = fs::remove_dir_all(folder)
             && error.kind() != io::ErrorKind::NotFound
         {
-            // The sheets are printed all the same; that they stay on record costs a reprint of this very job.
+            // The sheets are sent all the same; that they stay on record costs a reprint of this very job.
             self.messages.debug(&format!("cannot remove {}: {error}", folder.display()));
         }
     }
 }
+
+/// Name of the file in a sheet's folder that says that its job was held.
+const HELD: &str = "held";
+/// What is to be done about a printer at a bridge.
+const RESET: &str = "release it to reset the printer through the bridge and print this sheet";
+/// What is to be done about a printer at a device that tells nothing.
+const SWITCH: &str = "switch the printer off and on, then release the job to print this sheet";
 
 #[cfg(test)]
 mod tests {
@@ -192,6 +354,7 @@ mod tests {
     struct Rig {
         folder: tempfile::TempDir,
         call: Call,
+        printers: Printers,
     }
 
     impl Rig {
@@ -208,12 +371,13 @@ mod tests {
                 journal: folder.path().join("jobs"),
                 in_class: false,
             };
-            Rig { folder, call }
+            let printers = Printers::at(&folder.path().join("printers")).unwrap();
+            Rig { folder, call, printers }
         }
 
         fn run(&self, job: &[u8], stop: &(dyn Fn() -> bool + Sync)) -> (Exit, String) {
             let mut said = Vec::new();
-            let exit = run(&self.call, &mut &*job, &Messages::new(&mut said), stop);
+            let exit = run(&self.call, &self.printers, &mut &*job, &Messages::new(&mut said), stop);
             (exit, String::from_utf8(said).unwrap())
         }
 
@@ -250,6 +414,43 @@ mod tests {
         assert!(said.contains("ERROR: the job was interrupted") && rig.got().is_empty(), "{said}");
         assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
         assert!(rig.got() == bytes);
+    }
+
+    #[test]
+    fn what_another_user_left_in_the_printer_holds_every_job_until_it_is_released_or_the_printer_was_reset() {
+        let mut rig = Rig::new();
+        let bytes = job(Ink::Cyan, 30);
+        let Destination::Raw(device) = rig.call.to.clone() else { unreachable!() };
+        let printer = Printer::Device(device);
+        rig.printers.begin(&printer, "raw-1-1", None).unwrap();
+        for identity in ["one", "two"] {
+            rig.call.identity = identity.into();
+            let (exit, said) = rig.run(&bytes, &|| false);
+            assert_eq!(exit, Exit::Hold, "{said}");
+            assert!(said.contains("may hold part of an interrupted job") && said.contains("held"), "{said}");
+        }
+        assert!(rig.got().is_empty());
+        assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok, "released");
+        assert!(rig.got() == bytes);
+        assert_eq!(rig.printers.unfinished(&printer).unwrap(), []);
+        // So the other one is not asked again.
+        rig.call.identity = "one".into();
+        assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
+        rig.printers.begin(&printer, "raw-1-2", None).unwrap();
+        rig.printers.reset(None).unwrap();
+        rig.call.identity = "three".into();
+        assert_eq!(rig.run(&bytes, &|| false).0, Exit::Ok);
+    }
+
+    #[test]
+    fn ribbon_is_counted_for_every_sheet() {
+        let rig = Rig::new();
+        rig.run(&[job(Ink::Cyan, 30), job(Ink::Cyan, 30)].concat(), &|| false);
+        let (lines, damaged) = device::ledger::Ledger::in_folder(rig.printers.folder()).lines().unwrap();
+        let totals = device::ledger::totals(&lines, |_| None);
+        assert_eq!((damaged, totals.len()), (0, 1));
+        assert_eq!((totals[0].ink.as_str(), totals[0].passes, totals[0].failed), ("cyan", 2, 0));
+        assert!(totals[0].ribbon_mm > 0.0);
     }
 
     #[test]

@@ -62,7 +62,9 @@ impl Bench {
         let mut command = Command::new(path());
         command.args(args).current_dir(self.folder.path()).stdin(Stdio::null());
         command.env("FOILPRESS_CONFIG", self.home.path().join("config"));
-        command.env("FOILPRESS_JOBS", self.home.path().join("jobs"));
+        command
+            .env("FOILPRESS_JOBS", self.home.path().join("jobs"))
+            .env("FOILPRESS_PRINTERS", self.home.path().join("printers"));
         command
     }
 

@@ -258,7 +258,9 @@ impl Bench {
     fn foilpress(&self, args: &[&str]) -> Command {
         let mut command = Command::new(&self.usbfs);
         command.arg(self.folder.path().join("board")).arg("--").arg(&self.program).args(args);
-        command.env("FOILPRESS_JOBS", self.folder.path().join("jobs"));
+        command
+            .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
+            .env("FOILPRESS_PRINTERS", self.folder.path().join("printers"));
         command
     }
 

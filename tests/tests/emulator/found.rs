@@ -29,7 +29,12 @@ fn with(devices: &[(u16, u16, &str, &str)], args: &[&str]) -> Option<Output> {
         fs::write(device.join("names"), format!("{maker}\nthing\n{serial}\n")).unwrap();
         command.arg(device);
     }
-    command.arg("--").arg(program).args(args).env("FOILPRESS_JOBS", folder.path().join("jobs"));
+    command
+        .arg("--")
+        .arg(program)
+        .args(args)
+        .env("FOILPRESS_JOBS", folder.path().join("jobs"))
+        .env("FOILPRESS_PRINTERS", folder.path().join("printers"));
     Some(command.output().unwrap())
 }
 

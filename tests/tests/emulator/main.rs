@@ -89,7 +89,8 @@ impl Bench {
         command
             .args(args)
             .current_dir(self.folder.path())
-            .env("FOILPRESS_JOBS", self.folder.path().join("jobs"));
+            .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
+            .env("FOILPRESS_PRINTERS", self.folder.path().join("printers"));
         command
     }
 

@@ -4,6 +4,8 @@
 #[path = "../../../bridge/tests/model/mod.rs"]
 mod model;
 
+#[cfg(unix)]
+mod faults;
 mod paper;
 #[cfg(unix)]
 mod process;

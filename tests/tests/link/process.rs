@@ -58,7 +58,7 @@ fn spawn(folder: &Path) -> Child {
 }
 
 /// The largest of some.
-fn random_job(seed: u64) -> Vec<u8> {
+pub fn random_job(seed: u64) -> Vec<u8> {
     let mut random = seeded(seed);
     (0..20).map(|_| Planes::random(&mut random).printed()).max_by_key(Vec::len).unwrap()
 }
@@ -139,6 +139,7 @@ impl Bench {
             .args(args.replace("BRIDGE", &self.address().to_string()).split_whitespace())
             .current_dir(self.folder.path())
             .env("FOILPRESS_JOBS", self.jobs())
+            .env("FOILPRESS_PRINTERS", self.folder.path().join("printers"))
             .env("FOILPRESS_CONFIG", self.folder.path().join("config"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -172,7 +173,7 @@ impl Bench {
 }
 
 /// The program as it stands; built if need be.
-fn program() -> &'static Path {
+pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         let mut build = Command::new(env!("CARGO"));
@@ -360,7 +361,7 @@ fn silence_and_rubbish_are_no_bridge() {
     assert!(matches!(answer, Err(QueryError::Link(_))));
 }
 
-/// White and cyan, at a printer that has the cyan cassette and no other.
+/// White and cyan, at a printer that has the cyan cartridge and no other.
 fn two_passes() -> Bench {
     let plane = Plane { width: 64, length: 20, stride: 8, bits: vec![0x5a; 160] };
     let passes = [Ink::White, Ink::Cyan].map(|ink| Pass { ink, plane: plane.clone() });

@@ -63,6 +63,9 @@ impl Server {
 
     fn configure(&self) {
         let root = self.folder.path().display();
+        // As the package makes it: every user may add to it.
+        fs::create_dir(self.path("printers")).unwrap();
+        fs::set_permissions(self.path("printers"), fs::Permissions::from_mode(0o1777)).unwrap();
         for folder in ["etc", "cache", "run", "spool", "spool/tmp", "log", "bin", "files"] {
             fs::create_dir_all(self.path(folder)).unwrap();
         }
@@ -92,7 +95,8 @@ impl Server {
             format!(
                 "ServerRoot {root}/etc\nServerBin {root}/bin\nCacheDir {root}/cache\nStateDir {root}/run\n\
              RequestRoot {root}/spool\nTempDir {root}/spool/tmp\nAccessLog {root}/log/access\n\
-             ErrorLog {root}/log/error\nPageLog {root}/log/page\nSystemGroup root\nUser lp\nGroup lp\n"
+             ErrorLog {root}/log/error\nPageLog {root}/log/page\nSystemGroup root\nUser lp\nGroup lp\n\
+             SetEnv FOILPRESS_PRINTERS {root}/printers\n"
             ),
         )
         .unwrap();

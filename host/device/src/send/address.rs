@@ -37,7 +37,7 @@ pub enum Address {
 /// A text that is no destination.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error(
-    "`{0}` is no destination; write usb:, serial:/dev/ttyACM0 or tcp:HOST:PORT for a bridge (`foilpress bridge list` finds \
+    "`{0}` is not a destination; write usb:, serial:/dev/ttyACM0 or tcp:HOST:PORT for a bridge (`foilpress bridge list` finds \
      it), raw:/dev/usb/lp0 for a printer at a cable of its own, or file:job.rgl"
 )]
 pub struct NoDestination(String);
@@ -90,13 +90,13 @@ impl fmt::Display for Address {
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// Nothing is there.
-    #[error("{0}: nothing is there; is the bridge plugged in? `foilpress bridge list` shows what is")]
+    #[error("{0}: nothing is there; is the bridge plugged in? `foilpress bridge list` shows those that are")]
     Absent(Address),
     /// Several bridges, by their serial numbers.
     #[error("several bridges are on USB; choose one by its serial number: {}", by_number(.0))]
     Several(Vec<Option<String>>),
     /// Not allowed.
-    #[error("{0}: permission denied; `foilpress doctor` says what to set up")]
+    #[error("{0}: permission denied; `foilpress doctor` shows what to set up")]
     Forbidden(Address),
     /// Another program has it.
     #[error("{0}: another program uses it, perhaps another foilpress that is sending")]

@@ -5,8 +5,9 @@
 
 use serialport::SerialPortType;
 
+use super::address::{Address, OpenError};
 use super::transport::Transport;
-use super::{Address, OpenError, usb};
+use super::usb;
 
 /// What is plugged in.
 #[derive(Default)]
@@ -134,10 +135,10 @@ pub fn open(address: &Address, number: Option<u64>) -> Result<Box<dyn Transport>
 #[derive(Debug, thiserror::Error)]
 pub enum ChoiceError {
     /// None.
-    #[error("no bridge found; name its port with --to, or see `foilpress doctor`")]
+    #[error("no bridge found")]
     None,
     /// Several.
-    #[error("several bridges: choose one with --to: {}", .0.join(", "))]
+    #[error("several bridges: {}", .0.join(", "))]
     Several(Vec<String>),
 }
 

@@ -16,7 +16,7 @@ use super::status::Status;
 use super::transport::Transport;
 
 /// Between two questions: the vendor's monitor asks every four seconds.
-pub const EVERY: Duration = Duration::from_secs(4);
+pub(crate) const EVERY: Duration = Duration::from_secs(4);
 /// How long the bridge may take to answer for itself.
 const BRIDGE_PATIENCE: Duration = Duration::from_secs(5);
 /// How long it may take to put a question to the printer, and to get the answer.
@@ -32,12 +32,12 @@ pub enum Sheet {
     /// The printer says it has nothing to print any more.
     Out,
     /// Nothing can be known, for this reason.
-    Unknown(&'static str),
+    Unknown(String),
 }
 
 /// Why the printer could not be asked. The job is printed as far as the bridge can tell.
 #[derive(Debug, thiserror::Error)]
-pub enum FinishError {
+pub(crate) enum FinishError {
     /// The link could not be opened again.
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -46,9 +46,13 @@ pub enum FinishError {
     Query(#[from] QueryError),
 }
 
+fn unknown(why: &str) -> Sheet {
+    Sheet::Unknown(why.into())
+}
+
 /// Waits, without limit, until the printer says that it is done, asking every `every`. `watch` is told what is the
 /// matter with the printer, once for each change; nothing when all is well again.
-pub fn await_sheet(
+pub(crate) fn await_sheet(
     open: &mut dyn FnMut() -> Result<Box<dyn Transport>, OpenError>,
     every: Duration,
     watch: &mut dyn FnMut(&[String]),
@@ -59,10 +63,10 @@ pub fn await_sheet(
     let (mut idle, mut unanswered, mut most) = (0, 0, NEVER);
     loop {
         let (now, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
-            Reply::OneWay => return Ok(Sheet::Unknown("the printer's port does not talk back")),
-            Reply::NotNow => return Ok(Sheet::Unknown("the bridge has another job by now")),
+            Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
+            Reply::NotNow => return Ok(unknown("the bridge already has another job")),
             Reply::Stopped(Fault::PowerOff) => {
-                return Ok(Sheet::Unknown("the printer is switched off or its cable is loose"));
+                return Ok(unknown("the printer is switched off or its cable is loose"));
             }
             Reply::Stopped(Fault::BusyTooLong) | Reply::Silent => (None, Vec::new()),
             Reply::Stopped(fault) => (None, vec![super::words::fault(fault, None)]),
@@ -87,7 +91,7 @@ pub fn await_sheet(
             return Ok(Sheet::Out);
         }
         if unanswered == most {
-            return Ok(Sheet::Unknown("the printer does not answer"));
+            return Ok(unknown("the printer does not answer"));
         }
         sleep(every);
     }

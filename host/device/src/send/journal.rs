@@ -2,8 +2,9 @@
 //!
 //! A folder for each job, named by its number: `data`, the bytes, and `job.json`, where it stands. A job appears
 //! whole or not at all (written under another name, made durable, renamed), and so does every change of `job.json`.
-//! The bytes go when the job is over; the last records stay, so that a user who asks is told how it ended.
-//! A lock on the folder keeps two processes from sending the same job.
+//! The bytes are removed when the job has ended; the last records stay, so that a user who asks is told how it ended.
+//! A lock on the folder keeps two processes from sending the same job. What a job may have left in the printer is no matter of
+//! one user's journal: see [`crate::printers`].
 //!
 //! Cost: two file syncs for each saved step; [`run`](super::run) saves at the steps that matter and once a second.
 
@@ -16,7 +17,7 @@ use protocol::link::frame::checksum;
 use protocol::link::message::JobKind;
 use serde::{Deserialize, Serialize};
 
-use super::session::{Outcome, Phase, Record};
+use super::record::{Phase, Record};
 
 /// Ended jobs whose records are kept.
 const KEPT: usize = 20;
@@ -49,17 +50,6 @@ pub struct Entry {
     pub checksum: u32,
     /// Where it stands.
     pub record: Record,
-    /// Whether the printer is known to have been reset after it, should it have been left in the middle.
-    #[serde(default)]
-    pub settled: bool,
-}
-
-impl Entry {
-    /// Whether the printer may still wait for the rest of this job, so that the next one would be text to it. A bridge that
-    /// says itself that a job is lost resets the printer before the next one.
-    pub fn left_open(&self) -> bool {
-        !self.settled && matches!(self.record.phase, Phase::Ended(Outcome::Forgotten))
-    }
 }
 
 /// Why the journal cannot be used.
@@ -88,14 +78,14 @@ pub enum JournalError {
         what: String,
     },
     /// Another process is at it.
-    #[error("job {0:08x} is being sent by another foilpress; wait for it or stop it first")]
+    #[error("another process is sending job {0:08x}; wait for it or stop it first")]
     Locked(u32),
     /// No such job.
-    #[error("there is no job {0:08x}; `foilpress resume --list` shows those that are not done")]
+    #[error("there is no job {0:08x}")]
     NoSuchJob(u32),
-    /// It is over.
-    #[error("job {0:08x} is over; there is nothing to go on with")]
-    Over(u32),
+    /// It has ended.
+    #[error("job {0:08x} has ended; there is nothing to resume")]
+    Ended(u32),
 }
 
 fn io_error(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> JournalError {
@@ -195,7 +185,6 @@ impl Journal {
             checksum,
             // Callers refuse data that do not fit the link's offsets.
             record: Record::new(number, job.kind, job.data.len() as u32),
-            settled: false,
         };
         write_entry(staged.path(), &entry)?;
         let folder = self.folder_of(number);
@@ -216,7 +205,7 @@ impl Journal {
         // Read under the lock: another process may just have ended it.
         let entry = read_entry(&folder)?;
         if matches!(entry.record.phase, Phase::Ended(_)) {
-            return Err(JournalError::Over(job));
+            return Err(JournalError::Ended(job));
         }
         let path = folder.join("data");
         let damaged = |what: String| JournalError::Damaged { path: path.clone(), what };
@@ -242,17 +231,6 @@ impl Journal {
         Ok(entries)
     }
 
-    /// The printer behind this bridge has been reset: it waits for nothing any more.
-    pub fn settle(&self, bridge: Option<u64>) -> Result<(), JournalError> {
-        for entry in self.entries()?.into_iter().filter(Entry::left_open) {
-            if bridge.is_none() || entry.record.bridge.is_none() || entry.record.bridge == bridge {
-                let folder = self.folder_of(entry.record.job);
-                write_entry(&folder, &Entry { settled: true, ..entry })?;
-            }
-        }
-        Ok(())
-    }
-
     fn folders(&self) -> Result<Vec<PathBuf>, JournalError> {
         let listing = fs::read_dir(&self.folder).map_err(io_error("read", &self.folder))?;
         Ok(listing
@@ -264,8 +242,7 @@ impl Journal {
     /// Removes all but the last records of jobs that are over.
     pub fn tidy(&self) -> Result<(), JournalError> {
         let mut over = self.entries()?;
-        // What left a printer in the middle of a sheet has to be known until it was reset.
-        over.retain(|entry| matches!(entry.record.phase, Phase::Ended(_)) && !entry.left_open());
+        over.retain(|entry| matches!(entry.record.phase, Phase::Ended(_)));
         for entry in &over[..over.len().saturating_sub(KEPT)] {
             let folder = self.folder_of(entry.record.job);
             fs::remove_dir_all(&folder).map_err(io_error("remove", &folder))?;
@@ -346,6 +323,7 @@ fn sync_folder(folder: &Path) -> Result<(), JournalError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::send::session::Outcome;
 
     fn job(data: &[u8]) -> NewJob<'_> {
         NewJob {
@@ -393,7 +371,7 @@ mod tests {
         let ended = Record { phase: Phase::Ended(Outcome::Printed), ..queued.entry.record };
         queued.save(&ended).unwrap();
         drop(queued);
-        assert!(matches!(journal.open(number), Err(JournalError::Over(_))));
+        assert!(matches!(journal.open(number), Err(JournalError::Ended(_))));
         assert_eq!(journal.entries().unwrap()[0].record, ended);
         assert!(!folder.path().join(format!("{number:08x}/data")).exists());
     }
@@ -427,38 +405,6 @@ mod tests {
         journal.tidy().unwrap();
         assert_eq!(journal.entries().unwrap().len(), KEPT + 1);
         assert!(journal.open(waiting).is_ok());
-    }
-
-    #[test]
-    fn a_forgotten_job_is_known_until_its_printer_was_reset() {
-        let folder = tempfile::tempdir().unwrap();
-        let journal = Journal::at(folder.path()).unwrap();
-        for (bridge, outcome) in
-            [(1, Outcome::Forgotten), (2, Outcome::Forgotten), (3, Outcome::Printed), (4, Outcome::Lost)]
-        {
-            let mut queued = journal.queue(job(b"x")).unwrap();
-            let ended = Record { phase: Phase::Ended(outcome), bridge: Some(bridge), ..queued.entry.record };
-            queued.save(&ended).unwrap();
-        }
-        let open = || {
-            let entries = journal.entries().unwrap().into_iter();
-            let mut open: Vec<_> =
-                entries.filter(Entry::left_open).map(|entry| entry.record.bridge).collect();
-            open.sort();
-            open
-        };
-        assert_eq!(open(), [Some(1), Some(2)]);
-        journal.settle(Some(1)).unwrap();
-        assert_eq!(open(), [Some(2)]);
-        journal.tidy().unwrap();
-        journal.settle(None).unwrap();
-        assert_eq!(open(), []);
-        // Records of before this was known of.
-        let path = folder.path().join(format!("{:08x}/job.json", journal.entries().unwrap()[0].record.job));
-        let text = fs::read_to_string(&path).unwrap();
-        let older = text.lines().filter(|line| !line.contains("settled")).collect::<String>();
-        fs::write(&path, older.replace(",}", "}")).unwrap();
-        assert_eq!(journal.entries().unwrap().len(), 4);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! nobody knows which it got. So a job cannot be resumed here, and ended early only by the process that sends it; that is
 //! what the bridge is for.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -22,7 +22,7 @@ const STILL: Duration = Duration::from_secs(15);
 #[derive(Debug, thiserror::Error)]
 pub enum RawError {
     /// It cannot be opened; nothing was sent.
-    #[error("{}: cannot be opened; `foilpress doctor` says what to set up", path.display())]
+    #[error("{} cannot be opened; `foilpress doctor` says what to set up", path.display())]
     Open {
         /// The device.
         path: PathBuf,
@@ -32,7 +32,7 @@ pub enum RawError {
     },
     /// It failed in the middle.
     #[error(
-        "{}: failed after {taken} of {length} bytes; the sheet is lost. Switch the printer off and on before the next job",
+        "{} failed after {taken} of {length} bytes; the sheet is lost. Switch the printer off and on before the next job",
         path.display()
     )]
     Write {
@@ -48,23 +48,34 @@ pub enum RawError {
     },
 }
 
-/// Hands a job over, waiting for the operator as long as it takes. The job must have been [checked](super::check).
-pub fn send(job: &[u8], path: &Path, observer: &dyn Observer) -> Result<(), RawError> {
-    send_while(job, path, observer, &|| false).map(drop)
+/// What a device was given.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Sent {
+    /// Bytes the system took.
+    pub(crate) taken: usize,
+    /// Whether they are the whole job; otherwise it was ended early.
+    pub(crate) whole: bool,
 }
 
-/// Like [`send`]; when `stop` says so the job is brought to an [early end](press::inspect::ending), as soon as the device
-/// takes bytes. False if it was.
-pub fn send_while(
+fn open(path: &Path) -> Result<File, RawError> {
+    let cannot = |source| RawError::Open { path: path.to_path_buf(), source };
+    OpenOptions::new().write(true).open(path).map_err(cannot)
+}
+
+/// Whether the device can be opened now.
+pub(crate) fn try_open(path: &Path) -> Result<(), RawError> {
+    open(path).map(drop)
+}
+
+/// Hands a job over, waiting for the operator as long as it takes. The job must have been [checked](super::check). When `stop`
+/// says so the job is brought to an [early end](press::inspect::ending), as soon as the device takes bytes.
+pub(crate) fn send_while(
     job: &[u8],
     path: &Path,
     observer: &dyn Observer,
     stop: &dyn Fn() -> bool,
-) -> Result<bool, RawError> {
-    let mut device = OpenOptions::new()
-        .write(true)
-        .open(path)
-        .map_err(|source| RawError::Open { path: path.to_path_buf(), source })?;
+) -> Result<Sent, RawError> {
+    let mut device = open(path)?;
     observer.begin("to the printer", job.len() as u64);
     let (tell, told) = mpsc::channel();
     let result = std::thread::scope(|scope| {
@@ -76,8 +87,8 @@ pub fn send_while(
                     Ok(()) => waiting = false,
                     Err(RecvTimeoutError::Timeout) if !waiting => {
                         observer.note(
-                            "the printer takes nothing at the moment: it is busy with what it has, or waits for paper, \
-                             a cassette or its cover",
+                            "the printer takes no bytes at the moment: it is busy with what it has, or is waiting for paper, \
+                             a cartridge or its cover",
                         );
                         waiting = true;
                     }
@@ -112,7 +123,7 @@ pub fn send_while(
         }
         let flushed = device.flush().map_err(|error| (taken, error));
         drop(tell);
-        flushed.map(|()| cut.is_none())
+        flushed.map(|()| Sent { taken, whole: cut.is_none() })
     });
     observer.end();
     result.map_err(|(taken, source)| RawError::Write {
@@ -149,7 +160,8 @@ mod tests {
             }
             got
         });
-        send(&job, Path::new(&path), &Silent).unwrap();
+        let sent = send_while(&job, Path::new(&path), &Silent, &|| false).unwrap();
+        assert_eq!(sent, Sent { taken: job.len(), whole: true });
         assert!(got.join().unwrap() == job);
         drop(writer);
     }
@@ -160,9 +172,9 @@ mod tests {
             println!("skipped: no /dev/full");
             return;
         }
-        let error = send(&[0; 10], Path::new("/dev/full"), &Silent).unwrap_err();
+        let error = send_while(&[0; 10], Path::new("/dev/full"), &Silent, &|| false).unwrap_err();
         assert!(matches!(error, RawError::Write { taken: 0, length: 10, .. }), "{error}");
-        let error = send(&[0; 10], Path::new("/no/such/device"), &Silent).unwrap_err();
+        let error = try_open(Path::new("/no/such/device")).unwrap_err();
         assert!(matches!(error, RawError::Open { .. }));
     }
 }

@@ -12,6 +12,7 @@ use super::address::{Address, OpenError};
 use super::find;
 use super::session::{Bridge, Outcome, Record, Session, SessionError};
 use super::transport::Transport;
+use observe::with_causes;
 
 /// How long to wait for bytes when there is nothing to send.
 const IDLE: Duration = Duration::from_millis(20);
@@ -25,7 +26,7 @@ const SAVE: Duration = Duration::from_secs(1);
 /// What happens while a job is sent.
 #[derive(Debug)]
 pub enum Event<'a> {
-    /// The bridge has introduced itself.
+    /// The bridge has introduced itself: once on each link, and again when it has restarted without the link going.
     Connected(&'a Bridge),
     /// The link went, or cannot be opened again yet. Told once for each loss.
     Away(&'a str),
@@ -46,7 +47,7 @@ pub enum Wish {
     Leave,
 }
 
-/// Why sending stopped. The job is in the journal, and can be resumed unless its outcome says otherwise.
+/// Why sending stopped. The job is in the journal, and can be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError<E: std::error::Error + 'static> {
     /// The link could not be opened in the first place.
@@ -54,8 +55,7 @@ pub enum RunError<E: std::error::Error + 'static> {
     Open(#[from] OpenError),
     /// What answers is no bridge, or nothing answers.
     #[error(
-        "no bridge answers there{}; is it the right port (`foilpress bridge list`), and does it run this program's \
-         firmware?",
+        "no bridge answers there{}; check the port (`foilpress bridge list`) and that it runs this program's firmware",
         rubbish(*.0)
     )]
     NoAnswer(usize),
@@ -65,8 +65,8 @@ pub enum RunError<E: std::error::Error + 'static> {
     /// The record could not be saved, so nothing more was sent.
     #[error("cannot keep the job's record")]
     Save(#[source] E),
-    /// The caller wished to be let go; the job goes on where it stands when it is resumed.
-    #[error("left before the job was over")]
+    /// The caller stopped waiting; the job goes on where it stands when it is resumed.
+    #[error("stopped before the job ended")]
     Left,
 }
 
@@ -139,7 +139,7 @@ fn reopen(
             Ok(link) => return Some(link),
             Err(_) if wish() == Wish::Leave => return None,
             Err(error) => {
-                let text = error.to_string();
+                let text = with_causes(&error);
                 if text != told {
                     watch(Event::Away(&text));
                     told = text;
@@ -165,7 +165,7 @@ fn converse<E: std::error::Error>(
     let mut sent = 0;
     let mut buffer = [0; 4096];
     let mut received = 0usize;
-    let mut introduced = false;
+    let mut introduced = None;
     let mut last = session.progress().copied();
     let (mut saved, mut saved_at) = (session.record().printed, opened);
     loop {
@@ -205,23 +205,14 @@ fn converse<E: std::error::Error>(
         let now = start.elapsed();
         received += count;
         session.hear(now, &buffer[..count])?;
-        if !introduced
-            && session.greeted()
+        if session.greeted()
             && let Some(bridge) = session.bridge()
+            && introduced.replace(bridge.boot) != Some(bridge.boot)
         {
-            (introduced, *met) = (true, true);
+            *met = true;
             watch(Event::Connected(bridge));
         }
-        if let Some(progress) = session.progress()
-            && last.as_ref() != Some(progress)
-        {
-            let fault = session.fault();
-            if last.is_some_and(|last| fault_of(&last) != fault) || (last.is_none() && fault.is_some()) {
-                watch(Event::Fault(fault));
-            }
-            watch(Event::Moved(progress));
-            last = Some(*progress);
-        }
+        tell_progress(session, &mut last, watch);
         if session.record().printed != saved && now.saturating_sub(saved_at) >= SAVE {
             save(session.record()).map_err(RunError::Save)?;
             (saved, saved_at) = (session.record().printed, now);
@@ -234,6 +225,19 @@ fn converse<E: std::error::Error>(
             return Ok(None);
         }
     }
+}
+
+/// Tells what is new since `last`: a fault that came or went, and where the job is.
+fn tell_progress(session: &Session<'_>, last: &mut Option<Progress>, watch: &mut dyn FnMut(Event<'_>)) {
+    let Some(progress) = session.progress().filter(|progress| last.as_ref() != Some(progress)) else {
+        return;
+    };
+    let (before, fault) = (last.as_ref().and_then(fault_of), session.fault());
+    if before != fault {
+        watch(Event::Fault(fault));
+    }
+    watch(Event::Moved(progress));
+    *last = Some(*progress);
 }
 
 fn fault_of(progress: &Progress) -> Option<Fault> {

@@ -82,7 +82,7 @@ fn words(complaint: Complaint) -> String {
     match complaint {
         Complaint::Motor { units } => {
             let parts = [
-                (0x80, "cassette changer"),
+                (0x80, "cartridge changer"),
                 (0x40, "carriage"),
                 (0x20, "bail arm"),
                 (0x10, "line feed"),
@@ -101,16 +101,16 @@ fn words(complaint: Complaint) -> String {
         }
         Complaint::Jam { at_exit: true } => "paper jam at the exit; take the sheet out".into(),
         Complaint::Jam { at_exit: false } => "paper jam: the sheet was not fed; take it out".into(),
-        Complaint::RibbonEnd => "a ribbon is at its end; put in a fresh cassette".into(),
-        Complaint::RibbonBreak => "a ribbon is torn; take the cassette out and look".into(),
-        Complaint::PlaceOccupied => "a cassette holder is occupied; take a cassette out".into(),
+        Complaint::RibbonEnd => "a ribbon is at its end; load a new cartridge".into(),
+        Complaint::RibbonBreak => "a ribbon is torn; take the cartridge out and look".into(),
+        Complaint::PlaceOccupied => "a cartridge holder is occupied; take a cartridge out".into(),
         Complaint::WrongCartridge { wanted } => match Ink::from_barcode(wanted) {
             Some(ink) => {
-                format!("it wants the {} cassette ({}, barcode {wanted}); put it in", ink.name(), ink.part())
+                format!("it wants the {} cartridge ({}, barcode {wanted}); load it", ink.name(), ink.part())
             }
-            None => format!("it wants a cassette with barcode {wanted}"),
+            None => format!("it wants a cartridge with barcode {wanted}"),
         },
-        Complaint::Cartridge => "it reports a fault of a cassette".into(),
+        Complaint::Cartridge => "it reports a fault of a cartridge".into(),
     }
 }
 

@@ -1,11 +1,10 @@
 //! A job in the printer's language as the pass streams a bridge makes the same bytes from.
 //!
-//! Problem: what a printer takes is several times what has to cross the cable to a bridge that can pack rows itself.
+//! Problem: the bytes for a printer are several times those that have to cross the cable to a bridge that can pack rows itself.
 //! Method: the job is read back into its page and planes, these are coded ([`protocol::runs`]), and what a bridge
 //! would make of the code is made here and compared with the job, byte for byte. A job that does not come back the
-//! same (another driver's packing, a leading reset, one plane of black in its own mode) is not for this form: it goes
-//! as it is.
-//! Cost: the job is read three times, one plane for each thread is held at a time. Limits: the job must be one whole legal one.
+//! same (another driver's packing, a leading reset, one plane of black in its own mode) is sent byte for byte instead.
+//! Cost: the job is parsed once for its commands and once for its dots, and compared once; one plane for each thread is held at a time. Limits: the job must be one whole legal one.
 //! Source: `docs/wire-format.md`, section 4.
 
 use protocol::ink::{Ink, Kind};
@@ -299,7 +298,7 @@ mod tests {
         let mut plain = job.clone();
         plain.splice(from..from + 8, data.iter().copied());
         plain[at + 3] = 0;
-        assert!(super::super::check(&plain, &Silent).is_ok(), "legal all the same");
+        assert!(crate::send::check(&plain, &Silent).is_ok(), "legal all the same");
         assert_eq!(of_job(&plain, &Silent), None);
         assert_eq!(of_job(b"text", &Silent), None);
         assert_eq!(of_job(b"", &Silent), None);
@@ -315,7 +314,7 @@ mod tests {
         put(writer.next_pass(&mut out).unwrap(), &out);
         put(writer.row(&[1, 2, 3], &mut out).unwrap(), &out);
         put(writer.end(&mut out).unwrap(), &out);
-        assert!(super::super::check(&job, &Silent).is_ok());
+        assert!(crate::send::check(&job, &Silent).is_ok());
         assert_eq!(of_job(&job, &Silent), None);
     }
 

@@ -8,16 +8,17 @@ use super::session::{Outcome, Phase};
 
 /// What to do about a fault, with `ink` in the pass that was being printed.
 ///
-/// The lines of the port do not tell a missing cassette from an open cover, and the printer must not be asked in the
-/// middle of a job; so the cassette the pass needs is named wherever it may be the reason.
+/// The lines of the port do not tell a missing cartridge from an open cover, and the printer must not be asked in the
+/// middle of a job; so the cartridge the pass needs is named wherever it may be the reason.
 pub fn fault(fault: Fault, ink: Option<Ink>) -> String {
-    let cassette = |ink: Ink| format!("{} cassette ({}, barcode {})", ink.name(), ink.part(), ink.barcode());
+    let cartridge =
+        |ink: Ink| format!("{} cartridge ({}, barcode {})", ink.name(), ink.part(), ink.barcode());
     match (fault, ink) {
         (Fault::PaperOut, _) => "the printer is out of paper: load a sheet, the job goes on by itself".into(),
         (Fault::OffLine | Fault::Error, Some(ink)) => format!(
             "the printer has stopped: it may want the {}. Open the cover, put it in, close the cover; \
              the job goes on by itself",
-            cassette(ink)
+            cartridge(ink)
         ),
         (Fault::OffLine, None) => {
             "the printer is off line: close its cover and press its ready button; the job goes on by itself"
@@ -31,12 +32,12 @@ pub fn fault(fault: Fault, ink: Option<Ink>) -> String {
             "the printer is switched off or its cable is loose (+5 V absent): switch it on".into()
         }
         (Fault::BusyTooLong, Some(ink)) => format!(
-            "the printer has been busy for very long without an error: if it does not move, it may want the {}; \
+            "the printer has been busy for a long time without an error: if it does not move, it may want the {}; \
              nothing is lost by waiting",
-            cassette(ink)
+            cartridge(ink)
         ),
         (Fault::BusyTooLong, None) => {
-            "the printer has been busy for very long without an error; nothing is lost by waiting".into()
+            "the printer has been busy for a long time without an error; nothing is lost by waiting".into()
         }
         (Fault::NoAck, _) => {
             "the printer does not acknowledge bytes (nAck never came): the nAck wire may be loose".into()
@@ -50,7 +51,7 @@ pub fn pass_at(passes: &[PassPlace], printed: u64) -> Option<(usize, Ink)> {
     Some((number, Ink::from_code(passes.get(number.checked_sub(1)?)?.ink)?))
 }
 
-/// The ink whose cassette the printer may want with `printed` bytes at the port: that of the pass, or of the first one once
+/// The ink whose cartridge the printer may want with `printed` bytes at the port: that of the pass, or of the first one once
 /// a job has begun.
 pub fn wanted(passes: &[PassPlace], printed: u64) -> Option<Ink> {
     let first = passes.first()?.offset;
@@ -59,8 +60,8 @@ pub fn wanted(passes: &[PassPlace], printed: u64) -> Option<Ink> {
 }
 
 /// What to do with a printer that was left in the middle of a sheet.
-const RESET: &str = "Before the next job `foilpress bridge reset` resets the printer through the bridge (if it keeps the \
-                     sheet all the same, switch it off and on)";
+const RESET: &str = "Before the next job the printer has to be reset: `foilpress bridge reset` does so through the bridge (if it \
+                     keeps the sheet all the same, switch it off and on)";
 
 /// Where on the sheet a job was last heard of.
 fn reached(entry: &Entry) -> String {
@@ -75,13 +76,13 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
     let printed = entry.record.printed;
     match outcome {
         Outcome::Printed => format!(
-            "{}: the printer has taken all {} bytes, {} passes; now it prints what it still holds",
+            "{}: sent; the printer has taken all {} bytes, {} passes, and now prints what it still holds",
             entry.name,
             printed,
             entry.passes.len()
         ),
         Outcome::Cancelled if printed == 0 => {
-            format!("{}: cancelled; the printer had not taken a byte of it", entry.name)
+            format!("{}: cancelled; the printer has not received any of it", entry.name)
         }
         Outcome::Cancelled => {
             format!(
@@ -95,20 +96,20 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
                 _ => String::new(),
             };
             format!(
-                "{}: the bridge could not read the job{why}; the printer is ready for the next one",
+                "{}: the bridge could not read the job{why}, so it was not printed; the printer is ready for the next one",
                 entry.name
             )
         }
         Outcome::Lost => format!(
-            "{}: the sheet is lost{}: the printer was switched off or its cable pulled in the middle, or the bridge restarted \
-             and nobody had the job any more. The bridge resets the printer before the next job; take out what is in it, and \
-             send the job again",
+            "{}: the sheet is lost{}: the printer was switched off or its cable pulled during the job, or the bridge restarted \
+             and the job's data are gone. The bridge resets the printer before the next job. Take out the sheet, and send the job \
+             again",
             entry.name,
             reached(entry)
         ),
         Outcome::Forgotten => format!(
-            "{}: the bridge no longer knows this job, because it lost its memory or has printed others since; the sheet had \
-             come at least so far: {printed} of {} bytes{}. If it comes out complete all is well; otherwise it is lost. {RESET}. The job was \
+            "{}: the bridge no longer knows this job, because it lost its memory or has printed others since. At least {printed} of \
+             {} bytes were printed{}. If the sheet comes out complete, nothing is wrong; otherwise it is lost. {RESET}. The job is \
              not sent again by itself, so that nothing is printed twice",
             entry.name,
             entry.port_bytes,
@@ -122,7 +123,7 @@ fn defect(defect: Defect) -> String {
         DefectKind::Header => "an unknown header",
         DefectKind::Forbidden => "something that must not be printed",
         DefectKind::TooLarge => "a page too wide for its memory",
-        DefectKind::Stream => "no pass stream",
+        DefectKind::Stream => "a damaged pass stream",
         DefectKind::Excess => "bytes after the end",
         DefectKind::Truncated => "the end is missing",
     };
@@ -133,7 +134,7 @@ fn defect(defect: Defect) -> String {
 pub fn phase(entry: &Entry) -> String {
     match entry.record.phase {
         _ if entry.record.cancel && !matches!(entry.record.phase, Phase::Ended(_)) => {
-            "to be cancelled; the bridge has not confirmed it".into()
+            "cancel requested; the bridge has not confirmed it".into()
         }
         Phase::Queued => "queued, nothing printed".into(),
         Phase::Begun => "announced to the bridge, nothing printed".into(),
@@ -145,7 +146,7 @@ pub fn phase(entry: &Entry) -> String {
             Outcome::Cancelled => "cancelled",
             Outcome::Broken => "refused by the bridge",
             Outcome::Lost => "sheet lost",
-            Outcome::Forgotten => "not known to the bridge any more",
+            Outcome::Forgotten => "no longer known to the bridge",
         }
         .into(),
     }
@@ -156,10 +157,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stop_in_a_pass_names_the_cassette_as_it_is_sold() {
+    fn a_stop_in_a_pass_names_the_cartridge_as_it_is_sold() {
         let text = fault(Fault::OffLine, Some(Ink::White));
-        assert!(text.contains("white cassette (MDC-SCWH, barcode 16)"), "{text}");
-        assert!(!fault(Fault::PaperOut, Some(Ink::White)).contains("cassette"), "paper is no matter of ink");
+        assert!(text.contains("white cartridge (MDC-SCWH, barcode 16)"), "{text}");
+        assert!(!fault(Fault::PaperOut, Some(Ink::White)).contains("cartridge"), "paper is no matter of ink");
     }
 
     #[test]
@@ -172,7 +173,7 @@ mod tests {
         assert_eq!(at(49), None);
         assert_eq!((at(50), at(899)), (Some((1, Ink::White)), Some((1, Ink::White))));
         assert_eq!(at(5000), Some((2, Ink::Cyan)));
-        // The first cassette is fetched before its first row; a printer that has not begun wants none.
+        // The first cartridge is fetched before its first row; a printer that has not begun wants none.
         assert_eq!(
             [0, 1, 49, 900].map(|printed| wanted(&passes, printed)),
             [None, Some(Ink::White), Some(Ink::White), Some(Ink::Cyan)]

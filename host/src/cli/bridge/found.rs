@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use protocol::link::message::{Ask, Fault, JobState, Lines, Progress};
 use serde_json::json;
 
@@ -22,7 +22,8 @@ pub const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 
 /// The address of the only bridge.
 pub fn only() -> Result<Address> {
-    let bridge = find::only()?;
+    let bridge =
+        find::only().map_err(|error| anyhow!("{error}; name one with --to, or see `foilpress doctor`"))?;
     let (address, _) = bridge.open()?;
     Ok(address.clone())
 }

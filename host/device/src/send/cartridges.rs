@@ -1,13 +1,13 @@
-//! Whether the cassettes a job wants are in the printer.
+//! Whether the cartridges a job needs are in the printer.
 //!
-//! Cassettes are known by their barcode; the carousel turns, so places mean nothing. What the printer says while it reports
+//! Cartridges are known by their barcode; the carousel turns, so places mean nothing. What the printer says while it reports
 //! an error was true before the error, and decides nothing.
 
 use protocol::ink::Ink;
 
 use super::status::Status;
 
-/// What the printer says of the cassettes a job wants.
+/// What the printer says of the cartridges a job needs.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Found {
     /// All are in and ready.
@@ -18,17 +18,17 @@ pub enum Found {
     Stale,
 }
 
-/// A cassette a job wants that is not ready.
+/// A cartridge a job needs that is not ready.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Missing {
     /// Its ink.
     pub ink: Ink,
-    /// What is the matter, when it is in the machine: `backwards` or `end of ribbon`.
+    /// What is the matter, when it is in the printer: `backwards` or `end of ribbon`.
     pub condition: Option<&'static str>,
 }
 
-/// Looks for the cassettes of these inks in the printer's answer.
-pub fn find(status: &Status, wanted: &[Ink]) -> Found {
+/// Looks for the cartridges of these inks in the printer's answer.
+pub(crate) fn find(status: &Status, wanted: &[Ink]) -> Found {
     if status.stale {
         return Found::Stale;
     }
@@ -49,7 +49,7 @@ impl std::fmt::Display for Missing {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} ({}, barcode {})", self.ink.name(), self.ink.part(), self.ink.barcode())?;
         match self.condition {
-            Some("backwards") => write!(f, ": it is in the wrong way round"),
+            Some("backwards") => write!(f, ": it is loaded the wrong way round"),
             Some(condition) => write!(f, ": {condition}"),
             None => Ok(()),
         }
@@ -61,9 +61,9 @@ mod tests {
     use super::*;
     use press::simulate::{Carousel, Cartridge, Condition, Lever, Printer, Trouble};
 
-    /// The answer comes from the simulated printer, whose cassettes stand in whatever places they were given.
-    fn printer(cassettes: &[Cartridge]) -> Printer {
-        Printer::new(Carousel::new(cassettes).unwrap(), Lever::Auto)
+    /// The answer comes from the simulated printer, whose cartridges stand in whatever places they were given.
+    fn printer(cartridges: &[Cartridge]) -> Printer {
+        Printer::new(Carousel::new(cartridges).unwrap(), Lever::Auto)
     }
 
     fn ask(printer: &Printer, wanted: &[Ink]) -> Found {
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn cassettes_are_found_by_barcode_in_any_place() {
+    fn cartridges_are_found_by_barcode_in_any_place() {
         let loaded = printer(&[Ink::Cyan.into(), Ink::White.into(), Ink::Black.into()]);
         assert_eq!(ask(&loaded, &[Ink::White, Ink::Cyan]), Found::All);
         let Found::Missing(missing) = ask(&loaded, &[Ink::White, Ink::MetallicGold]) else { panic!() };
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cassette_that_cannot_print_counts_as_missing_and_says_why() {
+    fn a_cartridge_that_cannot_print_counts_as_missing_and_says_why() {
         let backwards = Cartridge { condition: Condition::Backwards, ..Ink::White.into() };
         let Found::Missing(missing) = ask(&printer(&[backwards]), &[Ink::White]) else { panic!() };
         assert!(missing[0].to_string().contains("wrong way round"));

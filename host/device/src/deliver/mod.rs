@@ -1,0 +1,360 @@
+//! The one way to a printer, for every command, the print queue, and whatever comes.
+//!
+//! Problem: a job has to be printed once, as a whole, at a printer that is ready for it, and counted; whoever sends it, and
+//! whatever crashes meanwhile. The steps are the same for all senders: [journal](crate::send::journal), the reset the printer
+//! may [need](crate::printers), what the device says it is, pass streams where the bridge makes the same bytes of them,
+//! the [session](crate::send::session), the [ledger](crate::ledger), waiting for the sheet.
+//! Method: a [`Delivery`] does these steps. A [`Caller`] is told what happens, and decides what only a person or a rule can: a
+//! terminal asks, a queue holds the job, a script fails. A job passes through three states that are never mixed:
+//! *queued* (on disk, [`Delivery::queue`]), *sent* (every byte has crossed the port, [`Delivery::send`]) and *printed* (the
+//! printer itself says that it is done, [`Delivery::await_sheet`]).
+//! Before the first byte of a job leaves, the delivery asks whether the printer holds part of another one. The bridge's own
+//! answer decides where it can; if the bridge has forgotten, the caller has to agree to a reset. The answer holds for one
+//! start of the bridge: if it restarts between question and first byte, the question is asked again.
+//! Cost: the bytes of a job are parsed once to [check](crate::send::check) that they are one whole legal job, because anything
+//! else wastes a sheet; then [`streams`] reads them twice for their planes and expands the code once, because a bridge
+//! must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
+//! refuses as pass streams is checked once more, as the ledger needs its passes.
+//! Limits: a raw device tells nothing, so nothing can be resumed there. A computer that shares a bridge with another one over the
+//! network knows only its own jobs; the bridge knows all since it started.
+//! Source: `docs/wire-format.md`, section 3; `docs/decisions/journal-before-deed.md`, `docs/decisions/reset-owed-by-the-printer.md`.
+
+mod bridge;
+mod raw;
+
+use std::borrow::Cow;
+
+use protocol::ink::Ink;
+use protocol::link::message::{JobKind, Progress};
+
+use crate::ledger::{self, Ledger, PassUse};
+use crate::printers::{Printer, Printers, PrintersError};
+use crate::send::cartridges::{self, Found};
+use crate::send::journal::{Entry, Journal, JournalError, NewJob, OpenJob};
+use crate::send::query::{QueryError, Reply};
+use crate::send::raw::RawError;
+use crate::send::session::{Outcome, SessionError};
+use crate::send::status::Status;
+use crate::send::{Address, Checked, Event, OpenError, Wish, streams, words};
+use observe::{Observer, with_causes};
+
+pub use bridge::{Met, find_cartridges, reset};
+
+/// Whoever has something sent: hears what happens, and decides what the delivery cannot.
+pub trait Caller {
+    /// Something happened.
+    fn tell(&self, news: &News<'_>);
+
+    /// Whether to go on. Without agreement nothing is sent, and the delivery fails with what the question was about.
+    fn agrees(&self, question: &Question<'_>) -> bool;
+
+    /// Whether to try again after an obstacle that may pass by itself, such as a bridge that is not there. May take its time.
+    /// `begun` says whether a bridge already knows the job.
+    fn waits(&self, obstacle: &Failure, begun: bool) -> bool {
+        let _ = (obstacle, begun);
+        false
+    }
+
+    /// What the caller wants now; asked again and again.
+    fn wish(&self) -> Wish {
+        Wish::GoOn
+    }
+
+    /// Watches the stages in which a job is prepared.
+    fn observer(&self) -> &dyn Observer;
+}
+
+/// What happens to a job.
+#[derive(Debug)]
+pub enum News<'a> {
+    /// What the printer said of itself and of the cartridges the job needs, before the job.
+    Printer(&'a Cartridges),
+    /// The printer was reset.
+    Reset,
+    /// A job is queued: on disk, and nothing of it printed.
+    Queued {
+        /// The job.
+        entry: &'a Entry,
+        /// Bytes that will cross the cable to the bridge.
+        data: u64,
+    },
+    /// A job, new or interrupted, is about to be sent.
+    Sending(&'a Entry),
+    /// The link, the position, the printer's faults.
+    Link(&'a Event<'a>),
+    /// The bridge does not take this page as pass streams; the same job follows byte for byte.
+    ByteForByte,
+    /// A device without a bridge is about to get a job.
+    SendingRaw,
+    /// Something the user should know.
+    Note(&'a str),
+}
+
+/// What only the caller can decide.
+#[derive(Debug)]
+pub enum Question<'a> {
+    /// May the printer be reset, since it may hold part of another job?
+    Reset(&'a ResetOwed),
+    /// May the job go to a device that does not identify itself as an ALPS printer?
+    NotAlps {
+        /// Its device ID.
+        id: &'a str,
+    },
+}
+
+/// A printer that may hold part of a job.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ResetOwed {
+    /// The printer.
+    pub printer: Printer,
+    /// The job's number.
+    pub job: String,
+}
+
+impl std::fmt::Display for ResetOwed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.printer {
+            Printer::Bridge(_) => write!(
+                f,
+                "{} may hold part of job {}, which its bridge no longer knows, and would print anything else as text until it is \
+                 reset",
+                self.printer, self.job
+            ),
+            Printer::Device(_) => write!(
+                f,
+                "{} may hold part of an interrupted job, and would print anything else as text until it has been switched off and \
+                 on",
+                self.printer
+            ),
+        }
+    }
+}
+
+/// Why a delivery stopped. Unless a sheet is named as lost, none is.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The bridge's port cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+    /// What answers is no bridge, or nothing answers.
+    #[error("{0}")]
+    NoAnswer(String),
+    /// A question to the bridge got no answer.
+    #[error(transparent)]
+    Query(#[from] QueryError),
+    /// The conversation cannot go on.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// The journal cannot be used.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// What is known of printers cannot be read or written.
+    #[error(transparent)]
+    Printers(#[from] PrintersError),
+    /// The caller did not agree to a reset.
+    #[error("{0}")]
+    ResetOwed(ResetOwed),
+    /// A reset through the bridge would not reach the printer.
+    #[error("the printer is switched off or its cable is loose, so it cannot be reset; switch it on")]
+    PrinterOff,
+    /// The caller did not agree to send to this device.
+    #[error("the device does not identify itself as an ALPS printer: {0}")]
+    NotAlps(String),
+    /// A device without a bridge failed.
+    #[error(transparent)]
+    Raw(#[from] RawError),
+    /// The caller stopped waiting.
+    #[error("stopped before the job ended")]
+    Left,
+}
+
+impl Failure {
+    /// Whether it may pass by itself: what is away may come back, and what is in use is free again one day.
+    pub fn may_pass(&self) -> bool {
+        match self {
+            Failure::Open(error) => !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_)),
+            Failure::Query(error) => {
+                matches!(error, QueryError::Link(_) | QueryError::NoAnswer | QueryError::JobOpen(_))
+            }
+            Failure::Session(error) => matches!(error, SessionError::Busy(_)),
+            Failure::Raw(RawError::Open { source, .. }) => {
+                source.kind() != std::io::ErrorKind::PermissionDenied
+            }
+            Failure::NoAnswer(_) | Failure::PrinterOff => true,
+            _ => false,
+        }
+    }
+
+    /// Whether somebody else is using the bridge, rather than the bridge being away.
+    pub fn is_in_use(&self) -> bool {
+        matches!(
+            self,
+            Failure::Open(OpenError::InUse(_))
+                | Failure::Session(SessionError::Busy(_))
+                | Failure::Query(QueryError::JobOpen(_))
+        )
+    }
+}
+
+/// What the printer says of the cartridges a job needs.
+#[derive(Debug)]
+pub enum Cartridges {
+    /// Its status answer, and what that means for the job.
+    Known {
+        /// The bytes of the answer, for whoever wants other facts of it.
+        answer: Vec<u8>,
+        /// The answer in words.
+        status: Status,
+        /// The cartridges.
+        found: Found,
+    },
+    /// It cannot be asked, for this reason.
+    Unknown(String),
+}
+
+impl Cartridges {
+    /// Reads an answer, with the inks of the job.
+    fn read(reply: Reply, inks: &[Ink]) -> Cartridges {
+        match reply {
+            Reply::NotNow => Cartridges::Unknown("the bridge has an open job".into()),
+            Reply::OneWay => Cartridges::Unknown("the printer's port is one-way".into()),
+            Reply::Silent => Cartridges::Unknown("the printer did not answer".into()),
+            Reply::Stopped(fault) => Cartridges::Unknown(words::fault(fault, None)),
+            Reply::Bytes(answer) => match Status::read(&answer) {
+                Err(error) => Cartridges::Unknown(with_causes(&error)),
+                Ok(status) => {
+                    let found = cartridges::find(&status, inks);
+                    Cartridges::Known { answer, status, found }
+                }
+            },
+        }
+    }
+}
+
+/// A job that was checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// What people call it.
+    pub name: &'a str,
+    /// Its bytes at the port.
+    pub bytes: &'a [u8],
+    /// What the [check](crate::send::check) found.
+    pub checked: &'a Checked,
+}
+
+/// A job in the form in which it crosses the cable: pass streams where a bridge makes exactly its bytes of them.
+pub struct Packed<'a> {
+    job: Job<'a>,
+    kind: JobKind,
+    data: Cow<'a, [u8]>,
+}
+
+impl<'a> Packed<'a> {
+    /// Codes the job, if that gains anything.
+    pub fn new(job: Job<'a>, observer: &dyn Observer) -> Packed<'a> {
+        match streams::of_job(job.bytes, observer).filter(|streams| streams.len() < job.bytes.len()) {
+            Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
+            None => Packed { job, kind: JobKind::Raw, data: job.bytes.into() },
+        }
+    }
+
+    /// The same under another name, such as that of a copy.
+    pub fn named<'b>(&'b self, name: &'b str) -> Packed<'b> {
+        Packed { job: Job { name, ..self.job }, kind: self.kind, data: Cow::Borrowed(&self.data) }
+    }
+}
+
+/// How a job at a bridge ended.
+#[derive(Debug)]
+pub struct Ended {
+    /// The job as the journal has it. Another number than was sent, if the bridge took it only byte for byte.
+    pub entry: Entry,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// What the bridge last said of it.
+    pub progress: Option<Progress>,
+}
+
+impl Ended {
+    /// The same in a sentence that says what to do next.
+    pub fn in_words(&self) -> String {
+        words::outcome(self.outcome, &self.entry, self.progress.as_ref())
+    }
+}
+
+/// The way to a printer.
+pub struct Delivery<'a> {
+    printers: &'a Printers,
+    ledger: Ledger,
+    caller: &'a dyn Caller,
+}
+
+impl<'a> Delivery<'a> {
+    /// A way for this caller. If what is known of printers is not shared with other users, the caller is told.
+    pub fn new(printers: &'a Printers, caller: &'a dyn Caller) -> Delivery<'a> {
+        if let Some(note) = printers.note() {
+            caller.tell(&News::Note(&note));
+        }
+        Delivery { printers, ledger: Ledger::in_folder(printers.folder()), caller }
+    }
+
+    /// Queues a job for the bridge at `to` under a new number. When this returns it is on disk, and nothing of it is printed.
+    pub fn queue(&self, journal: &Journal, packed: &Packed<'_>, to: &Address) -> Result<OpenJob, Failure> {
+        let Packed { job, kind, data } = packed;
+        let queued = journal.queue(NewJob {
+            name: job.name,
+            to: to.to_string(),
+            kind: *kind,
+            data,
+            port_bytes: job.bytes.len() as u64,
+            passes: job.checked.passes.clone(),
+        })?;
+        self.count(&number(&queued.entry), job.checked, job.bytes.len() as u64);
+        self.caller.tell(&News::Queued { entry: &queued.entry, data: data.len() as u64 });
+        Ok(queued)
+    }
+
+    /// Notes in the ledger that a job is about to be sent.
+    fn count(&self, job: &str, checked: &Checked, length: u64) {
+        let ends = checked.passes.iter().skip(1).map(|pass| pass.offset).chain([length]);
+        let passes = checked
+            .passes
+            .iter()
+            .zip(ends)
+            .zip(&checked.ribbon_mm)
+            .filter_map(|((pass, end), &ribbon_mm)| {
+                let ink = Ink::from_code(pass.ink)?.name().into();
+                Some(PassUse { ink, begin: pass.offset, end, ribbon_mm })
+            })
+            .collect();
+        self.note_in_ledger(ledger::Event::Job { job: job.into(), passes });
+    }
+
+    /// Notes in the ledger how much of a job was printed.
+    fn counted(&self, job: &str, bytes: u64, whole: bool) {
+        self.note_in_ledger(ledger::Event::Printed { job: job.into(), bytes, whole });
+    }
+
+    /// Without a ledger a job is printed all the same, and that it is not counted is told.
+    fn note_in_ledger(&self, event: ledger::Event) {
+        if let Err(error) = self.ledger.append(event) {
+            self.note(&format!("{}; this job is not counted there", with_causes(&error)));
+        }
+    }
+
+    /// The printer holds nothing of this job any more. If that cannot be written down, the next job asks for a needless reset.
+    fn close(&self, printer: &Printer, job: &str) {
+        if let Err(error) = self.printers.close(printer, job) {
+            self.note(&with_causes(&error));
+        }
+    }
+
+    fn note(&self, text: &str) {
+        self.caller.tell(&News::Note(text));
+    }
+}
+
+/// A job's number as people see it.
+fn number(entry: &Entry) -> String {
+    format!("{:08x}", entry.record.job)
+}

@@ -1,0 +1,433 @@
+//! Which printers may hold part of a job: one fact for each printer, kept once for the whole computer.
+//!
+//! Problem: a printer that has received part of a job takes whatever comes next as the rest of a row, and prints it as text.
+//! It has to be reset first. Every process must know this: another user's, the print queue's, tomorrow's.
+//! Method: a folder for the whole computer. Before the first byte of a job leaves, the file `open.PRINTER.JOB` is made durable
+//! there. It is removed when the job is known to have ended in an orderly way, or when the printer was reset. So a crash
+//! leaves it behind, whatever crashed. The folder is sticky: nobody can remove a file of another user. Whoever learns that
+//! another user's job has ended writes `closed.PRINTER.JOB` instead, which counts the same. Files appear under a temporary
+//! name and are renamed; links are never followed.
+//! A bridge is known by its serial number, however it is reached, because it has one port. A raw device is known by its path.
+//! Limits: another computer that shares a bridge over the network does not see the folder. A user who may print may also
+//! write false facts here, as they may send false bytes to the printer: the worst that follows is a needless reset.
+//! Source: `docs/decisions/reset-owed-by-the-printer.md`.
+
+use std::fmt;
+use std::fs::{self, File};
+use std::io::{self, Read as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use protocol::link::frame::checksum;
+use protocol::link::message::{JobState, Progress};
+use serde::{Deserialize, Serialize};
+
+use crate::send::journal::{Journal, JournalError};
+
+/// A fact is far smaller.
+const LARGEST: u64 = 4096;
+
+/// A printer, as this computer tells it from others.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Printer {
+    /// The one at the bridge with this serial number.
+    Bridge(u64),
+    /// The one at a device that takes its bytes as they are.
+    Device(PathBuf),
+}
+
+impl Printer {
+    /// A name that is safe as part of a file's: no dots, no separators.
+    fn file_name(&self) -> String {
+        match self {
+            Printer::Bridge(serial) => format!("bridge-{serial:016x}"),
+            Printer::Device(path) => {
+                // The same device by another name, such as a link made by udev, is the same printer.
+                let path = fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+                let text = path.to_string_lossy();
+                let plain: String =
+                    text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(80).collect();
+                format!("device{plain}-{:08x}", checksum(text.as_bytes()))
+            }
+        }
+    }
+}
+
+impl fmt::Display for Printer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Printer::Bridge(serial) => write!(f, "the printer at bridge {serial:016x}"),
+            Printer::Device(path) => write!(f, "the printer at {}", path.display()),
+        }
+    }
+}
+
+/// A job of which a printer may hold a part.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Unfinished {
+    /// Its number, as it is shown to people.
+    pub job: String,
+    /// The start of the bridge in which its first byte left; unknown if the fact cannot be read.
+    pub boot: Option<u32>,
+}
+
+/// What a bridge's own answer says of an unfinished job.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Standing {
+    /// It ended in an orderly way: the printer is ready.
+    Ended {
+        /// Bytes that crossed the port.
+        printed: u32,
+        /// Whether these were all.
+        whole: bool,
+    },
+    /// The bridge still has it, or resets the printer by itself before anything else.
+    WithBridge,
+    /// The bridge has lost its memory: the printer needs a reset.
+    ResetOwed,
+}
+
+impl Unfinished {
+    /// Judges by what the bridge, in its start `boot`, says of its last job. A bridge takes a new job only when the last one has
+    /// ended, so within one start another job in its place proves that this one has.
+    pub(crate) fn standing(&self, boot: u32, progress: &Progress) -> Standing {
+        let this = u32::from_str_radix(&self.job, 16) == Ok(progress.job) && progress.job != 0;
+        match progress.state {
+            JobState::Done if this => Standing::Ended { printed: progress.printed, whole: true },
+            JobState::Cancelled | JobState::Broken(_) if this => {
+                Standing::Ended { printed: progress.printed, whole: false }
+            }
+            _ if this => Standing::WithBridge,
+            JobState::None => Standing::ResetOwed,
+            // It may have been lost; then the bridge still knows that it has to reset the printer.
+            _ if self.boot == Some(boot) => Standing::WithBridge,
+            _ => Standing::ResetOwed,
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Fact {
+    boot: Option<u32>,
+    /// When it was written, in seconds since 1970: for whoever looks into the folder.
+    since: u64,
+}
+
+/// Why the folder cannot be used. Nothing is sent then.
+#[derive(Debug, thiserror::Error)]
+pub enum PrintersError {
+    /// There is no place for it.
+    #[error("no folder for what is known of printers")]
+    NoFolder(#[from] JournalError),
+    /// The file system refuses.
+    #[error("cannot {what} {}, where it is kept which printers need a reset", path.display())]
+    Io {
+        /// What was tried.
+        what: &'static str,
+        /// With what.
+        path: PathBuf,
+        /// What the system says.
+        #[source]
+        source: io::Error,
+    },
+}
+
+fn io_error(what: &'static str, path: &Path) -> impl FnOnce(io::Error) -> PrintersError {
+    let path = path.to_path_buf();
+    move |source| PrintersError::Io { what, path, source }
+}
+
+/// The folder of facts about printers.
+#[derive(Clone, Debug)]
+pub struct Printers {
+    folder: PathBuf,
+    /// The folder all users share, if this is not it.
+    instead_of: Option<PathBuf>,
+}
+
+impl Printers {
+    /// The computer's folder: `FOILPRESS_PRINTERS`; else the folder all users share, if it is there and can be written; else one
+    /// of this user's own, which [`Printers::note`] then tells.
+    pub fn of_system() -> Result<Printers, PrintersError> {
+        if let Some(folder) = std::env::var_os("FOILPRESS_PRINTERS").filter(|value| !value.is_empty()) {
+            return Printers::at(Path::new(&folder));
+        }
+        let shared = shared_folder();
+        if let Some(folder) = &shared
+            && tempfile::Builder::new().prefix(".try.").tempfile_in(folder).is_ok()
+        {
+            return Ok(Printers { folder: folder.clone(), instead_of: None });
+        }
+        let own = Printers::at(&Journal::of_user()?.folder().join("printers"))?;
+        Ok(Printers { instead_of: shared, ..own })
+    }
+
+    /// The facts in this folder, which is made if need be.
+    pub fn at(folder: &Path) -> Result<Printers, PrintersError> {
+        fs::create_dir_all(folder).map_err(io_error("make", folder))?;
+        Ok(Printers { folder: folder.to_path_buf(), instead_of: None })
+    }
+
+    /// Where they are.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What the user should know when the facts are not shared.
+    pub fn note(&self) -> Option<String> {
+        self.instead_of.as_ref().map(|shared| {
+            format!(
+                "{} cannot be written, so other users and print queues do not learn of a job that leaves the printer in need of \
+                 a reset; the Debian package and `foilpress queue install` make that folder",
+                shared.display()
+            )
+        })
+    }
+
+    /// Notes, before its first byte leaves, that the printer may hold a part of this job. When this returns it is on disk. The
+    /// same job again replaces what was noted.
+    pub fn begin(&self, printer: &Printer, job: &str, boot: Option<u32>) -> Result<(), PrintersError> {
+        self.tidy();
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        self.write(&self.path("open", printer, job), &Fact { boot, since })
+    }
+
+    /// Whether such a job is noted.
+    pub(crate) fn knows(&self, printer: &Printer, job: &str) -> bool {
+        self.path("open", printer, job).symlink_metadata().is_ok()
+    }
+
+    /// Notes that the printer holds nothing of this job any more.
+    pub fn close(&self, printer: &Printer, job: &str) -> Result<(), PrintersError> {
+        let open = self.path("open", printer, job);
+        match fs::remove_file(&open) {
+            Ok(()) => {
+                // Another user may have closed it before.
+                let _ = fs::remove_file(self.path("closed", printer, job));
+                self.sync()
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            // Another user's, in a sticky folder.
+            Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+                let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+                self.write(&self.path("closed", printer, job), &Fact { boot: None, since })
+            }
+            Err(error) => Err(io_error("remove", &open)(error)),
+        }
+    }
+
+    /// The jobs of which this printer may hold a part, in no order.
+    pub fn unfinished(&self, printer: &Printer) -> Result<Vec<Unfinished>, PrintersError> {
+        let prefix = format!("open.{}.", printer.file_name());
+        let mut found = Vec::new();
+        for name in self.names()? {
+            let Some(job) = name.strip_prefix(&prefix) else { continue };
+            if self.folder.join(closed(&name)).symlink_metadata().is_err() {
+                found.push(Unfinished { job: job.to_owned(), boot: self.boot(&name) });
+            }
+        }
+        Ok(found)
+    }
+
+    /// Notes that a printer was reset and holds nothing any more; without one, that all were.
+    pub fn reset(&self, printer: Option<&Printer>) -> Result<(), PrintersError> {
+        let of = printer.map(|printer| format!("open.{}.", printer.file_name()));
+        for name in self.names()? {
+            let mut parts = name.splitn(3, '.');
+            if parts.next() != Some("open") || of.as_ref().is_some_and(|of| !name.starts_with(of)) {
+                continue;
+            }
+            let path = self.folder.join(&name);
+            match fs::remove_file(&path) {
+                Ok(()) => {
+                    let _ = fs::remove_file(self.folder.join(closed(&name)));
+                }
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) if error.kind() == io::ErrorKind::PermissionDenied => {
+                    self.write(&self.folder.join(closed(&name)), &Fact { boot: None, since: 0 })?;
+                }
+                Err(error) => return Err(io_error("remove", &path)(error)),
+            }
+        }
+        self.sync()
+    }
+
+    fn boot(&self, name: &str) -> Option<u32> {
+        let path = self.folder.join(name);
+        // A link or a device in its place says nothing, which counts as the worst.
+        if !path.symlink_metadata().is_ok_and(|found| found.is_file()) {
+            return None;
+        }
+        let mut text = String::new();
+        File::open(path).ok()?.take(LARGEST).read_to_string(&mut text).ok()?;
+        serde_json::from_str::<Fact>(&text).ok()?.boot
+    }
+
+    fn names(&self) -> Result<Vec<String>, PrintersError> {
+        let listing = fs::read_dir(&self.folder).map_err(io_error("read", &self.folder))?;
+        Ok(listing.filter_map(|item| item.ok()?.file_name().into_string().ok()).collect())
+    }
+
+    fn path(&self, kind: &str, printer: &Printer, job: &str) -> PathBuf {
+        self.folder.join(format!("{kind}.{}.{job}", printer.file_name()))
+    }
+
+    /// Puts a whole file under its name, readable for everyone whatever this user's mask is.
+    fn write(&self, path: &Path, fact: &Fact) -> Result<(), PrintersError> {
+        let text = serde_json::to_vec(fact).map_err(|error| io_error("write", path)(error.into()))?;
+        let put = || -> io::Result<()> {
+            let mut file = tempfile::Builder::new().prefix(".new.").tempfile_in(&self.folder)?;
+            file.write_all(&text)?;
+            #[cfg(unix)]
+            file.as_file().set_permissions(std::os::unix::fs::PermissionsExt::from_mode(0o644))?;
+            file.as_file().sync_all()?;
+            file.persist(path).map_err(|error| error.error)?;
+            Ok(())
+        };
+        put().map_err(io_error("write", path))?;
+        self.sync()
+    }
+
+    /// Makes names durable, where the system has such a thing.
+    fn sync(&self) -> Result<(), PrintersError> {
+        #[cfg(unix)]
+        File::open(&self.folder)
+            .and_then(|folder| folder.sync_all())
+            .map_err(io_error("write", &self.folder))?;
+        Ok(())
+    }
+
+    /// Removes pairs that cancel out, as far as they are this user's.
+    fn tidy(&self) {
+        for name in self.names().unwrap_or_default() {
+            if let Some(rest) = name.strip_prefix("closed.") {
+                let open = self.folder.join(format!("open.{rest}"));
+                // The open one first: without it the other means nothing.
+                if fs::remove_file(&open).is_ok() || open.symlink_metadata().is_err() {
+                    let _ = fs::remove_file(self.folder.join(&name));
+                }
+            }
+        }
+    }
+}
+
+/// The name of the file that closes the one of this name.
+fn closed(open: &str) -> String {
+    format!("closed.{}", open.strip_prefix("open.").unwrap_or(open))
+}
+
+/// The folder all users share. An administrator makes it: this program must not choose one that others could have made first.
+fn shared_folder() -> Option<PathBuf> {
+    if cfg!(windows) {
+        std::env::var_os("ProgramData").map(|folder| PathBuf::from(folder).join("foilpress"))
+    } else if cfg!(target_os = "macos") {
+        Some("/Library/Application Support/foilpress".into())
+    } else {
+        Some("/var/lib/foilpress".into())
+    }
+}
+
+/// Makes the folder all users share, for an administrator: everyone may add to it, and nobody remove what is another's.
+pub fn make_shared_folder() -> Result<(), PrintersError> {
+    let Some(folder) = shared_folder() else { return Ok(()) };
+    fs::create_dir_all(&folder).map_err(io_error("make", &folder))?;
+    #[cfg(unix)]
+    fs::set_permissions(&folder, std::os::unix::fs::PermissionsExt::from_mode(0o1777))
+        .map_err(io_error("make", &folder))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn progress(job: u32, state: JobState) -> Progress {
+        Progress { job, state, accepted: 0, limit: 0, printed: 9, pass: 0, row: 0 }
+    }
+
+    #[test]
+    fn a_job_is_unfinished_from_before_its_first_byte_until_it_ends_or_the_printer_is_reset() {
+        let folder = tempfile::tempdir().unwrap();
+        let printers = Printers::at(folder.path()).unwrap();
+        let (one, two) = (Printer::Bridge(1), Printer::Bridge(2));
+        let device = Printer::Device("/dev/usb/lp0".into());
+        printers.begin(&one, "0000000a", Some(5)).unwrap();
+        printers.begin(&one, "0000000b", Some(5)).unwrap();
+        printers.begin(&two, "0000000c", None).unwrap();
+        printers.begin(&device, "raw-7-1", None).unwrap();
+        let count = |printer: &Printer| printers.unfinished(printer).unwrap().len();
+        assert_eq!([&one, &two, &device].map(count), [2, 1, 1]);
+        printers.close(&one, "0000000a").unwrap();
+        printers.close(&one, "0000000a").unwrap();
+        let left = Unfinished { job: "0000000b".into(), boot: Some(5) };
+        // Another process sees the same.
+        assert_eq!(Printers::at(folder.path()).unwrap().unfinished(&one).unwrap(), [left]);
+        printers.reset(Some(&one)).unwrap();
+        assert_eq!([&one, &two, &device].map(count), [0, 1, 1]);
+        printers.reset(None).unwrap();
+        assert_eq!([&one, &two, &device].map(count), [0, 0, 0]);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn what_another_user_closed_counts_and_is_cleared_away() {
+        let folder = tempfile::tempdir().unwrap();
+        let printers = Printers::at(folder.path()).unwrap();
+        let printer = Printer::Bridge(1);
+        printers.begin(&printer, "0000000a", Some(5)).unwrap();
+        fs::write(folder.path().join("closed.bridge-0000000000000001.0000000a"), "{}").unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap(), []);
+        printers.begin(&printer, "0000000b", Some(5)).unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(printers.unfinished(&printer).unwrap().len(), 1);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_file_that_cannot_be_read_and_a_link_count_as_the_worst_and_are_not_followed() {
+        use std::os::unix::fs::{PermissionsExt as _, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let printers = Printers::at(folder.path()).unwrap();
+        let printer = Printer::Bridge(1);
+        let secret = folder.path().join("secret");
+        fs::write(&secret, "{\"boot\":5,\"since\":0}").unwrap();
+        let open = folder.path().join("open.bridge-0000000000000001.0000000a");
+        symlink(&secret, &open).unwrap();
+        let unknown = Unfinished { job: "0000000a".into(), boot: None };
+        assert_eq!(printers.unfinished(&printer).unwrap(), std::slice::from_ref(&unknown));
+        // A fact replaces the link; what it led to stays as it was.
+        printers.begin(&printer, "0000000a", Some(6)).unwrap();
+        assert!(fs::symlink_metadata(&open).unwrap().is_file());
+        assert_eq!(fs::metadata(&open).unwrap().permissions().mode() & 0o777, 0o644);
+        assert_eq!(fs::read_to_string(&secret).unwrap(), "{\"boot\":5,\"since\":0}");
+        fs::write(&open, "half a fac").unwrap();
+        assert_eq!(printers.unfinished(&printer).unwrap(), [unknown]);
+    }
+
+    #[test]
+    fn a_bridge_that_shows_the_job_or_has_not_restarted_needs_no_reset_from_outside() {
+        let job = Unfinished { job: "0000000a".into(), boot: Some(5) };
+        let ended = |whole| Standing::Ended { printed: 9, whole };
+        for (boot, job_shown, state, expected) in [
+            (5, 0xa, JobState::Printing, Standing::WithBridge),
+            (6, 0xa, JobState::Printing, Standing::WithBridge),
+            (5, 0xa, JobState::Lost, Standing::WithBridge),
+            (6, 0xa, JobState::Done, ended(true)),
+            (6, 0xa, JobState::Cancelled, ended(false)),
+            (5, 0xb, JobState::Done, Standing::WithBridge),
+            (6, 0xb, JobState::Done, Standing::ResetOwed),
+            (6, 0xb, JobState::Printing, Standing::ResetOwed),
+            (6, 0, JobState::None, Standing::ResetOwed),
+            // Numbers of starts are drawn, and one may come twice.
+            (5, 0, JobState::None, Standing::ResetOwed),
+        ] {
+            assert_eq!(
+                job.standing(boot, &progress(job_shown, state)),
+                expected,
+                "{boot} {job_shown:x} {state:?}"
+            );
+        }
+        let unknown = Unfinished { boot: None, ..job };
+        assert_eq!(unknown.standing(5, &progress(0xb, JobState::Done)), Standing::ResetOwed);
+    }
+}
