@@ -119,10 +119,7 @@ fn streams_come_out_as_the_encoder_that_writes_files_would_have_it() {
 
 #[test]
 fn real_streams_pass_through_unchanged() {
-    let Some(folder) = std::env::var_os("FOILPRESS_GOLDEN") else {
-        println!("skipped: FOILPRESS_GOLDEN names no folder of streams");
-        return;
-    };
+    let Some(folder) = testing::needs::golden() else { return };
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|name| name == "bin") {

@@ -3,9 +3,8 @@
 //! Columns: stack, diffuse albedo, lobes (F0, alpha), green reflectance at half angles of 0, 10 and 30 degrees in 1/sr
 //! to three significant digits.
 
-use std::path::PathBuf;
-
 use inks::{Library, Stack};
+use testing::needs::data;
 
 struct Row {
     stack: &'static str,
@@ -162,15 +161,6 @@ fn gloss_agrees_with_the_published_readings() {
         let reading = inks::gloss::units(&library.optics().lobes(&stack.parse().unwrap()).unwrap());
         assert!((reading - published).abs() < 0.6 + 0.03 * published, "{stack}: {reading} not {published}");
     }
-}
-
-/// The folder of external data, if there is one.
-fn data() -> Option<PathBuf> {
-    let data = std::env::var_os("FOILPRESS_DATA").map(PathBuf::from);
-    if data.is_none() {
-        println!("skipped: FOILPRESS_DATA is not set");
-    }
-    data
 }
 
 /// R = ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2) at 630, 532 and 465 nm, from measured n and k of evaporated aluminium.

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use bridge::engine::{Engine, Identity, Memory, Outcome, Task};
 use device::send::transport::{Socket, Transport};
-use press::simulate::{Carousel, Cassette, Lever, Printer, STATUS_LENGTH, Trouble};
+use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};
@@ -44,7 +44,7 @@ pub struct Port {
     /// The bridge's power goes, and its memory with it.
     pub forget: AtomicBool,
     /// The cassettes that are in.
-    cassettes: Vec<Cassette>,
+    cassettes: Vec<Cartridge>,
     /// Bytes of memory for bands.
     band: usize,
     stop: AtomicBool,
@@ -67,7 +67,7 @@ impl Port {
             cut: false.into(),
             garbage: false.into(),
             forget: false.into(),
-            cassettes: cassettes.iter().copied().map(Cassette::from).collect(),
+            cassettes: cassettes.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
             stop: false.into(),
         }

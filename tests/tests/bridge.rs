@@ -9,7 +9,7 @@ use press::halftone::{Settings, halftone};
 use press::job::stream::write_job;
 use press::separate::{Pass, separate};
 use press::sheet::Sheet;
-use press::simulate::{Carousel, Cassette, Lever, Printer, Setup, Stock, difference, print};
+use press::simulate::{Carousel, Cartridge, Lever, Printer, Setup, Stock, difference, print};
 use protocol::ink::Ink;
 use protocol::link::frame::{self, MAX, Reader};
 use protocol::link::message::{DATA_MAX, JobKind, JobState, ToBridge};
@@ -114,7 +114,7 @@ fn the_job_after_a_cancelled_one_prints_on_the_same_printer() {
     let passes = separate(&sheet, &[], &Silent).unwrap().passes;
     let data = streams(&passes);
     let whole = bridged(&data, None).0;
-    let cassettes = INKS.map(Cassette::from);
+    let cassettes = INKS.map(Cartridge::from);
     let mut printer = Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto);
     for eighth in 0..8 {
         let (printed, state) = bridged(&data, Some(1 + whole.len() * eighth / 8));

@@ -111,12 +111,9 @@ fn balls_under_a_probe_are_the_references_balls() {
     let dir = tempfile::tempdir().unwrap();
     let space = Space::half_angle(64);
     let mut cases = vec![(Probe::studio(64), PAPER)];
-    match std::env::var("FOILPRESS_DATA") {
-        Ok(data) => {
-            let path = Path::new(&data).join("env/studio.hdr");
-            cases.push((Probe::read_hdr(&path).unwrap().shrunk(64), FOIL));
-        }
-        Err(_) => cases.push((Probe::studio(64), FOIL)),
+    match needs::data() {
+        Some(data) => cases.push((Probe::read_hdr(&data.join("env/studio.hdr")).unwrap().shrunk(64), FOIL)),
+        None => cases.push((Probe::studio(64), FOIL)),
     }
     for (probe, material) in &cases {
         let curve = curve(&space, *material);

@@ -1,174 +1,35 @@
-//! What is in a stream: its setup, its passes, its faults.
+//! The contents of a stream: its setup, its passes, its faults.
 //!
-//! Method: the strict reader, without a printer: whatever the cassettes and the sheet, the bytes alone are looked at.
-//! What was read before a fault is reported with it.
-//! Cost: one look at each byte, one bit for each dot and pass.
-//! The dialect of Ghostscript's drivers is read too, leniently.
+//! Problem: a job file must be understood and judged without a printer.
+//! Method: the strict reader of the printer's language reads the bytes alone, whatever cartridges and sheet are loaded. The
+//! dialect of Ghostscript's drivers is also read, leniently. A report includes everything before the first fault.
+//! Cost: one look at each byte, one bit for each dot and pass. Limits: only the first fault is found.
 
 mod ending;
 mod ghostscript;
+mod report;
+mod strict;
 
 use std::ops::Range;
 
-pub use ending::ending;
-
-use protocol::ink::Ink;
-use protocol::rgl::{Command, Compression, Fault, Mode, Order, Step, parse};
-use serde::Serialize;
-
-use crate::job::fault::words;
-use crate::separate::{Pass, Plane};
-use crate::simulate::Canvas;
 use observe::Observer;
 
-/// A stream in figures. Offsets are in bytes from its start; dots and rows at the job's resolution.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Inspection {
-    /// Length of the stream.
-    pub bytes: u64,
-    /// Whose dialect it is, if not that of the established open driver, which is ours: `Ghostscript`.
-    pub dialect: Option<&'static str>,
-    /// Whether it is one whole legal job.
-    pub complete: bool,
-    /// What the setup declares; parts that did not come are absent.
-    pub setup: Setup,
-    /// The passes in the order of printing, empty ones too.
-    pub passes: Vec<PassReport>,
-    /// The first fault.
-    pub error: Option<StreamError>,
-}
+pub use ending::ending;
+pub use report::{Bounds, Inspected, Inspection, PassReport, Setup, StreamError};
 
-/// What a setup declares.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Setup {
-    /// Dots per inch across and along.
-    pub resolution: Option<(u16, u16)>,
-    /// Media type.
-    pub media: Option<&'static str>,
-    /// Paper, by its code and declared size.
-    pub paper: Option<&'static str>,
-    /// Page width in dots.
-    pub width: u16,
-    /// Page length in rows.
-    pub length: u16,
-    /// Shift to the right in dots.
-    pub shift_x: u16,
-    /// Shift downwards in rows.
-    pub shift_y: u16,
-    /// Whether curl is corrected.
-    pub curl_correction: Option<bool>,
-    /// Whether the machine's own gloss is asked for.
-    pub built_in_gloss: bool,
-    /// Transfer mode: `blackRaster`, `colourPlane` or `multiPlane`.
-    pub mode: Option<&'static str>,
-    /// Cassette list, inks by name.
-    pub cassettes: Option<Vec<&'static str>>,
-}
-
-/// One pass in figures.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PassReport {
-    /// From 1.
-    pub number: usize,
-    /// Name of the ink.
-    pub ink: &'static str,
-    /// Its code in the stream.
-    pub code: u8,
-    /// The barcode on its cassette.
-    pub barcode: u8,
-    /// The cassette's part number.
-    pub cartridge: &'static str,
-    /// Whether it was announced as the last.
-    pub last: bool,
-    /// Dots printed.
-    pub dots: u64,
-    /// The smallest rectangle around them, shift included; absent in an empty pass.
-    pub bounds: Option<Bounds>,
-    /// Rows sent.
-    pub rows: u32,
-    /// Of these, packed.
-    pub packed_rows: u32,
-    /// Of these, plain.
-    pub plain_rows: u32,
-    /// Offset of its first byte.
-    pub offset: u64,
-    /// Its length in bytes.
-    pub bytes: u64,
-}
-
-impl PassReport {
-    /// A pass of which nothing has come but its beginning, at offset `at`.
-    fn begin(number: usize, ink: Ink, last: bool, at: usize) -> PassReport {
-        PassReport {
-            number,
-            ink: ink.name(),
-            code: ink.code(),
-            barcode: ink.barcode(),
-            cartridge: ink.part(),
-            last,
-            dots: 0,
-            bounds: None,
-            rows: 0,
-            packed_rows: 0,
-            plain_rows: 0,
-            offset: at as u64,
-            bytes: 0,
-        }
-    }
-}
-
-/// A rectangle of dots inside the printable area, and its place on paper.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Bounds {
-    /// First column.
-    pub x: usize,
-    /// First row.
-    pub y: usize,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// The same from the left edge of the printable area, in mm: x, y, width, height.
-    pub mm: [f64; 4],
-}
-
-/// Where and why a stream is no legal job.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, thiserror::Error)]
-#[error("byte {offset}: {words} (fault {fault})")]
-pub struct StreamError {
-    /// The byte.
-    pub offset: u64,
-    /// The fault's number.
-    pub fault: u8,
-    /// The fault in words.
-    pub words: &'static str,
-}
-
-/// A stream looked at: figures, and the dots of each pass.
-#[derive(Clone, Debug)]
-pub struct Inspected {
-    /// The figures.
-    pub inspection: Inspection,
-    /// The passes, one for each in [`Inspection::passes`]; planes cover the printable area, shifts applied.
-    pub passes: Vec<Pass>,
-}
-
-/// A pass being read.
-struct Open {
-    report: PassReport,
-    canvas: Canvas,
-}
-
-/// Where the sheets of a stream stand: several jobs may follow one another, as a driver writes the pages of a document.
+/// The sheets of a stream: one job each, since a driver writes the pages of a document one after another.
 ///
-/// A stream that is no job, or whose last job does not end, is in the result all the same; only [`inspect`] judges.
+/// A stream that is not a job, or whose last job is incomplete, counts as a sheet as well; only [`inspect`] judges.
 pub fn sheets(stream: &[u8]) -> Vec<Range<usize>> {
     let mut sheets = Vec::new();
     let mut at = 0;
     while at < stream.len() || sheets.is_empty() {
         let rest = &stream[at..];
-        let length =
-            if ghostscript::begins(rest) { ghostscript::first_sheet(rest) } else { first_sheet(rest) };
+        let length = if ghostscript::begins(rest) {
+            ghostscript::first_sheet(rest)
+        } else {
+            strict::first_sheet(rest)
+        };
         let end = at + length.unwrap_or(rest.len());
         sheets.push(at..end);
         at = end;
@@ -176,192 +37,24 @@ pub fn sheets(stream: &[u8]) -> Vec<Range<usize>> {
     sheets
 }
 
-/// The length of the first job, its final reset included.
-fn first_sheet(stream: &[u8]) -> Option<usize> {
-    let mut at = 0;
-    let mut left = false;
-    loop {
-        match parse(stream.get(at..)?) {
-            Ok(Step::Command(Command::Reset, length)) if left => return Some(at + length),
-            _ if left => return Some(at),
-            Ok(Step::Command(command, length)) => {
-                left = command == Command::LeaveRgl;
-                at += length;
-            }
-            _ => return None,
-        }
-    }
-}
-
-/// Looks at a stream. It never fails: what is wrong is part of the result.
+/// Inspects one sheet's job. Faults are part of the result.
 pub fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
     if ghostscript::begins(stream) {
-        return ghostscript::inspect(stream, observer);
+        ghostscript::inspect(stream, observer)
+    } else {
+        strict::inspect(stream, observer)
     }
-    observer.begin("inspect", stream.len() as u64);
-    let mut reader = Reader { order: Order::new(), open: None, reports: Vec::new(), passes: Vec::new() };
-    let (mut at, mut reported) = (0, 0);
-    let fault = loop {
-        if at == stream.len() {
-            break (!reader.order.is_complete()).then_some((Fault::Truncated, at));
-        }
-        match parse(&stream[at..]) {
-            Ok(Step::Command(command, length)) => {
-                if let Err(refusal) = reader.order.accept(&command) {
-                    break Some((refusal.fault, at + refusal.at));
-                }
-                reader.take(&command, at, length);
-                at += length;
-            }
-            Ok(Step::More(_)) => break Some((Fault::Truncated, stream.len())),
-            Err(refusal) => break Some((refusal.fault, at + refusal.at)),
-        }
-        if at - reported >= 1 << 16 {
-            observer.advance((at - reported) as u64);
-            reported = at;
-        }
-    };
-    reader.close(at);
-    observer.end();
-    let setup = setup(&reader.order);
-    Inspected::of(stream, None, setup, (reader.reports, reader.passes), fault)
-}
-
-impl Inspected {
-    fn of(
-        stream: &[u8],
-        dialect: Option<&'static str>,
-        setup: Setup,
-        (reports, passes): (Vec<PassReport>, Vec<Pass>),
-        fault: Option<(Fault, usize)>,
-    ) -> Inspected {
-        let error = fault.map(|(fault, offset)| StreamError {
-            offset: offset as u64,
-            fault: fault.number(),
-            words: words(fault),
-        });
-        let bytes = stream.len() as u64;
-        let complete = error.is_none();
-        let inspection = Inspection { bytes, dialect, complete, setup, passes: reports, error };
-        Inspected { inspection, passes }
-    }
-}
-
-struct Reader {
-    order: Order,
-    open: Option<Open>,
-    reports: Vec<PassReport>,
-    passes: Vec<Pass>,
-}
-
-impl Reader {
-    /// A legal command at offset `at`.
-    fn take(&mut self, command: &Command<'_>, at: usize, length: usize) {
-        match *command {
-            Command::InkSelect { ink, last } => self.begin(ink, last, at),
-            Command::RasterStart if self.order.declared().mode == Some(Mode::BlackRaster) => {
-                self.begin(Ink::Black, true, at + length);
-            }
-            Command::Row { data, .. } => {
-                if let Some(open) = &mut self.open {
-                    let compression = self.order.compression();
-                    open.canvas.put(self.order.row(), compression, data);
-                    open.report.rows += 1;
-                    match compression {
-                        Some(Compression::Packed) => open.report.packed_rows += 1,
-                        _ => open.report.plain_rows += 1,
-                    }
-                }
-            }
-            Command::BackFeed | Command::RasterEnd => self.close(at),
-            _ => {}
-        }
-    }
-
-    fn begin(&mut self, ink: Ink, last: bool, at: usize) {
-        let declared = self.order.declared();
-        let shift = (declared.shift_x.into(), declared.shift_y.into());
-        let canvas = Canvas::new(declared.width.into(), declared.length.into(), shift, usize::MAX, 1);
-        let report = PassReport::begin(self.reports.len() + 1, ink, last, at);
-        self.open = Some(Open { report, canvas });
-    }
-
-    fn close(&mut self, at: usize) {
-        let Some(Open { mut report, canvas }) = self.open.take() else { return };
-        let plane = canvas.into_plane();
-        let dpi = self.order.declared().resolution.unwrap_or_default().dpi();
-        (report.dots, report.bounds) = measure(&plane, dpi);
-        report.bytes = at as u64 - report.offset;
-        // The order knows the ink; the report only its name.
-        self.passes.push(Pass { ink: self.order.ink(), plane });
-        self.reports.push(report);
-    }
-}
-
-fn setup(order: &Order) -> Setup {
-    let declared = order.declared();
-    let dpi = declared.resolution.map(|resolution| resolution.dpi());
-    let paper = declared.paper.zip(dpi).map(|(code, (across, along))| {
-        let width = u32::from(declared.width) * 600 / u32::from(across);
-        let length = u32::from(declared.length) * 600 / u32::from(along);
-        code.paper(width as u16, length as u16).name()
-    });
-    Setup {
-        resolution: dpi,
-        media: declared.media.map(|media| media.name()),
-        paper,
-        width: declared.width,
-        length: declared.length,
-        shift_x: declared.shift_x,
-        shift_y: declared.shift_y,
-        curl_correction: declared.curl,
-        built_in_gloss: declared.gloss,
-        mode: declared.mode.map(mode_name),
-        cassettes: declared.cartridges.map(|list| list.inks().iter().map(|ink| ink.name()).collect()),
-    }
-}
-
-fn mode_name(mode: Mode) -> &'static str {
-    match mode {
-        Mode::BlackRaster => "blackRaster",
-        Mode::ColourPlane => "colourPlane",
-        Mode::MultiPlane => "multiPlane",
-    }
-}
-
-/// Dots of a plane and the rectangle around them.
-fn measure(plane: &Plane, dpi: (u16, u16)) -> (u64, Option<Bounds>) {
-    let mut columns = vec![0u8; plane.stride];
-    let (mut dots, mut first, mut last) = (0, None, 0);
-    for (y, row) in plane.bits.chunks_exact(plane.stride).enumerate() {
-        let in_row: u64 = row.iter().map(|byte| u64::from(byte.count_ones())).sum();
-        if in_row > 0 {
-            dots += in_row;
-            first.get_or_insert(y);
-            last = y;
-            columns.iter_mut().zip(row).for_each(|(column, byte)| *column |= byte);
-        }
-    }
-    let bounds = first.and_then(|y| {
-        let left = columns.iter().position(|&byte| byte != 0)?;
-        let right = columns.iter().rposition(|&byte| byte != 0)?;
-        let x = left * 8 + columns[left].leading_zeros() as usize;
-        let end = right * 8 + 8 - columns[right].trailing_zeros() as usize;
-        let (width, height) = (end - x, last + 1 - y);
-        let across = |dots: usize| dots as f64 * 25.4 / f64::from(dpi.0);
-        let along = |rows: usize| rows as f64 * 25.4 / f64::from(dpi.1);
-        Some(Bounds { x, y, width, height, mm: [across(x), along(y), across(width), along(height)] })
-    });
-    (dots, bounds)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::job::stream::write_job;
+    use crate::separate::{Pass, Plane};
     use observe::Silent;
+    use protocol::ink::Ink;
     use protocol::paper::Paper;
-    use protocol::rgl::{Media, Page};
+    use protocol::rgl::{Fault, Media, Page};
 
     const PAPER: Paper = Paper::Custom { width: 600, length: 300 };
 

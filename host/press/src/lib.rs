@@ -1,11 +1,18 @@
 //! Dots, pages, jobs and pictures.
 //!
-//! The modules stand in the order of the data: a mixture of stacks goes through [`halftone`], flat art through [`layers`],
-//! a chart through [`chart`], and each gives a dot map ([`sheet`]); [`layout`] puts it on a page, [`separate`] splits the page
-//! into passes, [`job`] plans them and writes them in the printer's language, [`simulate`] prints them without a printer,
-//! [`inspect`] reads them and [`preview`] shows them. [`pipeline`] is the way from dots to a job. Nothing here talks to a
-//! device.
+//! The modules follow the data. [`halftone`] turns a mixture of stacks into dots, [`layers`] flat art, [`chart`] a chart; each
+//! gives a dot map ([`sheet`]). [`layout`] puts it on a page, [`separate`] splits the page into passes, and [`job`] plans the
+//! passes and writes them in the printer's language. [`simulate`] prints a job without a printer, [`inspect`] reads it, and
+//! [`preview`] shows it. [`pipeline`] is the way from dots to a job. Nothing here talks to a device.
 #![deny(unsafe_code)]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "pixel arithmetic: sides and values are bounded by checks at the input (pages fit in u16, pictures in 2^28 pixels, \
+              stacks in u8), and checked casts in loops over dots would cost time and hide the arithmetic"
+)]
 
 pub mod chart;
 pub mod files;

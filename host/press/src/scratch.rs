@@ -1,8 +1,8 @@
-//! Temporary folders that go even when the program is stopped.
+//! Temporary folders that are removed even if the program is interrupted.
 //!
-//! A folder removes itself when it is dropped, but a program that is stopped drops nothing. So every folder stands in one
-//! list, which the program goes through when it is stopped. The list's lock orders the two: whoever holds it
-//! sees each folder either not made yet or listed.
+//! Problem: a folder removes itself when it is dropped, but an interrupted program drops nothing.
+//! Method: one list has every folder, and the program removes the folders in the list when it is interrupted. The lock of the
+//! list keeps the two apart: its holder sees each folder either listed or not yet made.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 static FOLDERS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// All folders there are. Nothing is made or given up while the guard lives.
+/// The list of all folders. No folder is made or kept while the guard lives.
 pub fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
     FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -21,10 +21,10 @@ pub fn folders() -> MutexGuard<'static, Vec<PathBuf>> {
 pub struct Scratch(TempDir);
 
 impl Scratch {
-    /// A hidden one in `parent`, so that what is made in it can be moved beside it.
+    /// Makes a hidden folder in `parent`, whose contents can then be moved beside it.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// The folder cannot be made.
     pub fn beside(parent: &Path) -> io::Result<Scratch> {
         let mut folders = folders();
         let folder = tempfile::Builder::new().prefix(".foilpress-").tempdir_in(parent)?;
@@ -32,20 +32,20 @@ impl Scratch {
         Ok(Scratch(folder))
     }
 
-    /// One where the system keeps temporary files.
+    /// Makes a folder in the system's folder for temporary files.
     ///
     /// # Errors
-    /// When the system refuses.
+    /// The folder cannot be made.
     pub fn new() -> io::Result<Scratch> {
         Scratch::beside(&std::env::temp_dir())
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn path(&self) -> &Path {
         self.0.path()
     }
 
-    /// Lets the folder stay, and says where. The guard shows that the list is in hand.
+    /// Keeps the folder and returns its path. The guard proves that the caller holds the list.
     pub fn keep(mut self, folders: &mut MutexGuard<'static, Vec<PathBuf>>) -> PathBuf {
         folders.retain(|path| path != self.0.path());
         self.0.disable_cleanup(true);
@@ -55,7 +55,7 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // A path that stays listed is removed once more at worst.
+        // At worst, a path that stays in the list is removed once more.
         if let Ok(mut folders) = FOLDERS.try_lock() {
             folders.retain(|path| path != self.0.path());
         }

@@ -108,8 +108,8 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
     if (setup.shift_x, setup.shift_y) != (0, 0) {
         writeln!(out, "shifted by {} dots and {} rows", setup.shift_x, setup.shift_y)?;
     }
-    if let Some(cassettes) = &setup.cassettes {
-        writeln!(out, "cartridges declared: {}", cassettes.join(", "))?;
+    if let Some(cartridges) = &setup.cartridges {
+        writeln!(out, "cartridge list: {}", cartridges.join(", "))?;
     }
     for pass in &summary.passes {
         write!(

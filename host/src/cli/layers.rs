@@ -8,6 +8,7 @@ use inks::{InkSet, Library};
 use protocol::ink::Ink;
 use serde_json::json;
 
+use super::advice;
 use super::choice::choice;
 use super::deliver::DeliverArgs;
 use super::job::{Artwork, ResultArgs};
@@ -261,8 +262,10 @@ impl Work {
             dots: &composed.dots,
             allowed: settings.inks,
             library: &library,
-            report: json!({ "art": { "composed": composed.report, "suggestions": composed.suggestions } }),
-            advice: words(&composed),
+            report: json!({
+                "art": { "composed": composed.report, "suggestions": suggestions(&composed, &settings.inks) }
+            }),
+            advice: words(&composed, &settings.inks),
         };
         then(&artwork, &layout)
     }
@@ -283,8 +286,18 @@ pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
     })
 }
 
+/// Suggestions for programs to read.
+fn suggestions(composed: &Composed, allowed: &InkSet) -> Vec<serde_json::Value> {
+    let suggestions = composed.suggestions.iter();
+    suggestions
+        .map(|Suggestion { text, remedy, dots }| {
+            json!({ "text": text, "how": advice::options_of(remedy, allowed), "dots": dots })
+        })
+        .collect()
+}
+
 /// What was laid and what the art needs, in words.
-fn words(composed: &Composed) -> String {
+fn words(composed: &Composed, allowed: &InkSet) -> String {
     let mut text = String::from("\nFrom the art, lowest first:\n");
     for laid in &composed.report.laid {
         let times = if laid.passes > 1 { format!(", {} times", laid.passes) } else { String::new() };
@@ -298,7 +311,8 @@ fn words(composed: &Composed) -> String {
     if !composed.suggestions.is_empty() {
         text.push_str("\nSuggestions, followed only when you say so:\n");
     }
-    for Suggestion { text: why, how, dots } in &composed.suggestions {
+    for Suggestion { text: why, remedy, dots } in &composed.suggestions {
+        let how = advice::options_of(remedy, allowed);
         text.push_str(&format!("    {how:<26} {why} ({} dots)\n", grouped(*dots)));
     }
     text

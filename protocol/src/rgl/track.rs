@@ -231,10 +231,7 @@ mod tests {
 
     #[test]
     fn every_real_stream_is_followed_to_its_end() {
-        let Some(folder) = std::env::var_os("FOILPRESS_GOLDEN") else {
-            std::println!("skipped: FOILPRESS_GOLDEN names no folder of streams");
-            return;
-        };
+        let Some(folder) = testing::needs::golden() else { return };
         let mut streams = 0;
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

@@ -4,14 +4,14 @@ use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::process::Stdio;
 
-use press::simulate::{Cassette, Trouble};
+use press::simulate::{Cartridge, Trouble};
 use serde_json::Value;
 
 use super::{Bench, INKS, job, text};
 
 #[test]
 fn the_log_tells_of_the_start_and_of_every_job_in_words() {
-    let Some(bench) = Bench::new(&INKS.map(Cassette::from)) else { return };
+    let Some(bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     let job = job();
     fs::write(bench.folder.path().join("job.rgl"), &job).unwrap();
     bench.well(&["send", "job.rgl", "--to", &bench.to()]);
@@ -50,7 +50,7 @@ fn the_log_tells_of_the_start_and_of_every_job_in_words() {
 
 #[test]
 fn the_wiring_is_tried_in_every_position_of_the_plug_and_never_on_a_printer() {
-    let Some(mut bench) = Bench::new(&INKS.map(Cassette::from)) else { return };
+    let Some(mut bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     // A printer in place of the plug: not a byte, and no reset.
     let with_printer = bench.run(&["bridge", "test", "--to", &bench.to()]);
     assert!(!with_printer.status.success() && text(&with_printer).contains("no loop-back plug answers"));
@@ -72,7 +72,7 @@ fn the_wiring_is_tried_in_every_position_of_the_plug_and_never_on_a_printer() {
 
 #[test]
 fn what_is_watched_changes_when_the_printer_does() {
-    let Some(bench) = Bench::new(&INKS.map(Cassette::from)) else { return };
+    let Some(bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     let mut child = bench
         .foilpress(&["bridge", "status", "--watch", "--json", "--to", &bench.to()])
         .stdout(Stdio::piped())

@@ -18,7 +18,7 @@ use foilpress_tests::emulated::{Desk, Emulated};
 use observe::Silent;
 use press::job::stream::write_job;
 use press::separate::{self, Pass, Plane};
-use press::simulate::{Carousel, Cassette, Lever, Printer, Stock, Trouble, difference, print};
+use press::simulate::{Carousel, Cartridge, Lever, Printer, Stock, Trouble, difference, print};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
@@ -46,7 +46,7 @@ struct Bench {
 
 impl Bench {
     /// A bridge and a printer with these cassettes, a sheet in its tray. `None`: there is no image to run.
-    fn new(cassettes: &[Cassette]) -> Option<Bench> {
+    fn new(cassettes: &[Cartridge]) -> Option<Bench> {
         let (image, program) = parts()?;
         let folder = tempfile::tempdir().unwrap();
         let printer = Printer::new(Carousel::new(cassettes).unwrap(), Lever::Auto);
@@ -58,7 +58,7 @@ impl Bench {
     }
 
     /// The same, on USB, where the program finds it by itself.
-    fn on_usb(cassettes: &[Cassette]) -> Option<Bench> {
+    fn on_usb(cassettes: &[Cartridge]) -> Option<Bench> {
         let mut bench = Bench::new(cassettes)?;
         bench.usbfs = std::env::var_os("FOILPRESS_USBFS").map(PathBuf::from);
         if bench.usbfs.is_none() {
@@ -245,7 +245,7 @@ fn job() -> Vec<u8> {
 
 /// A bridge, a printer with what the job needs, and the job in a file.
 fn with_job() -> Option<(Bench, Vec<u8>)> {
-    let bench = Bench::new(&INKS.map(Cassette::from))?;
+    let bench = Bench::new(&INKS.map(Cartridge::from))?;
     let job = job();
     fs::write(bench.folder.path().join("job.rgl"), &job).unwrap();
     Some((bench, job))
@@ -253,7 +253,7 @@ fn with_job() -> Option<(Bench, Vec<u8>)> {
 
 #[test]
 fn bridge_and_printer_are_found_and_asked_how_they_are() {
-    let Some(mut bench) = Bench::new(&INKS.map(Cassette::from)) else { return };
+    let Some(mut bench) = Bench::new(&INKS.map(Cartridge::from)) else { return };
     let words = bench.well(&["bridge", "status", "--to", &bench.to()]);
     for fact in ["no job since it was switched on", "MODEL:MD-5500", "white", "cyan", "black", "idle"] {
         assert!(words.contains(fact), "no `{fact}` in: {words}");
@@ -381,7 +381,7 @@ fn a_cancelled_sheet_comes_out_and_the_next_job_prints() {
 
 #[test]
 fn a_bridge_on_usb_is_found_by_itself_under_both_its_addresses() {
-    let Some(mut bench) = Bench::on_usb(&INKS.map(Cassette::from)) else { return };
+    let Some(mut bench) = Bench::on_usb(&INKS.map(Cartridge::from)) else { return };
     let list = bench.well(&["bridge", "list"]);
     for fact in ["serial:/dev/ttyACM0", "usb:0000000000000000", "MODEL:MD-5500"] {
         assert!(list.contains(fact), "no `{fact}` in: {list}");
@@ -393,7 +393,7 @@ fn a_bridge_on_usb_is_found_by_itself_under_both_its_addresses() {
 
 #[test]
 fn a_job_goes_over_bulk_endpoints_and_survives_pulled_cables_and_a_killed_sender() {
-    let Some(mut bench) = Bench::on_usb(&INKS.map(Cassette::from)) else { return };
+    let Some(mut bench) = Bench::on_usb(&INKS.map(Cartridge::from)) else { return };
     let job = job();
     fs::write(bench.folder.path().join("job.rgl"), &job).unwrap();
     let mut child = bench.spawn(&["send", "job.rgl", "--to", "usb:"]);

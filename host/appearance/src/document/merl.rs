@@ -94,6 +94,7 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<inks::Curve, DocumentEr
 mod tests {
     use super::*;
     use std::process::Command;
+    use testing::needs::Need;
 
     fn file(dims: [i32; 3], value: impl Fn(usize, usize, usize, usize) -> f64) -> Vec<u8> {
         let mut bytes: Vec<u8> = dims.iter().flat_map(|d| d.to_le_bytes()).collect();
@@ -152,23 +153,18 @@ mod tests {
     /// curve of that measurement.
     #[test]
     fn a_full_size_file_gives_the_curve_of_its_material() {
-        let Some(data) = std::env::var_os("FOILPRESS_DATA").map(std::path::PathBuf::from) else {
-            eprintln!("skipped: FOILPRESS_DATA is not set");
-            return;
-        };
+        let Some(data) = testing::needs::data().filter(|_| testing::needs::numpy()) else { return };
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("brass.binary");
+        let Some(script) = testing::needs::path(Need::Reference, "FOILPRESS_REFERENCE") else { return };
         let done = Command::new("python3")
-            .arg(data.join("../tools/mitsuba_ref.py"))
+            .arg(script)
             .args(["merl", "--name", "merl/brass", "--net"])
             .arg(data.join("brdf/nbrdf/networks.json"))
             .arg("--out")
             .arg(&out)
             .output();
-        if !done.is_ok_and(|done| done.status.success()) {
-            eprintln!("skipped: no Python with NumPy to write the file with");
-            return;
-        }
+        assert!(done.is_ok_and(|done| done.status.success()), "the reference writes the file");
         let space = Space::half_angle(32);
         let found = space.row(&parse(&std::fs::read(&out).unwrap(), &out).unwrap());
         let published = inks::Curve::read_csv(&data.join("brdf/curves_avg/merl_brass.csv")).unwrap();

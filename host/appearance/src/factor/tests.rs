@@ -1,6 +1,5 @@
 //! The stage as a whole, on synthetic documents with known results and on real textures.
 
-use std::path::Path;
 
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -43,21 +42,14 @@ struct Textures {
 
 impl Textures {
     fn open(name: &str, step: u32) -> Option<Textures> {
-        let Some(data) = std::env::var_os("FOILPRESS_DATA") else {
-            eprintln!("skipped: FOILPRESS_DATA does not name the folder of real documents");
-            return None;
-        };
-        let folder = Path::new(&data).join("svbrdf").join(name);
+        let folder = testing::needs::data()?.join("svbrdf").join(name);
         let load = |file: &str| image::open(folder.join(file)).ok().map(|image| image.to_rgb8());
         let separate = load("albedo.jpg").zip(load("roughness.jpg")).zip(load("metallic.jpg"));
         let packed = load("base_color.png").zip(load("occlusion_roughness_metallic.png"));
         let (base, roughness, metallic, channels) = match (separate, packed) {
             (Some(((base, roughness), metallic)), _) => (base, roughness, metallic, [0, 0]),
             (_, Some((base, packed))) => (base, packed.clone(), packed, [1, 2]),
-            _ => {
-                eprintln!("skipped: no textures in {}", folder.display());
-                return None;
-            }
+            _ => panic!("no textures in {}", folder.display()),
         };
         let linear = |v: u8| {
             let v = f32::from(v) / 255.0;

@@ -59,11 +59,11 @@ impl std::fmt::Display for Missing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use press::simulate::{Carousel, Cassette, Condition, Lever, Printer, Trouble};
+    use press::simulate::{Carousel, Cartridge, Condition, Lever, Printer, Trouble};
 
     /// The answer comes from the simulated printer, whose cartridges stand in whatever places they were given.
-    fn printer(cassettes: &[Cassette]) -> Printer {
-        Printer::new(Carousel::new(cassettes).unwrap(), Lever::Auto)
+    fn printer(cartridges: &[Cartridge]) -> Printer {
+        Printer::new(Carousel::new(cartridges).unwrap(), Lever::Auto)
     }
 
     fn ask(printer: &Printer, wanted: &[Ink]) -> Found {
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn a_cartridge_that_cannot_print_counts_as_missing_and_says_why() {
-        let backwards = Cassette { condition: Condition::Backwards, ..Ink::White.into() };
+        let backwards = Cartridge { condition: Condition::Backwards, ..Ink::White.into() };
         let Found::Missing(missing) = ask(&printer(&[backwards]), &[Ink::White]) else { panic!() };
         assert!(missing[0].to_string().contains("wrong way round"));
         // Another of the same ink that is ready is enough.

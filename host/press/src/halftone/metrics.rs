@@ -1,10 +1,10 @@
-//! How well a halftone keeps the mix and the minimum clusters.
+//! Measures how well a sheet keeps the mix and the minimum clusters.
 //!
-//! Problem: a halftone is judged by its tones, on the page and in a window the eye averages, and by its smallest
-//! clusters, which decide whether foil sticks.
-//! Method: what was asked is summed over the same lattice the halftone reads; windows are the walk's tiles of 64 by 64
-//! dots or a little less; clusters are 4-connected components, found by joining the runs of neighbouring
-//! rows. Cost: about the halftone's own for tones, 20 ns a run for clusters. Memory: 12 bytes a run of a row.
+//! Problem: the quality of a halftone depends on its tones, over the page and over a window that the eye averages, and on its
+//! smallest clusters, which decide whether foil sticks.
+//! Method: the requested weights are summed over the same lattice that the halftone reads. Windows are the walk's tiles of
+//! 64 by 64 dots or slightly less. Clusters are 4-connected components, found by joining the runs of neighbouring
+//! rows. Cost: about that of the halftone for tones, 20 ns a run for clusters. Memory: 12 bytes for each run of a row.
 
 use inks::Stack;
 use protocol::walk::{Tile, Walk};
@@ -19,16 +19,16 @@ use crate::sheet::clusters::smallest_clusters;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
-/// One stack of a halftone.
+/// Measurements of one stack on the printed rectangle.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tone {
     /// The stack.
     pub stack: Stack,
-    /// Share of the rectangle the mix asks for, 0..=1.
+    /// Share of the rectangle that the mix asks for, 0..=1.
     pub asked: f64,
     /// Share printed, 0..=1.
     pub printed: f64,
-    /// Largest |printed - asked| of a window, as a share of the window.
+    /// Largest |printed - asked| of any window, as a share of the window.
     pub worst_window: f64,
     /// Root mean square of printed - asked over the windows.
     pub rms_window: f64,
@@ -121,7 +121,7 @@ pub fn tones(mix: &InkMix, dots: &DotMap, observer: &dyn Observer) -> Result<Vec
     Ok(tones)
 }
 
-/// Number, least and sum of the runs of each stack along the walk.
+/// For each stack the number of its runs along the walk, the length of the shortest, and the sum of their lengths.
 fn runs<'s>(
     lattice: &Lattice,
     tiles: &[Tile],

@@ -1,12 +1,12 @@
-//! The ink mix where the walk is: document weights sampled along the curve, times the matrix of shares.
+//! The ink mix along the walk: weights of the document times the matrix of shares.
 //!
-//! Problem: weights over 57 stacks for every dot of a page would be gigabytes, while a document has a few
+//! Problem: weights over 57 stacks for every dot of a page would take gigabytes, while a document has a few
 //! bases at its own resolution.
 //! Method: the walk is cut into stretches of 16, 4 or 1 consecutive dots, which are squares of a Hilbert
-//! tile, the largest that is no coarser than the document's pixels. At the middle of each the basis weights are
-//! read, bilinear between pixels (positions in 1/2 dots, fractions in 1/256 pixel), or averaged over a dot's exact
-//! footprint where the document is finer than the dots. Shares are `sum_i a_i matrix[i][q]`, rounded to 1/UNIT; what
-//! rounding leaves goes to the largest share, at most stacks/2 units of 2^-18. All integers: equal on any machine.
+//! tile: the largest that are no coarser than the document's pixels. Basis weights are read at the middle of each stretch:
+//! bilinear between pixels (positions in 1/2 dots, fractions in 1/256 pixel), or averaged over the exact footprint of a dot
+//! where the document is finer than the dots. Shares are `sum_i a_i matrix[i][q]`, rounded to 1/UNIT. The rounding error,
+//! at most stacks/2 units of 2^-18, is added to the largest share. Integers only, so the result is equal on any machine.
 //! Cost: channels x stacks multiplications a stretch, eight at a time; stacks and channels without any weight are
 //! left out. Memory: a table of a few bytes for each half dot of the two sides.
 
@@ -16,15 +16,15 @@ use super::rule::{LANES, Lanes, Source, UNIT, blocks};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 
-/// Basis weights within a stretch are in this unit.
+/// The unit of basis weights within a stretch.
 const WEIGHT: u32 = 1 << 16;
 
-/// A size and orientation of tile: its curve as tables.
+/// The curve of all tiles with one size and orientation, as tables.
 pub(super) struct Shape {
     tile: Tile,
     /// Position on the curve of each dot, row by row.
     pub(super) order: Vec<u16>,
-    /// Middle of each stretch in half dots from the tile's corner, and its number of dots.
+    /// The middle of each stretch in half dots from the tile's corner, and its number of dots.
     stretches: Vec<(u8, u8, u8)>,
 }
 
@@ -58,11 +58,11 @@ impl Shape {
     }
 }
 
-/// Where a position along one side falls in the document.
+/// Maps positions along one side of the rectangle to the document's pixels.
 enum Axis {
-    /// For each half dot: the pixel before it and the part of the next, in 1/256.
+    /// For each half dot: the pixel before it, and the weight of the next pixel in 1/256.
     Between(Vec<(u32, u16)>),
-    /// For each dot: the first pixel and the range of `parts` it covers, each dot's parts with sum [`Axis::FULL`].
+    /// For each dot: its first pixel and its range of `parts`. The parts of a dot sum to [`Axis::FULL`].
     Over { spans: Vec<(u32, u32, u32)>, parts: Vec<u32> },
 }
 
@@ -121,14 +121,14 @@ impl Axis {
     }
 }
 
-/// Everything about a document on a rectangle of dots that does not change along the walk.
+/// Everything about a document on a rectangle of dots that is constant along the walk.
 pub(super) struct Lattice<'a> {
     mix: &'a InkMix,
     /// Numbers in `mix.stacks` of the stacks with weight, ascending.
     pub(super) stacks: Vec<u8>,
     /// Channels with weight.
     channels: Vec<usize>,
-    /// For each eight of the stacks above the shares of each of these channels.
+    /// For each group of eight of these stacks, the shares of each of these channels.
     shares: Vec<Lanes>,
     shapes: Vec<Shape>,
     across: Axis,
@@ -136,7 +136,7 @@ pub(super) struct Lattice<'a> {
 }
 
 impl<'a> Lattice<'a> {
-    /// For a walk over the dots the document is printed on. The mix has been checked.
+    /// For a walk over the dots of the document. The mix has been checked.
     pub(super) fn new(mix: &'a InkMix, walk: &Walk) -> Lattice<'a> {
         let maps = &mix.maps;
         let (width, height) = (usize::from(walk.width()), usize::from(walk.height()));
@@ -162,7 +162,7 @@ impl<'a> Lattice<'a> {
         let finer = (maps.width() > width, maps.height() > height);
         let axis =
             |finer, dots, pixels| if finer { Axis::over(dots, pixels) } else { Axis::between(dots, pixels) };
-        // Rounded up: an odd number of dots is none the less two dots a pixel.
+        // Rounded up, so that an odd number of dots counts as two dots a pixel.
         let coarse =
             |dots: usize| width.div_ceil(dots) >= maps.width() && height.div_ceil(dots) >= maps.height();
         let stretch = if coarse(4) {
@@ -191,7 +191,7 @@ impl<'a> Lattice<'a> {
 
     /// The tables of a tile of the walk.
     pub(super) fn shape(&self, tile: &Tile) -> &Shape {
-        // Every tile of the walk found its shape in `new`.
+        // `new` made a shape for every tile of the walk.
         self.shapes.iter().find(|shape| shape.fits(tile)).unwrap_or(&self.shapes[0])
     }
 
@@ -207,7 +207,7 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// Basis weights in units of 1/[`WEIGHT`] at a place in half dots, when no axis is finer than the dots.
+    /// Basis weights in units of 1/[`WEIGHT`] at a place in half dots, if neither axis is finer than the dots.
     #[inline(always)]
     fn between(&self, x: (u32, u16), y: (u32, u16), weights: &mut [u32]) {
         let maps = &self.mix.maps;
@@ -234,7 +234,7 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// The same by exact parts of pixels on either axis.
+    /// The same by exact parts of pixels along both axes.
     #[cold]
     fn over(&self, x: usize, y: usize, sums: &mut [u64], weights: &mut [u32]) {
         let maps = &self.mix.maps;
@@ -262,7 +262,7 @@ impl<'a> Lattice<'a> {
             for (&channel, share) in self.channels.iter().zip(shares) {
                 let weight = weights[channel] as i32;
                 for (sum, share) in sum.iter_mut().zip(share.0) {
-                    // The whole sum is about 2^31, and kept as the bits of an unsigned number.
+                    // The full sum is about 2^31, which fits if the bits are read as an unsigned number.
                     *sum = sum.wrapping_add(weight.wrapping_mul(share));
                 }
             }
@@ -295,7 +295,7 @@ pub(super) struct Along<'a, T> {
     tile: Option<(Tile, &'a Shape, usize)>,
     weights: Vec<u32>,
     sums: Vec<u64>,
-    /// Where the last mix was taken, which flat or enlarged documents often need again.
+    /// The place of the last mix, which flat or enlarged documents often need again.
     mixed: Option<((u32, u16), (u32, u16))>,
 }
 
@@ -307,7 +307,7 @@ impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
             Some(here) => here,
             None => match self.tiles.next() {
                 Some(tile) => (tile, lattice.shape(&tile), 0),
-                // Not asked for beyond the last tile; all to the first stack if it were.
+                // Never called beyond the last tile; if it were, the first stack would get all weight.
                 None => {
                     out.fill(Lanes::default());
                     out[0].0[0] = UNIT;

@@ -1,15 +1,15 @@
-//! One stack for every dot, in clusters no smaller than the inks can hold (section 4.2 of the 2009 paper).
+//! One stack for every dot, in clusters large enough for the inks to hold (section 4.2 of the 2009 paper).
 //!
-//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, with no cluster
-//! smaller than a stack's minimum.
-//! Method: error diffusion along the band walk ([`protocol::walk`]) of the document's own rectangle, by the rule in `rule` on the mix sampled by `mix`. The walk is cut into strips of 16 bands, each
-//! diffused by itself, so that both cores work and the result does not depend on how many there are; a strip
-//! forgets a few dots of debt at its end.
+//! Problem: a continuous mix of stacks becomes a [`DotMap`](crate::sheet::DotMap) whose local means are the mix, without any cluster
+//! smaller than the minimum cluster of its stack.
+//! Method: error diffusion along the band walk ([`protocol::walk`]) of the document's rectangle, by the rule in `rule` on
+//! the mix sampled by `mix`. The walk is cut into strips of 16 bands, which are diffused independently, so that all cores
+//! work and the result does not depend on their number. A strip drops a few dots of debt at its end.
 //! Cost: under 10 ns a dot on one core for 8 stacks, 20 ns for 57. Memory: the map, one byte a dot, and a few
-//! kilobytes a thread. Limits: minima of 1 to [`LARGEST`] dots.
-//! Guarantees: every dot has a stack that has weight in the document; no
-//! run along the rectangle's walk, hence no 4-connected cluster, is smaller than its stack's minimum (unless the
-//! whole rectangle is); the same input gives the same map on any machine with any number of threads.
+//! kilobytes a thread. Limits: minimum clusters of 1 to [`LARGEST`] dots.
+//! Guarantees: every dot has a stack with weight in the document. No
+//! run along the rectangle's walk, hence no 4-connected cluster, is smaller than the minimum cluster of its stack (unless
+//! the whole rectangle is). The same input gives the same map on any machine with any number of threads.
 
 pub mod metrics;
 mod mix;
@@ -32,25 +32,25 @@ pub const LARGEST: u16 = 64;
 /// Bands in a strip; the last strip has up to twice as many.
 const STRIP: usize = 16;
 
-/// What the halftone may be told.
+/// Settings of the halftone.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Settings {
-    /// Smallest cluster of each stack of the mix in dots, 1 to [`LARGEST`]. The paper uses 8 to 16.
+    /// Minimum cluster of each stack of the mix in dots, 1 to [`LARGEST`]. The paper uses 8 to 16.
     pub minimum: Vec<u16>,
 }
 
 impl Settings {
-    /// One minimum for all stacks.
+    /// The same minimum cluster for all stacks.
     pub fn uniform(stacks: usize, minimum: u16) -> Settings {
         Settings { minimum: vec![minimum; stacks] }
     }
 
-    /// The minima of these stacks in an ink library.
+    /// The minimum clusters of these stacks in an ink library.
     pub fn from_library(stacks: &[Stack], library: &Library) -> Settings {
         Settings { minimum: stacks.iter().map(|stack| library.minimum_cluster(stack)).collect() }
     }
 
-    /// A stack's minimum is the largest of its layers'; `bare` is that of the substrate.
+    /// For each stack the largest minimum cluster of its layers; `bare` is that of the substrate.
     pub fn of(stacks: &[Stack], bare: u16, ink: impl Fn(Ink) -> u16) -> Settings {
         let minimum = |stack: &Stack| stack.layers().iter().map(|&layer| ink(layer)).max().unwrap_or(bare);
         Settings { minimum: stacks.iter().map(minimum).collect() }
@@ -71,8 +71,8 @@ pub enum HalftoneError {
         /// Rows.
         length: u16,
     },
-    /// The matrix has another number of rows than the maps have channels.
-    #[error("the mix has {rows} rows of shares for {channels} weight maps; it needs one for each")]
+    /// The number of rows of the matrix differs from the number of channels.
+    #[error("the mix has {rows} rows of shares for {channels} weight maps; expected one row for each")]
     Rows {
         /// Rows found.
         rows: usize,
@@ -97,10 +97,10 @@ pub enum HalftoneError {
         /// The sum in units of 1/ONE.
         sum: u32,
     },
-    /// The settings are for another number of stacks.
+    /// The settings have a different number of stacks.
     #[error("{found} minimum clusters are set for {stacks} stacks")]
     Minima {
-        /// Minima given.
+        /// Minimum clusters in the settings.
         found: usize,
         /// Number of stacks.
         stacks: usize,
@@ -110,13 +110,13 @@ pub enum HalftoneError {
     Minimum {
         /// The stack.
         stack: Stack,
-        /// What was set.
+        /// The minimum cluster in the settings.
         minimum: u16,
     },
-    /// A dot map to be judged is not a halftone of this mix.
+    /// The dot map is not a halftone of this mix.
     #[error("the dot map is not a halftone of this mix: its stacks differ")]
     OtherStacks,
-    /// The stacks do not make a dot map.
+    /// The stacks are invalid.
     #[error(transparent)]
     Sheet(#[from] SheetError),
 }
@@ -201,10 +201,10 @@ pub fn halftone(
     Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
 }
 
-/// Places beyond a tile's end that a short run may be written over.
+/// Places beyond the end of a tile that a short run may overwrite.
 const SLACK: usize = 16;
 
-/// Runs along the walk to rows of the map, tile by tile.
+/// Writes runs along the walk to rows of the map, tile by tile.
 struct Paint<'a, T> {
     lattice: &'a mix::Lattice<'a>,
     observer: &'a dyn Observer,
@@ -230,7 +230,7 @@ impl<T: Iterator<Item = Tile>> rule::Sink for Paint<'_, T> {
             let Some(tile) = self.tile else { return };
             let area = usize::from(tile.area());
             let step = dots.min(area - self.filled);
-            // Most runs are short: one store of fixed length, whose excess the next run overwrites.
+            // Most runs are short, so one store of fixed length comes first; the next run overwrites the excess.
             self.line[self.filled..self.filled + SLACK].fill(stack);
             if step > SLACK {
                 self.line[self.filled + SLACK..self.filled + step].fill(stack);

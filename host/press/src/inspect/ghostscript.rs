@@ -1,23 +1,22 @@
 //! Streams of Ghostscript's drivers for these printers (`md5k`, `md2k`): another dialect, for reading only.
 //!
-//! Problem: owners have such streams and print them raw; they are jobs, though not by the strict reader's grammar.
-//! Method: what the dialect writes differently is known here, everything else is parsed as usual, and the order is
-//! held only where a sheet depends on it: a whole setup, a back-feed between passes, one form feed, an end.
+//! Problem: owners have such streams and print them raw. They are jobs, although not by the strict reader's grammar.
+//! Method: this reader parses the commands that the dialect writes differently; all others are parsed as usual. It checks
+//! the order only where a sheet depends on it: a complete setup, a back-feed between passes, one form feed, an end.
 //!
 //! ```text
 //! job   = [reset] select-rgl setup raster-start [compression] pass { back-feed pass } FF raster-end leave-rgl [reset]
 //! pass  = ink-select { [compression] [skip] row }
 //! ```
-//! Setup commands come in any order, each once; no page width is declared, so the paper's own counts.
-//! Positions in errors count from the stream's first byte.
-//! Limits: nobody has reported `md5k` on hardware. A PackBits header `80`, which `md2k` writes for runs of 129 and
-//! others read as nothing, is refused. Jobs with an econo ribbon are: no ink of ours has its code.
+//! Setup commands come in any order, each once. No page width is declared, so the paper's own width applies.
+//! Limits: nobody has reported on `md5k` with hardware. A PackBits header `80`, which `md2k` writes for runs of 129 and
+//! other software ignores, is refused. Jobs with an econo ribbon are refused too, because no known ink has its code.
 
 use protocol::ink::Ink;
 use protocol::rgl::{Command, Compression, Fault, PaperCode, Resolution, Step, parse};
 use protocol::{packbits, paper};
 
-use super::{Inspected, PassReport, Setup, measure, mode_name};
+use super::report::{Inspected, PassReport, Setup, measure, mode_name};
 use crate::separate::Pass;
 use crate::simulate::Canvas;
 use observe::Observer;
@@ -25,29 +24,29 @@ use observe::Observer;
 const ESC: u8 = 0x1b;
 const SUB: u8 = 0x1a;
 
-/// How every stream of the dialect begins, after the reset that may be missing: the printer's language, then a line-feed
-/// adjustment of nothing, which the strict grammar forbids.
+/// Every stream of the dialect begins like this after an optional reset: it selects the printer's language, then adjusts the
+/// line feed by zero, which the strict grammar forbids.
 const OPENING: [u8; 9] = [ESC, b'%', 0x80, b'A', ESC, SUB, 0, 0, b'L'];
 
-/// Rows the drivers send beyond the length they declare.
+/// Rows that the drivers send beyond the declared length.
 const SPARE_ROWS: u32 = 1;
 
-/// Whether a stream begins as this dialect does.
+/// Whether a stream begins like this dialect.
 pub(super) fn begins(stream: &[u8]) -> bool {
     stream.strip_prefix(&[ESC, b'e']).unwrap_or(stream).starts_with(&OPENING)
 }
 
 /// A command of the dialect.
 enum Item<'a> {
-    /// One that means something.
+    /// A command of the strict grammar.
     Known(Command<'a>),
-    /// A row that begins so many bytes from the left.
+    /// A row, and the byte at which it begins.
     Offset(usize, &'a [u8]),
-    /// One that says nothing about the sheet: feed source, print mode, adjustments.
-    Aside,
+    /// A command without effect on the dots: feed source, print mode, adjustments.
+    Ignored,
 }
 
-/// The command at the start of `bytes` and its length. Errors: the fault, and where from the start.
+/// The command at the start of `bytes` and its length; or the fault and its offset.
 fn step(bytes: &[u8]) -> Result<(Item<'_>, usize), (Fault, usize)> {
     let known = |command, length| Ok((Item::Known(command), length));
     match *bytes {
@@ -55,9 +54,9 @@ fn step(bytes: &[u8]) -> Result<(Item<'_>, usize), (Fault, usize)> {
             let resolution = Resolution::from_code(code).ok_or((Fault::ResolutionCode, 3))?;
             known(Command::Resolution(resolution), if rest.first() == Some(&0) { 6 } else { 5 })
         }
-        [ESC, SUB, 0, 0, b'L'] | [ESC, SUB, 0, 0, b'L', ..] => Ok((Item::Aside, 5)),
-        [ESC, SUB, 0 | 1, 0, b'A', ..] | [ESC, SUB, _, 0, b'U', ..] => Ok((Item::Aside, 5)),
-        [ESC, b'&', b'l', 1 | 2, 0, b'H', ..] => Ok((Item::Aside, 6)),
+        [ESC, SUB, 0, 0, b'L'] | [ESC, SUB, 0, 0, b'L', ..] => Ok((Item::Ignored, 5)),
+        [ESC, SUB, 0 | 1, 0, b'A', ..] | [ESC, SUB, _, 0, b'U', ..] => Ok((Item::Ignored, 5)),
+        [ESC, b'&', b'l', 1 | 2, 0, b'H', ..] => Ok((Item::Ignored, 6)),
         [ESC, b'*', b'r', 1, b'A', ..] => known(Command::RasterStart, 5),
         [ESC, b'*', b'b', low, high, b'T', ref rest @ ..] => {
             let length = usize::from(u16::from_le_bytes([low, high]));
@@ -73,8 +72,8 @@ fn step(bytes: &[u8]) -> Result<(Item<'_>, usize), (Fault, usize)> {
     }
 }
 
-/// The length of the first sheet's job in a stream, if it comes to its end: up to and with the command that leaves the
-/// printer's language.
+/// The length of the first sheet's job, including the command that leaves the printer's language; `None` if the job is
+/// incomplete.
 pub(super) fn first_sheet(stream: &[u8]) -> Option<usize> {
     let mut at = 0;
     loop {
@@ -113,7 +112,7 @@ struct Reader {
     line: Vec<u8>,
 }
 
-/// Looks at one sheet's job of this dialect.
+/// Inspects one sheet's job.
 pub(super) fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
     observer.begin("inspect", stream.len() as u64);
     let mut reader = Reader {
@@ -147,7 +146,7 @@ pub(super) fn inspect(stream: &[u8], observer: &dyn Observer) -> Inspected {
     Inspected::of(stream, Some("Ghostscript"), reader.setup, (reader.reports, reader.passes), fault)
 }
 
-/// Declares something once.
+/// Declares a value, which must not be declared twice.
 fn once<T>(place: &mut Option<T>, value: T) -> Result<(), Fault> {
     if place.is_some() {
         return Err(Fault::Repeated);
@@ -160,8 +159,8 @@ impl Reader {
     fn take(&mut self, item: Item<'_>, at: usize, length: usize) -> Result<(), Fault> {
         use Stage::{BackFed, Before, Ejected, Left, Pass, Raster, RasterEnded, Setup};
         let command = match item {
-            Item::Aside if self.stage == Setup => return Ok(()),
-            Item::Aside => return Err(Fault::OutOfOrder),
+            Item::Ignored if self.stage == Setup => return Ok(()),
+            Item::Ignored => return Err(Fault::OutOfOrder),
             Item::Offset(offset, data) => return self.put_row(offset, Compression::Plain, data, false),
             Item::Known(command) => command,
         };
@@ -179,7 +178,7 @@ impl Reader {
             (Setup, Command::Mode(mode)) => once(&mut setup.mode, mode_name(mode))?,
             (Setup, Command::CurlCorrection(on)) => once(&mut setup.curl_correction, on)?,
             (Setup, Command::Cartridges(list)) => {
-                once(&mut setup.cassettes, list.inks().iter().map(|ink| ink.name()).collect())?;
+                once(&mut setup.cartridges, list.inks().iter().map(|ink| ink.name()).collect())?;
             }
             (Setup, Command::RasterStart) => self.start()?,
             (Raster | BackFed, Command::InkSelect { ink, last }) => {
@@ -201,7 +200,7 @@ impl Reader {
             }
             (BackFed, Command::FormFeed | Command::RasterEnd) => return Err(Fault::BackFeedWithoutPass),
             (Raster, Command::FormFeed | Command::RasterEnd) => return Err(Fault::NoPass),
-            // The sheet may go before the raster data end, or after.
+            // The sheet may be ejected before or after the end of the raster data.
             (Pass, Command::FormFeed) => {
                 self.close(at);
                 (self.stage, self.ejected) = (Ejected, true);
@@ -214,7 +213,7 @@ impl Reader {
             (RasterEnded, Command::FormFeed) if !self.ejected => self.ejected = true,
             (RasterEnded, Command::LeaveRgl) if self.ejected => self.stage = Left,
             (RasterEnded, Command::LeaveRgl) => return Err(Fault::MissingFormFeed),
-            // Some of the drivers forget the end of the sheet.
+            // Some of the drivers omit the end of the sheet.
             (Pass, Command::Reset | Command::LeaveRgl) => return Err(Fault::MissingFormFeed),
             (Left, Command::Reset) if length == 2 => {}
             (Left, _) => return Err(Fault::AfterJob),
@@ -223,7 +222,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The setup is over.
+    /// Checks the setup and begins the raster data.
     fn start(&mut self) -> Result<(), Fault> {
         let resolution = self.resolution.ok_or(Fault::MissingResolution)?;
         let paper = self.paper.ok_or(Fault::MissingPaper)?;
@@ -240,7 +239,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Dots across the printable area of the paper, in the job's resolution.
+    /// Dots across the printable area of the paper, at the job's resolution.
     fn width(&self) -> usize {
         let named = paper::Paper::named().find(|named| Some(named.code()) == self.paper.map(PaperCode::code));
         let width = named.map_or(paper::LARGEST.0, |paper| paper.width());
@@ -254,7 +253,7 @@ impl Reader {
         self.open = Some((ink, report, canvas));
     }
 
-    /// A row, `offset` bytes from the left.
+    /// Takes a row that begins at byte `offset`. With `stays`, the next row has the same number.
     fn put_row(
         &mut self,
         offset: usize,

@@ -1,4 +1,4 @@
-//! Operations on one-bit planes: made from bytes, joined, taken from each other.
+//! Operations on one-bit planes: making them from bytes, and combining them.
 
 use rayon::prelude::*;
 
@@ -15,12 +15,12 @@ pub(super) fn full(width: usize, length: usize) -> Plane {
     from_bytes(width, &vec![1; width * length], |_| true)
 }
 
-/// The plane of the bytes, one a dot, that `ink` is true for. `width` at least 1.
+/// The plane of all dots whose byte satisfies `ink`. `width` is at least 1.
 pub(super) fn from_bytes(width: usize, bytes: &[u8], ink: impl Fn(u8) -> bool + Sync) -> Plane {
     from(width, bytes, |&byte| ink(byte))
 }
 
-/// The plane of the dots that `ink` is true for. `width` at least 1.
+/// The plane of all dots that satisfy `ink`. `width` is at least 1.
 pub(super) fn from<T: Sync>(width: usize, dots: &[T], ink: impl Fn(&T) -> bool + Sync) -> Plane {
     let mut plane = blank(width, dots.len() / width);
     plane.bits.par_chunks_mut(plane.stride).zip(dots.par_chunks_exact(width)).for_each(|(bits, dots)| {
@@ -31,7 +31,7 @@ pub(super) fn from<T: Sync>(width: usize, dots: &[T], ink: impl Fn(&T) -> bool +
     plane
 }
 
-/// Combines `with` into `plane` byte by byte. Both are of one size.
+/// Combines `with` into `plane` byte by byte. Both have the same size.
 pub(super) fn merge(plane: &mut Plane, with: &Plane, join: impl Fn(u8, u8) -> u8 + Sync) {
     let rows = plane.bits.par_chunks_mut(1 << 12).zip(with.bits.par_chunks(1 << 12));
     rows.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, &from)| *to = join(*to, from)));
@@ -42,7 +42,7 @@ pub(super) fn add(plane: &mut Plane, with: &Plane) {
     merge(plane, with, |a, b| a | b);
 }
 
-/// Whether the dot has ink.
+/// Whether a dot has ink.
 pub(super) fn at(plane: &Plane, x: usize, y: usize) -> bool {
     plane.bits[y * plane.stride + x / 8] & 0x80 >> (x % 8) != 0
 }

@@ -1,10 +1,10 @@
 //! CMYK JPEG: four plates.
 //!
-//! Problem: a CMYK picture says how much of four inks to print, not what it looks like; a profile, if there is one, tells that of
-//! another printer's inks.
-//! Method: its plates are taken as what they are called, layers of cyan, magenta, yellow and black with their tones, as those of
-//! a separated TIFF are. Adobe stores ink upside down, 0 is full ink, and every program that writes such files follows; what
-//! it calls YCCK is the same with cyan, magenta and yellow as a luminance and two differences.
+//! Problem: a CMYK picture states how much of four inks to print, not what colour results. Its profile, if it has one,
+//! describes another printer's inks.
+//! Method: each plate becomes a layer of its ink and keeps its tones, as in a separated TIFF. Adobe stores inverted values, where
+//! 0 is full ink, and all programs that write such files do the same. YCCK is the same picture with cyan, magenta and yellow
+//! as a luminance and two differences.
 //! Cost: the file in memory, and five bytes a pixel. Limits: baseline and progressive files of 8 bits.
 //! Source: Adobe technical note 5116, section 18; ITU-T T.871 for the transform.
 
@@ -16,34 +16,40 @@ use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
-use super::raster::{self, Coverage, Density, Scan, Unstated, wrong};
-use super::{Artwork, LayersError, Options, names};
+use super::artwork::Artwork;
+use super::coverage::{Coverage, Scan};
+use super::decode::jpeg_frame;
+use super::error::{LayersError, io, wrong};
+use super::names::{self, stem};
+use super::options::Options;
+use super::resolution::{self, Dpi};
+use super::size::{self, MOST_BYTES, Unstated};
 
 /// The inks of the plates, in the order of the channels.
 pub(super) const PLATES: [Ink; 4] = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black];
 
-/// The art of a JPEG with four channels; nothing if it has others.
-pub(super) fn jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
-    let read = raster::io(path, "read it");
-    if std::fs::metadata(path).map_err(&read)?.len() > raster::MOST_BYTES {
+/// Reads a JPEG with four channels; `None` if it has another number of channels.
+pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
+    let read = io(path, "read it");
+    if std::fs::metadata(path).map_err(&read)?.len() > MOST_BYTES {
         return Err(wrong(path, "the file is larger than a gigabyte"));
     }
     let bytes = std::fs::read(path).map_err(&read)?;
-    let Some((4, height, width)) = raster::jpeg_frame(&bytes) else { return Ok(None) };
+    let Some((4, height, width)) = jpeg_frame(&bytes) else { return Ok(None) };
     let (width, height) = (u32::from(width), u32::from(height));
-    raster::check_size(path, width, height)?;
+    size::check_pixels(path, width, height)?;
     if options.reserved {
-        return Err(wrong(path, "the picture is CMYK; reserved colours are sRGB, so convert it to sRGB"));
+        return Err(wrong(path, "the picture is CMYK, but reserved colours are sRGB; convert it to sRGB"));
     }
     let bad = |error| wrong(path, format!("cannot decode the picture: {error}"));
-    // The limits of the format, so that the check above is the one that speaks.
+    // The limits of the format: the size was checked above.
     let usual = DecoderOptions::default().set_max_width(1 << 16).set_max_height(1 << 16);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(&bytes[..]), usual);
     decoder.decode_headers().map_err(bad)?;
     let stored = match decoder.input_colorspace() {
         Some(space @ (ColorSpace::CMYK | ColorSpace::YCCK)) => space,
-        // Four channels that a later segment calls three: the decoder would not know what to do with them.
-        _ => return Err(wrong(path, "it has four channels and calls them something else than CMYK or YCCK")),
+        // A later segment may call the four channels three, which the decoder cannot handle.
+        _ => return Err(wrong(path, "it has four channels that are neither CMYK nor YCCK")),
     };
     let luminance = stored == ColorSpace::YCCK;
     decoder.set_options(usual.jpeg_set_out_colorspace(stored));
@@ -51,11 +57,11 @@ pub(super) fn jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, La
     let profile = decoder.icc_profile().is_some();
     let (pixels, rest) = pixels.as_chunks::<4>();
     if pixels.len() != width as usize * height as usize || !rest.is_empty() {
-        return Err(wrong(path, "it holds another number of pixels than it says"));
+        return Err(wrong(path, "its number of pixels differs from that in its header"));
     }
     let inks = |&[c, m, y, k]: &[u8; 4]| {
         if luminance {
-            // Red, green and blue of the transform are 255 less cyan, magenta and yellow, which are upside down.
+            // Red, green and blue of the transform are the inverted cyan, magenta and yellow: 255 minus them.
             let [red, green, blue] = rgb_of(c, m, y);
             [red, green, blue, 255 - k]
         } else {
@@ -63,8 +69,8 @@ pub(super) fn jpeg(path: &Path, options: &Options) -> Result<Option<Artwork>, La
         }
     };
     let plates = (0..4).map(|plate| pixels.iter().map(|pixel| inks(pixel)[plate]).collect()).collect();
-    let density = raster::density(&bytes, image::ImageFormat::Jpeg);
-    art(path, (width, height), density, plates, profile, options).map(Some)
+    let dpi = resolution::of_file(&bytes, image::ImageFormat::Jpeg);
+    artwork(path, (width, height), dpi, plates, profile, options).map(Some)
 }
 
 /// Red, green and blue of a luminance and two differences.
@@ -74,39 +80,39 @@ fn rgb_of(y: u8, cb: u8, cr: u8) -> [u8; 3] {
     [y + 1.402 * cr, y - 0.344_136 * cb - 0.714_136 * cr, y + 1.772 * cb].map(|v| v.round() as u8)
 }
 
-/// Art of four plates, 255 full ink, a byte a pixel.
-fn art(
+/// Art of four plates: one byte a pixel, 255 full ink.
+fn artwork(
     path: &Path,
     (width, height): (u32, u32),
-    density: Option<Density>,
+    dpi: Option<Dpi>,
     plates: Vec<Vec<u8>>,
     profile: bool,
     options: &Options,
 ) -> Result<Artwork, LayersError> {
     let mut notes = vec![note(path, profile)];
     let sides = (f64::from(width), f64::from(height));
-    let dots = raster::dots(path, sides, density, Unstated::Fills, options, &mut notes)?;
-    let mut art = Artwork::blank(&super::stem(path), dots);
+    let dots = size::dots(path, sides, dpi, Unstated::FillRoom, options, &mut notes)?;
+    let mut art = Artwork::blank(&stem(path), dots);
     art.notes = notes;
     for (ink, coverage) in PLATES.into_iter().zip(plates) {
-        let scan = Scan { path: path.to_path_buf(), width, height, density, coverage, by: Coverage::Dark };
+        let scan = Scan { path: path.to_path_buf(), width, height, dpi, coverage, by: Coverage::Dark };
         art.add(scan, &plate_of(ink), names::Named { place: None, ink }, true, options);
     }
     Ok(art)
 }
 
-/// What to call a plate.
+/// The name of a plate.
 pub(super) fn plate_of(ink: Ink) -> String {
     format!("the {} plate", ink.name())
 }
 
-/// What to say of a CMYK picture.
+/// A note on a CMYK picture.
 pub(super) fn note(path: &Path, profile: bool) -> String {
     format!(
-        "{}: CMYK, so its four plates are printed as they are in cyan, magenta, yellow and black{}; for colours matched to \
-         these inks convert it to sRGB",
+        "{}: CMYK, so its four plates are printed unchanged in cyan, magenta, yellow and black{}; convert it to sRGB to \
+         match its colours to these inks",
         path.display(),
-        if profile { ", and its colour profile, which is of other inks, is not used" } else { "" }
+        if profile { ", without its colour profile, which describes other inks" } else { "" }
     )
 }
 
@@ -117,7 +123,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// 16 x 8 pixels written by libjpeg (through Pillow): the left half 200, 0, 40, 20 of 255 in cyan, magenta, yellow and
-    /// black, the right half bare.
+    /// black; the right half is bare.
     const CMYK: &[u8] = include_bytes!("cmyk.jpg");
 
     fn planes(bytes: &[u8]) -> Vec<Vec<u8>> {
@@ -125,7 +131,7 @@ mod tests {
         let path = folder.path().join("photo.jpg");
         std::fs::write(&path, bytes).unwrap();
         let options = Options { dpi: Some(600.0), ..Options::default() };
-        let art = jpeg(&path, &options).unwrap().unwrap();
+        let art = read_jpeg(&path, &options).unwrap().unwrap();
         let plane =
             |ink: Ink| match art.layers.iter().find(|layer| layer.ink == ink).map(|layer| &layer.shape) {
                 Some(Shape::Tone(tones)) => tones.clone(),
@@ -142,7 +148,7 @@ mod tests {
             assert_eq!(plane.len(), 128);
             for (at, &tone) in plane.iter().enumerate() {
                 let wanted = if at % 16 < 8 { wanted } else { 0 };
-                // Tones this near to none count as none.
+                // Tones this near to zero count as zero.
                 assert!(tone.abs_diff(wanted) <= tolerance, "{at}: {tone}, not {wanted}");
             }
         }
@@ -155,7 +161,7 @@ mod tests {
 
     #[test]
     fn luminance_and_differences_become_the_inks_they_stand_for() {
-        // The same numbers, called YCCK: luminance 55, differences 255 and 215, black upside down.
+        // The same numbers as YCCK: luminance 55, differences 255 and 215, black inverted.
         let at = CMYK.windows(5).position(|window| window == b"Adobe").unwrap() + 11;
         let mut ycck = CMYK.to_vec();
         assert_eq!(ycck[at], 0);
@@ -181,10 +187,10 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("photo.jpg");
             std::fs::write(&path, &bytes).unwrap();
-            // A pixel a dot: a page of them takes its time.
+            // One dot for each pixel: a full page would take long.
             let options = Options { dpi: Some(600.0), ..Options::default() };
-            if let Err(error) = jpeg(&path, &options) {
-                // Sizes are of the page, all else of the file.
+            if let Err(error) = read_jpeg(&path, &options) {
+                // A size error names the page; any other error names the file.
                 let size = matches!(error, LayersError::TooSmall { .. } | LayersError::TooLarge { .. });
                 prop_assert!(size || error.to_string().contains("photo.jpg"), "{}", error);
             }

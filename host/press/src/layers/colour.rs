@@ -1,29 +1,21 @@
-//! Plain colour to the process inks: an image is a matte document.
+//! Plain colour to the process inks: a picture is a matte document.
 //!
-//! Problem: a photograph has millions of colours and a page thirty million dots, and white must stay bare paper.
-//! Method: sRGB is taken relative to the paper: white is the bare paper and black is black ink (without it, the darkest
-//! stack of the process inks at hand), colours lie between them in linear light. A lattice of 17 x 17 x 17 such colours is
-//! fitted to the stacks by the gamut stage (eq. 1 at every node, so what cannot be printed is clamped to the nearest that
-//! can), pixels are interpolated in it among the four corners of a tetrahedron, and the mix of stacks goes
-//! to the halftone stage. Interpolated mixtures are mixtures, so every pixel is printable.
-//! Cost: 50 ms for the lattice, 20 ns a pixel, 10 ns a dot. Pictures finer than 300 dpi are averaged to it, in linear
-//! light: no cluster of dots is finer. Limits: colours are clamped, not compressed; the ink library decides how true
-//! they are.
+//! Problem: a photograph has millions of colours, a page has thirty million dots, and white must stay bare paper.
+//! Method: sRGB is relative to the paper. White is bare paper, and black is black ink; without black ink, it is the darkest
+//! stack of the allowed process inks. Other colours lie between the two in linear light. The gamut stage fits a lattice of
+//! 17 x 17 x 17 such colours to the stacks (eq. 1 at every node; unprintable colours are clamped to the nearest
+//! printable one). Pixels are interpolated among the four corners of a tetrahedron of the lattice, and the mixture of
+//! stacks goes to the halftone stage. An interpolated mixture is a mixture, so every pixel is printable.
+//! Cost: 50 ms for the lattice, 20 ns a pixel, 10 ns a dot. Pictures finer than 300 dpi are averaged to 300 dpi in linear
+//! light, because no cluster of dots is finer. Limits: colours are clamped, not compressed; their accuracy is that of the
+//! ink library.
 
-use std::fs::File;
-use std::io::BufReader;
-use std::path::{Path, PathBuf};
-
-use image::DynamicImage;
 use inks::{InkSet, Library, Stack};
-use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
 use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
-use super::raster::{self, Density, Unstated, io, wrong};
-use super::{Artwork, LayersError, Options, bits, reserved};
+use super::error::LayersError;
 use crate::halftone::{self, halftone};
-use crate::separate::Plane;
 use appearance::brdf::{Space, Table};
 use appearance::document::{Materials, SAMPLES};
 use appearance::factor::Factored;
@@ -34,7 +26,7 @@ use observe::Observer;
 /// Nodes along an edge of the lattice.
 const NODES: usize = 17;
 
-/// Colours to be printed with the process inks.
+/// Colours to print with the process inks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colour {
     /// Pixels across.
@@ -45,167 +37,14 @@ pub struct Colour {
     pub rgb: Vec<u8>,
 }
 
-/// A picture as read: straight alpha, sRGB.
-pub(super) struct Pixels {
-    pub path: PathBuf,
-    pub width: u32,
-    pub height: u32,
-    pub density: Option<Density>,
-    /// Red, green, blue, opacity.
-    pub rgba: Vec<u8>,
-    pub notes: Vec<String>,
-}
-
-/// Reads a picture and brings its colours to sRGB.
-pub(super) fn read(path: &Path) -> Result<Pixels, LayersError> {
-    let file = File::open(path).map_err(io(path, "open it"))?;
-    let decoded = raster::decode(path, BufReader::new(file))?;
-    let (width, height) = (decoded.image.width(), decoded.image.height());
-    let mut notes = Vec::new();
-    let deep = matches!(
-        decoded.image,
-        DynamicImage::ImageLuma16(_)
-            | DynamicImage::ImageLumaA16(_)
-            | DynamicImage::ImageRgb16(_)
-            | DynamicImage::ImageRgba16(_)
-    );
-    if deep {
-        notes.push(format!("{}: 16 bits a channel are read as 8", path.display()));
-    }
-    let grey = !decoded.image.color().has_color();
-    let mut rgba = decoded.image.into_rgba8().into_raw();
-    if let Some(profile) = decoded.profile {
-        notes.extend(to_srgb(path, &profile, grey, &mut rgba)?);
-    }
-    Ok(Pixels { path: path.to_path_buf(), width, height, density: decoded.density, rgba, notes })
-}
-
-/// Applies an embedded profile; says so if it changed anything. `grey` is a picture whose file has grey values only.
-pub(super) fn to_srgb(
-    path: &Path,
-    profile: &[u8],
-    grey: bool,
-    rgba: &mut [u8],
-) -> Result<Option<String>, LayersError> {
-    let Ok(profile) = ColorProfile::new_from_slice(profile) else {
-        return Ok(Some(format!("{}: its colour profile is damaged; read as sRGB", path.display())));
-    };
-    let of_grey = match profile.color_space {
-        DataColorSpace::Rgb => false,
-        DataColorSpace::Gray if grey => true,
-        other => {
-            return Err(wrong(
-                path,
-                format!(
-                    "its colour profile is for {other:?}, which its pixels are not; convert the picture to sRGB"
-                ),
-            ));
-        }
-    };
-    let srgb = ColorProfile::new_srgb();
-    let bad =
-        |error| wrong(path, format!("its colour profile cannot be applied ({error}); convert it to sRGB"));
-    let layout = if of_grey { Layout::GrayAlpha } else { Layout::Rgba };
-    let transform = profile
-        .create_transform_8bit(layout, &srgb, Layout::Rgba, TransformOptions::default())
-        .map_err(bad)?;
-    let mut changed = false;
-    let mut line = vec![0; 4 << 12];
-    let mut greys = Vec::new();
-    for pixels in rgba.chunks_mut(4 << 12) {
-        let line = &mut line[..pixels.len()];
-        if of_grey {
-            greys.clear();
-            greys.extend(pixels.as_chunks::<4>().0.iter().flat_map(|&[v, _, _, alpha]| [v, alpha]));
-        }
-        transform.transform(if of_grey { &greys } else { &*pixels }, line).map_err(bad)?;
-        changed |= pixels != line;
-        pixels.copy_from_slice(line);
-    }
-    Ok(changed.then(|| format!("{}: its colour profile was applied", path.display())))
-}
-
-/// Art from one picture: reserved colours as layers if asked for, all else as colour.
-pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, LayersError> {
-    let sides = (f64::from(pixels.width), f64::from(pixels.height));
-    let unstated = if options.reserved { Unstated::IsDots } else { Unstated::Fills };
-    let dots = raster::dots(&pixels.path, sides, pixels.density, unstated, options, &mut pixels.notes)?;
-    Ok(artwork_of(name, pixels, dots, options))
-}
-
-/// The same at a size that is known.
-pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
-    let Pixels { path, width, height, mut rgba, notes, .. } = pixels;
-    let size = (width, height);
-    let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
-    let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 0));
-    rgba.par_chunks_exact_mut(4).for_each(|p| {
-        let alpha = u32::from(p[3]);
-        for v in &mut p[..3] {
-            *v = ((u32::from(*v) * alpha + 255 * (255 - alpha) + 127) / 255) as u8;
-        }
-    });
-    let mut rgb = rgba;
-    // In place: three bytes of a pixel never lie after its four.
-    for at in 0..rgb.len() / 4 {
-        rgb.copy_within(4 * at..4 * at + 3, 3 * at);
-    }
-    rgb.truncate(rgb.len() / 4 * 3);
-    let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
-    let mut art = flat(name, &file, size, dots, rgb, options);
-    art.opaque = opaque;
-    art.notes.splice(..0, notes);
-    art
-}
-
-/// Art from pixels without transparency, three bytes each. `file` is what notes call it.
-pub(super) fn flat(
-    name: &str,
-    file: &str,
-    size: (u32, u32),
-    dots: (usize, usize),
-    mut rgb: Vec<u8>,
-    options: &Options,
-) -> Artwork {
-    let drawn = plane_of::<3>(&rgb, size, dots, |p| *p != [255; 3]);
-    let (mut layers, mut notes) = (Vec::new(), Vec::new());
-    if options.reserved {
-        let found = reserved::take(&mut rgb, size, dots, options);
-        notes.extend(found.notes(file));
-        layers = found.layers;
-    }
-    let white = |bytes: &[u8]| bytes.iter().fold(255, |all, byte| all & byte) == 255;
-    let colour = rgb.par_chunks(1 << 12).any(|bytes| !white(bytes)).then(|| {
-        let full = Colour { width: size.0 as usize, height: size.1 as usize, rgb };
-        full.averaged(dots)
-    });
-    let (width, length) = dots;
-    Artwork { name: name.into(), width, length, layers, colour, drawn, opaque: None, notes }
-}
-
-/// The dots whose pixel, of `N` bytes, is so.
-fn plane_of<const N: usize>(
-    pixels: &[u8],
-    size: (u32, u32),
-    dots: (usize, usize),
-    is: impl Fn(&[u8; N]) -> bool + Sync,
-) -> Plane {
-    let pixels = pixels.as_chunks::<N>().0;
-    if (size.0 as usize, size.1 as usize) == dots {
-        return bits::from(dots.0, pixels, is);
-    }
-    let bytes: Vec<u8> = pixels.par_iter().map(|pixel| u8::from(is(pixel))).collect();
-    bits::from_bytes(dots.0, &raster::nearest(bytes, size, dots), |byte| byte > 0)
-}
-
 impl Colour {
-    /// At most one pixel for two dots along each side.
-    fn averaged(self, dots: (usize, usize)) -> Colour {
+    /// The same averaged to at most one pixel for two dots along each side.
+    pub(super) fn averaged(self, dots: (usize, usize)) -> Colour {
         let to = (self.width.min(dots.0.div_ceil(2)), self.height.min(dots.1.div_ceil(2)));
         if to == (self.width, self.height) {
             return self;
         }
-        // Sums of linear light, 16 bits a channel: exact enough for 8-bit sRGB to come back as it was.
+        // Sums of linear light in 16 bits a channel: exact enough to restore every 8-bit sRGB value.
         let linear: Vec<u32> = (0..=255u8)
             .map(|v| (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32)
             .collect();
@@ -216,7 +55,7 @@ impl Colour {
                 (if nearer { above } else { above - 1 }) as u8
             })
             .collect();
-        // Whole pixels: pairs, or the first and last are shared where sides are no multiples, which no dot shows.
+        // Whole pixels: pairs, or shared first and last pixels where the sides are no multiples. No dot shows the difference.
         let span = |at: usize, from: usize, to: usize| match from.div_ceil(2) == to {
             true => 2 * at..(2 * at + 2).min(from),
             false => at * from / to..((at + 1) * from).div_ceil(to),
@@ -242,7 +81,7 @@ impl Colour {
         Colour { width: to.0, height: to.1, rgb }
     }
 
-    /// The stacks of the dots: every stack is of process inks.
+    /// Halftones the colours: stacks of process inks, and the stack of each dot.
     pub(super) fn halftone(
         &self,
         dots: (usize, usize),
@@ -251,7 +90,7 @@ impl Colour {
         observer: &dyn Observer,
     ) -> Result<(Vec<Stack>, Vec<u8>), LayersError> {
         let mix = self.mix(inks, library, observer)?;
-        // Art is refused before if it is larger than any page.
+        // Larger art was refused when its size was decided.
         let (width, height) = (dots.0 as u16, dots.1 as u16);
         let settings = halftone::Settings::from_library(&mix.stacks, library);
         Ok(halftone(&mix, (width, height), &settings, observer)?.into_parts())
@@ -286,18 +125,18 @@ impl Colour {
     }
 }
 
-/// The node below a value and how far above it the value lies, in 1/256.
+/// The node below a value, and the distance of the value above it in 1/256 of the step between nodes.
 fn step(value: usize) -> (usize, u32) {
     let at = value * (NODES - 1);
     let node = (at / 255).min(NODES - 2);
     (node, ((at - node * 255) * 256).div_euclid(255) as u32)
 }
 
-/// The mixtures of the lattice's nodes, for what lies between them.
+/// The mixtures of the lattice's nodes, to interpolate between.
 struct Nodes {
-    /// For each node its weights, eight at a time, the rest zero.
+    /// The weights of each node in groups of eight, padded with zeros.
     lanes: Vec<[u16; 8]>,
-    /// Lanes of a node.
+    /// Groups of a node.
     each: usize,
     /// Channel of the largest weight of each node.
     largest: Vec<usize>,
@@ -316,8 +155,8 @@ impl Nodes {
         Nodes { lanes: lanes.collect(), each, largest }
     }
 
-    /// The mixture between nodes: along the edges of the cube from its lowest corner to its highest, the axis with the
-    /// largest fraction first. `sums` is room for the lanes of a node.
+    /// The mixture between nodes: along the edges of the cube from its lowest to its highest corner, first along the axis
+    /// with the largest fraction. `sums` is scratch space for the groups of a node.
     #[inline]
     fn between(&self, at: [(usize, u32); 3], sums: &mut [[u16; 8]], out: &mut [u16]) {
         let [x, y, z] = at;
@@ -346,7 +185,7 @@ impl Nodes {
             }
             (last, node) = (next, node + step);
         }
-        // What rounding down leaves, less than four units a channel, goes to the largest of the nearest node.
+        // Rounding down leaves less than four units a channel; they go to the largest weight of the nearest node.
         let total: u16 = sums.as_flattened().iter().sum();
         sums.as_flattened_mut()[self.largest[nearest.1]] += ONE - total;
         out.copy_from_slice(&sums.as_flattened()[..out.len()]);
@@ -357,7 +196,7 @@ impl Nodes {
     }
 }
 
-/// The lattice as a document: a matte for every node, red by rows of planes.
+/// The lattice as a document: one matte pixel for every node, in order of red, green and blue.
 struct Lattice {
     space: Space,
     paper: Vec<f64>,
@@ -373,7 +212,7 @@ impl Lattice {
         let black = printable.stacks.iter().position(|stack| stack.layers() == [Ink::Black]);
         let darkest = (0..printable.stacks.len())
             .min_by(|&a, &b| bright(printable.curves.row(a)).total_cmp(&bright(printable.curves.row(b))));
-        // Black is black ink, where there is any: text in three inks is never sharp.
+        // Prefer black ink: text in three inks is never sharp.
         let darkest = black.or(darkest).unwrap_or(0);
         let paper = printable.curves.row(bare).to_vec();
         let black = printable.curves.row(darkest).to_vec();

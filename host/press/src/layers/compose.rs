@@ -1,23 +1,28 @@
-//! Layers to stacks: white, finish, order, repeats, knock-out, undercoats.
+//! Layers to stacks: white, finish, order, passes, knockout, undercoats.
 //!
-//! Problem: layers say where inks are, a sheet says what lies on each dot, bottom to top, and some inks need others
-//! beneath them that nobody drew.
-//! Method: every layer is a plane; tones and colours are halftoned to planes. Eight dots of all planes at a time make
-//! the combinations that occur, which are counted, and each is turned into a stack once: in the order of the inks
-//! ([`Order`]), each as often as [`Settings::passes`] says, with knocked-out inks taken away and accepted undercoats put
-//! in. What the art needs and did not ask for comes back as [`Suggestion`]s, never silently.
-//! Cost: about 2 ns a dot and the halftones'. Limits: [`MOST_PASSES`] planes, 256 stacks.
+//! Problem: layers tell where each ink is, while a sheet tells which inks lie on each dot, bottom to top. Some inks also need
+//! others beneath them that nobody drew.
+//! Method: every layer is a plane; tones and colours are halftoned to planes. All planes are read eight dots at a time, the
+//! combinations that occur are counted, and each becomes a stack: the inks in their [`Order`], with
+//! [`Settings::passes`] of each, without knocked-out inks, with accepted undercoats. If the art lacks something, the result
+//! has a [`Suggestion`]; nothing is added silently.
+//! Cost: about 2 ns a dot, and the halftones. Limits: [`MOST_PASSES`] planes, 256 stacks.
 
 mod arrange;
 mod beds;
+mod settings;
+mod slot;
 mod suggest;
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::{Ink, Kind};
 use serde::Serialize;
 
-use super::raster::MM;
-use super::{Artwork, LayersError, Shape, White, bits};
+use super::artwork::{Artwork, Shape};
+use super::bits;
+use super::error::LayersError;
+use super::size::MM;
+use super::white::White;
 use crate::halftone::{self, halftone};
 use crate::separate::{MOST_PASSES, Plane, pack};
 use crate::sheet::DotMap;
@@ -26,72 +31,14 @@ use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps};
 use observe::Observer;
 
+use slot::{COLOURS, Slot};
+
 pub use arrange::Order;
-pub use suggest::{Accept, Suggestion};
+pub use settings::{Finish, Settings};
+pub use slot::Laid;
+pub use suggest::{Accept, Remedy, Suggestion};
 
-/// Where glossy finish goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Finish {
-    /// On what is drawn.
-    Artwork,
-    /// On the whole rectangle of the art.
-    All,
-    /// Nowhere, not even where the art draws it.
-    None,
-}
-
-/// How layers become stacks.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// The inks that may be used. Layers of others are left out and named in a note; foils must be among them.
-    pub inks: InkSet,
-    /// The order from the paper up.
-    pub order: Order,
-    /// How often an ink is laid in each of its layers; once when it is not listed.
-    pub passes: Vec<(Ink, u8)>,
-    /// Inks that leave out the process inks beneath them on their dots.
-    pub knockout: InkSet,
-    /// Where white goes; where the art draws it when not given.
-    pub white: Option<White>,
-    /// Dots the white is shrunk by, 0 to 236; negative to spread it.
-    pub choke: f64,
-    /// Where finish goes; where the art draws it when not given.
-    pub finish: Option<Finish>,
-    /// The suggestions that are accepted.
-    pub accept: Vec<Accept>,
-}
-
-impl Default for Settings {
-    fn default() -> Settings {
-        let metallic = Ink::ALL.into_iter().filter(|ink| ink.kind() == Kind::Metallic);
-        Settings {
-            inks: InkSet::default().with(Ink::White),
-            order: Order::Usual,
-            passes: Vec::new(),
-            knockout: InkSet::of(metallic),
-            white: None,
-            choke: 0.0,
-            finish: None,
-            accept: Vec::new(),
-        }
-    }
-}
-
-/// One ink at one depth.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Laid {
-    /// Name of the ink.
-    pub ink: &'static str,
-    /// Dots that have it.
-    pub dots: u64,
-    /// Where it comes from.
-    pub from: String,
-    /// How often it is laid on each of them.
-    pub passes: usize,
-}
-
-/// What was composed.
+/// A report on composed art.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Width and height in millimetres.
@@ -100,7 +47,7 @@ pub struct Report {
     pub laid: Vec<Laid>,
     /// Dots without any ink.
     pub bare: u64,
-    /// What was decided on the user's behalf, those of the art included.
+    /// What had to be assumed, including the notes of the art.
     pub notes: Vec<String>,
 }
 
@@ -109,28 +56,16 @@ pub struct Report {
 pub struct Composed {
     /// The dots.
     pub dots: DotMap,
-    /// What was composed.
+    /// A report on them.
     pub report: Report,
-    /// What the art needs.
+    /// What the art lacks.
     pub suggestions: Vec<Suggestion>,
-}
-
-/// Where the planes of plain colour come from.
-const COLOURS: &str = "the picture's colours";
-
-/// A plane on its way into the stacks.
-struct Slot {
-    ink: Ink,
-    from: String,
-    place: Option<u32>,
-    plane: Plane,
-    passes: usize,
 }
 
 /// Composes art to one stack for every dot.
 ///
 /// # Errors
-/// Settings that do not fit the art, more layers than the machine takes, nothing to print.
+/// Settings that do not suit the art, more passes than a sheet can take, art without a dot.
 pub fn compose(
     art: &Artwork,
     settings: &Settings,
@@ -165,7 +100,7 @@ pub fn compose(
             usize::from(settings.passes.iter().find(|(ink, _)| *ink == slot.ink).map_or(1, |p| p.1));
     }
     if let Some((ink, _)) = settings.passes.iter().find(|(ink, _)| !inks.contains(ink)) {
-        tell(format!("--passes: there is no {} to lay more often", ink.name()));
+        tell(format!("the art has no {}, so its number of passes has no effect", ink.name()));
     }
     let passes: usize = slots.iter().map(|slot| slot.passes).sum();
     if passes > MOST_PASSES {
@@ -176,7 +111,7 @@ pub fn compose(
     stack_up(art, &slots, settings, notes)
 }
 
-/// The art's own layers, tones and colours halftoned.
+/// The layers of the art itself, with tones and colours halftoned.
 fn drawn_slots(
     art: &Artwork,
     settings: &Settings,
@@ -193,21 +128,14 @@ fn drawn_slots(
             _ => false,
         };
         if unwanted {
-            tell(format!("{}: left out, since no {name} is wanted", layer.name));
+            tell(format!("{}: left out, because the settings ask for no {name}", layer.name));
             continue;
         }
         if !settings.inks.contains(layer.ink) {
             if layer.ink.kind() == Kind::Foil {
-                return Err(LayersError::Setting {
-                    option: "--inks",
-                    problem: format!(
-                        "{} asks for {name}; the codes of the foils are inferred and were never seen on hardware, so they \
-                         are printed only when asked for: add --inks +{name}",
-                        layer.name
-                    ),
-                });
+                return Err(LayersError::Foil { layer: layer.name.clone(), ink: layer.ink });
             }
-            tell(format!("{}: left out, since {name} is not among --inks", layer.name));
+            tell(format!("{}: left out, because {name} is not among the allowed inks", layer.name));
             continue;
         }
         let plane = match &layer.shape {
@@ -220,7 +148,7 @@ fn drawn_slots(
     if let Some(colour) = &art.colour {
         let process = InkSet::of(settings.inks.iter().filter(|ink| ink.kind() == Kind::Process));
         if process.is_empty() {
-            tell("the picture's colours are left out, since --inks has no process ink".into());
+            tell("the picture's colours are left out, because no process ink is allowed".into());
             return Ok(slots);
         }
         let (stacks, index) = colour.halftone((art.width, art.length), &process, library, observer)?;
@@ -233,7 +161,7 @@ fn drawn_slots(
         }
         let planes = pack::pack(art.width, &index, &inks_of, process.len());
         for (ink, mut plane) in process.iter().zip(planes) {
-            // What an ink was drawn for by its reserved colour is that ink alone.
+            // Dots of a layer, such as a reserved colour, keep that ink alone.
             bits::merge(&mut plane, &spot, |dots, spot| dots & !spot);
             match slots.iter_mut().find(|slot| slot.ink == ink) {
                 Some(slot) => bits::add(&mut slot.plane, &plane),
@@ -244,7 +172,7 @@ fn drawn_slots(
     Ok(slots)
 }
 
-/// A layer with tones as dots of its ink, in clusters the ink holds.
+/// Halftones a layer with tones, in clusters large enough for its ink.
 fn tone(
     coverage: &[u8],
     art: &Artwork,
@@ -266,22 +194,22 @@ fn tone(
     Ok(bits::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 
-/// The layers of a dot that has the slots of `mask`.
+/// The inks on a dot with the slots of `mask`, from the paper up.
 fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
     let mut layers: Vec<Ink> = Vec::new();
     for (_, slot) in slots.iter().enumerate().filter(|(at, _)| mask & 1 << at != 0) {
         if settings.knockout.contains(slot.ink) {
             layers.retain(|ink| ink.kind() != Kind::Process);
         }
-        let thrice =
+        let three_times =
             slot.ink == Ink::White && slot.passes == 1 && settings.accept.contains(&Accept::WhiteThrice);
-        let passes = if thrice { 3 } else { slot.passes };
+        let passes = if three_times { 3 } else { slot.passes };
         layers.extend(std::iter::repeat_n(slot.ink, passes));
     }
     if settings.accept.contains(&Accept::FoilUndercoat)
         && let Some(foil) = layers.iter().position(|ink| ink.kind() == Kind::Foil)
     {
-        // The process inks directly beneath, completed, in their customary order.
+        // All process inks in their customary order replace those directly beneath the foil.
         let from = layers[..foil].iter().rposition(|ink| ink.kind() != Kind::Process).map_or(0, |at| at + 1);
         let mut coat: Vec<Ink> = Ink::ALL.into_iter().filter(|ink| ink.kind() == Kind::Process).collect();
         coat.sort_by_key(|&ink| customary(ink));
@@ -295,6 +223,7 @@ fn layers(slots: &[Slot], mask: usize, settings: &Settings) -> Vec<Ink> {
     layers
 }
 
+/// Makes a stack of every combination of slots that occurs.
 fn stack_up(
     art: &Artwork,
     slots: &[Slot],
@@ -315,10 +244,10 @@ fn stack_up(
             stacks.len() - 1
         });
         counts[number] += count;
-        // More than 256 stacks are refused below, by the dot map.
+        // More than 256 stacks are refused below.
         stack_of[mask] = number.min(256) as u16;
     }
-    // No entry of the table says there is no stack, so there is no such dot.
+    // Every combination that occurs has an entry in the table, so unpacking always succeeds.
     let index = pack::unpack(&planes, width, length, &stack_of).unwrap_or_default();
     let dots = DotMap::new(width, length, stacks, index)?;
     let laid: Vec<Laid> = slots
@@ -338,7 +267,7 @@ fn stack_up(
         .collect();
     let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
     let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
-    suggestions.extend(suggest::rare(&laid, &settings.inks));
+    suggestions.extend(suggest::rare(&laid));
     let size_mm = (width as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
 }

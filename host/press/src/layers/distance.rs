@@ -1,13 +1,12 @@
 //! Growing and shrinking a plane by a Euclidean distance.
 //!
-//! Problem: white that reaches exactly to the edge of the colours shows beside them when passes are a dot apart, so
-//! it is choked (shrunk) or spread (grown) by a round brush.
-//! Method: the exact squared distance of every dot to the nearest dot of the plane, in integers: a scan along each
-//! column, then for each row the lower envelope of the parabolas `(x - i)^2 + g(i)^2` of its columns. Distances beyond
-//! the radius are cut to one more, so a column needs 16 bits. Dots within the radius are the grown plane; the shrunk one
-//! is what growing the rest leaves, the ground outside the art counting as rest, so that white ends before the art's
-//! edge too.
-//! Cost: about 15 ns a dot on one core, columns and rows shared out over the cores; three bytes a dot.
+//! Problem: white that ends exactly at the edge of the colours shows beside them if two passes are a dot apart. So white is
+//! choked (shrunk) or spread (grown) by a round brush.
+//! Method: the exact squared distance from every dot to the nearest dot of the plane, in integers. A scan of each column
+//! comes first, then for each row the lower envelope of the parabolas `(x - i)^2 + g(i)^2` of its columns. Distances beyond
+//! the radius are clamped to one more than it, so a column needs 16 bits. The grown plane is all dots within the radius.
+//! Shrinking grows the complement, which includes everything outside the art, so white also ends before the art's edge.
+//! Cost: about 15 ns a dot on one core, shared among the cores by rows; three bytes a dot.
 //! Source: A. Meijster, J. Roerdink, W. Hesselink, A general algorithm for computing distance transforms in linear time, 2000.
 
 use rayon::prelude::*;
@@ -18,15 +17,15 @@ use crate::separate::Plane;
 /// The largest radius in dots, 10 mm.
 pub(super) const MOST: u16 = 236;
 
-/// The plane and every dot no further than `sqrt(square)` from it, distances between the middles of dots. `square` is
-/// the squared radius in dots, at most `MOST * MOST`.
+/// The plane and every dot at most `sqrt(square)` from it, measured between the middles of dots. `square` is the squared
+/// radius in dots, at most `MOST * MOST`.
 pub(super) fn grow(plane: &Plane, square: u32) -> Plane {
     if square == 0 {
         return plane.clone();
     }
     let (width, length) = (plane.width, plane.length);
     let far = square.isqrt() as u16 + 1;
-    // Rows between a dot and the nearest ink of its column, `far` when there is none within reach.
+    // Rows from each dot to the nearest ink in its column; `far` if there is none within the radius.
     let mut above = vec![far; width * length];
     let step = |last: u16, ink: bool| if ink { 0 } else { (last + 1).min(far) };
     for y in 0..length {
@@ -46,7 +45,7 @@ pub(super) fn grow(plane: &Plane, square: u32) -> Plane {
     grown.bits.par_chunks_mut(grown.stride).zip(above.par_chunks_exact(width)).for_each_init(
         || Vec::with_capacity(width),
         |hull, (bits, gaps)| {
-            // Runs of nothing and of ink are most rows of a page.
+            // Most rows of a page are blank.
             if gaps.iter().all(|&gap| gap >= far) {
                 return;
             }
@@ -72,7 +71,7 @@ pub(super) fn grow(plane: &Plane, square: u32) -> Plane {
     grown
 }
 
-/// The columns that are nearest somewhere in the row, and from where on.
+/// The columns that are the nearest somewhere in the row, each with the first place where it is.
 fn envelope(gaps: &[u16], far: u16, hull: &mut Vec<(i64, i64)>) {
     hull.clear();
     let square = |at: i64| i64::from(gaps[at as usize]) * i64::from(gaps[at as usize]);
@@ -96,7 +95,7 @@ fn envelope(gaps: &[u16], far: u16, hull: &mut Vec<(i64, i64)>) {
     }
 }
 
-/// The dots of the plane further than `sqrt(square)` from every dot that is not of it; outside the art nothing is.
+/// The dots of the plane more than `sqrt(square)` from every dot outside it. All dots outside the art are outside the plane.
 pub(super) fn shrink(plane: &Plane, square: u32) -> Plane {
     if square == 0 {
         return plane.clone();
@@ -126,7 +125,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// By looking at every dot of the plane from every dot.
+    /// Compares every dot with every dot of the plane.
     fn near(plane: &Plane, x: usize, y: usize, square: u32) -> bool {
         (0..plane.length).any(|v| {
             (0..plane.width).any(|u| {

@@ -1,6 +1,10 @@
-//! Why art could not be read or composed, with the file, what was found, and what to do.
+//! Errors of reading and composing art.
+//!
+//! Each error states the file, what was found, and what to do in terms of settings. A program adds how its own user changes
+//! a setting, from the values in the variants.
 
-use std::path::PathBuf;
+use std::fmt;
+use std::path::{Path, PathBuf};
 
 use protocol::ink::Ink;
 
@@ -8,20 +12,20 @@ use crate::halftone::HalftoneError;
 use crate::sheet::SheetError;
 use appearance::gamut::GamutError;
 
-/// Why art could not be read or composed.
+/// An error of reading or composing art.
 #[derive(Debug, thiserror::Error)]
 pub enum LayersError {
-    /// The system refused.
+    /// The operating system reported an error.
     #[error("{}: cannot {attempt}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What was tried.
+        /// What was attempted.
         attempt: &'static str,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A file is damaged, of no known kind, or of a kind that cannot be meant.
+    /// A file is damaged, of an unknown format, or unsuitable.
     #[error("{}: {problem}", path.display())]
     File {
         /// The file.
@@ -29,7 +33,7 @@ pub enum LayersError {
         /// What is wrong, what was expected, and what to do.
         problem: String,
     },
-    /// A file among several names no ink.
+    /// The name of a file, channel or layer is that of no ink.
     #[error(
         "{}: `{name}` names no ink{}; name each file after its ink, such as white.png, gold.png, silver-foil.png; \
          the inks are {}",
@@ -38,16 +42,16 @@ pub enum LayersError {
     UnknownInk {
         /// The file.
         path: PathBuf,
-        /// The name in it: the file's stem, a channel's or a layer's name.
+        /// The name.
         name: String,
-        /// What may have been meant.
+        /// The nearest known name.
         suggestion: Option<&'static str>,
     },
-    /// No file says how large it is, nor does the user, and drawn for the printer it would be larger than the page.
+    /// Neither the file nor the settings state a size, and at 600 dpi the art is larger than the page.
     #[error(
-        "{} says no resolution; its {} x {} pixels at 600 dpi would be {:.1} x {:.1} mm, and the page has room for {:.1} x \
-         {:.1} mm; give its true resolution, such as --dpi 1200, or --size {}mm for the largest that fits",
-        path.display(), pixels.0, pixels.1, size_mm.0, size_mm.1, room_mm.0, room_mm.1, below(*fits_mm)
+        "{} states no resolution; its {} x {} pixels at 600 dpi would be {:.1} x {:.1} mm, but the page has room for {:.1} x \
+         {:.1} mm; set its resolution or its size",
+        path.display(), pixels.0, pixels.1, size_mm.0, size_mm.1, room_mm.0, room_mm.1
     )]
     NoSize {
         /// The file.
@@ -56,32 +60,33 @@ pub enum LayersError {
         pixels: (u32, u32),
         /// Its width and height at 600 dpi, in mm.
         size_mm: (f64, f64),
-        /// Width and height that the page has room for, in mm.
+        /// Width and height of the room on the page, in mm.
         room_mm: (f64, f64),
-        /// The width at which it fits, in mm.
+        /// The largest width that fits, in mm.
         fits_mm: f64,
     },
-    /// As large as a file says it is, it is larger than the page.
+    /// At the resolution that its file states, the art is larger than the page.
     #[error(
-        "{} says {}, so it is {:.1} x {:.1} mm, and the page has room for {:.1} x {:.1} mm; give --size {}mm for the largest \
-         that fits, --dpi if the file is wrong, a larger --paper, or --crop to cut",
-        path.display(), resolution(*says), size_mm.0, size_mm.1, room_mm.0, room_mm.1, below(*fits_mm)
+        "{} states {}, so it is {:.1} x {:.1} mm, but the page has room for {:.1} x {:.1} mm; print it smaller, correct its \
+         resolution, use larger paper, or crop it",
+        path.display(), resolution_in_words(*says), size_mm.0, size_mm.1, room_mm.0, room_mm.1
     )]
     Beyond {
         /// The file.
         path: PathBuf,
-        /// Pixels in an inch across and down, as it says.
+        /// Pixels per inch across and down, as the file states.
         says: (f64, f64),
         /// Its width and height, in mm.
         size_mm: (f64, f64),
-        /// Width and height that the page has room for, in mm.
+        /// Width and height of the room on the page, in mm.
         room_mm: (f64, f64),
-        /// The width at which it fits, in mm.
+        /// The largest width that fits, in mm.
         fits_mm: f64,
     },
-    /// Two layers are not of one size.
+    /// Two layers differ in size.
     #[error(
-        "{} is {found} and {} is {expected}; layers lie on each other pixel by pixel, so export them all at one size",
+        "{} is {found}, but {} is {expected}; layers are printed one on another pixel by pixel, so export all of them at the \
+         same size",
         path.display(), first.display()
     )]
     Sizes {
@@ -94,26 +99,26 @@ pub enum LayersError {
         /// Its size.
         expected: String,
     },
-    /// More dots than any sheet has.
+    /// The art is larger than the largest page.
     #[error(
-        "the art is {width_mm:.1} x {height_mm:.1} mm; the largest page prints {most_width_mm:.1} x {most_height_mm:.1} mm; \
-         give --size {}mm for the largest that fits", below(*fits_mm)
+        "the art is {width_mm:.1} x {height_mm:.1} mm, but the largest page prints {most_width_mm:.1} x \
+         {most_height_mm:.1} mm; print it smaller"
     )]
     TooLarge {
         /// Its width in mm.
         width_mm: f64,
         /// Its height in mm.
         height_mm: f64,
-        /// The most in mm.
+        /// The largest printable width in mm.
         most_width_mm: f64,
-        /// The most in mm.
+        /// The largest printable height in mm.
         most_height_mm: f64,
-        /// The width at which it fits the page, in mm.
+        /// The largest width that fits, in mm.
         fits_mm: f64,
     },
-    /// Less than a dot.
+    /// The art is smaller than a dot.
     #[error(
-        "{width_mm:.4} x {height_mm:.4} mm is less than a dot (0.0423 mm); give a larger --size or a smaller --dpi"
+        "the art is {width_mm:.4} x {height_mm:.4} mm, less than a dot (0.0423 mm); set a larger size or a lower resolution"
     )]
     TooSmall {
         /// Its width in mm.
@@ -127,17 +132,28 @@ pub enum LayersError {
         /// Why.
         reason: String,
     },
-    /// A setting does not fit the art.
-    #[error("{option}: {problem}")]
+    /// A setting does not suit the art.
+    #[error("{setting}: {problem}")]
     Setting {
-        /// The option as typed.
-        option: &'static str,
+        /// The setting.
+        setting: Setting,
         /// What is wrong, and what to do.
         problem: String,
     },
-    /// More layers than a dot can hold, or more passes than a sheet survives.
+    /// A foil that is not among the allowed inks.
     #[error(
-        "{passes} layers ({inks}) are more than the {} a sheet can take; print fewer --passes",
+        "{layer} asks for {}; the codes of the foils are inferred and were never tested on hardware, so foils print only if \
+         they are among the allowed inks", ink.name()
+    )]
+    Foil {
+        /// The layer that asks for it.
+        layer: String,
+        /// The foil.
+        ink: Ink,
+    },
+    /// More passes than a sheet can take.
+    #[error(
+        "the art needs {passes} passes ({inks}), but a sheet can take {}; print some inks fewer times",
         crate::separate::MOST_PASSES
     )]
     Passes {
@@ -146,10 +162,10 @@ pub enum LayersError {
         /// Their inks from the paper up.
         inks: String,
     },
-    /// A program that is needed is not there.
-    #[error("{}: {program} is needed to read it and is not installed; {install}", path.display())]
+    /// A required program is not installed.
+    #[error("{}: reading it needs {program}, which is not installed; {install}", path.display())]
     Program {
-        /// The file to be read.
+        /// The file to read.
         path: PathBuf,
         /// The program.
         program: &'static str,
@@ -162,7 +178,7 @@ pub enum LayersError {
     /// Halftoning.
     #[error(transparent)]
     Halftone(#[from] HalftoneError),
-    /// The stacks do not make a dot map.
+    /// The stacks are invalid.
     #[error(transparent)]
     Sheet(#[from] SheetError),
 }
@@ -171,12 +187,47 @@ fn hint(suggestion: &Option<&'static str>) -> String {
     suggestion.map_or(String::new(), |s| format!(", did you mean `{s}`?"))
 }
 
-/// A length in mm with one decimal, never longer than it is.
-fn below(mm: f64) -> f64 {
-    (10.0 * mm).floor() / 10.0
+/// Pixels per inch, in words.
+pub(super) fn resolution_in_words((x, y): (f64, f64)) -> String {
+    if (x - y).abs() < 0.5 { format!("{x:.0} dpi") } else { format!("{x:.0} x {y:.0} dpi") }
 }
 
-/// Pixels in an inch, in words.
-pub(super) fn resolution((x, y): (f64, f64)) -> String {
-    if (x - y).abs() < 0.5 { format!("{x:.0} dpi") } else { format!("{x:.0} x {y:.0} dpi") }
+/// A setting of how layers become stacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// The inks that may be used.
+    Inks,
+    /// The order of the layers.
+    Order,
+    /// Where white goes.
+    White,
+    /// How far white is shrunk.
+    Choke,
+    /// How far white is spread.
+    Spread,
+    /// Where finish goes.
+    Finish,
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Setting::Inks => "allowed inks",
+            Setting::Order => "order of the layers",
+            Setting::White => "white",
+            Setting::Choke => "choke",
+            Setting::Spread => "spread",
+            Setting::Finish => "finish",
+        })
+    }
+}
+
+/// An error about a file.
+pub(super) fn wrong(path: &Path, problem: impl Into<String>) -> LayersError {
+    LayersError::File { path: path.to_path_buf(), problem: problem.into() }
+}
+
+/// Makes errors of the operating system errors about a file.
+pub(super) fn io<'a>(path: &'a Path, attempt: &'static str) -> impl Fn(std::io::Error) -> LayersError + 'a {
+    move |source| LayersError::Io { path: path.to_path_buf(), attempt, source }
 }

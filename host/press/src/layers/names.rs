@@ -1,12 +1,17 @@
 //! Which ink a file, a layer or a channel names.
 //!
-//! Owners write `white.png`, `01-white.png`, `Gold Foil`, `decal_metallic gold 2`. A leading number is the layer's
-//! place from the paper up; a trailing one tells two layers of one ink apart. What is left is compared word by word,
-//! first whole, then its end, then its beginning, the longest name first, so that `gold foil` is never `gold`.
+//! Problem: owners name files `white.png`, `01-white.png`, `Gold Foil` or `decal_metallic gold 2`.
+//! Method: a leading number is the layer's place from the paper up; a trailing number tells two layers of one ink apart. The
+//! words between them are compared with the known names: the whole first, then the longest ending, then the longest
+//! beginning, so `gold foil` never means `gold`. Limits: English names; codes of one or two letters only as the whole name.
+
+use std::path::Path;
 
 use protocol::ink::Ink;
 
-/// Names beside [`Ink::name`] and [`Ink::short`], their words joined by `-`.
+use super::error::LayersError;
+
+/// Names in addition to [`Ink::name`] and [`Ink::short`], with words joined by `-`.
 const ALSO: [(&str, Ink); 32] = [
     ("k", Ink::Black),
     ("key", Ink::Black),
@@ -42,10 +47,10 @@ const ALSO: [(&str, Ink); 32] = [
     ("mf-ink", Ink::Primer),
 ];
 
-/// What a name says.
+/// An ink named by a file, a channel or a layer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Named {
-    /// Place from the paper up, when the name begins with a number.
+pub(super) struct Named {
+    /// Place from the paper up, if the name begins with a number.
     pub place: Option<u32>,
     /// The ink.
     pub ink: Ink,
@@ -57,7 +62,7 @@ fn exact(words: &[String]) -> Option<Ink> {
     Ink::from_name(&name).or_else(also)
 }
 
-/// The words of a name in lower case, and the number it begins with.
+/// The leading number of a name, and its words in lower case.
 fn words(name: &str) -> (Option<u32>, Vec<String>) {
     let mut words: Vec<String> = name
         .split(|c: char| !c.is_alphanumeric())
@@ -65,7 +70,7 @@ fn words(name: &str) -> (Option<u32>, Vec<String>) {
         .map(str::to_lowercase)
         .collect();
     let mut place = None;
-    // `01white` is two words as `01-white` is.
+    // `01white` means the same as `01-white`.
     if let Some(first) = words.first().cloned() {
         let digits = first.len() - first.trim_start_matches(|c: char| c.is_ascii_digit()).len();
         if digits > 0 && (digits < first.len() || words.len() > 1) {
@@ -80,21 +85,44 @@ fn words(name: &str) -> (Option<u32>, Vec<String>) {
     (place, words)
 }
 
-/// The ink a name names, if it names one. `name` is a file's stem, a layer's or a channel's name.
-pub fn ink(name: &str) -> Option<Named> {
+/// The ink that a name stands for. `name` is a file name without its extension, or the name of a layer or channel.
+pub(super) fn ink(name: &str) -> Option<Named> {
     let (place, words) = words(name);
     let n = words.len();
     let ends = (0..n).map(|at| &words[at..]);
     let begins = (1..n).rev().map(|at| &words[..at]);
-    // Short names of one or two letters count alone only: `logo-m` may be a size.
+    // Codes of one or two letters must be the whole name: `logo-m` may state a size.
     ends.chain(begins)
         .filter(|part| part.len() == n || part.join("-").len() > 2)
         .find_map(exact)
         .map(|ink| Named { place, ink })
 }
 
-/// The known name most like this one, if any is like it at all.
-pub fn closest(name: &str) -> Option<&'static str> {
+/// A file name without its extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "art".into(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// The ink of a layer, channel or plate in a file. A name of no ink is left out with a note, unless it resembles the name of
+/// one, which is an error.
+pub(super) fn of_part(
+    path: &Path,
+    name: &str,
+    kind: &str,
+    notes: &mut Vec<String>,
+) -> Result<Option<Named>, LayersError> {
+    let named = ink(name);
+    if named.is_none() {
+        if let suggestion @ Some(_) = closest(name) {
+            return Err(LayersError::UnknownInk { path: path.to_path_buf(), name: name.into(), suggestion });
+        }
+        notes.push(format!("{}: {kind} `{name}` names no ink: left out", path.display()));
+    }
+    Ok(named)
+}
+
+/// The known name that is most similar to this one, if one is similar enough.
+pub(super) fn closest(name: &str) -> Option<&'static str> {
     let (_, words) = words(name);
     let name = words.join("-");
     let known = Ink::ALL.into_iter().map(Ink::name).chain(ALSO.iter().map(|(name, _)| *name));
@@ -106,14 +134,17 @@ pub fn closest(name: &str) -> Option<&'static str> {
         .map(|(_, known)| known)
 }
 
-/// An ink as it is typed on the command line: any of its names.
+/// Reads an ink from any of its names.
+///
+/// # Errors
+/// A message with the nearest known name and the names of all inks.
 pub fn typed(word: &str) -> Result<Ink, String> {
     let (place, words) = words(word);
     match (place, exact(&words)) {
         (None, Some(ink)) => Ok(ink),
         _ => {
             let hint = closest(word).map_or(String::new(), |s| format!(", did you mean `{s}`?"));
-            Err(format!("`{word}` is no ink{hint}; inks are {}", Ink::ALL.map(Ink::name).join(", ")))
+            Err(format!("`{word}` is not an ink{hint}; the inks are {}", Ink::ALL.map(Ink::name).join(", ")))
         }
     }
 }

@@ -1,17 +1,17 @@
-//! From the paper up: in which order inks are laid.
+//! The order of inks from the paper up.
 //!
-//! Problem: art says which inks meet, seldom which lies beneath. What may lie on what is knowledge of the ink library.
-//! Method: every order of the inks is a stack; the one that breaks the fewest rules is taken, errors counting before
-//! warnings before notes, and of equals the customary one (undercoats first, opaque below transparent, clear coat
-//! last). Cost: at most 8! orders, some milliseconds; more inks, which no machine holds at once, lie in the customary order.
-//! Limits: rules are tried on all inks on top of each other, whether or not they meet on the art.
+//! Problem: art shows which inks meet, but seldom which lies beneath. The ink library knows which ink may lie on which.
+//! Method: every order of the inks is a stack. The best one breaks the fewest rules: errors are compared first, then
+//! warnings, then notes. Ties go to the order nearest the customary one (undercoats first, opaque below transparent, clear
+//! coat last). Cost: at most 8! orders, some milliseconds. More than eight inks, which no printer holds at once, take the
+//! customary order. Limits: rules are tested on a stack of all inks, whether or not they meet in the art.
 
 use inks::{Library, Severity, Stack};
 use protocol::ink::Ink;
 
 use crate::sheet::order::customary;
 
-/// The most inks whose orders are all tried.
+/// The most inks of which every order is tried.
 const MOST_TRIED: usize = 8;
 
 /// The inks from the paper up.
@@ -23,7 +23,7 @@ pub(super) fn by_rules(inks: &[Ink], library: &Library) -> Vec<Ink> {
         return order;
     }
     let mut best: Option<([usize; 3], Vec<Ink>)> = None;
-    // Orders come in ascending distance from the customary one, so the first of equals is the one to keep.
+    // Orders nearer to the customary one come first, so the first of equals is kept.
     permutations(&mut Vec::new(), &order, &mut |tried| {
         let stack = Stack::new(tried);
         let broken = library.broken_rules(&stack);
@@ -36,7 +36,7 @@ pub(super) fn by_rules(inks: &[Ink], library: &Library) -> Vec<Ink> {
     best.map_or(order, |(_, order)| order)
 }
 
-/// Every order of `rest` after `done`, those nearest the given order first.
+/// Visits every order of `rest` after `done`, starting with those nearest to the given order.
 fn permutations(done: &mut Vec<Ink>, rest: &[Ink], visit: &mut impl FnMut(&[Ink])) {
     if rest.is_empty() {
         return visit(done);

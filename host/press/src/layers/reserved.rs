@@ -1,15 +1,15 @@
 //! The vendor's reserved colours: a picture whose pixels name inks.
 //!
-//! Problem: owners draw white as 230,230,230 and gold as 225,160,0; drawing programs soften every edge, and a softened
-//! edge is no reserved colour, so it would be printed as a fringe of process dots around the gold. Worse, the softened
-//! edge of black on white passes through the very grey that calls for silver.
-//! Method: pixels within the tolerance of an ink's colour, in each of red, green and blue, are that ink. All others, and
-//! those that are in no square of four such pixels, go to the nearer of two colours (an ink and white, or two inks) if
-//! they lie on the straight line between them, or little beyond its ends as sharpening leaves them, and both are seen next to
-//! them: they are the edge of those two. A lone pixel that is nearly the colour of a metal is chance. What is left is
-//! colour for the process inks.
-//! Cost: 2 ns a pixel, 10 ns more for those in question. Limits: edges softened over more than two pixels remain partly colour.
-//! Source of the colours: the vendor's user's guide, in its English and its Japanese edition.
+//! Problem: owners draw white as 230,230,230 and gold as 225,160,0. Drawing programs soften every edge, and the colour of
+//! a soft edge is not reserved, so it would print as a fringe of process dots around the gold. Worse, the soft edge of black
+//! on white passes through the grey that stands for silver.
+//! Method: a pixel within the tolerance of an ink's colour, in each of red, green and blue, is that ink. Any other pixel,
+//! and any pixel outside a square of four pixels of the same ink, may be an edge. It is the edge of two colours (an ink and
+//! white, or two inks) if both occur near it and its own colour lies on the straight line between them, or slightly beyond
+//! the ends, as sharpening leaves it; it then takes the nearer one. A lone pixel near the colour of a metal is
+//! accidental. All other pixels are colour for the process inks.
+//! Cost: 2 ns a pixel, and 10 ns more for possible edges. Limits: edges softer than two pixels remain partly colour.
+//! Source of the colours: the vendor's user's guide, English and Japanese editions.
 
 mod classes;
 
@@ -17,26 +17,28 @@ use inks::InkSet;
 use protocol::ink::{Ink, Kind};
 use rayon::prelude::*;
 
-use super::{Layer, Options, Shape, bits, raster};
+use super::artwork::{Layer, Shape};
+use super::options::Options;
+use super::{bits, resample};
 use classes::{BLOCK, Classes, LOOSE, OTHER, PAPER};
 
 /// A reserved colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Reserved {
+struct Reserved {
     /// The ink it stands for.
-    pub ink: Ink,
+    ink: Ink,
     /// sRGB as drawn.
-    pub colour: [u8; 3],
-    /// How far each channel may be off. White and silver are 33 to 41 apart.
-    pub tolerance: u8,
+    colour: [u8; 3],
+    /// The largest difference in each channel. White and silver differ by 33 to 41.
+    tolerance: u8,
 }
 
 const fn reserved(ink: Ink, colour: [u8; 3], tolerance: u8) -> Reserved {
     Reserved { ink, colour, tolerance }
 }
 
-/// The vendor's table. Black is among it so that black lines stay solid.
-pub const TABLE: [Reserved; 6] = [
+/// The vendor's table. It includes black so that black lines stay solid.
+const TABLE: [Reserved; 6] = [
     reserved(Ink::White, [230, 230, 230], 8),
     reserved(Ink::MetallicGold, [225, 160, 0], 12),
     reserved(Ink::MetallicSilver, [189, 193, 197], 12),
@@ -45,36 +47,36 @@ pub const TABLE: [Reserved; 6] = [
     reserved(Ink::Black, [0, 0, 0], 8),
 ];
 
-/// How far from a reserved colour a pixel is that was given it, whatever a file's depth and profile did.
+/// The largest difference that a file's depth and profile make to a pixel drawn in a reserved colour.
 const EXACT: u8 = 2;
 
-/// What was found.
+/// The reserved colours of a picture.
 pub(super) struct Found {
     pub layers: Vec<Layer>,
-    /// Pixels of each layer, and how many of them by being edges.
+    /// Pixels of each layer, and the number of edges among them.
     counts: Vec<(u64, u64)>,
     /// Edge pixels that became bare paper.
     bared: u64,
-    /// Inks of the table that were not looked for.
+    /// Inks of the table that are not allowed.
     left_out: Vec<Ink>,
 }
 
 impl Found {
-    /// What to tell.
+    /// Notes for the user.
     pub fn notes(&self, file: &str) -> Vec<String> {
         let mut notes = Vec::new();
         let edges: u64 = self.counts.iter().map(|(_, edges)| edges).sum();
         if edges + self.bared > 0 {
             notes.push(format!(
                 "{file}: {} pixels lie between two colours, such as anti-aliased edges; {edges} became the ink next to \
-                 them, {} bare paper",
+                 them, and {} became bare paper",
                 edges + self.bared, self.bared
             ));
         }
         for (layer, (pixels, _)) in self.layers.iter().zip(&self.counts) {
             if *pixels < 64 {
                 notes.push(format!(
-                    "{file}: only {pixels} pixels have the colour of {}; if that is chance, leave it out with --inks",
+                    "{file}: only {pixels} pixels have the colour of {}; if this is accidental, do not allow that ink",
                     layer.ink.name()
                 ));
             }
@@ -82,21 +84,71 @@ impl Found {
         if !self.left_out.is_empty() {
             let names: Vec<_> = self.left_out.iter().map(|ink| ink.name()).collect();
             notes
-                .push(format!("{file}: the reserved colours of {} are printed as colours", names.join(", ")));
+                .push(format!("{file}: the reserved colours of {} print as plain colours", names.join(", ")));
         }
         if self.layers.is_empty() {
-            notes.push(format!("{file}: there is no reserved colour in it"));
+            notes.push(format!("{file}: the picture has no reserved colour"));
         }
         notes
     }
 }
 
-/// Takes the reserved colours out of a picture, leaving white, as layers at the dots.
+/// Takes the reserved colours out of a picture: their pixels become white, and layers at the dots.
 pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), options: &Options) -> Found {
     let table = in_use(&options.inks, options.tolerance);
+    let (classes, edges) = classify(rgb.as_chunks::<3>().0, size.0 as usize, &table);
+    let mut counts = vec![(0u64, 0u64); 1 + table.len()];
+    for &(_, to) in edges.iter().filter(|(_, to)| *to != OTHER) {
+        counts[usize::from(to)].1 += 1;
+    }
+    let mut class = classes.of;
+    let pixels_of = blank(rgb.as_chunks_mut::<3>().0, &mut class);
+    counts.iter_mut().zip(pixels_of).for_each(|(count, pixels)| count.0 = pixels);
+    let class = resample::nearest(class, size, dots);
+    let layers = (1..).zip(&table).filter(|&(at, _)| counts[usize::from(at)].0 > 0).map(|(at, entry)| {
+        let plane = bits::from_bytes(dots.0, &class, |class| class == at);
+        let colour = entry.colour.map(|v| v.to_string()).join(",");
+        let name = format!("the reserved colour {colour}");
+        Layer { ink: entry.ink, name, place: None, shape: Shape::Solid(plane) }
+    });
+    let layers = layers.collect();
+    let left_out = TABLE.iter().map(|entry| entry.ink).filter(|&ink| !options.inks.contains(ink)).collect();
+    let bared = counts[0].1;
+    let counts = counts.into_iter().skip(1).filter(|(pixels, _)| *pixels > 0).collect();
+    Found { layers, counts, bared, left_out }
+}
+
+/// The class of every pixel, and the pixels whose class was that of an edge or accidental, with their new class.
+fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, Vec<(usize, u8)>) {
+    let mut classes = Classes { of: by_colour(pixels, table), width };
+    let loose = classes.changes(
+        |class| class != PAPER && class != OTHER,
+        |class, at| (!classes.in_a_square(at)).then_some(class | LOOSE),
+    );
+    classes.apply(&loose);
     let mut colours = vec![[255; 3]];
     colours.extend(table.iter().map(|entry| entry.colour));
-    let pixels = rgb.as_chunks::<3>().0;
+    let is_accidental = |class: u8, at: usize| {
+        let place = usize::from(class & !LOOSE);
+        place.checked_sub(1).and_then(|at| table.get(at)).is_some_and(|entry| {
+            entry.ink.kind() == Kind::Metallic
+                && (0..3).any(|c| entry.colour[c].abs_diff(pixels[at][c]) > EXACT)
+                && classes.is_alone(at)
+        })
+    };
+    let edges = classes.changes(
+        |class| class >= LOOSE,
+        |class, at| {
+            edge(pixels[at], classes.around(at), &colours)
+                .or_else(|| is_accidental(class, at).then_some(OTHER))
+        },
+    );
+    classes.apply(&edges);
+    (classes, edges)
+}
+
+/// The class of every pixel by its own colour: paper, an entry of the table from 1, or [`OTHER`].
+fn by_colour(pixels: &[[u8; 3]], table: &[Reserved]) -> Vec<u8> {
     let mut of = vec![OTHER; pixels.len()];
     of.par_chunks_mut(BLOCK).zip(pixels.par_chunks(BLOCK)).for_each(|(of, pixels)| {
         if pixels.as_flattened().iter().fold(255, |all, byte| all & byte) == 255 {
@@ -108,7 +160,7 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
             if *pixel == [255; 3] {
                 *class = PAPER;
             } else if let Some((at, _)) = (1..)
-                .zip(&table)
+                .zip(table)
                 .filter(|(_, entry)| off(entry.colour) <= entry.tolerance)
                 .min_by_key(|(_, entry)| off(entry.colour))
             {
@@ -116,34 +168,13 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
             }
         }
     });
-    let mut classes = Classes { of, width: size.0 as usize };
-    let loose = classes.changes(
-        |class| class != PAPER && class != OTHER,
-        |class, at| (!classes.in_a_square(at)).then_some(class | LOOSE),
-    );
-    classes.apply(&loose);
-    let is_chance = |class: u8, at: usize| {
-        let place = usize::from(class & !LOOSE);
-        place.checked_sub(1).and_then(|at| table.get(at)).is_some_and(|entry| {
-            entry.ink.kind() == Kind::Metallic
-                && (0..3).any(|c| entry.colour[c].abs_diff(pixels[at][c]) > EXACT)
-                && classes.is_alone(at)
-        })
-    };
-    let edges = classes.changes(
-        |class| class >= LOOSE,
-        |class, at| {
-            edge(pixels[at], classes.around(at), &colours).or_else(|| is_chance(class, at).then_some(OTHER))
-        },
-    );
-    classes.apply(&edges);
-    let mut counts = vec![(0u64, 0u64); colours.len()];
-    for &(_, to) in edges.iter().filter(|(_, to)| *to != OTHER) {
-        counts[usize::from(to)].1 += 1;
-    }
-    let mut class = classes.of;
-    let blocks = class.par_chunks_mut(1 << 12).zip(rgb.as_chunks_mut::<3>().0.par_chunks_mut(1 << 12));
-    let pixels_of = blocks
+    of
+}
+
+/// Makes every pixel with a class white, takes the [`LOOSE`] mark off its class, and counts the pixels of each class.
+fn blank(pixels: &mut [[u8; 3]], class: &mut [u8]) -> [u64; 256] {
+    let blocks = class.par_chunks_mut(1 << 12).zip(pixels.par_chunks_mut(1 << 12));
+    blocks
         .fold(
             || [0u64; 256],
             |mut counts, (class, pixels)| {
@@ -155,36 +186,22 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
                 counts
             },
         )
-        .reduce(|| [0; 256], |a, b| std::array::from_fn(|class| a[class] + b[class]));
-    counts.iter_mut().zip(pixels_of).for_each(|(count, pixels)| count.0 = pixels);
-    let class = raster::nearest(class, size, dots);
-    let layers = |(at, entry): (u8, &Reserved)| {
-        let plane = bits::from_bytes(dots.0, &class, |class| class == at);
-        let colour = entry.colour.map(|v| v.to_string()).join(",");
-        (counts[usize::from(at)].0 > 0).then(|| Layer {
-            ink: entry.ink,
-            name: format!("the reserved colour {colour}"),
-            place: None,
-            shape: Shape::Solid(plane),
-        })
-    };
-    let layers = (1..).zip(&table).filter_map(layers).collect();
-    let left_out = TABLE.iter().map(|entry| entry.ink).filter(|&ink| !options.inks.contains(ink)).collect();
-    let bared = counts[0].1;
-    let counts = counts.into_iter().skip(1).filter(|(pixels, _)| *pixels > 0).collect();
-    Found { layers, counts, bared, left_out }
+        .reduce(|| [0; 256], |a, b| std::array::from_fn(|class| a[class] + b[class]))
 }
 
+/// The entries of the table whose inks are allowed, with this tolerance if one is set.
 fn in_use(inks: &InkSet, tolerance: Option<u8>) -> Vec<Reserved> {
     let with = |entry: &Reserved| Reserved { tolerance: tolerance.unwrap_or(entry.tolerance), ..*entry };
     TABLE.iter().filter(|entry| inks.contains(entry.ink)).map(with).collect()
 }
 
-/// The nearer of the two colours whose mixture the pixel is, if it is one of two that are seen around it.
+/// The class of an edge pixel: the nearer of two colours around it whose mixture it is; `None` if it is no such mixture.
+/// `seen` has a bit for each colour around the pixel.
 fn edge(pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
-    /// Squared distance from the line, in 8-bit steps, that rounding and gamma-blended edges need.
+    /// Largest squared distance from the line, in 8-bit steps: rounding and gamma-blended edges need this much.
     const OFF: i64 = 12 * 12;
-    /// How far beyond its ends sharpening reaches, as a part of the line: Lanczos and bicubic filters stay below a tenth.
+    /// Sharpened edges may lie beyond an end of the line by its length divided by this; Lanczos and bicubic filters stay
+    /// below a tenth.
     const BEYOND: i64 = 8;
     let vector =
         |a: [u8; 3], b: [u8; 3]| -> [i64; 3] { std::array::from_fn(|c| i64::from(b[c]) - i64::from(a[c])) };
@@ -197,7 +214,7 @@ fn edge(pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
             if at < -length / BEYOND || at > length + length / BEYOND {
                 continue;
             }
-            // |to|^2 - at^2 / length, the squared distance from the line.
+            // The squared distance from the line, |to|^2 - at^2 / length.
             let off = dot(to, to) - at * at / length;
             let nearer = if 2 * at < length { a } else { b } as u8;
             if off <= OFF && best.is_none_or(|(least, _)| off < least) {
@@ -211,9 +228,8 @@ fn edge(pixel: [u8; 3], seen: u32, colours: &[[u8; 3]]) -> Option<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layers::Options;
 
-    /// Discs of an ink's colour on another, softened over a pixel as drawing programs do.
+    /// A disc of one colour on another, softened over a pixel as drawing programs do.
     fn soft_disc(side: usize, colour: [u8; 3], ground: [u8; 3]) -> Vec<u8> {
         let middle = side as f64 / 2.0;
         (0..side * side)

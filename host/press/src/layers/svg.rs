@@ -1,11 +1,11 @@
 //! SVG drawings: layers named after inks, or one picture.
 //!
-//! Problem: a drawing program knows layers, which SVG writes as groups with a label or an identifier.
-//! Method: the drawing is rendered at its final number of dots without anti-aliasing. Groups that are Inkscape's layers
-//! are named by their label, others by their identifier; each topmost group that names an ink is rendered by itself. A
-//! drawing without such groups is one picture, whose edges are exact, so reserved colours need no guessing.
-//! Cost: four bytes a dot while a layer is rendered. Limits: opacity, clips and filters of groups around a layer do not
-//! reach into it; animation is not run.
+//! Problem: drawing programs have layers, which SVG stores as groups with a label or an identifier.
+//! Method: the drawing is rendered at its final number of dots without anti-aliasing. A group is named by its label, such as
+//! that of an Inkscape layer, or else by its identifier. Each topmost group that names an ink is rendered separately. A
+//! drawing without such groups is one picture; its edges are exact, so reserved colours are unambiguous.
+//! Cost: four bytes a dot while a layer is rendered. Limits: opacity, clips and filters of the groups around a layer do not
+//! apply to it; animations do not run.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,18 +13,22 @@ use std::sync::Arc;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, fontdb, roxmltree};
 
-use super::colour::{self, Pixels};
-use super::raster::{self, Gather, Scan, Unstated, wrong};
-use super::{Artwork, LayersError, Options, names};
+use super::artwork::Artwork;
+use super::coverage::{CoverageBuilder, Scan};
+use super::error::{LayersError, io, wrong};
+use super::names::{self, stem};
+use super::options::Options;
+use super::picture::{self, Pixels};
+use super::size::{self, Unstated};
 use observe::Observer;
 
 /// The most bytes of a drawing.
 const MOST_BYTES: u64 = 1 << 28;
 
-/// Units of a drawing without units in an inch.
+/// Units in an inch of a drawing without units.
 const UNITS: f64 = 96.0;
 
-/// Whether a file begins as a drawing does.
+/// Whether a file begins like an SVG drawing.
 pub(super) fn is_svg(start: &[u8]) -> bool {
     let text = String::from_utf8_lossy(start);
     let text = text.trim_start_matches('\u{feff}').trim_start();
@@ -40,7 +44,7 @@ struct Group {
 
 /// Reads a drawing.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
-    let reading = raster::io(path, "read it");
+    let reading = io(path, "read it");
     if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
         return Err(wrong(path, format!("the drawing is larger than {} MB", MOST_BYTES >> 20)));
     }
@@ -56,15 +60,15 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     if text.contains("<text") {
         load_fonts(path, Arc::make_mut(&mut usual.fontdb))?;
         notes.push(format!(
-            "{}: text is drawn with this computer's fonts; turn it into paths to have it as designed",
+            "{}: text is drawn with this computer's fonts; convert it to paths to keep its design",
             path.display()
         ));
     }
-    let tree =
-        usvg::Tree::from_str(&text, &usual).map_err(|error| wrong(path, format!("no drawing: {error}")))?;
+    let tree = usvg::Tree::from_str(&text, &usual)
+        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))?;
     let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
     let dots =
-        raster::dots(path, size, Some((UNITS, UNITS)), Unstated::IsDots, &options.sized(), &mut notes)?;
+        size::dots(path, size, Some((UNITS, UNITS)), Unstated::PixelPerDot, &options.sized(), &mut notes)?;
     let scale = Transform::from_scale((dots.0 as f64 / size.0) as f32, (dots.1 as f64 / size.1) as f32);
     let canvas =
         || Pixmap::new(dots.0 as u32, dots.1 as u32).ok_or_else(|| wrong(path, "the drawing is too large"));
@@ -74,37 +78,23 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         let mut pixmap = canvas()?;
         resvg::render(&tree, scale, &mut pixmap.as_mut());
         let rgba = straight(pixmap);
-        let pixels = Pixels { path: path.to_path_buf(), width, height, density: None, rgba, notes };
-        return Ok(colour::artwork_of(&super::stem(path), pixels, dots, options));
+        let pixels = Pixels { path: path.to_path_buf(), width, height, dpi: None, rgba, notes };
+        return Ok(picture::artwork_of(&stem(path), pixels, dots, options));
     }
     observer.begin("rendering layers", groups.len() as u64);
-    let mut art = Artwork::blank(&super::stem(path), dots);
+    let mut art = Artwork::blank(&stem(path), dots);
     for group in groups {
+        let Some(usvg::Node::Group(node)) = tree.node_by_id(&group.id) else {
+            notes.push(format!("{}: layer `{}` is hidden or empty: left out", path.display(), group.label));
+            continue;
+        };
         let mut pixmap = canvas()?;
-        match tree.node_by_id(&group.id) {
-            Some(usvg::Node::Group(node)) => {
-                // The renderer moves a group into the corner and forgets what lies around it: both are undone.
-                let around = node.transform().invert().map(|own| node.abs_transform().pre_concat(own));
-                let corner = node.abs_layer_bounding_box();
-                let place =
-                    scale.pre_concat(around.unwrap_or_default()).pre_translate(corner.x(), corner.y());
-                let node = usvg::Node::Group(node.clone());
-                resvg::render_node(&node, place, &mut pixmap.as_mut());
-            }
-            _ => {
-                notes.push(format!(
-                    "{}: layer `{}` is hidden or empty: left out",
-                    path.display(),
-                    group.label
-                ));
-                continue;
-            }
-        }
+        render_group(node, scale, &mut pixmap);
         let rgba = straight(pixmap);
-        let mut gather = Gather::new(rgba.len() / 4, true);
-        gather.row(&rgba, 4);
-        let (coverage, by) = gather.finish();
-        let scan = Scan { path: path.to_path_buf(), width, height, density: None, coverage, by };
+        let mut builder = CoverageBuilder::new(rgba.len() / 4, true);
+        builder.row(&rgba, 4);
+        let (coverage, by) = builder.finish();
+        let scan = Scan { path: path.to_path_buf(), width, height, dpi: None, coverage, by };
         art.add(scan, &group.label, group.named, false, options);
         observer.advance(1);
     }
@@ -113,15 +103,25 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     Ok(art)
 }
 
-/// This computer's fonts. The renderer leaves out text of a family that is not there, unless the usual one is: so there must
-/// be a usual one.
+/// Renders a group where it stands in the drawing.
+fn render_group(group: &usvg::Group, scale: Transform, pixmap: &mut Pixmap) {
+    // The renderer moves a group to the corner and ignores the transforms around it, so both are restored here.
+    let around = group.transform().invert().map(|own| group.abs_transform().pre_concat(own));
+    let corner = group.abs_layer_bounding_box();
+    let place = scale.pre_concat(around.unwrap_or_default()).pre_translate(corner.x(), corner.y());
+    let node = usvg::Node::Group(Box::new(group.clone()));
+    resvg::render_node(&node, place, &mut pixmap.as_mut());
+}
+
+/// Loads this computer's fonts. The renderer draws text of a missing family in the default family and leaves it out if that
+/// is missing too, so one is chosen here.
 fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersError> {
     fonts.load_system_fonts();
-    let usual = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
-    if fonts.query(&usual).is_some() {
+    let default = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
+    if fonts.query(&default).is_some() {
         return Ok(());
     }
-    // A face that is neither bold nor slanted reads best in place of any other; of several always the same.
+    // A regular upright face replaces any other best; the least name makes the choice the same every time.
     let plain = |face: &fontdb::FaceInfo| {
         face.style == fontdb::Style::Normal && face.weight == fontdb::Weight::NORMAL && !face.monospaced
     };
@@ -131,19 +131,19 @@ fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersErr
             fonts.set_serif_family(family);
             Ok(())
         }
-        None => Err(wrong(path, "it has text, and this computer has no fonts; turn the text into paths")),
+        None => Err(wrong(path, "it has text, but this computer has no fonts; convert the text to paths")),
     }
 }
 
-/// The topmost groups that name an ink, and the drawing with an identifier on each of them.
+/// The topmost groups that name an ink, and the drawing with an identifier added to each of them.
 fn groups(path: &Path, text: String, notes: &mut Vec<String>) -> Result<(String, Vec<Group>), LayersError> {
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     let document = roxmltree::Document::parse_with_options(&text, options)
-        .map_err(|error| wrong(path, format!("no drawing: {error}")))?;
+        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))?;
     let mut found = Vec::new();
     let mut missing = Vec::new();
     let mut others = Vec::new();
-    // Depth is bounded by the parser's own limit on nesting; this walk keeps its own stack anyway.
+    // The parser bounds the depth; a stack of its own spares this walk the recursion.
     let mut waiting: Vec<roxmltree::Node> = document.root_element().children().collect();
     waiting.reverse();
     while let Some(node) = waiting.pop() {
@@ -176,12 +176,12 @@ fn groups(path: &Path, text: String, notes: &mut Vec<String>) -> Result<(String,
     }
     if !found.is_empty() {
         for other in others {
-            super::named_part(path, &other, "layer", notes)?;
+            names::of_part(path, &other, "layer", notes)?;
         }
     }
     let mut text = text;
     for (start, id) in missing.into_iter().rev() {
-        // After the tag's name, which ends at the first blank, slash or bracket.
+        // Inserted after the tag's name, which ends at the first space, slash or bracket.
         if let Some(end) = text[start..].find(|c: char| c.is_whitespace() || c == '>' || c == '/') {
             text.insert_str(start + end, &format!(" id=\"{id}\""));
         }
@@ -189,7 +189,7 @@ fn groups(path: &Path, text: String, notes: &mut Vec<String>) -> Result<(String,
     Ok((text, found))
 }
 
-/// Straight alpha from the renderer's premultiplied.
+/// Straight alpha from the renderer's premultiplied alpha.
 fn straight(pixmap: Pixmap) -> Vec<u8> {
     let mut rgba = pixmap.take();
     for pixel in rgba.as_chunks_mut::<4>().0 {

@@ -1,11 +1,14 @@
-//! Reading art: files made here by other means than the readers, down to the dot.
+//! Reading art, dot by dot, from files that other means than the readers made.
 
 use std::fs;
+use std::path::PathBuf;
 
 use super::*;
 use observe::Silent;
 use proptest::prelude::*;
+use protocol::ink::Ink;
 use tempfile::TempDir;
+use testing::needs::{self, Need};
 
 struct Bench(TempDir);
 
@@ -18,7 +21,7 @@ impl Bench {
         self.0.path().join(name)
     }
 
-    /// Writes a PNG of this kind, at 600 dpi unless told.
+    /// Writes a PNG of this kind, at 600 dpi by default.
     fn png(
         &self,
         name: &str,
@@ -128,7 +131,7 @@ fn what_is_drawn_on_transparent_ground_is_ink_whatever_its_colour() {
     // Edges that a program multiplied into the colour are as opaque as they were.
     let file = rgba(&[[0, 0, 0, 255], [0, 0, 0, 200], [0, 0, 0, 60], [0, 0, 0, 0]]);
     assert_eq!(extent(&read(&[file], &Options::default()).layers[0]), (0, 0, 1, 0, 2));
-    // Black and white on transparent: white is left out, and that is said.
+    // Black and white on transparent: white is left out, with a note.
     let file = rgba(&[[0, 0, 0, 255], [255, 255, 255, 255], [0, 0, 0, 0]]);
     let art = read(&[file], &Options::default());
     assert_eq!(extent(&art.layers[0]), (0, 0, 0, 0, 1));
@@ -148,11 +151,14 @@ fn sizes_come_from_the_user_or_the_file_and_a_layer_without_one_is_of_dots() {
     for name in [unsized_.clone(), save("c.png", dims(1, png::Unit::Unspecified))] {
         let art = read(&[name], &Options::default());
         assert_eq!((art.width, art.length), (4, 2));
-        assert!(art.notes[0].contains("taken as drawn at 600 dpi, 0.2 x 0.1 mm"), "{:?}", art.notes);
+        assert!(art.notes[0].contains("at 600 dpi, 0.2 x 0.1 mm"), "{:?}", art.notes);
     }
     let narrow = Options { room: Room { width: 3, length: 9, cut: false }, ..Options::default() };
-    let said = open(std::slice::from_ref(&unsized_), &narrow, &Silent).unwrap_err().to_string();
-    assert!(said.contains("4 x 2 pixels at 600 dpi would be 0.2 x 0.1 mm") && said.contains("--size 0.1mm"));
+    let text = open(std::slice::from_ref(&unsized_), &narrow, &Silent).unwrap_err().to_string();
+    assert!(
+        text.contains("4 x 2 pixels at 600 dpi would be 0.2 x 0.1 mm")
+            && text.contains("set its resolution or its size")
+    );
     let cut = Options { room: Room { cut: true, ..narrow.room }, ..Options::default() };
     assert_eq!(read(std::slice::from_ref(&unsized_), &cut).width, 4);
     let dots = |path: &PathBuf, options: Options| {
@@ -196,16 +202,16 @@ fn a_photograph_without_a_resolution_fills_the_page_and_one_with_it_is_believed(
         assert!(art.width <= room.width && art.length <= room.length);
         assert!(art.notes[0].contains("as large as the page allows"), "{:?}", art.notes);
     }
-    // What stands for inks is drawn in dots.
+    // Reserved colours are drawn at one pixel a dot.
     let art = read(&[photo("holiday.png", (40, 20), None)], &options(true));
     assert_eq!((art.width, art.length), (40, 20));
     let art = read(&[photo("small.png", (72, 36), Some(72.0))], &options(false));
     assert_eq!((art.width, art.length), (600, 300));
-    let said = open(&[photo("large.png", (720, 360), Some(72.0))], &options(false), &Silent)
+    let text = open(&[photo("large.png", (720, 360), Some(72.0))], &options(false), &Silent)
         .unwrap_err()
         .to_string();
-    for words in ["large.png says 72 dpi", "254.0 x 127.0 mm", "room for 100.0 x 80.0 mm", "--size 99.9mm"] {
-        assert!(said.contains(words), "{words}: {said}");
+    for words in ["large.png states 72 dpi", "254.0 x 127.0 mm", "room for 100.0 x 80.0 mm", "crop it"] {
+        assert!(text.contains(words), "{words}: {text}");
     }
 }
 
@@ -469,13 +475,11 @@ showpage
 ";
 
 fn ghostscript() -> bool {
-    let there = std::process::Command::new("gs").arg("--version").output().is_ok();
-    let required = ["FOILPRESS_QUEUE", "CI"].into_iter().any(|name| std::env::var_os(name).is_some());
-    assert!(there || !required, "there is no Ghostscript here; `cargo xtask test` installs it");
-    if !there {
-        println!("skipped: there is no Ghostscript here");
+    let found = needs::starts("gs");
+    if !found {
+        Need::Queue.skip("Ghostscript is not installed; `cargo xtask queue` installs it");
     }
-    there
+    found
 }
 
 #[test]

@@ -1,24 +1,28 @@
 //! TIFF files whose channels name inks: CMYK plates, spot channels, or both.
 //!
-//! Problem: drawing programs hand over spot inks as extra channels, named in one of two places, and stored either way
-//! round.
-//! Method: names come from the InkNames tag (every channel an ink, the largest value full ink) or from the resource block
-//! Photoshop leaves (extra channels only, 0 is full ink, as it shows them). CMYK channels are the process inks' plates. The
-//! decoder drops extra channels unless the file calls itself grey, so the photometric tag is changed in memory before
-//! it is asked.
-//! Cost: the file in memory, and a byte a pixel for each channel. Limits: 8 and 16 bits a channel, the first image of the file.
+//! Problem: drawing programs export spot inks as extra channels. Their names stand in one of two places, and full ink is
+//! either the largest value or zero.
+//! Method: names come from the InkNames tag (every channel is an ink, the largest value is full ink) or from Photoshop's
+//! resource block (extra channels only, 0 is full ink, as Photoshop displays them). CMYK channels are the plates of the
+//! process inks. The decoder drops extra channels unless the file is greyscale, so the photometric tag is changed in memory
+//! first.
+//! Cost: the file in memory, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel, the file's first image.
 //! Source: TIFF 6.0 sections 16 and 18; Adobe's file format specification for the resource block.
 
-use std::io::Cursor;
 use std::path::Path;
 
-use ::tiff::decoder::{Decoder, DecodingResult, Limits};
+use ::tiff::decoder::DecodingResult;
 use ::tiff::tags::Tag;
 
-use super::cmyk::PLATES;
-use super::colour::{self, Pixels};
-use super::raster::{self, Coverage, Density, Scan, Unstated, wrong};
-use super::{Artwork, LayersError, Options, cmyk, names};
+use super::artwork::Artwork;
+use super::cmyk::{self, PLATES};
+use super::coverage::{Coverage, Scan};
+use super::error::{LayersError, io, wrong};
+use super::names::{self, stem};
+use super::options::Options;
+use super::picture::{self, Pixels};
+use super::resolution::{TiffDecoder, of_tiff, tiff_decoder};
+use super::size::{self, MOST_BYTES, Unstated};
 
 const INK_SET: Tag = Tag::Unknown(332);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);
@@ -31,38 +35,10 @@ const BLACK_IS_ZERO: u16 = 1;
 const RGB: u16 = 2;
 const SEPARATED: u16 = 5;
 
-/// The most channels that are looked at.
+/// The most channels of a file.
 const MOST_CHANNELS: usize = 24;
 
-type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
-
-fn open(bytes: &[u8]) -> Option<Reader<'_>> {
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = 1 << 30;
-    limits.intermediate_buffer_size = 1 << 30;
-    Some(Decoder::new(Cursor::new(bytes)).ok()?.with_limits(limits))
-}
-
-/// The resolution in the file.
-pub(super) fn density(bytes: &[u8]) -> Option<Density> {
-    density_of(&mut open(bytes)?)
-}
-
-fn density_of(decoder: &mut Reader<'_>) -> Option<Density> {
-    let inch = match decoder.find_tag_unsigned::<u16>(Tag::ResolutionUnit).ok()? {
-        None | Some(2) => 1.0,
-        Some(3) => 2.54,
-        Some(_) => return None,
-    };
-    let mut along = |tag| {
-        let ratio = decoder.get_tag(tag).ok()?.into_u64_vec().ok()?;
-        let &[numerator, denominator] = ratio.as_slice() else { return None };
-        Some(numerator as f64 / denominator as f64 * inch)
-    };
-    Some((along(Tag::XResolution)?, along(Tag::YResolution)?))
-}
-
-/// What a channel is.
+/// A channel of the file.
 struct Channel {
     name: String,
     ink: Option<names::Named>,
@@ -70,15 +46,15 @@ struct Channel {
     inverted: bool,
 }
 
-/// The art of a TIFF with more in it than a picture; nothing if it is a plain picture.
-pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
-    let read = raster::io(path, "read it");
-    if std::fs::metadata(path).map_err(&read)?.len() > raster::MOST_BYTES {
+/// Reads a TIFF with plates or spot channels; `None` if it is a plain picture.
+pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, LayersError> {
+    let reading = io(path, "read it");
+    if std::fs::metadata(path).map_err(&reading)?.len() > MOST_BYTES {
         return Err(wrong(path, "the file is larger than a gigabyte"));
     }
-    let mut bytes = std::fs::read(path).map_err(&read)?;
-    let Some(mut decoder) = open(&bytes) else { return Ok(None) };
-    let number = |decoder: &mut Reader<'_>, tag| decoder.find_tag_unsigned::<u16>(tag).ok().flatten();
+    let mut bytes = std::fs::read(path).map_err(&reading)?;
+    let Some(mut decoder) = tiff_decoder(&bytes) else { return Ok(None) };
+    let number = |decoder: &mut TiffDecoder<'_>, tag| decoder.find_tag_unsigned::<u16>(tag).ok().flatten();
     let photometric = number(&mut decoder, Tag::PhotometricInterpretation).unwrap_or(BLACK_IS_ZERO);
     let samples = usize::from(number(&mut decoder, Tag::SamplesPerPixel).unwrap_or(1));
     let ink_set = number(&mut decoder, INK_SET).unwrap_or(1);
@@ -90,13 +66,13 @@ pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, L
         _ => return Ok(None),
     };
     if samples > MOST_CHANNELS {
-        return Err(wrong(path, format!("{samples} channels; at most {MOST_CHANNELS} can be inks")));
+        return Err(wrong(path, format!("it has {samples} channels; expected at most {MOST_CHANNELS}")));
     }
     if samples < base || samples == base && photometric != SEPARATED {
         return Ok(None);
     }
     let (named_inks, named_extra) = (ink_names(&bytes), photoshop_names(&mut decoder));
-    // One extra channel without a name is transparency.
+    // An extra channel without a name is transparency.
     if photometric != SEPARATED && named_extra.is_empty() {
         return Ok(None);
     }
@@ -105,9 +81,10 @@ pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, L
     if photometric != SEPARATED && channels.iter().all(|channel| channel.ink.is_none()) {
         return Ok(None);
     }
-    let (width, height) = decoder.dimensions().map_err(|error| wrong(path, format!("damaged: {error}")))?;
-    raster::check_size(path, width, height)?;
-    let density = density_of(&mut decoder);
+    let (width, height) =
+        decoder.dimensions().map_err(|error| wrong(path, format!("the file is damaged: {error}")))?;
+    size::check_pixels(path, width, height)?;
+    let dpi = of_tiff(&mut decoder);
     let profile = decoder.find_tag(PROFILE).ok().flatten().and_then(|value| value.into_u8_vec().ok());
     drop(decoder);
     set_photometric(&mut bytes);
@@ -117,26 +94,26 @@ pub(super) fn spots(path: &Path, options: &Options) -> Result<Option<Artwork>, L
         notes.push(cmyk::note(path, profile.is_some()));
     }
     let spots = channels[base..].iter().any(|channel| channel.ink.is_some());
-    let unstated = if spots { Unstated::IsDots } else { Unstated::Fills };
+    let unstated = if spots { Unstated::PixelPerDot } else { Unstated::FillRoom };
     let sides = (f64::from(width), f64::from(height));
-    let dots = raster::dots(path, sides, density, unstated, options, &mut notes)?;
+    let dots = size::dots(path, sides, dpi, unstated, options, &mut notes)?;
     let mut art = if photometric == SEPARATED {
-        Artwork::blank(&super::stem(path), dots)
+        Artwork::blank(&stem(path), dots)
     } else {
         let colour = |c: usize| &planes[if base == 3 { c } else { 0 }];
         let mut rgba: Vec<u8> =
             (0..planes[0].len()).flat_map(|at| [colour(0)[at], colour(1)[at], colour(2)[at], 255]).collect();
         if let Some(profile) = profile {
-            notes.extend(colour::to_srgb(path, &profile, base == 1, &mut rgba)?);
+            notes.extend(picture::to_srgb(path, &profile, base == 1, &mut rgba)?);
         }
-        let pixels = Pixels { path: path.to_path_buf(), width, height, density, rgba, notes: Vec::new() };
-        colour::artwork_of(&super::stem(path), pixels, dots, options)
+        let pixels = Pixels { path: path.to_path_buf(), width, height, dpi, rgba, notes: Vec::new() };
+        picture::artwork_of(&stem(path), pixels, dots, options)
     };
     for (channel, plane) in channels.into_iter().zip(planes) {
         let Some(named) = channel.ink else { continue };
         let coverage = if channel.inverted { plane.iter().map(|v| 255 - v).collect() } else { plane };
         let (path, by) = (path.to_path_buf(), Coverage::Dark);
-        let scan = Scan { path, width, height, density, coverage, by };
+        let scan = Scan { path, width, height, dpi, coverage, by };
         art.add(scan, &channel.name, named, true, options);
     }
     art.notes.append(&mut notes);
@@ -174,25 +151,27 @@ fn channels(
                 ));
             }
         };
-        let ink = super::named_part(path, name, "channel", notes)?;
+        let ink = names::of_part(path, name, "channel", notes)?;
         if ink.is_some() && inverted {
-            notes
-                .push(format!("{}: in channel `{name}` black is ink, as Photoshop shows it", path.display()));
+            notes.push(format!(
+                "{}: black is ink in channel `{name}`, as Photoshop displays it",
+                path.display()
+            ));
         }
         channels.push(Channel { name: name.clone(), ink, inverted });
     }
     Ok(channels)
 }
 
-/// Names of all inks: text ended by NUL, one after the other. The decoder stops at the first.
+/// Names of all inks: consecutive texts that end in NUL. The decoder itself stops at the first.
 fn ink_names(bytes: &[u8]) -> Vec<String> {
     let text = field(bytes, INK_NAMES).and_then(|field| bytes.get(field)).unwrap_or_default();
     let names = text.split(|&byte| byte == 0).map(|name| String::from_utf8_lossy(name).trim().to_owned());
     names.filter(|name| !name.is_empty()).collect()
 }
 
-/// Names of the channels beyond the picture's own, from Photoshop's resource block.
-fn photoshop_names(decoder: &mut Reader<'_>) -> Vec<String> {
+/// Names of the extra channels, from Photoshop's resource block.
+fn photoshop_names(decoder: &mut TiffDecoder<'_>) -> Vec<String> {
     let block = decoder.find_tag(PHOTOSHOP).ok().flatten().and_then(|value| value.into_u8_vec().ok());
     let block = block.unwrap_or_default();
     let (mut plain, mut unicode) = (Vec::new(), Vec::new());
@@ -208,7 +187,7 @@ fn photoshop_names(decoder: &mut Reader<'_>) -> Vec<String> {
     if unicode.is_empty() { plain } else { unicode }
 }
 
-/// One resource: its number, its data, and what follows. A name and the data are padded to even lengths.
+/// The first resource: its number, its data, and the bytes after it. Names and data are padded to even lengths.
 fn resource(block: &[u8]) -> Option<(u16, &[u8], &[u8])> {
     let rest = block.strip_prefix(b"8BIM")?;
     let (id, rest) = rest.split_first_chunk::<2>()?;
@@ -242,11 +221,11 @@ fn unicode_strings(mut data: &[u8]) -> Vec<String> {
     strings
 }
 
-/// Calls the first image grey, so that the decoder hands out all of its channels.
+/// Marks the first image as greyscale, so that the decoder returns all of its channels.
 fn set_photometric(bytes: &mut [u8]) {
     let grey =
         if bytes.starts_with(b"II") { BLACK_IS_ZERO.to_le_bytes() } else { BLACK_IS_ZERO.to_be_bytes() };
-    // A file without the field is for the decoder to refuse.
+    // The decoder refuses a file without the field.
     if let Some(value) =
         field(bytes, PHOTOMETRIC).filter(|f| f.len() == 2).and_then(|field| bytes.get_mut(field))
     {
@@ -254,7 +233,7 @@ fn set_photometric(bytes: &mut [u8]) {
     }
 }
 
-/// Where the value of a tag of the first image lies, for values of bytes and short numbers.
+/// The place of a tag's value in the first image, for values of bytes and 16-bit numbers.
 fn field(bytes: &[u8], tag: u16) -> Option<std::ops::Range<usize>> {
     let little = bytes.starts_with(b"II");
     let short = |at: usize| -> Option<u16> {
@@ -273,7 +252,7 @@ fn field(bytes: &[u8], tag: u16) -> Option<std::ops::Range<usize>> {
     Some(at..at.checked_add(length)?)
 }
 
-/// A byte a pixel for each channel.
+/// One byte a pixel for each channel.
 fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Vec<Vec<u8>>, LayersError> {
     let bad = |error: ::tiff::TiffError| {
         wrong(
@@ -281,18 +260,18 @@ fn planes(path: &Path, bytes: &[u8], samples: usize, pixels: usize) -> Result<Ve
             format!("cannot decode its channels: {error}; save it uncompressed or with LZW, 8 or 16 bits"),
         )
     };
-    let Some(mut decoder) = open(bytes) else { return Err(wrong(path, "damaged")) };
+    let Some(mut decoder) = tiff_decoder(bytes) else { return Err(wrong(path, "the file is damaged")) };
     let mut decoded = DecodingResult::U8(Vec::new());
     decoder.read_image_to_buffer(&mut decoded).map_err(bad)?;
     let values: Vec<u8> = match decoded {
         DecodingResult::U8(values) => values,
         DecodingResult::U16(values) => values.into_iter().map(|v| (v >> 8) as u8).collect(),
-        _ => return Err(wrong(path, "its channels are neither of 8 nor of 16 bits; save it with 8")),
+        _ => return Err(wrong(path, "its channels have neither 8 nor 16 bits; save it with 8 bits")),
     };
     if values.len() != samples * pixels {
         return Err(wrong(
             path,
-            "it holds fewer channels than it says; save it with interleaved channels of 8 bits",
+            "it has fewer channels than its header states; save it with interleaved channels of 8 bits",
         ));
     }
     let planar = decoder.find_tag_unsigned::<u16>(Tag::PlanarConfiguration).ok().flatten() == Some(2);

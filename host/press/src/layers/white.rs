@@ -1,11 +1,11 @@
 //! Where white goes when the art does not draw it.
 //!
-//! Problem: on anything but white paper transparent inks need white beneath them, and what "beneath the art" means
-//! depends on the art: an eye's white may be pure white, a hole may be meant.
-//! Method: [`White`] names the ways owners use. A silhouette is everything that cannot be reached from outside the art
-//! through dots on which nothing is drawn, up, down, left and right: runs of such dots in each row are joined to
-//! those they touch in the next (union-find), and what is joined to the border is outside.
-//! Cost: a scan of the bits and a few bytes a run. Limits: a silhouette leaks through an outline that is not closed.
+//! Problem: transparent inks need white beneath them on anything but white paper. What "beneath the art" means depends on the
+//! art: the white of an eye may be pure white, and a hole may be intended.
+//! Method: [`White`] lists the usual choices. A silhouette is everything that cannot be reached from outside the art
+//! through undrawn dots, in steps up, down, left and right. Runs of undrawn dots in each row are joined to the runs they
+//! touch in the next row (union-find); all runs joined to the border are outside.
+//! Cost: one scan of the bits, and a few bytes a run. Limits: a silhouette leaks through a gap in its outline.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::bits;
 use crate::separate::Plane;
 
-/// Where white is laid beneath the art.
+/// Where white goes beneath the art.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum White {
@@ -26,9 +26,9 @@ pub enum White {
     Reserved,
     /// Where the picture is neither pure white nor transparent.
     Opaque,
-    /// Everything inside the outline, holes and the whites of eyes too.
+    /// Everything inside the outline, including holes and white areas.
     Silhouette,
-    /// Where the picture is not transparent, pure white too.
+    /// Where the picture is not transparent, including pure white.
     Alpha,
 }
 
@@ -49,11 +49,11 @@ impl fmt::Display for White {
 struct Run {
     from: usize,
     to: usize,
-    /// Another run of the same region; its own number at the region's root.
+    /// Another run of the same region; at the region's root, this run itself.
     parent: u32,
 }
 
-/// Root of a region, with the way to it halved.
+/// The root of a region. Halves the path to it.
 fn root(runs: &mut [Run], mut at: u32) -> u32 {
     while runs[at as usize].parent != at {
         let up = runs[runs[at as usize].parent as usize].parent;
@@ -74,7 +74,7 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
         let row = &drawn.bits[y * drawn.stride..][..drawn.stride];
         let mut x = 0;
         while x < width {
-            // Eight drawn dots at a time, and eight undrawn ones below.
+            // Eight dots at a time where all are drawn, and below, eight where none is drawn.
             if x.is_multiple_of(8) && row[x / 8] == 0xff {
                 x += 8;
                 continue;
@@ -143,7 +143,7 @@ mod tests {
         bits::from_bytes(width, rows.concat().as_bytes(), |byte| byte == b'#')
     }
 
-    /// By walking from the border step by step.
+    /// Walks from the border step by step.
     fn flooded(drawn: &Plane) -> Vec<bool> {
         let (width, length) = (drawn.width, drawn.length);
         let mut outside = vec![false; width * length];

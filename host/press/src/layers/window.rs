@@ -1,13 +1,13 @@
-//! A rectangle of a picture's pixels: what is drawn of it, or what is to be printed of it.
+//! A rectangle of a picture's pixels, such as the part that is drawn or the part to print.
 
 use rayon::prelude::*;
 
 /// A rectangle in pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Window {
-    /// Of its first column.
+    /// First column.
     pub left: usize,
-    /// Of its first row.
+    /// First row.
     pub top: usize,
     /// Columns.
     pub width: usize,
@@ -16,16 +16,16 @@ pub struct Window {
 }
 
 impl Window {
-    /// The smallest window around the pixels that have a byte other than `ground`. Pixels are `bytes` long, rows `width`
+    /// The smallest window around all pixels with a byte other than `ground`. A pixel has `bytes` bytes, a row has `width`
     /// pixels.
     pub fn around(pixels: &[u8], width: usize, bytes: usize, ground: u8) -> Option<Window> {
         let drawn = |&byte: &u8| byte != ground;
-        // For each row with something on it: its number, and the first and last byte of that.
+        // For each row that is not blank: its number, and its first and last byte other than the ground.
         let [top, bottom, first, last] = pixels
             .par_chunks_exact((width * bytes).max(1))
             .enumerate()
             .filter_map(|(y, row)| {
-                // Mostly there is nothing, and that is seen fastest a word at a time.
+                // Most rows are blank, and comparing words finds that fastest.
                 let (head, words, tail) = (row.as_chunks::<16>().0, [ground; 16], row.as_chunks::<16>().1);
                 if head.iter().all(|word| *word == words) && !tail.iter().any(drawn) {
                     return None;
@@ -37,7 +37,7 @@ impl Window {
         Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
     }
 
-    /// The smallest window around two.
+    /// The smallest window around both.
     pub fn join(&self, other: &Window) -> Window {
         let (left, top) = (self.left.min(other.left), self.top.min(other.top));
         let right = (self.left + self.width).max(other.left + other.width);
@@ -45,7 +45,7 @@ impl Window {
         Window { left, top, width: right - left, height: bottom - top }
     }
 
-    /// What two have in common.
+    /// The common part of both, if they overlap.
     pub fn meet(&self, other: &Window) -> Option<Window> {
         let (left, top) = (self.left.max(other.left), self.top.max(other.top));
         let right = (self.left + self.width).min(other.left + other.width);
@@ -58,10 +58,10 @@ impl Window {
         })
     }
 
-    /// The part of a picture in the window, which lies on it. Pixels are `bytes` long, rows `width` pixels.
+    /// The pixels inside the window, which lies within the picture. A pixel has `bytes` bytes, a row has `width` pixels.
     pub fn cut(&self, mut pixels: Vec<u8>, width: usize, bytes: usize) -> Vec<u8> {
         let row = bytes * self.width;
-        // In place: no row moves down.
+        // In place, since no row moves to a later byte.
         for y in 0..self.height {
             let from = bytes * ((self.top + y) * width + self.left);
             pixels.copy_within(from..from + row, y * row);

@@ -1,4 +1,4 @@
-//! A picture to lay radiance and words out on.
+//! A picture on which radiance and text are laid out.
 
 use std::convert::Infallible;
 
@@ -9,19 +9,20 @@ use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, 
 use embedded_graphics::text::{Baseline, Text};
 use image::{Rgb, RgbImage};
 
+use super::error::{PreviewError, check_size};
+use super::radiance::Radiance;
 use super::tone::{Exposure, linear, srgb};
-use super::{PreviewError, Radiance, check_size};
 
-/// The neutral ground, sRGB.
-pub const GROUND: [u8; 3] = [52, 52, 52];
-/// Words that matter.
-pub const INK: [u8; 3] = [232, 232, 232];
-/// Words that explain.
-pub const FAINT: [u8; 3] = [168, 168, 168];
+/// The neutral background, sRGB.
+const GROUND: [u8; 3] = [52, 52, 52];
+/// Colour of important text.
+pub(super) const INK: [u8; 3] = [232, 232, 232];
+/// Colour of explanatory text.
+pub(super) const FAINT: [u8; 3] = [168, 168, 168];
 
-/// The sizes of letters in use; every letter of a size is equally wide.
+/// Sizes of letters; all letters of a size have the same width.
 #[derive(Clone, Copy)]
-pub enum Letters {
+pub(super) enum Letters {
     Title,
     Plain,
     Small,
@@ -36,19 +37,19 @@ impl Letters {
         }
     }
 
-    /// Pixels a letter is wide.
+    /// Width of a letter in pixels.
     pub fn width(self) -> usize {
         self.font().character_size.width as usize
     }
 
-    /// Pixels a line is high.
+    /// Height of a line in pixels.
     pub fn height(self) -> usize {
         self.font().character_size.height as usize
     }
 }
 
-/// A picture on the neutral ground.
-pub struct Canvas {
+/// A picture on the neutral background.
+pub(super) struct Canvas {
     image: RgbImage,
 }
 
@@ -62,21 +63,20 @@ impl Canvas {
         self.image
     }
 
-    /// Writes a line with its top left corner at (x, y); what does not fit is cut off. Letters outside Latin-1
-    /// appear as question marks.
+    /// Writes a line with its top left corner at (x, y), cut off at the edge. Letters outside Latin-1 become question marks.
     pub fn text(&mut self, x: usize, y: usize, letters: Letters, colour: [u8; 3], text: &str) {
         let (width, height) = (self.image.width() as usize, self.image.height() as usize);
         if x >= width || y >= height {
             return;
         }
         let style = MonoTextStyle::new(letters.font(), Rgb888::new(colour[0], colour[1], colour[2]));
-        // What lies outside is cut off here: the drawing library adds up widths without looking.
+        // Cut here, because the drawing library adds up widths without checking for overflow.
         let visible: String = text.chars().take((width - x).div_ceil(letters.width())).collect();
         let at = Point::new(x as i32, y as i32);
         let Ok(_) = Text::with_baseline(&visible, at, style, Baseline::Top).draw(self);
     }
 
-    /// Lays radiance over the ground with its top left corner at (x, y).
+    /// Draws radiance over the background with its top left corner at (x, y).
     pub fn paste(&mut self, x: usize, y: usize, picture: &Radiance, exposure: Exposure) {
         let ground = linear(GROUND);
         for (j, row) in picture.pixels.chunks_exact(picture.width).enumerate() {
@@ -85,7 +85,7 @@ impl Canvas {
                 if covered <= 0.0 || px >= self.image.width() || py >= self.image.height() {
                     continue;
                 }
-                // The curve is for what is covered; the edge then blends what is shown.
+                // Tone mapping applies to the covered part; the result is then blended at the edge.
                 let shown = exposure.shown([r, g, b].map(|v| v / covered));
                 let blend = |c: usize| shown[c] * covered + ground[c] * (1.0 - covered);
                 self.image.put_pixel(px, py, Rgb(srgb([blend(0), blend(1), blend(2)])));
@@ -115,6 +115,14 @@ impl DrawTarget for Canvas {
         }
         Ok(())
     }
+}
+
+/// A text cut to `room` letters.
+pub(super) fn shortened(text: &str, room: usize) -> String {
+    if text.chars().count() <= room {
+        return text.to_string();
+    }
+    text.chars().take(room.saturating_sub(2)).chain("..".chars()).collect()
 }
 
 #[cfg(test)]
@@ -154,5 +162,11 @@ mod tests {
         let image = canvas.finish();
         assert_eq!(image.get_pixel(0, 1).0, GROUND);
         assert!(image.get_pixel(1, 1).0[0] > 240);
+    }
+
+    #[test]
+    fn words_that_do_not_fit_are_cut() {
+        assert_eq!(shortened("light from the left", 8), "light ..");
+        assert_eq!(shortened("short", 8), "short");
     }
 }

@@ -1,13 +1,13 @@
-//! How far the print is from the document, seen by an eye at a distance.
+//! The difference between print and document, seen by an eye at a distance.
 //!
-//! Problem: dot by dot no halftone resembles its document; the eye averages before it compares.
-//! Method: both are averaged over the spot the eye averages over, in reflectance, and the distance of the metric
-//! (eqs. 2-3 of the 2009 paper's appendix) is taken at every spot. The spot: Nasanen's low-pass
-//! `exp(-f / (0.525 ln L + 3.91))`, f in cycles per degree, at L = 11 cd/m^2, passes white noise like a window of
-//! effective area `2 / (pi a^2)` square degrees, a = 5.17: 1.35 mm a side at half a metre. We use the window
+//! Problem: no halftone resembles its document dot by dot. The eye averages before it compares.
+//! Method: the reflectance of both is averaged over the spot that the eye averages over, and the distance of the metric
+//! (eqs. 2-3 of the 2009 paper's appendix) is computed at every spot. Nasanen's low-pass
+//! `exp(-f / (0.525 ln L + 3.91))`, with f in cycles per degree and L = 11 cd/m^2, passes white noise like a window with an
+//! effective area of `2 / (pi a^2)` square degrees, a = 5.17: a side of 1.35 mm at half a metre. The window here is
 //! [1 2 1] (x) [1 2 1] over cells of 3/8 of that side (effective side 16/6 cells), which leaks less than a box.
-//! Cost: one pass over dots and document pixels; memory of a few lines of cells.
-//! Limits: achromatic contrast model on every column alike; nothing is said of detail finer than a cell.
+//! Cost: one pass over dots and document pixels; memory for a few lines of cells.
+//! Limits: one achromatic contrast model for all columns; detail finer than a cell is ignored.
 
 use rayon::prelude::*;
 
@@ -15,23 +15,23 @@ use crate::sheet::DOTS_PER_MM;
 use appearance::brdf::Space;
 use observe::Observer;
 
-use super::PreviewError;
+use super::error::PreviewError;
 use super::source::{Lines, Scratch, Source};
 
-/// Lines of cells to a parallel task; fixed, so that sums are taken in one order on any number of threads.
+/// Lines of cells in a parallel task. It is fixed, so that the order of sums does not depend on the number of threads.
 const CHUNK: usize = 16;
 
-/// Places averaged along each axis of a cell when a document is finer than the cells.
+/// Places averaged along each axis of a cell if a document is finer than the cells.
 const SAMPLES: usize = 16;
 
-/// Distances between two pictures over all spots the eye resolves. About 0.01 is hard to see, 0.05 is plain.
+/// Distances between two pictures over all spots that the eye resolves. 0.01 is barely visible, 0.05 is obvious.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// Mean distance.
     pub mean: f64,
     /// Root of the mean squared distance.
     pub rmse: f64,
-    /// Distance 95 % of the spots stay below.
+    /// The distance that 95 % of the spots do not exceed.
     pub p95: f64,
     /// Greatest distance.
     pub max: f64,
@@ -43,16 +43,16 @@ pub struct Report {
     pub map: Vec<f32>,
 }
 
-/// Side in millimetres of the square window the eye averages over at `metres`. See the module text.
-pub fn spot_mm(metres: f64) -> f64 {
+/// Side in millimetres of the square window that the eye averages over at `metres`. See the module text.
+fn spot_mm(metres: f64) -> f64 {
     let cycles = 0.525 * 11f64.ln() + 3.91;
     let degrees = (2.0 / std::f64::consts::PI).sqrt() / cycles;
     1000.0 * metres * degrees.to_radians()
 }
 
-/// Side in dots of the cells the window of an eye at `metres` is made of; 1 or more.
-pub fn cell_dots(metres: f64) -> usize {
-    // 6/16: the three taps 1/4, 1/2, 1/4 pass noise like a box of 16/6 cells.
+/// Side in dots of the cells of that window; 1 or more.
+fn cell_dots(metres: f64) -> usize {
+    // 6/16, because the three taps 1/4, 1/2, 1/4 pass noise like a box of 16/6 cells.
     (spot_mm(metres) * DOTS_PER_MM * 6.0 / 16.0).round().max(1.0) as usize
 }
 
@@ -60,7 +60,7 @@ pub fn cell_dots(metres: f64) -> usize {
 /// paper, `size` dots of 1/600 inch across and down.
 ///
 /// # Errors
-/// When the two are not in the same tabulation, or a table does not fit its source.
+/// Different tabulations, or a table that does not match its source.
 pub fn fidelity(
     target: &Source,
     print: &Source,
@@ -71,7 +71,7 @@ pub fn fidelity(
     let space = target.space();
     if print.space() != space {
         return Err(PreviewError::Shape {
-            what: "columns of the print's tabulation, which must be the target's own",
+            what: "columns of the print's tabulation, which must be that of the target",
             expected: space.columns(),
             found: print.space().columns(),
         });
@@ -104,9 +104,9 @@ pub fn fidelity(
     Ok(Report { mean, rmse, p95: at(0.95), max: at(1.0), width, height, map })
 }
 
-/// [`appearance::brdf::Space::distance`] for rows of f32, eight columns side by side; sums are taken in one fixed order.
+/// [`appearance::brdf::Space::distance`] for rows of f32, eight columns at a time. The order of sums is fixed.
 struct Metric {
-    /// Per column: the factor to reflected radiance and the root of the quadrature weight.
+    /// For each column: the factor to reflected radiance, and the root of the quadrature weight.
     columns: Vec<(f32, f32)>,
 }
 
@@ -131,14 +131,14 @@ impl Metric {
     }
 }
 
-/// The cube root of `x`, to a few units in the last place; nothing below 1e-30 counts, where it is 1e-10.
+/// The cube root of `x` to a few units in the last place. Values below 1e-30 count as 1e-30, whose root is 1e-10.
 ///
-/// A third of the exponent, read off the bits, is within 6 %; each of Halley's steps cubes that error. Unlike the
-/// library's function this is plain arithmetic, so the compiler does several columns at once; comparing a page took
-/// six times as long without it.
+/// A third of the exponent, computed on the bits, is within 6 %; each of Halley's steps cubes that error. Unlike the
+/// library's function, this is plain arithmetic that the compiler can vectorise. Without it, comparing a page took six times
+/// as long.
 fn cube_root(x: f32) -> f32 {
     let x = x.max(1e-30);
-    // (1 - 1/3) of the bias 127 in the exponent's place, moved so that errors above and below are alike.
+    // Two thirds of the exponent's bias of 127, adjusted to balance the errors above and below.
     let mut y = f32::from_bits(x.to_bits() / 3 + 0x2a51_19f2);
     for _ in 0..2 {
         let cube = y * y * y;
@@ -147,7 +147,7 @@ fn cube_root(x: f32) -> f32 {
     y
 }
 
-/// Lines `first..first + count` after the window [1 2 1] / 4 along both axes; edge cells are repeated outwards.
+/// Lines `first..first + count` filtered by the window [1 2 1] / 4 along both axes. Edge cells repeat outwards.
 fn blurred(lines: &Lines, first: usize, count: usize) -> Vec<f32> {
     let (columns, width, last) = (lines.columns(), lines.width(), lines.height() - 1);
     let mut scratch = Scratch::default();

@@ -1,9 +1,9 @@
-//! A document or a sheet lying flat under lights, seen from straight above.
+//! A flat document or sheet under lights, seen from straight above.
 //!
-//! Method: the eye is orthographic, so the view is the normal everywhere and the half angle is half the light's
-//! polar angle. Each pixel's mean reflectance is read once and looked up for every light:
-//! `L = f(theta_h) E cos_i`, E = 1 at the middle of the picture when it faces the light, falling with the square
-//! of the distance from a light at a point.
+//! Method: the eye is orthographic, so the view direction is the normal everywhere and the half angle is half the polar angle
+//! of the light. The mean reflectance of each pixel is read once and evaluated for every light:
+//! `L = f(theta_h) E cos_i`. E is 1 at the middle of the picture facing the light, and falls with the square of the
+//! distance from a point light.
 //! Cost: reading the source, then one search among the angles and six multiply-adds for each light and pixel.
 //! Limits: lights have no size, so a highlight is as sharp as the material.
 
@@ -11,16 +11,17 @@ use rayon::prelude::*;
 
 use observe::Observer;
 
+use super::error::PreviewError;
+use super::radiance::Radiance;
 use super::source::{Scratch, Source};
-use super::{PreviewError, Radiance};
 
-/// A light over the picture. x points right, y to the top of the picture, z to the eye; the unit of length is
-/// the picture's longer side and the origin its middle.
+/// A light over the picture. x points right, y to the top of the picture, z to the eye. The unit of length is the
+/// picture's longer side; the origin is its middle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
     /// Infinitely far away in this direction (any length, z > 0).
     Far([f64; 3]),
-    /// At this point (z > 0). Highlights lie beneath it and roam as it moves.
+    /// At this point (z > 0). Highlights lie beneath it.
     Point([f64; 3]),
 }
 
@@ -37,16 +38,16 @@ impl Light {
         Ok(())
     }
 
-    /// The direction to the light from a point of the sheet, of any length.
-    pub fn direction(self, x: f64, y: f64) -> [f64; 3] {
+    /// The direction from a point of the sheet to the light, of any length.
+    pub(super) fn direction(self, x: f64, y: f64) -> [f64; 3] {
         match self {
             Light::Far(v) => v,
             Light::Point(p) => [p[0] - x, p[1] - y, p[2]],
         }
     }
 
-    /// Half angle (radians) and `E cos_i` at a point of the sheet.
-    pub fn at(self, x: f64, y: f64) -> (f64, f64) {
+    /// The half angle (radians) and `E cos_i` at a point of the sheet.
+    pub(super) fn at(self, x: f64, y: f64) -> (f64, f64) {
         let to = self.direction(x, y);
         let falloff = match self {
             Light::Far(_) => 1.0,
@@ -61,8 +62,8 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The two angles around `theta` and how far between them it is; the ends hold outside.
-pub(crate) fn bracket(angles: &[f64], theta: f64) -> (usize, usize, f64) {
+/// The two angles around `theta` and its fractional place between them. Outside the range, the nearest end applies.
+pub(super) fn bracket(angles: &[f64], theta: f64) -> (usize, usize, f64) {
     let above = angles.partition_point(|&a| a <= theta);
     if above == 0 {
         (0, 0, 0.0)
@@ -73,14 +74,13 @@ pub(crate) fn bracket(angles: &[f64], theta: f64) -> (usize, usize, f64) {
     }
 }
 
-/// Places averaged along each axis of a picture's pixel when a document is finer than the picture.
-pub const DOCUMENT_SAMPLES: usize = 4;
+/// Places averaged along each axis of a pixel if a document is finer than the picture.
+const DOCUMENT_SAMPLES: usize = 4;
 
-/// Renders `source` as `width` x `height` pixels under each of `lights` by itself; one picture a light.
+/// Renders `source` as `width` x `height` pixels, one picture for each of `lights`.
 ///
 /// # Errors
-/// When the source's tabulation has no half angles, its tables do not fit each other, or a light is below the
-/// sheet.
+/// A tabulation without half angles, tables that do not match each other, or a light below the sheet.
 pub fn flat(
     source: &Source,
     lights: &[Light],

@@ -1,9 +1,9 @@
-//! The dots as ink on a ground of any colour: all together, and each pass by itself.
+//! Dots as ink on a background of any colour: the whole sheet, or one pass.
 //!
-//! Method: a palette. Every stack gets the colour of its layers upon the ground (transparent inks tint, the others hide), and
-//! the dots stay what they are, a pixel each. Clear inks hardly show together with others, as on paper; in the picture of
-//! their own pass they are labelled with a colour. Cost: one look at each dot. Limits: no proof: gloss and metal do not show.
-//! For light there is [`super::flat()`].
+//! Method: a palette. Every stack gets the colour of its layers on the background (transparent inks tint it, other inks
+//! cover it), and every dot is one pixel. Clear inks hardly show among others, as on paper; the picture of their own pass
+//! shows them in a label colour. Cost: one look at each dot. Limits: not a proof, because gloss and metal do not show; see
+//! [`super::flat()`] for lit sheets.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -16,7 +16,7 @@ use crate::sheet::colours::{label, upon};
 use crate::sheet::picture::{Kind, write_png};
 use crate::sheet::{Area, Sheet};
 
-/// A ground to print on, sRGB.
+/// A background to print on, sRGB.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Ground(pub [u8; 3]);
 
@@ -27,9 +27,9 @@ impl Default for Ground {
     }
 }
 
-/// Not a colour.
+/// Text that is not a colour.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no colour; write it like #204080, or black, white, clear")]
+#[error("`{0}` is not a colour; write it like #204080, or use black, white or clear")]
 pub struct NoColour(String);
 
 impl FromStr for Ground {
@@ -52,10 +52,13 @@ impl FromStr for Ground {
     }
 }
 
-/// Writes an area of a sheet as its inks look on the ground, a pixel a dot.
+/// Writes a picture of an area of a sheet in its inks, one pixel a dot.
+///
+/// # Errors
+/// The file cannot be written.
 ///
 /// # Panics
-/// When the area leaves the sheet: a bug of the caller, never a matter of input.
+/// If the area leaves the sheet, which is a bug of the caller.
 pub fn save_sheet(sheet: &Sheet, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
     let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
@@ -63,10 +66,13 @@ pub fn save_sheet(sheet: &Sheet, area: Area, ground: Ground, path: &Path) -> Res
     write_png(path, (area.width, area.length), Kind::Indexed(&palette), &dots)
 }
 
-/// Writes an area of one pass in its ink on the ground, a pixel a dot.
+/// Writes a picture of an area of one pass in its ink, one pixel a dot.
+///
+/// # Errors
+/// The file cannot be written.
 ///
 /// # Panics
-/// When the area leaves the plane: a bug of the caller, never a matter of input.
+/// If the area leaves the plane, which is a bug of the caller.
 pub fn save_pass(pass: &Pass, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
     let palette = [ground.0, label(pass.ink, ground.0)];
     let plane = &pass.plane;
@@ -77,7 +83,7 @@ pub fn save_pass(pass: &Pass, area: Area, ground: Ground, path: &Path) -> Result
     write_png(path, (area.width, area.length), Kind::Indexed(&palette), &dots)
 }
 
-/// The whole sheet small, `longest` pixels on its longer side at most: each pixel is the mean of its dots on the ground.
+/// A picture of the whole sheet, at most `longest` pixels on its longer side. Each pixel is the mean of its dots.
 pub fn thumbnail(sheet: &Sheet, ground: Ground, longest: usize) -> RgbImage {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
     let step = sheet.width().max(sheet.length()).div_ceil(longest.max(1)).max(1);
@@ -92,7 +98,7 @@ pub fn thumbnail(sheet: &Sheet, ground: Ground, longest: usize) -> RgbImage {
             }
         }
     }
-    // Sides of a sheet are u16, and a mean of bytes is one.
+    // The sides of a sheet fit in u16, and a mean of bytes fits in a byte.
     RgbImage::from_fn(width as u32, height as u32, |x, y| {
         let [r, g, b, count] = sums[y as usize * width + x as usize];
         image::Rgb([r, g, b].map(|sum| ((sum + count / 2) / count.max(1)) as u8))

@@ -1,8 +1,8 @@
 //! Every basis before and after mapping, as lit balls: `materials.png`, after figure 6 of the 2009 paper.
 //!
-//! A card a basis: target on the left, print on the right, each under a light beside the eye and under a probe;
-//! below, the distance of the metric and the mixture in words. All balls under one kind of light share an
-//! exposure chosen from white paper under it, so cards can be compared.
+//! Each basis has a card with the target on the left and the print on the right, both under a light near the eye and under a
+//! light probe. The card also states the distance of the metric and the mixture in words. All balls under one kind of light
+//! share the exposure of white paper under it, so that cards can be compared.
 
 use image::RgbImage;
 use inks::Stack;
@@ -11,37 +11,38 @@ use rayon::prelude::*;
 use appearance::brdf::{Space, Table};
 use observe::Observer;
 
-use super::canvas::{Canvas, FAINT, INK, Letters};
-use super::sheet_picture::shortened;
+use super::canvas::{Canvas, FAINT, INK, Letters, shortened};
+use super::error::{PreviewError, check_size};
+use super::probe::Probe;
+use super::radiance::Radiance;
 use super::sphere::{under_light, under_probe};
 use super::tone::Exposure;
-use super::{PreviewError, Probe, Radiance, check_size};
 
 /// One material before and after mapping.
 #[derive(Clone, Debug)]
 pub struct Swatch<'a> {
-    /// What it is called, such as `basis 3`.
+    /// Its name, such as `basis 3`.
     pub name: String,
-    /// Reflectance asked for, a row of the space.
+    /// The reflectance to reproduce, a row of the space.
     pub target: &'a [f64],
-    /// Reflectance of the mixture.
+    /// The reflectance of the mixture.
     pub printed: &'a [f64],
-    /// The mixture: stacks and their shares, which sum to about 1.
+    /// The mixture: stacks and their weights, which sum to about 1.
     pub mix: Vec<(Stack, f64)>,
 }
 
-/// Direction of the light of the left ball of each pair: a little off the eye, so that the highlight is too.
+/// Direction of the light on the left ball of each pair: off the eye, to move the highlight off the centre.
 const LIGHT: [f64; 3] = [-0.45, 0.5, 1.0];
 
-/// Rows of the probe balls are lit by.
+/// Rows of the light probe.
 const PROBE_ROWS: usize = 128;
 
 const GAP: usize = 20;
 
-/// Lays out `swatches` as cards of balls `ball` pixels across.
+/// Lays out `swatches` as cards with balls of `ball` pixels across.
 ///
 /// # Errors
-/// When a row does not fit the space, the space has no half angles, or the whole would be too large.
+/// A row of another space, a space without half angles, or a picture that would be too large.
 pub fn materials_picture(
     space: &Space,
     swatches: &[Swatch],
@@ -58,7 +59,7 @@ pub fn materials_picture(
         }
         rows.push(row);
     }
-    // White paper joins the balls only to set the exposure of the probe.
+    // White paper is rendered only to set the exposure under the probe.
     rows.push(&vec![0.85 / std::f64::consts::PI; space.columns()]);
     let mut around = under_probe(space, &rows, &probe.shrunk(PROBE_ROWS), ball, observer)?;
     let paper = around.pop().map_or(Exposure::PAPER, |p| Exposure::of(&[p]));
@@ -104,8 +105,8 @@ pub fn materials_picture(
     Ok(canvas.finish())
 }
 
-/// A mixture in words, largest share first, whole per cents that sum to 100: `62 % MS+C, 38 % substrate`.
-/// Shares that round to nothing are left out.
+/// A mixture in words, largest weight first, in whole per cents that sum to 100: `62 % MS+C, 38 % substrate`.
+/// Weights that round to zero are left out.
 pub fn mix_in_words(mix: &[(Stack, f64)]) -> String {
     let sum: f64 = mix.iter().map(|m| m.1.max(0.0)).sum();
     if sum.is_nan() || sum <= 0.0 {
@@ -122,7 +123,7 @@ pub fn mix_in_words(mix: &[(Stack, f64)]) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// Breaks a list at its commas into at most `lines` lines of `room` letters.
+/// Breaks a list at its commas into at most `lines` lines of at most `room` letters.
 fn wrapped(text: &str, room: usize, lines: usize) -> Vec<String> {
     let mut out = vec![String::new()];
     for part in text.split_inclusive(", ") {

@@ -1,8 +1,8 @@
 //! Light from everywhere: a latitude-longitude panorama of radiance.
 //!
-//! Conventions: row 0 is up (+y); at column u and row v in 0..1 the direction is
-//! `(sin phi sin t, cos t, -cos phi sin t)`, phi = 2 pi u, t = pi v. The eye looks along -z, so the middle of the
-//! panorama is behind the eye and its left edge behind the ball. Texels count with their exact solid angle.
+//! Conventions: row 0 is up (+y). At column u and row v, both from 0 to 1, the direction is
+//! `(sin phi sin t, cos t, -cos phi sin t)` with phi = 2 pi u and t = pi v. The eye looks along -z, so the middle of the
+//! panorama is behind the eye and its left edge is behind the ball. Texels are weighted by their exact solid angle.
 //! Source of files: Radiance `.hdr` (RGBE), decoded within limits.
 
 use std::f64::consts::PI;
@@ -12,10 +12,10 @@ use std::path::Path;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder, Limits};
 
-use super::PreviewError;
+use super::error::PreviewError;
 
-/// The widest panorama that is read.
-pub const WIDEST: usize = 8192;
+/// The widest panorama that can be read.
+const WIDEST: usize = 8192;
 
 /// Radiance from every direction. See the module text for its layout.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,10 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// A panorama of `height` rows and as many columns as fill it; radiance finite and not negative.
+    /// A panorama of `height` rows. Radiance is finite and not negative.
+    ///
+    /// # Errors
+    /// A number of texels that is no multiple of `height`, or radiance out of range.
     pub fn new(height: usize, rgb: Vec<[f32; 3]>) -> Result<Probe, PreviewError> {
         let shape = |what, expected, found| PreviewError::Shape { what, expected, found };
         let width = rgb.len() / height.max(1);
@@ -41,14 +44,14 @@ impl Probe {
         Ok(Probe { width, height, rgb })
     }
 
-    /// The same radiance from everywhere: a furnace.
+    /// The same radiance from every direction: a furnace.
     pub fn constant(radiance: f32) -> Probe {
         let (width, height) = (128, 64);
         Probe { width, height, rgb: vec![[radiance.max(0.0); 3]; width * height] }
     }
 
-    /// A photographer's studio of our own: a window with four panes at the upper left, a tall strip at the
-    /// right, a lamp behind and a soft ceiling, in a grey room that is darker below. `height` rows (1 or more).
+    /// A synthetic photo studio of `height` rows (1 or more): a window with four panes at the upper left, a tall strip light at
+    /// the right, a lamp behind and a soft ceiling light, in a grey room that is darker below.
     pub fn studio(height: usize) -> Probe {
         let height = height.max(1);
         let width = 2 * height;
@@ -63,14 +66,17 @@ impl Probe {
     }
 
     /// Reads a Radiance `.hdr` file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is not a panorama twice as wide as high.
     pub fn read_hdr(path: &Path) -> Result<Probe, PreviewError> {
         let file = std::fs::File::open(path)
             .map_err(|e| PreviewError::Probe { path: path.to_path_buf(), problem: e.to_string() })?;
         Probe::from_hdr(BufReader::new(file), path)
     }
 
-    /// Reads a Radiance `.hdr` from anything; `path` is only named in errors.
-    pub fn from_hdr(input: impl BufRead + Seek, path: &Path) -> Result<Probe, PreviewError> {
+    /// Reads a Radiance `.hdr` from any input; errors name `path`.
+    fn from_hdr(input: impl BufRead + Seek, path: &Path) -> Result<Probe, PreviewError> {
         let wrong = |problem: String| PreviewError::Probe { path: path.to_path_buf(), problem };
         let mut decoder = HdrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
         let (width, height) = decoder.dimensions();
@@ -84,7 +90,7 @@ impl Probe {
         limits.max_image_width = Some(WIDEST as u32);
         limits.max_image_height = Some(WIDEST as u32);
         decoder.set_limits(limits).map_err(|e| wrong(e.to_string()))?;
-        // What the header calls exposure was multiplied into the pixels by the program that wrote them.
+        // The program that wrote the file multiplied the pixels by the exposure in the header.
         let exposure = decoder.metadata().exposure.unwrap_or(1.0);
         if !(exposure.is_finite() && exposure > 0.0) {
             return Err(wrong(format!("EXPOSURE={exposure} must be above 0")));
@@ -109,19 +115,19 @@ impl Probe {
         &self.rgb
     }
 
-    /// Direction of the middle of a texel.
+    /// The direction of the middle of a texel.
     pub fn direction(&self, x: usize, y: usize) -> [f64; 3] {
         direction((x as f64 + 0.5) / self.width as f64, (y as f64 + 0.5) / self.height as f64)
     }
 
-    /// Solid angle of each texel of row `y`; all of them sum to 4 pi.
+    /// The solid angle of each texel of row `y`. All texels together have 4 pi.
     pub fn solid_angle(&self, y: usize) -> f64 {
         let edge = |y: usize| (PI * y as f64 / self.height as f64).cos();
         (edge(y) - edge(y + 1)) * 2.0 * PI / self.width as f64
     }
 
-    /// Averaged by solid angle to at most `height` rows, by a whole factor; the same where that factor is 1 or
-    /// does not divide both sides.
+    /// The probe averaged by solid angle to at most `height` rows, by the least whole factor that divides both sides; unchanged
+    /// if there is none.
     pub fn shrunk(&self, height: usize) -> Probe {
         let k = (1..=self.height)
             .find(|k| {
@@ -147,12 +153,12 @@ impl Probe {
 }
 
 /// The direction at column `u` and row `v`, both 0 to 1.
-pub fn direction(u: f64, v: f64) -> [f64; 3] {
+pub(super) fn direction(u: f64, v: f64) -> [f64; 3] {
     let (phi, t) = (2.0 * PI * u, PI * v);
     [phi.sin() * t.sin(), t.cos(), -phi.cos() * t.sin()]
 }
 
-/// One rectangular lamp: where it is, half its size as tangents, panes across and down, radiance.
+/// A rectangular lamp: its direction, half its size as tangents, panes across and down, radiance.
 struct Lamp {
     towards: [f64; 3],
     half: [f64; 2],
@@ -173,7 +179,7 @@ const LAMPS: [Lamp; 4] = [
 ];
 
 fn studio_radiance(d: [f64; 3]) -> [f64; 3] {
-    // A floor, a wall that brightens to the ceiling, and no hard line between them.
+    // A floor, and a wall that brightens towards the ceiling, with a soft line between them.
     let up = smooth(-0.35, 0.25, d[1]);
     let wall = 0.20 + 0.22 * d[1].max(0.0);
     let mut sum: [f64; 3] = std::array::from_fn(|c| {
@@ -188,12 +194,12 @@ fn studio_radiance(d: [f64; 3]) -> [f64; 3] {
 }
 
 impl Lamp {
-    /// How much of the lamp's radiance comes from `d`: 1 within a pane, 0 outside, smooth at the edges.
+    /// The fraction of the lamp's radiance in direction `d`: 1 within a pane, 0 outside, smooth at the edges.
     fn mask(&self, d: [f64; 3]) -> f64 {
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let unit = |a: [f64; 3]| a.map(|v| v / dot(a, a).sqrt());
         let w = unit(self.towards);
-        // Lamps overhead have no upright; the tilt of every LAMP leaves this cross product well away from 0.
+        // Undefined for a lamp straight overhead; every lamp is tilted enough to keep this cross product away from 0.
         let across = unit([w[2], 0.0, -w[0]]);
         let up = [
             w[1] * across[2] - w[2] * across[1],
@@ -218,7 +224,7 @@ impl Lamp {
     }
 }
 
-/// 0 below `from`, 1 above `to`, smooth between.
+/// 0 below `from`, 1 above `to`, smooth in between.
 fn smooth(from: f64, to: f64, x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -324,12 +330,9 @@ mod tests {
 
     #[test]
     fn real_panoramas_open() {
-        let Ok(data) = std::env::var("FOILPRESS_DATA") else {
-            println!("skipped: FOILPRESS_DATA is not set");
-            return;
-        };
+        let Some(data) = testing::needs::data() else { return };
         for name in ["studio.hdr", "venice.hdr"] {
-            let probe = Probe::read_hdr(&Path::new(&data).join("env").join(name)).unwrap();
+            let probe = Probe::read_hdr(&data.join("env").join(name)).unwrap();
             assert_eq!((probe.width(), probe.height()), (1024, 512));
             let small = probe.shrunk(128);
             assert_eq!((small.width(), small.height()), (256, 128));

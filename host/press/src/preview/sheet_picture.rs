@@ -1,19 +1,21 @@
 //! The target beside the simulated print, under several lights: `sheet.png`.
 //!
-//! A column for each light and three rows: target, print, and a close-up of the print's dots where they are most
-//! varied. One exposure, chosen from the target, serves every panel, so that what differs between the rows differs
-//! on paper.
+//! The picture has a column for each light and three rows: the target, the print, and a close-up of the print's dots where
+//! they vary most. All panels share one exposure, that of the target, so a difference between rows is a difference on paper.
 
 use image::RgbImage;
 
 use crate::sheet::{Area, DotMap};
 use observe::Observer;
 
-use super::canvas::{Canvas, FAINT, INK, Letters};
+use super::canvas::{Canvas, FAINT, INK, Letters, shortened};
+use super::error::{PreviewError, check_size};
+use super::flat::{Light, flat};
+use super::radiance::Radiance;
+use super::source::Source;
 use super::tone::Exposure;
-use super::{Light, PreviewError, Radiance, Source, check_size, flat};
 
-/// The lights of the usual picture: over the middle, beside it, and low enough to show the body colour alone.
+/// The default lights: above the middle, beside it, and low enough to show only the body colour.
 pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
     ("light at the eye", Light::Point([0.0, 0.0, 1.3])),
     ("light from the left", Light::Point([-0.3, 0.2, 1.1])),
@@ -23,17 +25,17 @@ pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
 
 const GAP: usize = 16;
 
-/// Pixels a dot is wide in the close-up.
+/// Width of a dot in the close-up, in pixels.
 const MAGNIFIED: usize = 5;
 
-/// Places across and down that are looked at for the close-up.
+/// Candidate places for the close-up, across and down.
 const PLACES: usize = 24;
 
-/// Lays target and print out under each of `lights`, panels of `longest` pixels on their longer side in the
-/// print's proportions. `title` heads the picture, `notes` stand below it, a line each.
+/// Lays out target and print under each of `lights`. Panels have the print's proportions, and `longest` pixels on their
+/// longer side. `title` stands above the picture and `notes` below it, one line each.
 ///
 /// # Errors
-/// As [`flat()`]; also when the whole would be larger than [`super::LONGEST_SIDE`].
+/// Those of [`flat()`], or a picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
 pub fn sheet_picture(
     target: &Source,
     print: &Source,
@@ -78,8 +80,8 @@ pub fn sheet_picture(
     Ok(canvas.finish())
 }
 
-/// The dots of a sheet, [`MAGNIFIED`] times, as `width` x `height` pixels under each of `lights`. Sources without
-/// dots, and sheets too small for a close-up to show anything new, have none.
+/// The dots of a sheet, magnified [`MAGNIFIED`] times, as `width` x `height` pixels under each of `lights`. `None` for
+/// sources without dots, and for sheets so small that a close-up would show nothing new.
 fn close_up(
     print: &Source,
     lights: &[Light],
@@ -96,7 +98,7 @@ fn close_up(
     let longest = area.width.max(area.length) as f64;
     let x = ((part.left - area.left) as f64 + 0.5 * (across as f64 - area.width as f64)) / longest;
     let y = (0.5 * (area.length as f64 - down as f64) - (part.top - area.top) as f64) / longest;
-    // So small a part sees every light in one direction, as bright as there.
+    // Over so small a part, the direction and brightness of a light are constant.
     let near: Vec<Light> = lights.iter().map(|light| Light::Far(light.direction(x, y))).collect();
     let mut panels =
         flat(&Source::Print { dots, space, stacks, area: part }, &near, width, height, observer)?;
@@ -107,7 +109,7 @@ fn close_up(
     Ok(Some(panels))
 }
 
-/// The part of `width` x `length` dots whose stacks have the greatest entropy among evenly spread places.
+/// The part of `width` x `length` dots with the greatest entropy of stacks, among evenly spaced places.
 fn most_varied(dots: &DotMap, area: Area, width: usize, length: usize) -> Area {
     let mut best = (f64::NEG_INFINITY, area);
     let mut counts = vec![0u32; dots.stacks().len()];
@@ -127,14 +129,6 @@ fn most_varied(dots: &DotMap, area: Area, width: usize, length: usize) -> Area {
         }
     }
     best.1
-}
-
-/// The text, cut to `room` letters.
-pub(super) fn shortened(text: &str, room: usize) -> String {
-    if text.chars().count() <= room {
-        return text.to_string();
-    }
-    text.chars().take(room.saturating_sub(2)).chain("..".chars()).collect()
 }
 
 #[cfg(test)]
@@ -216,11 +210,5 @@ mod tests {
                 (panel.pixels[height / 2 * width + width / 2][0], whole.pixels[10 * 300 + 15][0]);
             assert!((found / expected - 1.0).abs() < 0.02, "{found}, not {expected}");
         }
-    }
-
-    #[test]
-    fn words_that_do_not_fit_are_cut() {
-        assert_eq!(shortened("light from the left", 8), "light ..");
-        assert_eq!(shortened("short", 8), "short");
     }
 }

@@ -1,11 +1,11 @@
-//! What lies at each pixel of a picture: the reflectance of a document or of a printed sheet, averaged over it.
+//! The reflectance of a document or a printed sheet, averaged over each pixel of a picture.
 //!
-//! Problem: a page is 30 million dots of up to 57 stacks, a document up to as many pixels of curves; neither fits
-//! in memory as reflectance.
-//! Method: pictures are made line by line. A line of a sheet is a histogram of stacks for each pixel (every dot
-//! counts once, in exactly one pixel), times the stacks' rows; a line of a factored document averages weights
-//! first; a line of other documents averages reflectance at up to `samples` x `samples` places of a pixel.
-//! Cost: one increment a dot, then one multiply-add for each column and stack present in the pixel.
+//! Problem: a page has 30 million dots of up to 57 stacks, and a document may have as many pixels of curves. Neither fits in
+//! memory as reflectance.
+//! Method: pictures are made line by line. A line of a sheet is a histogram of stacks for each pixel (every dot is counted
+//! once, in exactly one pixel) times the stacks' rows. A line of a factored document averages weights first. A line of any
+//! other document averages reflectance at up to `samples` x `samples` places of a pixel.
+//! Cost: one increment a dot, then one multiply-add for each column and stack in the pixel.
 //! Limits: averaging is linear in reflectance, as section 4.2 of the 2009 paper assumes of halftones.
 
 use crate::sheet::{Area, DotMap};
@@ -15,9 +15,9 @@ use appearance::factor::Factored;
 use appearance::weights::ONE;
 use inks::{Library, Stack};
 
-use super::{PreviewError, check_size};
+use super::error::{PreviewError, check_size};
 
-/// Something a flat picture can be made of.
+/// The content of a flat picture.
 #[derive(Clone, Copy)]
 pub enum Source<'a> {
     /// The target, pixel by pixel.
@@ -38,7 +38,7 @@ pub enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// The tabulation its reflectance is in.
+    /// The tabulation of its reflectance.
     pub fn space(&self) -> &'a Space {
         match self {
             Source::Document(materials) => materials.space(),
@@ -47,7 +47,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Its own pixels or dots, across and down.
+    /// Its own size in pixels or dots, across and down.
     pub fn size(&self) -> (usize, usize) {
         match self {
             Source::Document(materials) => (materials.width(), materials.height()),
@@ -56,18 +56,18 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Pixels across and down of a picture in the source's proportions whose longer side is `longest`.
+    /// The size in pixels of a picture in the source's proportions, with `longest` pixels on its longer side.
     pub fn fit(&self, longest: usize) -> (usize, usize) {
         let (w, h) = self.size();
         let side = |part: usize, whole: usize| (part * longest + whole / 2) / whole.max(1);
         (side(w, w.max(h)).max(1), side(h, w.max(h)).max(1))
     }
 
-    /// Ready to be read line by line as `width` x `height` pixels.
+    /// Prepares reading it line by line as `width` x `height` pixels.
     ///
-    /// `samples` bounds the places averaged along each axis of a pixel of [`Source::Document`]; the other sources
-    /// are averaged exactly. A picture finer than the source repeats the source's pixels.
-    pub(crate) fn lines(
+    /// `samples` limits the places averaged along each axis of a pixel of [`Source::Document`]; other sources are averaged
+    /// exactly. A picture finer than the source repeats the source's pixels.
+    pub(super) fn lines(
         &self,
         width: usize,
         height: usize,
@@ -122,8 +122,8 @@ fn same(what: &'static str, expected: usize, found: usize) -> Result<(), Preview
     if expected == found { Ok(()) } else { Err(PreviewError::Shape { what, expected, found }) }
 }
 
-/// A source about to be read as a picture of one size.
-pub(crate) struct Lines<'a> {
+/// A source to read line by line at one size.
+pub(super) struct Lines<'a> {
     source: Source<'a>,
     width: usize,
     height: usize,
@@ -132,23 +132,23 @@ pub(crate) struct Lines<'a> {
     rows: Vec<f32>,
 }
 
-/// Memory for one line, kept between lines.
+/// Memory for one line, reused for the next.
 #[derive(Default)]
-pub(crate) struct Scratch {
+pub(super) struct Scratch {
     counts: Vec<u32>,
     sums: Vec<u64>,
     row: Vec<f32>,
 }
 
-/// The part of `size` things that is pixel `i` of `pixels`: every thing is in exactly one pixel, and a pixel
-/// finer than the things holds the thing it starts in.
+/// The range of dots (of `size`) in pixel `i` (of `pixels`): every dot is in exactly one pixel, and a pixel smaller than a dot
+/// has the dot in which it starts.
 fn span(i: usize, pixels: usize, size: usize) -> (usize, usize) {
     let start = i * size / pixels;
     (start, ((i + 1) * size / pixels).max(start + 1))
 }
 
 impl Lines<'_> {
-    /// Columns of a pixel.
+    /// Columns of the reflectance of a pixel.
     pub fn columns(&self) -> usize {
         self.columns
     }
@@ -163,7 +163,7 @@ impl Lines<'_> {
         self.height
     }
 
-    /// Writes the mean reflectance (1/sr) of line `y`; `out` has `width * columns` places.
+    /// Writes the mean reflectance (1/sr) of line `y` to `out`, which has `width * columns` places.
     pub fn read(&self, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
         match &self.source {
             Source::Document(materials) => self.read_document(*materials, y, scratch, out),
@@ -230,7 +230,7 @@ impl Lines<'_> {
             out.fill(0.0);
             let scale = 1.0 / (down * across) as f32;
             for j in 0..down {
-                // Centres of equal parts, so that a pixel read at fewer places is still read evenly.
+                // The centres of equal parts, so that the places are spread evenly.
                 let py = y0 + (2 * j + 1) * (y1 - y0) / (2 * down);
                 for i in 0..across {
                     let px = x0 + (2 * i + 1) * (x1 - x0) / (2 * across);

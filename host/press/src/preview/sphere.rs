@@ -1,14 +1,14 @@
-//! A material as a ball, seen from far away, under one far light or under a light probe.
+//! A material as a ball, seen from far away, under one distant light or under a light probe.
 //!
-//! Geometry: the eye looks along -z from infinity, the ball fills the picture, x is right, y is up; the normal at
+//! Geometry: the eye looks along -z from infinity, the ball fills the picture, x points right, y points up. The normal at
 //! (x, y) is (x, y, sqrt(1 - x^2 - y^2)).
-//! One light: `f(theta_h) cos_i`, averaged over [`SUBSAMPLES`]^2 places of a pixel. Light at the eye gives
-//! theta_h = asin r: the curve itself.
-//! Probe: the sum over texels of `f(theta_h) cos_i L dOmega` is linear in the curve, so each pixel's light is
-//! gathered once, as the weight of every sample of the curve, and all materials are that row times their own.
-//! Texels are a quadtree; a node stands for its texels where the curve and the cosine cannot change much over it.
-//! Cost: a pass over some hundreds of nodes for each pixel, whatever the number of materials.
-//! Limits: highlights narrower than a texel show the texels; 128 rows serve the sharpest foil.
+//! One light: `f(theta_h) cos_i`, averaged over `SUBSAMPLES`^2 places of a pixel. A light at the eye gives
+//! theta_h = asin r, which is the curve itself.
+//! Probe: the sum over texels of `f(theta_h) cos_i L dOmega` is linear in the curve. So the light of each pixel is gathered
+//! once, as a weight for every sample of the curve, and each material is the product of these weights and its own samples.
+//! The texels form a quadtree. A node replaces its texels where the curve and the cosine hardly change over it.
+//! Cost: a pass over some hundreds of nodes for each pixel, for any number of materials.
+//! Limits: highlights narrower than a texel show the texels; 128 rows are enough for the sharpest foil.
 
 use inks::Curve;
 use rayon::prelude::*;
@@ -16,25 +16,29 @@ use rayon::prelude::*;
 use appearance::brdf::{Space, Table};
 use observe::Observer;
 
+use super::error::{PreviewError, check_size};
 use super::flat::bracket;
 use super::probe::{Probe, direction};
-use super::{PreviewError, Radiance, check_size};
+use super::radiance::Radiance;
 
-/// Places along each axis of a pixel at which coverage, and light from one direction, are taken.
-pub const SUBSAMPLES: usize = 4;
+/// Places along each axis of a pixel at which coverage and light from one direction are sampled.
+const SUBSAMPLES: usize = 4;
 
-/// A node is taken whole when its half vectors stay within this share of their angle to the normal. Tested to
-/// keep every pixel within 1 % of the sum over single texels, for the sharpest foil and for paper.
+/// A node replaces its texels if its half vectors spread over no more than this fraction of their angle to the normal. A test
+/// shows that every pixel stays within 1 % of the sum over single texels, for the sharpest foil and for paper.
 const OPENING: f32 = 0.12;
 
-/// Sine of the reach of the largest nodes that may straddle the horizon of a normal.
+/// Sine of the reach of the largest nodes that may cross the horizon of a normal.
 const HORIZON: f32 = 0.1;
 
 /// Steps of the table from the chord between normal and half vector to a place among the curve's angles.
 const STEPS: usize = 8192;
 
-/// A ball of `curve` under light from far away in direction `light` (any length), irradiance 1 where the surface
-/// faces it, as a `size` x `size` picture.
+/// A `size` x `size` picture of a ball of `curve` under a distant light in direction `light` (any length), with irradiance 1
+/// where the surface faces it.
+///
+/// # Errors
+/// A size out of range, or a direction that is zero or not finite.
 pub fn under_light(curve: &Curve, light: [f64; 3], size: usize) -> Result<Radiance, PreviewError> {
     check_size(size, size)?;
     let length = light.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -50,7 +54,7 @@ pub fn under_light(curve: &Curve, light: [f64; 3], size: usize) -> Result<Radian
             subsamples(size, x, y, |nx, ny| {
                 let n = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()];
                 let cos_i = dot(n, l).max(0.0);
-                // asin of the half chord: exact where the cosine has no digits left.
+                // asin of the half chord stays exact where the cosine runs out of digits.
                 let theta = 2.0 * (0.5 * distance(n, h)).min(1.0).asin();
                 let f = curve.at(theta);
                 (0..3).for_each(|c| sum[c] += f[c] * cos_i);
@@ -62,7 +66,10 @@ pub fn under_light(curve: &Curve, light: [f64; 3], size: usize) -> Result<Radian
     Ok(Radiance { width: size, height: size, pixels })
 }
 
-/// Balls of `rows` (reflectance in the half-angle space `space`), each by itself under `probe`.
+/// Pictures of balls under `probe`, one for each of `rows` (reflectance in the half-angle space `space`).
+///
+/// # Errors
+/// A size out of range, a space without half angles, or rows of another space.
 pub fn under_probe(
     space: &Space,
     rows: &Table,
@@ -133,7 +140,7 @@ pub fn under_probe(
     Ok((0..rows.len()).map(ball).collect())
 }
 
-/// Calls `inside` with every sub-sample of pixel (x, y) that lies on the ball.
+/// Calls `inside` for every sub-sample of pixel (x, y) on the ball.
 fn subsamples(size: usize, x: usize, y: usize, mut inside: impl FnMut(f64, f64)) {
     let at =
         |i: usize, j: usize| ((i * SUBSAMPLES + j) as f64 + 0.5) / (size * SUBSAMPLES) as f64 * 2.0 - 1.0;
@@ -156,21 +163,21 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     dot(d, d).sqrt()
 }
 
-/// The half vector of a unit direction and the eye; any normal across the view for light from straight behind.
+/// The half vector of a unit direction and the eye. For light from straight behind, some vector across the view.
 fn half(l: [f64; 3]) -> [f64; 3] {
     let h = [l[0], l[1], l[2] + 1.0];
     let length = dot(h, h).sqrt();
     if length < 1e-6 { [1.0, 0.0, 0.0] } else { h.map(|v| v / length) }
 }
 
-/// From the chord between normal and half vector to a fractional place among the curve's angles.
+/// Maps the chord between normal and half vector to a fractional place among the curve's angles.
 struct Places {
     table: Vec<f32>,
 }
 
 impl Places {
     fn new(angles: &[f64]) -> Places {
-        // Chord / sqrt 2 = sqrt(1 - cos theta_h): even steps of it are dense where curves are steep.
+        // Chord / sqrt 2 = sqrt(1 - cos theta_h), so even steps are dense where curves are steep.
         let place = |step: usize| {
             let chord = std::f64::consts::SQRT_2 * step as f64 / STEPS as f64;
             let (i, _, s) = bracket(angles, 2.0 * (0.5 * chord).min(1.0).asin());
@@ -179,7 +186,7 @@ impl Places {
         Places { table: (0..=STEPS).map(place).collect() }
     }
 
-    /// The sample below and how far it is to the next; the next exists wherever that is above 0.
+    /// The sample below and the fraction of the way to the next sample, which exists if the fraction is above 0.
     fn at(&self, chord: f32) -> (usize, f32) {
         let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
         let (k, s) = (step as usize, step.fract());
@@ -188,7 +195,7 @@ impl Places {
     }
 }
 
-/// Texels of a probe and groups of them.
+/// A texel of a probe, or a group of them.
 struct Node {
     /// Unit direction of the light, weighted by radiance.
     towards: [f32; 3],
@@ -216,8 +223,8 @@ impl Tree {
         tree
     }
 
-    /// Adds the texels of columns `x` and rows `y` (start, end) and everything below; recursion halves the
-    /// longer side each time, so its depth is the logarithm of the number of texels.
+    /// Adds the node of columns `x` and rows `y` (start, end) with its descendants. Each recursion halves the longer side, so
+    /// the depth is the logarithm of the number of texels.
     fn add(&mut self, probe: &Probe, x: [usize; 2], y: [usize; 2]) {
         let (mut light, mut mean, mut total) = ([0.0f64; 3], [0.0f64; 3], 0.0);
         for row in y[0]..y[1] {
@@ -225,7 +232,7 @@ impl Tree {
             for column in x[0]..x[1] {
                 let texel = probe.rgb()[row * probe.width() + column].map(f64::from);
                 let d = probe.direction(column, row);
-                // Black texels count a little: a dark node still needs a direction.
+                // Black texels have a tiny weight, because a dark node needs a direction, too.
                 let weight = omega * (texel.iter().sum::<f64>() + 1e-9);
                 total += weight;
                 for c in 0..3 {
@@ -236,7 +243,7 @@ impl Tree {
         }
         let single = x[1] - x[0] == 1 && y[1] - y[0] == 1;
         let length = dot(mean, mean).sqrt();
-        // Directions that cancel leave none; such a node is always opened, so any will do.
+        // Directions may cancel. Such a node is always opened, so its direction does not matter.
         let scattered = length < 0.3 * total;
         let towards = if length > 1e-12 * total { mean.map(|v| v / length) } else { [0.0, 1.0, 0.0] };
         let h = half(towards);
@@ -291,7 +298,7 @@ impl Tree {
             }
             let d = [n[0] - node.half[0], n[1] - node.half[1], n[2] - node.half[2]];
             let chord = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            // Across the horizon the cosine has a kink, which only small nodes may straddle.
+            // The cosine has a kink at the horizon, so only small nodes may cross it.
             let horizon = cos_i > node.reach || node.reach < HORIZON;
             if node.spread > 0.0 && !(horizon && node.spread <= opening * chord) {
                 i += 1;

@@ -1,31 +1,30 @@
 //! From radiance to the bytes of a picture.
 //!
-//! Method: one exposure for everything that is to be compared; then a curve that leaves darks and middles alone and
-//! bends what would clip, `x / (x + room)` above the knee, so that a highlight a hundred times white still has a
-//! shape. It is taken half on the largest channel (gold stays gold) and half channel by channel (the core of a
-//! highlight goes to white, as on film). sRGB coding by `palette`. Limits: display-referred; compare numbers on
-//! radiance, not on bytes.
+//! Method: one exposure for all pictures to compare, then a tone curve. It keeps darks and midtones, and compresses
+//! brighter values by `x / (x + room)` above the knee, so that a highlight a hundred times brighter than white keeps its
+//! shape. Half of the result is scaled by the largest channel (gold stays gold), the other half by each channel (the core
+//! of a highlight turns white, as on film). sRGB coding by `palette`. Limits: display-referred; compare radiance, not bytes.
 
 use palette::{LinSrgb, Srgb};
 
-use super::Radiance;
+use super::radiance::Radiance;
 
-/// Where the curve begins to bend, as a share of white.
+/// The value above which the curve compresses, as a fraction of white.
 const KNEE: f32 = 0.4;
 
-/// Where the exposure puts the brighter middle of a picture: light enough for paper to look white, with room left
-/// for what shines.
+/// The exposure maps the brighter middle of a picture to this: light enough for white paper, with room for highlights.
 const MIDDLE: f32 = 0.6;
 
-/// What radiance is multiplied by before it is shown.
+/// The factor of radiance before the tone curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exposure(pub f32);
+pub(super) struct Exposure(pub f32);
 
 impl Exposure {
-    /// White paper facing a light of irradiance 1 reflects about 0.85 / pi; this lands it a little below white.
+    /// For white paper facing a light of irradiance 1, which reflects about 0.85 / pi: it becomes slightly darker than white.
     pub const PAPER: Exposure = Exposure(3.0);
 
-    /// An exposure under which 70 % of the covered pixels of `pictures` stay below 0.6 of white, but never so far from that of white paper that black would look white: a factor of 4 at most either way.
+    /// An exposure that keeps 70 % of the covered pixels of `pictures` below 0.6 of white. It is within a factor of 4 of
+    /// [`Exposure::PAPER`], so that black never looks white.
     pub fn of(pictures: &[Radiance]) -> Exposure {
         let mut values: Vec<f32> = pictures
             .iter()
@@ -41,7 +40,7 @@ impl Exposure {
         Exposure((MIDDLE / bright.max(1e-9)).clamp(Exposure::PAPER.0 / 4.0, Exposure::PAPER.0 * 4.0))
     }
 
-    /// A colour (linear, before exposure) as it is shown: 0 to 1, linear.
+    /// Maps a linear colour before exposure to display values, linear from 0 to 1.
     pub fn shown(self, rgb: [f32; 3]) -> [f32; 3] {
         let rgb = rgb.map(|v| (v * self.0).max(0.0));
         let most = rgb[0].max(rgb[1]).max(rgb[2]);
@@ -53,20 +52,20 @@ impl Exposure {
     }
 }
 
-/// The curve: the identity below the knee, towards 1 above it, with one slope where they meet.
+/// The tone curve: the identity below the knee, approaching 1 above it, with equal slopes at the knee.
 fn bent(v: f32) -> f32 {
     let (over, room) = (v - KNEE, 1.0 - KNEE);
     if over <= 0.0 { v } else { KNEE + room * over / (over + room) }
 }
 
-/// Codes a linear colour of 0 to 1 as sRGB.
-pub fn srgb(rgb: [f32; 3]) -> [u8; 3] {
+/// Encodes a linear colour from 0 to 1 as sRGB.
+pub(super) fn srgb(rgb: [f32; 3]) -> [u8; 3] {
     let coded: Srgb<u8> = Srgb::from_linear(LinSrgb::new(rgb[0], rgb[1], rgb[2]));
     [coded.red, coded.green, coded.blue]
 }
 
-/// A colour coded as sRGB, linear again.
-pub fn linear(rgb: [u8; 3]) -> [f32; 3] {
+/// Decodes an sRGB colour to linear values.
+pub(super) fn linear(rgb: [u8; 3]) -> [f32; 3] {
     let colour: LinSrgb<f32> = Srgb::new(rgb[0], rgb[1], rgb[2]).into_linear();
     [colour.red, colour.green, colour.blue]
 }

@@ -1,11 +1,11 @@
-//! The dots of one pass, as its rows come in.
+//! The dots of one pass, as its rows arrive.
 
 use protocol::packbits;
 use protocol::rgl::Compression;
 
 use crate::separate::Plane;
 
-/// The plane of a pass while it is printed: the declared page at the job's resolution.
+/// The plane of a pass during printing: the declared page at the job's resolution.
 #[derive(Clone, Debug)]
 pub(crate) struct Canvas {
     plane: Plane,
@@ -13,12 +13,12 @@ pub(crate) struct Canvas {
     shift_y: usize,
     /// Dots across that lie on the sheet.
     edge: usize,
-    /// How many dots wide a dot of this ink comes out.
+    /// Width of a printed dot of this ink, in dots of the job.
     spread: usize,
     row: Vec<u8>,
-    /// Dots that fell beside the sheet.
+    /// Dots that missed the sheet.
     pub(crate) platen: u64,
-    /// Dots that widened beyond the page and were thrown away.
+    /// Parts of wide dots beyond the page, which are dropped.
     pub(crate) lost: u64,
 }
 
@@ -43,7 +43,7 @@ impl Canvas {
         }
     }
 
-    /// Prints a row that the order of the job has accepted: it unpacks, and it lies inside the page.
+    /// Prints a row that the job's grammar has accepted, so it can be unpacked and lies inside the page.
     pub(crate) fn put(&mut self, row: u32, compression: Option<Compression>, data: &[u8]) {
         let stride = self.plane.stride;
         let start = (row as usize + self.shift_y) * stride;
@@ -76,7 +76,7 @@ impl Canvas {
     }
 }
 
-/// Adds a row moved to the right; it is known to fit.
+/// Adds a row moved to the right by so many dots. The caller ensures that it fits.
 fn shift_into(place: &mut [u8], row: &[u8], by: usize) {
     let (bytes, bits) = (by / 8, by % 8);
     for (i, &byte) in row.iter().enumerate() {
@@ -91,7 +91,7 @@ fn shift_into(place: &mut [u8], row: &[u8], by: usize) {
     }
 }
 
-/// Adds a row with every dot `spread` dots wide. Returns how many dots came out beyond `width`.
+/// Adds a row with every dot `spread` dots wide. Returns the number of dots beyond `width`.
 fn widen_into(place: &mut [u8], row: &[u8], shift: usize, spread: usize, width: usize) -> u64 {
     let mut lost = 0;
     for (i, &byte) in row.iter().enumerate() {
@@ -109,7 +109,7 @@ fn widen_into(place: &mut [u8], row: &[u8], shift: usize, spread: usize, width: 
     lost
 }
 
-/// Takes away the dots of a row from column `edge` on and returns how many there were.
+/// Removes the dots of a row from column `edge` on and returns their number.
 fn cut(row: &mut [u8], edge: usize) -> u64 {
     let mut dots = 0;
     for (i, byte) in row.iter_mut().enumerate().skip(edge / 8) {

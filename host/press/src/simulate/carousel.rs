@@ -1,6 +1,6 @@
-//! Cassettes: eight places in the carousel, at most seven cassettes, one of them on the carriage while it prints.
+//! Cartridges: eight places in the carousel, at most seven cartridges, one of them on the carriage while it prints.
 //!
-//! The machine knows a cassette by its barcode, never by its place: the carousel turns.
+//! The carousel turns, so the printer identifies a cartridge by its barcode instead of its place.
 
 use protocol::ink::Ink;
 use protocol::rgl::command::MAX_CARTRIDGES;
@@ -8,71 +8,74 @@ use protocol::rgl::command::MAX_CARTRIDGES;
 /// Places in the carousel: upper 1 to 4, lower 1 to 4.
 pub const PLACES: usize = 8;
 
-/// What the machine's sensor says about a cassette.
+/// The state of a cartridge as the printer's sensor reads it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Condition {
     /// Usable.
     #[default]
     Ready,
-    /// Put in backwards.
+    /// Inserted backwards.
     Backwards,
-    /// Its ribbon is at the end.
+    /// Its ribbon is used up.
     Spent,
 }
 
-/// A cassette.
+/// A cartridge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Cassette {
-    /// The number on it, below 64.
+pub struct Cartridge {
+    /// Its barcode, below 64.
     pub barcode: u8,
     /// Its state.
     pub condition: Condition,
 }
 
-impl From<Ink> for Cassette {
-    fn from(ink: Ink) -> Cassette {
-        Cassette { barcode: ink.barcode(), condition: Condition::Ready }
+impl From<Ink> for Cartridge {
+    fn from(ink: Ink) -> Cartridge {
+        Cartridge { barcode: ink.barcode(), condition: Condition::Ready }
     }
 }
 
-/// Why cassettes cannot be loaded.
+/// Why cartridges cannot be loaded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CarouselError {
     /// Too many.
-    #[error("the printer holds seven cassettes, not {0}; take some out")]
+    #[error("the printer holds seven cartridges, not {0}; remove some")]
     TooMany(usize),
-    /// No such barcode.
-    #[error("barcode {0} is no cassette's; barcodes are below 63")]
+    /// A barcode out of range.
+    #[error("no cartridge has barcode {0}; barcodes are below 63")]
     Barcode(u8),
 }
 
-/// How fetching a cassette went.
+/// The result of fetching a cartridge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Fetch {
     /// It is on the carriage.
     Ready,
-    /// There is none with this barcode that can be used.
+    /// No usable cartridge has this barcode.
     Missing,
-    /// It is there, and its ribbon is at the end.
+    /// It is present, but its ribbon is used up.
     Spent,
 }
 
-/// The cassettes in the machine.
+/// The cartridges in the printer.
 #[derive(Clone, Debug, Default)]
 pub struct Carousel {
-    places: [Option<Cassette>; PLACES],
-    /// The cassette on the carriage and the place it came from.
-    carriage: Option<(Cassette, usize)>,
+    places: [Option<Cartridge>; PLACES],
+    /// The cartridge on the carriage and the place it came from.
+    carriage: Option<(Cartridge, usize)>,
 }
 
 impl Carousel {
-    /// A carousel with these cassettes, upper places first.
-    pub fn new(cassettes: &[Cassette]) -> Result<Carousel, CarouselError> {
+    /// A carousel with these cartridges, upper places first.
+    ///
+    /// # Errors
+    /// Too many cartridges, or a barcode out of range.
+    pub fn new(cartridges: &[Cartridge]) -> Result<Carousel, CarouselError> {
         let mut carousel = Carousel::default();
-        if cassettes.len() > MAX_CARTRIDGES {
-            return Err(CarouselError::TooMany(cassettes.len()));
+        if cartridges.len() > MAX_CARTRIDGES {
+            return Err(CarouselError::TooMany(cartridges.len()));
         }
-        cassettes.iter().try_for_each(|&cassette| carousel.insert(cassette))?;
+        cartridges.iter().try_for_each(|&cartridge| carousel.insert(cartridge))?;
         Ok(carousel)
     }
 
@@ -80,22 +83,26 @@ impl Carousel {
         self.places.iter().flatten().count() + usize::from(self.carriage.is_some())
     }
 
-    /// Puts a cassette in. One with the same barcode that cannot be used any more is taken out for it.
-    pub fn insert(&mut self, cassette: Cassette) -> Result<(), CarouselError> {
-        if cassette.barcode >= 0x3f {
-            return Err(CarouselError::Barcode(cassette.barcode));
+    /// Inserts a cartridge. It replaces an unusable one with the same barcode.
+    ///
+    /// # Errors
+    /// Too many cartridges, or a barcode out of range.
+    pub fn insert(&mut self, cartridge: Cartridge) -> Result<(), CarouselError> {
+        if cartridge.barcode >= 0x3f {
+            return Err(CarouselError::Barcode(cartridge.barcode));
         }
         for place in &mut self.places {
-            if place.is_some_and(|old| old.barcode == cassette.barcode && old.condition != Condition::Ready) {
-                *place = Some(cassette);
+            if place.is_some_and(|old| old.barcode == cartridge.barcode && old.condition != Condition::Ready)
+            {
+                *place = Some(cartridge);
                 return Ok(());
             }
         }
         if self
             .carriage
-            .is_some_and(|(old, _)| old.barcode == cassette.barcode && old.condition != Condition::Ready)
+            .is_some_and(|(old, _)| old.barcode == cartridge.barcode && old.condition != Condition::Ready)
         {
-            self.carriage = self.carriage.map(|(_, from)| (cassette, from));
+            self.carriage = self.carriage.map(|(_, from)| (cartridge, from));
             return Ok(());
         }
         if self.count() >= MAX_CARTRIDGES {
@@ -103,63 +110,63 @@ impl Carousel {
         }
         let home = self.carriage.map(|(_, from)| from);
         let free = (0..PLACES).find(|&place| self.places[place].is_none() && Some(place) != home);
-        // Seven cassettes at most in eight places: one is always free.
+        // At most seven cartridges are in eight places, so one is always free.
         match free {
-            Some(place) => self.places[place] = Some(cassette),
+            Some(place) => self.places[place] = Some(cartridge),
             None => return Err(CarouselError::TooMany(PLACES + 1)),
         }
         Ok(())
     }
 
-    /// Takes the cassette with this barcode out.
-    pub fn remove(&mut self, barcode: u8) -> Option<Cassette> {
+    /// Removes the cartridge with this barcode.
+    pub fn remove(&mut self, barcode: u8) -> Option<Cartridge> {
         if let Some(place) = self.places.iter_mut().find(|p| p.is_some_and(|c| c.barcode == barcode)) {
             return place.take();
         }
-        let (cassette, _) = self.carriage.take_if(|(cassette, _)| cassette.barcode == barcode)?;
-        Some(cassette)
+        let (cartridge, _) = self.carriage.take_if(|(cartridge, _)| cartridge.barcode == barcode)?;
+        Some(cartridge)
     }
 
-    /// Takes back what is on the carriage and fetches the cassette with this barcode.
+    /// Returns the cartridge on the carriage to its place and fetches the one with this barcode.
     pub(super) fn fetch(&mut self, barcode: u8) -> Fetch {
         let ready =
-            |cassette: &Cassette| cassette.barcode == barcode && cassette.condition == Condition::Ready;
-        if self.carriage.is_some_and(|(cassette, _)| ready(&cassette)) {
+            |cartridge: &Cartridge| cartridge.barcode == barcode && cartridge.condition == Condition::Ready;
+        if self.carriage.is_some_and(|(cartridge, _)| ready(&cartridge)) {
             return Fetch::Ready;
         }
-        if let Some((cassette, home)) = self.carriage.take() {
-            self.places[home] = Some(cassette);
+        if let Some((cartridge, home)) = self.carriage.take() {
+            self.places[home] = Some(cartridge);
         }
         if let Some(place) = (0..PLACES).find(|&place| self.places[place].as_ref().is_some_and(ready)) {
-            self.carriage = self.places[place].take().map(|cassette| (cassette, place));
+            self.carriage = self.places[place].take().map(|cartridge| (cartridge, place));
             return Fetch::Ready;
         }
-        let spent = |c: &Cassette| c.barcode == barcode && c.condition == Condition::Spent;
+        let spent = |c: &Cartridge| c.barcode == barcode && c.condition == Condition::Spent;
         if self.places.iter().flatten().any(spent) { Fetch::Spent } else { Fetch::Missing }
     }
 
-    /// The barcode on the carriage.
+    /// Barcode of the cartridge on the carriage.
     pub fn on_carriage(&self) -> Option<u8> {
-        self.carriage.map(|(cassette, _)| cassette.barcode)
+        self.carriage.map(|(cartridge, _)| cartridge.barcode)
     }
 
     /// The first bytes of the nine status entries: upper 1-4, lower 1-4, carriage.
     pub(super) fn entries(&self) -> [u8; PLACES + 1] {
-        let entry = |cassette: Option<Cassette>| {
-            cassette.map_or(0xff, |cassette| {
-                let state = match cassette.condition {
+        let entry = |cartridge: Option<Cartridge>| {
+            cartridge.map_or(0xff, |cartridge| {
+                let state = match cartridge.condition {
                     Condition::Ready => 0x00,
                     Condition::Backwards => 0x40,
                     Condition::Spent => 0x80,
                 };
-                state | cassette.barcode
+                state | cartridge.barcode
             })
         };
         let mut entries = [0xff; PLACES + 1];
-        for (place, cassette) in entries.iter_mut().zip(self.places) {
-            *place = entry(cassette);
+        for (place, cartridge) in entries.iter_mut().zip(self.places) {
+            *place = entry(cartridge);
         }
-        entries[PLACES] = entry(self.carriage.map(|(cassette, _)| cassette));
+        entries[PLACES] = entry(self.carriage.map(|(cartridge, _)| cartridge));
         entries
     }
 }
@@ -169,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cassette_goes_to_the_carriage_and_back_to_its_place() {
+    fn a_cartridge_goes_to_the_carriage_and_back_to_its_place() {
         let mut carousel = Carousel::new(&[Ink::Cyan.into(), Ink::White.into()]).unwrap();
         assert_eq!(carousel.fetch(16), Fetch::Ready);
         assert_eq!(carousel.entries(), [3, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 16]);
@@ -181,18 +188,18 @@ mod tests {
     }
 
     #[test]
-    fn eight_cassettes_do_not_go_in() {
-        let eight: Vec<Cassette> = Ink::ALL[..8].iter().map(|&ink| ink.into()).collect();
+    fn eight_cartridges_do_not_go_in() {
+        let eight: Vec<Cartridge> = Ink::ALL[..8].iter().map(|&ink| ink.into()).collect();
         assert_eq!(Carousel::new(&eight).unwrap_err(), CarouselError::TooMany(8));
         let mut seven = Carousel::new(&eight[..7]).unwrap();
         assert_eq!(seven.fetch(eight[0].barcode), Fetch::Ready);
         assert_eq!(seven.insert(eight[7]), Err(CarouselError::TooMany(8)), "the one on the carriage counts");
-        assert_eq!(seven.insert(Cassette { barcode: 63, ..eight[7] }), Err(CarouselError::Barcode(63)));
+        assert_eq!(seven.insert(Cartridge { barcode: 63, ..eight[7] }), Err(CarouselError::Barcode(63)));
     }
 
     #[test]
-    fn a_spent_cassette_is_found_and_replaced() {
-        let spent = Cassette { condition: Condition::Spent, ..Ink::Black.into() };
+    fn a_spent_cartridge_is_found_and_replaced() {
+        let spent = Cartridge { condition: Condition::Spent, ..Ink::Black.into() };
         let mut carousel = Carousel::new(&[spent]).unwrap();
         assert_eq!(carousel.fetch(0), Fetch::Spent);
         assert_eq!(carousel.entries()[0], 0x80);

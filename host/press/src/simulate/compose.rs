@@ -1,11 +1,11 @@
-//! Passes as stacks: which inks lie on each dot.
+//! From passes to stacks: the inks on each dot.
 //!
-//! Method: eight passes at a time. What lies on a dot after them is what lay there before (a number) and which of the
-//! eight print it (a byte); one walk over the page finds the pairs that occur, they get their stacks' numbers, a second
-//! walk writes the numbers.
-//! Cost: two walks and one byte a dot for each eight passes. Rows are shared among the cores; the numbers follow from
-//! the pairs that occur, whoever found them, so they are the same for any number of threads.
-//! Limits: at most 256 different stacks after any eight passes, which is what a sheet can tell apart.
+//! Method: eight passes at a time. The stack on a dot after them follows from the stack before (a number) and the passes
+//! among the eight that print it (a byte). One walk over the page finds the pairs that occur, each pair gets the number of
+//! its stack, and a second walk writes the numbers.
+//! Cost: two walks and one byte a dot for each eight passes. The cores share the rows. The numbers depend only on the set
+//! of pairs, so they are the same for any number of threads.
+//! Limits: at most 256 different stacks after any eight passes, as many as a sheet can hold.
 
 use std::collections::HashMap;
 
@@ -14,17 +14,38 @@ use protocol::ink::Ink;
 use protocol::paper::Paper;
 use rayon::prelude::*;
 
-use super::printout::PrintoutError;
 use crate::separate::Pass;
-use crate::sheet::Sheet;
+use crate::sheet::{Sheet, SheetError};
+
+/// Why a printout cannot become a [`Sheet`].
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PrintoutError {
+    /// Sheets have 600 dpi.
+    #[error("a sheet has 600 x 600 dpi, but this printout has {across} x {along}; use its passes instead")]
+    Resolution {
+        /// Dots per inch across.
+        across: u16,
+        /// Dots per inch along.
+        along: u16,
+    },
+    /// More stacks than a sheet can hold.
+    #[error("the passes make {0} different stacks on this sheet; a sheet holds at most 256")]
+    TooManyStacks(usize),
+    /// A dot has a stack that is not in the given list.
+    #[error("the printout has dots with stack `{0}`, which is not in the list of stacks")]
+    UnknownStack(Stack),
+    /// The list of stacks is invalid.
+    #[error(transparent)]
+    Sheet(#[from] SheetError),
+}
 
 /// Rows a thread takes at a time.
 const BAND: usize = 64;
 
-/// Stacks a number can stand for, and sets of eight passes.
+/// Values of a stack's number, and of a set of eight passes.
 const NUMBERS: usize = 256;
 
-/// `SPREAD[byte]`: bit 7 - i of the byte as the lowest bit of byte i.
+/// `SPREAD[byte]` has bit 7 - i of the byte as the lowest bit of its byte i.
 const SPREAD: [u64; 256] = {
     let mut table = [0; 256];
     let mut byte = 0;
@@ -39,18 +60,18 @@ const SPREAD: [u64; 256] = {
     table
 };
 
-/// Up to eight passes, and what the walks over their planes need to know.
+/// Up to eight passes, with what the walks over their planes need.
 struct Group<'a> {
     passes: &'a [&'a Pass],
     width: usize,
     stride: usize,
-    /// Nothing lies on any dot yet.
+    /// Whether all dots are still bare.
     first: bool,
 }
 
 impl Group<'_> {
-    /// Calls `dots(first column, for each of eight dots the passes that print it)` along row `y`, but where a first
-    /// group prints nothing.
+    /// Calls `dots(first column, the passes that print each of eight dots)` along row `y`. The first group skips dots that it
+    /// does not print.
     fn walk_row(&self, y: usize, mut dots: impl FnMut(usize, [u8; 8])) {
         let mut rows: [&[u8]; 8] = [&[]; 8];
         for (row, pass) in rows.iter_mut().zip(self.passes) {
@@ -68,7 +89,7 @@ impl Group<'_> {
         }
     }
 
-    /// Which pairs occur: `seen[number * 256 + set]`.
+    /// The pairs that occur, as `seen[number * 256 + set]`.
     fn pairs(&self, index: &[u8]) -> Vec<bool> {
         let none = || vec![false; NUMBERS * NUMBERS];
         let mut seen = index
@@ -106,7 +127,7 @@ impl Group<'_> {
         });
     }
 
-    /// A stack with the inks of a set of these passes on top.
+    /// A stack plus the inks of a set of these passes on top.
     fn on(&self, below: &Stack, set: usize) -> Stack {
         let above =
             self.passes.iter().enumerate().filter(|(p, _)| set >> p & 1 != 0).map(|(_, pass)| pass.ink);
@@ -114,8 +135,8 @@ impl Group<'_> {
     }
 }
 
-/// The sheet these passes print on `paper`; all planes are the paper's size. Without a list the stacks that occur are
-/// numbered, the substrate first, by the passes that make them.
+/// The sheet that these passes print on `paper`; all planes have the paper's size. Stacks are numbered as in `known`. Without
+/// it, the substrate comes first, then the stacks that occur, in the order of the passes that make them.
 pub(super) fn sheet(paper: Paper, passes: &[Pass], known: Option<&[Stack]>) -> Result<Sheet, PrintoutError> {
     let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
     let passes: Vec<&Pass> = passes.iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).collect();
@@ -125,7 +146,7 @@ pub(super) fn sheet(paper: Paper, passes: &[Pass], known: Option<&[Stack]>) -> R
     for (g, passes) in passes.chunks(8).enumerate() {
         let group = Group { passes, width, stride: width.div_ceil(8), first: g == 0 };
         let seen = group.pairs(&index);
-        // In the last group the numbers are those of the list given, if any.
+        // The last group numbers its stacks as in the given list, if there is one.
         let given = known.filter(|_| g + 1 == groups);
         let mut next = given.map_or_else(|| vec![Stack::SUBSTRATE], <[Stack]>::to_vec);
         let mut numbers: HashMap<Stack, usize> = next.iter().cloned().zip(0..).collect();
@@ -141,7 +162,7 @@ pub(super) fn sheet(paper: Paper, passes: &[Pass], known: Option<&[Stack]>) -> R
                     next.len() - 1
                 }
             };
-            // Beyond a byte the sheet is refused below.
+            // A number of more than a byte is refused below.
             table[pair] = number as u8;
         }
         if next.len() > NUMBERS {

@@ -1,27 +1,31 @@
-//! The machine: takes bytes in any pieces, fetches cassettes, prints rows, stops when something is the matter.
+//! The printer: takes bytes in pieces of any size, fetches cartridges, prints rows, and stops when it is in trouble.
 
 use protocol::ink::{Ink, Kind};
 use protocol::paper::{LEFT, Paper};
 use protocol::rgl::{Command, Fault, Mode, Order, PaperCode, Resolution, Step, parse};
 
 use super::canvas::Canvas;
-use super::carousel::{Carousel, CarouselError, Cassette, Fetch, PLACES};
-use super::from_dots;
+use super::carousel::{Carousel, CarouselError, Cartridge, Fetch, PLACES};
 use super::printout::Printout;
 use super::status::{ASK, Activity, CLEAR, Lever, STATUS_LENGTH, TAKEN, Trouble, answer};
 use crate::job::fault::words;
 use crate::layout::paper::Stock;
 use crate::separate::Pass;
 
-/// Rows of 1/600 inch the machine needs below the printable area: a little less than what any driver whose pages are
-/// known to print leaves on its paper (14.4 mm; postcard 14.5, A4 in its longest form 14.9).
+/// Rows of 1/600 inch that the printer needs below the printable area (14.4 mm): slightly less than the margin of any driver
+/// whose pages are known to print (postcard 14.5 mm, A4 in its longest form 14.9 mm).
 const BOTTOM: u16 = 340;
 
-/// The byte of a stream that is not a legal job's.
+/// A number of dots at a resolution, in 1/600 inch.
+pub(super) fn from_dots(dots: u16, dpi: u16) -> u16 {
+    (u32::from(dots) * 600 / u32::from(dpi)).min(u16::MAX.into()) as u16
+}
+
+/// The first byte that is not part of a legal job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("byte {offset}: {} (fault {})", words(*fault), fault.number())]
 pub struct Refused {
-    /// Its offset from the first byte the printer was given, or since it was last switched on.
+    /// Its offset from the first byte since the printer was switched on.
     pub offset: u64,
     /// What is wrong.
     pub fault: Fault,
@@ -38,23 +42,23 @@ struct Job {
     /// The line of the sheet under the head, in 1/600 inch from its upper edge.
     position: u32,
     pass: Option<(Ink, Canvas)>,
-    /// An ink whose cassette is still waited for.
+    /// An ink whose cartridge is missing.
     wanted: Option<Ink>,
 }
 
-/// The printer. It stays on between jobs; [`Printer::take_printout`] takes the finished sheet away, which it waits for.
+/// The printer. It stays on between jobs, and waits until [`Printer::take_printout`] removes the finished sheet.
 #[derive(Clone, Debug)]
 pub struct Printer {
     carousel: Carousel,
     lever: Lever,
     tray: Option<Stock>,
     trouble: Option<Trouble>,
-    /// The cassette entries as they were when the trouble began: the machine does not renew them until it is over.
+    /// The cartridge entries from before the trouble: the printer does not update them until it is over.
     stale: [u8; PLACES + 1],
     order: Order,
-    /// The beginning of a command whose end has not come yet.
+    /// The beginning of an incomplete command.
     carry: Vec<u8>,
-    /// A command that could not be done: it waits for the operator.
+    /// A command that waits for the operator.
     held: Vec<u8>,
     /// Offset of the command being read.
     offset: u64,
@@ -64,7 +68,7 @@ pub struct Printer {
     answers: Vec<u8>,
 }
 
-/// What stands at a command boundary.
+/// What the bytes at a command boundary are.
 enum Next<'a> {
     Command(Command<'a>, usize),
     Ask,
@@ -73,7 +77,7 @@ enum Next<'a> {
 }
 
 impl Printer {
-    /// A printer with these cassettes and no paper.
+    /// A printer with these cartridges and no paper.
     pub fn new(carousel: Carousel, lever: Lever) -> Printer {
         Printer {
             carousel,
@@ -92,8 +96,10 @@ impl Printer {
         }
     }
 
-    /// Takes bytes, in pieces of any size, and returns how many it took: fewer than given while it waits for the
-    /// operator. What has been refused stays refused until the printer is switched off and on.
+    /// Takes bytes in pieces of any size and returns how many it took: not all of them if it waits for the operator.
+    ///
+    /// # Errors
+    /// A byte that is not part of a legal job. The printer then refuses everything until it is switched off and on.
     pub fn feed(&mut self, bytes: &[u8]) -> Result<usize, Refused> {
         let mut taken = 0;
         loop {
@@ -109,7 +115,7 @@ impl Printer {
             }
             let rest = &bytes[taken..];
             if self.carry.is_empty() {
-                if !self.hears(rest) {
+                if !self.accepts(rest) {
                     return Ok(taken);
                 }
                 match self.next(rest)? {
@@ -121,8 +127,8 @@ impl Printer {
                 }
                 continue;
             }
-            // Rare: a command cut by the end of the piece before.
-            if !self.hears(&self.carry) {
+            // Rare: the previous piece ended inside a command.
+            if !self.accepts(&self.carry) {
                 return Ok(taken);
             }
             let mut carry = std::mem::take(&mut self.carry);
@@ -143,9 +149,9 @@ impl Printer {
         }
     }
 
-    /// Whether the printer listens to what stands at a command boundary: when something is the matter, only to
-    /// questions. No command begins with the bytes those begin with.
-    fn hears(&self, bytes: &[u8]) -> bool {
+    /// Whether the printer accepts these bytes at a command boundary. In trouble it accepts only questions, which begin with
+    /// other bytes than any command.
+    fn accepts(&self, bytes: &[u8]) -> bool {
         self.trouble.is_none() || bytes.first().is_none_or(|&first| is_question(first))
     }
 
@@ -180,7 +186,7 @@ impl Printer {
         Err(refused)
     }
 
-    /// Acts on what stands at the start of `bytes` and returns its length. A command that has to wait for the
+    /// Acts on the command or question at the start of `bytes` and returns its length. A command that must wait for the
     /// operator is held.
     fn act(&mut self, next: Next<'_>, bytes: &[u8]) -> Result<usize, Refused> {
         let length = match next {
@@ -198,7 +204,7 @@ impl Printer {
                 let mut order = self.order;
                 let mut legal = order.accept(&command);
                 if self.order.is_complete() && self.finished.is_none() && legal.is_err() {
-                    // The sheet has been taken away: what is no reset behind its job begins the next one.
+                    // The sheet was removed, so anything but the reset after its job begins the next job.
                     order = Order::new();
                     legal = order.accept(&command);
                 }
@@ -218,14 +224,13 @@ impl Printer {
         Ok(length)
     }
 
-    /// Does what a legal command says. `order` is the state after it. False when it could not be done: there is now
-    /// some trouble.
+    /// Carries out a legal command; `order` is the state after it. Returns false if trouble prevents that.
     fn perform(&mut self, command: &Command<'_>, order: &Order) -> bool {
         match *command {
             Command::RasterStart => return self.begin(order),
             Command::InkSelect { ink, .. } => {
                 self.begin_pass(ink, order);
-                // The command is done even if the cassette is missing: the machine stops behind it.
+                // Done even if the cartridge is missing: the printer stops after this command.
             }
             Command::Row { data, .. } => {
                 let row = order.row();
@@ -254,7 +259,7 @@ impl Printer {
         true
     }
 
-    /// Takes a sheet and, in the mode without ink-select, begins its pass.
+    /// Takes a sheet; in the mode without ink-select, also begins its pass.
     fn begin(&mut self, order: &Order) -> bool {
         let Some(stock) = self.tray.take() else {
             self.stop(Trouble::NoPaper);
@@ -287,7 +292,7 @@ impl Printer {
         let Some(job) = &mut self.job else { return };
         let declared = order.declared();
         let edge = usize::from(job.stock.width.saturating_sub(LEFT)) * usize::from(job.dpi.0) / 600;
-        // The machine takes the pitch from the cassette's barcode: these inks print at 600 whatever the job says.
+        // The cartridge's barcode sets the dot pitch: these inks print at 600 dpi in any job.
         let spread = match declared.resolution {
             Some(Resolution::Dpi1200) if ink.kind() != Kind::Process => 2,
             _ => 1,
@@ -299,7 +304,7 @@ impl Printer {
         self.fetch();
     }
 
-    /// Fetches the cassette that is waited for, or says what is missing.
+    /// Fetches the cartridge that the pass needs; trouble if it is missing or spent.
     fn fetch(&mut self) {
         let Some(ink) = self.job.as_ref().and_then(|job| job.wanted) else { return };
         let before = self.carousel.entries();
@@ -316,8 +321,8 @@ impl Printer {
         self.trouble = trouble;
     }
 
-    /// Whether the sheet is long enough for a row, or for the whole page at the end of a pass. Its end is felt when
-    /// it passes, so a page too long stops after part of it.
+    /// Whether the sheet is long enough for a row, or for the whole page at the end of a pass. The printer detects the end of
+    /// the sheet as it passes, so it stops in the middle of a page that is too long.
     fn sheet_reaches(&mut self, row: Option<u32>, order: &Order) -> bool {
         let Some(job) = &self.job else { return true };
         let declared = order.declared();
@@ -344,12 +349,12 @@ impl Printer {
         }
     }
 
-    /// The answers to what has been asked, taken away.
+    /// Takes the answers to all questions so far.
     pub fn answers(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.answers)
     }
 
-    /// What the printer would answer now. While something is the matter, the cassette entries are those from before.
+    /// The status answer at this moment. In trouble, the cartridge entries are those from before.
     pub fn status(&self) -> [u8; STATUS_LENGTH] {
         let activity = if self.job.is_some() {
             Activity::Printing
@@ -362,27 +367,27 @@ impl Printer {
         answer(activity, self.trouble, self.lever, entries)
     }
 
-    /// What stops the printer.
+    /// The trouble that stops the printer.
     pub fn trouble(&self) -> Option<Trouble> {
         self.trouble
     }
 
-    /// The cassettes.
+    /// The cartridges.
     pub fn carousel(&self) -> &Carousel {
         &self.carousel
     }
 
-    /// The line of the sheet under the head, in 1/600 inch from its upper edge; `None` while no sheet is in.
+    /// The line of the sheet under the head, in 1/600 inch from its upper edge; `None` if there is no sheet.
     pub fn position(&self) -> Option<u32> {
         self.job.as_ref().map(|job| job.position)
     }
 
-    /// Offset of the command the printer is at.
+    /// Offset of the command that the printer reads next.
     pub fn offset(&self) -> u64 {
         self.offset
     }
 
-    /// Puts a sheet in the tray, or the slot; one that lies there is exchanged.
+    /// Puts a sheet in the tray or the slot, in place of any other.
     pub fn load(&mut self, stock: Stock) {
         self.tray = Some(stock);
         if self.trouble == Some(Trouble::NoPaper) {
@@ -390,21 +395,24 @@ impl Printer {
         }
     }
 
-    /// Opens the cover, puts a cassette in and closes the cover; a print that waited for it goes on.
-    pub fn insert(&mut self, cassette: Cassette) -> Result<(), CarouselError> {
-        self.carousel.insert(cassette)?;
+    /// Opens the cover, inserts a cartridge and closes the cover. A print that waited for it continues.
+    ///
+    /// # Errors
+    /// See [`CarouselError`].
+    pub fn insert(&mut self, cartridge: Cartridge) -> Result<(), CarouselError> {
+        self.carousel.insert(cartridge)?;
         if matches!(self.trouble, Some(Trouble::RibbonMismatch { .. } | Trouble::RibbonEnd { .. })) {
             self.fetch();
         }
         Ok(())
     }
 
-    /// Opens the cover, takes a cassette out and closes the cover.
-    pub fn remove(&mut self, barcode: u8) -> Option<Cassette> {
+    /// Opens the cover, removes a cartridge and closes the cover.
+    pub fn remove(&mut self, barcode: u8) -> Option<Cartridge> {
         self.carousel.remove(barcode)
     }
 
-    /// Makes something go wrong, for tests of what stands before the printer.
+    /// Causes trouble, for tests of the software in front of the printer.
     pub fn strike(&mut self, trouble: Trouble) {
         self.stop(trouble);
     }
@@ -416,8 +424,7 @@ impl Printer {
         }
     }
 
-    /// What "@RCL3" does: the error goes away if it is one that can, and with it the job; its sheet is ejected as far
-    /// as it is printed.
+    /// Does what "@RCL3" does: clears an error that can be cleared, drops the job, and ejects the sheet as it is.
     pub fn clear(&mut self) {
         if self.trouble.is_some_and(Trouble::can_be_cleared) {
             self.trouble = None;
@@ -425,7 +432,7 @@ impl Printer {
         }
     }
 
-    /// Switches the printer off and on: whatever was the matter is over, the job is lost, and offsets count anew.
+    /// Switches the printer off and on: the trouble is over, the job is lost, and offsets start from 0.
     pub fn power_cycle(&mut self) {
         self.trouble = None;
         self.refused = None;
@@ -441,7 +448,7 @@ impl Printer {
         self.held.clear();
     }
 
-    /// Takes the ejected sheet away; the printer is then ready for the next job. `None` while there is none.
+    /// Removes the ejected sheet, so that the printer is ready for the next job. `None` if there is none.
     pub fn take_printout(&mut self) -> Option<Printout> {
         if self.finished.as_ref().is_some_and(|printout| printout.complete) && !self.order.is_complete() {
             return None;

@@ -1,12 +1,12 @@
-//! What comes out of the printer: the passes, one upon the other.
+//! A printed sheet: its passes, one on another.
 
 use inks::Stack;
 use protocol::paper::Paper;
 use protocol::rgl::{Media, Resolution};
 
-use super::compose;
+use super::compose::{self, PrintoutError};
 use crate::separate::Pass;
-use crate::sheet::{Sheet, SheetError};
+use crate::sheet::Sheet;
 
 /// A printed sheet.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -22,49 +22,29 @@ pub struct Printout {
     /// The passes in the order of printing, empty ones too. Planes cover the printable area at the job's resolution,
     /// shifts applied.
     pub passes: Vec<Pass>,
-    /// Dots that fell beside the sheet and soiled the platen.
+    /// Dots that missed the sheet and soiled the platen.
     pub platen_dots: u64,
-    /// Dots that came out beyond the page because the ink prints wider than the job's resolution.
+    /// Dots beyond the page, because the ink prints wider than the job's resolution.
     pub lost_dots: u64,
     /// Whether the whole job was printed.
     pub complete: bool,
 }
 
-/// Why a printout cannot be given as a [`Sheet`].
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum PrintoutError {
-    /// Sheets are 600 dpi.
-    #[error(
-        "a sheet has 600 x 600 dots an inch, this printout {across} x {along}; look at its passes instead"
-    )]
-    Resolution {
-        /// Dots per inch across.
-        across: u16,
-        /// Dots per inch along.
-        along: u16,
-    },
-    /// More than a sheet can tell apart.
-    #[error("the passes make {0} different stacks on this sheet; a sheet tells 256 apart")]
-    TooManyStacks(usize),
-    /// A dot has a stack that is not in the list given.
-    #[error("the printout has dots with stack `{0}`, which is not in the list of stacks")]
-    UnknownStack(Stack),
-    /// The list of stacks is no sheet's.
-    #[error(transparent)]
-    Sheet(#[from] SheetError),
-}
-
 impl Printout {
-    /// The sheet, its stacks numbered by the passes they need.
+    /// The sheet, with stacks numbered in the order of the passes they need.
     ///
     /// A dot's stack is the inks of the passes that print it, in order.
+    ///
+    /// # Errors
+    /// Another resolution than 600 dpi, or more than 256 stacks.
     pub fn sheet(&self) -> Result<Sheet, PrintoutError> {
         compose::sheet(self.at_600()?, &self.passes, None)
     }
 
     /// The sheet with the stacks numbered as in `stacks`, whose first is the substrate.
     ///
-    /// Errors: [`PrintoutError::UnknownStack`] when a dot has another stack.
+    /// # Errors
+    /// [`PrintoutError::UnknownStack`] if a dot has another stack; see also [`PrintoutError`].
     pub fn sheet_with(&self, stacks: &[Stack]) -> Result<Sheet, PrintoutError> {
         compose::sheet(self.at_600()?, &self.passes, Some(stacks))
     }
@@ -77,15 +57,15 @@ impl Printout {
     }
 }
 
-/// Where two sheets differ.
+/// A difference between two sheets.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Difference {
-    /// They are not of one size.
-    #[error("the sheets are {} x {} and {} x {} dots", left.0, left.1, right.0, right.1)]
+    /// Their sizes differ.
+    #[error("one sheet is {} x {} dots, the other {} x {}", left.0, left.1, right.0, right.1)]
     Size {
         /// Dots across and rows of the first.
         left: (usize, usize),
-        /// Of the second.
+        /// Dots across and rows of the second.
         right: (usize, usize),
     },
     /// The first dot, row by row, with different stacks.
@@ -102,7 +82,7 @@ pub enum Difference {
     },
 }
 
-/// The first difference between two sheets, dot for dot; the numbers of the stacks do not matter.
+/// The first difference between two sheets, dot by dot. Stacks are compared by their inks, not by their numbers.
 pub fn difference(left: &Sheet, right: &Sheet) -> Option<Difference> {
     let size = |sheet: &Sheet| (sheet.width(), sheet.length());
     if size(left) != size(right) {

@@ -1,7 +1,8 @@
-//! What the printer answers when asked how it is, and what can be the matter with it.
+//! The printer's status answer, and the troubles it reports.
 //!
-//! Thirty-eight bytes: `02 80`, the length 33, a status byte, nine cassette entries of three bytes, five error bytes,
-//! `03`. Source: answers recorded from the hardware, layout as the established open driver's tool reads them.
+//! An answer has 38 bytes: `02 80`, the length 33, a status byte, nine cartridge entries of three bytes, five error bytes,
+//! `03`. Source: answers recorded from the hardware; the layout is
+//! that of the established open driver's tool.
 
 use std::fmt;
 
@@ -12,11 +13,11 @@ use super::carousel::PLACES;
 /// Length of a status answer.
 pub const STATUS_LENGTH: usize = 38;
 
-/// Asks for the status, between jobs only.
+/// The status question; legal between jobs only.
 pub(super) const ASK: [u8; 2] = [0x05, 0x01];
 /// "@RCL3": clears an error; answered by [`TAKEN`].
 pub(super) const CLEAR: [u8; 11] = [0x02, 0x02, 0x06, 0x00, 0x40, 0x52, 0x43, 0x4c, 0x33, 0x01, 0x03];
-/// Says that a command was taken, not that it helped.
+/// Acknowledges a command; it does not report success.
 pub(super) const TAKEN: u8 = 0x06;
 
 /// Where sheets are taken from.
@@ -29,33 +30,33 @@ pub enum Lever {
     Manual,
 }
 
-/// What stops the printer.
+/// A reason for the printer to stop.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Trouble {
-    /// No sheet to take.
+    /// There is no sheet.
     NoPaper,
-    /// The sheet is shorter than the declared length and the margins.
+    /// The sheet is shorter than the declared length plus the margins.
     WrongSize,
-    /// A pass needs a cassette that is not there.
+    /// A pass needs a cartridge that is missing.
     RibbonMismatch {
-        /// The barcode of the cassette wanted.
+        /// Barcode of the missing cartridge.
         wanted: u8,
     },
-    /// The ribbon the pass needs is at its end.
+    /// The ribbon of the pass is used up.
     RibbonEnd {
-        /// The cassette's barcode.
+        /// Barcode of the cartridge.
         barcode: u8,
     },
     /// The cover is open.
     CoverOpen,
     /// The sheet is stuck.
     Jam {
-        /// At the exit; otherwise it was not fed.
+        /// Whether it is stuck at the exit; otherwise it was not fed.
         at_exit: bool,
     },
-    /// A motor does not do what it should.
+    /// A motor has failed.
     Motor {
-        /// 80 cassette changer, 40 carriage, 20 bail arm, 10 line feed, 08 feeder, 04 anti-curl.
+        /// 80 cartridge changer, 40 carriage, 20 bail arm, 10 line feed, 08 feeder, 04 anti-curl.
         unit: u8,
     },
 }
@@ -69,13 +70,13 @@ impl fmt::Display for Trouble {
                 "wrong paper size: the sheet is shorter than the job's page and its margins; load the declared paper",
             ),
             Trouble::RibbonMismatch { wanted } => {
-                write!(f, "ribbon mismatch: put in the {} cassette (barcode {wanted})", name(wanted))
+                write!(f, "ribbon mismatch: insert the {} cartridge (barcode {wanted})", name(wanted))
             }
             Trouble::RibbonEnd { barcode } => {
-                write!(f, "the {} ribbon (barcode {barcode}) is at its end; put in a fresh one", name(barcode))
+                write!(f, "ribbon end: the {} ribbon (barcode {barcode}) is used up; insert a new cartridge", name(barcode))
             }
             Trouble::CoverOpen => f.write_str("the cover is open; close it"),
-            Trouble::Jam { at_exit: true } => f.write_str("paper jam at the exit; take the sheet out"),
+            Trouble::Jam { at_exit: true } => f.write_str("paper jam at the exit; remove the sheet"),
             Trouble::Jam { at_exit: false } => f.write_str("the sheet was not fed; load it again"),
             Trouble::Motor { unit } => {
                 write!(f, "motor error (unit {unit:02x}); switch the printer off and on")
@@ -92,7 +93,7 @@ impl Trouble {
             Trouble::NoPaper => [0, 0x80, if manual { 0x40 } else { 0 }, 0, 0],
             Trouble::WrongSize => [0, 0x80, if manual { 0xc0 } else { 0x80 }, 0, 0],
             Trouble::RibbonMismatch { wanted } => [0, 0x10, 0, wanted << 3 | 6, 0],
-            // Which holder is said in bits whose coding is not known.
+            // Some bits give the cartridge holder, but their coding is unknown.
             Trouble::RibbonEnd { .. } => [0, 0x20, 0, 0, 0],
             Trouble::CoverOpen => [0x40, 0, 0, 0, 0],
             Trouble::Jam { at_exit } => {
@@ -102,23 +103,23 @@ impl Trouble {
         }
     }
 
-    /// Whether "@RCL3" makes it go away.
+    /// Whether "@RCL3" clears it.
     pub(super) fn can_be_cleared(self) -> bool {
         !matches!(self, Trouble::Motor { .. } | Trouble::CoverOpen)
     }
 }
 
-/// What the machine is doing.
+/// What the printer is doing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Activity {
     Idle,
-    /// Bytes of a job have come but nothing is printed, or the sheet has just been ejected.
+    /// It has received bytes of a job but printed nothing, or has just ejected the sheet.
     Buffered,
     Printing,
 }
 
-/// The answer. `entries` are the first bytes of the cassette entries; the other two are not the remaining ribbon, and
-/// what they are is not known, so they are 0 here.
+/// The status answer. `entries` are the first bytes of the cartridge entries. The other two bytes of each are 0 here: their
+/// meaning is unknown, except that they are not the remaining ribbon.
 pub(super) fn answer(
     activity: Activity,
     trouble: Option<Trouble>,

@@ -43,13 +43,13 @@ fn three() -> Vec<Pass> {
     ]
 }
 
-fn printer(cassettes: &[Ink]) -> Printer {
-    let cassettes: Vec<Cassette> = cassettes.iter().map(|&ink| ink.into()).collect();
-    Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Manual)
+fn printer(cartridges: &[Ink]) -> Printer {
+    let cartridges: Vec<Cartridge> = cartridges.iter().map(|&ink| ink.into()).collect();
+    Printer::new(Carousel::new(&cartridges).unwrap(), Lever::Manual)
 }
 
-fn loaded(cassettes: &[Ink]) -> Printer {
-    let mut printer = printer(cassettes);
+fn loaded(cartridges: &[Ink]) -> Printer {
+    let mut printer = printer(cartridges);
     printer.load(Stock::of(SMALL));
     printer
 }
@@ -89,7 +89,7 @@ fn raw(resolution: Resolution, width: u16, ink: Ink, row: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn cassettes_are_on_the_carriage_in_the_order_of_the_passes() {
+fn cartridges_are_on_the_carriage_in_the_order_of_the_passes() {
     let mut printer = loaded(&[Ink::Black, Ink::White, Ink::Cyan]);
     let mut seen = vec![];
     for byte in job(SMALL, &three()) {
@@ -121,7 +121,7 @@ fn the_sheet_goes_back_between_passes_and_out_at_the_end() {
 }
 
 #[test]
-fn a_missing_cassette_is_asked_for_by_its_barcode_and_the_print_goes_on_with_it() {
+fn a_missing_cartridge_is_asked_for_by_its_barcode_and_the_print_goes_on_with_it() {
     let job = job(SMALL, &three());
     let mut printer = loaded(&[Ink::Cyan, Ink::Black]);
     let taken = printer.feed(&job).unwrap();
@@ -129,7 +129,7 @@ fn a_missing_cassette_is_asked_for_by_its_barcode_and_the_print_goes_on_with_it(
     assert_eq!(printer.trouble(), Some(Trouble::RibbonMismatch { wanted: 16 }));
     assert_eq!(printer.feed(&job[taken..]), Ok(0), "it waits");
 
-    // The recorded answer's status and error bytes; the cassettes as they were before, whatever goes in meanwhile.
+    // The recorded answer's status and error bytes; the cartridges as they were before, whatever goes in meanwhile.
     assert_eq!(printer.feed(&[0x05, 0x01]), Ok(2));
     let asked = printer.answers();
     assert_eq!((asked.len(), asked[4], &asked[32..37]), (38, 0xc9, &[0, 0x10, 0, 0x86, 0][..]));
@@ -146,9 +146,9 @@ fn a_missing_cassette_is_asked_for_by_its_barcode_and_the_print_goes_on_with_it(
 
 #[test]
 fn a_spent_ribbon_stops_the_print_until_a_fresh_one_is_in() {
-    let spent = Cassette { condition: Condition::Spent, ..Ink::Cyan.into() };
-    let cassettes = [Ink::White.into(), spent, Ink::Black.into()];
-    let mut printer = Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto);
+    let spent = Cartridge { condition: Condition::Spent, ..Ink::Cyan.into() };
+    let cartridges = [Ink::White.into(), spent, Ink::Black.into()];
+    let mut printer = Printer::new(Carousel::new(&cartridges).unwrap(), Lever::Auto);
     printer.load(Stock::of(SMALL));
     let job = job(SMALL, &three());
     let taken = printer.feed(&job).unwrap();
@@ -340,9 +340,9 @@ fn messages_say_which_byte_which_ink_and_what_to_do() {
     bad[3] = 0;
     let text = print(&bad, &Setup::default(), &Silent).unwrap_err().to_string();
     assert_eq!(text, "byte 0: no command of the printer's language begins with these bytes (fault 1)");
-    let setup = Setup { cassettes: Some(vec![]), ..Setup::default() };
+    let setup = Setup { cartridges: Some(vec![]), ..Setup::default() };
     let text = print(&job(SMALL, &three()), &setup, &Silent).unwrap_err().to_string();
-    assert!(text.ends_with("ribbon mismatch: put in the white cassette (barcode 16)"), "{text}");
+    assert!(text.ends_with("ribbon mismatch: insert the white cartridge (barcode 16)"), "{text}");
 }
 
 #[test]
@@ -354,7 +354,7 @@ fn stacks_that_are_not_in_the_list_are_named() {
 }
 
 #[test]
-fn an_eighth_cassette_is_refused_where_it_is_asked_for() {
+fn an_eighth_cartridge_is_refused_where_it_is_asked_for() {
     let mut eight = raw(Resolution::Dpi600, 100, Ink::Black, &[1]);
     let select = eight.windows(5).position(|w| w == [0x1b, 0x1a, 0x00, 0x80, 0x72]).unwrap();
     let before: Vec<u8> = Ink::ALL[1..8]
@@ -370,9 +370,9 @@ fn an_eighth_cassette_is_refused_where_it_is_asked_for() {
 fn outcome(
     stream: &[u8],
     pieces: &[usize],
-    cassettes: &[Ink],
+    cartridges: &[Ink],
 ) -> (Option<Refused>, Option<Trouble>, Vec<u8>, Option<Printout>) {
-    let mut printer = loaded(cassettes);
+    let mut printer = loaded(cartridges);
     let mut rest = stream;
     let mut pieces = pieces.iter().cycle();
     let mut refused = None;
@@ -462,10 +462,10 @@ proptest! {
             let at = at.index(stream.len() + 1);
             stream.splice(at..at, [0x05, 0x01]);
         }
-        let cassettes = if missing { &ALL_THREE[1..] } else { &ALL_THREE };
-        let whole = outcome(&stream, &[], cassettes);
-        prop_assert_eq!(&outcome(&stream, &[1], cassettes), &whole);
-        prop_assert_eq!(&outcome(&stream, &pieces, cassettes), &whole);
+        let cartridges = if missing { &ALL_THREE[1..] } else { &ALL_THREE };
+        let whole = outcome(&stream, &[], cartridges);
+        prop_assert_eq!(&outcome(&stream, &[1], cartridges), &whole);
+        prop_assert_eq!(&outcome(&stream, &pieces, cartridges), &whole);
     }
 
     #[test]

@@ -281,10 +281,7 @@ fn crc(bytes: &[u8]) -> u32 {
 
 #[test]
 fn the_real_documents_open() {
-    let Some(data) = std::env::var_os("FOILPRESS_DATA").map(std::path::PathBuf::from) else {
-        eprintln!("skipped: FOILPRESS_DATA is not set");
-        return;
-    };
+    let Some(data) = testing::needs::data() else { return };
     for (name, side) in [("rustymetal", 1024), ("helmet_metal", 512), ("helmet_leather", 512)] {
         let path = data.join("svbrdf").join(name);
         let document = open(path.to_str().unwrap(), &Options::default(), &Silent).unwrap();

@@ -27,11 +27,7 @@ fn mixture(curves: &Table, weights: &[f64]) -> Vec<f64> {
 
 /// The measured materials, or `None` with a message if they are not available.
 fn measured(space: &Space) -> Option<Vec<(String, Vec<f64>)>> {
-    let Some(data) = std::env::var_os("FOILPRESS_DATA") else {
-        println!("skipped: FOILPRESS_DATA is not set");
-        return None;
-    };
-    let folder = PathBuf::from(data).join("brdf/curves_avg");
+    let folder = testing::needs::data()?.join("brdf/curves_avg");
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
     files.sort();
     let name = |p: &PathBuf| p.file_stem().unwrap().to_string_lossy().into_owned();

@@ -70,7 +70,7 @@ fn literal(stretches: &[(u32, Vec<i32>)], minimum: &[u16], absent: usize) -> Vec
     let (mut entered, mut check) = (0, absent);
     let (mut at, mut current, mut out) = (0, None::<usize>, Vec::new());
     loop {
-        // The windows move on before the debts of the absent are looked at.
+        // The windows advance before the debts of absent stacks are checked.
         while entered < n.min(at + far) {
             for q in 0..stacks {
                 if weights[entered][q] > 0 {
@@ -109,8 +109,8 @@ fn literal(stretches: &[(u32, Vec<i32>)], minimum: &[u16], absent: usize) -> Vec
         let m = fitting.max().unwrap_or(0);
         let cost = |k: usize| {
             let deviation = |q: usize| {
-                let look = debt[q] + asked(q, m);
-                (if q == k { look - m as i128 * unit } else { look }).abs()
+                let demand = debt[q] + asked(q, m);
+                (if q == k { demand - m as i128 * unit } else { demand }).abs()
             };
             let worst = (0..stacks).map(deviation).max().unwrap();
             (worst, (0..stacks).map(|q| deviation(q).pow(2)).sum::<i128>(), Some(k) != current, k)

@@ -1,22 +1,23 @@
-//! The order of the layers: as the user lists it, as numbered names say, or by the ink library's rules.
+//! The order of the layers: as listed in the settings, as numbered in their names, or by the ink library's rules.
 
 use inks::Library;
 use protocol::ink::Ink;
 
-use super::super::{LayersError, order};
-use super::Slot;
+use super::super::error::{LayersError, Setting};
+use super::super::order;
+use super::slot::Slot;
 
-/// In which order layers lie on the paper.
+/// The order of layers from the paper up.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub enum Order {
-    /// As their numbered names say if all are numbered, otherwise by the ink library's rules.
+    /// By the numbers in the layers' names if all have one, otherwise by the ink library's rules.
     #[default]
-    Usual,
+    Default,
     /// By the ink library's rules.
     Rules,
-    /// As given, first lowest.
+    /// In the order of the files or layers, the first lowest.
     Given,
-    /// In this order from the paper up. An ink may stand twice: its layer is laid at both depths.
+    /// In this order. An ink may be listed twice: its layer is printed at both depths.
     Inks(Vec<Ink>),
 }
 
@@ -31,14 +32,14 @@ pub(super) fn arranged(
     let mut slots = slots;
     match wanted {
         Order::Given => {}
-        Order::Usual if numbered => slots.sort_by_key(|slot| slot.place),
-        Order::Usual | Order::Rules => {
+        Order::Default if numbered => slots.sort_by_key(|slot| slot.place),
+        Order::Default | Order::Rules => {
             if let Some(twice) = twice {
                 return Err(LayersError::Setting {
-                    option: "--order",
+                    setting: Setting::Order,
                     problem: format!(
-                        "{} layers are of {}; say at which depth each lies: number the files from the paper up \
-                         (01-white.png, 02-black.png, 03-white.png), or use --order given",
+                        "{} layers are {}; to state the depth of each, number the files from the paper up \
+                         (01-white.png, 02-black.png, 03-white.png) or keep the given order",
                         slots.iter().filter(|slot| slot.ink == slots[twice].ink).count(),
                         slots[twice].ink.name()
                     ),
@@ -53,9 +54,9 @@ pub(super) fn arranged(
     Ok(slots)
 }
 
-/// The slots as listed; an ink listed more often than it has layers is laid there again.
+/// The slots as listed. If an ink is listed more often than it has layers, its last layer is repeated.
 fn in_order(slots: Vec<Slot>, order: &[Ink]) -> Result<Vec<Slot>, LayersError> {
-    let wrong = |problem: String| Err(LayersError::Setting { option: "--order", problem });
+    let wrong = |problem: String| Err(LayersError::Setting { setting: Setting::Order, problem });
     if let Some(slot) = slots.iter().find(|slot| !order.contains(&slot.ink)) {
         return wrong(format!("{} ({}) is not in the list", slot.ink.name(), slot.from));
     }
@@ -68,7 +69,7 @@ fn in_order(slots: Vec<Slot>, order: &[Ink]) -> Result<Vec<Slot>, LayersError> {
             return wrong(format!("the art has no {}", ink.name()));
         };
         if of_ink.len() > times {
-            return wrong(format!("{} has {} layers and is listed {times} times", ink.name(), of_ink.len()));
+            return wrong(format!("{} has {} layers but is listed {times} times", ink.name(), of_ink.len()));
         }
         let slot = of_ink.get(nth).unwrap_or(last);
         let (from, plane) = (slot.from.clone(), slot.plane.clone());

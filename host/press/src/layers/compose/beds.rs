@@ -1,93 +1,114 @@
-//! White beneath the art and finish on it, where the settings say.
+//! White beneath the art and finish on it, as the settings say.
 
 use protocol::ink::{Ink, Kind};
 
-use super::super::raster::MM;
-use super::super::{Artwork, LayersError, White, bits, distance, white};
-use super::{Finish, Settings, Slot};
+use super::super::artwork::Artwork;
+use super::super::error::{LayersError, Setting};
+use super::super::size::MM;
+use super::super::white::{self, White};
+use super::super::{bits, distance};
+use super::settings::{Finish, Settings};
+use super::slot::Slot;
+use crate::separate::Plane;
 
-/// Adds white where the settings say, and chokes or spreads it.
+/// Adds white, and chokes or spreads it.
 pub(super) fn lay_white(
     slots: &mut Vec<Slot>,
     art: &Artwork,
     settings: &Settings,
     tell: &mut dyn FnMut(String),
 ) -> Result<(), LayersError> {
-    let wrong = |option, problem: String| Err(LayersError::Setting { option, problem });
-    let ground = match settings.white {
-        None | Some(White::None) => None,
-        Some(White::Reserved) => {
-            if !slots.iter().any(|slot| slot.ink == Ink::White) {
-                return wrong("--white reserved", "the picture has no reserved white, 230,230,230".into());
-            }
-            None
+    if let Some((mode, mut bed)) = white_bed(slots, art, settings)? {
+        if !settings.inks.contains(Ink::White) {
+            return refused(Setting::White, "white is not among the allowed inks");
         }
-        Some(White::Under) => {
+        // The art's own white becomes part of the bed, so that there is one layer of white.
+        if let Some(at) = slots.iter().position(|slot| slot.ink == Ink::White) {
+            let drawn = slots.remove(at);
+            bits::add(&mut bed, &drawn.plane);
+        }
+        let from = format!("white setting: {mode}");
+        slots.push(Slot { ink: Ink::White, from, place: Some(0), plane: bed, passes: 1 });
+    }
+    choke(slots, settings.choke, tell)
+}
+
+/// The plane of white that the settings ask for, if any, and its mode.
+fn white_bed(
+    slots: &[Slot],
+    art: &Artwork,
+    settings: &Settings,
+) -> Result<Option<(White, Plane)>, LayersError> {
+    let Some(mode) = settings.white else { return Ok(None) };
+    let bed = match mode {
+        White::None => return Ok(None),
+        White::Reserved => {
+            if !slots.iter().any(|slot| slot.ink == Ink::White) {
+                return refused(Setting::White, "the picture has no reserved white, 230,230,230");
+            }
+            return Ok(None);
+        }
+        White::Under => {
             let mut under = bits::blank(art.width, art.length);
             let clear = |ink: Ink| matches!(ink.kind(), Kind::Finish | Kind::Primer);
             slots.iter().filter(|slot| !clear(slot.ink)).for_each(|slot| bits::add(&mut under, &slot.plane));
-            Some(under)
+            under
         }
-        Some(White::Opaque) => Some(art.drawn.clone()),
-        Some(White::Silhouette) => Some(white::silhouette(&art.drawn)),
-        Some(White::Alpha) => match &art.opaque {
-            Some(opaque) => Some(opaque.clone()),
+        White::Opaque => art.drawn.clone(),
+        White::Silhouette => white::silhouette(&art.drawn),
+        White::Alpha => match &art.opaque {
+            Some(opaque) => opaque.clone(),
             None => {
-                return wrong(
-                    "--white alpha",
-                    format!(
-                        "{} has no transparency, so all of it would be white; export it with a transparent ground, or use \
-                         --white opaque or silhouette",
-                        art.name
-                    ),
+                let problem = format!(
+                    "{} has no transparency, so all of it would be white; export it with a transparent background, or choose \
+                     white mode opaque or silhouette",
+                    art.name
                 );
+                return refused(Setting::White, problem);
             }
         },
     };
-    if ground.is_some() && !settings.inks.contains(Ink::White) {
-        return wrong("--white", "white is not among --inks".into());
-    }
-    if let Some(mut ground) = ground {
-        // One bed of white: the art's own white belongs to it.
-        let mode = settings.white.map_or_else(String::new, |mode| format!("--white {mode}"));
-        let drawn = slots.iter().position(|slot| slot.ink == Ink::White);
-        if let Some(at) = drawn {
-            let drawn = slots.remove(at);
-            bits::add(&mut ground, &drawn.plane);
-        }
-        slots.push(Slot { ink: Ink::White, from: mode, place: Some(0), plane: ground, passes: 1 });
-    }
-    if settings.choke == 0.0 {
+    Ok(Some((mode, bed)))
+}
+
+/// Shrinks all white by so many dots, or spreads it if the number is negative.
+fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result<(), LayersError> {
+    if choke == 0.0 {
         return Ok(());
     }
-    let radius = settings.choke.abs();
+    let setting = if choke > 0.0 { Setting::Choke } else { Setting::Spread };
+    let radius = choke.abs();
     if radius.is_nan() || radius > f64::from(distance::MOST) {
-        let option = if settings.choke > 0.0 { "--choke" } else { "--spread" };
-        return wrong(
-            option,
-            format!("{:.2} mm is more than {:.0} mm", radius * MM, f64::from(distance::MOST) * MM),
-        );
+        let most = f64::from(distance::MOST) * MM;
+        return refused(setting, format!("{:.2} mm is more than {most:.0} mm", radius * MM));
     }
     let square = (radius * radius + 1e-6) as u32;
     if square == 0 {
-        tell(format!("{:.3} mm is less than a dot (0.042 mm): the white stays as it is", radius * MM));
+        tell(format!(
+            "{setting}: {:.3} mm is less than a dot (0.042 mm), so the white is unchanged",
+            radius * MM
+        ));
     }
     let mut any = false;
     for slot in slots.iter_mut().filter(|slot| slot.ink == Ink::White) {
         any = true;
-        slot.plane = if settings.choke > 0.0 {
+        slot.plane = if choke > 0.0 {
             distance::shrink(&slot.plane, square)
         } else {
             distance::grow(&slot.plane, square)
         };
     }
     if !any {
-        return wrong("--choke", "there is no white to choke or spread; add a --white".into());
+        return refused(setting, "there is no white to choke or spread; choose where white goes");
     }
     Ok(())
 }
 
-/// Adds finish where the settings say.
+fn refused<T>(setting: Setting, problem: impl Into<String>) -> Result<T, LayersError> {
+    Err(LayersError::Setting { setting, problem: problem.into() })
+}
+
+/// Adds finish.
 pub(super) fn lay_finish(
     slots: &mut Vec<Slot>,
     art: &Artwork,
@@ -103,16 +124,13 @@ pub(super) fn lay_finish(
         Some(Finish::All) => bits::full(art.width, art.length),
     };
     if !settings.inks.contains(Ink::Finish) {
-        return Err(LayersError::Setting {
-            option: "--finish",
-            problem: "finish is not among --inks".into(),
-        });
+        return refused(Setting::Finish, "finish is not among the allowed inks");
     }
     match slots.iter_mut().find(|slot| slot.ink == Ink::Finish) {
         Some(slot) => bits::add(&mut slot.plane, &coat),
         None => slots.push(Slot {
             ink: Ink::Finish,
-            from: "--finish".into(),
+            from: "finish setting".into(),
             place: Some(u32::MAX),
             plane: coat,
             passes: 1,

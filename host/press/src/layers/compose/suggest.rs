@@ -1,52 +1,53 @@
-//! What a print needs that the art does not have: undercoats, more white, other settings.
+//! Suggestions for a better print: undercoats, more white, other settings.
 //!
-//! Nothing here is done unasked: a suggestion says what and why, how many dots it is about, and what to type to have it.
+//! Nothing here changes the print. A suggestion states a problem, the number of dots concerned, and a remedy.
 //! Source: the vendor's guide and owners' reports, as the ink library's rules.
 
-use inks::{InkSet, Stack};
+use inks::Stack;
 use protocol::ink::{Ink, Kind};
-use serde::Serialize;
+use protocol::rgl::Media;
 
-use super::{COLOURS, Laid, Settings};
+use super::slot::{COLOURS, Laid};
 
-/// An ink with fewer than one of so many of the dots of a picture's colours is not worth a pass.
+/// An ink is not worth a pass on fewer dots of a picture's colours than one in this many.
 const RARE: u64 = 1000;
 
-/// A suggestion that the user accepts: what the plan adds to the art.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+/// An addition to the art that a user can accept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Accept {
     /// Solid cyan, magenta, yellow and black beneath every foil.
     FoilUndercoat,
-    /// Primer, finish, primer between black and the white on it.
+    /// Primer, finish and primer between black and the white above it.
     EvenWhite,
-    /// Three layers of white where there is one.
+    /// Three passes of white instead of one.
     WhiteThrice,
 }
 
-impl Accept {
-    /// As typed.
-    pub fn name(self) -> &'static str {
-        match self {
-            Accept::FoilUndercoat => "foil-undercoat",
-            Accept::EvenWhite => "even-white",
-            Accept::WhiteThrice => "white-thrice",
-        }
-    }
+/// The change of a setting that follows a suggestion.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Remedy {
+    /// Accept an addition to the art.
+    Accept(Accept),
+    /// Print with the settings of this medium.
+    Media(Media),
+    /// Print the inks in this order from the paper up.
+    Order(Vec<Ink>),
+    /// Print without this ink.
+    Without(Ink),
 }
 
-/// Something the print needs that the art does not have.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+/// Something that would improve the print.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Suggestion {
-    /// What and why.
+    /// The problem, its reason and its remedy.
     pub text: String,
-    /// What to add to the command to have it.
-    pub how: String,
-    /// How many dots it is about.
+    /// What to set.
+    pub remedy: Remedy,
+    /// Number of dots concerned.
     pub dots: u64,
 }
 
-/// What the stacks need; `order` are the inks from the paper up.
+/// Suggestions on stacks and their numbers of dots; `order` has the inks from the paper up.
 pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Suggestion> {
     let about = |touches: &dyn Fn(&[Ink]) -> bool| -> u64 {
         stacks.iter().zip(dots).filter(|(stack, _)| touches(stack.layers())).map(|(_, dots)| dots).sum()
@@ -63,64 +64,55 @@ pub(super) fn suggest(stacks: &[Stack], dots: &[u64], order: &[Ink]) -> Vec<Sugg
     let metal = |layers: &[Ink]| layers.iter().position(|ink| ink.kind() == Kind::Metallic);
     let metals = about(&|layers| metal(layers).is_some());
     let covered = about(&|layers| metal(layers).is_some_and(|metal| layers[metal..].contains(&Ink::Black)));
-    // A little black on metal is lettering; most of the metal under black is a mistake.
+    // A little black on metal is lettering; metal mostly under black is a mistake.
     let hidden = if 2 * covered > metals { covered } else { 0 };
     let (metal_inks, others): (Vec<Ink>, Vec<Ink>) =
         order.iter().partition(|ink| ink.kind() == Kind::Metallic);
     let beneath = others.iter().rposition(|ink| ink.kind() == Kind::Process).map_or(0, |at| at + 1);
     let metal_above = [&others[..beneath], &metal_inks, &others[beneath..]].concat();
-    let metal_above: Vec<_> = metal_above.into_iter().map(Ink::name).collect();
-    let accept = |what: Accept| format!("--accept {}", what.name());
     [
         (
             bare_foil,
-            "foil prints properly only on a solid of cyan, magenta, yellow and black, for grip and gloss",
-            accept(Accept::FoilUndercoat),
+            "foil adheres and shines only on solid cyan, magenta, yellow and black",
+            Remedy::Accept(Accept::FoilUndercoat),
         ),
         (
             white_on_black,
-            "white straight on black is full of missing points; primer, finish and primer between them make it even",
-            accept(Accept::EvenWhite),
+            "white directly on black has many missing dots; primer, finish and primer between them make it even",
+            Remedy::Accept(Accept::EvenWhite),
         ),
-        (thin_white, "one layer of white looks grey; three are nearly white", accept(Accept::WhiteThrice)),
+        (thin_white, "one pass of white looks grey; three look nearly white", Remedy::Accept(Accept::WhiteThrice)),
         (
             primed,
-            "primer can tear its ribbon on the settings for plain paper; those for cardboard cured it",
-            "--media cardboard".into(),
+            "the media settings for plain paper can tear the primer ribbon; those for cardboard prevent it",
+            Remedy::Media(Media::Cardboard),
         ),
         (
             hidden,
-            "black covers most of the metallic ink; laid above black the metal is seen, and black is left out beneath it",
-            format!("--order {}", metal_above.join(",")),
+            "black covers most of the metallic ink; print the metallic ink above black, which is then left out beneath it",
+            Remedy::Order(metal_above),
         ),
     ]
     .into_iter()
     .filter(|(dots, ..)| *dots > 0)
-    .map(|(dots, text, how)| Suggestion { text: text.into(), how, dots })
+    .map(|(dots, text, remedy)| Suggestion { text: text.into(), remedy, dots })
     .collect()
 }
 
-/// Inks that plain colour asks for on so few dots that nobody would miss them; `allowed` are the inks that may be used.
-pub(super) fn rare(laid: &[Laid], allowed: &InkSet) -> Vec<Suggestion> {
+/// Suggestions to leave out inks that plain colour needs on so few dots that nobody would miss them.
+pub(super) fn rare(laid: &[Laid]) -> Vec<Suggestion> {
     let coloured: Vec<&Laid> = laid.iter().filter(|laid| laid.from == COLOURS).collect();
     let all: u64 = coloured.iter().map(|laid| laid.dots).sum();
-    let without = |name: &str| {
-        if *allowed == Settings::default().inks {
-            return format!("--inks -{name}");
-        }
-        let others: Vec<_> = allowed.iter().map(Ink::name).filter(|&other| other != name).collect();
-        format!("--inks {}", others.join(","))
-    };
     coloured
         .into_iter()
         .filter(|laid| laid.dots * RARE < all)
-        .map(|laid| Suggestion {
-            text: format!(
-                "the colours have next to no {}; without it a pass and a cartridge are saved",
+        .filter_map(|laid| {
+            let ink = Ink::from_name(laid.ink)?;
+            let text = format!(
+                "the colours have hardly any {}; leaving it out saves a pass and a cartridge",
                 laid.ink
-            ),
-            how: without(laid.ink),
-            dots: laid.dots,
+            );
+            Some(Suggestion { text, remedy: Remedy::Without(ink), dots: laid.dots })
         })
         .collect()
 }
@@ -134,30 +126,20 @@ mod tests {
     }
 
     #[test]
-    fn an_ink_on_next_to_no_dots_of_the_colours_is_suggested_to_be_left_out() {
+    fn leaving_out_an_ink_on_hardly_any_dots_of_the_colours_is_suggested() {
         let laid = [
             laid(Ink::White, 3, "white.png"),
             laid(Ink::Cyan, 90_000, COLOURS),
             laid(Ink::Black, 9_910, COLOURS),
             laid(Ink::Yellow, 90, COLOURS),
         ];
-        let how = |allowed: &InkSet| {
-            rare(&laid, allowed)
-                .into_iter()
-                .map(|suggestion| (suggestion.how, suggestion.dots))
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(how(&Settings::default().inks), [("--inks -yellow".to_owned(), 90)]);
-        let some = InkSet::of([Ink::White, Ink::Cyan, Ink::Yellow, Ink::Black]);
-        let [(words, 90)] = &how(&some)[..] else { panic!("one suggestion") };
-        // What is typed means the same inks but that one.
-        let typed: InkSet = words.strip_prefix("--inks ").unwrap().parse().unwrap();
-        assert_eq!(typed, InkSet::of([Ink::White, Ink::Cyan, Ink::Black]));
+        let [Suggestion { remedy, dots: 90, .. }] = &rare(&laid)[..] else { panic!("one suggestion") };
+        assert_eq!(*remedy, Remedy::Without(Ink::Yellow));
     }
 
     #[test]
-    fn few_dots_that_were_drawn_are_meant() {
+    fn few_dots_that_were_drawn_are_kept() {
         let laid = [laid(Ink::Cyan, 90_000, COLOURS), laid(Ink::Yellow, 3, "yellow.png")];
-        assert!(rare(&laid, &Settings::default().inks).is_empty());
+        assert!(rare(&laid).is_empty());
     }
 }

@@ -61,14 +61,14 @@ fn an_ink_may_lie_at_two_depths_and_several_times() {
 #[test]
 fn two_layers_of_an_ink_need_an_order() {
     let mut art = art(&[(Ink::White, &["#."]), (Black, &["##"]), (Ink::White, &[".#"])]);
-    assert!(refused(&art, &with(|_| ())).contains("2 layers are of white"));
+    assert!(refused(&art, &with(|_| ())).contains("2 layers are white"));
     assert_eq!(dots(&composed(&art, &with(|s| s.order = Order::Given))), ["W+K", "K+W"]);
     for (place, layer) in [3, 2, 1].into_iter().zip(&mut art.layers) {
         layer.place = Some(place);
     }
     assert_eq!(dots(&composed(&art, &with(|_| ()))), ["K+W", "W+K"], "as numbered");
     let wrong = with(|s| s.order = Order::Inks(vec![Ink::White, Black]));
-    assert!(refused(&art, &wrong).contains("white has 2 layers and is listed 1 times"));
+    assert!(refused(&art, &wrong).contains("white has 2 layers but is listed 1 times"));
     let wrong = with(|s| s.order = Order::Inks(vec![Ink::White, Ink::White]));
     assert!(refused(&art, &wrong).contains("black (black) is not in the list"));
 }
@@ -81,11 +81,12 @@ fn metal_on_process_ink_knocks_it_out_and_not_the_white_beneath() {
     assert_eq!(dots(&composed(&art, &settings)), ["W+K", "W+MG", "W+MG", "W+MG"]);
     let overprint = with(|s| (s.order, s.knockout) = (above, InkSet::EMPTY));
     assert_eq!(dots(&composed(&art, &overprint)), ["W+K", "W+K+MG", "W+K+MG", "W+MG"]);
-    // Beneath it, by the rules, nothing is taken away; that black hides gold is said.
+    // The rules put gold beneath black: nothing is knocked out, and a suggestion warns that black hides gold.
     let below = composed(&art, &with(|_| ()));
     assert_eq!(dots(&below), ["W+K", "W+MG+K", "W+MG+K", "W+MG"]);
     let hidden = below.suggestions.iter().find(|s| s.text.contains("covers most of the metallic")).unwrap();
-    assert_eq!((hidden.dots, hidden.how.as_str()), (2, "--order white,black,metallic-gold"));
+    let order = Remedy::Order(vec![Ink::White, Black, MetallicGold]);
+    assert_eq!((hidden.dots, &hidden.remedy), (2, &order));
 }
 
 #[test]
@@ -136,7 +137,7 @@ fn undercoats_are_suggested_and_laid_only_when_accepted() {
     let art = art(&[(SilverFoil, &["##."]), (Black, &[".##"]), (Cyan, &["..#"])]);
     let plain = composed(&art, &with(|_| ()));
     assert_eq!(dots(&plain), ["SF", "K+SF", "C+K"]);
-    let foil = plain.suggestions.iter().find(|s| s.how == "--accept foil-undercoat").unwrap();
+    let foil = plain.suggestions.iter().find(|s| s.remedy == Remedy::Accept(Accept::FoilUndercoat)).unwrap();
     assert_eq!(foil.dots, 2);
     let accepted = composed(&art, &with(|s| s.accept = vec![Accept::FoilUndercoat]));
     assert_eq!(dots(&accepted), ["C+M+Y+K+SF", "C+M+Y+K+SF", "C+K"]);
@@ -145,7 +146,7 @@ fn undercoats_are_suggested_and_laid_only_when_accepted() {
     let art = self::art(&[(Black, &["##"]), (Ink::White, &["#."])]);
     let above = |s: &mut Settings| s.order = Order::Given;
     let plain = composed(&art, &with(above));
-    assert!(plain.suggestions.iter().any(|s| s.how == "--accept even-white" && s.dots == 1));
+    assert!(plain.suggestions.iter().any(|s| s.remedy == Remedy::Accept(Accept::EvenWhite) && s.dots == 1));
     let accepted = composed(
         &art,
         &with(|s| {
@@ -157,15 +158,17 @@ fn undercoats_are_suggested_and_laid_only_when_accepted() {
 }
 
 #[test]
-fn what_cannot_be_is_said() {
+fn impossible_settings_are_reported() {
     let two = art(&[(Black, &["#"]), (Cyan, &["#"])]);
     assert_eq!(dots(&composed(&two, &with(|s| s.inks = InkSet::of([Black])))), ["K"]);
     let notes = composed(&two, &with(|s| s.inks = InkSet::of([Black]))).report.notes;
     assert!(notes.iter().any(|note| note.contains("cyan: left out")), "{notes:?}");
     assert!(refused(&art(&[(Black, &["."])]), &with(|_| ())).contains("nothing to print"));
-    assert!(refused(&art(&[(GoldFoil, &["#"])]), &Settings::default()).contains("--inks +gold-foil"));
+    assert!(
+        refused(&art(&[(GoldFoil, &["#"])]), &Settings::default()).contains("gold-foil asks for gold-foil")
+    );
     let often = with(|s| s.passes = vec![(Black, 9), (Cyan, 9)]);
-    assert!(refused(&two, &often).contains("18 layers"));
+    assert!(refused(&two, &often).contains("18 passes"));
 }
 
 #[test]

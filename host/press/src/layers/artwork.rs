@@ -1,0 +1,175 @@
+//! Art as read: layers of ink, and colours, at 600 dpi.
+//!
+//! Method: a layer starts as coverage, one byte a pixel, whatever its file was. Coverage is resampled to the dots. Layers
+//! to be halftoned keep it; all others become one bit a dot at half coverage.
+//! Cost: 1 ns a dot for each layer. Limits: soft edges become hard, and a note says how many pixels they had.
+
+use protocol::ink::{Ink, Kind};
+use rayon::prelude::*;
+
+use super::colour::Colour;
+use super::coverage::{Coverage, Scan};
+use super::options::Options;
+use super::{bits, names, resample};
+use crate::separate::Plane;
+
+/// Least coverage of a dot that is ink.
+const THRESHOLD: u8 = 128;
+/// Coverage up to this is plainly paper; coverage from 255 minus this on is plainly ink.
+const PLAIN: u8 = 8;
+
+/// What a layer prints.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Ink or no ink at each dot.
+    Solid(Plane),
+    /// Coverage from 0 to 255, one byte a dot.
+    Tone(Vec<u8>),
+}
+
+/// One layer of art.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// Its ink.
+    pub ink: Ink,
+    /// Its source: the name of a file, a channel or a layer.
+    pub name: String,
+    /// Its place from the paper up, if its name begins with a number.
+    pub place: Option<u32>,
+    /// What it prints.
+    pub shape: Shape,
+}
+
+/// Art at 600 dpi.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Artwork {
+    /// Name of the art.
+    pub name: String,
+    /// Dots across.
+    pub width: usize,
+    /// Rows.
+    pub length: usize,
+    /// The layers in the order in which they were given.
+    pub layers: Vec<Layer>,
+    /// Colours for the process inks: those of a plain picture, without its reserved colours.
+    pub colour: Option<Colour>,
+    /// Dots on which something is drawn: neither pure white nor transparent, or ink of a layer.
+    pub drawn: Plane,
+    /// Dots that are not transparent, if the art has transparency.
+    pub opaque: Option<Plane>,
+    /// What the reader had to assume, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl Artwork {
+    /// Art of `width` x `length` dots on which nothing is drawn.
+    pub(super) fn blank(name: &str, (width, length): (usize, usize)) -> Artwork {
+        Artwork {
+            name: name.into(),
+            width,
+            length,
+            layers: Vec::new(),
+            colour: None,
+            drawn: bits::blank(width, length),
+            opaque: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// Adds a layer. `plate` marks the coverage as that of a printing plate: process inks keep their tones there, and a
+    /// blank plate adds nothing.
+    pub(super) fn add(
+        &mut self,
+        scan: Scan,
+        name: &str,
+        named: names::Named,
+        plate: bool,
+        options: &Options,
+    ) {
+        if plate && scan.coverage.iter().all(|&c| c == 0) {
+            return;
+        }
+        let (layer, mut notes) = layer(scan, name, named, plate, (self.width, self.length), options);
+        match &layer.shape {
+            Shape::Solid(plane) => bits::add(&mut self.drawn, plane),
+            Shape::Tone(tones) => {
+                bits::add(&mut self.drawn, &bits::from_bytes(self.width, tones, |c| c > PLAIN))
+            }
+        }
+        self.layers.push(layer);
+        self.notes.append(&mut notes);
+    }
+}
+
+/// A layer from its coverage, and notes on it.
+fn layer(
+    scan: Scan,
+    name: &str,
+    named: names::Named,
+    plate: bool,
+    (width, length): (usize, usize),
+    options: &Options,
+) -> (Layer, Vec<String>) {
+    let mut notes = Vec::new();
+    match scan.by {
+        Coverage::Dark => {}
+        Coverage::Opaque => notes.push(format!("{name}: ink prints where the picture is not transparent")),
+        Coverage::DarkAndOpaque => notes.push(format!(
+            "{name}: several colours on a transparent background; ink prints where they are dark, and the light parts are \
+             left out"
+        )),
+    }
+    let toned = plate && named.ink.kind() == Kind::Process && has_tones(&scan.coverage);
+    if toned {
+        notes.push(format!("{name}: the plate has tones, so it is halftoned"));
+    }
+    let tones = toned || options.halftone.contains(named.ink);
+    if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
+        notes.push(format!(
+            "{name}: resampled from {} to {width} x {length} dots; draw at 600 dpi to keep edges exactly as drawn",
+            scan.size()
+        ));
+    }
+    if !tones && let Some(note) = soft_edges(name, &scan.coverage) {
+        notes.push(note);
+    }
+    let coverage = resample::average(scan.coverage, (scan.width, scan.height), (width, length));
+    let layer =
+        Layer { ink: named.ink, name: name.into(), place: named.place, shape: shape(width, coverage, tones) };
+    if let Shape::Solid(plane) = &layer.shape
+        && plane.dots() == 0
+    {
+        notes.push(format!("{}: no pixel is dark enough to be ink; draw layers in black", layer.name));
+    }
+    (layer, notes)
+}
+
+/// Coverage as a layer's shape.
+fn shape(width: usize, coverage: Vec<u8>, tones: bool) -> Shape {
+    if tones {
+        Shape::Tone(coverage)
+    } else {
+        Shape::Solid(bits::from_bytes(width, &coverage, |c| c >= THRESHOLD))
+    }
+}
+
+/// A note on pixels that are neither plainly ink nor plainly paper, if there are any.
+fn soft_edges(name: &str, coverage: &[u8]) -> Option<String> {
+    let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
+    let inked = coverage.par_iter().filter(|c| (THRESHOLD..255 - PLAIN).contains(c)).count();
+    let share = 100.0 * between as f64 / coverage.len().max(1) as f64;
+    let advice = if share > 5.0 { "; if they are tones rather than edges, halftone this layer" } else { "" };
+    (between > 0).then(|| {
+        format!(
+            "{name}: {between} pixels ({share:.2} %) are neither ink nor paper, such as anti-aliased edges; {inked} of \
+             them are dark enough to be ink, and the others are left out{advice}"
+        )
+    })
+}
+
+/// Whether coverage has tones rather than soft edges: more than a twentieth of all pixels with ink are partly covered.
+fn has_tones(coverage: &[u8]) -> bool {
+    let inked = coverage.par_iter().filter(|&&c| c > PLAIN).count();
+    let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
+    20 * between > inked
+}

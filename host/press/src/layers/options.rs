@@ -1,0 +1,68 @@
+//! Options of the readers of art.
+
+use inks::InkSet;
+use protocol::ink::Ink;
+
+use crate::layout::Size;
+
+/// How to read art.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Size on paper; overrides the size in the file.
+    pub size: Option<Size>,
+    /// Resolution in pixels per inch; overrides the resolution in the file.
+    pub dpi: Option<f64>,
+    /// Whether the vendor's reserved colours stand for their inks.
+    pub reserved: bool,
+    /// Largest difference of red, green and blue from a reserved colour; `None` for each ink's own tolerance.
+    pub tolerance: Option<u8>,
+    /// Page of a PDF or PostScript file, from 1.
+    pub page: u32,
+    /// Layers to halftone, so that they keep their tones; all others are ink or paper.
+    pub halftone: InkSet,
+    /// The inks that reserved colours may stand for.
+    pub inks: InkSet,
+    /// Room on the page: art without a size of its own is fitted to it.
+    pub room: Room,
+}
+
+/// Room for art on a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Dots across.
+    pub width: usize,
+    /// Dots down.
+    pub length: usize,
+    /// Whether art may be larger because the page crops it.
+    pub cut: bool,
+}
+
+impl Default for Room {
+    /// The largest page, without cropping.
+    fn default() -> Room {
+        let (width, length) = protocol::paper::LARGEST;
+        Room { width: width.into(), length: length.into(), cut: false }
+    }
+}
+
+impl Options {
+    /// The same options for art whose size does not depend on pixels. The layout judges whether it fits the page.
+    pub(super) fn sized(&self) -> Options {
+        Options { room: Room { cut: true, ..self.room }, ..self.clone() }
+    }
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options {
+            size: None,
+            dpi: None,
+            reserved: false,
+            tolerance: None,
+            page: 1,
+            halftone: InkSet::EMPTY,
+            inks: InkSet::default().with(Ink::White),
+            room: Room::default(),
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! A picture as art: transparency, reserved colours, and colour for the process inks.
+//!
+//! Method: the picture is brought to sRGB by its embedded profile and laid on white by its transparency. Reserved colours
+//! become layers if the options say so; whatever else is not white is colour.
+//! Cost: four bytes a pixel, and some nanoseconds. Limits: 8 bits a channel.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use image::DynamicImage;
+use moxcms::{ColorProfile, DataColorSpace, Layout, TransformOptions};
+use rayon::prelude::*;
+
+use super::artwork::Artwork;
+use super::colour::Colour;
+use super::decode::decode;
+use super::error::{LayersError, io, wrong};
+use super::options::Options;
+use super::resolution::Dpi;
+use super::size::{self, Unstated};
+use super::{bits, resample, reserved};
+use crate::separate::Plane;
+
+/// A picture in sRGB with straight alpha.
+pub(super) struct Pixels {
+    pub path: PathBuf,
+    pub width: u32,
+    pub height: u32,
+    pub dpi: Option<Dpi>,
+    /// Red, green, blue, opacity.
+    pub rgba: Vec<u8>,
+    pub notes: Vec<String>,
+}
+
+/// Reads a picture and converts its colours to sRGB.
+pub(super) fn read(path: &Path) -> Result<Pixels, LayersError> {
+    let file = File::open(path).map_err(io(path, "open it"))?;
+    let decoded = decode(path, BufReader::new(file))?;
+    let (width, height) = (decoded.image.width(), decoded.image.height());
+    let mut notes = Vec::new();
+    let deep = matches!(
+        decoded.image,
+        DynamicImage::ImageLuma16(_)
+            | DynamicImage::ImageLumaA16(_)
+            | DynamicImage::ImageRgb16(_)
+            | DynamicImage::ImageRgba16(_)
+    );
+    if deep {
+        notes.push(format!("{}: 16 bits per channel are reduced to 8", path.display()));
+    }
+    let grey = !decoded.image.color().has_color();
+    let mut rgba = decoded.image.into_rgba8().into_raw();
+    if let Some(profile) = decoded.profile {
+        notes.extend(to_srgb(path, &profile, grey, &mut rgba)?);
+    }
+    Ok(Pixels { path: path.to_path_buf(), width, height, dpi: decoded.dpi, rgba, notes })
+}
+
+/// Applies an embedded profile, and returns a note if that changed anything. `grey` marks pixels of a greyscale file.
+pub(super) fn to_srgb(
+    path: &Path,
+    profile: &[u8],
+    grey: bool,
+    rgba: &mut [u8],
+) -> Result<Option<String>, LayersError> {
+    let Ok(profile) = ColorProfile::new_from_slice(profile) else {
+        return Ok(Some(format!("{}: its colour profile is damaged, so it is read as sRGB", path.display())));
+    };
+    let of_grey = match profile.color_space {
+        DataColorSpace::Rgb => false,
+        DataColorSpace::Gray if grey => true,
+        other => {
+            return Err(wrong(
+                path,
+                format!(
+                    "its colour profile is for {other:?}, but its pixels are not; convert the picture to sRGB"
+                ),
+            ));
+        }
+    };
+    let srgb = ColorProfile::new_srgb();
+    let bad =
+        |error| wrong(path, format!("its colour profile cannot be applied ({error}); convert it to sRGB"));
+    let layout = if of_grey { Layout::GrayAlpha } else { Layout::Rgba };
+    let transform = profile
+        .create_transform_8bit(layout, &srgb, Layout::Rgba, TransformOptions::default())
+        .map_err(bad)?;
+    let mut changed = false;
+    let mut line = vec![0; 4 << 12];
+    let mut greys = Vec::new();
+    for pixels in rgba.chunks_mut(4 << 12) {
+        let line = &mut line[..pixels.len()];
+        if of_grey {
+            greys.clear();
+            greys.extend(pixels.as_chunks::<4>().0.iter().flat_map(|&[v, _, _, alpha]| [v, alpha]));
+        }
+        transform.transform(if of_grey { &greys } else { &*pixels }, line).map_err(bad)?;
+        changed |= pixels != line;
+        pixels.copy_from_slice(line);
+    }
+    Ok(changed.then(|| format!("{}: its colour profile was applied", path.display())))
+}
+
+/// Art from a page in memory, drawn at `dpi` pixels per inch: sRGB without transparency, three bytes a pixel, row by row
+/// from the top.
+///
+/// # Errors
+/// `rgb` of another length than `size`, or a side of no dots or of more than 65535.
+pub fn page(
+    name: &str,
+    size: (usize, usize),
+    dpi: u16,
+    rgb: Vec<u8>,
+    options: &Options,
+) -> Result<Artwork, LayersError> {
+    let problem = || {
+        wrong(
+            Path::new(name),
+            format!("the page is {} x {} pixels; expected 1 to 65535 dots on a side", size.0, size.1),
+        )
+    };
+    if Some(rgb.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(3)) {
+        return Err(problem());
+    }
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
+    let dots = size::page_dots(size, dpi.into()).ok_or_else(problem)?;
+    Ok(opaque_artwork(name, name, (side(size.0)?, side(size.1)?), dots, rgb, options))
+}
+
+/// Art from one picture: reserved colours as layers if the options say so, the rest as colour.
+pub(super) fn artwork(name: &str, mut pixels: Pixels, options: &Options) -> Result<Artwork, LayersError> {
+    let sides = (f64::from(pixels.width), f64::from(pixels.height));
+    let unstated = if options.reserved { Unstated::PixelPerDot } else { Unstated::FillRoom };
+    let dots = size::dots(&pixels.path, sides, pixels.dpi, unstated, options, &mut pixels.notes)?;
+    Ok(artwork_of(name, pixels, dots, options))
+}
+
+/// The same at a known size in dots.
+pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
+    let Pixels { path, width, height, mut rgba, notes, .. } = pixels;
+    let size = (width, height);
+    let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
+    let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 0));
+    rgba.par_chunks_exact_mut(4).for_each(|p| {
+        let alpha = u32::from(p[3]);
+        for v in &mut p[..3] {
+            *v = ((u32::from(*v) * alpha + 255 * (255 - alpha) + 127) / 255) as u8;
+        }
+    });
+    let mut rgb = rgba;
+    // In place: three bytes of a pixel never lie after its four.
+    for at in 0..rgb.len() / 4 {
+        rgb.copy_within(4 * at..4 * at + 3, 3 * at);
+    }
+    rgb.truncate(rgb.len() / 4 * 3);
+    let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
+    let mut art = opaque_artwork(name, &file, size, dots, rgb, options);
+    art.opaque = opaque;
+    art.notes.splice(..0, notes);
+    art
+}
+
+/// Art from pixels without transparency, three bytes each. `file` is what notes call it.
+fn opaque_artwork(
+    name: &str,
+    file: &str,
+    size: (u32, u32),
+    dots: (usize, usize),
+    mut rgb: Vec<u8>,
+    options: &Options,
+) -> Artwork {
+    let drawn = plane_of::<3>(&rgb, size, dots, |p| *p != [255; 3]);
+    let (mut layers, mut notes) = (Vec::new(), Vec::new());
+    if options.reserved {
+        let found = reserved::take(&mut rgb, size, dots, options);
+        notes.extend(found.notes(file));
+        layers = found.layers;
+    }
+    let white = |bytes: &[u8]| bytes.iter().fold(255, |all, byte| all & byte) == 255;
+    let colour = rgb.par_chunks(1 << 12).any(|bytes| !white(bytes)).then(|| {
+        let full = Colour { width: size.0 as usize, height: size.1 as usize, rgb };
+        full.averaged(dots)
+    });
+    let (width, length) = dots;
+    Artwork { name: name.into(), width, length, layers, colour, drawn, opaque: None, notes }
+}
+
+/// The dots whose pixel of `N` bytes satisfies `is`.
+fn plane_of<const N: usize>(
+    pixels: &[u8],
+    size: (u32, u32),
+    dots: (usize, usize),
+    is: impl Fn(&[u8; N]) -> bool + Sync,
+) -> Plane {
+    let pixels = pixels.as_chunks::<N>().0;
+    if (size.0 as usize, size.1 as usize) == dots {
+        return bits::from(dots.0, pixels, is);
+    }
+    let bytes: Vec<u8> = pixels.par_iter().map(|pixel| u8::from(is(pixel))).collect();
+    bits::from_bytes(dots.0, &resample::nearest(bytes, size, dots), |byte| byte > 0)
+}
