@@ -30,6 +30,8 @@ const MOST_CURVE_BYTES: u64 = 16 << 20;
 const CALIBRATION: f64 = 1.05;
 
 type Found = (Option<Library>, Vec<Problem>);
+/// A library's folder, and what reads the built-in library it may be based on.
+type Folder<'a> = (&'a Path, fn() -> Library);
 
 /// Reads `folder/library.toml`, which may be based on the built-in library.
 pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
@@ -64,7 +66,7 @@ struct Listing {
 
 /// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
 /// text itself has no folder.
-pub(crate) fn parse(text: &str, file: &Path, folder: Option<(&Path, fn() -> Library)>) -> Found {
+pub(crate) fn parse(text: &str, file: &Path, folder: Option<Folder<'_>>) -> Found {
     let mut findings = Findings { text, file: file.to_path_buf(), found: Vec::new() };
     let parsed = match toml::from_str::<File>(text) {
         Ok(parsed) => parsed,
