@@ -1,7 +1,5 @@
 //! The port's driver on simulated pins in virtual time, between the engine and a printer.
 
-mod model;
-
 use bridge::driver::Event;
 use bridge::port::Timing;
 use bridge::printer_class::DeviceId;

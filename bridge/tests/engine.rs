@@ -1,7 +1,5 @@
 //! The engine on a good link: what it answers, what it refuses, how it ends a job.
 
-mod model;
-
 use bridge::engine::{Engine, LOCAL, Outcome, Task};
 use model::{IDENTITY, Job, NONE, Planes, framed, is_a_whole_job, memory, run, seeded};
 use proptest::prelude::*;

@@ -1,8 +1,6 @@
 //! Whatever happens to the link, the host, the bridge and the printer: the bytes at the port are those of an
 //! undisturbed run.
 
-mod model;
-
 use model::{ALL, Job, Mischief, NONE, is_a_whole_job, run, seeded};
 use protocol::link::message::JobState;
 use rand::RngExt;

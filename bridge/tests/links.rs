@@ -1,7 +1,5 @@
 //! Two ways to one engine, and the engine's work in turns.
 
-mod model;
-
 use bridge::engine::Engine;
 use bridge::links::{Links, Way};
 use bridge::turn::{self, Turn};

@@ -1,7 +1,5 @@
 //! The ordinary printer: packets of an operating system, with an engine behind them and a printer that is a list.
 
-mod model;
-
 use bridge::engine::{Engine, LOCAL};
 use bridge::printer_class::{End, Intake, Next, PACKET};
 use model::{IDENTITY, Job, framed, is_a_whole_job, memory, seeded};

@@ -25,7 +25,7 @@
 //! After the fault is mended the user goes on: with the next job, after a SIGKILL with the same one, after `refused` with
 //! `foilpress bridge reset`, after `held` by releasing the job; until a job was sent. `½` is then always followed by `R`.
 
-use crate::process::{program, random_job};
+use crate::process::random_job;
 use device::printers::{Printer, Printers};
 use device::send::journal::{Journal, NewJob};
 use foilpress_tests::served::{Bridge, Port};
@@ -40,6 +40,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+use testing::program::{path as program, small_document};
 
 /// Who has a job sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -155,6 +156,7 @@ impl Bench {
         // Only root may do so; otherwise both users are the same, with journals of their own.
         let _ = chown(path("user-1"), Some(NOBODY), None);
         fs::write(path("job.rgl"), random_job(8)).unwrap();
+        small_document(&path("tile"));
         let port = Port::new(&[Ink::White], 700);
         port.one_way.store(true, Ordering::Relaxed);
         let bridge = Bridge::on_unix(&path("bridge"), port).unwrap();
@@ -218,7 +220,7 @@ impl Bench {
             Send | TwoUsers => self.start(&["send", "job.rgl", "--to", &to]),
             Print => {
                 let place = ["--size", "12x9mm", "--paper", "postcard", "-o", "out.print"];
-                let arguments = [&["print", "sample:leaf"], &place[..], &["--yes", "--to", &to]].concat();
+                let arguments = [&["print", "tile"], &place[..], &["--yes", "--to", &to]].concat();
                 self.start(&arguments)
             }
             Resume => {

@@ -1,9 +1,6 @@
 //! Host, bridge and printer joined in memory: whatever happens between them, the bytes at the printer are those of an
 //! undisturbed run.
 
-#[path = "../../../bridge/tests/model/mod.rs"]
-mod model;
-
 #[cfg(unix)]
 mod faults;
 mod paper;

@@ -1,12 +1,12 @@
 //! From a document to the paper, over a bad link, to a printer with an absent-minded operator.
 
 use crate::EVERYTHING;
-use crate::model::{ALL, Job, seeded};
 use crate::wire::{self, World};
 use appearance::document::{self, Options};
 use appearance::{factor, gamut};
 use device::send::session::Outcome;
 use device::send::streams;
+use model::{ALL, Job, seeded};
 use observe::Silent;
 use press::job::Handling;
 use press::layout::Layout;

@@ -1,6 +1,5 @@
 //! Real processes, a real socket, a real journal: the sender is killed with SIGKILL again and again.
 
-use crate::model::{Planes, is_a_whole_job, seeded};
 use device::send::journal::{Journal, NewJob};
 use device::send::query::{Query, QueryError, Reply};
 use device::send::session::{Outcome, Phase, Session};
@@ -8,6 +7,7 @@ use device::send::status::Status;
 use device::send::transport::{Transport, pair};
 use device::send::{self, Address, streams};
 use foilpress_tests::served::{Bridge, Port};
+use model::{Planes, is_a_whole_job, seeded};
 use observe::Silent;
 use press::job::stream::write_job;
 use press::separate::{Pass, Plane};
@@ -19,9 +19,9 @@ use rand::RngExt;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::OnceLock;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use testing::program::path as program;
 
 /// Says in the child what it is to send.
 const ROLE: &str = "FOILPRESS_TEST_SENDER";
@@ -170,22 +170,6 @@ impl Bench {
         assert_eq!(output.status.code(), Some(code), "{args}: {said}");
         said
     }
-}
-
-/// The program as it stands; built if need be.
-pub fn program() -> &'static Path {
-    static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| {
-        let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--locked", "--package", "foilpress", "--bin", "foilpress"]);
-        if !cfg!(debug_assertions) {
-            build.arg("--release");
-        }
-        assert!(build.status().unwrap().success(), "the program cannot be built");
-        // Beside the folder this test stands in.
-        let tests = std::env::current_exe().unwrap();
-        tests.ancestors().nth(2).unwrap().join("foilpress")
-    })
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! The host's real session and the bridge's real engine with a bad wire, a bad port and accidents between them, in
 //! virtual time.
 
-use crate::model::{Board, Damages, Job, Mischief, chance, damage};
 use bridge::engine::{Checkpoint, Engine, Identity, Outcome as Done, Task};
 use device::send::session::{Outcome, Record, Session, SessionError};
+use model::{Board, Damages, Job, Mischief, chance, damage};
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};
 use rand::RngExt;

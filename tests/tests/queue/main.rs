@@ -1,9 +1,6 @@
 //! A real print server, the program as its backend and filter, a bridge on a socket: what users of a queue do and see.
 #![cfg(unix)]
 
-#[path = "../../../bridge/tests/model/mod.rs"]
-mod model;
-
 mod bridge;
 mod server;
 mod system;

@@ -1,6 +1,5 @@
 //! The stage as a whole, on synthetic documents with known results and on real textures.
 
-
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -332,10 +332,7 @@ mod tests {
 
     #[test]
     fn real_streams_that_are_taken_come_back_byte_for_byte() {
-        let Some(folder) = std::env::var_os("FOILPRESS_GOLDEN") else {
-            println!("skipped: FOILPRESS_GOLDEN names no folder of streams");
-            return;
-        };
+        let Some(folder) = testing::needs::golden() else { return };
         let (mut taken, mut all) = (0, 0);
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();

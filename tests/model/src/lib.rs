@@ -1,5 +1,6 @@
 //! Both ends of the link in memory: a small host, a wire that misbehaves, a port with an absent-minded operator.
-#![allow(dead_code)]
+#![forbid(unsafe_code)]
+#![allow(missing_docs, reason = "a model for tests, read beside them")]
 
 pub mod bench;
 

@@ -1,6 +1,6 @@
 //! The whole bridge in virtual time: frames go in at one end, a printer stands at the other.
 
-use super::{Board, IDENTITY, framed};
+use crate::{Board, IDENTITY, framed};
 use bridge::driver::Driver;
 use bridge::engine::{Checkpoint, Engine};
 use bridge::port::Port;
