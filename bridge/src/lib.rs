@@ -29,6 +29,7 @@ pub mod port;
 pub mod printer_class;
 mod ring;
 #[cfg(any(test, feature = "simulation"))]
+#[allow(clippy::cast_possible_truncation, reason = "the simulation counts bytes of tests")]
 pub mod simulation;
 mod streams;
 pub mod turn;

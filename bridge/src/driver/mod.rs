@@ -185,8 +185,7 @@ where
 
     /// Sends some bytes by the processor.
     fn send(&mut self, engine: &mut Engine<'_>) -> u32 {
-        // The port's clock may wrap.
-        let now_ms = (self.board.now_us() / 1000) as u32;
+        let now_ms = wrapping_ms(self.board.now_us());
         let output = engine.output();
         let (mut count, mut stop) = (0, None);
         for byte in &output[..output.len().min(HANDFUL)] {
@@ -333,7 +332,7 @@ where
         let now_us = self.board.now_us();
         let ended = match question.step(now_us) {
             Step::Write(bytes) => {
-                let written = self.port.write(bytes, (now_us / 1000) as u32);
+                let written = self.port.write(bytes, wrapping_ms(now_us));
                 question.written(written, self.board.now_us())
             }
             Step::Read => {
@@ -390,4 +389,10 @@ where
             },
         }
     }
+}
+
+/// The port's clock in milliseconds, which may wrap.
+#[expect(clippy::cast_possible_truncation, reason = "the clock wraps after 49 days")]
+fn wrapping_ms(now_us: u64) -> u32 {
+    (now_us / 1000) as u32
 }

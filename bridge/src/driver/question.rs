@@ -73,7 +73,7 @@ impl StatusQuestion {
     /// For how many µs there is nothing to do.
     pub(crate) fn pause_us(&self, now_us: u64) -> u32 {
         // At most the pause between two attempts.
-        self.due_us.saturating_sub(now_us) as u32
+        u32::try_from(self.due_us.saturating_sub(now_us)).unwrap_or(u32::MAX)
     }
 
     /// What is to be done at `now_us`.

@@ -53,6 +53,7 @@ impl Timing {
 
     /// The divider of a clock of `clock_hz`, in 1/256, that makes a tick at least an eighth of the longest of these times:
     /// for senders that give each time eight ticks.
+    #[expect(clippy::cast_possible_truncation, reason = "at most 65.5 µs of cycles")]
     pub fn eighth(&self, clock_hz: u32) -> u32 {
         let longest = self.setup.max(self.strobe).max(self.hold).max(self.settle);
         // Whole clock cycles; one more, because a divider with a fraction may give eight ticks one cycle less than

@@ -38,6 +38,7 @@ impl DeviceId {
             return false;
         }
         // At most DEVICE_ID_MAX, so it fits both the two bytes and the room.
+        #[expect(clippy::cast_possible_truncation, reason = "at most DEVICE_ID_MAX")]
         let length = (text.len() + 2) as u16;
         self.0.clear();
         self.0.extend_from_slice(&length.to_be_bytes()).is_ok() && self.0.extend_from_slice(text).is_ok()
