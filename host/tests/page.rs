@@ -57,7 +57,7 @@ fn what_would_be_cut_is_refused_in_mm_before_the_long_work() {
     let said = bench.refused(1, &format!("print tile {SMALL} --at 1x20mm"));
     assert!(said.contains("2.4 mm at the left") && said.contains("--crop"), "{said}");
     let plan = bench.done(&format!("print tile {SMALL} -q --at 1x20mm --crop"));
-    assert!(plan.contains("cut off: 2.4 mm at the left"), "{plan}");
+    assert!(plan.contains("cut off beyond the printable area: 2.4 mm at the left"), "{plan}");
     for (args, word) in [
         ("--repeat 0x2", "3x4"),
         ("--gap -1mm", "0 or more"),

@@ -14,15 +14,18 @@ use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
 /// Commands that are not run here, by their first words, and why.
-const ELSEWHERE: [(&str, &str); 9] = [
+const ELSEWHERE: [(&str, &str); 12] = [
     ("foilpress bridge flash", "needs a board in its boot loader: tests/emulator/flash.rs"),
     ("foilpress queue", "changes the computer's print system: tests/queue/system.rs"),
-    ("lp ", "needs a print server: tests/queue/shown.rs"),
-    ("gs ", "needs Ghostscript: tests/queue/shown.rs"),
+    ("lp ", "needs a print server: tests/queue/main.rs"),
+    ("gs ", "is Ghostscript's own"),
     ("cargo ", "is the build itself, and the gate"),
     ("apt ", "is the system's own"),
     ("cat job.rgl > /dev/usb/lp0", "needs a printer; the program never opens such a device unasked"),
-    ("foilpress inspect page.md5k", "needs Ghostscript: tests/queue/shown.rs"),
+    ("foilpress inspect page.md5k", "needs Ghostscript: press::inspect::ghostscript"),
+    ("foilpress bridge list", "needs USB: tests/emulator/found.rs"),
+    ("foilpress resume", "needs an interrupted job: tests/link/process.rs, tests/emulator/main.rs"),
+    ("foilpress cancel", "needs an interrupted job: tests/link/process.rs, tests/emulator/main.rs"),
     ("foilpress generate", "is for packages: `cargo xtask package` runs it"),
 ];
 
@@ -194,7 +197,7 @@ impl Desk {
         assert!(failed.is_empty(), "{} of {ran} commands failed:\n{}", failed.len(), failed.join("\n"));
         // What was printed on the way was whole jobs, one after the other.
         let printed = self.bridge.printed();
-        for sheet in press::inspect::sheets(&printed) {
+        for sheet in press::inspect::sheets(&printed).into_iter().filter(|sheet| !sheet.is_empty()) {
             let found = press::inspect::inspect(&printed[sheet], &Silent).inspection;
             assert!(found.error.is_none() && found.complete, "at the port: {:?}", found.error);
         }

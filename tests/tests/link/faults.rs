@@ -24,6 +24,7 @@
 //!
 //! After the fault is mended the user goes on: with the next job, after a SIGKILL with the same one, after `refused` with
 //! `foilpress bridge reset`, after `held` by releasing the job; until a job was sent. `½` is then always followed by `R`.
+//! Where `|` stands, a quick bridge has ended the first job before the second user comes, and a slow one has not.
 
 use crate::process::random_job;
 use device::printers::{Printer, Printers};
@@ -36,6 +37,7 @@ use protocol::link::message::JobKind;
 use std::fs::{self, File};
 use std::os::unix::fs::{PermissionsExt as _, chown};
 use std::os::unix::process::CommandExt as _;
+use std::panic::catch_unwind;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -83,8 +85,8 @@ const TABLE: [(Fault, [&str; 5]); 11] = [
     (BridgeForgets,            ["unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "held ½, held ½, sent ½R1",    "unknown ½, refused ½, sent ½R1"]),
     (RestartBetweenSheets,     ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (KilledBeforeTheFirstByte, ["killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",            "killed 0, busy 0, sent 11"]),
-    (KilledInARow,             ["killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",            "killed ½, busy ½, sent 11"]),
-    (KilledAndForgotten,       ["killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, held ½, held ½, sent ½R1", "killed ½, refused ½, sent ½R1"]),
+    (KilledInARow,             ["killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",            "killed ½, busy ½, sent 11 | killed ½, sent 11"]),
+    (KilledAndForgotten,       ["killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, held ½, sent ½R1", "killed ½, refused ½, sent ½R1"]),
     (LinkLostAndBack,          ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (PaperOut,                 ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (SwitchedOff,              ["lost ½, sent ½R1",                "lost ½, sent ½R1",                "lost ½, sent ½R1",                "held ½, sent ½R1",            "lost ½, sent ½R1"]),
@@ -102,7 +104,11 @@ fn every_caller_meets_every_fault_and_the_printer_never_gets_half_a_job_and_then
             .iter()
             .map(|(fault, cells)| {
                 scope.spawn(move || {
-                    let tell = |(&caller, &cell)| (*fault, caller, cell, Bench::new(caller).story(*fault));
+                    let tell = |(&caller, &cell)| {
+                        // A story that breaks off hides no other.
+                        let told = catch_unwind(|| Bench::new(caller).story(*fault));
+                        (*fault, caller, cell, told.unwrap_or_else(|_| "broke off".to_owned()))
+                    };
                     CALLERS.iter().zip(cells).map(tell).collect::<Vec<_>>()
                 })
             })
@@ -112,7 +118,7 @@ fn every_caller_meets_every_fault_and_the_printer_never_gets_half_a_job_and_then
     let mut wrong = Vec::new();
     for (fault, caller, expected, told) in stories {
         println!("{fault:?}, {caller:?}: {told}");
-        if told != expected {
+        if expected.split(" | ").all(|allowed| told != allowed) {
             wrong.push(format!("{fault:?}, {caller:?}: {told}; expected {expected}"));
         }
     }
@@ -324,7 +330,7 @@ impl Bench {
         match fault {
             RestartBetweenSheets | ResetOwedByAnother => {}
             PaperOut | KilledBeforeTheFirstByte => {
-                self.until("no paper", &mut run, |_, run| run.said().contains("out of paper"));
+                self.until("no paper", &mut run, |_, run| run.is_out_of_paper());
             }
             _ => self.until_it_prints(&mut run),
         }
@@ -423,6 +429,13 @@ impl Run {
         let mut text = Vec::new();
         let _ = File::open(&self.log).and_then(|mut file| std::io::Read::read_to_end(&mut file, &mut text));
         String::from_utf8_lossy(&text).into_owned()
+    }
+
+    /// Whether the user was told of the job that the paper is out. Before the job the same words say why the loaded cartridges
+    /// are not known; then nothing is queued yet.
+    fn is_out_of_paper(&self) -> bool {
+        let said = self.said();
+        said.lines().any(|line| line.contains("the printer is out of paper") && !line.contains("not known"))
     }
 
     fn kill(&mut self) {

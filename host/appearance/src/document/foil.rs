@@ -356,7 +356,7 @@ mod tests {
         let path = folder.path().join("a.foil");
         write(&factored(3, 2, 2, 5), "a", None, &path).unwrap();
         std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
-        let error = read(&path, &Silent).unwrap_err().to_string();
+        let error = observe::with_causes(&read(&path, &Silent).unwrap_err());
         assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
     }
 

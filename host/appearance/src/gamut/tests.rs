@@ -401,7 +401,7 @@ fn inconsistent_inputs_are_errors() {
     assert_eq!(fails(&document, None, &short), GamutError::Curves { stacks: 56, curves: 57 });
     let mut other = printable.clone();
     other.curves = everything(&Space::half_angle(8)).curves;
-    assert!(fails(&document, None, &other).to_string().contains("24 columns"));
+    assert!(observe::with_causes(&fails(&document, None, &other)).contains("24 columns"));
     let pixels = field(&space, 3, 4);
     assert!(matches!(fails(&document, Some(&pixels), &printable), GamutError::Size { found_width: 3, .. }));
     let mut fewer = document.clone();

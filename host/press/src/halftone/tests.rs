@@ -222,5 +222,5 @@ fn contradictions_are_named() {
     assert!(error(&wrong, page, &settings).contains("1 rows of shares for 2"));
     let mut wrong = mix;
     wrong.stacks[0] = wrong.stacks[1].clone();
-    assert!(error(&wrong, page, &settings).contains("substrate first"));
+    assert!(error(&wrong, page, &settings).contains("the substrate comes first"));
 }

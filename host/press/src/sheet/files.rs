@@ -291,7 +291,7 @@ mod tests {
             ("width = 9", "width = 65535", "largest sheet"),
             ("\"custom\"", "\"a4\"", "a4 is 4800 x 6372"),
             ("\"custom\"", "\"a44\"", "`a44` is none of"),
-            ("\"substrate\", ", "", "substrate first"),
+            ("\"substrate\", ", "", "the substrate comes first"),
             ("\"substrate\"", "\"tin\"", "`tin`"),
             ("separation.png", "../separation.png", "picture: `../separation.png`"),
         ] {
