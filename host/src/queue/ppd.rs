@@ -1,4 +1,4 @@
-//! The printer description: papers with the margins the printer enforces, and the [`options`] of the
+//! The printer description: papers with the margins the printer enforces, and the `options` of the
 //! dialog, as a PPD file.
 //!
 //! Source: the PPD specification 4.3 and the print system's extensions to it (`cupsFilter2`, `cupsManualCopies`). The

@@ -3,7 +3,7 @@
 //! Problem: a job has to be printed once, as a whole, at a printer that is ready for it, and counted; whoever sends it, and
 //! whatever crashes meanwhile. The steps are the same for all senders: [journal](crate::send::journal), the reset the printer
 //! may [need](crate::printers), what the device says it is, pass streams where the bridge makes the same bytes of them,
-//! the [session](crate::send::session), the [ledger](crate::ledger), waiting for the sheet.
+//! the [session](crate::send::session), the [`ledger`], waiting for the sheet.
 //! Method: a [`Delivery`] does these steps. A [`Caller`] is told what happens, and decides what only a person or a rule can: a
 //! terminal asks, a queue holds the job, a script fails. A job passes through three states that are never mixed:
 //! *queued* (on disk, [`Delivery::queue`]), *sent* (every byte has crossed the port, [`Delivery::send`]) and *printed* (the

@@ -1,6 +1,6 @@
 //! One stack for every dot, in clusters large enough for the inks to hold (section 4.2 of the 2009 paper).
 //!
-//! Problem: a continuous mix of stacks becomes a [`DotMap`](crate::sheet::DotMap) whose local means are the mix, without any cluster
+//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, without any cluster
 //! smaller than the minimum cluster of its stack.
 //! Method: error diffusion along the band walk ([`protocol::walk`]) of the document's rectangle, by the rule in `rule` on
 //! the mix sampled by `mix`. The walk is cut into strips of 16 bands, which are diffused independently, so that all cores

@@ -59,7 +59,7 @@ pub fn save_plane(plane: &Plane, path: &Path) -> Result<(), FileError> {
     write_png(path, (plane.width, plane.length), Kind::Bits, &bits)
 }
 
-/// Writes [`TEXT`] and a picture of each pass into a folder that exists, the text last.
+/// Writes `passes.toml` and a picture of each pass into a folder that exists, the text last.
 pub fn save(separation: &Separation, folder: &Path) -> Result<(), FileError> {
     separation
         .passes
