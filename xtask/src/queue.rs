@@ -9,8 +9,9 @@ use anyhow::{Result, bail};
 use crate::{cargo, command};
 
 /// Programs the tests start, and the packages they are in.
-const NEEDED: [(&str, &str); 7] = [
+const NEEDED: [(&str, &str); 8] = [
     ("/usr/sbin/cupsd", "cups-daemon"),
+    ("/usr/lib/cups/daemon/cups-deviced", "cups"),
     ("/usr/bin/lp", "cups-client"),
     ("/usr/bin/ipptool", "cups-ipp-utils"),
     ("/usr/lib/cups/filter/pdftopdf", "cups-filters"),

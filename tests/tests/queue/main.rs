@@ -254,7 +254,7 @@ fn spot_colours_that_name_inks_are_printed_in_them_and_others_in_process_inks() 
     let wanted = wanted.to_str().unwrap();
     let refused = server.print(&["-d", "Alps", "-o", CARD_MEDIA, wanted]);
     assert_ne!(server.wait_for_job(refused), "completed");
-    assert!(server.log().contains("-o FoilpressFoils=On"), "{}", server.log());
+    assert!(server.log().contains("FoilpressFoils=On"), "{}", server.log());
     assert_eq!(bridge.printed().len(), before);
     server.say("cupsenable", &["Alps"]);
     let asked = server.print(&["-d", "Alps", "-o", CARD_MEDIA, "-o", "FoilpressFoils=On", wanted]);
