@@ -1,4 +1,5 @@
-//! Every command that the README, the guides and the help show, run as it stands.
+//! Commands that the README, the guides and the help show, run as they stand. Those that take minutes are ignored, and run
+//! only when asked for.
 //!
 //! A document's commands run in order, in a copy of the folders that it speaks of, so that later lines find what earlier
 //! ones made. What goes to a bridge goes to one that this test serves: only the address is another. [`ELSEWHERE`] names the
