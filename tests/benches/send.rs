@@ -31,7 +31,7 @@ fn main() {
     divan::main();
 }
 
-/// The page as a job. Seven cassettes are the most, so one ink is used twice.
+/// The page as a job. Seven cartridges are the most, so one ink is used twice.
 fn job() -> &'static [u8] {
     static JOB: OnceLock<Vec<u8>> = OnceLock::new();
     JOB.get_or_init(|| {

@@ -43,16 +43,16 @@ pub struct Port {
     pub garbage: AtomicBool,
     /// The bridge's power goes, and its memory with it.
     pub forget: AtomicBool,
-    /// The cassettes that are in.
-    cassettes: Vec<Cartridge>,
+    /// The cartridges that are in.
+    cartridges: Vec<Cartridge>,
     /// Bytes of memory for bands.
     band: usize,
     stop: AtomicBool,
 }
 
 impl Port {
-    /// A printer with these cassettes that takes so many bytes a millisecond.
-    pub fn new(cassettes: &[Ink], rate: usize) -> Port {
+    /// A printer with these cartridges that takes so many bytes a millisecond.
+    pub fn new(cartridges: &[Ink], rate: usize) -> Port {
         Port {
             printed: Mutex::default(),
             rate: rate.into(),
@@ -67,7 +67,7 @@ impl Port {
             cut: false.into(),
             garbage: false.into(),
             forget: false.into(),
-            cassettes: cassettes.iter().copied().map(Cartridge::from).collect(),
+            cartridges: cartridges.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
             stop: false.into(),
         }
@@ -79,7 +79,7 @@ impl Port {
     }
 
     fn status(&self) -> [u8; STATUS_LENGTH] {
-        let carousel = Carousel::new(&self.cassettes).expect("at most seven cassettes");
+        let carousel = Carousel::new(&self.cartridges).expect("at most seven cartridges");
         let mut printer = Printer::new(carousel, Lever::Auto);
         if is(&self.open_cover) {
             printer.strike(Trouble::CoverOpen);

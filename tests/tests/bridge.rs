@@ -114,8 +114,8 @@ fn the_job_after_a_cancelled_one_prints_on_the_same_printer() {
     let passes = separate(&sheet, &[], &Silent).unwrap().passes;
     let data = streams(&passes);
     let whole = bridged(&data, None).0;
-    let cassettes = INKS.map(Cartridge::from);
-    let mut printer = Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto);
+    let cartridges = INKS.map(Cartridge::from);
+    let mut printer = Printer::new(Carousel::new(&cartridges).unwrap(), Lever::Auto);
     for eighth in 0..8 {
         let (printed, state) = bridged(&data, Some(1 + whole.len() * eighth / 8));
         assert_eq!(state, JobState::Cancelled);

@@ -1,5 +1,4 @@
-//! Commands that the README, the guides and the help show, run as they stand. Those that take minutes are ignored, and run
-//! only when asked for.
+//! Commands that the README, the guides and the help show, run as they stand.
 //!
 //! A document's commands run in order, in a copy of the folders that it speaks of, so that later lines find what earlier
 //! ones made. What goes to a bridge goes to one that this test serves: only the address is another. [`ELSEWHERE`] names the
@@ -15,7 +14,7 @@ use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
 /// Commands that are not run here, by their first words, and why.
-const ELSEWHERE: [(&str, &str); 12] = [
+const ELSEWHERE: [(&str, &str); 16] = [
     ("foilpress bridge flash", "needs a board in its boot loader: tests/emulator/flash.rs"),
     ("foilpress queue", "changes the computer's print system: tests/queue/system.rs"),
     ("lp ", "needs a print server: tests/queue/main.rs"),
@@ -27,6 +26,10 @@ const ELSEWHERE: [(&str, &str); 12] = [
     ("foilpress bridge list", "needs USB: tests/emulator/found.rs"),
     ("foilpress resume", "needs an interrupted job: tests/link/process.rs, tests/emulator/main.rs"),
     ("foilpress cancel", "needs an interrupted job: tests/link/process.rs, tests/emulator/main.rs"),
+    ("foilpress bridge status --watch", "runs until Ctrl-C: tests/emulator/care.rs"),
+    ("foilpress bridge log", "needs the firmware's debug data: tests/emulator/care.rs"),
+    ("foilpress bridge test", "needs a loop-back plug, or no printer: tests/emulator/care.rs"),
+    ("foilpress doctor", "judges the whole computer: tests/emulator/main.rs"),
     ("foilpress generate", "is for packages: `cargo xtask package` runs it"),
 ];
 
@@ -133,19 +136,15 @@ impl Desk {
         fs::write(&device, "").unwrap();
         command = command.replace("/dev/usb/lp0", &device.display().to_string());
         // Without an address the program looks for the only bridge on USB.
-        for words in [
-            "foilpress bridge reset",
-            "foilpress bridge status",
-            "foilpress bridge log",
-            "foilpress bridge test",
-        ] {
-            if command.starts_with(words) && !command.contains("--to") {
-                command = format!("{command} --to {}", self.address);
-            }
+        let is_of_a_bridge = ["foilpress bridge reset", "foilpress bridge status"]
+            .iter()
+            .any(|words| command.starts_with(words));
+        if is_of_a_bridge && !command.contains("--to") && !command.contains("--by-hand") {
+            command = format!("{command} --to {}", self.address);
         }
         // Nobody is there to answer.
         if command.contains("--to tcp:")
-            && ["foilpress print", "foilpress send", "foilpress layers"]
+            && ["foilpress print", "foilpress chart", "foilpress layers"]
                 .iter()
                 .any(|words| command.starts_with(words))
             && !command.contains("--yes")
@@ -215,13 +214,11 @@ fn document(name: &str) {
 }
 
 #[test]
-#[ignore = "takes minutes; not seen to pass yet"]
 fn the_readme() {
     document("README.md");
 }
 
 #[test]
-#[ignore = "takes minutes; not seen to pass yet"]
 fn the_guide() {
     document("docs/guide.md");
 }
@@ -237,7 +234,6 @@ fn decals() {
 }
 
 #[test]
-#[ignore = "takes minutes; not seen to pass yet"]
 fn pages() {
     document("docs/guide/page.md");
 }
@@ -284,6 +280,62 @@ fn no_document_with_commands_is_left_out() {
     }
 }
 
+/// The program's sources as its messages read: continued strings joined, `…` for what is filled in.
+fn messages() -> String {
+    let mut folders = vec![root().join("host")];
+    let mut text = String::new();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() && !path.ends_with("target") {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                text.push_str(&fs::read_to_string(path).unwrap());
+            }
+        }
+    }
+    let mut joined = String::new();
+    for (at, piece) in text.split("\\\n").enumerate() {
+        joined.push_str(if at == 0 { piece } else { piece.trim_start() });
+    }
+    let mut pieces = joined.replace("\\\"", "\"").split('{').map(str::to_owned).collect::<Vec<_>>();
+    for piece in pieces.iter_mut().skip(1) {
+        // Braces around code hold lines or strings.
+        if let Some((_, after)) = piece.split_once('}').filter(|(name, _)| !name.contains(['\n', '"'])) {
+            *piece = format!("…{after}");
+        }
+    }
+    pieces.concat()
+}
+
+/// What documents quote in their tables of messages and symptoms is what the program says.
+#[test]
+fn quoted_messages_are_those_of_the_program() {
+    let messages = messages();
+    let (mut strange, mut quoted) = (Vec::new(), 0);
+    for (name, _) in DOCUMENTS {
+        let mut is_table = false;
+        for line in fs::read_to_string(root().join(name)).unwrap().lines() {
+            is_table = line.starts_with("| message")
+                || line.starts_with("| symptom")
+                || is_table && line.starts_with('|');
+            let Some(cell) = line.split('|').nth(1).filter(|_| is_table) else { continue };
+            let quotes = cell.split(['`', '"']).skip(1).step_by(2).filter(|quote| !quote.starts_with("--"));
+            for part in quotes.flat_map(|quote| quote.split(|c: char| c == '…' || c.is_ascii_digit())) {
+                let part = part.trim_matches([' ', ',', '.', ':']);
+                if part.chars().count() >= 8 && !part.starts_with("foilpress") {
+                    quoted += 1;
+                    if !messages.contains(part) {
+                        strange.push(format!("{name}: {part}"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(quoted > 30, "only {quoted} quotations were found");
+    assert!(strange.is_empty(), "no message says:\n{}", strange.join("\n"));
+}
+
 /// The examples of a command's help and of its subcommands'.
 fn examples(words: &str, found: &mut Vec<String>) {
     let output = Command::new(program::path()).args(words.split_whitespace()).arg("--help").output().unwrap();
@@ -324,21 +376,53 @@ fn disc(path: &Path) {
     picture.save(path).unwrap();
 }
 
-/// Files that the examples of the help name.
-fn files_of_the_examples(folder: &Path) {
+/// A drawing with a layer for each of two inks.
+const DRAWING: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm" viewBox="0 0 30 20">
+<g id="gold"><circle cx="10" cy="10" r="8" fill="#c90"/></g>
+<g id="black"><path d="M18 3h9v14h-9z" stroke="#000" fill="none"/></g>
+</svg>"##;
+
+/// A page in plain colours.
+const PAGE: &str = "%!PS
+<< /PageSize [85 57] >> setpagedevice
+0 0 0.6 setrgbcolor 10 10 65 37 rectfill 1 0.8 0 setrgbcolor 20 20 20 17 rectfill
+showpage
+";
+
+/// A material without maps.
+const HELMET: &str = r#"{"asset": {"version": "2.0"}, "materials": [{"name": "brass", "pbrMetallicRoughness":
+{"baseColorFactor": [0.8, 0.6, 0.2, 1], "metallicFactor": 1, "roughnessFactor": 0.4}}]}"#;
+
+/// Files, a preset and a profile that the examples of the help name.
+fn files_of_the_examples(desk: &Desk) {
+    let folder = desk.folder.path();
     small_document(&folder.join("my-material"));
-    for ink in ["white", "gold", "black", "cyan", "01-white", "02-gold"] {
+    for ink in ["white", "gold", "black"] {
         disc(&folder.join(format!("{ink}.png")));
+    }
+    copy(&folder.join("docs/guide/decal"), &folder.join("decal"));
+    copy(&root().join("inks/library"), &folder.join("my-library"));
+    fs::copy(folder.join("docs/guide/reserved/art.png"), folder.join("art.png")).unwrap();
+    image::open(folder.join("docs/pictures/leaf-sheet.jpg")).unwrap().save(folder.join("photo.png")).unwrap();
+    fs::write(folder.join("art.svg"), DRAWING).unwrap();
+    fs::write(folder.join("page.ps"), PAGE).unwrap();
+    fs::write(folder.join("helmet.gltf"), HELMET).unwrap();
+    for command in [
+        "gs -q -dBATCH -dNOPAUSE -sDEVICE=pdfwrite -sOutputFile=decal.pdf page.ps",
+        "foilpress layers white.png --to file:job.rgl",
+        "foilpress preset save decal --media film --mirror --paper postcard",
+        "foilpress profile set default --cross 20.4x29.7mm --distance 200.3mm",
+    ] {
+        desk.run(command, folder).unwrap();
     }
 }
 
 #[test]
-#[ignore = "takes minutes; not seen to pass yet"]
 fn the_examples_of_the_help() {
     let mut commands = Vec::new();
     examples("", &mut commands);
     assert!(commands.len() > 30, "only {} examples were found", commands.len());
     let desk = Desk::new();
-    files_of_the_examples(desk.folder.path());
+    files_of_the_examples(&desk);
     desk.run_all(".", &commands);
 }

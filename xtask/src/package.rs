@@ -168,6 +168,9 @@ fn check(package: &Path, tree: &Path) -> Result<()> {
 const INSTALLED: [&str; 3] =
     ["/usr/bin/foilpress", "/usr/lib/cups/backend/foilpress", "/usr/lib/cups/filter/foilpress"];
 
+/// What all users of the machine share: made by the package, removed with it when it is purged.
+const STATE: &str = "/var/lib/foilpress";
+
 fn is_root() -> bool {
     #[cfg(unix)]
     return fs::metadata("/proc/self").is_ok_and(|data| std::os::unix::fs::MetadataExt::uid(&data) == 0);
@@ -177,18 +180,31 @@ fn is_root() -> bool {
 
 /// Installs the package, prints through it, and removes it. A machine that has one keeps it.
 fn install_here(root: &Path, package: &Path) -> Result<()> {
-    if let Some(path) = INSTALLED.into_iter().find(|path| Path::new(path).exists()) {
+    if let Some(path) = INSTALLED.into_iter().chain([STATE]).find(|path| Path::new(path).exists()) {
         println!("not installed on this machine: {path} is there already, and stays");
         return Ok(());
     }
     queue::install()?;
     succeed(command("dpkg", &["--install"]).arg(package).stdout(Stdio::null()))?;
     // Whatever comes of it, the machine is left as it was.
-    let tried = try_here(root);
+    let tried = has_shared_state().and_then(|()| try_here(root));
     let removed = succeed(command("dpkg", &["--purge", "foilpress"]).stdout(Stdio::null()));
     tried.and(removed)?;
-    let left: Vec<&str> = INSTALLED.into_iter().filter(|path| Path::new(path).exists()).collect();
+    let left: Vec<&str> =
+        INSTALLED.into_iter().chain([STATE]).filter(|path| Path::new(path).exists()).collect();
     ensure!(left.is_empty(), "left behind by the package: {}", left.join(", "));
+    Ok(())
+}
+
+/// The folder of resets owed and ribbon used is there, and every user may write to it but not remove another's files.
+fn has_shared_state() -> Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let data = fs::metadata(STATE).with_context(|| format!("the package did not make {STATE}"))?;
+        let mode = data.permissions().mode() & 0o7777;
+        ensure!(data.is_dir() && mode == 0o1777, "{STATE} has mode {mode:o}, not 1777");
+    }
     Ok(())
 }
 

@@ -117,10 +117,10 @@ struct Fact {
 #[derive(Debug, thiserror::Error)]
 pub enum PrintersError {
     /// There is no place for it.
-    #[error("no folder for what is known of printers")]
+    #[error("found no folder for the state of printers")]
     NoFolder(#[from] JournalError),
     /// The file system refuses.
-    #[error("cannot {what} {}, where it is kept which printers need a reset", path.display())]
+    #[error("cannot {what} {}, which records the printers that need a reset", path.display())]
     Io {
         /// What was tried.
         what: &'static str,

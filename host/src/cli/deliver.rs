@@ -201,9 +201,9 @@ fn finish(
 
 /// Says when the sheet is out, or why that cannot be said. Nothing that happens here changes that the job was sent.
 fn await_sheet(delivery: &Delivery<'_>, name: &str, address: &Address, observer: &dyn Observer) {
-    output::say_on_interrupt("the printer has the whole job and goes on by itself");
+    output::say_on_interrupt("the printer has the whole job and continues without this program");
     let mut watch = |troubles: &[String]| match troubles {
-        [] => observer.note("the printer goes on"),
+        [] => observer.note("the printer continues"),
         troubles => observer.note(&format!("the printer waits: {}", troubles.join("; "))),
     };
     match delivery.await_sheet(address, &mut watch) {
@@ -219,7 +219,7 @@ fn await_sheet(delivery: &Delivery<'_>, name: &str, address: &Address, observer:
 /// What becomes of a job that is on disk when sending it fails.
 fn kept(job: &OpenJob) -> String {
     let (number, name) = (job.entry.record.job, &job.entry.name);
-    format!("job {number:08x} ({name}) is kept; `foilpress resume {number:08x}` goes on with it")
+    format!("job {number:08x} ({name}) is kept; `foilpress resume {number:08x}` continues it")
 }
 
 /// A failure before anything was queued.

@@ -69,7 +69,7 @@ const LAYERS: &str = "layers";
     args_override_self = true,
     after_help = "Examples:\n  \
     foilpress plan job.rgl\n  \
-    foilpress plan sample:leaf --size 80mm --repeat 2x3 --gap 2mm\n  \
+    foilpress plan sample:leaf --size 60mm --repeat 3x3 --gap 2mm\n  \
     foilpress plan layers white.png gold.png --passes white=3\n  \
     foilpress plan job.rgl --html plan.html              (one page to print and keep beside the printer)\n  \
     foilpress plan job.rgl --json\n\n\

@@ -1,6 +1,6 @@
-//! A person at a terminal has something sent: what they see of it, and what they are asked.
+//! Shows a delivery to the person at a terminal, and asks them what it needs to know.
 //!
-//! Where nobody can be asked the answer is no.
+//! Without a terminal every answer is no.
 
 use std::cell::RefCell;
 use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
@@ -17,7 +17,7 @@ use device::send::journal::{Entry, PassPlace};
 use device::send::{Event, words};
 use observe::Observer;
 
-/// The caller of a delivery that a person has asked for.
+/// The caller of a delivery that a person started.
 pub struct Terminal<'o> {
     force: bool,
     cartridges_shown: bool,
@@ -25,7 +25,7 @@ pub struct Terminal<'o> {
     position: RefCell<Position>,
 }
 
-/// What is shown of a job under way.
+/// The progress shown of the job being sent.
 #[derive(Default)]
 struct Position {
     passes: Vec<PassPlace>,
@@ -40,8 +40,8 @@ struct Position {
 }
 
 impl<'o> Terminal<'o> {
-    /// With `force` a device that does not identify itself as an ALPS printer is only remarked upon. Which cartridges are
-    /// loaded is not said again if that was shown.
+    /// With `force`, a device that does not identify itself as an ALPS printer gets a note instead of a refusal.
+    /// `cartridges_shown`: the loaded cartridges were shown before, and are not shown again.
     pub fn new(force: bool, cartridges_shown: bool, observer: &'o dyn Observer) -> Terminal<'o> {
         Terminal { force, cartridges_shown, observer, position: RefCell::default() }
     }
@@ -49,7 +49,7 @@ impl<'o> Terminal<'o> {
     fn begin(&self, entry: &Entry) {
         let number = entry.record.job;
         output::say_on_interrupt(&format!(
-            "the bridge goes on printing what it holds. `foilpress resume {number:08x}` goes on with the job, \
+            "the bridge prints what it has received. `foilpress resume {number:08x}` continues the job, \
              `foilpress cancel {number:08x}` ends the sheet"
         ));
         *self.position.borrow_mut() = Position {
@@ -65,7 +65,7 @@ impl<'o> Terminal<'o> {
         match event {
             Event::Connected(bridge) => {
                 if std::mem::take(&mut position.away) {
-                    self.observer.note("the bridge is back; going on where the printer is");
+                    self.observer.note("the bridge is back; the job continues where the printer is");
                 } else if position.bridge != Some(bridge.serial) {
                     self.observer
                         .note(&format!("bridge {:016x}, firmware {}", bridge.serial, bridge.firmware));
@@ -75,8 +75,8 @@ impl<'o> Terminal<'o> {
             Event::Away(why) => {
                 if !std::mem::replace(&mut position.away, true) {
                     self.observer.note(&format!(
-                        "the link to the bridge is gone ({why}); the bridge prints what it holds, and the job goes on when it is \
-                         back. Nothing is lost"
+                        "the link to the bridge is gone ({why}); the bridge prints what it has received, and the job continues when \
+                         the link is back. Nothing is lost"
                     ));
                 }
             }
@@ -88,7 +88,7 @@ impl<'o> Terminal<'o> {
                 let ink = words::wanted(&position.passes, position.printed);
                 self.observer.note(&words::fault(*fault, ink));
             }
-            Event::Fault(None) => self.observer.note("the printer goes on"),
+            Event::Fault(None) => self.observer.note("the printer continues"),
         }
     }
 }
@@ -132,10 +132,10 @@ impl Caller for Terminal<'_> {
             News::Sending(entry) => self.begin(entry),
             News::Link(event) => self.link(event),
             News::ByteForByte => self.observer.note(
-                "the bridge does not take this page as pass streams; the same job is sent byte for byte under a new number",
+                "the bridge cannot take this page as pass streams, so the same job is sent byte for byte under a new number",
             ),
             News::SendingRaw => output::say_on_interrupt(
-                "the printer may have a part of the job. Switch it off and on before the next one",
+                "the printer may have received part of the job. Switch it off and on before the next job",
             ),
             News::Note(text) => self.observer.note(text),
         }
@@ -163,7 +163,7 @@ impl Caller for Terminal<'_> {
     }
 }
 
-/// Asks a person; where there is none the answer is no.
+/// Asks the person at the terminal; without one the answer is no.
 fn agreed(question: &str) -> bool {
     if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
         return false;
@@ -174,7 +174,7 @@ fn agreed(question: &str) -> bool {
     asked.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
 }
 
-/// Bytes on the cable, against bytes at the printer.
+/// The size of a job on the cable and at the printer.
 fn size_text(kind: JobKind, data: u64, printed: u64) -> String {
     match kind {
         JobKind::Streams => format!(
@@ -193,7 +193,7 @@ pub fn cartridges_needed(inks: &[Ink]) -> String {
     format!("cartridges needed, in this order: {}", list.join(", "))
 }
 
-/// What the printer says of the cartridges a job needs.
+/// What the printer reports about the cartridges a job needs.
 pub fn cartridges_text(cartridges: &Cartridges) -> String {
     let unknown = |why: &str| format!("The loaded cartridges are not known: {why}");
     match cartridges {

@@ -3,7 +3,7 @@
 //! Problem: the print system starts jobs again after a crash of its own, retries what failed, and knows nothing of
 //! ribbons; a sheet must not be printed twice, and a job that is cancelled must leave a printer that is ready.
 //! Method: a job's sheets go one after the other to the [delivery](device::deliver), as every command's do. Each has a journal
-//! of its own under the job's identity, so a process that takes over knows what was sent and goes on where the printer is. A
+//! of its own under the job's identity, so a process that takes over knows what was sent and continues where the printer is. A
 //! sheet whose outcome is unknown, and a printer that has to be reset, hold the job: nobody can be asked here. Whoever releases
 //! a held job agrees to the reset and to printing the sheet again. SIGTERM ends the sheet at the bridge.
 //! What an earlier job has left open at the bridge is ended first.
@@ -159,7 +159,7 @@ impl<W: Write + Send> Backend<'_, W> {
         let sent = match known {
             Some(Entry { record, .. }) if record.phase == Phase::Ended(Outcome::Printed) => return Ok(true),
             Some(Entry { record, .. }) if !matches!(record.phase, Phase::Ended(_)) => {
-                self.messages.info("the job was interrupted; going on where the printer is");
+                self.messages.info("the job was interrupted; it continues where the printer is");
                 journal.open(record.job).map_err(Failure::from)
             }
             // Whoever started a job again whose sheet had ended badly wants another one.

@@ -184,12 +184,12 @@ impl<W: Write> Messages<W> {
     }
 
     /// The cartridges the printer has found. It does not know how much ribbon is left, so no amount is reported.
-    pub fn cassettes(&self, status: &Status) {
-        if status.stale || status.cassettes.is_empty() {
+    pub fn cartridges(&self, status: &Status) {
+        if status.stale || status.cartridges.is_empty() {
             return;
         }
-        let each = |say: &dyn Fn(&device::send::status::Cassette) -> String| {
-            status.cassettes.iter().map(say).collect::<Vec<_>>().join(",")
+        let each = |say: &dyn Fn(&device::send::status::CartridgeStatus) -> String| {
+            status.cartridges.iter().map(say).collect::<Vec<_>>().join(",")
         };
         // Of IPP's levels: -3 some is left, 0 none.
         let level = |condition: &str| if condition == "loaded" { "-3" } else { "0" };

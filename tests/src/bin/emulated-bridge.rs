@@ -1,6 +1,6 @@
 //! The emulated bridge for people: `cargo xtask emulator --serve`.
 //!
-//! A bridge with a simulated MD-5500 at it, until standard input ends. Cassettes are put in as the printer asks for
+//! A bridge with a simulated MD-5500 at it, until standard input ends. Cartridges are put in as the printer asks for
 //! them; every sheet that comes out is kept as the bytes that made it.
 
 #[cfg(unix)]
@@ -120,7 +120,7 @@ mod unix {
         }
     }
 
-    /// Puts a cassette in, for another one if seven are in.
+    /// Puts a cartridge in, for another one if seven are in.
     fn put_in(printer: &mut Printer, ink: Ink) -> Result<(), CarouselError> {
         match printer.insert(ink.into()) {
             Err(CarouselError::TooMany(_)) => {

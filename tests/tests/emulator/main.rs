@@ -45,11 +45,11 @@ struct Bench {
 }
 
 impl Bench {
-    /// A bridge and a printer with these cassettes, a sheet in its tray. `None`: there is no image to run.
-    fn new(cassettes: &[Cartridge]) -> Option<Bench> {
+    /// A bridge and a printer with these cartridges, a sheet in its tray. `None`: there is no image to run.
+    fn new(cartridges: &[Cartridge]) -> Option<Bench> {
         let (image, program) = parts()?;
         let folder = tempfile::tempdir().unwrap();
-        let printer = Printer::new(Carousel::new(cassettes).unwrap(), Lever::Auto);
+        let printer = Printer::new(Carousel::new(cartridges).unwrap(), Lever::Auto);
         let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("emulator");
         let ends = folder.path().join("bridge");
         fs::create_dir(&ends).unwrap();
@@ -58,8 +58,8 @@ impl Bench {
     }
 
     /// The same, on USB, where the program finds it by itself.
-    fn on_usb(cassettes: &[Cartridge]) -> Option<Bench> {
-        let mut bench = Bench::new(cassettes)?;
+    fn on_usb(cartridges: &[Cartridge]) -> Option<Bench> {
+        let mut bench = Bench::new(cartridges)?;
         bench.usbfs = std::env::var_os("FOILPRESS_USBFS").map(PathBuf::from);
         if bench.usbfs.is_none() {
             Need::Usb.skip("`cargo xtask emulator` found no umockdev");
@@ -177,7 +177,7 @@ fn said(mut child: Child) -> String {
 }
 
 #[test]
-fn a_printed_document_is_the_very_sheet_although_every_cassette_has_to_be_put_in() {
+fn a_printed_document_is_the_very_sheet_although_every_cartridge_has_to_be_put_in() {
     let Some(mut bench) = Bench::new(&[]) else { return };
     let mut child = bench.spawn(&[
         "print",

@@ -44,8 +44,8 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         let mut random = seeded(seed);
         let (kind, data) =
             if seed % 2 == 0 { (JobKind::Streams, &streams) } else { (JobKind::Raw, &print.bytes) };
-        let cassettes = wanted(&print.bytes);
-        let printer = RefCell::new(Printer::new(Carousel::new(&cassettes).unwrap(), Lever::Auto));
+        let cartridges = wanted(&print.bytes);
+        let printer = RefCell::new(Printer::new(Carousel::new(&cartridges).unwrap(), Lever::Auto));
         printer.borrow_mut().load(Stock::of(Paper::Postcard));
         let troubles = RefCell::new(0);
         let job = Job { id: 77, kind, data: data.clone(), expected: print.bytes.clone() };

@@ -316,7 +316,7 @@ fn between_jobs_the_printer_itself_is_asked() {
     let Reply::Bytes(bytes) = query.printer(Ask::Printer, PATIENCE).unwrap() else { panic!("no answer") };
     let status = Status::read(&bytes).unwrap();
     assert_eq!(status.errors, ["the cover is open; close it"]);
-    assert_eq!(status.cassettes[0].ink, Some("white"));
+    assert_eq!(status.cartridges[0].ink, Some("white"));
 }
 
 #[test]

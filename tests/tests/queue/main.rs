@@ -349,7 +349,7 @@ fn a_raw_job_is_printed_byte_for_byte_as_often_as_asked() {
     assert_eq!(server.wait_for_job(raw), "completed");
     assert!(bridge.printed() == bytes.repeat(3));
     assert_eq!(server.job(raw, "job-media-sheets-completed"), "2");
-    // White is not among the cassettes of this printer, which was said before; nothing is left of it.
+    // White is not among the cartridges of this printer, which was said before; nothing is left of it.
     assert!(server.log().contains("not loaded: white (MDC-SCWH, barcode 16)"), "{}", server.log());
     assert!(server.state("Alps").contains("Alerts: none"), "{}", server.state("Alps"));
 }

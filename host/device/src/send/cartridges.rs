@@ -35,11 +35,11 @@ pub(crate) fn find(status: &Status, wanted: &[Ink]) -> Found {
     let missing: Vec<Missing> = wanted
         .iter()
         .filter_map(|&ink| {
-            let mut its = status.cassettes.iter().filter(|cassette| cassette.barcode == ink.barcode());
-            if its.clone().any(|cassette| cassette.condition == "loaded") {
+            let mut its = status.cartridges.iter().filter(|cartridge| cartridge.barcode == ink.barcode());
+            if its.clone().any(|cartridge| cartridge.condition == "loaded") {
                 return None;
             }
-            Some(Missing { ink, condition: its.next().map(|cassette| cassette.condition) })
+            Some(Missing { ink, condition: its.next().map(|cartridge| cartridge.condition) })
         })
         .collect();
     if missing.is_empty() { Found::All } else { Found::Missing(missing) }

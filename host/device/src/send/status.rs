@@ -19,15 +19,15 @@ pub struct Status {
     pub tray: bool,
     /// What is the matter, in words.
     pub errors: Vec<String>,
-    /// The cassettes it has found.
-    pub cassettes: Vec<Cassette>,
-    /// Whether the cassettes are those of before the error.
+    /// The cartridges it has found.
+    pub cartridges: Vec<CartridgeStatus>,
+    /// Whether the cartridges are those of before the error.
     pub stale: bool,
 }
 
-/// A cassette as the printer sees it.
+/// A cartridge as the printer sees it.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
-pub struct Cassette {
+pub struct CartridgeStatus {
     /// Its barcode.
     pub barcode: u8,
     /// Its ink, if the barcode is known.
@@ -49,7 +49,7 @@ impl Status {
     /// Reads an answer.
     pub fn read(bytes: &[u8]) -> Result<Status, NoStatus> {
         let answer = status::Status::parse(bytes).map_err(|status::NotAStatus| NoStatus(bytes.len()))?;
-        let cassettes = answer
+        let cartridges = answer
             .places()
             .into_iter()
             .enumerate()
@@ -61,7 +61,7 @@ impl Status {
                     Place::AtEnd(barcode) => (barcode, "end of ribbon"),
                 };
                 let ink = Ink::from_barcode(barcode).map(Ink::name);
-                Some(Cassette { barcode, ink, on_carriage: place == status::PLACES - 1, condition })
+                Some(CartridgeStatus { barcode, ink, on_carriage: place == status::PLACES - 1, condition })
             })
             .collect();
         Ok(Status {
@@ -71,7 +71,7 @@ impl Status {
             tray: answer.automatic_feed(),
             stale: answer.in_error(),
             errors: answer.complaints().map(words).collect(),
-            cassettes,
+            cartridges,
         })
     }
 }
@@ -127,18 +127,18 @@ impl fmt::Display for Status {
             writeln!(f, "    {error}")?;
         }
         if self.stale {
-            writeln!(f, "cassettes as they were before the error:")?;
+            writeln!(f, "cartridges as they were before the error:")?;
         } else {
-            writeln!(f, "cassettes:{}", if self.cassettes.is_empty() { " none" } else { "" })?;
+            writeln!(f, "cartridges:{}", if self.cartridges.is_empty() { " none" } else { "" })?;
         }
-        for cassette in &self.cassettes {
+        for cartridge in &self.cartridges {
             writeln!(
                 f,
                 "    {:<18} barcode {:>2}, {}{}",
-                cassette.ink.unwrap_or("unknown ink"),
-                cassette.barcode,
-                cassette.condition,
-                if cassette.on_carriage { ", on the carriage" } else { "" }
+                cartridge.ink.unwrap_or("unknown ink"),
+                cartridge.barcode,
+                cartridge.condition,
+                if cartridge.on_carriage { ", on the carriage" } else { "" }
             )?;
         }
         Ok(())
@@ -154,7 +154,7 @@ mod tests {
     #[test]
     fn the_simulated_printers_answers_say_what_it_is_told() {
         let mut printer = Printer::new(Carousel::new(&[Ink::White.into()]).unwrap(), Lever::Auto);
-        assert_eq!(Status::read(&printer.status()).unwrap().cassettes[0].ink, Some("white"));
+        assert_eq!(Status::read(&printer.status()).unwrap().cartridges[0].ink, Some("white"));
         for (trouble, word) in [
             (Trouble::CoverOpen, "cover"),
             (Trouble::NoPaper, "no paper"),

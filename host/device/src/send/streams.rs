@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn foils_and_lists_of_cassettes_go_too() {
+    fn foils_and_lists_of_cartridges_go_too() {
         let page = Page::plain(Paper::Custom { width: 64, length: 40 });
         let inks = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::White, Ink::GoldFoil];
         let passes = inks.map(|ink| pass(ink, &page, &[(3, 5), (60, 39)]));

@@ -14,18 +14,18 @@ pub fn fault(fault: Fault, ink: Option<Ink>) -> String {
     let cartridge =
         |ink: Ink| format!("{} cartridge ({}, barcode {})", ink.name(), ink.part(), ink.barcode());
     match (fault, ink) {
-        (Fault::PaperOut, _) => "the printer is out of paper: load a sheet, the job goes on by itself".into(),
+        (Fault::PaperOut, _) => "the printer is out of paper: load a sheet, and the job continues".into(),
         (Fault::OffLine | Fault::Error, Some(ink)) => format!(
-            "the printer has stopped: it may want the {}. Open the cover, put it in, close the cover; \
-             the job goes on by itself",
+            "the printer has stopped: it may want the {}. Open the cover, put it in, close the cover, \
+             and the job continues",
             cartridge(ink)
         ),
         (Fault::OffLine, None) => {
-            "the printer is off line: close its cover and press its ready button; the job goes on by itself"
+            "the printer is off line: close its cover and press its ready button, and the job continues"
                 .into()
         }
         (Fault::Error, None) => {
-            "the printer reports an error: look at its lamps, cover and paper; the job goes on by itself"
+            "the printer reports an error: look at its lamps, cover and paper; the job continues once it is cleared"
                 .into()
         }
         (Fault::PowerOff, _) => {
@@ -60,8 +60,8 @@ pub fn wanted(passes: &[PassPlace], printed: u64) -> Option<Ink> {
 }
 
 /// What to do with a printer that was left in the middle of a sheet.
-const RESET: &str = "Before the next job the printer has to be reset: `foilpress bridge reset` does so through the bridge (if it \
-                     keeps the sheet all the same, switch it off and on)";
+const RESET: &str = "The printer must be reset before the next job: `foilpress bridge reset` resets it through the bridge. If \
+                     the sheet stays in, switch the printer off and on";
 
 /// Where on the sheet a job was last heard of.
 fn reached(entry: &Entry) -> String {
@@ -108,7 +108,7 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             reached(entry)
         ),
         Outcome::Forgotten => format!(
-            "{}: the bridge no longer knows this job, because it lost its memory or has printed others since. At least {printed} of \
+            "{}: the bridge no longer knows this job, because it restarted or has printed other jobs since. At least {printed} of \
              {} bytes were printed{}. If the sheet comes out complete, nothing is wrong; otherwise it is lost. {RESET}. The job is \
              not sent again by itself, so that nothing is printed twice",
             entry.name,

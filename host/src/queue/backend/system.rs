@@ -106,7 +106,7 @@ impl<'a, W: Write + Send> System<'a, W> {
     /// wants.
     fn printer(&self, cartridges: &Cartridges) {
         let Cartridges::Known { answer, status, found } = cartridges else { return };
-        self.messages.cassettes(status);
+        self.messages.cartridges(status);
         let mut reasons: Vec<Reason> = match status::Status::parse(answer) {
             Ok(answer) => answer.complaints().map(|complaint| Reason::of_complaint(&complaint)).collect(),
             Err(status::NotAStatus) => Vec::new(),
@@ -133,7 +133,7 @@ impl<'a, W: Write + Send> System<'a, W> {
             Event::Away(why) => {
                 messages.reasons(&[Reason::Connecting, Reason::OffLine]);
                 messages.info(&format!(
-                    "the link to the bridge is gone ({why}); the bridge prints what it holds, and the job goes on when it is back"
+                    "the link to the bridge is gone ({why}); the bridge prints what it has received, and the job continues when the link is back"
                 ));
             }
             Event::Moved(progress) => {
@@ -157,7 +157,7 @@ impl<'a, W: Write + Send> System<'a, W> {
             Event::Fault(None) => {
                 job.faulty = false;
                 messages.reasons(&[]);
-                messages.info("the printer goes on");
+                messages.info("the printer continues");
             }
         }
     }
@@ -181,8 +181,9 @@ impl<W: Write + Send> Caller for System<'_, W> {
             }
             News::Link(event) => self.link(event),
             News::ByteForByte => {
-                self.messages
-                    .debug("the bridge does not take this page as pass streams; it is sent byte for byte");
+                self.messages.debug(
+                    "the bridge cannot take this page as pass streams, so the same job is sent byte for byte",
+                );
             }
             News::SendingRaw => {
                 self.messages.reasons(&[]);
@@ -211,7 +212,7 @@ impl<W: Write + Send> Caller for System<'_, W> {
         let reason = if obstacle.is_in_use() { Reason::Connecting } else { Reason::OffLine };
         self.messages.reasons(&[Reason::Connecting, reason]);
         self.messages.info(&format!(
-            "{}. Nothing is lost; the job goes on when the printer can be reached",
+            "{}. Nothing is lost; the job continues when the printer can be reached",
             observe::with_causes(obstacle)
         ));
         self.pause()
