@@ -189,7 +189,7 @@ fn converse<E: std::error::Error>(
             match link.send(&out[sent..]) {
                 Ok(count) => sent += count,
                 Err(error) => {
-                    watch(Event::Away(&error.to_string()));
+                    watch(Event::Away(&with_causes(&error)));
                     return Ok(None);
                 }
             }
@@ -198,7 +198,7 @@ fn converse<E: std::error::Error>(
         let count = match link.receive(&mut buffer, patience) {
             Ok(count) => count,
             Err(error) => {
-                watch(Event::Away(&error.to_string()));
+                watch(Event::Away(&with_causes(&error)));
                 return Ok(None);
             }
         };
