@@ -22,7 +22,7 @@ use super::source::{Lines, Scratch, Source};
 const CHUNK: usize = 16;
 
 /// Places averaged along each axis of a cell if a document is finer than the cells.
-const SAMPLES: usize = 16;
+const SAMPLES: usize = 64;
 
 /// Distances between two pictures over all spots that the eye resolves. 0.01 is barely visible, 0.05 is obvious.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,9 +2,10 @@
 //!
 //! Problem: a page has 30 million dots of up to 57 stacks, and a document may have as many pixels of curves. Neither fits in
 //! memory as reflectance.
-//! Method: pictures are made line by line. A line of a sheet is a histogram of stacks for each pixel (every dot is counted
-//! once, in exactly one pixel) times the stacks' rows. A line of a factored document averages weights first. A line of any
-//! other document averages reflectance at up to `samples` x `samples` places of a pixel.
+//! Method: pictures are made line by line, and a pixel is the mean over exactly the area it covers, with parts of dots and of
+//! pixels at its edges. A line of a sheet is a histogram of stacks for each pixel times the stacks' rows. A line of a
+//! factored document averages weights first. A line of any other document averages reflectance, at up to `samples` x
+//! `samples` places of a pixel.
 //! Cost: one increment a dot, then one multiply-add for each column and stack in the pixel.
 //! Limits: averaging is linear in reflectance, as section 4.2 of the 2009 paper assumes of halftones.
 
@@ -66,7 +67,7 @@ impl<'a> Source<'a> {
     /// Prepares reading it line by line as `width` x `height` pixels.
     ///
     /// `samples` limits the places averaged along each axis of a pixel of [`Source::Document`]; other sources are averaged
-    /// exactly. A picture finer than the source repeats the source's pixels.
+    /// exactly, by area.
     pub(super) fn lines(
         &self,
         width: usize,
@@ -99,7 +100,8 @@ impl<'a> Source<'a> {
             same("columns of the reflectance", columns, table.columns())?;
         }
         let rows = table.map_or_else(Vec::new, |t| t.rows().flatten().map(|&v| v as f32).collect());
-        Ok(Lines { source: *self, width, height, samples: samples.max(1), columns, rows })
+        let across = (0..width).map(|x| Cover::new(x, width, self.size().0)).collect();
+        Ok(Lines { source: *self, width, height, samples: samples.max(1), columns, rows, across })
     }
 }
 
@@ -130,6 +132,8 @@ pub(super) struct Lines<'a> {
     samples: usize,
     columns: usize,
     rows: Vec<f32>,
+    /// What each pixel of a line covers across.
+    across: Vec<Cover>,
 }
 
 /// Memory for one line, reused for the next.
@@ -140,11 +144,48 @@ pub(super) struct Scratch {
     row: Vec<f32>,
 }
 
-/// The range of dots (of `size`) in pixel `i` (of `pixels`): every dot is in exactly one pixel, and a pixel smaller than a dot
-/// has the dot in which it starts.
-fn span(i: usize, pixels: usize, size: usize) -> (usize, usize) {
-    let start = i * size / pixels;
-    (start, ((i + 1) * size / pixels).max(start + 1))
+/// What one of `pixels` equal pixels covers of a side of `size` places: places in a row, with the part of each in
+/// 1/`pixels` of a place. The parts of a pixel sum to `size`, and those of a place, over all pixels, to `pixels`.
+#[derive(Clone, Copy, Debug)]
+struct Cover {
+    /// First place, and the one after the last.
+    places: (usize, usize),
+    /// Parts of the first and of the last place.
+    ends: (u32, u32),
+    /// Part of every place between.
+    whole: u32,
+}
+
+impl Cover {
+    fn new(i: usize, pixels: usize, size: usize) -> Cover {
+        // In 1/pixels of a place.
+        let (start, end) = (i * size, (i + 1) * size);
+        let places = (start / pixels, end.div_ceil(pixels));
+        let first = end.min((places.0 + 1) * pixels) - start;
+        let last = end - start.max((places.1 - 1) * pixels);
+        // Sides of sheets and pictures are below 2^16.
+        Cover { places, ends: (first as u32, last as u32), whole: pixels as u32 }
+    }
+
+    /// The part of a place of this pixel.
+    fn part(&self, place: usize) -> u32 {
+        match place {
+            _ if place == self.places.0 => self.ends.0,
+            _ if place + 1 == self.places.1 => self.ends.1,
+            _ => self.whole,
+        }
+    }
+
+    /// All places with their parts, or `samples` of them, evenly spread and alike, where there are more.
+    fn sampled(&self, samples: usize) -> impl Iterator<Item = (usize, u32)> + use<'_> {
+        let (from, to) = self.places;
+        let count = (to - from).min(samples);
+        (0..count).map(move |i| match count == to - from {
+            true => (from + i, self.part(from + i)),
+            // The centres of equal parts.
+            false => (from + (2 * i + 1) * (to - from) / (2 * count), 1),
+        })
+    }
 }
 
 impl Lines<'_> {
@@ -165,22 +206,29 @@ impl Lines<'_> {
 
     /// Writes the mean reflectance (1/sr) of line `y` to `out`, which has `width * columns` places.
     pub fn read(&self, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
+        let (across, down) = self.source.size();
+        let line = Cover::new(y, self.height, down);
+        // The parts of a pixel sum to this.
+        let scale = 1.0 / (across as f64 * down as f64);
         match &self.source {
-            Source::Document(materials) => self.read_document(*materials, y, scratch, out),
+            Source::Document(materials) => self.read_document(*materials, &line, scratch, out),
             Source::Factored(factored) => {
                 let maps = &factored.maps;
-                let (y0, y1) = span(y, self.height, maps.height());
-                for (x, out) in out.chunks_exact_mut(self.columns).enumerate() {
-                    let (x0, x1) = span(x, self.width, maps.width());
+                let scale = (scale / f64::from(ONE)) as f32;
+                for (cover, out) in self.across.iter().zip(out.chunks_exact_mut(self.columns)) {
                     scratch.sums.clear();
                     scratch.sums.resize(maps.channels(), 0);
-                    for py in y0..y1 {
-                        for px in x0..x1 {
+                    for py in line.places.0..line.places.1 {
+                        for px in cover.places.0..cover.places.1 {
+                            let part = u64::from(line.part(py)) * u64::from(cover.part(px));
                             let weights = maps.at(py * maps.width() + px);
-                            scratch.sums.iter_mut().zip(weights).for_each(|(s, &w)| *s += u64::from(w));
+                            scratch
+                                .sums
+                                .iter_mut()
+                                .zip(weights)
+                                .for_each(|(s, &w)| *s += part * u64::from(w));
                         }
                     }
-                    let scale = 1.0 / (f32::from(ONE) * ((y1 - y0) * (x1 - x0)) as f32);
                     self.mix(scratch.sums.iter().map(|&s| s as f32 * scale), out);
                 }
             }
@@ -188,22 +236,26 @@ impl Lines<'_> {
                 let stacks = dots.stacks().len();
                 scratch.counts.clear();
                 scratch.counts.resize(self.width * stacks, 0);
-                let (y0, y1) = span(y, self.height, area.length);
-                for row in y0..y1 {
+                for row in line.places.0..line.places.1 {
                     let start = (area.top + row) * dots.width() + area.left;
-                    let line = &dots.index()[start..start + area.width];
-                    for (x, counts) in scratch.counts.chunks_exact_mut(stacks).enumerate() {
-                        let (x0, x1) = span(x, self.width, area.width);
-                        for &dot in &line[x0..x1] {
-                            counts[usize::from(dot)] += 1;
+                    let dots = &dots.index()[start..start + area.width];
+                    // A page has fewer than 2^32 dots, so no sum of parts overflows.
+                    let down = line.part(row);
+                    for (cover, counts) in self.across.iter().zip(scratch.counts.chunks_exact_mut(stacks)) {
+                        let (from, to) = cover.places;
+                        counts[usize::from(dots[from])] += down * cover.ends.0;
+                        if to - from > 1 {
+                            counts[usize::from(dots[to - 1])] += down * cover.ends.1;
+                            for &dot in &dots[from + 1..to - 1] {
+                                counts[usize::from(dot)] += down * cover.whole;
+                            }
                         }
                     }
                 }
-                let pixels = out.chunks_exact_mut(self.columns).zip(scratch.counts.chunks_exact(stacks));
-                for (x, (out, counts)) in pixels.enumerate() {
-                    let (x0, x1) = span(x, self.width, area.width);
-                    let scale = 1.0 / ((y1 - y0) * (x1 - x0)) as f32;
-                    self.mix(counts.iter().map(|&n| n as f32 * scale), out);
+                for (out, counts) in
+                    out.chunks_exact_mut(self.columns).zip(scratch.counts.chunks_exact(stacks))
+                {
+                    self.mix(counts.iter().map(|&n| n as f32 * scale as f32), out);
                 }
             }
         }
@@ -218,26 +270,21 @@ impl Lines<'_> {
         }
     }
 
-    fn read_document(&self, materials: &dyn Materials, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
-        let (w, h) = (materials.width(), materials.height());
-        let (y0, y1) = span(y, self.height, h);
-        let down = (y1 - y0).min(self.samples);
+    fn read_document(&self, materials: &dyn Materials, line: &Cover, scratch: &mut Scratch, out: &mut [f32]) {
         scratch.row.resize(self.columns, 0.0);
         let row = &mut scratch.row;
-        for (x, out) in out.chunks_exact_mut(self.columns).enumerate() {
-            let (x0, x1) = span(x, self.width, w);
-            let across = (x1 - x0).min(self.samples);
+        for (cover, out) in self.across.iter().zip(out.chunks_exact_mut(self.columns)) {
             out.fill(0.0);
-            let scale = 1.0 / (down * across) as f32;
-            for j in 0..down {
-                // The centres of equal parts, so that the places are spread evenly.
-                let py = y0 + (2 * j + 1) * (y1 - y0) / (2 * down);
-                for i in 0..across {
-                    let px = x0 + (2 * i + 1) * (x1 - x0) / (2 * across);
-                    materials.reflectance(py * w + px, row);
-                    out.iter_mut().zip(row.iter()).for_each(|(o, &r)| *o += scale * r);
+            let mut sum = 0.0;
+            for (py, down) in line.sampled(self.samples) {
+                for (px, across) in cover.sampled(self.samples) {
+                    let part = down as f32 * across as f32;
+                    materials.reflectance(py * materials.width() + px, row);
+                    out.iter_mut().zip(row.iter()).for_each(|(o, &r)| *o += part * r);
+                    sum += part;
                 }
             }
+            out.iter_mut().for_each(|o| *o /= sum);
         }
     }
 }
@@ -252,17 +299,21 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_dot_is_in_exactly_one_pixel(size in 1usize..300, pixels in 1usize..300) {
-            let mut times = vec![0; size];
-            for i in 0..pixels.min(size) {
-                let (start, end) = span(i, pixels.min(size), size);
-                times[start..end].iter_mut().for_each(|t| *t += 1);
-            }
-            prop_assert!(times.iter().all(|&t| t == 1));
+        fn pixels_cover_a_side_once_and_alike(size in 1usize..300, pixels in 1usize..300) {
+            let mut covered = vec![0; size];
             for i in 0..pixels {
-                let (start, end) = span(i, pixels, size);
-                prop_assert!(start < end && end <= size);
+                let cover = Cover::new(i, pixels, size);
+                prop_assert!(cover.places.0 < cover.places.1 && cover.places.1 <= size);
+                let parts = (cover.places.0..cover.places.1).map(|place| cover.part(place));
+                prop_assert_eq!(parts.sum::<u32>() as usize, size);
+                for (place, part) in cover.sampled(usize::MAX) {
+                    // By the lengths of intervals: the pixel and the place, on a common scale.
+                    let (from, to) = ((i * size).max(place * pixels), ((i + 1) * size).min((place + 1) * pixels));
+                    prop_assert_eq!(part as usize, to - from);
+                    covered[place] += part as usize;
+                }
             }
+            prop_assert!(covered.iter().all(|&parts| parts == pixels));
         }
 
         #[test]
@@ -283,9 +334,9 @@ mod tests {
             for y in 0..height {
                 lines.read(y, &mut scratch, &mut out);
                 for x in 0..width {
-                    let (x0, x1) = (x * 9 / width, ((x + 1) * 9 / width).max(x * 9 / width + 1));
-                    let (y0, y1) = (y * 7 / height, ((y + 1) * 7 / height).max(y * 7 / height + 1));
-                    let all = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x + 2) + (y + 1) * 12));
+                    // Every dot as width x height smaller ones, which belong wholly to one pixel.
+                    let all = (y * 7..(y + 1) * 7)
+                        .flat_map(|v| (x * 9..(x + 1) * 9).map(move |u| (u / width + 2) + (v / height + 1) * 12));
                     let mean = all.clone().map(|i| f64::from(dots[i]) + 1.0).sum::<f64>() / all.count() as f64;
                     for (j, &found) in out[x * 6..][..6].iter().enumerate() {
                         prop_assert!((f64::from(found) - mean * j as f64).abs() < 1e-4);
