@@ -5,6 +5,7 @@
 //! commands that need more than that, and who runs them.
 
 use std::fs;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -157,16 +158,21 @@ impl Desk {
     /// Runs a command in this folder; what it said if it failed.
     fn run(&self, command: &str, folder: &Path) -> Result<(), String> {
         let path = std::env::var("PATH").unwrap_or_default();
-        let output = Command::new("sh")
+        let mut child = Command::new("sh")
             .args(["-c", command])
             .current_dir(folder)
             .env("PATH", format!("{}:{path}", self.folder.path().join("bin").display()))
             .env("FOILPRESS_CONFIG", self.folder.path().join("config"))
             .env("FOILPRESS_JOBS", self.folder.path().join("jobs"))
             .env("FOILPRESS_PRINTERS", self.folder.path().join("printers"))
-            .stdin(Stdio::null())
-            .output()
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
             .unwrap();
+        // Enter for each further copy. What asks a question needs a terminal. A command that reads nothing may have ended.
+        let _ = child.stdin.take().map(|mut stdin| stdin.write_all(b"\n\n\n"));
+        let output = child.wait_with_output().unwrap();
         if output.status.success() {
             return Ok(());
         }
