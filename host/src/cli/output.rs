@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
+use press::process;
 use press::scratch::{self, Scratch};
 
 /// What the user is told when the program is interrupted.
@@ -237,6 +238,8 @@ pub fn yield_to_interrupt() {
 /// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
+        // First, so that none of them writes into a folder that is being removed.
+        process::stop_all();
         // Never released, so that from here on nothing new is staged and nothing is moved to its destination.
         let paths = scratch::folders();
         for path in paths.iter() {
