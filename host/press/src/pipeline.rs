@@ -106,7 +106,7 @@ pub fn draft(request: &Request<'_>, observer: &dyn Observer) -> Result<Draft, Jo
     let Arranged { sheet, laid } = layout::arrange(request.dots, layout, observer)?;
     let separation = separate_page(&sheet, &laid, library, observer)?;
     let page = request.handling.page(layout.paper);
-    let plan = Plan::new(&Subject::new(name, &sheet, &laid, &separation, &page), library);
+    let plan = Plan::new(&Subject::new(name, &sheet, &laid, &separation, &page, layout.mirror), library);
     Ok(Draft { sheet, laid, separation, plan })
 }
 

@@ -105,6 +105,38 @@ pub fn thumbnail(sheet: &Sheet, ground: Ground, longest: usize) -> RgbImage {
     })
 }
 
+/// A picture of an area of one pass in its ink, at most `longest` pixels on its longer side. Each pixel is the mean of its
+/// dots.
+///
+/// # Panics
+/// If the area leaves the plane, which is a bug of the caller.
+pub fn pass_thumbnail(pass: &Pass, area: Area, ground: Ground, longest: usize) -> RgbImage {
+    let colours = [ground.0, label(pass.ink, ground.0)];
+    let plane = &pass.plane;
+    let step = area.width.max(area.length).div_ceil(longest.max(1)).max(1);
+    let (width, height) = (area.width.div_ceil(step), area.length.div_ceil(step));
+    // Dots of each pixel: all of them, and those with ink.
+    let mut sums = vec![[0u32; 2]; width * height];
+    let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
+    for (y, row) in rows.enumerate() {
+        for x in 0..area.width {
+            let at = area.left + x;
+            let sum = &mut sums[y / step * width + x / step];
+            sum[0] += 1;
+            sum[1] += u32::from(row[at / 8] >> (7 - at % 8) & 1);
+        }
+    }
+    // The sides of an area fit in u16, and a mean of bytes fits in a byte.
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let [all, inked] = sums[y as usize * width + x as usize];
+        let mean = |c: usize| {
+            let sum = u32::from(colours[0][c]) * (all - inked) + u32::from(colours[1][c]) * inked;
+            ((sum + all / 2) / all.max(1)) as u8
+        };
+        image::Rgb([mean(0), mean(1), mean(2)])
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,6 +186,27 @@ mod tests {
         let lit: Vec<(u32, u32)> =
             picture.enumerate_pixels().filter(|(_, _, p)| p.0[0] > 100).map(|(x, y, _)| (x, y)).collect();
         assert_eq!(lit, [(7, 0), (8, 0), (15, 1)]);
+    }
+
+    #[test]
+    fn a_thumbnail_of_a_pass_keeps_the_mean_of_its_area() {
+        // 4 x 2 dots of ink at (5, 1).
+        let mut bits = vec![0u8; 3 * 5];
+        for (x, y) in [1, 2].into_iter().flat_map(|y| (5..9).map(move |x| (x, y))) {
+            bits[y * 3 + x / 8] |= 0x80 >> (x % 8);
+        }
+        let pass =
+            Pass { ink: Ink::White, plane: crate::separate::Plane { width: 20, length: 5, stride: 3, bits } };
+        let area = Area { left: 4, top: 0, width: 12, length: 4 };
+        let small = pass_thumbnail(&pass, area, Ground([0; 3]), 6);
+        assert_eq!(small.dimensions(), (6, 2));
+        let white = f64::from(label(Ink::White, [0; 3])[0]);
+        // Dots 4 and 5 of rows 0 and 1: one of four has ink.
+        for (x, y, share) in [(0, 0, 0.25), (1, 0, 0.5), (2, 0, 0.25), (3, 0, 0.0), (1, 1, 0.5), (5, 1, 0.0)]
+        {
+            let found = f64::from(small.get_pixel(x, y).0[0]);
+            assert!((found - share * white).abs() <= 1.0, "({x}, {y}): {found}");
+        }
     }
 
     #[test]
