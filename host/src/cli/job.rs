@@ -64,7 +64,7 @@ impl Places {
     pub fn new(name: &str, result: &ResultArgs, deliver: &DeliverArgs) -> Result<Places> {
         let usual = || format!("{}.print", output::file_name(name)).into();
         let target = result.output.clone().unwrap_or_else(usual);
-        let also = deliver.file();
+        let also = deliver.file()?;
         if let Some(to) = also
             && absolute(to)?.starts_with(absolute(&target)?)
         {

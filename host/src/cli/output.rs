@@ -213,13 +213,14 @@ impl Staged {
     }
 }
 
-/// A document's name as a file name. Names come from documents, which must not decide where this program writes.
+/// A document's name as a file name, without blanks, so that it can be typed as it stands. Names come from documents, which
+/// must not decide where this program writes.
 pub fn file_name(name: &str) -> String {
     const LONGEST: usize = 80;
     let plain: String = name
         .trim()
         .chars()
-        .map(|c| if c.is_control() || "/\\:*?\"<>|".contains(c) { '-' } else { c })
+        .map(|c| if c.is_control() || c.is_whitespace() || "/\\:*?\"<>|".contains(c) { '-' } else { c })
         .take(LONGEST)
         .collect();
     let plain = plain.trim_start_matches(['.', '-']).trim_end_matches(['.', ' ']);
@@ -358,7 +359,8 @@ mod tests {
             ("..", "document"),
             (" \n ", "document"),
             ("-o", "o"),
-            ("Gold \u{5370}", "Gold \u{5370}"),
+            ("Gold \u{5370}", "Gold-\u{5370}"),
+            ("ramp SF MS", "ramp-SF-MS"),
         ] {
             assert_eq!(file_name(name), expected, "{name}");
         }

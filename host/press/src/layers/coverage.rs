@@ -42,11 +42,6 @@ pub(super) struct Scan {
 }
 
 impl Scan {
-    /// The size in words.
-    pub fn size(&self) -> String {
-        self.size_at(None)
-    }
-
     /// The size in words, at the resolution that was set instead of the file's.
     pub fn size_at(&self, set: Option<f64>) -> String {
         let pixels = format!("{} x {} pixels", self.width, self.height);

@@ -39,6 +39,7 @@ pub use error::{LayersError, Setting};
 pub use open::{is_art, open};
 pub use options::{Options, Pages, Room};
 pub use picture::page;
+pub use svg::DRAWING;
 pub use white::White;
 pub use window::Window;
 

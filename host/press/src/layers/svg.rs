@@ -29,6 +29,9 @@ use super::size::{self, Unstated};
 use crate::process;
 use observe::Observer;
 
+/// Name of the thread that renders a drawing. A panic in it becomes an error of the reader.
+pub const DRAWING: &str = "drawing";
+
 /// The most bytes of a drawing.
 const MOST_BYTES: u64 = 1 << 28;
 
@@ -61,7 +64,7 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     observer.begin("rendering layers", groups.len().max(1) as u64);
     let (steps, done) = mpsc::channel();
     let drawing = Drawing { path: path.to_path_buf(), text, groups, notes, options: options.clone() };
-    let begun = thread::Builder::new().name("drawing".into()).spawn(move || {
+    let begun = thread::Builder::new().name(DRAWING.into()).spawn(move || {
         // Nobody listens any more if it took too long.
         let drawn = drawing.draw(&|| drop(steps.send(None)));
         let _ = steps.send(Some(drawn));
