@@ -349,6 +349,41 @@ fn ten_millimetres_of_choke_are_not_more_than_ten() {
 }
 
 #[test]
+fn line_art_prints_at_1200_dpi_in_process_inks_and_in_no_other() {
+    let bench = Bench::new();
+    // Lines of one dot at 1200 dpi, for 120 x 60 dots of 1/1200 inch.
+    let lines = |x: u32, _| Luma([if x % 2 == 0 { 0 } else { 255 }]);
+    GrayImage::from_fn(120, 60, lines).save(bench.path("black.png")).unwrap();
+    layer(&bench, "white.png", 0..60, 0..40);
+    let art = "black.png --dpi 1200 --resolution 1200 --paper postcard";
+    let words = bench.done(&format!("layers {art} -o fine.print"));
+    assert!(words.contains("printed at 1200 x 600 dpi") && words.contains("2.5 x 1.3 mm"), "{words}");
+    let job = json(&bench.done("inspect fine.print/job.rgl --json"));
+    assert_eq!(job["setup"]["resolution"], serde_json::json!([1200, 600]), "{job}");
+    // 60 lines of 30 rows: the art's columns are the printer's, its rows are half as many.
+    assert_eq!(job["passes"][0]["dots"], 60 * 30);
+    assert_eq!(job["passes"][0]["bounds"]["width"], 119);
+    // The plan from its bytes is the same, and the preview has the sheet's shape.
+    let (own, again) = (
+        json(&bench.done(&format!("plan layers {art} --json"))),
+        json(&bench.done("plan fine.print/job.rgl --json")),
+    );
+    assert_eq!(
+        (&own["resolution_dpi"], &own["passes"][0]["dots"]),
+        (&again["resolution_dpi"], &again["passes"][0]["dots"])
+    );
+    assert_eq!(image::image_dimensions(bench.path("fine.print/preview.png")).unwrap(), (120, 60));
+    let said = bench.refused(1, "layers white.png --resolution 1200 --paper postcard");
+    assert!(said.contains("print at 600 dpi, or without white"), "{said}");
+    assert!(
+        bench
+            .done("plan layers white.png --resolution 1200 --paper postcard")
+            .contains("error: only cyan, magenta")
+    );
+    assert!(bench.refused(2, "layers white.png --resolution 2400").contains("600 or 1200 dpi"));
+}
+
+#[test]
 fn lists_are_there_for_programs() {
     let bench = Bench::new();
     assert_eq!(json(&bench.done("preset list --json")), Value::Array(Vec::new()));

@@ -130,10 +130,11 @@ pub fn make(
     let html = shown::page(plan, sheet, &separation.passes, laid.area, ground)?;
     write(&folder.join("plan.html"), html.as_bytes())?;
     // The page is the simulated sheet, dot for dot.
-    save_sheet(sheet, laid.area, ground, &folder.join("preview.png"))?;
+    let across = shown::across(plan);
+    save_sheet(sheet, laid.area, across, ground, &folder.join("preview.png"))?;
     printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
         let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
-        save_pass(pass, laid.area, ground, &folder.join(name))
+        save_pass(pass, laid.area, across, ground, &folder.join(name))
     })?;
     let passes = folder.join("passes");
     fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
-use protocol::rgl::Media;
+use protocol::rgl::{Media, Resolution};
 
 use crate::folders;
 use observe::Observer;
@@ -101,6 +101,7 @@ impl LayoutArgs {
         };
         Ok(Layout {
             paper: self.paper,
+            resolution: Resolution::Dpi600,
             position,
             repeat: self.repeat,
             gap: self.gap,

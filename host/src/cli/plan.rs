@@ -112,7 +112,7 @@ fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<Dra
     let job = super::stdio::read_job(path)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)
         .with_context(|| format!("{}", path.display()))?;
-    let sheet = printout.sheet().with_context(|| format!("{}", path.display()))?;
+    let sheet = printout.sheet_in_dots(None).with_context(|| format!("{}", path.display()))?;
     let page = Page {
         media: printout.media,
         resolution: printout.resolution,

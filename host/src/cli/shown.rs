@@ -40,11 +40,20 @@ impl From<Draft> for Drawn {
     }
 }
 
+/// Dots across in 1/600 inch.
+pub fn across(plan: &Plan) -> usize {
+    usize::from(plan.resolution_dpi.0 / 600).max(1)
+}
+
 /// The plan as a page with its pictures on this ground.
 pub fn page(plan: &Plan, sheet: &Sheet, passes: &[Pass], area: Area, ground: Ground) -> Result<String> {
+    let across = across(plan);
     let pictures = Pictures {
-        sheet: thumbnail(sheet, ground, THUMBNAIL),
-        passes: passes.iter().map(|pass| pass_thumbnail(pass, area, ground, PASS_THUMBNAIL)).collect(),
+        sheet: thumbnail(sheet, across, ground, THUMBNAIL),
+        passes: passes
+            .iter()
+            .map(|pass| pass_thumbnail(pass, area, across, ground, PASS_THUMBNAIL))
+            .collect(),
     };
     Ok(page::html(plan, &pictures)?)
 }

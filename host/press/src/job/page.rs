@@ -76,10 +76,14 @@ fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std:
     }
     writeln!(
         page,
-        "; top left corner at {:.1} mm, {:.1} mm.{}</p>\n\
+        "; top left corner at {:.1} mm, {:.1} mm.{}{}</p>\n\
          <p>Media <b>{}</b>, curl correction <b>{}</b>.</p>\n<p>About <b>{}</b> <small>({})</small></p>",
         plan.from_edge_mm.0,
         plan.from_edge_mm.1,
+        match plan.resolution_dpi {
+            (600, 600) => String::new(),
+            (across, along) => format!(" Printed at {across} &times; {along} dpi."),
+        },
         if plan.mirrored == Some(true) { " <b>Mirrored</b> left to right." } else { "" },
         plan.media,
         if plan.curl_correction { "on" } else { "off" },

@@ -37,9 +37,11 @@ pub struct Plan {
     pub media: &'static str,
     /// Whether the printer corrects the sheet's curl.
     pub curl_correction: bool,
+    /// Dots an inch across and along.
+    pub resolution_dpi: (u16, u16),
     /// Width and height of one copy on paper in millimetres.
     pub size_mm: (f64, f64),
-    /// The same in dots of 1/600 inch.
+    /// The same in dots.
     pub size_dots: (u16, u16),
     /// Top left corner of the first copy in the printable area, in dots.
     pub origin_dots: (u16, u16),
@@ -213,6 +215,8 @@ impl Plan {
                 estimate: ribbon::of(&dots.plane, dpi),
             })
             .collect();
+        // At 1200 x 600 dpi there are two dots across in 1/600 inch.
+        let across = usize::from(subject.page.resolution.across(1)).max(1);
         let mm = |dots: usize| Mm::of_dots(dots as i64).0;
         // Sides of a sheet are u16.
         let dots = |(a, b): (usize, usize)| (a as u16, b as u16);
@@ -222,10 +226,11 @@ impl Plan {
             sheet_mm: paper::sheet_mm(paper),
             media: subject.page.media.name(),
             curl_correction: subject.page.curl_correction,
-            size_mm: (mm(first.width), mm(first.length)),
+            resolution_dpi: dpi,
+            size_mm: (mm(first.width / across), mm(first.length)),
             size_dots: dots((first.width, first.length)),
             origin_dots: dots((first.left, first.top)),
-            from_edge_mm: from_edge(paper, first),
+            from_edge_mm: from_edge(paper, Area { left: first.left / across, ..first }),
             copies: laid.grid,
             mirrored: subject.mirrored,
             cut: laid.cut,
@@ -518,6 +523,9 @@ impl fmt::Display for Plan {
             self.media,
             if self.curl_correction { "on" } else { "off" }
         )?;
+        if self.resolution_dpi != (600, 600) {
+            writeln!(f, "printed at {} x {} dpi", self.resolution_dpi.0, self.resolution_dpi.1)?;
+        }
         if self.mirrored == Some(true) {
             writeln!(f, "mirrored left to right")?;
         }

@@ -20,6 +20,8 @@ pub struct Options {
     pub pages: Pages,
     /// Layers to halftone, so that they keep their tones; all others are ink or paper.
     pub halftone: InkSet,
+    /// Dots across in 1/600 inch: 1, or 2 for a print at 1200 x 600 dpi.
+    pub across: usize,
     /// The inks that reserved colours may stand for.
     pub inks: InkSet,
     /// Room on the page: art without a size of its own is fitted to it.
@@ -65,6 +67,7 @@ impl Default for Options {
             tolerance: None,
             pages: Pages::Only,
             halftone: InkSet::EMPTY,
+            across: 1,
             inks: InkSet::default().with(Ink::White),
             room: Room::default(),
         }

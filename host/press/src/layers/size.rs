@@ -127,7 +127,8 @@ pub(super) fn dots(
         }
         (None, None) => without_resolution(path, pixels, unstated, &fit, notes)?,
     };
-    to_dots(size, &fit)
+    let (width, length) = to_dots(size, &fit)?;
+    Ok((width * options.across.max(1), length))
 }
 
 /// The size of a picture whose resolution neither the file nor the user states.

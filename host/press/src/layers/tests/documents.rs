@@ -122,6 +122,26 @@ fn art_of_a_whole_sheet_is_refused_with_its_size_or_cropped_at_its_true_size() {
     }
 }
 
+#[test]
+fn art_for_1200_dpi_has_twice_as_many_dots_across_and_the_same_size() {
+    let bench = Bench::new();
+    let fine = Options { across: 2, dpi: Some(1200.0), ..Options::default() };
+    // Columns of pixels at 1200 dpi stay columns; two rows become one.
+    let columns: Vec<u8> = (0..20 * 10).map(|at| if at % 20 % 2 == 0 { 0 } else { 255 }).collect();
+    let art = read(&[bench.grey("black.png", (20, 10), &columns)], &fine);
+    assert_eq!((art.width, art.length), (20, 5));
+    assert_eq!(extent(&art.layers[0]), (0, 0, 18, 4, 50));
+    let file = bench
+        .write("art.svg", drawing(r##"<g id="black"><rect x="10" y="10" width="10" height="10"/></g>"##));
+    let art = read(&[file], &Options { across: 2, ..Options::default() });
+    assert_eq!((art.width, art.length), (1890, 709));
+    let (left, top, right, bottom, _) = extent(&art.layers[0]);
+    assert!(
+        near((right + 1 - left) as u64, 2.0 * dots(10.0), 0.01)
+            && near((bottom + 1 - top) as u64, dots(10.0), 0.01)
+    );
+}
+
 /// Four pages of 2 x 1 inch; the second is blank.
 const SEVERAL: &str = "%!PS-Adobe-3.0
 /page { <</PageSize [144 72]>> setpagedevice } def
