@@ -2,8 +2,9 @@
 //!
 //! Problem: ribbons are no longer made and do not tell how much is left on them.
 //! Method: files that only grow, a line of JSON for each thing that happens: a job is sent, its end is known, a new
-//! cartridge is put in. A line is written at once and made durable; half a line, after a crash, is skipped. Totals are
-//! computed from the lines whenever they are asked for.
+//! cartridge is put in, its price is noted. A line is written at once and made durable; half a line, after a crash, is skipped. Totals are
+//! computed from the lines whenever they are asked for. How much ribbon a cartridge gives is what its owner says, or else what
+//! the earlier ones gave between two new cartridges of their ink.
 //! A cartridge belongs to a printer, not to whoever prints, so the ledger is that of the computer, beside
 //! [what is known of its printers](crate::printers). Each user appends to a file of their own, which nobody else can change;
 //! totals are taken from all of them. The lines name no document: everyone can read them.
@@ -15,6 +16,7 @@ use std::io::{self, BufRead as _, BufReader, Read as _, Seek as _, SeekFrom, Wri
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use press::job::plan::{Cost, Price};
 use protocol::ink::Ink;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +43,18 @@ pub enum Event {
     New {
         /// Name of its ink.
         ink: String,
+    },
+    /// A cartridge of an ink costs so much, from now on.
+    Price {
+        /// Name of the ink.
+        ink: String,
+        /// How much.
+        amount: f64,
+        /// Of what, as the owner writes it.
+        currency: String,
+        /// How much ribbon a cartridge gives in millimetres, if the owner knows.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        ribbon_mm: Option<f64>,
     },
     /// A job is about to be sent.
     Job {
@@ -86,6 +100,10 @@ pub struct Total {
     pub passes: u32,
     /// Of these, in jobs that were not printed to their end.
     pub failed: u32,
+    /// What a cartridge costs, if that is noted.
+    pub price: Option<Price>,
+    /// What the ribbon that has gone costs, an estimate, if it is also known how much a cartridge gives.
+    pub cost: Option<Cost>,
 }
 
 /// Why the ledger cannot be used.
@@ -228,8 +246,21 @@ fn user() -> String {
         .collect()
 }
 
-/// What has gone of each ink. `known` says how many bytes were printed of a job whose end never came to the ledger.
+/// What has gone of each ink, and what that costs. `known` says how many bytes were printed of a job whose end never came to
+/// the ledger.
 pub fn totals(lines: &[Line], known: impl Fn(&str) -> Option<u64>) -> Vec<Total> {
+    let mut totals = counted(lines, known);
+    totals.retain(|total| total.passes > 0 || total.since.is_some() || total.price.is_some());
+    totals
+}
+
+/// The prices that are noted, with the ribbon that a cartridge gives as far as that is known. `known` as for [`totals`].
+pub fn prices(lines: &[Line], known: impl Fn(&str) -> Option<u64>) -> Vec<Price> {
+    counted(lines, known).into_iter().filter_map(|total| total.price).collect()
+}
+
+/// The totals of every ink.
+fn counted(lines: &[Line], known: impl Fn(&str) -> Option<u64>) -> Vec<Total> {
     let ended = |wanted: &str| {
         let ends = lines.iter().filter_map(|line| match &line.event {
             Event::Printed { job, bytes, whole } if job == wanted => Some((*bytes, *whole)),
@@ -238,16 +269,36 @@ pub fn totals(lines: &[Line], known: impl Fn(&str) -> Option<u64>) -> Vec<Total>
         // A job that goes on after an interruption has several ends; the last knows most.
         ends.reduce(|a, b| (a.0.max(b.0), a.1 || b.1))
     };
-    let mut totals: Vec<Total> = Ink::ALL
-        .iter()
-        .map(|ink| Total { ink: ink.name().into(), since: None, ribbon_mm: 0.0, passes: 0, failed: 0 })
-        .collect();
+    let fresh = |ink: String| Total {
+        ink,
+        since: None,
+        ribbon_mm: 0.0,
+        passes: 0,
+        failed: 0,
+        price: None,
+        cost: None,
+    };
+    let mut totals: Vec<Total> = Ink::ALL.iter().map(|ink| fresh(ink.name().into())).collect();
+    // The ribbon of each cartridge that was followed by a new one.
+    let mut gave: Vec<(String, f64)> = Vec::new();
     for line in lines {
         match &line.event {
             Event::New { ink } => {
                 if let Some(total) = totals.iter_mut().find(|total| total.ink == *ink) {
-                    let ink = std::mem::take(&mut total.ink);
-                    *total = Total { ink, since: Some(line.at), ribbon_mm: 0.0, passes: 0, failed: 0 };
+                    // Only a cartridge that was noted when it was new has been counted from its beginning.
+                    if total.since.is_some() && total.ribbon_mm > 0.0 {
+                        gave.push((ink.clone(), total.ribbon_mm));
+                    }
+                    let price = total.price.take();
+                    *total = Total { since: Some(line.at), price, ..fresh(ink.clone()) };
+                }
+            }
+            Event::Price { ink, amount, currency, ribbon_mm } => {
+                if let Some(total) = totals.iter_mut().find(|total| total.ink == *ink) {
+                    let cartridge = Cost { amount: *amount, currency: currency.clone() };
+                    let ribbon_mm = ribbon_mm.filter(|mm| mm.is_finite() && *mm > 0.0);
+                    let price = Price { ink: ink.clone(), cartridge, ribbon_mm };
+                    total.price = Some(price).filter(|price| price.cartridge.amount.is_finite());
                 }
             }
             Event::Job { job, passes, .. } => {
@@ -267,7 +318,17 @@ pub fn totals(lines: &[Line], known: impl Fn(&str) -> Option<u64>) -> Vec<Total>
             Event::Printed { .. } => {}
         }
     }
-    totals.retain(|total| total.passes > 0 || total.since.is_some());
+    for total in &mut totals {
+        let Some(price) = &mut total.price else { continue };
+        if price.ribbon_mm.is_none() {
+            let its: Vec<f64> = gave.iter().filter(|(ink, _)| *ink == total.ink).map(|(_, mm)| *mm).collect();
+            price.ribbon_mm = (!its.is_empty()).then(|| its.iter().sum::<f64>() / its.len() as f64);
+        }
+        total.cost = price.ribbon_mm.map(|mm| Cost {
+            amount: price.cartridge.amount * total.ribbon_mm / mm,
+            currency: price.cartridge.currency.clone(),
+        });
+    }
     totals
 }
 
@@ -326,6 +387,40 @@ mod tests {
             (of(&ledger, Ink::White), of(&ledger, Ink::Cyan)),
             (Some((10.0, 1, 0)), Some((10.0, 2, 0)))
         );
+    }
+
+    #[test]
+    fn ribbon_costs_its_share_of_the_cartridge_as_long_as_that_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let ledger = Ledger::in_folder(folder.path());
+        let total = || totals(&ledger.lines().unwrap().0, |_| None).remove(0);
+        let price = |amount, ribbon_mm| Event::Price {
+            ink: "white".into(),
+            amount,
+            currency: "EUR".into(),
+            ribbon_mm,
+        };
+        let print = |number: &str, mm: f64| {
+            ledger.append(job(number, vec![pass(Ink::White, 0, 10, mm)])).unwrap();
+            ledger.append(printed(number, 10, true)).unwrap();
+        };
+        ledger.append(price(12.0, None)).unwrap();
+        print("a", 400.0);
+        let white = total();
+        assert_eq!((white.ribbon_mm, white.cost), (400.0, None));
+        assert_eq!(white.price.unwrap().cartridge.amount, 12.0);
+        // Its first cartridge was not counted from the beginning; the second gave 6 m.
+        ledger.append(Event::New { ink: "white".into() }).unwrap();
+        print("b", 6000.0);
+        assert_eq!(total().cost, None);
+        ledger.append(Event::New { ink: "white".into() }).unwrap();
+        print("c", 1500.0);
+        assert_eq!(total().cost, Some(Cost { amount: 3.0, currency: "EUR".into() }));
+        // The owner knows better, and the price changes.
+        ledger.append(price(20.0, Some(10_000.0))).unwrap();
+        assert_eq!(total().cost, Some(Cost { amount: 3.0, currency: "EUR".into() }));
+        let [known] = &prices(&ledger.lines().unwrap().0, |_| None)[..] else { panic!("one price") };
+        assert_eq!((known.cartridge.amount, known.ribbon_mm), (20.0, Some(10_000.0)));
     }
 
     #[test]

@@ -23,6 +23,7 @@ pub mod layers;
 pub mod layout;
 pub mod pipeline;
 pub mod preview;
+pub mod process;
 pub mod scratch;
 pub mod separate;
 pub mod sheet;

@@ -17,16 +17,16 @@
 
 pub mod document;
 
-use inks::{InkSet, Library, Severity};
+use inks::{Certainty, InkSet, Library, Severity};
 use protocol::ink::Kind;
 use protocol::paper::Paper;
-use protocol::rgl::{FoilConsent, Page};
+use protocol::rgl::{FoilConsent, Page, Resolution};
 
 use crate::job::Handling;
 use crate::job::plan::{Plan, Subject};
 use crate::job::stream::{self, StreamError};
 use crate::layout::{self, Arranged, Laid, Layout, LayoutError};
-use crate::separate::{self, Pass, SeparateError, Separation};
+use crate::separate::{self, Check, Pass, SeparateError, Separation};
 use crate::sheet::{DotMap, Sheet};
 use crate::simulate::{self, Difference, Printout, PrintoutError, SimulateError};
 use observe::Observer;
@@ -105,8 +105,10 @@ pub fn draft(request: &Request<'_>, observer: &dyn Observer) -> Result<Draft, Jo
     let Request { name, layout, library, .. } = *request;
     let Arranged { sheet, laid } = layout::arrange(request.dots, layout, observer)?;
     let separation = separate_page(&sheet, &laid, library, observer)?;
-    let page = request.handling.page(layout.paper);
-    let plan = Plan::new(&Subject::new(name, &sheet, &laid, &separation, &page), library);
+    let mut separation = separation;
+    separation.checks.splice(..0, wrong_resolution(layout, &separation.passes));
+    let page = Page { resolution: layout.resolution, ..request.handling.page(layout.paper) };
+    let plan = Plan::new(&Subject::new(name, &sheet, &laid, &separation, &page, layout.mirror), library);
     Ok(Draft { sheet, laid, separation, plan })
 }
 
@@ -118,8 +120,32 @@ pub fn job(request: &Request<'_>, observer: &dyn Observer) -> Result<Job, JobErr
     let draft = draft(request, observer)?;
     permit(&draft.separation)?;
     let passes = &draft.separation.passes;
-    let bytes = encode(request.layout.paper, request.handling, passes, &request.allowed, observer)?;
+    let Layout { paper, resolution, .. } = *request.layout;
+    let page = Page { resolution, ..request.handling.page(paper) };
+    let bytes = encoded(page, passes, &request.allowed, observer)?;
     Ok(Job { draft, bytes })
+}
+
+/// What forbids passes at another resolution than 600 dpi: the printer takes the pitch of a dot from the cartridge.
+fn wrong_resolution(layout: &Layout, passes: &[Pass]) -> Option<Check> {
+    let mut special: Vec<&str> = passes
+        .iter()
+        .map(|pass| pass.ink)
+        .filter(|ink| ink.kind() != Kind::Process)
+        .map(|ink| ink.name())
+        .collect();
+    special.dedup();
+    (layout.resolution != Resolution::Dpi600 && !special.is_empty()).then(|| Check {
+        rule: "resolution".into(),
+        severity: Severity::Error,
+        certainty: Certainty::Measured,
+        text: format!(
+            "only cyan, magenta, yellow and black print at 1200 dpi, and white came out twice as wide; print at 600 dpi, or \
+             without {}",
+            special.join(", ")
+        ),
+        stacks: Vec::new(),
+    })
 }
 
 /// The passes of a page, and what the rules say of its copies: marks are cut off, so no rule but a ban is about them.
@@ -162,7 +188,15 @@ pub fn encode(
     allowed: &InkSet,
     observer: &dyn Observer,
 ) -> Result<Vec<u8>, JobError> {
-    let page: Page = handling.page(paper);
+    encoded(handling.page(paper), passes, allowed, observer)
+}
+
+fn encoded(
+    page: Page,
+    passes: &[Pass],
+    allowed: &InkSet,
+    observer: &dyn Observer,
+) -> Result<Vec<u8>, JobError> {
     let foil = allowed.iter().any(|ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
     let mut bytes = Vec::new();
     stream::write_job(page, foil, passes, &mut bytes, observer)?;
@@ -178,7 +212,7 @@ impl Job {
     pub fn prove(&self, observer: &dyn Observer) -> Result<Printout, JobError> {
         let printout = simulate::print(&self.bytes, &simulate::Setup::default(), observer)?;
         let sheet = &self.draft.sheet;
-        match simulate::difference(sheet, &printout.sheet_with(sheet.stacks())?) {
+        match simulate::difference(sheet, &printout.sheet_in_dots(Some(sheet.stacks()))?) {
             Some(difference) => Err(JobError::Different(difference)),
             None => Ok(printout),
         }
@@ -230,6 +264,52 @@ mod tests {
         index[0] ^= 1;
         other.draft.sheet = Sheet::new(layout.paper, stacks, index).unwrap();
         assert!(matches!(other.prove(&Silent), Err(JobError::Different(_))));
+    }
+
+    #[test]
+    fn a_job_at_1200_dpi_prints_its_dots_where_they_are_wanted_and_takes_process_inks_only() {
+        let library = Library::builtin();
+        // 61 x 20 at 1/600 inch: twice as many dots across, every other one black but for one column of cyan.
+        let dots = |other: &str| {
+            let stacks = vec![Stack::SUBSTRATE, "K".parse().unwrap(), other.parse().unwrap()];
+            let index = (0..122 * 20).map(|dot| if dot % 122 == 31 { 2 } else { (dot % 2) as u8 });
+            DotMap::new(122, 20, stacks, index.collect()).unwrap()
+        };
+        for mirror in [false, true] {
+            let layout = Layout {
+                resolution: Resolution::Dpi1200,
+                position: layout::Position::FromPrintable("2.54x5.08mm".parse().unwrap()),
+                repeat: layout::Repeat::Grid(2, 1),
+                gap: "2.54x0mm".parse().unwrap(),
+                mirror,
+                ..Layout::centred(Paper::A4)
+            };
+            let dots = dots("C");
+            let job = job(&request(&dots, &layout, InkSet::default(), &library), &Silent).unwrap();
+            let printout = job.prove(&Silent).unwrap();
+            assert_eq!((printout.resolution, printout.paper), (Resolution::Dpi1200, Paper::A4));
+            let plane = &printout.passes.iter().find(|pass| pass.ink == Ink::Black).unwrap().plane;
+            assert_eq!((plane.width, plane.length), (9600, 6372));
+            // Found one by one: corners at 60 and 181 x 120 in 1/600 inch.
+            for (x, y) in (100..400).flat_map(|x| (115..145).map(move |y| (x, y))) {
+                let black = plane.bits[y * plane.stride + x / 8] & 0x80 >> (x % 8) != 0;
+                let wanted = [120, 362].iter().any(|&left| {
+                    let at = if mirror { (left + 121usize).checked_sub(x) } else { x.checked_sub(left) };
+                    (120..140).contains(&y) && at.is_some_and(|at| at < 122 && at % 2 == 1 && at != 31)
+                });
+                assert_eq!(black, wanted, "({x}, {y}), mirror {mirror}");
+            }
+            let plan = &job.draft.plan;
+            assert_eq!((plan.resolution_dpi, plan.size_dots), ((1200, 600), (122, 20)));
+            assert!((plan.size_mm.0 - 61.0 * 25.4 / 600.0).abs() < 1e-9, "{:?}", plan.size_mm);
+            assert!((plan.from_edge_mm.0 - (80.0 + 60.0) * 25.4 / 600.0).abs() < 1e-9);
+        }
+        let layout = Layout { resolution: Resolution::Dpi1200, ..Layout::centred(Paper::A4) };
+        let white = dots("W");
+        let asked = request(&white, &layout, InkSet::default(), &library);
+        assert_eq!(draft(&asked, &Silent).unwrap().plan.checks[0].rule, "resolution");
+        let said = job(&asked, &Silent).unwrap_err().to_string();
+        assert!(said.contains("print at 600 dpi, or without white"), "{said}");
     }
 
     #[test]

@@ -54,9 +54,14 @@ fn of_layers(error: &LayersError) -> Option<String> {
         LayersError::NoSize { fits_mm, .. } => {
             format!("such as --dpi 1200, or --size {}mm for the largest that fits", below(*fits_mm))
         }
-        LayersError::Beyond { fits_mm, .. } => format!(
-            "the options are --size ({}mm is the largest that fits), --dpi, --paper and --crop",
-            below(*fits_mm)
+        LayersError::Beyond { fits_mm, says, .. } => format!(
+            "the options are --size ({}mm is the largest that fits), {}--paper and --crop",
+            below(*fits_mm),
+            if says.is_some() { "--dpi, " } else { "" }
+        ),
+        LayersError::Pages { pages, .. } => format!(
+            "--page {} reads one page; --pages white,gold,black reads one page per ink",
+            pages.first().unwrap_or(&1)
         ),
         LayersError::TooLarge { fits_mm, .. } => {
             format!("--size {}mm is the largest that fits", below(*fits_mm))

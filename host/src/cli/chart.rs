@@ -164,7 +164,7 @@ const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", " 
 type Make = fn(&Stack, &Stack, &Library, &dyn Observer) -> Result<DotMap, chart::ChartError>;
 
 fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Library) -> Artwork<'a> {
-    Artwork { name, dots, allowed, library, report: Value::Null, advice: String::new() }
+    Artwork { name, dots, allowed, library, notes: &[], report: Value::Null, advice: String::new() }
 }
 
 fn print(artwork: &Artwork<'_>, args: &JobArgs, observer: &dyn Observer) -> Result<()> {

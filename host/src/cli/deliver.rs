@@ -40,10 +40,10 @@ pub struct DeliverArgs {
 
 impl DeliverArgs {
     /// The file the job is to be written to, if it goes to a file.
-    pub fn file(&self) -> Option<&Path> {
+    pub fn file(&self) -> Result<Option<&Path>> {
         match &self.to {
-            Some(Destination::File(path)) => Some(path),
-            _ => None,
+            Some(to @ Destination::File(path)) => fits(to, self.copies).map(|()| Some(path.as_path())),
+            _ => Ok(None),
         }
     }
 
@@ -66,6 +66,17 @@ impl DeliverArgs {
     }
 }
 
+/// Whether so many copies can go there.
+fn fits(to: &Destination, copies: u16) -> Result<()> {
+    if let (Destination::File(path), 2..) = (to, copies) {
+        let file = path.display();
+        bail!(
+            "--copies counts printed sheets, but {file} holds the job once; print it with `foilpress send {file} --copies {copies}`"
+        );
+    }
+    Ok(())
+}
+
 /// How a job is to be delivered.
 #[derive(Clone, Copy)]
 pub struct Order {
@@ -79,6 +90,7 @@ pub struct Order {
 
 /// Takes a job to its destination, once for each copy.
 pub fn deliver(job: Job<'_>, to: &Destination, order: Order, observer: &dyn Observer) -> Result<()> {
+    fits(to, order.copies)?;
     if let Some(driver) = job.checked.dialect {
         observer.note(&format!(
             "{} is in the dialect of {driver}'s drivers, which nobody has tried; it is sent unchanged",

@@ -4,46 +4,59 @@ use std::path::Path;
 
 use anyhow::{Error, Result, bail};
 use clap::Args as ClapArgs;
+use serde_json::{Value, json};
 
 use super::bridge::{Found, ask};
 use super::permission;
-use super::resume::line;
+use super::resume::{as_json, line};
 use super::stdio::chain;
 use device::flash::{drive, usb};
 use device::send::find::{self, Candidate};
 use device::send::journal::Journal;
 use device::send::query::is_alps;
 use device::send::session::Phase;
-use device::send::{Address, OpenError};
+use device::send::{Address, OpenError, words};
 use observe::with_causes;
 
 /// Arguments of `doctor`.
 #[derive(ClapArgs, Debug)]
-#[command(after_help = "Examples:\n  foilpress doctor\n  foilpress doctor --to serial:/dev/ttyACM0")]
+#[command(
+    after_help = "Examples:\n  foilpress doctor\n  foilpress doctor --to serial:/dev/ttyACM0\n  foilpress doctor --json"
+)]
 pub struct Args {
     /// Address of the bridge [default: every bridge found]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
 }
 
 /// What was found so far.
 struct Visit<W> {
     out: W,
-    /// Number of problems that prevent printing.
-    troubles: usize,
+    /// Problems that prevent printing.
+    troubles: Vec<String>,
+    /// Everything that was found, for programs to read.
+    found: Value,
     /// Whether a permission is missing.
     forbidden: bool,
 }
 
 /// Runs `doctor`. Fails if something prevents printing.
 pub fn run(args: &Args) -> Result<()> {
-    let mut visit = Visit { out: std::io::stdout().lock(), troubles: 0, forbidden: false };
+    let out: Box<dyn std::io::Write> =
+        if args.json { Box::new(std::io::sink()) } else { Box::new(std::io::stdout().lock()) };
+    let found =
+        json!({ "jobs_folder": null, "unfinished_jobs": [], "boards_in_boot_loader": 0, "bridges": [] });
+    let mut visit = Visit { out, troubles: Vec::new(), found, forbidden: false };
     visit.journal()?;
     let bridges = match &args.to {
         Some(address) => vec![Candidate { serial_number: None, addresses: vec![address.clone()] }],
         None => find::survey().bridges,
     };
     let boards = if args.to.is_none() { visit.boards()? } else { 0 };
+    visit.found["boards_in_boot_loader"] = boards.into();
     if bridges.is_empty() && boards == 0 {
         visit.trouble(
             "no bridge found on USB: plug it in. If it is plugged in, its cable may carry no data, or it has no firmware yet: hold \
@@ -54,12 +67,19 @@ pub fn run(args: &Args) -> Result<()> {
         visit.bridge(bridge)?;
     }
     visit.raw_device()?;
-    visit.end()
+    visit.end(args.json)
+}
+
+/// Adds to a list.
+fn push(list: &mut Value, item: Value) {
+    if let Value::Array(items) = list {
+        items.push(item);
+    }
 }
 
 impl<W: std::io::Write> Visit<W> {
     fn trouble(&mut self, text: &str) -> Result<()> {
-        self.troubles += 1;
+        self.troubles.push(text.trim().to_owned());
         Ok(writeln!(self.out, "{text}")?)
     }
 
@@ -73,6 +93,7 @@ impl<W: std::io::Write> Visit<W> {
             Err(error) => self.trouble(&format!("cannot keep jobs: {}", with_causes(&error))),
             Ok(journal) => {
                 writeln!(self.out, "jobs are kept in {}", journal.folder().display())?;
+                self.found["jobs_folder"] = journal.folder().display().to_string().into();
                 for entry in journal.entries()? {
                     if !matches!(entry.record.phase, Phase::Ended(_)) {
                         writeln!(
@@ -80,6 +101,7 @@ impl<W: std::io::Write> Visit<W> {
                             "    unfinished (`foilpress resume` continues it): {}",
                             line(&entry)
                         )?;
+                        push(&mut self.found["unfinished_jobs"], as_json(&entry));
                     }
                 }
                 Ok(())
@@ -120,7 +142,11 @@ impl<W: std::io::Write> Visit<W> {
     fn bridge(&mut self, bridge: &Candidate) -> Result<()> {
         let ways: Vec<String> = bridge.addresses.iter().map(ToString::to_string).collect();
         writeln!(self.out, "\n{}", ways.join("  "))?;
-        match ask(bridge) {
+        let asked = ask(bridge);
+        let mut about = asked.as_ref().map_or_else(|error| json!({ "error": chain(error) }), Found::json);
+        about["addresses"] = ways.into();
+        push(&mut self.found["bridges"], about);
+        match asked {
             Err(error) => return self.failure(&error),
             Ok(found) => self.answers(&found)?,
         }
@@ -135,7 +161,7 @@ impl<W: std::io::Write> Visit<W> {
 
     fn answers(&mut self, found: &Found) -> Result<()> {
         found.write(&mut self.out)?;
-        self.troubles += usize::from(found.fault.is_some());
+        self.troubles.extend(found.fault.map(|fault| words::fault(fault, None)));
         match found.device_id() {
             Some(id) if !is_alps(&id) => self.trouble(
                 "the device does not identify itself as an ALPS printer, so jobs are not sent to it; `--force` with send or print \
@@ -149,7 +175,10 @@ impl<W: std::io::Write> Visit<W> {
         let raw = Path::new("/dev/usb/lp0");
         if raw.exists() {
             let (place, out) = (raw.display(), &mut self.out);
-            match std::fs::OpenOptions::new().write(true).open(raw) {
+            let opened = std::fs::OpenOptions::new().write(true).open(raw);
+            let error = opened.as_ref().err().map(ToString::to_string);
+            self.found["raw_device"] = json!({ "path": raw, "error": error });
+            match opened {
                 Ok(_) => writeln!(out, "\n{place} can be written: `--to raw:{place}` sends to it")?,
                 Err(error) => {
                     self.forbidden |= error.kind() == std::io::ErrorKind::PermissionDenied;
@@ -160,12 +189,17 @@ impl<W: std::io::Write> Visit<W> {
         Ok(())
     }
 
-    fn end(mut self) -> Result<()> {
+    fn end(mut self, json: bool) -> Result<()> {
+        if json {
+            self.found["problems"] = json!(self.troubles);
+            self.found["permission_missing"] = self.forbidden.into();
+            super::show(&format!("{}\n", serde_json::to_string_pretty(&self.found)?))?;
+        }
         if self.forbidden {
             write!(self.out, "\n{}", permission::how_to_give())?;
         }
-        if self.troubles > 0 {
-            bail!("problems that prevent printing: {}", self.troubles);
+        if !self.troubles.is_empty() {
+            bail!("problems that prevent printing: {}", self.troubles.len());
         }
         Ok(writeln!(self.out, "\nall is well")?)
     }

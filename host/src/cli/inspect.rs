@@ -31,7 +31,8 @@ pub struct Args {
     passes: Option<PathBuf>,
 }
 
-/// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1.
+/// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1, and no passes
+/// are written.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let job = read_job(&args.job)?;
     let places = sheets(&job);
@@ -57,9 +58,6 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         }
         summaries.push(inspection);
     }
-    if let Some(staged) = staged {
-        staged.commit()?;
-    }
     if args.json {
         let text = match &summaries[..] {
             [one] => serde_json::to_string_pretty(one)?,
@@ -68,10 +66,14 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         writeln!(out, "{text}")?;
     }
     let faulty = (1..).zip(&summaries).find_map(|(number, summary)| Some((number, summary.error.as_ref()?)));
+    // The passes of a stream that is no job are no result: with an error nothing appears.
+    let unwritten = if staged.is_some() { "; no passes are written" } else { "" };
     match faulty {
-        Some((number, error)) if several => bail!("{}: sheet {number}: {error}", args.job.display()),
-        Some((_, error)) => bail!("{}: {error}", args.job.display()),
-        None => Ok(()),
+        Some((number, error)) if several => {
+            bail!("{}: sheet {number}: {error}{unwritten}", args.job.display())
+        }
+        Some((_, error)) => bail!("{}: {error}{unwritten}", args.job.display()),
+        None => staged.map_or(Ok(()), Staged::commit),
     }
 }
 

@@ -13,17 +13,15 @@ use serde_json::{Value, json};
 
 use super::deliver::DeliverArgs;
 use super::layout::{LayoutArgs, MediaArgs};
+use super::ledger;
 use super::output::{self, Kind, Staged};
+use super::shown;
 use observe::Observer;
-use press::job::page;
 use press::layout::Layout;
 use press::pipeline::{self, Draft, Job, Request};
-use press::preview::inks::{Ground, save_pass, save_sheet, thumbnail};
+use press::preview::inks::{Ground, save_pass, save_sheet};
 use press::separate;
 use press::sheet::DotMap;
-
-/// Pixels of the longer side of the sheet on the plan's page.
-pub const THUMBNAIL: usize = 640;
 
 /// What is made of dots, and where it goes.
 #[derive(Args, Debug)]
@@ -66,7 +64,7 @@ impl Places {
     pub fn new(name: &str, result: &ResultArgs, deliver: &DeliverArgs) -> Result<Places> {
         let usual = || format!("{}.print", output::file_name(name)).into();
         let target = result.output.clone().unwrap_or_else(usual);
-        let also = deliver.file();
+        let also = deliver.file()?;
         if let Some(to) = also
             && absolute(to)?.starts_with(absolute(&target)?)
         {
@@ -113,20 +111,30 @@ pub struct Made {
 }
 
 /// Makes a job, proves it, and writes what every print has: the job, its passes, the plan as a page, and the dots as the
-/// simulated printer printed them: all inks on the ground, and each pass by itself.
-pub fn make(request: &Request<'_>, places: Places, ground: Ground, observer: &dyn Observer) -> Result<Made> {
-    let job = pipeline::job(request, observer)?;
+/// simulated printer printed them: all inks on the ground, and each pass by itself. `notes` are what the readers had to
+/// assume.
+pub fn make(
+    request: &Request<'_>,
+    notes: &[String],
+    places: Places,
+    ground: Ground,
+    observer: &dyn Observer,
+) -> Result<Made> {
+    let mut job = pipeline::job(request, observer)?;
+    job.draft.plan.notes = notes.to_vec();
+    job.draft.plan.price(&ledger::prices());
     let printout = job.prove(observer)?;
     let Draft { sheet, laid, separation, plan } = &job.draft;
     let folder = places.folder.create()?.to_path_buf();
     write(&folder.join("job.rgl"), &job.bytes)?;
-    let picture = thumbnail(sheet, ground, THUMBNAIL);
-    write(&folder.join("plan.html"), page::html(plan, &picture)?.as_bytes())?;
+    let html = shown::page(plan, sheet, &separation.passes, laid.area, ground)?;
+    write(&folder.join("plan.html"), html.as_bytes())?;
     // The page is the simulated sheet, dot for dot.
-    save_sheet(sheet, laid.area, ground, &folder.join("preview.png"))?;
+    let across = shown::across(plan);
+    save_sheet(sheet, laid.area, across, ground, &folder.join("preview.png"))?;
     printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
         let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
-        save_pass(pass, laid.area, ground, &folder.join(name))
+        save_pass(pass, laid.area, across, ground, &folder.join(name))
     })?;
     let passes = folder.join("passes");
     fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
@@ -185,6 +193,8 @@ pub struct Artwork<'a> {
     pub allowed: InkSet,
     /// The library.
     pub library: &'a Library,
+    /// What the readers had to assume.
+    pub notes: &'a [String],
     /// What else the report should hold: an object, or null for nothing.
     pub report: Value,
     /// What else to say below the plan; empty for nothing.
@@ -209,7 +219,7 @@ impl<'a> Artwork<'a> {
     ) -> Result<()> {
         let places = Places::new(self.name, result, deliver)?;
         let ground = result.background.unwrap_or_default();
-        let made = make(&self.request(layout, media), places, ground, observer)?;
+        let made = make(&self.request(layout, media), self.notes, places, ground, observer)?;
         made.finish(self.report.clone(), (&self.advice, "preview.png"), result, deliver, observer)
     }
 }

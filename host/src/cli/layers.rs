@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
+use protocol::rgl::Resolution;
 use serde_json::json;
 
 use super::advice;
@@ -17,7 +18,7 @@ use super::preset::PresetArg;
 use super::shown::Shown;
 use observe::Observer;
 use press::job::plan::grouped;
-use press::layers::{self, Accept, Composed, Finish, Order, Room, Suggestion, White, names};
+use press::layers::{self, Accept, Composed, Finish, Order, Pages, Room, Suggestion, White, names};
 use press::layout::{Layout, Mm, NoLength, Size};
 use press::pipeline;
 use press::sheet::DOTS_PER_MM;
@@ -40,9 +41,12 @@ pub struct LayersArgs {
     /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one
     #[arg(long, value_name = "DPI", value_parser = dpi)]
     pub dpi: Option<f64>,
-    /// Page of a PDF or PostScript file
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = page)]
-    pub page: u32,
+    /// Page of a PDF or PostScript file [default: the only page with art; several are an error]
+    #[arg(long, value_name = "N", value_parser = page)]
+    pub page: Option<u32>,
+    /// Read one page per ink from a PDF or PostScript file: the ink of each page, such as white,gold,black
+    #[arg(long, value_name = "INKS", value_delimiter = ',', value_parser = names::typed, conflicts_with = "page")]
+    pub pages: Vec<Ink>,
     /// Layers to halftone, so that they keep their tones; other layers are solid where they are darker than half
     #[arg(long, value_name = "INKS")]
     pub halftone: Option<String>,
@@ -85,6 +89,14 @@ pub struct LayersArgs {
 fn dpi(text: &str) -> Result<f64, String> {
     let dpi: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
     if (20.0..=10_000.0).contains(&dpi) { Ok(dpi) } else { Err("expected 20 to 10000".into()) }
+}
+
+fn resolution(text: &str) -> Result<Resolution, String> {
+    match text {
+        "600" => Ok(Resolution::Dpi600),
+        "1200" => Ok(Resolution::Dpi1200),
+        _ => Err("the printer prints at 600 or 1200 dpi; --dpi is the resolution of a picture".into()),
+    }
 }
 
 fn page(text: &str) -> Result<u32, String> {
@@ -160,7 +172,12 @@ impl LayersArgs {
             dpi: self.dpi,
             reserved: self.reserved || self.white == Some(White::Reserved),
             tolerance: self.tolerance,
-            page: self.page,
+            pages: match (self.page, &self.pages[..]) {
+                (Some(page), _) => Pages::Number(page),
+                (None, []) => Pages::Only,
+                (None, inks) => Pages::Inks(inks.to_vec()),
+            },
+            across: 1,
             halftone: self.halftone.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--halftone", text))?,
             inks: self.inks()?,
             room: Room { width, length, cut: layout.cut },
@@ -183,6 +200,7 @@ impl LayersArgs {
             choke: self.choke.unwrap_or(0.0) - self.spread.unwrap_or(0.0),
             finish: self.finish,
             accept: self.accept.clone(),
+            ..usual
         })
     }
 }
@@ -196,6 +214,11 @@ pub struct Work {
     /// [default: the size stated in the files, else 600 dpi for layers and as large as the page allows for a plain picture]
     #[arg(long)]
     size: Option<Size>,
+    /// Resolution of the print across the sheet: 600, or 1200 for art in cyan, magenta, yellow and black only
+    ///
+    /// Along the sheet it is always 600 dpi. The printer prints every other ink wrong at 1200 dpi, so such a job is refused.
+    #[arg(long, value_name = "DPI", default_value = "600", value_parser = resolution)]
+    resolution: Resolution,
     #[command(flatten)]
     layout: LayoutArgs,
     #[command(flatten)]
@@ -214,6 +237,7 @@ pub struct Work {
     foilpress layers art.png --reserved --inks white,gold,black\n  \
     foilpress layers art.svg --white silhouette --choke 0.1mm --repeat 2x4 --gap 3mm --crop-marks\n  \
     foilpress layers decal.pdf --page 1 --white alpha\n  \
+    foilpress layers plates.pdf --pages white,gold,black    (one page per ink)\n  \
     foilpress layers photo.png --size 120mm --to serial:/dev/ttyACM0\n  \
     foilpress plan layers white.png gold.png black.png      (only the plan; nothing is written or sent)\n\n\
     In a layer, dark pixels are ink; on a transparent background, everything drawn is ink. Artwork drawn at 600 dpi is \
@@ -253,8 +277,10 @@ impl Work {
         then: impl FnOnce(&Artwork<'_>, &Layout) -> Result<T>,
     ) -> Result<T> {
         let library = self.layers.library()?;
-        let layout = self.layout.layout(observer)?;
-        let (options, settings) = (self.layers.options(self.size, &layout)?, self.layers.settings()?);
+        let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
+        let across = self.resolution.across(1).into();
+        let options = layers::Options { across, ..self.layers.options(self.size, &layout)? };
+        let settings = layers::Settings { across, ..self.layers.settings()? };
         let art = layers::open(&self.layers.art, &options, observer)?;
         let composed = layers::compose(&art, &settings, &library, observer)?;
         let artwork = Artwork {
@@ -262,6 +288,7 @@ impl Work {
             dots: &composed.dots,
             allowed: settings.inks,
             library: &library,
+            notes: &composed.report.notes,
             report: json!({
                 "art": { "composed": composed.report, "suggestions": suggestions(&composed, &settings.inks) }
             }),
@@ -281,8 +308,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
     let page = args.shown.stage()?;
     args.work.with(observer, |artwork, layout| {
-        let draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
-        args.shown.show(page, (&draft.plan, &draft.sheet), &artwork.report, &artwork.advice)
+        let mut draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
+        draft.plan.notes = artwork.notes.to_vec();
+        args.shown.show(page, draft.into(), &artwork.report, &artwork.advice)
     })
 }
 

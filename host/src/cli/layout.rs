@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
-use protocol::rgl::Media;
+use protocol::rgl::{Media, Resolution};
 
 use crate::folders;
 use observe::Observer;
@@ -101,6 +101,7 @@ impl LayoutArgs {
         };
         Ok(Layout {
             paper: self.paper,
+            resolution: Resolution::Dpi600,
             position,
             repeat: self.repeat,
             gap: self.gap,
@@ -256,7 +257,11 @@ pub struct ProfileArgs {
 #[derive(clap::Subcommand, Debug)]
 enum ProfileCommand {
     /// List the profiles
-    List,
+    List {
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Save measurements of the calibration chart as a profile; the profile `default` is used whenever none is named
     Set(SetProfile),
 }
@@ -278,7 +283,17 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
     use std::fmt::Write as _;
     let folder = profiles()?;
     match &args.command {
-        ProfileCommand::List => {
+        ProfileCommand::List { json: true } => {
+            let names =
+                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+            let profile = |name: String| {
+                let Profile { offset_mm, feed } = Profile::load(&folders::file(&folder, &name)?)?;
+                anyhow::Ok(serde_json::json!({ "name": name, "offset_mm": offset_mm, "feed": feed }))
+            };
+            let profiles = names.into_iter().map(profile).collect::<Result<Vec<_>>>()?;
+            super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&profiles)?))
+        }
+        ProfileCommand::List { json: false } => {
             let mut text = String::new();
             for name in
                 folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?

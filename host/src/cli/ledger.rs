@@ -6,16 +6,20 @@ use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
 use protocol::ink::Ink;
 
-use device::ledger::{Event, Ledger, totals};
+use device::ledger::{self, Event, Ledger, totals};
 use device::printers::Printers;
 use device::send::journal::Journal;
+use press::job::plan::Price;
 use press::job::ribbon;
+use press::layout::Mm;
 
 /// Arguments of `ledger`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress ledger                   (ribbon used so far, including failed jobs)\n  \
     foilpress ledger new white         (a new white cartridge is loaded)\n  \
+    foilpress ledger price white 12 EUR\n  \
+    foilpress ledger price white 12 EUR --length 20m\n  \
     foilpress ledger --json")]
 pub struct Args {
     #[command(subcommand)]
@@ -33,6 +37,52 @@ enum Command {
         #[arg(value_parser = super::layout::ink)]
         ink: Ink,
     },
+    /// Record the price of a cartridge; plans and the ledger then say what the ribbon costs
+    Price {
+        /// Ink of the cartridge
+        #[arg(value_parser = super::layout::ink)]
+        ink: Ink,
+        /// Price of one cartridge
+        #[arg(value_parser = amount)]
+        price: f64,
+        /// Currency, such as EUR
+        #[arg(value_parser = currency)]
+        currency: String,
+        /// Ribbon in one cartridge, such as 20m [default: what earlier cartridges gave between two `ledger new`]
+        #[arg(long, value_name = "LENGTH", value_parser = ribbon_length)]
+        length: Option<f64>,
+    },
+}
+
+fn amount(text: &str) -> Result<f64, String> {
+    match text.replace(',', ".").parse() {
+        Ok(amount) if (0.0..=1e6).contains(&amount) => Ok(amount),
+        _ => Err("expected an amount from 0 to 1000000, such as 12 or 12.50".into()),
+    }
+}
+
+fn currency(text: &str) -> Result<String, String> {
+    let fits = (1..=8).contains(&text.chars().count())
+        && !text.chars().any(|c| c.is_control() || c.is_ascii_digit());
+    if fits { Ok(text.into()) } else { Err("expected a currency, such as EUR".into()) }
+}
+
+/// A length of ribbon in millimetres: metres are how ribbons are measured.
+fn ribbon_length(text: &str) -> Result<f64, String> {
+    let metres = text.strip_suffix('m').filter(|number| !number.ends_with(['m', 'c']));
+    let mm = match metres {
+        Some(number) => number.trim().parse::<f64>().map(|metres| 1000.0 * metres).ok(),
+        None => text.parse::<Mm>().map(|length| length.0).ok(),
+    };
+    mm.filter(|mm| (100.0..=1e6).contains(mm))
+        .ok_or_else(|| "expected a length from 0.1m to 1000m, such as 20m".into())
+}
+
+/// The prices in the ledger; none if it cannot be read, for a plan does not depend on them.
+pub fn prices() -> Vec<Price> {
+    let read = || anyhow::Ok(Ledger::in_folder(Printers::of_system()?.folder()).lines()?.0);
+    // Jobs that never ended count by what their journals know only where ribbon is reported.
+    read().map_or_else(|_| Vec::new(), |lines| ledger::prices(&lines, |_| None))
 }
 
 /// Runs `ledger`.
@@ -42,6 +92,12 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(Command::New { ink }) = &args.command {
         ledger.append(Event::New { ink: ink.name().into() })?;
         return super::show(&format!("{}: a new cartridge, counted from now on\n", ink.name()));
+    }
+    if let Some(Command::Price { ink, price, currency, length }) = &args.command {
+        let (ink, amount, ribbon_mm) = (ink.name().to_owned(), *price, *length);
+        let said = format!("{ink}: {amount:.2} {currency} a cartridge, from now on\n");
+        ledger.append(Event::Price { ink, amount, currency: currency.clone(), ribbon_mm })?;
+        return super::show(&said);
     }
     let (lines, damaged) = ledger.lines()?;
     let entries = journal.entries()?;
@@ -67,7 +123,19 @@ pub fn run(args: &Args) -> Result<()> {
         if total.failed > 0 {
             write!(text, ", {} of them in jobs that failed", total.failed)?;
         }
-        writeln!(text, "{}", if total.since.is_some() { ", since it was new" } else { "" })?;
+        text.push_str(if total.since.is_some() { ", since it was new" } else { "" });
+        match (&total.cost, &total.price) {
+            (Some(cost), _) => write!(text, ", about {cost}")?,
+            (None, Some(price)) => {
+                write!(
+                    text,
+                    ", {} a cartridge (how much ribbon one gives is not known yet)",
+                    price.cartridge
+                )?;
+            }
+            (None, None) => {}
+        }
+        text.push('\n');
     }
     if totals.is_empty() {
         text = "no job was sent yet\n".into();

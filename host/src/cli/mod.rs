@@ -136,6 +136,13 @@ enum Command {
 
 /// Runs the program with the arguments it was started with.
 pub fn main() -> ExitCode {
+    // The renderer of drawings may fail on hostile ones; the reader of art tells that as an error.
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if std::thread::current().name() != Some(press::layers::DRAWING) {
+            usual(panic);
+        }
+    }));
     let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
         Ok(args) => Args::parse_from(args),
         Err(error) => {

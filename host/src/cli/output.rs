@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
+use press::process;
 use press::scratch::{self, Scratch};
 
 /// What the user is told when the program is interrupted.
@@ -212,13 +213,14 @@ impl Staged {
     }
 }
 
-/// A document's name as a file name. Names come from documents, which must not decide where this program writes.
+/// A document's name as a file name, without blanks, so that it can be typed as it stands. Names come from documents, which
+/// must not decide where this program writes.
 pub fn file_name(name: &str) -> String {
     const LONGEST: usize = 80;
     let plain: String = name
         .trim()
         .chars()
-        .map(|c| if c.is_control() || "/\\:*?\"<>|".contains(c) { '-' } else { c })
+        .map(|c| if c.is_control() || c.is_whitespace() || "/\\:*?\"<>|".contains(c) { '-' } else { c })
         .take(LONGEST)
         .collect();
     let plain = plain.trim_start_matches(['.', '-']).trim_end_matches(['.', ' ']);
@@ -237,6 +239,8 @@ pub fn yield_to_interrupt() {
 /// code 130.
 pub fn remove_on_interrupt() -> Result<()> {
     ctrlc::set_handler(|| {
+        // First, so that none of them writes into a folder that is being removed.
+        process::stop_all();
         // Never released, so that from here on nothing new is staged and nothing is moved to its destination.
         let paths = scratch::folders();
         for path in paths.iter() {
@@ -355,7 +359,8 @@ mod tests {
             ("..", "document"),
             (" \n ", "document"),
             ("-o", "o"),
-            ("Gold \u{5370}", "Gold \u{5370}"),
+            ("Gold \u{5370}", "Gold-\u{5370}"),
+            ("ramp SF MS", "ramp-SF-MS"),
         ] {
             assert_eq!(file_name(name), expected, "{name}");
         }

@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::layers;
 use super::print::Work;
-use super::shown::Shown;
+use super::shown::{Drawn, Shown};
 use observe::Observer;
 use press::job::plan::{Plan, Subject};
 use press::layout::Laid;
@@ -90,13 +90,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     };
     let page = args.shown.stage()?;
     let path = Path::new(&args.work.document.document);
-    let (plan, sheet) = if is_job(path) {
+    let drawn = if is_job(path) {
         of_job(path, &args.work.inks.library()?, observer)?
     } else {
-        let draft = args.work.draft(observer)?;
-        (draft.plan, draft.sheet)
+        args.work.draft(observer)?.into()
     };
-    args.shown.show(page, (&plan, &sheet), &Value::Null, "")
+    args.shown.show(page, drawn, &Value::Null, "")
 }
 
 /// Whether a file begins like a job. All jobs begin with an escape; no document's file does.
@@ -108,12 +107,12 @@ fn is_job(path: &Path) -> bool {
             && first == *b"\x1b")
 }
 
-/// The plan of a job from its bytes, and the sheet it prints.
-fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<(Plan, Sheet)> {
+/// The plan of a job from its bytes, and what it prints.
+fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<Drawn> {
     let job = super::stdio::read_job(path)?;
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)
         .with_context(|| format!("{}", path.display()))?;
-    let sheet = printout.sheet().with_context(|| format!("{}", path.display()))?;
+    let sheet = printout.sheet_in_dots(None).with_context(|| format!("{}", path.display()))?;
     let page = Page {
         media: printout.media,
         resolution: printout.resolution,
@@ -135,8 +134,9 @@ fn of_job(path: &Path, library: &Library, observer: &dyn Observer) -> Result<(Pl
         planned: &planned,
         checks: &checks,
         page: &page,
+        mirrored: None,
     };
-    Ok((Plan::new(&subject, library), sheet))
+    Ok(Drawn { plan: Plan::new(&subject, library), sheet, passes, area })
 }
 
 /// The smallest rectangle that holds all ink.

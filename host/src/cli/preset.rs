@@ -50,7 +50,11 @@ enum Command {
         options: Vec<String>,
     },
     /// List the presets and show which one is in use
-    List,
+    List {
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Apply a preset to every command that it fits, without naming it; `none` stops that
     Use {
         /// Name of the preset, or none
@@ -154,7 +158,7 @@ fn refusal(program: &clap::Command, command: &[&str], words: &[String]) -> Optio
 pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
     match &args.command {
         Command::Save { name, options } => save(name, options, program),
-        Command::List => list(),
+        Command::List { json } => list(*json),
         Command::Use { name } => apply(name),
     }
 }
@@ -188,10 +192,20 @@ fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
     show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
 }
 
-fn list() -> Result<()> {
+fn list(json: bool) -> Result<()> {
     let folder = presets()?;
     let names = folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
     let used = in_use();
+    if json {
+        let preset = |name: &String| {
+            let preset = Preset::load(name)?;
+            let in_use = used.as_ref() == Some(name);
+            let options = serde_json::to_value(&preset.options)?;
+            anyhow::Ok(serde_json::json!({ "name": name, "options": options, "in_use": in_use }))
+        };
+        let presets = names.iter().map(preset).collect::<Result<Vec<_>>>()?;
+        return show(&format!("{}\n", serde_json::to_string_pretty(&presets)?));
+    }
     let mut text = String::new();
     for name in &names {
         let words = Preset::load(name)?.words()?.join(" ");

@@ -65,7 +65,9 @@ impl Work {
     pub fn draft(&self, observer: &dyn Observer) -> Result<Draft> {
         let (inks, library) = self.inks.at_hand()?;
         let laid = self.halftone(self.document.open(observer)?, inks, library, observer)?;
-        Ok(pipeline::draft(&self.request(&laid), observer)?)
+        let mut draft = pipeline::draft(&self.request(&laid), observer)?;
+        draft.plan.notes.clone_from(&laid.document.notes);
+        Ok(draft)
     }
 
     fn halftone(
@@ -132,7 +134,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
     let laid = args.work.halftone(document, inks, library, observer)?;
     let ground = args.result.background.unwrap_or_default();
-    let made = job::make(&args.work.request(&laid), places, ground, observer)?;
+    let made = job::make(&args.work.request(&laid), &laid.document.notes, places, ground, observer)?;
     let pictures = pictures(&laid, made.job.draft.separation.passes.len(), &probe, observer)?;
     for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))?;

@@ -5,10 +5,12 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::{Context, Error, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
+use serde_json::json;
 
 use super::stdio::{chain, show};
 use crate::queue::call::{Call, Exit};
@@ -41,7 +43,11 @@ enum Command {
     /// Remove a queue (as root)
     Remove(Remove),
     /// List the queues of this program
-    List,
+    List {
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Print the printer description (PPD), to install a queue by hand
     Ppd,
 }
@@ -87,7 +93,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.command {
         Command::Install(args) => install(args, observer),
         Command::Remove(args) => remove(args, observer),
-        Command::List => list(),
+        Command::List { json } => list(*json),
         Command::Ppd => show(&ppd::description(&Profile::default())),
     }
 }
@@ -223,18 +229,26 @@ fn ours(name: &str) -> Result<()> {
     }
 }
 
-fn list() -> Result<()> {
-    let mut out = io::stdout().lock();
-    let mut found = false;
+fn list(json: bool) -> Result<()> {
+    let mut found = Vec::new();
     for (name, device) in queues()? {
         if uri::parse(&device).is_ok() {
-            found = true;
-            let state = system("lpstat", &["-p", &name])?;
-            writeln!(out, "{name}  {device}")?;
-            state.lines().try_for_each(|line| writeln!(out, "    {}", line.trim()))?;
+            let state: Vec<String> =
+                system("lpstat", &["-p", &name])?.lines().map(|line| line.trim().to_owned()).collect();
+            found.push((name, device, state));
         }
     }
-    if !found {
+    let mut out = io::stdout().lock();
+    if json {
+        let queue = |(name, device, state): &(String, String, Vec<String>)| json!({ "name": name, "device": device, "state": state });
+        let queues: Vec<_> = found.iter().map(queue).collect();
+        return Ok(writeln!(out, "{}", serde_json::to_string_pretty(&queues)?)?);
+    }
+    for (name, device, state) in &found {
+        writeln!(out, "{name}  {device}")?;
+        state.iter().try_for_each(|line| writeln!(out, "    {line}"))?;
+    }
+    if found.is_empty() {
         writeln!(out, "no queue leads to this program; `foilpress queue install` installs one")?;
     }
     Ok(())
@@ -280,18 +294,27 @@ pub fn backend(args: &Conventional) -> ExitCode {
 /// The filter: `job user title copies options [file]`, jobs to standard output.
 pub fn filter(args: &Conventional) -> ExitCode {
     let messages = Messages::of_filter(io::stderr());
-    match filtered(&args.arguments, &messages) {
-        Ok(0) => {
-            messages.error("there is nothing to print: every page is blank");
-            ExitCode::FAILURE
-        }
-        Ok(_) => ExitCode::SUCCESS,
-        Err(error) => {
-            messages.error(&chain(&error));
-            ExitCode::FAILURE
-        }
+    // A cancelled job leaves neither folders nor a Ghostscript behind.
+    if let Err(error) = super::output::remove_on_interrupt() {
+        messages.debug(&chain(&error));
     }
+    let why = match filtered(&args.arguments, &messages) {
+        Ok(1..) => return ExitCode::SUCCESS,
+        Ok(0) => "there is nothing to print: every page is blank".into(),
+        Err(error) => {
+            super::output::yield_to_interrupt();
+            chain(&error)
+        }
+    };
+    messages.error(&why);
+    // The print system shows this message with the job only if it reads it before it sees the filter end; otherwise it
+    // shows "Filter failed" alone.
+    std::thread::sleep(HEARD);
+    ExitCode::FAILURE
 }
+
+/// How long the print system may take to read a message.
+const HEARD: Duration = Duration::from_secs(1);
 
 fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
     let (asked, file) = match arguments {

@@ -29,6 +29,9 @@ pub struct Resume {
     /// List the jobs and their states without resuming any
     #[arg(long, conflicts_with_all = ["job", "to"])]
     list: bool,
+    /// Print the list as JSON
+    #[arg(long, requires = "list")]
+    json: bool,
 }
 
 /// Arguments of `cancel`.
@@ -58,6 +61,10 @@ pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
     let journal = Journal::of_user()?;
     if args.list {
         let entries = journal.entries()?;
+        if args.json {
+            let entries: Vec<_> = entries.iter().map(as_json).collect();
+            return super::show(&format!("{}\n", serde_json::to_string_pretty(&entries)?));
+        }
         if entries.is_empty() {
             observer.note("no job has been sent to a bridge yet");
         }
@@ -130,6 +137,20 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
             bail!("several jobs have not ended; choose one:\n{}", lines.join("\n"))
         }
     }
+}
+
+/// A job for programs to read.
+pub fn as_json(entry: &Entry) -> serde_json::Value {
+    serde_json::json!({
+        "job": format!("{:08x}", entry.record.job),
+        "name": entry.name,
+        "to": entry.to,
+        "queued_at": entry.queued,
+        "bytes": entry.port_bytes,
+        "bytes_printed": entry.record.printed,
+        "ended": matches!(entry.record.phase, Phase::Ended(_)),
+        "state": words::phase(entry),
+    })
 }
 
 /// A job in a line.

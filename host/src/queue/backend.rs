@@ -104,7 +104,12 @@ impl<W: Write + Send> Backend<'_, W> {
                 if self.system.stops() {
                     return Ok(());
                 }
-                if !self.sheet(&job, place, checked, &folder.join(format!("{number:04}")))? {
+                let own = folder.join(format!("{number:04}"));
+                if !self.sheet(&job, place, checked, &own)? {
+                    // Of a job without a printed sheet there is nothing to remember: if it is started again, it begins anew.
+                    if number == 1 && self.has_ended(&own) {
+                        self.forget(&folder);
+                    }
                     return Ok(());
                 }
                 self.messages.page(number);
@@ -312,6 +317,16 @@ impl<W: Write + Send> Backend<'_, W> {
         Ok(all)
     }
 
+    /// Whether nothing of a sheet can still be at a bridge or in a printer.
+    fn has_ended(&self, folder: &Path) -> bool {
+        let ended = |journal: Journal| {
+            let entries = journal.entries().ok()?;
+            Some(entries.iter().all(|entry| entry.record.phase == Phase::Ended(Outcome::Cancelled)))
+        };
+        !folder.join("begun").exists()
+            && (!folder.exists() || Journal::at(folder).ok().and_then(ended).unwrap_or(false))
+    }
+
     fn forget(&self, folder: &Path) {
         if let Err(error) = fs::remove_dir_all(folder)
             && error.kind() != io::ErrorKind::NotFound
@@ -465,6 +480,13 @@ mod tests {
         assert!(!got.is_empty() && got.len() < bytes.len());
         assert!(inspect(&got, &Silent).inspection.complete);
         assert!(!said.contains("PAGE:"), "{said}");
+        assert_eq!(fs::read_dir(&rig.call.journal).unwrap().count(), 0, "nothing is kept of a cancelled job");
+        // What was printed before is remembered, in case the job is started again.
+        let two = [job(Ink::Cyan, 3), job(Ink::Cyan, 400)].concat();
+        let pages = AtomicUsize::new(0);
+        let (_, said) = rig.run(&two, &|| pages.fetch_add(1, Ordering::SeqCst) > 16);
+        assert!(said.contains("PAGE: 1 1") && !said.contains("PAGE: 2 1"), "{said}");
+        assert!(rig.call.journal.join("one/0001/done").exists());
     }
 
     #[test]

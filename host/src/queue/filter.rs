@@ -191,7 +191,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         }
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |source| FilterError::Layers { page: number, source };
-        let page = layers::pdf::separated(path, number, plates, dpi.into()).map_err(in_page)?;
+        let page = layers::pdf::separated(path, number, dpi.into()).map_err(in_page)?;
         let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
             let art =

@@ -399,6 +399,27 @@ fn what_is_no_job_never_reaches_the_printer() {
 }
 
 #[test]
+fn why_a_page_is_not_printed_is_said_with_the_job() {
+    let server = server!();
+    let bridge = Bridge::start(FAST);
+    server.queue("Alps", &bridge.uri());
+    let file = server.path("files/page.pdf");
+    fs::write(&file, pdf(&["0 g 120 240 240 240 re f"])).unwrap();
+    let file = file.to_str().unwrap();
+    for (option, words) in [
+        ("FoilpressWhite=Beneath", "Silhouette"),
+        ("FoilpressPosition=left", "20x30mm"),
+        ("MediaType=Tin", "MediaType"),
+    ] {
+        let job = server.print(&["-d", "Alps", "-o", option, file]);
+        assert_ne!(server.wait_for_job(job), "completed");
+        let said = server.job(job, "job-printer-state-message");
+        assert!(said.contains(words), "{option}: {said}");
+    }
+    assert!(bridge.printed().is_empty());
+}
+
+#[test]
 fn a_cancelled_job_leaves_a_printer_that_is_ready_for_the_next() {
     let server = server!();
     let bridge = Bridge::start(100);

@@ -17,7 +17,6 @@ mod rule;
 
 use inks::{Library, Stack};
 use protocol::ink::Ink;
-use protocol::paper::LARGEST as LARGEST_PAGE;
 use protocol::walk::{Band, MOST, Tile, Walk};
 use rayon::prelude::*;
 
@@ -28,6 +27,9 @@ use observe::Observer;
 
 /// The largest minimum cluster.
 pub const LARGEST: u16 = 64;
+
+/// Dots across and rows of the largest map: half as much again as the longest page, so that art for A3 can be cropped.
+pub const LARGEST_MAP: (u16, u16) = (11_640, 11_640);
 
 /// Bands in a strip; the last strip has up to twice as many.
 const STRIP: usize = 16;
@@ -60,10 +62,10 @@ impl Settings {
 /// Why a mix cannot be halftoned.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum HalftoneError {
-    /// The rectangle has no dots, or more than the largest sheet of paper.
+    /// The rectangle has no dots, or too many.
     #[error(
-        "a document of {width} x {length} dots cannot be halftoned; a side has 1 dot at least, the largest sheet of paper \
-         {} x {}", LARGEST_PAGE.0, LARGEST_PAGE.1
+        "a document of {width} x {length} dots cannot be halftoned; expected 1 x 1 to {} x {} dots",
+        LARGEST_MAP.0, LARGEST_MAP.1
     )]
     Size {
         /// Dots across.
@@ -122,7 +124,7 @@ pub enum HalftoneError {
 }
 
 fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Result<(), HalftoneError> {
-    if !(1..=LARGEST_PAGE.0).contains(&width) || !(1..=LARGEST_PAGE.1).contains(&length) {
+    if !(1..=LARGEST_MAP.0).contains(&width) || !(1..=LARGEST_MAP.1).contains(&length) {
         return Err(HalftoneError::Size { width, length });
     }
     let (rows, channels, stacks) = (mix.matrix.len(), mix.maps.channels(), mix.stacks.len());

@@ -208,8 +208,8 @@ fn contradictions_are_named() {
     let error = |mix: &InkMix, size: (u16, u16), settings: &Settings| {
         halftone(mix, size, settings, &Silent).unwrap_err().to_string()
     };
-    for size in [(0, 60), (50, 0), (4941, 60), (50, u16::MAX)] {
-        assert!(error(&mix, size, &settings).contains("the largest sheet of paper 4940 x 7760"));
+    for size in [(0, 60), (50, 0), (11_641, 60), (50, u16::MAX)] {
+        assert!(error(&mix, size, &settings).contains("expected 1 x 1 to 11640 x 11640 dots"));
     }
     assert!(error(&mix, page, &Settings::uniform(3, 9)).contains("3 minimum clusters"));
     assert!(error(&mix, page, &Settings::uniform(2, 0)).contains("`substrate` is 0 dots"));

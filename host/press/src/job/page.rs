@@ -10,16 +10,29 @@ use image::{ImageFormat, RgbImage};
 use super::plan::{Plan, grouped};
 use super::ribbon;
 
-/// The plan with a picture of the sheet, for a sheet of A4 or letter.
+/// The pictures on the page: what the sheet will look like.
+pub struct Pictures {
+    /// The whole sheet.
+    pub sheet: RgbImage,
+    /// The printed part of it in each pass, in the order of the plan's passes.
+    pub passes: Vec<RgbImage>,
+}
+
+/// The plan with pictures of the sheet and of each pass, for a sheet of A4 or letter.
 ///
 /// # Errors
-/// When the picture cannot be compressed.
-pub fn html(plan: &Plan, picture: &RgbImage) -> Result<String, image::ImageError> {
-    let mut png = Cursor::new(Vec::new());
-    picture.write_to(&mut png, ImageFormat::Png)?;
+/// When a picture cannot be compressed.
+pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageError> {
+    let encoded = |picture: &RgbImage| {
+        let mut png = Cursor::new(Vec::new());
+        picture.write_to(&mut png, ImageFormat::Png)?;
+        Ok::<String, image::ImageError>(STANDARD.encode(png.into_inner()))
+    };
+    let sheet = encoded(&pictures.sheet)?;
+    let passes: Vec<String> = pictures.passes.iter().map(encoded).collect::<Result<_, _>>()?;
     let mut page = String::new();
     // Writing to a string does not fail.
-    let _ = write(plan, &STANDARD.encode(png.into_inner()), &mut page);
+    let _ = write(plan, &sheet, &passes, &mut page);
     Ok(page)
 }
 
@@ -43,16 +56,18 @@ fn escape(text: &str) -> String {
 const STYLE: &str = "@page{margin:15mm}body{font:10.5pt/1.35 sans-serif;color:#111;max-width:180mm;margin:0 auto}\
     h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}h2:first-of-type{clear:both}p{margin:1mm 0}\
     table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.6mm 2mm;border-bottom:.2mm solid #bbb}\
-    th{font-weight:600}td.n,th.n{text-align:right}img{float:right;width:52mm;border:.2mm solid #999;margin:0 0 3mm 5mm}\
+    th{font-weight:600}td.n,th.n{text-align:right}img{border:.2mm solid #999}\
+    .sheet{float:right;width:52mm;margin:0 0 3mm 5mm}.passes{display:flex;flex-wrap:wrap;gap:3mm}\
+    figure{margin:0;break-inside:avoid}figure img{max-width:41mm;max-height:41mm}figcaption{font-size:8.5pt}\
     .box{display:inline-block;width:3.4mm;height:3.4mm;border:.3mm solid #111;vertical-align:-.5mm}small{color:#555}";
 
-fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
+fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std::fmt::Result {
     let name = escape(&plan.document);
     write!(
         page,
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}: job plan</title>\
          <style>{STYLE}</style></head><body>\n\
-         <img alt=\"the sheet\" src=\"data:image/png;base64,{picture}\">\n<h1>{name}</h1>\n"
+         <img class=\"sheet\" alt=\"the sheet as it is printed\" src=\"data:image/png;base64,{sheet}\">\n<h1>{name}</h1>\n"
     )?;
     let (width, height) = plan.size_mm;
     write!(page, "<p>{width:.1} &times; {height:.1} mm on {}", plan.paper)?;
@@ -61,17 +76,22 @@ fn write(plan: &Plan, picture: &str, page: &mut String) -> std::fmt::Result {
     }
     writeln!(
         page,
-        "; top left corner at {:.1} mm, {:.1} mm.</p>\n\
+        "; top left corner at {:.1} mm, {:.1} mm.{}{}</p>\n\
          <p>Media <b>{}</b>, curl correction <b>{}</b>.</p>\n<p>About <b>{}</b> <small>({})</small></p>",
         plan.from_edge_mm.0,
         plan.from_edge_mm.1,
+        match plan.resolution_dpi {
+            (600, 600) => String::new(),
+            (across, along) => format!(" Printed at {across} &times; {along} dpi."),
+        },
+        if plan.mirrored == Some(true) { " <b>Mirrored</b> left to right." } else { "" },
         plan.media,
         if plan.curl_correction { "on" } else { "off" },
         ribbon::duration(plan.seconds_estimated),
         Plan::TIME_NOTE
     )?;
     write_cartridges(plan, page)?;
-    write_passes(plan, page)?;
+    write_passes(plan, passes, page)?;
     write_checks(plan, page)?;
     writeln!(page, "</body></html>")
 }
@@ -117,8 +137,8 @@ fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// The passes and what they use.
-fn write_passes(plan: &Plan, page: &mut String) -> std::fmt::Result {
+/// The passes, what they use, and what each prints.
+fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
         "<p><small>If a cartridge is missing, the printer pauses before that pass and continues once it is \
@@ -138,15 +158,39 @@ fn write_passes(plan: &Plan, page: &mut String) -> std::fmt::Result {
         )?;
     }
     writeln!(page, "</table>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
+    for cost in plan.costs() {
+        writeln!(page, "<p>Cost: {}.</p>", escape(&cost))?;
+    }
+    writeln!(page, "<div class=\"passes\">")?;
+    for (pass, picture) in plan.passes.iter().zip(pictures) {
+        let (number, ink) = (pass.number, pass.ink);
+        writeln!(
+            page,
+            "<figure><img alt=\"pass {number}, {ink}\" src=\"data:image/png;base64,{picture}\">\
+             <figcaption>{number} {ink}</figcaption></figure>"
+        )?;
+    }
+    writeln!(
+        page,
+        "</div>\n<p><small>The pictures show the sheet and the printed part of each pass{}.</small></p>",
+        if plan.mirrored == Some(true) { ", mirrored as they are printed" } else { "" }
+    )?;
     Ok(())
 }
 
-/// What the rules say.
+/// What the rules say, and what the readers had to assume.
 fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
     if !plan.checks.is_empty() {
         writeln!(page, "<h2>Before you print</h2>\n<ul>")?;
         for check in &plan.checks {
             writeln!(page, "<li><b>{}</b>: {}</li>", check.severity, escape(&check.text))?;
+        }
+        writeln!(page, "</ul>")?;
+    }
+    if !plan.notes.is_empty() {
+        writeln!(page, "<h2>From reading the files</h2>\n<ul>")?;
+        for note in &plan.notes {
+            writeln!(page, "<li>{}</li>", escape(note))?;
         }
         writeln!(page, "</ul>")?;
     }

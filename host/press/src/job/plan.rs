@@ -14,7 +14,7 @@ use super::loading;
 use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
-use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
+use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Plane, Planned, Separation};
 use crate::sheet::colours::colours;
 use crate::sheet::{Area, Sheet};
 
@@ -37,9 +37,11 @@ pub struct Plan {
     pub media: &'static str,
     /// Whether the printer corrects the sheet's curl.
     pub curl_correction: bool,
+    /// Dots an inch across and along.
+    pub resolution_dpi: (u16, u16),
     /// Width and height of one copy on paper in millimetres.
     pub size_mm: (f64, f64),
-    /// The same in dots of 1/600 inch.
+    /// The same in dots.
     pub size_dots: (u16, u16),
     /// Top left corner of the first copy in the printable area, in dots.
     pub origin_dots: (u16, u16),
@@ -47,6 +49,8 @@ pub struct Plan {
     pub from_edge_mm: (f64, f64),
     /// Columns and rows of copies on the sheet.
     pub copies: (u16, u16),
+    /// Whether the print is mirrored left to right; absent if the bytes of a job are all that is known.
+    pub mirrored: Option<bool>,
     /// What the layout cuts off.
     pub cut: Option<Cut>,
     /// The cartridges to load, in the order of first use.
@@ -55,12 +59,42 @@ pub struct Plan {
     pub changes: Vec<Change>,
     /// The passes, first printed (lowest) first.
     pub passes: Vec<Pass>,
+    /// What the ribbon costs, an estimate: a sum for each currency. Empty as long as no price is known.
+    pub costs_estimated: Vec<Cost>,
     /// Time in seconds, an estimate.
     pub seconds_estimated: f64,
     /// The stacks in use, most dots first; shares are of the copies' dots.
     pub stacks: Vec<Share>,
     /// What the rules say of the job, most severe first.
     pub checks: Vec<Check>,
+    /// What the readers of the document or art had to assume, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// An amount of money.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cost {
+    /// How much.
+    pub amount: f64,
+    /// Of what, as the owner writes it.
+    pub currency: String,
+}
+
+impl fmt::Display for Cost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.2} {}", self.amount, self.currency)
+    }
+}
+
+/// What an owner paid for a cartridge.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Price {
+    /// Name of its ink.
+    pub ink: String,
+    /// A whole cartridge.
+    pub cartridge: Cost,
+    /// How much ribbon one gives in millimetres, if that is known.
+    pub ribbon_mm: Option<f64>,
 }
 
 /// A cartridge to load.
@@ -78,6 +112,10 @@ pub struct Cartridge {
     pub first_pass: usize,
     /// Ribbon used in all its passes, in millimetres, an estimate.
     pub ribbon_mm_estimated: f64,
+    /// What a whole cartridge costs, if the owner has said so.
+    pub price: Option<Cost>,
+    /// What its ribbon in this job costs, an estimate, if it is also known how much ribbon a cartridge gives.
+    pub cost_estimated: Option<Cost>,
 }
 
 /// A cartridge to replace in the course of the job.
@@ -100,7 +138,7 @@ pub struct Pass {
     pub ink: &'static str,
     /// Dots with ink.
     pub dots: u64,
-    /// Dots as a share of the copies'.
+    /// The share of the copies' dots that has its ink; marks do not count.
     pub share: f64,
     /// Runs of the carriage, ribbon and time, estimates.
     pub estimate: Use,
@@ -138,6 +176,8 @@ pub struct Subject<'a> {
     pub checks: &'a [Check],
     /// How the page is declared to the printer.
     pub page: &'a Page,
+    /// Whether it is mirrored, if that is known.
+    pub mirrored: Option<bool>,
 }
 
 impl<'a> Subject<'a> {
@@ -148,9 +188,11 @@ impl<'a> Subject<'a> {
         laid: &'a Laid,
         separation: &'a Separation,
         page: &'a Page,
+        mirrored: bool,
     ) -> Subject<'a> {
         let (planned, checks) = (&separation.plan.passes, &separation.checks);
-        Subject { name, sheet, laid, passes: &separation.passes, planned, checks, page }
+        let (passes, mirrored) = (&separation.passes, Some(mirrored));
+        Subject { name, sheet, laid, passes, planned, checks, page, mirrored }
     }
 }
 
@@ -169,10 +211,12 @@ impl Plan {
                 number,
                 ink: planned.ink.name(),
                 dots: planned.dots,
-                share: share(planned.dots),
+                share: share(laid.copies.iter().map(|copy| inked(&dots.plane, copy)).sum()),
                 estimate: ribbon::of(&dots.plane, dpi),
             })
             .collect();
+        // At 1200 x 600 dpi there are two dots across in 1/600 inch.
+        let across = usize::from(subject.page.resolution.across(1)).max(1);
         let mm = |dots: usize| Mm::of_dots(dots as i64).0;
         // Sides of a sheet are u16.
         let dots = |(a, b): (usize, usize)| (a as u16, b as u16);
@@ -182,20 +226,92 @@ impl Plan {
             sheet_mm: paper::sheet_mm(paper),
             media: subject.page.media.name(),
             curl_correction: subject.page.curl_correction,
-            size_mm: (mm(first.width), mm(first.length)),
+            resolution_dpi: dpi,
+            size_mm: (mm(first.width / across), mm(first.length)),
             size_dots: dots((first.width, first.length)),
             origin_dots: dots((first.left, first.top)),
-            from_edge_mm: from_edge(paper, first),
+            from_edge_mm: from_edge(paper, Area { left: first.left / across, ..first }),
             copies: laid.grid,
+            mirrored: subject.mirrored,
             cut: laid.cut,
             cartridges: cartridges(subject.planned, &passes, library),
             changes: changes(subject.planned),
+            costs_estimated: Vec::new(),
             seconds_estimated: passes.iter().map(|pass| pass.estimate.seconds).sum(),
             passes,
             stacks: shares(sheet, laid, library),
             checks: checks(subject),
+            notes: Vec::new(),
         }
     }
+
+    /// Adds what the ribbon costs.
+    pub fn price(&mut self, prices: &[Price]) {
+        for cartridge in &mut self.cartridges {
+            let Some(price) = prices.iter().find(|price| price.ink == cartridge.ink) else { continue };
+            cartridge.price = Some(price.cartridge.clone());
+            cartridge.cost_estimated = price.ribbon_mm.filter(|&mm| mm > 0.0).map(|mm| Cost {
+                amount: price.cartridge.amount * cartridge.ribbon_mm_estimated / mm,
+                currency: price.cartridge.currency.clone(),
+            });
+        }
+        self.costs_estimated.clear();
+        for cost in self.cartridges.iter().filter_map(|cartridge| cartridge.cost_estimated.as_ref()) {
+            match self.costs_estimated.iter_mut().find(|sum| sum.currency == cost.currency) {
+                Some(sum) => sum.amount += cost.amount,
+                None => self.costs_estimated.push(cost.clone()),
+            }
+        }
+    }
+
+    /// What the ribbon costs, in sentences; empty as long as no price is known.
+    pub(super) fn costs(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        let named = |wanted: fn(&Cartridge) -> bool| -> Vec<&'static str> {
+            self.cartridges
+                .iter()
+                .filter(|cartridge| wanted(cartridge))
+                .map(|cartridge| cartridge.ink)
+                .collect()
+        };
+        if !self.costs_estimated.is_empty() {
+            let sums: Vec<String> = self.costs_estimated.iter().map(Cost::to_string).collect();
+            let counted = named(|cartridge| cartridge.cost_estimated.is_some());
+            let mut text = format!("about {} for the ribbon of {}", sums.join(" and "), counted.join(", "));
+            let others = named(|cartridge| cartridge.price.is_none());
+            if !others.is_empty() {
+                text += &format!("; no price is known for {}", others.join(", "));
+            }
+            said.push(text);
+        }
+        for cartridge in &self.cartridges {
+            if let (Some(price), None) = (&cartridge.price, &cartridge.cost_estimated) {
+                said.push(format!(
+                    "a cartridge of {} is {price}; how much ribbon one gives is not known yet",
+                    cartridge.ink
+                ));
+            }
+        }
+        said
+    }
+}
+
+/// Dots of a plane with ink in an area.
+fn inked(plane: &Plane, area: &Area) -> u64 {
+    let rows = plane.bits.chunks_exact(plane.stride.max(1)).skip(area.top).take(area.length);
+    let (first, end) = (area.left, (area.left + area.width).min(plane.width));
+    rows.map(|row| {
+        let whole =
+            |from: usize, to: usize| (from..to).map(|byte| u64::from(row[byte].count_ones())).sum::<u64>();
+        let single =
+            |from: usize, to: usize| (from..to).filter(|x| row[x / 8] & 0x80 >> (x % 8) != 0).count() as u64;
+        let (low, high) = (first.next_multiple_of(8), end / 8 * 8);
+        if low > high {
+            return single(first, end);
+        }
+        single(first, low) + whole(low / 8, high / 8) + single(high, end)
+    })
+    .sum()
 }
 
 /// From the corner of the paper to that of an area, in millimetres.
@@ -222,6 +338,8 @@ fn cartridges(planned: &[Planned], passes: &[Pass], library: &Library) -> Vec<Ca
             barcode: ink.barcode(),
             first_pass: its.clone().next().map_or(1, |pass| pass.number),
             ribbon_mm_estimated: its.map(|pass| pass.estimate.ribbon_mm).sum(),
+            price: None,
+            cost_estimated: None,
         }
     };
     inks.into_iter().map(cartridge).collect()
@@ -361,6 +479,9 @@ impl Plan {
             )?;
         }
         writeln!(f, "Ribbon: about {} in all ({}).", ribbon::length(self.ribbon_mm()), Plan::RIBBON_NOTE)?;
+        for cost in self.costs() {
+            writeln!(f, "Cost: {cost}.")?;
+        }
         writeln!(f, "Time: about {} ({}).", ribbon::duration(self.seconds_estimated), Plan::TIME_NOTE)?;
         Ok(())
     }
@@ -402,6 +523,12 @@ impl fmt::Display for Plan {
             self.media,
             if self.curl_correction { "on" } else { "off" }
         )?;
+        if self.resolution_dpi != (600, 600) {
+            writeln!(f, "printed at {} x {} dpi", self.resolution_dpi.0, self.resolution_dpi.1)?;
+        }
+        if self.mirrored == Some(true) {
+            writeln!(f, "mirrored left to right")?;
+        }
         self.write_cartridges(f)?;
         self.write_passes(f)?;
         self.write_stacks(f)?;
@@ -409,6 +536,12 @@ impl fmt::Display for Plan {
             writeln!(f, "\nBefore you print:")?;
             for check in &self.checks {
                 writeln!(f, "    {check}")?;
+            }
+        }
+        if !self.notes.is_empty() {
+            writeln!(f, "\nFrom reading the files:")?;
+            for note in &self.notes {
+                writeln!(f, "    {note}")?;
             }
         }
         Ok(())
@@ -435,7 +568,27 @@ pub fn grouped(number: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::grouped;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_dots_of_an_area_are_counted_one_by_one(
+            width in 1usize..70, length in 1usize..9, seed: u32, corner: (u8, u8), size: (u8, u8)
+        ) {
+            let ink = |x: usize, y: usize| ((x * 9 + y) as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 19 & 1 == 1;
+            let stride = width.div_ceil(8);
+            let mut bits = vec![0u8; stride * length];
+            for (x, y) in (0..length).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| ink(x, y)) {
+                bits[y * stride + x / 8] |= 0x80 >> (x % 8);
+            }
+            let (left, top) = (usize::from(corner.0) % width, usize::from(corner.1) % length);
+            let (wide, long) = (usize::from(size.0) % (width - left + 1), usize::from(size.1) % (length - top + 1));
+            let wanted = (top..top + long).flat_map(|y| (left..left + wide).map(move |x| (x, y))).filter(|&(x, y)| ink(x, y));
+            let area = Area { left, top, width: wide, length: long };
+            prop_assert_eq!(inked(&Plane { width, length, stride, bits }, &area), wanted.count() as u64);
+        }
+    }
 
     #[test]
     fn thousands_stand_apart() {

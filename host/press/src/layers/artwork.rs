@@ -118,6 +118,7 @@ fn layer(
             "{name}: several colours on a transparent background; ink prints where they are dark, and the light parts are \
              left out"
         )),
+        Coverage::Drawn => notes.push(format!("{name}: drawn in several colours; all of it is ink")),
     }
     let toned = plate && named.ink.kind() == Kind::Process && has_tones(&scan.coverage);
     if toned {
@@ -127,7 +128,7 @@ fn layer(
     if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
         notes.push(format!(
             "{name}: resampled from {} to {width} x {length} dots; draw at 600 dpi to keep edges exactly as drawn",
-            scan.size()
+            scan.size_at(options.dpi)
         ));
     }
     if !tones && let Some(note) = soft_edges(name, &scan.coverage) {

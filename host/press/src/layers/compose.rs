@@ -268,7 +268,7 @@ fn stack_up(
     let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
     let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
     suggestions.extend(suggest::rare(&laid));
-    let size_mm = (width as f64 * MM, length as f64 * MM);
+    let size_mm = ((width / settings.across.max(1)) as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
 }
 

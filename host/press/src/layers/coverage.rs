@@ -14,6 +14,7 @@ use super::size::{MOST_BYTES, check_pixels};
 
 /// The rule that gave the coverage.
 ///
+/// A layer of a drawing: its opacity, because what is drawn in the layer of an ink is ink. Other art follows its pixels.
 /// Opaque art: the distance of the darkest of red, green and blue from white, so black art is ink, and so is art drawn in
 /// the ink's own saturated colour. Art in one colour on a transparent background: its opacity, whatever the colour. Other
 /// art with transparency: the product of the two, so dark and opaque is ink.
@@ -25,6 +26,8 @@ pub(super) enum Coverage {
     Opaque,
     /// Dark and opaque is ink.
     DarkAndOpaque,
+    /// Whatever is drawn, in several colours, is ink.
+    Drawn,
 }
 
 /// The coverage of a layer's picture.
@@ -39,10 +42,29 @@ pub(super) struct Scan {
 }
 
 impl Scan {
-    /// The size in words.
-    pub fn size(&self) -> String {
+    /// The size in words, at the resolution that was set instead of the file's.
+    pub fn size_at(&self, set: Option<f64>) -> String {
         let pixels = format!("{} x {} pixels", self.width, self.height);
-        self.dpi.map_or(pixels.clone(), |dpi| format!("{pixels} at {}", resolution_in_words(dpi)))
+        let dpi = set.map(|dpi| (dpi, dpi)).or(self.dpi);
+        dpi.map_or(pixels.clone(), |dpi| format!("{pixels} at {}", resolution_in_words(dpi)))
+    }
+}
+
+impl Scan {
+    /// The coverage of a layer of a drawing, whatever its colours: red, green, blue and opacity of each pixel.
+    pub fn of_layer(path: &Path, (width, height): (u32, u32), rgba: &[u8]) -> Scan {
+        let mut builder = CoverageBuilder::of_drawing(rgba.len() / 4);
+        builder.row(rgba, 4);
+        let by = if builder.one_colour() { Coverage::Opaque } else { Coverage::Drawn };
+        Scan { path: path.to_path_buf(), width, height, dpi: None, coverage: builder.alpha, by }
+    }
+
+    /// The coverage of a layer that was drawn on nothing and has tones: red, green, blue and opacity of each pixel.
+    pub fn of_drawing(path: &Path, (width, height): (u32, u32), rgba: &[u8]) -> Scan {
+        let mut builder = CoverageBuilder::of_drawing(rgba.len() / 4);
+        builder.row(rgba, 4);
+        let (coverage, by) = builder.finish();
+        Scan { path: path.to_path_buf(), width, height, dpi: None, coverage, by }
     }
 }
 
@@ -68,6 +90,11 @@ impl CoverageBuilder {
         }
     }
 
+    /// For a drawing, which has no ground: what is drawn in one colour is ink even if it leaves no pixel free.
+    fn of_drawing(pixels: usize) -> CoverageBuilder {
+        CoverageBuilder { transparent: true, ..CoverageBuilder::new(pixels, true) }
+    }
+
     /// Adds pixels of 1 to 4 channels: grey; grey and alpha; RGB; RGB and alpha.
     pub fn row(&mut self, row: &[u8], channels: usize) {
         match channels {
@@ -90,12 +117,17 @@ impl CoverageBuilder {
         }
     }
 
+    /// Whether everything opaque has one colour.
+    fn one_colour(&self) -> bool {
+        self.range.iter().all(|&(least, most)| most <= least.saturating_add(CoverageBuilder::ONE_COLOUR))
+    }
+
     /// The coverage and its rule.
     pub fn finish(self) -> (Vec<u8>, Coverage) {
         if !self.transparent {
             return (self.dark, Coverage::Dark);
         }
-        if self.range.iter().all(|&(least, most)| most <= least.saturating_add(CoverageBuilder::ONE_COLOUR)) {
+        if self.one_colour() {
             return (self.alpha, Coverage::Opaque);
         }
         let times = |(d, a): (&u8, &u8)| ((u32::from(*d) * u32::from(*a) + 127) / 255) as u8;

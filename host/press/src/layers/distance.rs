@@ -14,11 +14,8 @@ use rayon::prelude::*;
 use super::bits;
 use crate::separate::Plane;
 
-/// The largest radius in dots, 10 mm.
-pub(super) const MOST: u16 = 236;
-
 /// The plane and every dot at most `sqrt(square)` from it, measured between the middles of dots. `square` is the squared
-/// radius in dots, at most `MOST * MOST`.
+/// radius in dots; the radius is less than 65535.
 pub(super) fn grow(plane: &Plane, square: u32) -> Plane {
     if square == 0 {
         return plane.clone();

@@ -65,23 +65,35 @@ pub enum LayersError {
         /// The largest width that fits, in mm.
         fits_mm: f64,
     },
-    /// At the resolution that its file states, the art is larger than the page.
+    /// At the size that its file states, the art is larger than the page.
     #[error(
-        "{} states {}, so it is {:.1} x {:.1} mm, but the page has room for {:.1} x {:.1} mm; print it smaller, correct its \
-         resolution, use larger paper, or crop it",
-        path.display(), resolution_in_words(*says), size_mm.0, size_mm.1, room_mm.0, room_mm.1
+        "{} {}{:.1} x {:.1} mm, but the page has room for {:.1} x {:.1} mm; print it smaller, {}use larger paper, or crop it",
+        path.display(), says.map_or("is ".into(), |says| format!("states {}, so it is ", resolution_in_words(says))),
+        size_mm.0, size_mm.1, room_mm.0, room_mm.1,
+        if says.is_some() { "correct its resolution, " } else { "" }
     )]
     Beyond {
         /// The file.
         path: PathBuf,
-        /// Pixels per inch across and down, as the file states.
-        says: (f64, f64),
+        /// Pixels per inch across and down, as the file of a picture states; a drawing states its size.
+        says: Option<(f64, f64)>,
         /// Its width and height, in mm.
         size_mm: (f64, f64),
         /// Width and height of the room on the page, in mm.
         room_mm: (f64, f64),
         /// The largest width that fits, in mm.
         fits_mm: f64,
+    },
+    /// Several pages hold art, and none was chosen.
+    #[error(
+        "{} has art on {} pages ({}); choose one of them, or name an ink for each page",
+        path.display(), pages.len(), listed(pages)
+    )]
+    Pages {
+        /// The file.
+        path: PathBuf,
+        /// The pages that hold art, from 1.
+        pages: Vec<u32>,
     },
     /// Two layers differ in size.
     #[error(
@@ -99,9 +111,9 @@ pub enum LayersError {
         /// Its size.
         expected: String,
     },
-    /// The art is larger than the largest page.
+    /// The art is larger than anything of which a page can be cut.
     #[error(
-        "the art is {width_mm:.1} x {height_mm:.1} mm, but the largest page prints {most_width_mm:.1} x \
+        "the art is {width_mm:.1} x {height_mm:.1} mm; even cropped it can be at most {most_width_mm:.1} x \
          {most_height_mm:.1} mm; print it smaller"
     )]
     TooLarge {
@@ -109,9 +121,9 @@ pub enum LayersError {
         width_mm: f64,
         /// Its height in mm.
         height_mm: f64,
-        /// The largest printable width in mm.
+        /// The largest width in mm.
         most_width_mm: f64,
-        /// The largest printable height in mm.
+        /// The largest height in mm.
         most_height_mm: f64,
         /// The largest width that fits, in mm.
         fits_mm: f64,
@@ -185,6 +197,13 @@ pub enum LayersError {
 
 fn hint(suggestion: &Option<&'static str>) -> String {
     suggestion.map_or(String::new(), |s| format!(", did you mean `{s}`?"))
+}
+
+/// Numbers in words, the first few of many.
+fn listed(numbers: &[u32]) -> String {
+    const NAMED: usize = 8;
+    let named: Vec<String> = numbers.iter().take(NAMED).map(u32::to_string).collect();
+    named.join(", ") + if numbers.len() > NAMED { ", …" } else { "" }
 }
 
 /// Pixels per inch, in words.

@@ -37,8 +37,9 @@ pub use colour::Colour;
 pub use compose::{Accept, Composed, Finish, Laid, Order, Remedy, Report, Settings, Suggestion, compose};
 pub use error::{LayersError, Setting};
 pub use open::{is_art, open};
-pub use options::{Options, Room};
+pub use options::{Options, Pages, Room};
 pub use picture::page;
+pub use svg::DRAWING;
 pub use white::White;
 pub use window::Window;
 

@@ -184,7 +184,7 @@ impl First {
             path: scan.path.clone(),
             pixels: (scan.width, scan.height),
             dpi: scan.dpi,
-            size: scan.size(),
+            size: scan.size_at(options.dpi),
             dots: size::dots(&scan.path, sides, scan.dpi, Unstated::PixelPerDot, options, notes)?,
         })
     }
@@ -201,7 +201,7 @@ impl First {
             return Ok(self.dots);
         }
         Err(LayersError::Sizes {
-            found: other.size(),
+            found: other.size_at(options.dpi),
             path: other.path.clone(),
             first: self.path.clone(),
             expected: self.size.clone(),

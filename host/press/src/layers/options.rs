@@ -16,14 +16,27 @@ pub struct Options {
     pub reserved: bool,
     /// Largest difference of red, green and blue from a reserved colour; `None` for each ink's own tolerance.
     pub tolerance: Option<u8>,
-    /// Page of a PDF or PostScript file, from 1.
-    pub page: u32,
+    /// Pages of a PDF or PostScript file.
+    pub pages: Pages,
     /// Layers to halftone, so that they keep their tones; all others are ink or paper.
     pub halftone: InkSet,
+    /// Dots across in 1/600 inch: 1, or 2 for a print at 1200 x 600 dpi.
+    pub across: usize,
     /// The inks that reserved colours may stand for.
     pub inks: InkSet,
     /// Room on the page: art without a size of its own is fitted to it.
     pub room: Room,
+}
+
+/// Which pages of a document to read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Pages {
+    /// The only one that holds art.
+    Only,
+    /// The one of this number, from 1.
+    Number(u32),
+    /// One for each ink, from the first page on.
+    Inks(Vec<Ink>),
 }
 
 /// Room for art on a page.
@@ -45,13 +58,6 @@ impl Default for Room {
     }
 }
 
-impl Options {
-    /// The same options for art whose size does not depend on pixels. The layout judges whether it fits the page.
-    pub(super) fn sized(&self) -> Options {
-        Options { room: Room { cut: true, ..self.room }, ..self.clone() }
-    }
-}
-
 impl Default for Options {
     fn default() -> Options {
         Options {
@@ -59,8 +65,9 @@ impl Default for Options {
             dpi: None,
             reserved: false,
             tolerance: None,
-            page: 1,
+            pages: Pages::Only,
             halftone: InkSet::EMPTY,
+            across: 1,
             inks: InkSet::default().with(Ink::White),
             room: Room::default(),
         }

@@ -1,7 +1,8 @@
 //! The resolution that a picture's file states.
 //!
-//! Method: PNG states pixels per metre; the JFIF segment of a JPEG and the tags of a TIFF state pixels per inch or per
-//! centimetre. Limits: resolutions below 20 or above 10000 dpi are ignored, because programs that mean none write 1.
+//! Method: PNG states pixels per metre; the JFIF and EXIF segments of a JPEG and the tags of a TIFF state pixels per inch or
+//! per centimetre. Of the two segments JFIF comes first; in EXIF, 72 dpi means that the resolution is unknown, by its
+//! standard (CIPA DC-008). Limits: resolutions below 20 or above 10000 dpi are ignored, because programs that mean none write 1.
 
 use std::io::Cursor;
 
@@ -19,7 +20,7 @@ pub(super) fn of_file(bytes: &[u8], format: ImageFormat) -> Option<Dpi> {
             let decoder = png::Decoder::new(Cursor::new(bytes));
             decoder.read_info().ok()?.info().pixel_dims.and_then(of_png)
         }
-        ImageFormat::Jpeg => of_jfif(bytes),
+        ImageFormat::Jpeg => of_jfif(bytes).filter(plausible).or_else(|| of_exif(bytes)),
         ImageFormat::Tiff => of_tiff(&mut tiff_decoder(bytes)?),
         _ => None,
     }
@@ -48,6 +49,23 @@ fn of_jfif(bytes: &[u8]) -> Option<Dpi> {
         _ => return None,
     };
     Some((number(3) * inch, number(5) * inch))
+}
+
+/// The resolution in the EXIF segment of a JPEG.
+fn of_exif(bytes: &[u8]) -> Option<Dpi> {
+    let exif = exif::Reader::new().read_from_container(&mut Cursor::new(bytes)).ok()?;
+    let field = |tag| Some(&exif.get_field(tag, exif::In::PRIMARY)?.value);
+    let inch = match field(exif::Tag::ResolutionUnit).and_then(|unit| unit.get_uint(0)) {
+        None | Some(2) => 1.0,
+        Some(3) => 2.54,
+        Some(_) => return None,
+    };
+    let along = |tag| match field(tag)? {
+        exif::Value::Rational(ratios) => Some(ratios.first()?.to_f64() * inch),
+        _ => None,
+    };
+    let dpi = (along(exif::Tag::XResolution)?, along(exif::Tag::YResolution)?);
+    (dpi != (72.0, 72.0)).then_some(dpi)
 }
 
 /// A TIFF decoder over bytes in memory.

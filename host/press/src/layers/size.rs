@@ -3,7 +3,7 @@
 //! Problem: the size comes from the user, from the file's resolution, or from neither; and the page has limited room.
 //! Method: settings override the file. Without either, a layer takes one dot for each pixel, while a plain picture fills
 //! the room; a note says which. Art that is larger than the room is an error unless the page crops it. Units:
-//! millimetres, then dots of 600 dpi. Limits: the largest page, at least one dot.
+//! millimetres, then dots of 600 dpi. Limits: twice the largest page on each side if it is cropped; at least one dot.
 
 use std::path::Path;
 
@@ -38,12 +38,15 @@ pub(super) fn check_pixels(path: &Path, width: u32, height: u32) -> Result<(), L
 }
 
 /// How large to print a picture whose file states no resolution.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Unstated {
     /// As large as the room allows: plain colour has no size of its own.
     FillRoom,
     /// One dot for each pixel: layers of ink are drawn for the printer.
     PixelPerDot,
+    /// Does not happen: a drawing has a size, and what is taken for its pixels is only a measure. It is known to this many
+    /// millimetres.
+    Drawing { rounded_mm: f64 },
 }
 
 /// A rectangle in millimetres: width, height.
@@ -56,11 +59,15 @@ struct Fit {
     aspect: f64,
     /// Whether the page crops larger art.
     crops: bool,
+    /// What the art may be larger than the room: half a dot as in the layout, or what its size is rounded by.
+    grace: f64,
 }
 
 impl Fit {
-    fn new(room: Room, aspect: f64) -> Fit {
-        Fit { room: (room.width as f64 * MM, room.length as f64 * MM), aspect, crops: room.cut }
+    fn new(room: Room, aspect: f64, unstated: Unstated) -> Fit {
+        let grace = if let Unstated::Drawing { rounded_mm } = unstated { rounded_mm } else { 0.0 };
+        let sides = (room.width as f64 * MM, room.length as f64 * MM);
+        Fit { room: sides, aspect, crops: room.cut, grace: grace.max(MM / 2.0) }
     }
 
     /// The largest art of this shape in a rectangle.
@@ -73,9 +80,9 @@ impl Fit {
         self.within(self.room)
     }
 
-    /// Whether art is small enough for the room, give or take half a dot as in the layout.
+    /// Whether art is small enough for the room.
     fn accepts(&self, (width, height): Rectangle) -> bool {
-        self.crops || width < self.room.0 + MM / 2.0 && height < self.room.1 + MM / 2.0
+        self.crops || width < self.room.0 + self.grace && height < self.room.1 + self.grace
     }
 }
 
@@ -92,16 +99,25 @@ pub(super) fn dots(
     notes: &mut Vec<String>,
 ) -> Result<(usize, usize), LayersError> {
     let inches = |(x, y): Dpi| (25.4 * pixels.0 / x, 25.4 * pixels.1 / y);
-    let own = options.dpi.map(|dpi| (dpi, dpi)).or(stated).map(inches);
-    let fit = Fit::new(options.room, own.map_or(pixels.1 / pixels.0, |(width, height)| height / width));
+    let drawing = matches!(unstated, Unstated::Drawing { .. });
+    let asked = options.dpi.filter(|_| !drawing);
+    if drawing && options.dpi.is_some() {
+        notes.push(format!(
+            "{}: a drawing has a size of its own, so the resolution has no effect; set its size to change it",
+            path.display()
+        ));
+    }
+    let own = asked.map(|dpi| (dpi, dpi)).or(stated).map(inches);
+    let aspect = own.map_or(pixels.1 / pixels.0, |(width, height)| height / width);
+    let fit = Fit::new(options.room, aspect, unstated);
     let size = match (options.size, own) {
         (Some(Size { width, height: None }), _) => (width, width * fit.aspect),
         (Some(Size { width, height: Some(height) }), _) => fit.within((width, height)),
         (None, Some(own)) => {
-            if let (None, Some(stated), false) = (options.dpi, stated, fit.accepts(own)) {
+            if let (None, Some(stated), false) = (asked, stated, fit.accepts(own)) {
                 return Err(LayersError::Beyond {
                     path: path.to_path_buf(),
-                    says: stated,
+                    says: (!drawing).then_some(stated),
                     size_mm: own,
                     room_mm: fit.room,
                     fits_mm: fit.largest().0,
@@ -111,7 +127,8 @@ pub(super) fn dots(
         }
         (None, None) => without_resolution(path, pixels, unstated, &fit, notes)?,
     };
-    to_dots(size, &fit)
+    let (width, length) = to_dots(size, &fit)?;
+    Ok((width * options.across.max(1), length))
 }
 
 /// The size of a picture whose resolution neither the file nor the user states.
@@ -128,7 +145,7 @@ fn without_resolution(
             let dpi = 25.4 * pixels.0 / size.0;
             (size, format!("as large as the page allows, {:.1} x {:.1} mm ({dpi:.0} dpi)", size.0, size.1))
         }
-        Unstated::PixelPerDot => {
+        Unstated::PixelPerDot | Unstated::Drawing { .. } => {
             let size = (25.4 * pixels.0 / 600.0, 25.4 * pixels.1 / 600.0);
             if !fit.accepts(size) {
                 return Err(LayersError::NoSize {
@@ -154,8 +171,8 @@ fn to_dots((width_mm, height_mm): Rectangle, fit: &Fit) -> Result<(usize, usize)
     if !(across >= 1.0 && down >= 1.0) {
         return Err(LayersError::TooSmall { width_mm, height_mm });
     }
-    let most = protocol::paper::LARGEST;
-    let most = (f64::from(most.0.max(most.1)), f64::from(most.1));
+    let most = crate::halftone::LARGEST_MAP;
+    let most = (f64::from(most.0), f64::from(most.1));
     if across > most.0 || down > most.1 {
         let (most_width_mm, most_height_mm) = (most.0 * MM, most.1 * MM);
         return Err(LayersError::TooLarge {

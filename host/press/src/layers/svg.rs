@@ -2,25 +2,35 @@
 //!
 //! Problem: drawing programs have layers, which SVG stores as groups with a label or an identifier.
 //! Method: the drawing is rendered at its final number of dots without anti-aliasing. A group is named by its label, such as
-//! that of an Inkscape layer, or else by its identifier. Each topmost group that names an ink is rendered separately. A
-//! drawing without such groups is one picture; its edges are exact, so reserved colours are unambiguous.
+//! that of an Inkscape layer, or else by its identifier. Each topmost group that names an ink is rendered separately, and
+//! what is drawn in it is ink, whatever its colour. Only a layer to be halftoned, or one that holds pictures, has tones: there
+//! dark is ink. A drawing has no ground. Without such groups it is one picture; its edges are exact, so reserved colours are
+//! unambiguous. Rendering has a thread of its own, because filters may take for ever, and the renderer may fail on hostile
+//! drawings.
 //! Cost: four bytes a dot while a layer is rendered. Limits: opacity, clips and filters of the groups around a layer do not
-//! apply to it; animations do not run.
+//! apply to it; animations do not run; a layer may take as long as a page ([`process::limit`]). A thread cannot be stopped:
+//! one that takes too long ends with the program.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::thread;
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, fontdb, roxmltree};
 
 use super::artwork::Artwork;
-use super::coverage::{CoverageBuilder, Scan};
+use super::coverage::Scan;
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
 use super::picture::{self, Pixels};
 use super::size::{self, Unstated};
+use crate::process;
 use observe::Observer;
+
+/// Name of the thread that renders a drawing. A panic in it becomes an error of the reader.
+pub const DRAWING: &str = "drawing";
 
 /// The most bytes of a drawing.
 const MOST_BYTES: u64 = 1 << 28;
@@ -51,6 +61,85 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let text = std::fs::read_to_string(path).map_err(&reading)?;
     let mut notes = Vec::new();
     let (text, groups) = groups(path, text, &mut notes)?;
+    observer.begin("rendering layers", groups.len().max(1) as u64);
+    let (steps, done) = mpsc::channel();
+    let drawing = Drawing { path: path.to_path_buf(), text, groups, notes, options: options.clone() };
+    let begun = thread::Builder::new().name(DRAWING.into()).spawn(move || {
+        // Nobody listens any more if it took too long.
+        let drawn = drawing.draw(&|| drop(steps.send(None)));
+        let _ = steps.send(Some(drawn));
+    });
+    begun.map_err(io(path, "start a thread for it"))?;
+    let limit = process::limit();
+    let art = loop {
+        match done.recv_timeout(limit) {
+            Ok(None) => observer.advance(1),
+            Ok(Some(art)) => break art,
+            Err(RecvTimeoutError::Timeout) => break Err(wrong(path, process::too_long(limit))),
+            Err(RecvTimeoutError::Disconnected) => {
+                break Err(wrong(
+                    path,
+                    "the drawing cannot be rendered; simplify its filters, or export it as PNG",
+                ));
+            }
+        }
+    };
+    observer.end();
+    art
+}
+
+/// A drawing on its way to its own thread.
+struct Drawing {
+    path: PathBuf,
+    text: String,
+    groups: Vec<Group>,
+    notes: Vec<String>,
+    options: Options,
+}
+
+impl Drawing {
+    /// Renders it, and calls `advance` after each layer.
+    fn draw(self, advance: &dyn Fn()) -> Result<Artwork, LayersError> {
+        let Drawing { path, text, groups, mut notes, options } = self;
+        let path = path.as_path();
+        let tree = parsed(path, &text, &mut notes)?;
+        let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
+        let unstated = Unstated::Drawing { rounded_mm: 0.0 };
+        let dots = size::dots(path, size, Some((UNITS, UNITS)), unstated, &options, &mut notes)?;
+        let scale = Transform::from_scale((dots.0 as f64 / size.0) as f32, (dots.1 as f64 / size.1) as f32);
+        let (width, height) = (dots.0 as u32, dots.1 as u32);
+        let canvas = || Pixmap::new(width, height).ok_or_else(|| wrong(path, "the drawing is too large"));
+
+        if groups.is_empty() {
+            let mut pixmap = canvas()?;
+            resvg::render(&tree, scale, &mut pixmap.as_mut());
+            let rgba = straight(pixmap);
+            let pixels = Pixels { path: path.to_path_buf(), width, height, dpi: None, rgba, notes };
+            return Ok(picture::drawing(&stem(path), pixels, dots, &options));
+        }
+        let mut art = Artwork::blank(&stem(path), dots);
+        for group in groups {
+            let Some(usvg::Node::Group(node)) = tree.node_by_id(&group.id) else {
+                let name = &group.label;
+                notes.push(format!("{}: layer `{name}` is hidden or empty: left out", path.display()));
+                continue;
+            };
+            let mut pixmap = canvas()?;
+            render_group(node, scale, &mut pixmap);
+            let rgba = straight(pixmap);
+            let toned = options.halftone.contains(group.named.ink) || has_picture(node);
+            let of = if toned { Scan::of_drawing } else { Scan::of_layer };
+            art.add(of(path, (width, height), &rgba), &group.label, group.named, false, &options);
+            advance();
+        }
+        art.opaque = Some(art.drawn.clone());
+        art.notes.append(&mut notes);
+        Ok(art)
+    }
+}
+
+/// The drawing as the renderer understands it.
+fn parsed(path: &Path, text: &str, notes: &mut Vec<String>) -> Result<usvg::Tree, LayersError> {
     let mut usual = usvg::Options {
         resources_dir: path.parent().map(Path::to_path_buf),
         shape_rendering: usvg::ShapeRendering::CrispEdges,
@@ -64,43 +153,23 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
             path.display()
         ));
     }
-    let tree = usvg::Tree::from_str(&text, &usual)
-        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))?;
-    let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
-    let dots =
-        size::dots(path, size, Some((UNITS, UNITS)), Unstated::PixelPerDot, &options.sized(), &mut notes)?;
-    let scale = Transform::from_scale((dots.0 as f64 / size.0) as f32, (dots.1 as f64 / size.1) as f32);
-    let canvas =
-        || Pixmap::new(dots.0 as u32, dots.1 as u32).ok_or_else(|| wrong(path, "the drawing is too large"));
-    let (width, height) = (dots.0 as u32, dots.1 as u32);
+    usvg::Tree::from_str(text, &usual)
+        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))
+}
 
-    if groups.is_empty() {
-        let mut pixmap = canvas()?;
-        resvg::render(&tree, scale, &mut pixmap.as_mut());
-        let rgba = straight(pixmap);
-        let pixels = Pixels { path: path.to_path_buf(), width, height, dpi: None, rgba, notes };
-        return Ok(picture::artwork_of(&stem(path), pixels, dots, options));
+/// Whether a group holds a picture made of pixels.
+fn has_picture(group: &usvg::Group) -> bool {
+    let mut waiting = vec![group];
+    while let Some(group) = waiting.pop() {
+        for node in group.children() {
+            match node {
+                usvg::Node::Group(inner) => waiting.push(inner),
+                usvg::Node::Image(image) if !matches!(image.kind(), usvg::ImageKind::SVG(_)) => return true,
+                _ => {}
+            }
+        }
     }
-    observer.begin("rendering layers", groups.len() as u64);
-    let mut art = Artwork::blank(&stem(path), dots);
-    for group in groups {
-        let Some(usvg::Node::Group(node)) = tree.node_by_id(&group.id) else {
-            notes.push(format!("{}: layer `{}` is hidden or empty: left out", path.display(), group.label));
-            continue;
-        };
-        let mut pixmap = canvas()?;
-        render_group(node, scale, &mut pixmap);
-        let rgba = straight(pixmap);
-        let mut builder = CoverageBuilder::new(rgba.len() / 4, true);
-        builder.row(&rgba, 4);
-        let (coverage, by) = builder.finish();
-        let scan = Scan { path: path.to_path_buf(), width, height, dpi: None, coverage, by };
-        art.add(scan, &group.label, group.named, false, options);
-        observer.advance(1);
-    }
-    observer.end();
-    art.notes.append(&mut notes);
-    Ok(art)
+    false
 }
 
 /// Renders a group where it stands in the drawing.

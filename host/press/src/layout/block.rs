@@ -24,6 +24,9 @@ impl Block {
         if let Some(problem) = layout.profile.problem() {
             return Err(LayoutError::Setting(format!("printer profile: {problem}")));
         }
+        if layout.across() == 0 {
+            return Err(LayoutError::Setting("pages are laid out at 600 or 1200 dots an inch".into()));
+        }
         let gap = (layout.gap.0.dots(), layout.gap.1.dots());
         if gap.0 < 0 || gap.1 < 0 {
             return Err(LayoutError::Setting("the gap between copies cannot be negative".into()));

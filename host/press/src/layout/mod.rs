@@ -17,6 +17,8 @@ mod settings;
 pub mod size;
 
 use inks::Stack;
+use protocol::paper::Paper;
+use protocol::rgl::Resolution;
 
 pub use length::{Mm, NoLength, Point};
 pub use profile::Profile;
@@ -84,18 +86,20 @@ pub(crate) fn check(width: usize, length: usize, layout: &Layout) -> Result<(), 
     Block::of((width, length), layout).map(|_| ())
 }
 
-/// Lays a dot map on a page.
+/// Lays a dot map on a page. At 1200 x 600 dpi the sheet is one of custom paper, twice as many dots wide.
 ///
 /// # Errors
 /// What is beyond the printable area, unless the layout says to cut; settings out of range.
 pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Result<Arranged, LayoutError> {
-    let block = Block::of((dots.width(), dots.length()), layout)?;
+    // Only whole pairs of dots have a place.
+    let across = layout.across();
+    let block = Block::of((dots.width() / across.max(1), dots.length()), layout)?;
     let mut stacks = dots.stacks().to_vec();
     let marked = layout.crop_marks || layout.registration_marks;
     let in_use = if marked { order::passes_of(&used(dots)) } else { Vec::new() };
     let (marks, marks_left_out) = marks::marks_of(layout, &in_use, &block, &mut stacks)?;
     let page = Page { dots, layout, block: &block, marks: &marks };
-    let sheet = Sheet::new(layout.paper, stacks, page.render(observer))?;
+    let sheet = Sheet::new(in_dots(layout.paper, layout.resolution), stacks, page.render(observer))?;
 
     let room = block.room;
     let mut copies = Vec::new();
@@ -114,6 +118,17 @@ pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Resul
     let area = page.area(all.meet(room)).filter(|_| !copies.is_empty()).ok_or(nothing)?;
     let laid = Laid { grid: block.grid, marks_left_out, copies, area, cut: block.cut };
     Ok(Arranged { sheet, laid })
+}
+
+/// A paper whose area is counted in the dots of a job of this resolution.
+pub(crate) fn in_dots(paper: Paper, resolution: Resolution) -> Paper {
+    match resolution {
+        Resolution::Dpi600 => paper,
+        _ => Paper::Custom {
+            width: resolution.across(paper.width()),
+            length: resolution.along(paper.length()),
+        },
+    }
 }
 
 /// The stacks that are on a dot.

@@ -20,7 +20,8 @@ pub(super) struct Page<'a> {
 impl Page<'_> {
     /// The dots of the sheet, row by row as they are sent.
     pub fn render(&self, observer: &dyn Observer) -> Vec<u8> {
-        let (width, length) = (usize::from(self.layout.paper.width()), self.layout.paper.length());
+        let width = usize::from(self.layout.paper.width()) * self.layout.across();
+        let length = self.layout.paper.length();
         observer.begin("layout", length.into());
         let mut index = vec![0; width * usize::from(length)];
         index.par_chunks_exact_mut(width).enumerate().for_each(|(sent, row)| {
@@ -36,7 +37,7 @@ impl Page<'_> {
         if !(self.block.room.top..self.block.room.bottom).contains(&y) {
             return;
         }
-        let offset = self.layout.profile.offset().0;
+        let (offset, across) = (self.layout.profile.offset().0, self.layout.across());
         let fits = |left: i64, right: i64| (left.max(self.block.room.left), right.min(self.block.room.right));
         if let Some(&(top, _)) = self.block.rows.iter().find(|(top, bottom)| (*top..*bottom).contains(&y)) {
             // Within the dot map, by the line above.
@@ -48,12 +49,14 @@ impl Page<'_> {
                     continue;
                 }
                 // The room lies within what the offset leaves of the row.
-                let target = &mut row[(from - offset) as usize..(to - offset) as usize];
+                let target = &mut row[across * (from - offset) as usize..across * (to - offset) as usize];
                 if self.layout.mirror {
-                    let source = &dots[(right - to) as usize..(right - from) as usize];
+                    let source = &dots[across * (right - to) as usize..across * (right - from) as usize];
                     target.iter_mut().zip(source.iter().rev()).for_each(|(dot, &source)| *dot = source);
                 } else {
-                    target.copy_from_slice(&dots[(from - left) as usize..(to - left) as usize]);
+                    target.copy_from_slice(
+                        &dots[across * (from - left) as usize..across * (to - left) as usize],
+                    );
                 }
             }
         }
@@ -63,7 +66,7 @@ impl Page<'_> {
             }
             let (from, to) = fits(mark.place.left, mark.place.right);
             for x in (from..to).filter(|&x| mark.covers(x, y)) {
-                row[(x - offset) as usize] = *stack;
+                row[across * (x - offset) as usize..][..across].fill(*stack);
             }
         }
     }
@@ -86,9 +89,9 @@ impl Page<'_> {
         };
         let (top, bottom) = (first_at(place.top), first_at(place.bottom));
         (top < bottom).then(|| Area {
-            left: (place.left - offset) as usize,
+            left: self.layout.across() * (place.left - offset) as usize,
             top: top as usize,
-            width: place.width() as usize,
+            width: self.layout.across() * place.width() as usize,
             length: (bottom - top) as usize,
         })
     }

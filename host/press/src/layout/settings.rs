@@ -2,6 +2,7 @@
 
 use protocol::ink::Ink;
 use protocol::paper::Paper;
+use protocol::rgl::Resolution;
 
 use super::length::{Mm, Point};
 use super::profile::Profile;
@@ -16,6 +17,9 @@ pub const MOST_REPEATS: u16 = 200;
 pub struct Layout {
     /// The paper.
     pub paper: Paper,
+    /// Dots an inch. At 1200 x 600 dpi a dot map has two dots across for each of its rows' height; where things are is still
+    /// reckoned in 1/600 inch.
+    pub resolution: Resolution,
     /// Where the block of copies goes.
     pub position: Position,
     /// How many copies.
@@ -61,6 +65,7 @@ impl Layout {
     pub fn centred(paper: Paper) -> Layout {
         Layout {
             paper,
+            resolution: Resolution::Dpi600,
             position: Position::Centred,
             repeat: Repeat::Grid(1, 1),
             gap: Point::default(),
@@ -71,6 +76,11 @@ impl Layout {
             cut: false,
             profile: Profile::default(),
         }
+    }
+
+    /// Dots across in 1/600 inch: 1, or 2 at 1200 x 600 dpi; 0 at a resolution that nothing is laid out for.
+    pub(crate) fn across(&self) -> usize {
+        self.resolution.across(1).into()
     }
 
     /// The part of the ideal page that this printer reaches, in dots of the printable area.

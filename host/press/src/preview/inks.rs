@@ -52,45 +52,62 @@ impl FromStr for Ground {
     }
 }
 
-/// Writes a picture of an area of a sheet in its inks, one pixel a dot.
+/// Writes a picture of an area of a sheet in its inks, one pixel a dot; of a sheet with `across` dots in 1/600 inch, each row
+/// is repeated as often, so that the picture has the sheet's shape.
 ///
 /// # Errors
 /// The file cannot be written.
 ///
 /// # Panics
 /// If the area leaves the sheet, which is a bug of the caller.
-pub fn save_sheet(sheet: &Sheet, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
+pub fn save_sheet(
+    sheet: &Sheet,
+    area: Area,
+    across: usize,
+    ground: Ground,
+    path: &Path,
+) -> Result<(), FileError> {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
     let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
+    let rows = rows.flat_map(|row| std::iter::repeat_n(row, across));
     let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-    write_png(path, (area.width, area.length), Kind::Indexed(&palette), &dots)
+    write_png(path, (area.width, area.length * across), Kind::Indexed(&palette), &dots)
 }
 
-/// Writes a picture of an area of one pass in its ink, one pixel a dot.
+/// Writes a picture of an area of one pass in its ink, as [`save_sheet`] does.
 ///
 /// # Errors
 /// The file cannot be written.
 ///
 /// # Panics
 /// If the area leaves the plane, which is a bug of the caller.
-pub fn save_pass(pass: &Pass, area: Area, ground: Ground, path: &Path) -> Result<(), FileError> {
+pub fn save_pass(
+    pass: &Pass,
+    area: Area,
+    across: usize,
+    ground: Ground,
+    path: &Path,
+) -> Result<(), FileError> {
     let palette = [ground.0, label(pass.ink, ground.0)];
     let plane = &pass.plane;
     let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
     let dots: Vec<u8> = rows
+        .flat_map(|row| std::iter::repeat_n(row, across))
         .flat_map(|row| (area.left..area.left + area.width).map(|x| row[x / 8] >> (7 - x % 8) & 1))
         .collect();
-    write_png(path, (area.width, area.length), Kind::Indexed(&palette), &dots)
+    write_png(path, (area.width, area.length * across), Kind::Indexed(&palette), &dots)
 }
 
-/// A picture of the whole sheet, at most `longest` pixels on its longer side. Each pixel is the mean of its dots.
-pub fn thumbnail(sheet: &Sheet, ground: Ground, longest: usize) -> RgbImage {
+/// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each
+/// pixel is the mean of its dots.
+pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -> RgbImage {
     let palette: Vec<[u8; 3]> = sheet.stacks().iter().map(|stack| upon(stack, ground.0)).collect();
-    let step = sheet.width().max(sheet.length()).div_ceil(longest.max(1)).max(1);
-    let (width, height) = (sheet.width().div_ceil(step), sheet.length().div_ceil(step));
+    let step = (sheet.width() / across).max(sheet.length()).div_ceil(longest.max(1)).max(1);
+    let wide = step * across;
+    let (width, height) = (sheet.width().div_ceil(wide), sheet.length().div_ceil(step));
     let mut sums = vec![[0u32; 4]; width * height];
     for (y, row) in sheet.index().chunks_exact(sheet.width()).enumerate() {
-        for (sum, dots) in sums[y / step * width..].iter_mut().zip(row.chunks(step)) {
+        for (sum, dots) in sums[y / step * width..].iter_mut().zip(row.chunks(wide)) {
             for &dot in dots {
                 let colour = palette[usize::from(dot)];
                 (0..3).for_each(|c| sum[c] += u32::from(colour[c]));
@@ -102,6 +119,39 @@ pub fn thumbnail(sheet: &Sheet, ground: Ground, longest: usize) -> RgbImage {
     RgbImage::from_fn(width as u32, height as u32, |x, y| {
         let [r, g, b, count] = sums[y as usize * width + x as usize];
         image::Rgb([r, g, b].map(|sum| ((sum + count / 2) / count.max(1)) as u8))
+    })
+}
+
+/// A picture of an area of one pass in its ink, with `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each pixel is the mean of its
+/// dots.
+///
+/// # Panics
+/// If the area leaves the plane, which is a bug of the caller.
+pub fn pass_thumbnail(pass: &Pass, area: Area, across: usize, ground: Ground, longest: usize) -> RgbImage {
+    let colours = [ground.0, label(pass.ink, ground.0)];
+    let plane = &pass.plane;
+    let step = (area.width / across).max(area.length).div_ceil(longest.max(1)).max(1);
+    let wide = step * across;
+    let (width, height) = (area.width.div_ceil(wide), area.length.div_ceil(step));
+    // Dots of each pixel: all of them, and those with ink.
+    let mut sums = vec![[0u32; 2]; width * height];
+    let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
+    for (y, row) in rows.enumerate() {
+        for x in 0..area.width {
+            let at = area.left + x;
+            let sum = &mut sums[y / step * width + x / wide];
+            sum[0] += 1;
+            sum[1] += u32::from(row[at / 8] >> (7 - at % 8) & 1);
+        }
+    }
+    // The sides of an area fit in u16, and a mean of bytes fits in a byte.
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let [all, inked] = sums[y as usize * width + x as usize];
+        let mean = |c: usize| {
+            let sum = u32::from(colours[0][c]) * (all - inked) + u32::from(colours[1][c]) * inked;
+            ((sum + all / 2) / all.max(1)) as u8
+        };
+        image::Rgb([mean(0), mean(1), mean(2)])
     })
 }
 
@@ -132,7 +182,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("preview.png");
         let area = Area { left: 0, top: 2, width: 20, length: 3 };
-        save_sheet(&sheet(), area, Ground([0x20, 0x40, 0x80]), &path).unwrap();
+        save_sheet(&sheet(), area, 1, Ground([0x20, 0x40, 0x80]), &path).unwrap();
         let picture = image::open(&path).unwrap().to_rgb8();
         assert_eq!(picture.dimensions(), (20, 3));
         let at = |x: u32| picture.get_pixel(x, 1).0;
@@ -149,7 +199,7 @@ mod tests {
         let plane =
             crate::separate::Plane { width: 20, length: 2, stride: 3, bits: vec![0, 0x18, 0, 0x80, 0, 0x10] };
         let area = Area { left: 4, top: 0, width: 16, length: 2 };
-        save_pass(&Pass { ink: Ink::White, plane }, area, Ground([0; 3]), &path).unwrap();
+        save_pass(&Pass { ink: Ink::White, plane }, area, 1, Ground([0; 3]), &path).unwrap();
         let picture = image::open(&path).unwrap().to_rgb8();
         let lit: Vec<(u32, u32)> =
             picture.enumerate_pixels().filter(|(_, _, p)| p.0[0] > 100).map(|(x, y, _)| (x, y)).collect();
@@ -157,8 +207,29 @@ mod tests {
     }
 
     #[test]
+    fn a_thumbnail_of_a_pass_keeps_the_mean_of_its_area() {
+        // 4 x 2 dots of ink at (5, 1).
+        let mut bits = vec![0u8; 3 * 5];
+        for (x, y) in [1, 2].into_iter().flat_map(|y| (5..9).map(move |x| (x, y))) {
+            bits[y * 3 + x / 8] |= 0x80 >> (x % 8);
+        }
+        let pass =
+            Pass { ink: Ink::White, plane: crate::separate::Plane { width: 20, length: 5, stride: 3, bits } };
+        let area = Area { left: 4, top: 0, width: 12, length: 4 };
+        let small = pass_thumbnail(&pass, area, 1, Ground([0; 3]), 6);
+        assert_eq!(small.dimensions(), (6, 2));
+        let white = f64::from(label(Ink::White, [0; 3])[0]);
+        // Dots 4 and 5 of rows 0 and 1: one of four has ink.
+        for (x, y, share) in [(0, 0, 0.25), (1, 0, 0.5), (2, 0, 0.25), (3, 0, 0.0), (1, 1, 0.5), (5, 1, 0.0)]
+        {
+            let found = f64::from(small.get_pixel(x, y).0[0]);
+            assert!((found - share * white).abs() <= 1.0, "({x}, {y}): {found}");
+        }
+    }
+
+    #[test]
     fn a_thumbnail_keeps_the_mean() {
-        let small = thumbnail(&sheet(), Ground([0; 3]), 10);
+        let small = thumbnail(&sheet(), 1, Ground([0; 3]), 10);
         assert_eq!(small.dimensions(), (10, 6));
         let white = f64::from(upon(&"W".parse().unwrap(), [0; 3])[0]);
         // Dots 4 and 5: half ground, half white.

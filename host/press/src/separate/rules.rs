@@ -257,10 +257,14 @@ fn too_many_cartridges(plan: &Plan) -> Option<Check> {
         return None;
     }
     let dots = |ink| plan.passes.iter().filter(|pass| pass.ink == ink).map(|pass| pass.dots).sum::<u64>();
-    let least = plan.cartridges.iter().copied().min_by_key(|&ink| dots(ink));
-    let rare = least.map_or_else(String::new, |ink| {
-        format!(", for example {}, which has the fewest dots ({})", ink.name(), dots(ink))
-    });
+    let least = plan.cartridges.iter().map(|&ink| dots(ink)).min().unwrap_or_default();
+    let rarest: Vec<&str> =
+        plan.cartridges.iter().filter(|&&ink| dots(ink) == least).map(|ink| ink.name()).collect();
+    let rare = match rarest[..] {
+        [one] => format!(", for example {one}, which has the fewest dots ({least})"),
+        _ if rarest.len() == plan.cartridges.len() => String::new(),
+        _ => format!(", for example one of {}, which have the fewest dots ({least} each)", rarest.join(", ")),
+    };
     Some(Check {
         rule: "cartridges".into(),
         severity: Severity::Error,
@@ -330,6 +334,29 @@ mod tests {
             assert!(has(stack, wrong, rule), "{rule}: {wrong}");
             assert!(!has(stack, right, rule), "{rule}: {right}");
         }
+    }
+
+    #[test]
+    fn an_ink_is_named_as_the_rarest_only_if_others_have_more_dots() {
+        let inks = ["K", "C", "M", "Y", "MG", "MM", "MC", "MS"];
+        let said = |few: usize| {
+            let stacks = [Stack::SUBSTRATE].into_iter().chain(inks.map(|ink| ink.parse().unwrap())).collect();
+            // The last `few` inks have half as many dots.
+            let index = (0..1024usize).map(|dot| match (dot % 8, dot / 8) {
+                (ink, turn) if ink >= 8 - few && turn >= 64 => 0,
+                (ink, _) => 1 + ink as u8,
+            });
+            let sheet = Sheet::new(Paper::Custom { width: 32, length: 32 }, stacks, index.collect()).unwrap();
+            checks(&sheet, &[]).iter().find(|check| check.rule == "cartridges").unwrap().text.clone()
+        };
+        assert!(said(0).ends_with("leave out an ink"), "{}", said(0));
+        assert!(
+            said(1).ends_with("for example metallic-silver, which has the fewest dots (64)"),
+            "{}",
+            said(1)
+        );
+        let two = "for example one of metallic-cyan, metallic-silver, which have the fewest dots (64 each)";
+        assert!(said(2).ends_with(two), "{}", said(2));
     }
 
     #[test]

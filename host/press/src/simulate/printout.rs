@@ -5,6 +5,7 @@ use protocol::paper::Paper;
 use protocol::rgl::{Media, Resolution};
 
 use super::compose::{self, PrintoutError};
+use crate::layout::in_dots;
 use crate::separate::Pass;
 use crate::sheet::Sheet;
 
@@ -47,6 +48,15 @@ impl Printout {
     /// [`PrintoutError::UnknownStack`] if a dot has another stack; see also [`PrintoutError`].
     pub fn sheet_with(&self, stacks: &[Stack]) -> Result<Sheet, PrintoutError> {
         compose::sheet(self.at_600()?, &self.passes, Some(stacks))
+    }
+
+    /// The sheet in the dots of the job: at 1200 x 600 dpi one of custom paper, twice as many dots wide. With `stacks`, they
+    /// are numbered as there.
+    ///
+    /// # Errors
+    /// As for [`Printout::sheet`] and [`Printout::sheet_with`], but for the resolution.
+    pub fn sheet_in_dots(&self, stacks: Option<&[Stack]>) -> Result<Sheet, PrintoutError> {
+        compose::sheet(in_dots(self.paper, self.resolution), &self.passes, stacks)
     }
 
     fn at_600(&self) -> Result<Paper, PrintoutError> {

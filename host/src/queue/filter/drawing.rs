@@ -1,17 +1,25 @@
 //! Ghostscript at work: the pages of a document as pictures, through a pipe.
 
-use std::io::{self, BufReader, Read};
+use std::io::{BufReader, Read};
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::thread::{self, JoinHandle};
+use std::process::{ChildStdout, Command, Stdio};
 
-use super::{FilterError, io_error};
+use press::process::{self, Process, ProcessError};
 
-/// Ghostscript at work.
+use super::FilterError;
+
+/// Ghostscript at work. Each page has the time limit of [`process::limit`]; while a page is printed there is none.
 pub(super) struct Drawing {
-    child: Child,
+    process: Process,
     pages: BufReader<ChildStdout>,
-    complaints: JoinHandle<String>,
+}
+
+/// Why there is no drawing.
+fn failed(error: ProcessError) -> FilterError {
+    match error {
+        ProcessError::Start(error) => FilterError::NoGhostscript(error),
+        error => FilterError::Ghostscript(observe::with_causes(&error)),
+    }
 }
 
 impl Drawing {
@@ -24,31 +32,23 @@ impl Drawing {
             .arg(format!("-r{dpi}"))
             .args(["-sstdout=%stderr", "-sOutputFile=%stdout", "-f"])
             .arg(path)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(FilterError::NoGhostscript)?;
-        let (Some(pages), Some(mut words)) = (child.stdout.take(), child.stderr.take()) else {
-            return Err(FilterError::Ghostscript("its pipes cannot be had".into()));
+            .stdout(Stdio::piped());
+        let mut process = Process::start(&mut command, process::limit()).map_err(failed)?;
+        let Some(pages) = process.output() else {
+            return Err(FilterError::Ghostscript("its pipe cannot be had".into()));
         };
         // A page is 100 MB: through the usual 64 KB the two programs mostly wait for each other. What is refused is slower.
         #[cfg(target_os = "linux")]
         let _ = rustix::pipe::fcntl_setpipe_size(&pages, 1 << 20);
-        let complaints = thread::spawn(move || {
-            let mut bytes = Vec::new();
-            // Only the beginning is shown, but all is taken so that it never waits. What cannot be read is not shown.
-            let _ = (&mut words).take(1 << 14).read_to_end(&mut bytes);
-            let _ = io::copy(&mut words, &mut io::sink());
-            String::from_utf8_lossy(&bytes).lines().take(3).collect::<Vec<_>>().join("; ")
-        });
-        Ok(Drawing { child, pages: BufReader::with_capacity(1 << 18, pages), complaints })
+        Ok(Drawing { process, pages: BufReader::with_capacity(1 << 18, pages) })
     }
 
     /// Width and height of the next page in pixels.
     pub(super) fn next_page(&mut self) -> Result<Option<(usize, usize)>, FilterError> {
-        let read = io_error("read what Ghostscript draws");
+        self.process.advance();
         let mut byte = [0];
-        if self.pages.read(&mut byte).map_err(read)? == 0 {
+        let cannot = |source| FilterError::Io { what: "read what Ghostscript draws", source };
+        if self.pages.read(&mut byte).map_err(cannot)? == 0 {
             return Ok(None);
         }
         // `P6`, then width, height and depth apart by white space or comment lines, then one byte of white space.
@@ -56,7 +56,7 @@ impl Drawing {
         let (mut word, mut comment, mut length) = (String::new(), false, 0);
         word.push(char::from(byte[0]));
         while numbers.len() < 4 {
-            self.pages.read_exact(&mut byte).map_err(io_error("read what Ghostscript draws"))?;
+            self.read(&mut byte)?;
             length += 1;
             match byte[0] {
                 b'\n' if comment => comment = false,
@@ -84,14 +84,22 @@ impl Drawing {
     /// The pixels of the page, red, green and blue, row by row.
     pub(super) fn pixels(&mut self, (width, height): (usize, usize)) -> Result<Vec<u8>, FilterError> {
         let mut rgb = vec![0; 3 * width * height];
-        self.pages.read_exact(&mut rgb).map_err(io_error("read what Ghostscript draws"))?;
+        self.read(&mut rgb)?;
+        self.process.pause();
         Ok(rgb)
     }
 
+    /// Fills the bytes. Output that ends early is told by its limit if that has passed.
+    fn read(&mut self, bytes: &mut [u8]) -> Result<(), FilterError> {
+        self.pages.read_exact(bytes).map_err(|source| match self.process.passed() {
+            Some(error) => failed(error),
+            None => FilterError::Io { what: "read what Ghostscript draws", source },
+        })
+    }
+
     /// Sees to it that all was drawn.
-    pub(super) fn end(mut self) -> Result<(), FilterError> {
-        let status = self.child.wait().map_err(io_error("wait for Ghostscript"))?;
-        let words = self.complaints.join().unwrap_or_default();
-        if status.success() { Ok(()) } else { Err(FilterError::Ghostscript(words)) }
+    pub(super) fn end(self) -> Result<(), FilterError> {
+        self.process.advance();
+        self.process.end(|| false).map(drop).map_err(failed)
     }
 }

@@ -33,12 +33,14 @@ pub struct Settings {
     pub knockout: InkSet,
     /// Where white goes; `None` for where the art draws it.
     pub white: Option<White>,
-    /// Dots by which white is shrunk, 0 to 236; negative to spread it.
+    /// Dots by which white is shrunk, 0 to 237; negative to spread it.
     pub choke: f64,
     /// Where finish goes; `None` for where the art draws it.
     pub finish: Option<Finish>,
     /// The suggestions to follow.
     pub accept: Vec<Accept>,
+    /// Dots across in 1/600 inch, as in the options of the reader.
+    pub across: usize,
 }
 
 impl Default for Settings {
@@ -53,6 +55,7 @@ impl Default for Settings {
             choke: 0.0,
             finish: None,
             accept: Vec::new(),
+            across: 1,
         }
     }
 }

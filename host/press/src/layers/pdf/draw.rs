@@ -1,0 +1,256 @@
+//! Ghostscript and Poppler at work on a document: drafts of its pages, and a page as a picture.
+//!
+//! Method: a draft at a low resolution tells the size of each page, whether anything is drawn on it, and its plates. Nothing
+//! is anti-aliased. Cost: some 0.1 s a page for drafts, seconds for a page. Limits: the time limit of [`process`] for each
+//! page; Ghostscript can read only the file (its safer mode); Poppler knows no plates.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::super::coverage;
+use super::super::error::{LayersError, io, wrong};
+use super::super::names::stem;
+use crate::process::{self, Process, ProcessError};
+use crate::scratch::Scratch;
+
+/// Resolution of drafts.
+pub(super) const DRAFT: f64 = 36.0;
+
+/// Drafts of more pages are no progress: a program may show pages for ever.
+const MOST_PAGES: u32 = 1000;
+
+/// The plates that every page has.
+pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
+
+/// A page of a document, as its draft shows it.
+pub(super) struct Leaf {
+    /// Its number, from 1.
+    pub number: u32,
+    /// Pixels across and down at [`DRAFT`] dots an inch.
+    pub size: (f64, f64),
+    /// Whether anything but white is drawn on it.
+    pub drawn: bool,
+    /// Its plates beside those of [`PROCESS`] that are not blank.
+    pub spots: Vec<String>,
+}
+
+/// The part of a page to draw.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Part {
+    /// The part that is meant to be seen.
+    CropBox,
+    /// The whole sheet.
+    Sheet,
+}
+
+/// The program that draws.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Program {
+    Ghostscript,
+    Poppler,
+}
+
+impl Program {
+    /// Drafts of all pages, or of one.
+    ///
+    /// # Errors
+    /// A document that cannot be read, that takes too long, or no such program.
+    pub fn leaves(
+        self,
+        path: &Path,
+        only: Option<u32>,
+        part: Part,
+        folder: &Scratch,
+    ) -> Result<Vec<Leaf>, LayersError> {
+        match self {
+            Program::Ghostscript => ghostscript_leaves(path, only, part, folder),
+            Program::Poppler => poppler_leaves(path, only, folder),
+        }
+    }
+
+    /// Draws a page on a transparent ground, as PNG.
+    ///
+    /// # Errors
+    /// As [`Program::leaves`].
+    pub fn picture(
+        self,
+        path: &Path,
+        page: u32,
+        dpi: (f64, f64),
+        folder: &Scratch,
+    ) -> Result<PathBuf, LayersError> {
+        let picture = folder.path().join("page.png");
+        match self {
+            Program::Ghostscript => {
+                let options = [one_page(page), crop(Part::CropBox)].concat();
+                ghostscript(path, &options, "pngalpha", dpi, &picture, || false)?;
+            }
+            Program::Poppler => {
+                let (x, y) = dpi;
+                let options = [
+                    ["-singlefile", "-rx", &format!("{x:.4}"), "-ry", &format!("{y:.4}")]
+                        .map(String::from)
+                        .to_vec(),
+                    pages(page),
+                ];
+                poppler(path, &options.concat(), &picture.with_extension(""))?;
+            }
+        }
+        Ok(picture)
+    }
+}
+
+fn one_page(page: u32) -> Vec<String> {
+    vec![format!("-dFirstPage={page}"), format!("-dLastPage={page}")]
+}
+
+fn crop(part: Part) -> Vec<String> {
+    if part == Part::CropBox { vec!["-dUseCropBox".into()] } else { Vec::new() }
+}
+
+fn pages(page: u32) -> Vec<String> {
+    vec!["-f".into(), page.to_string(), "-l".into(), page.to_string()]
+}
+
+fn ghostscript_leaves(
+    path: &Path,
+    only: Option<u32>,
+    part: Part,
+    folder: &Scratch,
+) -> Result<Vec<Leaf>, LayersError> {
+    let place = |number: u32| match only {
+        Some(_) => folder.path().join("draft.tif"),
+        None => folder.path().join(format!("draft{number}.tif")),
+    };
+    let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
+    let options =
+        [vec!["-sCompression=lzw".into()], only.map_or_else(Vec::new, one_page), crop(part)].concat();
+    let mut begun = 0;
+    let progressed = || {
+        let next = begun < MOST_PAGES && place(begun + 1).exists();
+        begun += u32::from(next);
+        next && only.is_none()
+    };
+    ghostscript(path, &options, "tiffsep", (DRAFT, DRAFT), &to, progressed)?;
+    let mut leaves = Vec::new();
+    for number in only.map_or(1..=u32::MAX, |number| number..=number) {
+        let draft = place(number);
+        let Ok((width, height)) = image::image_dimensions(&draft) else { break };
+        let (mut drawn, mut spots) = (false, Vec::new());
+        for (name, file) in plates_beside(&draft, folder)? {
+            // A page paints every pixel it touches, so a draft misses nothing.
+            if coverage::scan(&file)?.coverage.iter().any(|&c| c > 0) {
+                drawn = true;
+                if !PROCESS.contains(&name.as_str()) {
+                    spots.push(name);
+                }
+            }
+        }
+        leaves.push(Leaf { number, size: (width.into(), height.into()), drawn, spots });
+    }
+    Ok(leaves)
+}
+
+fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Vec<Leaf>, LayersError> {
+    let options = [vec!["-r".into(), DRAFT.to_string()], only.map_or_else(Vec::new, pages)];
+    poppler(path, &options.concat(), &folder.path().join("draft"))?;
+    let listing = std::fs::read_dir(folder.path()).map_err(io(path, "list its pages"))?;
+    let mut drafts: Vec<(u32, PathBuf)> = listing
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter_map(|file| Some((stem(&file).strip_prefix("draft-")?.parse().ok()?, file)))
+        .collect();
+    drafts.sort();
+    let leaf = |(number, file): (u32, PathBuf)| {
+        let scan = coverage::scan(&file)?;
+        let drawn = scan.coverage.iter().any(|&c| c > 0);
+        Ok(Leaf { number, size: (scan.width.into(), scan.height.into()), drawn, spots: Vec::new() })
+    };
+    drafts.into_iter().map(leaf).collect()
+}
+
+/// The names and files of the plates beside a separated page, such as `page(Gold Foil).tif`.
+pub(super) fn plates_beside(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
+    let prefix = stem(page);
+    let mut plates = Vec::new();
+    for entry in std::fs::read_dir(folder.path()).map_err(io(page, "list its plates"))? {
+        let file = entry.map_err(io(page, "list its plates"))?.path();
+        let name = stem(&file);
+        let plate = name.strip_prefix(&prefix).and_then(|rest| rest.strip_prefix('(')?.strip_suffix(')'));
+        if let Some(plate) = plate {
+            plates.push((plate.to_owned(), file.clone()));
+        }
+    }
+    plates.sort();
+    Ok(plates)
+}
+
+/// Separates a page into a TIFF for each plate beside `to`. Returns what Ghostscript says of them.
+pub(super) fn separate(
+    path: &Path,
+    page: u32,
+    part: Part,
+    dpi: (f64, f64),
+    to: &Path,
+) -> Result<String, LayersError> {
+    let options = [one_page(page), crop(part), vec!["-dPrintSpotCMYK".into()]].concat();
+    ghostscript(path, &options, "tiffsep", dpi, to, || false)
+}
+
+/// Runs Ghostscript on a document; `progressed` tells whether it has begun another page.
+fn ghostscript(
+    path: &Path,
+    options: &[String],
+    device: &str,
+    dpi: (f64, f64),
+    to: &Path,
+    progressed: impl FnMut() -> bool,
+) -> Result<String, LayersError> {
+    let file = std::path::absolute(path).map_err(io(path, "find it"))?;
+    let mut command = Command::new("gs");
+    command
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
+        .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
+        .args(options)
+        .arg(format!("-r{:.4}x{:.4}", dpi.0, dpi.1))
+        .arg(format!("-sDEVICE={device}"))
+        .arg(format!("-sOutputFile={}", to.display()))
+        .arg("-f")
+        .arg(file);
+    let install = "install it (Debian: apt install ghostscript), or export the page as PNG";
+    run(path, command, install, progressed)
+}
+
+/// Runs Poppler on a PDF.
+fn poppler(path: &Path, options: &[String], to: &Path) -> Result<String, LayersError> {
+    let file = std::path::absolute(path).map_err(io(path, "find it"))?;
+    let mut command = Command::new("pdftocairo");
+    command.args(["-png", "-transp", "-cropbox", "-antialias", "none"]).args(options).arg(file).arg(to);
+    let install =
+        "install it (Debian: apt install ghostscript), or Poppler (poppler-utils), or export the page as PNG";
+    run(path, command, install, || false)
+}
+
+/// Runs a program to its end and returns what it said. `install` is what to do if it is not installed.
+fn run(
+    path: &Path,
+    mut command: Command,
+    install: &'static str,
+    progressed: impl FnMut() -> bool,
+) -> Result<String, LayersError> {
+    let begun = Process::start(command.stdout(Stdio::null()), process::limit());
+    begun.and_then(|process| process.end(progressed)).map_err(|error| match error {
+        ProcessError::Start(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            LayersError::Program { path: path.to_path_buf(), program: "Ghostscript", install }
+        }
+        ProcessError::Start(source) => {
+            LayersError::Io { path: path.to_path_buf(), attempt: "start a program to read it", source }
+        }
+        ProcessError::Io(source) => LayersError::Io {
+            path: path.to_path_buf(),
+            attempt: "wait for the program that reads it",
+            source,
+        },
+        ProcessError::Failed(why) => wrong(path, format!("cannot be read: {why}")),
+        ProcessError::TooLong(limit) => wrong(path, process::too_long(limit)),
+    })
+}

@@ -1,0 +1,422 @@
+//! Nothing of the art is lost, and what was decided is said: pages, limits, the plan, the ledger's prices, lists for programs.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use image::{GrayImage, Luma};
+use serde_json::Value;
+
+use testing::needs::{self, Need};
+use testing::program::{Bench, entries, text};
+
+/// A black layer of 60 x 40 pixels with ink in a rectangle.
+fn layer(bench: &Bench, name: &str, x: std::ops::Range<u32>, y: std::ops::Range<u32>) {
+    let ink = |u: u32, v: u32| Luma([if x.contains(&u) && y.contains(&v) { 0 } else { 255 }]);
+    GrayImage::from_fn(60, 40, ink).save(bench.path(name)).expect("a picture");
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in {text}"))
+}
+
+fn ghostscript() -> bool {
+    let found = needs::starts("gs");
+    if !found {
+        Need::Queue.skip("Ghostscript is not installed; `cargo xtask queue` installs it");
+    }
+    found
+}
+
+/// An executable script in a folder that is first on the path.
+fn script(bench: &Bench, name: &str, body: &str) -> std::ffi::OsString {
+    let folder = bench.path("bin");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join(name), format!("#!/bin/sh\n{body}")).unwrap();
+    fs::set_permissions(folder.join(name), fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(std::iter::once(folder).chain(std::env::split_paths(&path))).unwrap()
+}
+
+/// Whether any process has this text in its arguments.
+fn runs(what: &str) -> bool {
+    let listing = fs::read_dir("/proc").into_iter().flatten().filter_map(Result::ok);
+    listing
+        .filter_map(|entry| fs::read(entry.path().join("cmdline")).ok())
+        .any(|arguments| text(&arguments).contains(what))
+}
+
+#[test]
+fn endless_pages_end_at_the_limit_in_every_path_and_nothing_runs_on() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let scratch = bench.path("scratch");
+    fs::create_dir(&scratch).unwrap();
+    // Calculates for ever, and shows pages for ever.
+    for (name, body) in [("loop.ps", "{} loop"), ("pages.ps", "{showpage} loop")] {
+        fs::write(bench.path(name), format!("%!PS\n{body}\n")).unwrap();
+        let file = bench.path(name).display().to_string();
+        for command in [
+            format!("layers {name}"),
+            format!("layers {name} --page 1"),
+            format!("plan layers {name} --pages white,gold"),
+            format!("cups-filter 1 me title 1 FoilpressSpots=Named {file}"),
+            format!("cups-filter 1 me title 1 FoilpressSpots=Off {file}"),
+        ] {
+            // A queue prints pages as long as there are some; whoever prints them stops it.
+            if name == "pages.ps" && command.contains("cups-filter") {
+                continue;
+            }
+            let begun = Instant::now();
+            let output = bench
+                .command(&command)
+                .env("FOILPRESS_TIME_LIMIT", "2")
+                .env("TMPDIR", &scratch)
+                .output()
+                .unwrap();
+            let said = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(1), "{command}: {said}");
+            assert!(said.contains("took more than 2 s and was stopped"), "{command}: {said}");
+            assert!(said.contains("FOILPRESS_TIME_LIMIT"), "{command}: {said}");
+            assert!(begun.elapsed() < Duration::from_secs(60), "{command}: {:?}", begun.elapsed());
+            assert!(!runs(&file), "{command}: Ghostscript goes on");
+            assert!(entries(&scratch).is_empty(), "{command}: {:?}", entries(&scratch));
+        }
+    }
+}
+
+#[test]
+fn a_drawing_with_endless_filters_ends_at_the_limit() {
+    let bench = Bench::new();
+    let dilate =
+        r#"<feMorphology operator="dilate" radius="50"/><feMorphology operator="erode" radius="50"/>"#
+            .repeat(200);
+    let svg = format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="190mm" height="260mm"><filter id="f" x="0" y="0" width="1" height="1">{dilate}</filter>
+        <g id="white"><rect width="700" height="900" filter="url(#f)"/></g></svg>"##
+    );
+    fs::write(bench.path("heavy.svg"), svg).unwrap();
+    for command in ["layers heavy.svg", "plan layers heavy.svg"] {
+        let begun = Instant::now();
+        let output = bench.command(command).env("FOILPRESS_TIME_LIMIT", "1").output().unwrap();
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.contains("heavy.svg: drawing it took more than 1 s"), "{said}");
+        assert!(begun.elapsed() < Duration::from_secs(30), "{:?}", begun.elapsed());
+    }
+}
+
+#[test]
+fn a_drawing_on_which_the_renderer_fails_is_an_error_like_any_other() {
+    let bench = Bench::new();
+    // Its noise overflows in builds that check.
+    let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm"><filter id="f">
+        <feTurbulence baseFrequency="0.05" numOctaves="200"/></filter><g id="white"><rect width="9" height="9" filter="url(#f)"/></g></svg>"##;
+    fs::write(bench.path("noise.svg"), svg).unwrap();
+    let output = bench.run("plan layers noise.svg --paper postcard");
+    let said = text(&output.stderr);
+    assert!(!said.contains("panicked"), "{said}");
+    assert!(output.status.success() || said.contains("noise.svg: the drawing cannot be rendered"), "{said}");
+}
+
+#[test]
+fn a_cancelled_filter_leaves_neither_folders_nor_a_ghostscript() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    fs::create_dir(bench.path("scratch")).unwrap();
+    fs::write(bench.path("loop.ps"), "%!PS\n{} loop\n").unwrap();
+    let file = bench.path("loop.ps").display().to_string();
+    let mut child = bench
+        .command(&format!("cups-filter 1 me title 1 FoilpressSpots=Named {file}"))
+        .env("TMPDIR", bench.path("scratch"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    while !runs(&format!("-f\0{file}")) {
+        assert!(begun.elapsed() < Duration::from_secs(60), "Ghostscript is never started");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    // As the print system ends it.
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    assert_ne!(child.wait().unwrap().code(), Some(0));
+    assert!(!runs(&format!("-f\0{file}")), "Ghostscript goes on");
+    assert!(entries(&bench.path("scratch")).is_empty(), "{:?}", entries(&bench.path("scratch")));
+}
+
+const PAGES: &str = "%!PS
+/page { <</PageSize [144 72]>> setpagedevice } def
+page 0 setgray 12 12 96 48 rectfill showpage
+page 0 setgray 24 24 36 12 rectfill showpage
+page 0 setgray 84 24 12 12 rectfill showpage
+";
+
+#[test]
+fn pages_are_chosen_or_given_their_inks_on_the_command_line() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    fs::write(bench.path("pages.ps"), PAGES).unwrap();
+    let before = bench.entries();
+    let said = bench.refused(1, "layers pages.ps --paper postcard");
+    assert!(said.contains("art on 3 pages (1, 2, 3)") && said.contains("--page 1 reads one page"), "{said}");
+    assert!(said.contains("--pages white,gold,black reads one page per ink"), "{said}");
+    bench.refused(2, "layers pages.ps --page 1 --pages white");
+    assert!(bench.refused(2, "layers pages.ps --pages white,blak").contains("did you mean `black`?"));
+    assert_eq!(bench.entries(), before);
+    let plan = json(&bench.done("plan layers pages.ps --pages white,gold,black --paper postcard --json"));
+    let passes = plan["passes"].as_array().unwrap();
+    let inks: Vec<&str> = passes.iter().map(|pass| pass["ink"].as_str().unwrap()).collect();
+    assert_eq!(inks, ["white", "metallic-gold", "black"]);
+    // 600 / 72 dots a unit; rectangles take every dot they touch.
+    for (pass, wanted) in passes.iter().zip([96 * 48, 36 * 12, 12 * 12]) {
+        let (found, wanted) = (pass["dots"].as_f64().unwrap(), f64::from(wanted) * (600.0f64 / 72.0).powi(2));
+        assert!((found / wanted - 1.0).abs() < 0.04, "{pass}: {wanted}");
+    }
+}
+
+#[test]
+fn a_page_as_large_as_the_sheet_is_refused_with_the_remedy_and_printed_at_true_size_when_cropped() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let page = "%!PS\n<</PageSize [595.276 841.89]>> setpagedevice
+        [/Separation (White) /DeviceCMYK {pop 0 0 0 0}] setcolorspace 1 setcolor 100 100 72 72 rectfill showpage\n";
+    fs::write(bench.path("a4.ps"), page).unwrap();
+    let said = bench.refused(1, "plan layers a4.ps");
+    assert!(said.contains("room for 203.2 x 269.7 mm") && said.contains("--crop"), "{said}");
+    assert!(!said.contains("--dpi"), "{said}");
+    bench.done("layers a4.ps --crop --at 0x0mm -o a4.print");
+    let job = json(&bench.done("inspect a4.print/job.rgl --json"));
+    let bounds = &job["passes"][0]["bounds"];
+    let of = |name: &str| bounds[name].as_f64().unwrap();
+    // An inch of 600 dots, 100 points from the left and below, less the margins of 80 and 284 dots.
+    let (x, y) = (100.0 * 600.0 / 72.0 - 80.0, (841.89 - 172.0) * 600.0 / 72.0 - 284.0);
+    assert!((of("width") - 600.0).abs() <= 2.0 && (of("height") - 600.0).abs() <= 2.0, "{bounds}");
+    assert!((of("x") - x).abs() <= 4.0 && (of("y") - y).abs() <= 9.0, "{bounds}: {x}, {y}");
+}
+
+#[test]
+fn the_plan_and_its_page_say_what_is_mirrored_and_assumed_and_show_every_pass() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 5..55, 5..35);
+    layer(&bench, "gold.png", 10..20, 10..30);
+    let words = bench.done("plan layers white.png gold.png --mirror --paper postcard --html plan.html");
+    let page = fs::read_to_string(bench.path("plan.html")).unwrap();
+    assert!(words.contains("\nmirrored left to right\n"), "{words}");
+    assert!(page.contains("<b>Mirrored</b> left to right"));
+    for text in [&words, &page] {
+        assert!(text.contains("white.png states no resolution, so it is printed at 600 dpi"), "{text}");
+    }
+    bench.done("layers white.png gold.png --mirror --paper postcard -o d.print");
+    assert!(fs::read_to_string(bench.path("d.print/plan.html")).unwrap().contains("<b>Mirrored</b>"));
+    let plain = bench.done("plan layers white.png gold.png --paper postcard --html plain.html");
+    assert!(
+        !plain.contains("mirrored")
+            && !fs::read_to_string(bench.path("plain.html")).unwrap().contains("irrored")
+    );
+
+    // Each pass by itself: gold lies left of the middle, and right of it when mirrored.
+    let darkest = |page: &str, alt: &str| {
+        let at = page.find(&format!("alt=\"{alt}\"")).unwrap_or_else(|| panic!("{alt}"));
+        let data = page[at..].split("base64,").nth(1).unwrap().split('"').next().unwrap();
+        let picture = image::load_from_memory(&decoded(data)).unwrap().to_rgb8();
+        let ground = picture.get_pixel(0, 0).0;
+        let columns: Vec<u32> =
+            picture.enumerate_pixels().filter(|(.., pixel)| pixel.0 != ground).map(|(x, ..)| x).collect();
+        let mean = columns.iter().sum::<u32>() as f64 / columns.len() as f64;
+        (picture.width(), picture.height(), mean / f64::from(picture.width()))
+    };
+    let (width, height, place) = darkest(&page, "pass 2, metallic-gold");
+    assert_eq!((width, height), (60, 40));
+    assert!((place - 45.0 / 60.0).abs() < 0.02, "{place}");
+    let plain = fs::read_to_string(bench.path("plain.html")).unwrap();
+    assert!((darkest(&plain, "pass 2, metallic-gold").2 - 15.0 / 60.0).abs() < 0.02);
+    darkest(&plain, "pass 1, white");
+    darkest(&plain, "the sheet as it is printed");
+}
+
+/// Bytes of base64.
+fn decoded(text: &str) -> Vec<u8> {
+    let value = |c: u8| match c {
+        b'A'..=b'Z' => c - b'A',
+        b'a'..=b'z' => c - b'a' + 26,
+        b'0'..=b'9' => c - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let digits: Vec<u32> = text.bytes().filter(|&c| c != b'=').map(|c| u32::from(value(c))).collect();
+    let group = |four: &[u32]| {
+        let bits = (0..4).fold(0, |bits, at| bits << 6 | four.get(at).copied().unwrap_or(0));
+        bits.to_be_bytes()[1..four.len()].to_vec()
+    };
+    digits.chunks(4).flat_map(group).collect()
+}
+
+#[test]
+fn marks_are_no_cover_of_the_art() {
+    let bench = Bench::new();
+    layer(&bench, "black.png", 0..60, 0..40);
+    let art = "plan layers black.png --paper postcard --json --crop-marks --registration-marks";
+    let pass = &json(&bench.done(art))["passes"][0];
+    assert_eq!(pass["share"], 1.0, "{pass}");
+    assert!(pass["dots"].as_u64().unwrap() > 60 * 40, "{pass}");
+}
+
+#[test]
+fn ribbon_has_its_price_in_ledger_and_plan() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 0..60, 0..40);
+    let plan = || bench.done("plan layers white.png --paper postcard");
+    assert!(!plan().contains("Cost:"));
+    assert!(bench.done("ledger price white 12 EUR").contains("white: 12.00 EUR a cartridge"));
+    assert!(
+        plan()
+            .contains("Cost: a cartridge of white is 12.00 EUR; how much ribbon one gives is not known yet")
+    );
+    assert!(bench.done("ledger").contains("12.00 EUR a cartridge"));
+    bench.done("ledger price white 12,50 EUR --length 25.4m");
+    // 60 dots of ribbon are 2.54 mm: 12.50 EUR for ten thousand times as much.
+    let json_plan = json(&bench.done("plan layers white.png --paper postcard --json"));
+    let cost = &json_plan["costs_estimated"][0];
+    assert!((cost["amount"].as_f64().unwrap() - 0.00125).abs() < 1e-9 && cost["currency"] == "EUR", "{cost}");
+    assert!(plan().contains("for the ribbon of white"), "{}", plan());
+    bench.done("plan layers white.png --paper postcard --html plan.html");
+    assert!(fs::read_to_string(bench.path("plan.html")).unwrap().contains("for the ribbon of white"));
+    let totals = json(&bench.done("ledger --json"));
+    assert_eq!(totals["ribbons"][0]["price"]["ribbon_mm"], 25400.0);
+    for wrong in ["white twelve EUR", "white -1 EUR", "white 12 12", "white 12 EUR --length 2", "tin 12 EUR"]
+    {
+        bench.refused(2, &format!("ledger price {wrong}"));
+    }
+}
+
+#[test]
+fn a_file_holds_one_copy_and_says_so() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 0..60, 0..40);
+    let before = bench.entries();
+    let said = bench.refused(1, "layers white.png --paper postcard --to file:job.rgl --copies 2");
+    assert!(said.contains("`foilpress send job.rgl --copies 2`"), "{said}");
+    assert_eq!(bench.entries(), before);
+    bench.done("layers white.png --paper postcard --to file:job.rgl -o d.print");
+    let said = bench.refused(1, "send job.rgl --to file:copy.rgl --copies 3");
+    assert!(said.contains("--copies counts printed sheets") && !bench.path("copy.rgl").exists(), "{said}");
+}
+
+#[test]
+fn a_failed_inspection_leaves_no_folder() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 0..60, 0..40);
+    bench.done("layers white.png --paper postcard -o d.print");
+    let job = fs::read(bench.path("d.print/job.rgl")).unwrap();
+    fs::write(bench.path("cut.rgl"), &job[..job.len() - 4]).unwrap();
+    let said = bench.refused(1, "inspect cut.rgl --passes passes");
+    assert!(said.contains("no passes are written") && !bench.path("passes").exists(), "{said}");
+    bench.done("inspect d.print/job.rgl --passes passes");
+    assert_eq!(entries(&bench.path("passes")), ["01-white.png"]);
+}
+
+#[test]
+fn default_names_can_be_typed_as_they_stand() {
+    let bench = Bench::new();
+    bench.done("chart ramp K C");
+    let made = bench.entries();
+    assert!(
+        made.iter().any(|name| name.ends_with(".print")) && !made.iter().any(|name| name.contains(' ')),
+        "{made:?}"
+    );
+}
+
+#[test]
+fn ten_millimetres_of_choke_are_not_more_than_ten() {
+    let bench = Bench::new();
+    GrayImage::from_pixel(600, 600, Luma([0])).save(bench.path("white.png")).unwrap();
+    let plan = json(&bench.done("plan layers white.png --choke 10mm --paper postcard --json"));
+    // 236 dots and a bit less on each side.
+    assert_eq!(plan["passes"][0]["dots"], (600 - 2 * 236) * (600 - 2 * 236));
+    let said = bench.refused(1, "plan layers white.png --choke 10.001mm --paper postcard");
+    assert!(said.contains("10.001 mm is more than 10 mm"), "{said}");
+}
+
+#[test]
+fn line_art_prints_at_1200_dpi_in_process_inks_and_in_no_other() {
+    let bench = Bench::new();
+    // Lines of one dot at 1200 dpi, for 120 x 60 dots of 1/1200 inch.
+    let lines = |x: u32, _| Luma([if x % 2 == 0 { 0 } else { 255 }]);
+    GrayImage::from_fn(120, 60, lines).save(bench.path("black.png")).unwrap();
+    layer(&bench, "white.png", 0..60, 0..40);
+    let art = "black.png --dpi 1200 --resolution 1200 --paper postcard";
+    let words = bench.done(&format!("layers {art} -o fine.print"));
+    assert!(words.contains("printed at 1200 x 600 dpi") && words.contains("2.5 x 1.3 mm"), "{words}");
+    let job = json(&bench.done("inspect fine.print/job.rgl --json"));
+    assert_eq!(job["setup"]["resolution"], serde_json::json!([1200, 600]), "{job}");
+    // 60 lines of 30 rows: the art's columns are the printer's, its rows are half as many.
+    assert_eq!(job["passes"][0]["dots"], 60 * 30);
+    assert_eq!(job["passes"][0]["bounds"]["width"], 119);
+    // The plan from its bytes is the same, and the preview has the sheet's shape.
+    let (own, again) = (
+        json(&bench.done(&format!("plan layers {art} --json"))),
+        json(&bench.done("plan fine.print/job.rgl --json")),
+    );
+    assert_eq!(
+        (&own["resolution_dpi"], &own["passes"][0]["dots"]),
+        (&again["resolution_dpi"], &again["passes"][0]["dots"])
+    );
+    assert_eq!(image::image_dimensions(bench.path("fine.print/preview.png")).unwrap(), (120, 60));
+    let said = bench.refused(1, "layers white.png --resolution 1200 --paper postcard");
+    assert!(said.contains("print at 600 dpi, or without white"), "{said}");
+    assert!(
+        bench
+            .done("plan layers white.png --resolution 1200 --paper postcard")
+            .contains("error: only cyan, magenta")
+    );
+    assert!(bench.refused(2, "layers white.png --resolution 2400").contains("600 or 1200 dpi"));
+}
+
+#[test]
+fn lists_are_there_for_programs() {
+    let bench = Bench::new();
+    assert_eq!(json(&bench.done("preset list --json")), Value::Array(Vec::new()));
+    assert_eq!(json(&bench.done("profile list --json")), Value::Array(Vec::new()));
+    assert_eq!(json(&bench.done("resume --list --json")), Value::Array(Vec::new()));
+    bench.done("preset save decal --media film --mirror");
+    bench.done("preset use decal");
+    bench.done("profile set default --cross 20.4x29.7mm --distance 200.3mm");
+    let preset = &json(&bench.done("preset list --json"))[0];
+    assert_eq!((&preset["name"], &preset["in_use"]), (&"decal".into(), &true.into()));
+    assert_eq!((&preset["options"]["media"], &preset["options"]["mirror"]), (&"film".into(), &true.into()));
+    let profile = &json(&bench.done("profile list --json"))[0];
+    assert_eq!(profile["name"], "default");
+    assert!(
+        (profile["feed"].as_f64().unwrap() - 1.0).abs() < 0.01 && profile["offset_mm"].is_array(),
+        "{profile}"
+    );
+    bench.refused(2, "resume --json");
+    // A print system of scripts: one queue of ours, one of another maker.
+    let path = script(
+        &bench,
+        "lpstat",
+        "case $1 in -v) echo 'device for Alps: foilpress:/usb'; echo 'device for Other: usb://x';; \
+        -p) echo 'printer Alps is idle.  enabled since now'; echo '\tready';; esac\n",
+    );
+    let output = bench.command("queue list --json").env("PATH", path).output().unwrap();
+    let queues = json(&text(&output.stdout));
+    assert_eq!(queues.as_array().unwrap().len(), 1, "{queues}");
+    assert_eq!((&queues[0]["name"], &queues[0]["state"][1]), (&"Alps".into(), &"ready".into()));
+    // No bridge is here: the problem is in the list, and the exit code says so as well.
+    let output = bench.command("doctor --json --to tcp:127.0.0.1:1").output().unwrap();
+    let found = json(&text(&output.stdout));
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(found["bridges"][0]["addresses"][0], "tcp:127.0.0.1:1");
+    assert!(!found["problems"].as_array().unwrap().is_empty() && found["jobs_folder"].is_string(), "{found}");
+}
