@@ -8,6 +8,7 @@ use protocol::ink::Kind;
 use protocol::paper::Paper;
 use protocol::rgl::{FoilConsent, Media, Page};
 
+use crate::halftone::eye::Tangent;
 use crate::halftone::{self, HalftoneError, Placement};
 use crate::job::placement::{self, PlacementError, Size};
 use crate::job::stream::{self, StreamError};
@@ -30,6 +31,8 @@ pub struct Settings {
     pub gamut: gamut::Settings,
     /// The inks at hand. Foils in the set are the user's consent to print them.
     pub inks: InkSet,
+    /// How dots are chosen.
+    pub halftone: halftone::Method,
     /// The paper and how the document lies on it.
     pub layout: Layout,
     /// What the paper is made of.
@@ -123,7 +126,7 @@ pub fn print(
     let printable = Printable::from_library(library, &settings.inks, &factored.space);
     let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
     let alone = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-    let halftoned = halftone_mix(&mapped.mix, library, &alone, observer)?;
+    let halftoned = halftone_mix(&mapped.mix, library, &alone, settings.halftone, observer)?;
     let Arranged { sheet, laid } =
         layout::arrange(&Piece::from(halftoned.clone()), &settings.layout, observer)?;
     let separation = separate_page(&sheet, &laid, library, observer)?;
@@ -178,10 +181,17 @@ pub fn halftone_mix(
     mix: &InkMix,
     library: &Library,
     placement: &Placement,
+    method: halftone::Method,
     observer: &dyn Observer,
 ) -> Result<Sheet, HalftoneError> {
     let minimum = mix.stacks.iter().map(|stack| library.minimum_cluster(stack)).collect();
-    halftone::halftone(mix, placement, &halftone::Settings { minimum }, observer)
+    let points = if method == halftone::Method::Best {
+        let space = Space::half_angle(32);
+        Tangent::of_mix(mix, &space, &reflectances(&mix.stacks, library, &space)).leading()
+    } else {
+        Vec::new()
+    };
+    halftone::halftone(mix, placement, &halftone::Settings { method, minimum, points }, observer)
 }
 
 /// The passes of a page. What the rules say is about its pieces: marks are cut off.
@@ -217,8 +227,12 @@ pub fn job_on(
 /// A stack the library does not know shows as its longest part from the top that it does know: the uppermost
 /// layers decide most of what is seen.
 pub fn stack_table(sheet: &Sheet, library: &Library, space: &Space) -> Table {
+    reflectances(sheet.stacks(), library, space)
+}
+
+fn reflectances(stacks: &[inks::Stack], library: &Library, space: &Space) -> Table {
     let mut table = Table::new(space.columns());
-    for stack in sheet.stacks() {
+    for stack in stacks {
         let layers = stack.layers();
         let known = (0..=layers.len()).find_map(|below| library.entry(&inks::Stack::new(&layers[below..])));
         let row = known.map(|entry| space.row(&entry.curve_at(space.angles())));

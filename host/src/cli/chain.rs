@@ -119,6 +119,9 @@ pub struct Halftone {
     mix: PathBuf,
     #[command(flatten)]
     page: PageArgs,
+    /// How dots are chosen
+    #[arg(long, value_name = "METHOD", default_value = "walk", value_parser = choice::<press::halftone::Method>())]
+    halftone: press::halftone::Method,
     /// Folder of an ink library of your own: its minimum clusters count
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
@@ -135,7 +138,7 @@ impl Halftone {
         let pixels = (mix.maps.width(), mix.maps.height());
         let placement = placement::place(pixels, provenance.size_mm, self.page.size, self.page.paper)?;
         let staged = Staged::folder(&self.output, Kind::Sheet)?;
-        let sheet = pipeline::halftone_mix(&mix, &library, &placement, observer)?;
+        let sheet = pipeline::halftone_mix(&mix, &library, &placement, self.halftone, observer)?;
         sheet.save(staged.create()?)?;
         staged.commit()
     }

@@ -10,12 +10,14 @@ use inks::{InkSet, Library};
 use serde_json::json;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
+use super::choice::choice;
 use super::deliver::DeliverArgs;
 use super::layout::{LayoutArgs, MediaArgs};
 use super::piece::{Places, ResultArgs, write, write_job};
 use super::preset::PresetArg;
 use appearance::document::Document;
 use observe::Observer;
+use press::halftone::Method;
 use press::job::placement::Size;
 use press::job::plan::{Plan, Subject};
 use press::layout::Mm;
@@ -47,6 +49,9 @@ pub struct Work {
     pub factor: FactorArgs,
     #[command(flatten)]
     pub gamut: GamutArgs,
+    /// How dots are chosen
+    #[arg(long, value_name = "METHOD", default_value = "walk", value_parser = choice::<Method>())]
+    pub halftone: Method,
     #[command(flatten)]
     pub inks: InkArgs,
     #[command(flatten)]
@@ -92,6 +97,7 @@ impl Work {
             factor: self.factor.settings(),
             gamut: self.gamut.settings(self.factor.seed),
             inks,
+            halftone: self.halftone,
             layout,
             media: page.media,
             curl_correction: page.curl_correction,

@@ -24,6 +24,7 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         factor: factor::Settings::default(),
         gamut: gamut::Settings::default(),
         inks: inks::InkSet::default(),
+        halftone: Default::default(),
         layout: Layout::centred(Paper::Postcard),
         media: Media::default(),
         curl_correction: true,

@@ -314,7 +314,7 @@ mod tests {
         let mix = InkMix { stacks, maps: WeightMaps::new(width, height, 2, data).unwrap(), matrix };
         let paper = Paper::Custom { width: 700, length: 640 };
         let place = Placement { paper, x: 30, y: 20, width: 600, height: 500 };
-        let settings = Settings { minimum: vec![9, 9, 16] };
+        let settings = Settings { minimum: vec![9, 9, 16], ..Default::default() };
         let sheet = halftone(&mix, &place, &settings, &Silent).unwrap();
         let tones = tones(&mix, &place, &sheet, &Silent).unwrap();
         assert_eq!(tones.len(), 3);

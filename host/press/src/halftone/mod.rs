@@ -12,9 +12,12 @@
 //! run along the rectangle's walk, hence no 4-connected cluster, is smaller than its stack's minimum (unless the
 //! whole rectangle is); the same input gives the same sheet on any machine with any number of threads.
 
+mod cells;
+pub mod eye;
 pub mod metrics;
 mod mix;
 mod rule;
+mod search;
 
 use inks::Stack;
 use protocol::ink::Ink;
@@ -48,23 +51,39 @@ pub struct Placement {
     pub height: u16,
 }
 
+/// How dots are chosen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Method {
+    /// Runs along a space-filling walk: the rule of the paper.
+    #[default]
+    Walk,
+    /// Compact cells with error diffusion; solids exact.
+    Cells,
+    /// Cells, then exchanged where that lessens the error the eye sees.
+    Best,
+}
+
 /// What the halftone may be told.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Settings {
+    /// How dots are chosen.
+    pub method: Method,
     /// Smallest cluster of each stack of the mix in dots, 1 to [`LARGEST`]. The paper uses 8 to 16.
     pub minimum: Vec<u16>,
+    /// Where each stack lies among all in what it reflects ([`eye::Tangent::leading`]); only [`Method::Best`] needs it.
+    pub points: Vec<[f32; 4]>,
 }
 
 impl Settings {
     /// One minimum for all stacks.
     pub fn uniform(stacks: usize, minimum: u16) -> Settings {
-        Settings { minimum: vec![minimum; stacks] }
+        Settings { minimum: vec![minimum; stacks], ..Settings::default() }
     }
 
     /// A stack's minimum is the largest of its layers'; `bare` is that of the substrate.
     pub fn of(stacks: &[Stack], bare: u16, ink: impl Fn(Ink) -> u16) -> Settings {
         let minimum = |stack: &Stack| stack.layers().iter().map(|&layer| ink(layer)).max().unwrap_or(bare);
-        Settings { minimum: stacks.iter().map(minimum).collect() }
+        Settings { minimum: stacks.iter().map(minimum).collect(), ..Settings::default() }
     }
 }
 
@@ -134,6 +153,14 @@ pub enum HalftoneError {
         /// Number of stacks.
         stacks: usize,
     },
+    /// The search needs to know what each stack reflects.
+    #[error("the search needs a point for each of {stacks} stacks, not {found}")]
+    Points {
+        /// Points given.
+        found: usize,
+        /// Number of stacks.
+        stacks: usize,
+    },
     /// A minimum cluster is out of range.
     #[error("minimum cluster of `{stack}` is {minimum} dots; it must be 1 to {LARGEST}")]
     Minimum {
@@ -182,6 +209,9 @@ fn check(mix: &InkMix, place: &Placement, settings: &Settings) -> Result<(), Hal
     if settings.minimum.len() != stacks {
         return Err(HalftoneError::Minima { found: settings.minimum.len(), stacks });
     }
+    if settings.method == Method::Best && settings.points.len() != stacks {
+        return Err(HalftoneError::Points { found: settings.points.len(), stacks });
+    }
     for (stack, &minimum) in mix.stacks.iter().zip(&settings.minimum) {
         if !(1..=LARGEST).contains(&minimum) {
             return Err(HalftoneError::Minimum { stack: stack.clone(), minimum });
@@ -200,6 +230,11 @@ pub fn halftone(
     observer: &dyn Observer,
 ) -> Result<Sheet, HalftoneError> {
     check(mix, place, settings)?;
+    if settings.method != Method::Walk {
+        let (size, points) = ((place.width.into(), place.height.into()), settings.points.as_slice());
+        let points = (settings.method == Method::Best).then_some(points);
+        return placed(mix, place, cells::cells(mix, size, &settings.minimum, points, observer));
+    }
     let walk = Walk::new(place.width, place.height);
     let lattice = mix::Lattice::new(mix, &walk);
     let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| settings.minimum[usize::from(q)]).collect();
@@ -239,6 +274,20 @@ pub fn halftone(
         rule::walk(&mut rule, &mut source, &mut paint);
     });
     observer.end();
+    Ok(Sheet::new(place.paper, mix.stacks.clone(), index)?)
+}
+
+/// Dots of the rectangle on its page.
+fn placed(mix: &InkMix, place: &Placement, dots: Vec<u8>) -> Result<Sheet, HalftoneError> {
+    let (width, wide) = (usize::from(place.paper.width()), usize::from(place.width));
+    if dots.len() == width * usize::from(place.paper.length()) {
+        return Ok(Sheet::new(place.paper, mix.stacks.clone(), dots)?);
+    }
+    let mut index = vec![0; width * usize::from(place.paper.length())];
+    let rows = index[usize::from(place.y) * width..].chunks_exact_mut(width);
+    for (row, dots) in rows.zip(dots.chunks_exact(wide)) {
+        row[usize::from(place.x)..][..wide].copy_from_slice(dots);
+    }
     Ok(Sheet::new(place.paper, mix.stacks.clone(), index)?)
 }
 

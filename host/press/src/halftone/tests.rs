@@ -77,7 +77,7 @@ proptest! {
             ((v >> 40) as f64 / (1u64 << 24) as f64).powi(3)
         };
         let mix = plain(9, 7, 5, |x, y| (0..5).map(|q| noise(x, y, q)).collect());
-        let sheet = halftone(&mix, &custom(width, height), &Settings { minimum: minimum.clone() }, &Silent);
+        let sheet = halftone(&mix, &custom(width, height), &Settings { minimum: minimum.clone(), ..Default::default() }, &Silent);
         let clusters = components(&sheet.unwrap());
         for (stack, size) in &clusters {
             prop_assert!(

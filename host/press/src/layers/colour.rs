@@ -258,7 +258,7 @@ impl Colour {
         // Art is refused before if it is larger than any page.
         let (width, height) = (dots.0 as u16, dots.1 as u16);
         let place = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-        let sheet = pipeline::halftone_mix(&mix, library, &place, observer)?;
+        let sheet = pipeline::halftone_mix(&mix, library, &place, Default::default(), observer)?;
         Ok(sheet.into_parts())
     }
 

@@ -263,7 +263,7 @@ fn tone(
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
     let place = Placement { paper: Paper::Custom { width, length: height }, x: 0, y: 0, width, height };
-    let sheet = pipeline::halftone_mix(&mix, library, &place, observer)?;
+    let sheet = pipeline::halftone_mix(&mix, library, &place, Default::default(), observer)?;
     Ok(bits::from_bytes(art.width, sheet.index(), |stack| stack == 1))
 }
 
