@@ -124,7 +124,12 @@ impl Sketch {
             width: wide,
             height: long,
         };
-        let sheet = halftone::halftone(&mix, &place, &halftone::Settings { minimum, ..Default::default() }, observer)?;
+        let sheet = halftone::halftone(
+            &mix,
+            &place,
+            &halftone::Settings { minimum, ..Default::default() },
+            observer,
+        )?;
         let numbers: Vec<u8> = mix.stacks.iter().map(|stack| self.number(stack)).collect();
         for (row, dots) in sheet.index().chunks_exact(width).enumerate() {
             for (column, &dot) in dots.iter().enumerate() {
