@@ -9,7 +9,7 @@
 //! response exp(-f/k) the autocorrelation is known, (1 + (r/a)^2)^(-3/2), a = 1 / (pi k).
 //! Strips of block rows are searched at the same time where they do not reach each other, then what lies between them:
 //! the dots do not depend on the number of threads.
-//! Cost: 4 (2 REACH / 3)^2 products a cell of 3 x 3 dots to begin with, and for each exchange twice as many; one
+//! Cost: 4 (2 REACH / 3)^2 products a cell of 3 x 3 dots to begin with, and for each exchange half as many; one
 //! exchange for every two cells, [`PASSES`] rounds. Memory: 44 bytes a cell. Limits: four coordinates, those in which
 //! stacks differ most, about the page's mean mixture; cells beside edges stay as they are, and so do all stacks after
 //! the 64th.
@@ -25,15 +25,18 @@ pub(super) type Point = [f32; 4];
 /// Rounds over the page; more change little.
 const PASSES: usize = 4;
 
-/// How far an error reaches, in dots to each side. Less makes the search worse than none.
-const REACH: usize = 36;
+/// How far an error reaches, in dots to each side: less leaves means unseen, and the search makes worse of them.
+const REACH: usize = 30;
+
+/// How far an exchange reaches. Its two errors cancel from afar.
+const NEAR: usize = 20;
 
 /// From how far the eye looks, in dots: 0.3 m. What is even from near is even from afar.
 const SCALE: f32 = 7.62;
 
 /// Block rows in a strip, and how many at each end its neighbours can reach.
 const STRIP: usize = 24;
-const MARGIN: usize = 3;
+const MARGIN: usize = 2;
 
 /// Not to be exchanged.
 const FIXED: u8 = u8::MAX;
@@ -92,20 +95,21 @@ struct Part<'a> {
 type Place = (usize, usize, usize, usize);
 
 /// Calls `with(range of cells, first distance, step of distances, distance down)` for the cells of blocks in `rows`
-/// up to [`REACH`] dots from a place; distances in half dots.
+/// up to `reach` dots from a place; distances in half dots.
 fn around(
     plan: &Plan,
     start: &[usize],
     rows: (usize, usize),
     (bx, by, i, j): Place,
+    reach: usize,
     mut with: impl FnMut(std::ops::Range<usize>, isize, isize, isize),
 ) {
     let size = plan.size(bx, by);
     let centre =
         |block: usize, cell: usize, size: usize| (2 * block * BLOCK + (2 * cell + 1) * size) as isize;
     let (cx, cy) = (centre(bx, i, size), centre(by, j, size));
-    let reach = 2 * REACH as isize;
-    let blocks = REACH.div_ceil(BLOCK);
+    let blocks = reach.div_ceil(BLOCK);
+    let reach = 2 * reach as isize;
     for y in by.saturating_sub(blocks).max(rows.0)..(by + blocks + 1).min(rows.1) {
         for x in bx.saturating_sub(blocks)..(bx + blocks + 1).min(plan.across) {
             let size = plan.size(x, y);
@@ -247,7 +251,7 @@ fn first_look(
             for at in 0..count * count {
                 let mut seen = [0.0; 4];
                 let place = (bx, by, at % count, at / count);
-                around(plan, start, (0, plan.down()), place, |range, dx, step, dy| {
+                around(plan, start, (0, plan.down()), place, REACH, |range, dx, step, dy| {
                     for (error, i) in errors[range].iter().zip(0..) {
                         let k = kernel.at(dx + i * step, dy);
                         for (seen, error) in seen.iter_mut().zip(error) {
@@ -337,27 +341,27 @@ impl Part<'_> {
             let change =
                 2.0 * area * linear + 2.0 * area * area * square * apart[usize::from(dx != 0 && dy != 0)];
             if change < least {
-                (least, best) = (change, Some(there));
+                (least, best) = (change, Some((there, (dx * step, dy * step))));
             }
         }
-        if let Some(there) = best {
+        if let Some((there, there_by)) = best {
             let (a, b) = (self.number(place), self.number(there));
             let (from, to) = (own.stack, self.cells[b].stack);
             (self.cells[a].stack, self.cells[b].stack) = (to, from);
             let (from, to) = (self.points[usize::from(from)], self.points[usize::from(to)]);
             let error: Point = std::array::from_fn(|c| area * (to[c] - from[c]));
-            self.spread(place, error);
-            self.spread(there, error.map(|c| -c));
+            self.spread(place, there_by, error);
         }
     }
 
-    /// Adds an error at a place to what all cells around see.
-    fn spread(&mut self, place: Place, error: Point) {
+    /// Adds an error at a place, and its opposite a few half dots from there, to what the cells around see.
+    fn spread(&mut self, place: Place, (right, below): (isize, isize), error: Point) {
         let (kernel, first) = (self.kernel, self.start[self.rows.0 * self.plan.across]);
         let cells = &mut *self.cells;
-        around(self.plan, self.start, self.rows, place, |range, dx, step, dy| {
+        around(self.plan, self.start, self.rows, place, NEAR, |range, dx, step, dy| {
             for (cell, i) in cells[range.start - first..range.end - first].iter_mut().zip(0..) {
-                let k = kernel.at(dx + i * step, dy);
+                let x = dx + i * step;
+                let k = kernel.at(x, dy) - kernel.at(x - right, dy - below);
                 for (seen, error) in cell.seen.iter_mut().zip(error) {
                     *seen += k * error;
                 }

@@ -9,7 +9,7 @@
 //! debts like any other row.
 //! Cost: about eight operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
-use super::field::{Field, Row};
+use super::field::{Field, LANES, Row};
 use super::plan::{BLOCK, Plan};
 
 /// Part of an absent stack's debt that each cell hands to the stacks present.
@@ -169,38 +169,44 @@ impl<'a> Strip<'a> {
         block * BLOCK + x % BLOCK / usize::from(self.format[block])
     }
 
+    /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present
+    /// stack with most of it; the lowest among equals. Absent stacks hand some of theirs to those present.
+    fn choose(&mut self, slot: usize) -> usize {
+        let slots = self.slots[slot..slot + self.field.lanes].as_chunks::<LANES>().0;
+        let (want, carry) = (self.want.as_chunks::<LANES>().0, self.carry.as_chunks::<LANES>().0);
+        let debt = self.debt.as_chunks_mut::<LANES>().0;
+        let (mut most, mut absent, mut present) =
+            ([f32::NEG_INFINITY; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+        for ((debt, want), (slot, carry)) in debt.iter_mut().zip(want).zip(slots.iter().zip(carry)) {
+            for l in 0..LANES {
+                let sum = want[l] + slot[l] + carry[l];
+                let here = want[l] > 0.0;
+                most[l] = if here && sum > most[l] { sum } else { most[l] };
+                present[l] += if here { 1.0 } else { 0.0 };
+                let handed = if here { 0.0 } else { sum * FORGET };
+                absent[l] += handed;
+                debt[l] = sum - handed;
+            }
+        }
+        let most = most.into_iter().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
+        let is_best = |q: &usize| self.debt[*q] == most && self.want[*q] > 0.0;
+        let best = (0..self.field.lanes).find(is_best).unwrap_or(0);
+        let absent: f32 = absent.iter().sum();
+        if absent != 0.0 {
+            let each = absent / present.iter().sum::<f32>();
+            for (debt, &want) in self.debt.iter_mut().zip(&self.want) {
+                *debt += if want > 0.0 { each } else { 0.0 };
+            }
+        }
+        best
+    }
+
     /// Decides the stack of a unit that asks for `self.want`, and hands on what it owes.
     fn decide(&mut self, x: usize, y: usize, size: usize, area: usize, calm: bool) -> usize {
         let lanes = self.field.lanes;
         let slot = self.slot(x) * lanes;
-        let (mut most, mut best) = (f32::NEG_INFINITY, 0);
-        let pending = &mut self.slots[slot..slot + lanes];
-        for (((debt, slot), &carry), &want) in
-            self.debt.iter_mut().zip(pending.iter()).zip(&self.carry).zip(&self.want)
-        {
-            *debt = slot + carry + want;
-        }
-        let (mut absent, mut present) = (0.0, 0);
-        for (q, (debt, &want)) in self.debt.iter_mut().zip(&self.want).enumerate() {
-            if want > 0.0 {
-                present += 1;
-                if *debt > most {
-                    (most, best) = (*debt, q);
-                }
-            } else {
-                absent += *debt * FORGET;
-                *debt *= 1.0 - FORGET;
-            }
-        }
+        let best = self.choose(slot);
         self.debt[best] -= area as f32;
-        if absent != 0.0 {
-            let each = absent / present as f32;
-            for (debt, &want) in self.debt.iter_mut().zip(&self.want) {
-                if want > 0.0 {
-                    *debt += each;
-                }
-            }
-        }
         let (behind, ahead) =
             if self.back { (x + size, x.wrapping_sub(1)) } else { (x.wrapping_sub(1), x + size) };
         let mut shares = disturbed(x, y);
@@ -217,10 +223,15 @@ impl<'a> Strip<'a> {
             }
         }
         let [next, back, down, over] = shares;
-        for (i, &debt) in self.debt.iter().enumerate() {
-            self.carry[i] = debt * next;
-            self.slots[slot + i] = self.late[i] + debt * down;
-            self.late[i] = debt * over;
+        let (debt, slots) = (self.debt.as_chunks::<LANES>().0, &mut self.slots[slot..slot + lanes]);
+        let (carry, late) = (self.carry.as_chunks_mut::<LANES>().0, self.late.as_chunks_mut::<LANES>().0);
+        let stacks = debt.iter().zip(slots.as_chunks_mut::<LANES>().0).zip(carry.iter_mut().zip(late));
+        for ((debt, slot), (carry, late)) in stacks {
+            for l in 0..LANES {
+                carry[l] = debt[l] * next;
+                slot[l] = late[l] + debt[l] * down;
+                late[l] = debt[l] * over;
+            }
         }
         if back > 0.0 {
             let slot = self.slot(behind) * lanes;

@@ -222,16 +222,16 @@ impl<'a> Field<'a> {
         out.sums.clear();
         out.sums.resize(maps.width() * count, 0.0);
         for (y, &part) in (first..).zip(parts) {
-            let pixels = maps.data()[y * maps.width() * all..][..maps.width() * all].chunks_exact(all);
-            for (sums, pixel) in out.sums.chunks_exact_mut(count).zip(pixels) {
-                if count == all {
-                    for (sum, &weight) in sums.iter_mut().zip(pixel) {
-                        *sum += part * f32::from(weight);
-                    }
-                } else {
-                    for (sum, &channel) in sums.iter_mut().zip(&self.channels) {
-                        *sum += part * f32::from(pixel[channel]);
-                    }
+            let pixels = &maps.data()[y * maps.width() * all..][..maps.width() * all];
+            if count == all {
+                for (sum, &weight) in out.sums.iter_mut().zip(pixels) {
+                    *sum += part * f32::from(weight);
+                }
+                continue;
+            }
+            for (sums, pixel) in out.sums.chunks_exact_mut(count).zip(pixels.chunks_exact(all)) {
+                for (sum, &channel) in sums.iter_mut().zip(&self.channels) {
+                    *sum += part * f32::from(pixel[channel]);
                 }
             }
         }

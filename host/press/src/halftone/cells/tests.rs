@@ -1,6 +1,7 @@
 //! The claims of the cells: widths by trying every square, tones by counting, regions by changing their neighbours.
 
 use super::super::eye::{Tangent, error_seen, peak, swing, thin};
+use super::super::metrics::smallest_clusters;
 use super::super::{Method, Placement, Settings, halftone};
 use super::{Point, cells};
 use appearance::brdf::{Space, stacks::rows};
@@ -82,6 +83,34 @@ proptest! {
             }
         }
     }
+}
+
+/// A disc and slanted bars of solid in a tone: every connected part of the tone keeps its minimum, and what is thin
+/// lies beside a solid that makes it so.
+#[test]
+fn parts_beside_solids_keep_their_minimum() {
+    let (width, height) = (400, 300);
+    let solid = |x: usize, y: usize| {
+        let (dx, dy) = (x as f64 - 140.0, y as f64 - 150.0);
+        dx.hypot(dy) < 100.0 || (x > 250 && (3 * x + y) % 120 < 50)
+    };
+    let mix =
+        plain(width, height, 3, |x, y| if solid(x, y) { vec![0.0, 0.0, 1.0] } else { vec![0.6, 0.3, 0.1] });
+    let dots = cells(&mix, (width, height), &[9; 3], None, &Silent);
+    let free: Vec<bool> = (0..dots.len()).map(|at| solid(at % width, at / width)).collect();
+    // Solids of the same stack may touch a part, so they are numbered apart.
+    let numbered: Vec<u8> = dots.iter().zip(&free).map(|(&dot, &free)| if free { 3 } else { dot }).collect();
+    let least = smallest_clusters(width, &numbered, &std::array::from_fn(|stack| stack as u8));
+    assert!(least[..3].iter().all(|&area| area >= 9), "{:?}", &least[..4]);
+    let tones = free.iter().filter(|&&free| !free).count();
+    let thin_dots = thin(width, &dots, |_| 3, |at| free[at]);
+    assert!(thin_dots as f64 <= 0.003 * tones as f64, "{thin_dots} of {tones}");
+    let beside = |at: usize| {
+        let (x, y) = (at % width, at / width);
+        (y.saturating_sub(4)..(y + 5).min(height))
+            .any(|y| (x.saturating_sub(4)..(x + 5).min(width)).any(|x| solid(x, y)))
+    };
+    assert_eq!(thin(width, &dots, |_| 3, |at| free[at] || beside(at)), 0);
 }
 
 /// A tone in a frame of solid: nothing beyond the frame changes its dots.
