@@ -75,6 +75,22 @@ impl Choice for press::halftone::Method {
     ];
 }
 
+impl Choice for press::layers::Intent {
+    const ALL: &'static [(press::layers::Intent, &'static str, &'static str)] = &[
+        (press::layers::Intent::Auto, "auto", "Perceptual for pictures, colorimetric for text and drawings"),
+        (
+            press::layers::Intent::Perceptual,
+            "perceptual",
+            "Saturated colours move closer together, and differences between them survive",
+        ),
+        (
+            press::layers::Intent::Colorimetric,
+            "colorimetric",
+            "Printable colours are kept; others become the nearest printable colour of their hue",
+        ),
+    ];
+}
+
 impl Choice for White {
     const ALL: &'static [(White, &'static str, &'static str)] = &[
         (White::None, "none", "No white at all, not even where the art draws it"),

@@ -3,12 +3,12 @@
 //! Problem: pages have spot plates and transparent backgrounds, and their languages are large.
 //! Method: Ghostscript separates the page at a low resolution first, which gives its size and its plates. If a plate names
 //! an ink, Ghostscript separates the page again at its final number of dots, into one file for each plate. If none does, it
-//! renders the page on a transparent background. Nothing is anti-aliased. If Ghostscript is missing, Poppler renders PDF,
+//! draws the page with the kind of each pixel ([`kinds`](super::kinds)). Nothing is anti-aliased. If Ghostscript is missing, Poppler renders PDF,
 //! but without plates.
 //! Cost: seconds a page. Limits: ten minutes; the process can read only the file (Ghostscript's safer mode).
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -18,6 +18,7 @@ use protocol::ink::Kind;
 use super::artwork::Artwork;
 use super::coverage::{self, Coverage, Scan};
 use super::error::{LayersError, io, wrong};
+use super::kinds;
 use super::names::{self, stem};
 use super::options::Options;
 use super::picture;
@@ -81,12 +82,7 @@ fn page(
     }
     let name = stem(path);
     if plates.is_empty() {
-        let rendered = folder.path().join("page.png");
-        ghostscript(path, options.page, "pngalpha", dpi, &rendered)?;
-        let pixels = picture::read(&rendered)?;
-        let dots = (pixels.width as usize, pixels.height as usize);
-        let mut art = picture::artwork_of(&name, pixels, dots, options);
-        art.notes.retain(|note| !note.contains("colour profile"));
+        let mut art = drawn(path, options, dpi, folder)?;
         art.notes.append(&mut notes);
         return Ok(art);
     }
@@ -96,6 +92,28 @@ fn page(
         .ok_or_else(|| LayersError::Nothing { reason: "no plate of the page has a dot".into() })?;
     art.notes.append(&mut notes);
     Ok(art)
+}
+
+/// The art of a page without plates: what it draws, on transparent ground.
+fn drawn(path: &Path, options: &Options, dpi: (f64, f64), folder: &Scratch) -> Result<Artwork, LayersError> {
+    let page = folder.path().join("page.pam");
+    let conversions = kinds::conversions().map_err(io(path, "keep the conversion of its colours"))?;
+    let before = [
+        "-dUseCropBox".into(),
+        format!("-dFirstPage={}", options.page),
+        format!("-dLastPage={}", options.page),
+        format!("-sSourceObjectICC={}", conversions.path().display()),
+    ];
+    run_ghostscript(path, &before, kinds::DEVICE, dpi, &page, &[])?;
+    let missing = || wrong(path, format!("there is no page {}, or the file is damaged", options.page));
+    let mut file = BufReader::new(File::open(&page).map_err(|_| missing())?);
+    let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(missing)?;
+    let size = (u32::try_from(width), u32::try_from(height));
+    let (Ok(wide), Ok(high)) = size else { return Err(missing()) };
+    size::check_pixels(path, wide, high)?;
+    let mut pixels = vec![0; kinds::BYTES * width * height];
+    file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
+    Ok(picture::tagged_artwork(&stem(path), (wide, high), (width, height), pixels, options))
 }
 
 /// The art of a separated page: its process plates and those in `spots`.

@@ -18,8 +18,9 @@ use super::coverage::{CoverageBuilder, Scan};
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
-use super::picture::{self, Pixels};
+use super::picture;
 use super::size::{self, Unstated};
+use super::svg_kinds;
 use observe::Observer;
 
 /// The most bytes of a drawing.
@@ -78,8 +79,10 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         let mut pixmap = canvas()?;
         resvg::render(&tree, scale, &mut pixmap.as_mut());
         let rgba = straight(pixmap);
-        let pixels = Pixels { path: path.to_path_buf(), width, height, dpi: None, rgba, notes };
-        return Ok(picture::artwork_of(&stem(path), pixels, dots, options));
+        let pixels = svg_kinds::tagged(&text, &usual, scale, (width, height), &rgba);
+        let mut art = picture::tagged_artwork(&stem(path), (width, height), dots, pixels, options);
+        art.notes.splice(..0, notes);
+        return Ok(art);
     }
     observer.begin("rendering layers", groups.len() as u64);
     let mut art = Artwork::blank(&stem(path), dots);
@@ -190,7 +193,7 @@ fn groups(path: &Path, text: String, notes: &mut Vec<String>) -> Result<(String,
 }
 
 /// Straight alpha from the renderer's premultiplied alpha.
-fn straight(pixmap: Pixmap) -> Vec<u8> {
+pub(super) fn straight(pixmap: Pixmap) -> Vec<u8> {
     let mut rgba = pixmap.take();
     for pixel in rgba.as_chunks_mut::<4>().0 {
         let alpha = u32::from(pixel[3]);
