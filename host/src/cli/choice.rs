@@ -67,6 +67,30 @@ impl Choice for Intent {
     ];
 }
 
+impl Choice for press::halftone::Method {
+    const ALL: &'static [(press::halftone::Method, &'static str, &'static str)] = &[
+        (press::halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
+        (press::halftone::Method::Cells, "cells", "Compact square clusters; solid dots exactly as drawn"),
+        (press::halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
+    ];
+}
+
+impl Choice for press::layers::Intent {
+    const ALL: &'static [(press::layers::Intent, &'static str, &'static str)] = &[
+        (press::layers::Intent::Auto, "auto", "Perceptual for pictures, colorimetric for text and drawings"),
+        (
+            press::layers::Intent::Perceptual,
+            "perceptual",
+            "Saturated colours move closer together, and differences between them survive",
+        ),
+        (
+            press::layers::Intent::Colorimetric,
+            "colorimetric",
+            "Printable colours are kept; others become the nearest printable colour of their hue",
+        ),
+    ];
+}
+
 impl Choice for White {
     const ALL: &'static [(White, &'static str, &'static str)] = &[
         (White::None, "none", "No white at all, not even where the art draws it"),

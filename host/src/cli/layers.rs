@@ -16,9 +16,10 @@ use super::job::{Artwork, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use super::shown::Shown;
+use crate::queue::options::GAMMAS;
 use observe::Observer;
 use press::job::plan::grouped;
-use press::layers::{self, Accept, Composed, Finish, Order, Pages, Room, Suggestion, White, names};
+use press::layers::{self, Accept, Composed, Finish, Intent, Order, Pages, Room, Suggestion, White, names};
 use press::layout::{Layout, Mm, NoLength, Size};
 use press::pipeline;
 use press::sheet::DOTS_PER_MM;
@@ -78,6 +79,12 @@ pub struct LayersArgs {
     /// Where glossy finish is printed [default: where the artwork draws it]
     #[arg(long, value_name = "WHERE", value_parser = choice::<Finish>())]
     pub finish: Option<Finish>,
+    /// What is printed for colours that the inks do not reach
+    #[arg(long, value_name = "INTENT", value_parser = choice::<Intent>(), default_value = "auto")]
+    pub intent: Intent,
+    /// Brighten the colours of pictures by this exponent, 0.2 to 5; below 1 darkens them
+    #[arg(long, value_name = "EXPONENT", value_parser = gamma, default_value_t = 1.0)]
+    pub gamma: f64,
     /// Suggestions of the plan to accept, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
     pub accept: Vec<Accept>,
@@ -97,6 +104,11 @@ fn resolution(text: &str) -> Result<Resolution, String> {
         "1200" => Ok(Resolution::Dpi1200),
         _ => Err("the printer prints at 600 or 1200 dpi; --dpi is the resolution of a picture".into()),
     }
+}
+
+fn gamma(text: &str) -> Result<f64, String> {
+    let gamma: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
+    if GAMMAS.contains(&gamma) { Ok(gamma) } else { Err("expected 0.2 to 5".into()) }
 }
 
 fn page(text: &str) -> Result<u32, String> {
@@ -199,6 +211,9 @@ impl LayersArgs {
             white: self.white,
             choke: self.choke.unwrap_or(0.0) - self.spread.unwrap_or(0.0),
             finish: self.finish,
+            intent: self.intent,
+            gamma: self.gamma,
+            halftone: usual.halftone,
             accept: self.accept.clone(),
             ..usual
         })

@@ -1,11 +1,12 @@
 //! The filter: pages in, jobs in the printer's language out, one for each sheet.
 //!
 //! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this printer cannot print on.
-//! Method: a PDF is drawn by Ghostscript; each page becomes art as if it were a picture given to `foilpress layers`: black
-//! is solid black, reserved colours are inks of their own if wanted, everything else is halftoned in process inks. A page
+//! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it were a
+//! picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if wanted, everything
+//! else is halftoned in process inks. A page
 //! with spot colours that name inks is separated instead, and its plates are layers. The art is laid where the page has it,
 //! or where the user wants it, on a sheet of the page's size; what lies on the margins is reported in millimetres.
-//! Cost: the page at three bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one more
+//! Cost: the page at four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one more
 //! drawing of all pages at a low resolution.
 //! Limits: documents of 1 GB, sheets the printer takes, upright. Transparency is gone when a page has been drawn, so
 //! white cannot follow it. On a separated page the choice of inks leaves plates out; it does not mix them again.
@@ -28,7 +29,7 @@ use super::raster::{self, RasterError};
 use drawing::Drawing;
 use observe::Observer;
 use page::Press;
-use press::layers::{self, LayersError, Window};
+use press::layers::{self, LayersError, Window, kinds};
 use press::pipeline::JobError;
 
 /// The largest document.
@@ -165,7 +166,7 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
             rgb.extend_from_slice(&row);
         }
         // Of a PDF the print system has turned the pages itself.
-        let job = picture(number, paper, (size, page.dpi), rgb, press.choices.mirror, press)?;
+        let job = picture(number, paper, (size, page.dpi), Pixels::Plain(rgb), press.choices.mirror, press)?;
         for _ in 0..page.copies {
             press.write(&job)?;
         }
@@ -210,11 +211,20 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
     let mut number = only.unwrap_or(1);
     while let Some(size) = drawing.next_page()? {
         let paper = page::paper(number, size, dpi, press.choices)?;
-        let job = picture(number, paper, (size, dpi), drawing.pixels(size)?, false, press)?;
+        let pixels = Pixels::Tagged(drawing.pixels(size)?);
+        let job = picture(number, paper, (size, dpi), pixels, false, press)?;
         press.write(&job)?;
         number += 1;
     }
     drawing.end()
+}
+
+/// A page that was drawn.
+enum Pixels {
+    /// Three bytes a pixel.
+    Plain(Vec<u8>),
+    /// Four bytes a pixel: what drew it comes first.
+    Tagged(Vec<u8>),
 }
 
 /// The job of a page that is a picture; empty if nothing is on it.
@@ -222,16 +232,25 @@ fn picture(
     number: usize,
     paper: Paper,
     (size, dpi): ((usize, usize), u16),
-    rgb: Vec<u8>,
+    pixels: Pixels,
     mirrored: bool,
     press: &Press<'_>,
 ) -> Result<Vec<u8>, FilterError> {
-    let drawn = Window::around(&rgb, size.0, 3, 255);
+    let drawn = match &pixels {
+        Pixels::Plain(rgb) => Window::around(rgb, size.0, 3, 255),
+        Pixels::Tagged(pixels) => kinds::bounds(pixels, size.0),
+    };
     let Some(view) = press.view(number, paper, (size, dpi), drawn, mirrored) else { return Ok(Vec::new()) };
-    let (window, name) = (&view.window, format!("page {number}"));
-    let rgb = window.cut(rgb, size.0, 3);
-    let art = layers::page(&name, (window.width, window.height), dpi, rgb, &press.options(dpi))
-        .map_err(|source| FilterError::Layers { page: number, source })?;
+    let (window, name, options) = (&view.window, format!("page {number}"), press.options(dpi));
+    let part = (window.width, window.height);
+    let art = match pixels {
+        Pixels::Plain(rgb) => layers::page(&name, part, dpi, window.cut(rgb, size.0, 3), &options),
+        Pixels::Tagged(pixels) => {
+            let pixels = window.cut(pixels, size.0, kinds::BYTES);
+            layers::tagged_page(&name, part, dpi, pixels, &options)
+        }
+    }
+    .map_err(|source| FilterError::Layers { page: number, source })?;
     press.job(number, paper, &art, &view, mirrored)
 }
 

@@ -7,7 +7,8 @@ use inks::InkSet;
 use protocol::ink::Ink;
 use protocol::rgl::Media;
 
-use press::layers::{Finish, White};
+use press::halftone::Method;
+use press::layers::{Finish, Intent, White};
 use press::layout::{Point, Profile};
 
 /// Keywords for the calibration profile of the queue's printer in its description.
@@ -68,6 +69,12 @@ pub struct Choices {
     pub finish: Finish,
     /// Resolution at which the page is rendered, in pixels per inch.
     pub dpi: u16,
+    /// How colours that the inks do not reach are replaced.
+    pub intent: Intent,
+    /// Exponent that brightens colours.
+    pub gamma: f64,
+    /// How tones become dots.
+    pub halftone: Method,
     /// Where the drawing goes on its sheet.
     pub place: Place,
     /// Whether pages are mirrored left to right.
@@ -113,6 +120,24 @@ const FINISH: [(&str, &str, Finish); 3] = [
 const QUALITY: [(&str, &str, u16); 2] =
     [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (rendered at 300 dpi)", 300)];
 
+const HALFTONE: [(&str, &str, Method); 3] = [
+    ("Walk", "Runs along a curve", Method::Walk),
+    ("Cells", "Compact clusters", Method::Cells),
+    ("Best", "Compact clusters, searched (slower)", Method::Best),
+];
+
+const INTENT: [(&str, &str, Intent); 3] = [
+    ("Auto", "Perceptual for pictures, colorimetric for drawings", Intent::Auto),
+    ("Perceptual", "Perceptual (differences survive)", Intent::Perceptual),
+    ("Colorimetric", "Colorimetric (printable colours are exact)", Intent::Colorimetric),
+];
+
+const GAMMA: [(&str, &str, f64); 3] =
+    [("Normal", "Normal (1)", 1.0), ("Lighter", "Lighter (1.3)", 1.3), ("Darker", "Darker (0.8)", 0.8)];
+
+/// The exponents that may be asked for.
+pub const GAMMAS: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+
 const CURL: [(&str, &str, bool); 2] = [("On", "On (paper)", true), ("Off", "Off (decal film)", false)];
 
 /// `glossy-paper` as a keyword of a printer description: `GlossyPaper`.
@@ -135,6 +160,8 @@ pub fn all() -> Vec<DialogOption> {
     let option = |keyword, text, choices| DialogOption { keyword, text, choices, custom: None };
     let mut place = option("FoilpressPosition", "Position", texts(PLACE.iter().map(|row| (row.0, row.1))));
     place.custom = Some(("Corner", "Top left corner of the drawing, such as 20x30mm"));
+    let mut gamma = option("FoilpressGamma", "Brightness", texts(GAMMA.iter().map(|row| (row.0, row.1))));
+    gamma.custom = Some(("Exponent", "Gamma, 0.2 to 5, such as 1.2"));
     vec![
         option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
         option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
@@ -144,6 +171,9 @@ pub fn all() -> Vec<DialogOption> {
         option("FoilpressFinish", "Glossy finish", texts(FINISH.iter().map(|row| (row.0, row.1)))),
         option("FoilpressQuality", "Quality", texts(QUALITY.iter().map(|row| (row.0, row.1)))),
         option("FoilpressCurl", "Curl correction", texts(CURL.iter().map(|row| (row.0, row.1)))),
+        option("FoilpressIntent", "Colours out of reach", texts(INTENT.iter().map(|row| (row.0, row.1)))),
+        gamma,
+        option("FoilpressHalftone", "Halftone", texts(HALFTONE.iter().map(|row| (row.0, row.1)))),
         place,
     ]
 }
@@ -170,8 +200,8 @@ impl Choices {
         let asked = |keyword: &str| {
             options.iter().rev().find(|(name, _)| name.eq_ignore_ascii_case(keyword)).map(|(_, value)| value)
         };
-        let mut numbers = [0; 9];
-        let mut corner = None;
+        let mut numbers = [0; 12];
+        let (mut corner, mut exponent) = (None, None);
         for (number, option) in numbers.iter_mut().zip(all()) {
             let find = |value: &str| option.choices.iter().position(|c| c.0.eq_ignore_ascii_case(value));
             let usual =
@@ -182,11 +212,13 @@ impl Choices {
             };
             match find(value) {
                 Some(choice) => *number = choice,
-                None if option.custom.is_some() => corner = Some(read_corner(&option, value)?),
+                None if option.keyword == "FoilpressPosition" => corner = Some(read_corner(&option, value)?),
+                None if option.keyword == "FoilpressGamma" => exponent = Some(read_gamma(&option, value)?),
                 None => return Err(option.no_choice(value)),
             }
         }
-        let [media, inks, spots, foils, white, finish, quality, curl, place] = numbers;
+        let [media, inks, spots, foils, white, finish, quality, curl, intent, gamma, halftone, place] =
+            numbers;
         let process = InkSet::of([Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black]);
         let is_custom = |keyword: &str| {
             asked(keyword).is_some_and(|value| value.to_ascii_lowercase().starts_with("custom."))
@@ -204,6 +236,9 @@ impl Choices {
             white: WHITE[white].2,
             finish: FINISH[finish].2,
             dpi: QUALITY[quality].2,
+            intent: INTENT[intent].2,
+            gamma: exponent.unwrap_or(GAMMA[gamma].2),
+            halftone: HALFTONE[halftone].2,
             place: corner.map_or(PLACE[place].2, Place::At),
             mirror: ["MirrorPrint", "mirror"]
                 .into_iter()
@@ -222,13 +257,20 @@ impl DialogOption {
     }
 }
 
-/// A position as dialogs write it, `Custom.20x30mm`, or as people do, `20x30mm`.
-fn read_corner(option: &DialogOption, value: &str) -> Result<Point, NoChoice> {
-    let bare = match value.get(..7) {
+/// A value as dialogs write it, `Custom.20x30mm`, or as people do, `20x30mm`.
+fn bare(value: &str) -> &str {
+    match value.get(..7) {
         Some(head) if head.eq_ignore_ascii_case("custom.") => &value[7..],
         _ => value,
-    };
-    bare.parse().map_err(|_| option.no_choice(value))
+    }
+}
+
+fn read_corner(option: &DialogOption, value: &str) -> Result<Point, NoChoice> {
+    bare(value).parse().map_err(|_| option.no_choice(value))
+}
+
+fn read_gamma(option: &DialogOption, value: &str) -> Result<f64, NoChoice> {
+    bare(value).parse().ok().filter(|gamma| GAMMAS.contains(gamma)).ok_or_else(|| option.no_choice(value))
 }
 
 /// `*DefaultKEYWORD: value` in a printer description.
@@ -348,6 +390,15 @@ mod tests {
         assert_eq!(Choices::read(&[], None).unwrap().place, Place::Page);
         let error = place("left").unwrap_err().to_string();
         assert!(error.contains("Centre") && error.contains("20x30mm"), "{error}");
+    }
+
+    #[test]
+    fn a_gamma_is_a_word_or_a_number_in_its_range() {
+        let gamma = |value: &str| Choices::read(&[pair("FoilpressGamma", value)], None).map(|c| c.gamma);
+        assert_eq!((gamma("Lighter"), gamma("1.7"), gamma("Custom.0.5")), (Ok(1.3), Ok(1.7), Ok(0.5)));
+        for wrong in ["0", "NaN", "-1", "inf", "9"] {
+            assert!(gamma(wrong).unwrap_err().to_string().contains("0.2 to 5"), "{wrong}");
+        }
     }
 
     #[test]

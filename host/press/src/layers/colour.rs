@@ -1,84 +1,75 @@
 //! Plain colour to the process inks: a picture is a matte document.
 //!
-//! Problem: a photograph has millions of colours, a page has thirty million dots, and white must stay bare paper.
+//! Problem: a photograph has millions of colours, a page has thirty million dots, white must stay bare paper, and letters
+//! must stay whole.
 //! Method: sRGB is relative to the paper. White is bare paper, and black is black ink; without black ink, it is the darkest
-//! stack of the allowed process inks. Other colours lie between the two in linear light. The gamut stage fits a lattice of
-//! 17 x 17 x 17 such colours to the stacks (eq. 1 at every node; unprintable colours are clamped to the nearest
-//! printable one). Pixels are interpolated among the four corners of a tetrahedron of the lattice, and the mixture of
-//! stacks goes to the halftone stage. An interpolated mixture is a mixture, so every pixel is printable.
-//! Cost: 50 ms for the lattice, 20 ns a pixel, 10 ns a dot. Pictures finer than 300 dpi are averaged to 300 dpi in linear
-//! light, because no cluster of dots is finer. Limits: colours are clamped, not compressed; their accuracy is that of the
-//! ink library.
+//! stack of the allowed process inks. Other colours lie between the two in linear light, brought into the inks' reach by an
+//! [`Intent`] and fitted to the stacks at the nodes of a `lattice`. Dots in `flat` colours that a stack prints are fixed to
+//! it, and `outline` decides which dots of letters and lines are. The halftone makes the others of their mixtures.
+//! Cost: 60 ms for a lattice, 20 ns a pixel, 10 ns a dot; a page in black and white needs none of it. Pictures finer than
+//! 300 dpi are averaged to 300 dpi in linear light, because no cluster of dots is finer. White and black dots do not count
+//! in such an average: they are fixed. Limits: the accuracy of colours is that of the ink library.
 
 use inks::{InkSet, Library, Stack};
-use protocol::ink::{Ink, Kind};
+use protocol::ink::{Ink, Kind as InkKind};
 use rayon::prelude::*;
 
+use super::compose::Settings;
 use super::error::LayersError;
+use super::flat::{BLACK, Flat, TONE, WHITE, split};
+use super::intent::{Intent, Light, difference};
+use super::kinds::Kind;
+use super::lattice::{Lattice, Nodes, ends, step};
+use super::outline::{self, Treatment};
 use crate::halftone::{self, halftone};
 use appearance::brdf::{Space, Table};
 use appearance::document::{Materials, SAMPLES};
 use appearance::factor::Factored;
-use appearance::gamut::{self, Gloss, InkMix, Intent, Printable};
+use appearance::gamut::{self, Gloss, InkMix, Printable};
 use appearance::weights::{ONE, WeightMaps};
 use observe::Observer;
 
-/// Nodes along an edge of the lattice.
-const NODES: usize = 17;
+/// A flat colour is printed as a stack that is at most so much farther from it in Oklab than the best mixture; 0.02 is barely
+/// visible.
+const SAME: f64 = 0.05;
+/// Least weight of a stack in the mixture of a colour that the stack may stand for.
+const NEARLY: f64 = 1.0 / 8.0;
 
 /// Colours to print with the process inks.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Colour {
     /// Pixels across.
     pub width: usize,
     /// Pixels down.
     pub height: usize,
-    /// sRGB, three bytes a pixel; 255, 255, 255 is bare paper.
+    /// sRGB, three bytes a pixel; 255, 255, 255 is bare paper. Empty if everything is black or white.
     pub rgb: Vec<u8>,
+    /// For each pixel whether text or a drawing has its colour; empty if none has.
+    pub(super) drawn: Vec<bool>,
+    /// The dots in flat colours; without any, all are tones.
+    pub(super) flat: Flat,
 }
 
 impl Colour {
-    /// The same averaged to at most one pixel for two dots along each side.
-    pub(super) fn averaged(self, dots: (usize, usize)) -> Colour {
-        let to = (self.width.min(dots.0.div_ceil(2)), self.height.min(dots.1.div_ceil(2)));
-        if to == (self.width, self.height) {
-            return self;
-        }
-        // Sums of linear light in 16 bits a channel: exact enough to restore every 8-bit sRGB value.
-        let linear: Vec<u32> = (0..=255u8)
-            .map(|v| (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32)
-            .collect();
-        let coded: Vec<u8> = (0..=65535)
-            .map(|light| {
-                let above = linear.partition_point(|&v| v < light).clamp(1, 255);
-                let nearer = light.abs_diff(linear[above]) <= light.abs_diff(linear[above - 1]);
-                (if nearer { above } else { above - 1 }) as u8
-            })
-            .collect();
-        // Whole pixels: pairs, or shared first and last pixels where the sides are no multiples. No dot shows the difference.
-        let span = |at: usize, from: usize, to: usize| match from.div_ceil(2) == to {
-            true => 2 * at..(2 * at + 2).min(from),
-            false => at * from / to..((at + 1) * from).div_ceil(to),
+    /// The colours of pixels of three bytes, or of four with a tag before them, to be printed on so many dots; `None` if
+    /// all are white.
+    pub(super) fn of<const N: usize>(
+        pixels: &[[u8; N]],
+        size: (u32, u32),
+        dots: (usize, usize),
+    ) -> Option<Colour> {
+        let white = |pixels: &[[u8; N]]| {
+            pixels.iter().fold(255, |all, pixel| all & split(pixel).1.iter().fold(255, |a, v| a & v)) == 255
         };
-        let mut rgb = vec![0; to.0 * to.1 * 3];
-        rgb.par_chunks_exact_mut(to.0 * 3).enumerate().for_each(|(y, row)| {
-            let rows = span(y, self.height, to.1);
-            for (x, out) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-                let columns = span(x, self.width, to.0);
-                let mut sum = [0u64; 3];
-                for y in rows.clone() {
-                    let line = &self.rgb[3 * (y * self.width + columns.start)..][..3 * columns.len()];
-                    for pixel in line.as_chunks::<3>().0 {
-                        sum.iter_mut()
-                            .zip(pixel)
-                            .for_each(|(sum, &v)| *sum += u64::from(linear[usize::from(v)]));
-                    }
-                }
-                let count = (rows.len() * columns.len()) as u64;
-                *out = sum.map(|sum| coded[((sum + count / 2) / count) as usize]);
-            }
-        });
-        Colour { width: to.0, height: to.1, rgb }
+        if pixels.par_chunks(1 << 12).all(white) {
+            return None;
+        }
+        let flat = Flat::of(pixels, size.0 as usize);
+        let mut colour = Colour::default();
+        if !flat.is_black_and_white() {
+            colour = averaged(pixels, &flat, (size.0 as usize, size.1 as usize), dots);
+        }
+        Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
     /// Halftones the colours: stacks of process inks, and the stack of each dot.
@@ -86,160 +77,283 @@ impl Colour {
         &self,
         dots: (usize, usize),
         inks: &InkSet,
+        settings: &Settings,
         library: &Library,
         observer: &dyn Observer,
     ) -> Result<(Vec<Stack>, Vec<u8>), LayersError> {
-        let mix = self.mix(inks, library, observer)?;
+        let space = Space::half_angle(SAMPLES);
+        let process = InkSet::of(inks.iter().filter(|ink| ink.kind() == InkKind::Process));
+        let printable = Printable::from_library(library, &process, &space);
+        let solids = Solids::new(&printable, &space);
+        if let Some(done) = self.without_tones(&solids) {
+            return Ok(done);
+        }
+        let (mut mix, flats) = self.mix(&printable, space, settings, observer)?;
+        let fixed = (!self.flat.index.is_empty()).then(|| {
+            let treatments = self.treatments(&mut mix, &flats, &solids);
+            outline::fixed(&self.flat, dots.0, &treatments)
+        });
         // Larger art was refused when its size was decided.
-        let (width, height) = (dots.0 as u16, dots.1 as u16);
-        let settings = halftone::Settings::from_library(&mix.stacks, library);
-        Ok(halftone(&mix, (width, height), &settings, observer)?.into_parts())
+        let size = (dots.0 as u16, dots.1 as u16);
+        let toning = halftone::Settings {
+            method: settings.halftone,
+            ..halftone::Settings::from_library(&mix.stacks, library)
+        };
+        Ok(halftone(&mix, size, fixed.as_deref(), &toning, observer)?.into_parts())
     }
 
-    /// The mixture of stacks at every pixel.
-    fn mix(&self, inks: &InkSet, library: &Library, observer: &dyn Observer) -> Result<InkMix, LayersError> {
-        let space = Space::half_angle(SAMPLES);
-        let process = InkSet::of(inks.iter().filter(|ink| ink.kind() == Kind::Process));
-        let printable = Printable::from_library(library, &process, &space);
-        let lattice = Lattice::new(space, &printable);
-        let mut bases = Table::new(lattice.space.columns());
+    /// The mixture of stacks at every pixel, and that of every flat colour.
+    fn mix(
+        &self,
+        printable: &Printable,
+        space: Space,
+        settings: &Settings,
+        observer: &dyn Observer,
+    ) -> Result<(InkMix, Vec<Vec<f64>>), LayersError> {
+        let has_drawings = self.flat.colours.len() > 2 || !self.drawn.is_empty();
+        let intents: &[Intent] = match settings.intent {
+            Intent::Auto if has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
+            Intent::Auto => &[Intent::Perceptual],
+            Intent::Perceptual => &[Intent::Perceptual],
+            Intent::Colorimetric => &[Intent::Colorimetric],
+        };
+        let of_drawings = intents.len() - 1;
+        let lattice = Lattice::new(space, printable, intents, settings.gamma);
+        let mut bases = Table::new(lattice.space().columns());
         bases.push(&lattice.paper);
         let maps = WeightMaps::uniform(lattice.width(), lattice.height());
-        let factored = Factored { space: lattice.space.clone(), bases, maps };
-        let settings =
-            gamut::Settings { intent: Intent::Clamp, gloss: Gloss::Keep, ..gamut::Settings::default() };
-        let nodes = gamut::map(&factored, Some(&lattice), &printable, &settings, observer)?.mix;
-        let channels = nodes.maps.channels();
-        let mut data = vec![0u16; self.width * self.height * channels];
+        let factored = Factored { space: lattice.space().clone(), bases, maps };
+        let fit = gamut::Settings {
+            intent: gamut::Intent::Clamp,
+            gloss: Gloss::Keep,
+            ..gamut::Settings::default()
+        };
+        let fitted = gamut::map(&factored, Some(&lattice), printable, &fit, observer)?.mix;
+        let channels = fitted.maps.channels();
         let steps: [(usize, u32); 256] = std::array::from_fn(step);
-        let lattice = Nodes::new(&nodes.maps);
-        data.par_chunks_mut(channels << 12).zip(self.rgb.par_chunks(3 << 12)).for_each(|(out, rgb)| {
-            let mut sums = vec![[0; 8]; lattice.each];
-            for (out, pixel) in out.chunks_exact_mut(channels).zip(rgb.as_chunks::<3>().0) {
-                lattice.between(pixel.map(|v| steps[usize::from(v)]), &mut sums, out);
-            }
-        });
+        let nodes = Nodes::new(&fitted.maps);
+        let mut data = vec![0u16; self.width * self.height * channels];
+        data.par_chunks_mut(channels << 12).zip(self.rgb.par_chunks(3 << 12)).enumerate().for_each(
+            |(block, (out, rgb))| {
+                let mut sums = nodes.scratch();
+                let drawn = self.drawn.get(block << 12..).unwrap_or_default();
+                let drawn = drawn.iter().copied().chain(std::iter::repeat(false));
+                for ((out, pixel), drawn) in
+                    out.chunks_exact_mut(channels).zip(rgb.as_chunks::<3>().0).zip(drawn)
+                {
+                    let lattice = if drawn { of_drawings } else { 0 };
+                    nodes.between(lattice, pixel.map(|v| steps[usize::from(v)]), &mut sums, out);
+                }
+            },
+        );
         let maps =
             WeightMaps::new(self.width, self.height, channels, data).map_err(gamut::GamutError::from)?;
-        Ok(InkMix { stacks: nodes.stacks, maps, matrix: nodes.matrix })
-    }
-}
-
-/// The node below a value, and the distance of the value above it in 1/256 of the step between nodes.
-fn step(value: usize) -> (usize, u32) {
-    let at = value * (NODES - 1);
-    let node = (at / 255).min(NODES - 2);
-    (node, ((at - node * 255) * 256).div_euclid(255) as u32)
-}
-
-/// The mixtures of the lattice's nodes, to interpolate between.
-struct Nodes {
-    /// The weights of each node in groups of eight, padded with zeros.
-    lanes: Vec<[u16; 8]>,
-    /// Groups of a node.
-    each: usize,
-    /// Channel of the largest weight of each node.
-    largest: Vec<usize>,
-}
-
-impl Nodes {
-    fn new(maps: &WeightMaps) -> Nodes {
-        let each = maps.channels().div_ceil(8);
-        let nodes = || maps.data().chunks_exact(maps.channels());
-        let lanes = nodes().flat_map(|node| {
-            (0..each).map(move |lane| {
-                std::array::from_fn(|at| node.get(8 * lane + at).copied().unwrap_or_default())
-            })
+        let (mut sums, mut weights) = (nodes.scratch(), vec![0; channels]);
+        let flats = self.flat.colours.iter().map(|(_, colour)| {
+            nodes.between(of_drawings, colour.map(|v| steps[usize::from(v)]), &mut sums, &mut weights);
+            let share = |stack: usize| -> f64 {
+                let parts = weights.iter().zip(&fitted.matrix);
+                parts.map(|(&weight, row)| f64::from(weight) * f64::from(row[stack])).sum()
+            };
+            let one = f64::from(ONE) * f64::from(ONE);
+            (0..fitted.stacks.len()).map(|stack| share(stack) / one).collect()
         });
-        let largest = nodes().map(|node| (0..node.len()).max_by_key(|&at| node[at]).unwrap_or(0)).collect();
-        Nodes { lanes: lanes.collect(), each, largest }
+        let flats = flats.collect();
+        Ok((InkMix { stacks: fitted.stacks, maps, matrix: fitted.matrix }, flats))
     }
 
-    /// The mixture between nodes: along the edges of the cube from its lowest to its highest corner, first along the axis
-    /// with the largest fraction. `sums` is scratch space for the groups of a node.
-    #[inline]
-    fn between(&self, at: [(usize, u32); 3], sums: &mut [[u16; 8]], out: &mut [u16]) {
-        let [x, y, z] = at;
-        let mut axes = [(x.1, NODES * NODES), (y.1, NODES), (z.1, 1)];
-        for (a, b) in [(0, 1), (1, 2), (0, 1)] {
-            if axes[a].0 < axes[b].0 {
-                axes.swap(a, b);
-            }
+    /// The stacks, and that of each dot, if all dots are in colours that are the name of a stack.
+    fn without_tones(&self, solids: &Solids<'_>) -> Option<(Vec<Stack>, Vec<u8>)> {
+        let index = &self.flat.index;
+        let used = index.par_chunks(1 << 16).map(|dots| {
+            let mut used = [false; 256];
+            dots.iter().for_each(|&dot| used[usize::from(dot)] = true);
+            used
+        });
+        let used = used.reduce(|| [false; 256], |a, b| std::array::from_fn(|at| a[at] | b[at]));
+        if index.is_empty() || used[usize::from(TONE)] {
+            return None;
         }
-        let mut node = (x.0 * NODES + y.0) * NODES + z.0;
-        let mut nearest = (0, node);
-        let mut last = 256;
-        sums.fill([0; 8]);
-        for (next, step) in axes.into_iter().chain([(0, 0)]) {
-            let part = last - next;
-            if part == 256 {
-                return out.copy_from_slice(&self.of(node).as_flattened()[..out.len()]);
+        let mut stacks = vec![Stack::SUBSTRATE];
+        let mut number = [0u8; 256];
+        for (at, (_, colour)) in self.flat.colours.iter().enumerate().filter(|(at, _)| used[*at]) {
+            let stack = solids.named(*colour)?;
+            let known = stacks.iter().position(|known| *known == stack).unwrap_or_else(|| {
+                stacks.push(stack);
+                stacks.len() - 1
+            });
+            number[at] = known as u8;
+        }
+        Some((stacks, index.par_iter().map(|&dot| number[usize::from(dot)]).collect()))
+    }
+
+    /// How each flat colour is printed, from the weights of the stacks in its mixture. Stacks that colours name and nothing
+    /// else uses are added to the mix.
+    fn treatments(&self, mix: &mut InkMix, flats: &[Vec<f64>], solids: &Solids<'_>) -> Vec<Treatment> {
+        let bodies: Vec<Light> = mix.stacks.iter().map(|stack| solids.body(stack)).collect();
+        let treatment = |(&(_, colour), weights): (&(Kind, [u8; 3]), &Vec<f64>)| {
+            if let Some(stack) = solids.named(colour) {
+                let known = mix.stacks.iter().position(|known| *known == stack);
+                return Treatment::Solid(known.unwrap_or_else(|| {
+                    mix.stacks.push(stack);
+                    mix.matrix.iter_mut().for_each(|shares| shares.push(0));
+                    mix.stacks.len() - 1
+                }) as u8);
             }
-            if part > 0 {
-                for (sums, weights) in sums.iter_mut().zip(self.of(node)) {
-                    for (sum, &weight) in sums.iter_mut().zip(weights) {
-                        *sum += ((u32::from(weight) * (part << 8)) >> 16) as u16;
-                    }
+            let wanted = solids.wanted(colour);
+            let mixed =
+                std::array::from_fn(|c| weights.iter().zip(&bodies).map(|(w, body)| w * body[c]).sum());
+            let off = |stack: usize| difference(bodies[stack], wanted);
+            let inked = || (1..weights.len()).filter(|&stack| weights[stack] > 0.0);
+            let nearest = inked()
+                .filter(|&stack| weights[stack] >= NEARLY)
+                .min_by(|&a, &b| off(a).total_cmp(&off(b)))
+                .or_else(|| inked().max_by(|&a, &b| weights[a].total_cmp(&weights[b])));
+            match nearest {
+                None => Treatment::Solid(0),
+                Some(stack) if off(stack) <= difference(mixed, wanted) + SAME => {
+                    Treatment::Solid(stack as u8)
                 }
-                nearest = nearest.max((part, node));
+                Some(stack) => Treatment::Shape { solid: stack as u8, dark: weights[0] < 0.5 },
             }
-            (last, node) = (next, node + step);
+        };
+        self.flat.colours.iter().zip(flats).map(treatment).collect()
+    }
+}
+
+/// The stacks as solid colours.
+struct Solids<'a> {
+    printable: &'a Printable,
+    /// Numbers of the bare paper and of the stack that prints black.
+    bare: usize,
+    black: usize,
+}
+
+impl Solids<'_> {
+    fn new<'a>(printable: &'a Printable, space: &Space) -> Solids<'a> {
+        let (bare, black) = ends(printable, space);
+        Solids { printable, bare, black }
+    }
+
+    /// The stack that a colour names: white and black, and cyan, magenta, yellow, red, green and blue at full strength, as
+    /// drawing programs and the conversion from CMYK write the inks. None of the six is printable in sRGB's sense.
+    fn named(&self, colour: [u8; 3]) -> Option<Stack> {
+        if colour.iter().any(|&v| v != 0 && v != 255) {
+            return None;
         }
-        // Rounding down leaves less than four units a channel; they go to the largest weight of the nearest node.
-        let total: u16 = sums.as_flattened().iter().sum();
-        sums.as_flattened_mut()[self.largest[nearest.1]] += ONE - total;
-        out.copy_from_slice(&sums.as_flattened()[..out.len()]);
-    }
-
-    fn of(&self, node: usize) -> &[[u16; 8]] {
-        &self.lanes[node * self.each..][..self.each]
-    }
-}
-
-/// The lattice as a document: one matte pixel for every node, in order of red, green and blue.
-struct Lattice {
-    space: Space,
-    paper: Vec<f64>,
-    black: Vec<f64>,
-    /// Linear light of the nodes.
-    light: [f64; NODES],
-}
-
-impl Lattice {
-    fn new(space: Space, printable: &Printable) -> Lattice {
-        let bright = |row: &[f64]| row.iter().zip(space.weight()).map(|(r, w)| r * w).sum::<f64>();
-        let bare = printable.stacks.iter().position(|stack| stack.layers().is_empty()).unwrap_or(0);
-        let black = printable.stacks.iter().position(|stack| stack.layers() == [Ink::Black]);
-        let darkest = (0..printable.stacks.len())
-            .min_by(|&a, &b| bright(printable.curves.row(a)).total_cmp(&bright(printable.curves.row(b))));
-        // Prefer black ink: text in three inks is never sharp.
-        let darkest = black.or(darkest).unwrap_or(0);
-        let paper = printable.curves.row(bare).to_vec();
-        let black = printable.curves.row(darkest).to_vec();
-        let light =
-            std::array::from_fn(|i| f64::from(appearance::srgb::decode(i as f32 / (NODES - 1) as f32)));
-        Lattice { space, paper, black, light }
-    }
-}
-
-impl Materials for Lattice {
-    fn width(&self) -> usize {
-        NODES * NODES
-    }
-
-    fn height(&self) -> usize {
-        NODES
-    }
-
-    fn space(&self) -> &Space {
-        &self.space
-    }
-
-    fn reflectance(&self, pixel: usize, out: &mut [f32]) {
-        let light = [pixel / (NODES * NODES), pixel / NODES % NODES, pixel % NODES].map(|i| self.light[i]);
-        for (at, out) in out.iter_mut().enumerate() {
-            *out = (self.black[at] + light[at % 3] * (self.paper[at] - self.black[at])) as f32;
+        let stacks = &self.printable.stacks;
+        match colour {
+            [0, 0, 0] => Some(stacks[self.black].clone()),
+            _ => {
+                let filters = [Ink::Cyan, Ink::Magenta, Ink::Yellow];
+                let inks: Vec<Ink> =
+                    filters.into_iter().zip(colour).filter(|(_, v)| *v == 0).map(|(ink, _)| ink).collect();
+                let stack = Stack::new(inks);
+                stacks.contains(&stack).then_some(stack)
+            }
         }
+    }
+
+    /// What a stack reflects at the raking end of its curve, relative to paper: the body's colour without the surface's gloss.
+    fn body(&self, stack: &Stack) -> Light {
+        match self.printable.stacks.iter().position(|known| known == stack) {
+            Some(at) => self.relative(at),
+            None => [1.0; 3],
+        }
+    }
+
+    fn relative(&self, stack: usize) -> Light {
+        let [row, paper] = [stack, self.bare].map(|stack| self.printable.curves.row(stack));
+        std::array::from_fn(|c| row[row.len() - 3 + c] / paper[row.len() - 3 + c])
+    }
+
+    /// The light that a colour asks for, between black and paper.
+    fn wanted(&self, colour: [u8; 3]) -> Light {
+        let black = self.relative(self.black);
+        let light = colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
+        std::array::from_fn(|c| black[c] + light[c] * (1.0 - black[c]))
+    }
+}
+
+/// The colours averaged to at most one pixel for two dots along each side.
+fn averaged<const N: usize>(
+    pixels: &[[u8; N]],
+    flat: &Flat,
+    size: (usize, usize),
+    dots: (usize, usize),
+) -> Colour {
+    let to = (size.0.min(dots.0.div_ceil(2)), size.1.min(dots.1.div_ceil(2)));
+    // Sums of linear light in 16 bits a channel: exact enough to restore every 8-bit sRGB value.
+    let linear: Vec<u32> = (0..=255u8)
+        .map(|v| (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32)
+        .collect();
+    let coded: Vec<u8> = (0..=65535)
+        .map(|light| {
+            let above = linear.partition_point(|&v| v < light).clamp(1, 255);
+            let nearer = light.abs_diff(linear[above]) <= light.abs_diff(linear[above - 1]);
+            (if nearer { above } else { above - 1 }) as u8
+        })
+        .collect();
+    // Whole pixels: pairs, or shared first and last pixels where the sides are no multiples. No dot shows the difference.
+    let span = |at: usize, from: usize, to: usize| match from.div_ceil(2) == to {
+        _ if from == to => at..at + 1,
+        true => 2 * at..(2 * at + 2).min(from),
+        false => at * from / to..((at + 1) * from).div_ceil(to),
+    };
+    let mut rgb = vec![255; to.0 * to.1 * 3];
+    let mut drawn = vec![false; to.0 * to.1];
+    // Pixels that are only white and black.
+    let mut plain = vec![true; to.0 * to.1];
+    let rows = rgb.par_chunks_exact_mut(to.0 * 3).zip(drawn.par_chunks_exact_mut(to.0));
+    rows.zip(plain.par_chunks_exact_mut(to.0)).enumerate().for_each(|(y, ((rgb, drawn), plain))| {
+        let rows = span(y, size.1, to.1);
+        if flat.index[rows.start * size.0..rows.end * size.0].iter().fold(0, |most, &dot| most.max(dot))
+            == WHITE
+        {
+            return;
+        }
+        for (x, out) in rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+            let columns = span(x, size.0, to.0);
+            let at = || rows.clone().flat_map(|y| columns.clone().map(move |x| y * size.0 + x));
+            let toned = at().find(|&at| flat.index[at] > BLACK);
+            plain[x] = toned.is_none();
+            drawn[x] = toned.is_some_and(|at| flat.index[at] != TONE);
+            let (mut sum, mut count) = ([0u64; 3], 0);
+            for at in at().filter(|&at| toned.is_none() || flat.index[at] > BLACK) {
+                let colour = split(&pixels[at]).1;
+                sum.iter_mut().zip(colour).for_each(|(sum, v)| *sum += u64::from(linear[usize::from(v)]));
+                count += 1;
+            }
+            *out = sum.map(|sum| coded[((sum + count / 2) / count) as usize]);
+        }
+    });
+    spread(&mut rgb, &mut drawn, &plain, to.0);
+    if !drawn.contains(&true) {
+        drawn.clear();
+    }
+    Colour { width: to.0, height: to.1, rgb, drawn, flat: Flat::default() }
+}
+
+/// Gives plain pixels beside others the colour of one of these: the halftone interpolates between pixels, and a tone must
+/// not fade towards an edge because white is beyond it.
+fn spread(rgb: &mut [u8], drawn: &mut [bool], plain: &[bool], width: usize) {
+    let height = plain.len() / width;
+    let busy: Vec<bool> = plain.par_chunks_exact(width).map(|row| row.contains(&false)).collect();
+    let beside = |at: usize, sides: usize| at.saturating_sub(1)..(at + 2).min(sides);
+    let taken: Vec<(usize, usize)> = (0..height)
+        .into_par_iter()
+        .filter(|&y| busy[beside(y, height)].contains(&true))
+        .flat_map_iter(|y| {
+            (0..width).filter_map(move |x| {
+                let at = y * width + x;
+                let mut near = beside(y, height).flat_map(|v| beside(x, width).map(move |u| v * width + u));
+                plain[at].then(|| near.find(|&near| !plain[near])).flatten().map(|from| (at, from))
+            })
+        })
+        .collect();
+    for (at, from) in taken {
+        rgb.copy_within(3 * from..3 * from + 3, 3 * at);
+        drawn[at] = drawn[from];
     }
 }
 
@@ -247,85 +361,162 @@ impl Materials for Lattice {
 mod tests {
     use super::*;
     use observe::Silent;
-    use proptest::prelude::*;
+
+    /// The mixture of pictures' pixels by an intent, with the reflectance of the stacks.
+    fn mixed(pixels: &[[u8; 3]], intent: Intent) -> (InkMix, Printable) {
+        let colour = Colour {
+            width: pixels.len(),
+            height: 1,
+            rgb: pixels.as_flattened().to_vec(),
+            ..Colour::default()
+        };
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process(), &space);
+        let settings = Settings { intent, ..Settings::default() };
+        (colour.mix(&printable, space, &settings, &Silent).unwrap().0, printable)
+    }
+
+    fn process() -> InkSet {
+        InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process))
+    }
+
+    /// What is printed for each pixel, between black and paper in linear light.
+    fn printed(pixels: &[[u8; 3]], intent: Intent) -> Vec<Light> {
+        let (mix, printable) = mixed(pixels, intent);
+        let (bare, black) = ends(&printable, &Space::half_angle(SAMPLES));
+        let row = |stack: &Stack| {
+            printable.curves.row(printable.stacks.iter().position(|known| known == stack).unwrap())
+        };
+        let mut shares = vec![0.0; mix.stacks.len()];
+        (0..pixels.len())
+            .map(|pixel| {
+                mix.shares(pixel, &mut shares);
+                std::array::from_fn(|c| {
+                    let at = 3 * (SAMPLES - 1) + c;
+                    let light: f64 =
+                        mix.stacks.iter().zip(&shares).map(|(stack, share)| share * row(stack)[at]).sum();
+                    let [paper, black] = [bare, black].map(|end| printable.curves.row(end)[at]);
+                    (light - black) / (paper - black)
+                })
+            })
+            .collect()
+    }
+
+    fn linear(pixel: [u8; 3]) -> Light {
+        pixel.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)))
+    }
 
     #[test]
     fn greys_reflect_what_they_should_and_white_is_bare_paper() {
-        let greys: Vec<u8> = (0..=255).collect();
-        let colour = Colour { width: 256, height: 1, rgb: greys.iter().flat_map(|&v| [v; 3]).collect() };
-        let (library, inks) = (Library::builtin(), InkSet::default());
-        let mix = colour.mix(&inks, &library, &Silent).unwrap();
-        let space = Space::half_angle(SAMPLES);
-        let row = |stack: &str| {
-            let entry = library.entry(&stack.parse().unwrap()).unwrap();
-            space.row(&entry.curve_at(space.angles()))
-        };
-        let (paper, darkest) = (row("substrate"), row("K"));
-        let mut shares = vec![0.0; mix.stacks.len()];
-        for (pixel, &v) in greys.iter().enumerate() {
-            mix.shares(pixel, &mut shares);
-            let light = f64::from(appearance::srgb::decode(f32::from(v) / 255.0));
-            // The raking half of the curve: the body's colour without the surface's gloss.
-            let at = 3 * (SAMPLES - 1) + 1;
-            let printed: f64 = mix
-                .stacks
-                .iter()
-                .zip(&shares)
-                .map(|(stack, share)| share * row(&stack.to_string())[at])
-                .sum();
-            let wanted = darkest[at] + light * (paper[at] - darkest[at]);
-            assert!((printed - wanted).abs() < 0.02 * paper[at], "grey {v}: {printed}, not {wanted}");
+        let greys: Vec<[u8; 3]> = (0..=255).map(|v| [v; 3]).collect();
+        for intent in [Intent::Perceptual, Intent::Colorimetric] {
+            for (grey, light) in greys.iter().zip(printed(&greys, intent)) {
+                assert!((light[1] - linear(*grey)[1]).abs() < 0.02, "{grey:?} is printed as {light:?}");
+            }
+            let (mix, _) = mixed(&greys, intent);
+            let mut shares = vec![0.0; mix.stacks.len()];
+            mix.shares(255, &mut shares);
+            assert_eq!(shares[0], 1.0, "white has no ink: {shares:?}");
         }
-        mix.shares(255, &mut shares);
-        assert_eq!(shares[0], 1.0, "white has no ink: {shares:?}");
+    }
+
+    #[test]
+    fn printable_colours_are_printed_as_they_are_by_the_colorimetric_intent() {
+        // Muted colours, and those of skin, sky and leaves.
+        let muted =
+            [[194, 150, 130], [98, 122, 157], [87, 108, 67], [133, 128, 177], [120, 80, 60], [180, 190, 120]];
+        for (pixel, light) in muted.into_iter().zip(printed(&muted, Intent::Colorimetric)) {
+            let off = difference(light, linear(pixel));
+            assert!(off < 0.02, "{pixel:?} differs by {off}");
+        }
+    }
+
+    #[test]
+    fn ramps_to_a_saturated_colour_are_printed_without_a_flat_patch_by_the_perceptual_intent() {
+        for end in [
+            [255u8, 0, 0],
+            [0, 255, 0],
+            [0, 0, 255],
+            [0, 255, 255],
+            [255, 0, 255],
+            [255, 255, 0],
+            [255, 128, 0],
+        ] {
+            // From grey to the colour; on the way every step of the picture is one of print.
+            let ramp: Vec<[u8; 3]> =
+                (0..=16).map(|i| end.map(|v| (128 + i * (i32::from(v) - 128) / 16) as u8)).collect();
+            let light = printed(&ramp, Intent::Perceptual);
+            for (pair, pixels) in light.windows(2).zip(ramp.windows(2)) {
+                let (step, asked) =
+                    (difference(pair[0], pair[1]), difference(linear(pixels[0]), linear(pixels[1])));
+                assert!(step > 0.08 * asked && step < 1.6 * asked, "{:?}: {step} for {asked}", pixels[1]);
+            }
+        }
     }
 
     #[test]
     fn averages_are_of_light_not_of_numbers() {
-        let checks = (0..64 * 64).flat_map(|at| if (at % 64 + at / 64) % 2 == 0 { [255; 3] } else { [0; 3] });
-        let colour = Colour { width: 64, height: 64, rgb: checks.collect() };
-        let half = colour.clone().averaged((64, 64));
+        // Of greys: white and black are not averaged.
+        let checks: Vec<[u8; 3]> =
+            (0..64 * 64).map(|at| if (at % 64 + at / 64) % 2 == 0 { [254; 3] } else { [1; 3] }).collect();
+        let half = Colour::of(&checks, (64, 64), (64, 64)).unwrap();
         assert_eq!((half.width, half.height), (32, 32));
         // sRGB of half the light.
-        assert!(half.rgb.iter().all(|&v| v == 188), "{:?}", &half.rgb[..6]);
-        assert_eq!(colour.clone().averaged((128, 128)), colour, "300 dpi stays as it is");
+        assert!(half.rgb.iter().all(|&v| v == 187 || v == 188), "{:?}", &half.rgb[..6]);
+        let same = Colour::of(&checks, (64, 64), (128, 128)).unwrap();
+        assert_eq!(same.rgb, checks.concat(), "300 dpi stays as it is");
     }
 
-    proptest! {
-        #[test]
-        fn between_nodes_weights_are_those_of_the_tetrahedron(pixel: [u8; 3], seed: u32, channels in 1usize..20) {
-            let random = |i: usize| f64::from((i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11);
-            let mut data = vec![0; NODES * NODES * NODES * channels];
-            for (node, out) in data.chunks_exact_mut(channels).enumerate() {
-                let weights: Vec<f64> = (0..channels).map(|q| random(channels * node + q)).collect();
-                appearance::weights::quantise(&weights, out);
-            }
-            let maps = WeightMaps::new(NODES * NODES, NODES, channels, data).unwrap();
-            let (nodes, at) = (Nodes::new(&maps), pixel.map(|v| step(usize::from(v))));
-            let (mut sums, mut out) = (vec![[0; 8]; nodes.each], vec![0; channels]);
-            nodes.between(at, &mut sums, &mut out);
-            prop_assert_eq!(out.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
-            // The barycentric form: a corner for each axis that is at least as far along as the fraction says.
-            let mut exact = vec![0.0; channels];
-            let mut levels = vec![0, 256];
-            levels.extend(at.map(|(_, part)| part));
-            levels.sort_unstable();
-            for pair in levels.windows(2) {
-                let node = at.iter().fold(0, |node, &(n, part)| node * NODES + n + usize::from(part > pair[0]));
-                let share = f64::from(pair[1] - pair[0]) / 256.0;
-                exact.iter_mut().zip(maps.at(node)).for_each(|(sum, &w)| *sum += share * f64::from(w));
-            }
-            for (&out, &exact) in out.iter().zip(&exact) {
-                let off = f64::from(out) - exact;
-                prop_assert!(off > -4.0 && off <= 4.0 * channels as f64, "{} is not {}", out, exact);
+    #[test]
+    fn a_tone_does_not_fade_towards_white_letters() {
+        let page: Vec<[u8; 3]> =
+            (0..40 * 40).map(|at| if (at % 40) % 13 < 5 { [255; 3] } else { [40, 60, 90] }).collect();
+        let colour = Colour::of(&page, (40, 40), (40, 40)).unwrap();
+        assert!(
+            colour.rgb.as_chunks::<3>().0.iter().all(|pixel| *pixel == [40, 60, 90] || *pixel == [255; 3])
+        );
+        for (at, pixel) in page.iter().enumerate().filter(|(_, pixel)| **pixel != [255; 3]) {
+            let (x, y) = (at % 40 / 2, at / 40 / 2);
+            let near = (y.saturating_sub(1)..(y + 2).min(20))
+                .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(20)).map(move |u| 20 * v + u));
+            for near in near {
+                assert_eq!(colour.rgb[3 * near..3 * near + 3], *pixel);
             }
         }
+    }
 
-        #[test]
-        fn a_value_lies_between_its_nodes(value in 0usize..256) {
-            let (node, part) = step(value);
-            let at = (node as f64 + f64::from(part) / 256.0) / (NODES - 1) as f64;
-            prop_assert!((at - value as f64 / 255.0).abs() < 1.0 / 4000.0);
-        }
+    #[test]
+    fn inks_are_found_in_flat_colours() {
+        let names = [
+            [0, 0, 0],
+            [255, 0, 255],
+            [0, 0, 255],
+            [0, 255, 255],
+            [255, 255, 0],
+            [255, 0, 0],
+            [0, 255, 0],
+            [20, 20, 20],
+            [128, 128, 128],
+            [204, 204, 204],
+        ];
+        let mut pixels: Vec<[u8; 4]> =
+            names.iter().flat_map(|&[r, g, b]| [[Kind::DRAWING, r, g, b]; 8]).collect();
+        pixels.push([0, 255, 255, 255]);
+        let colour = Colour::of(&pixels, (pixels.len() as u32, 1), (pixels.len(), 1)).unwrap();
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process(), &space);
+        let solids = Solids::new(&printable, &space);
+        let (mut mix, flats) = colour.mix(&printable, space.clone(), &Settings::default(), &Silent).unwrap();
+        let treatments = colour.treatments(&mut mix, &flats, &solids);
+        let found = |rgb: [u8; 3]| {
+            let at = colour.flat.colours.iter().position(|(_, colour)| *colour == rgb).unwrap();
+            match treatments[at] {
+                Treatment::Solid(stack) => mix.stacks[usize::from(stack)].to_string(),
+                Treatment::Shape { solid, dark } => {
+                    format!("{} {}", if dark { "dark" } else { "pale" }, mix.stacks[usize::from(solid)])
+                }
+            }
+        };
+        assert_eq!(names.map(found), ["K", "M", "C+M", "C", "Y", "M+Y", "C+Y", "K", "dark K", "pale K"]);
     }
 }

@@ -140,7 +140,7 @@ fn drawn_slots(
         }
         let plane = match &layer.shape {
             Shape::Solid(plane) => plane.clone(),
-            Shape::Tone(coverage) => tone(coverage, art, layer.ink, library, observer)?,
+            Shape::Tone(coverage) => tone(coverage, art, layer.ink, settings, library, observer)?,
         };
         let (ink, from, place) = (layer.ink, layer.name.clone(), layer.place);
         slots.push(Slot { ink, from, place, plane, passes: 1 });
@@ -151,7 +151,8 @@ fn drawn_slots(
             tell("the picture's colours are left out, because no process ink is allowed".into());
             return Ok(slots);
         }
-        let (stacks, index) = colour.halftone((art.width, art.length), &process, library, observer)?;
+        let (stacks, index) =
+            colour.halftone((art.width, art.length), &process, settings, library, observer)?;
         let mut spot = bits::blank(art.width, art.length);
         slots.iter().for_each(|slot| bits::add(&mut spot, &slot.plane));
         let mut inks_of = [0u16; 256];
@@ -177,6 +178,7 @@ fn tone(
     coverage: &[u8],
     art: &Artwork,
     ink: Ink,
+    settings: &Settings,
     library: &Library,
     observer: &dyn Observer,
 ) -> Result<Plane, LayersError> {
@@ -189,8 +191,11 @@ fn tone(
     let stacks = vec![Stack::SUBSTRATE, Stack::new([ink])];
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
-    let settings = halftone::Settings::from_library(&mix.stacks, library);
-    let dots = halftone(&mix, (width, height), &settings, observer)?;
+    let toning = halftone::Settings {
+        method: settings.halftone,
+        ..halftone::Settings::from_library(&mix.stacks, library)
+    };
+    let dots = halftone(&mix, (width, height), None, &toning, observer)?;
     Ok(bits::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 

@@ -4,14 +4,14 @@
 //! and nothing of it may be lost in silence.
 //! Method: drafts of all pages ([`draw`]) tell which hold art. If several do, the user chooses one, or names an ink for
 //! each. A page with spot colours that name inks is separated at its final number of dots ([`plates`]). Any other page is
-//! drawn on a transparent background and is a picture. Without Ghostscript, Poppler draws PDF, but without plates.
+//! drawn with the kind of each pixel ([`kinds`]), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
 mod draw;
 mod plates;
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use protocol::ink::Ink;
@@ -19,6 +19,7 @@ use protocol::ink::Ink;
 use super::artwork::Artwork;
 use super::coverage::Scan;
 use super::error::{LayersError, io, wrong};
+use super::kinds;
 use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::picture;
@@ -117,12 +118,34 @@ impl Document<'_> {
             art.notes.append(&mut notes);
             return Ok(art);
         }
-        let pixels = picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?)?;
-        let dots = (pixels.width as usize, pixels.height as usize);
-        let mut art = picture::drawing(&name, pixels, dots, self.options);
-        art.notes.retain(|note| !note.contains("colour profile"));
+        let mut art = match self.program {
+            Program::Ghostscript => self.drawn(leaf, dpi)?,
+            Program::Poppler => {
+                let pixels =
+                    picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?)?;
+                let dots = (pixels.width as usize, pixels.height as usize);
+                let mut art = picture::drawing(&name, pixels, dots, self.options);
+                art.notes.retain(|note| !note.contains("colour profile"));
+                art
+            }
+        };
         art.notes.append(&mut notes);
         Ok(art)
+    }
+
+    /// What a page draws, with the kind of each pixel.
+    fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, LayersError> {
+        let page = draw::tagged(self.path, leaf.number, dpi, self.folder)?;
+        let damaged = || wrong(self.path, format!("page {} cannot be drawn", leaf.number));
+        let mut file = BufReader::new(File::open(&page).map_err(|_| damaged())?);
+        let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
+        let (Ok(wide), Ok(high)) = (u32::try_from(width), u32::try_from(height)) else {
+            return Err(damaged());
+        };
+        size::check_pixels(self.path, wide, high)?;
+        let mut pixels = vec![0; kinds::BYTES * width * height];
+        file.read_exact(&mut pixels).map_err(io(self.path, "read its page"))?;
+        Ok(picture::tagged_artwork(&stem(self.path), (wide, high), (width, height), pixels, self.options))
     }
 
     /// One layer for each page, by the rules for pictures that are named after inks.

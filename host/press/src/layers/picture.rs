@@ -19,7 +19,7 @@ use super::error::{LayersError, io, wrong};
 use super::options::Options;
 use super::resolution::Dpi;
 use super::size::{self, Unstated};
-use super::{bits, resample, reserved};
+use super::{bits, kinds, resample, reserved};
 use crate::separate::Plane;
 
 /// A picture in sRGB with straight alpha.
@@ -114,18 +114,55 @@ pub fn page(
     rgb: Vec<u8>,
     options: &Options,
 ) -> Result<Artwork, LayersError> {
+    page_of::<3>(name, size, dpi, rgb, options)
+}
+
+/// Art from a page that knows what drew each pixel ([`kinds`](super::kinds)), with a tag before each pixel.
+///
+/// # Errors
+/// As [`page`].
+pub fn tagged_page(
+    name: &str,
+    size: (usize, usize),
+    dpi: u16,
+    pixels: Vec<u8>,
+    options: &Options,
+) -> Result<Artwork, LayersError> {
+    page_of::<{ kinds::BYTES }>(name, size, dpi, pixels, options)
+}
+
+fn page_of<const N: usize>(
+    name: &str,
+    size: (usize, usize),
+    dpi: u16,
+    pixels: Vec<u8>,
+    options: &Options,
+) -> Result<Artwork, LayersError> {
     let problem = || {
         wrong(
             Path::new(name),
             format!("the page is {} x {} pixels; expected 1 to 65535 dots on a side", size.0, size.1),
         )
     };
-    if Some(rgb.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(3)) {
+    if Some(pixels.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(N)) {
         return Err(problem());
     }
     let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
     let dots = size::page_dots(size, dpi.into()).ok_or_else(problem)?;
-    Ok(opaque_artwork(name, name, (side(size.0)?, side(size.1)?), dots, rgb, options))
+    Ok(opaque_artwork::<N>(name, name, (side(size.0)?, side(size.1)?), dots, pixels, options))
+}
+
+/// Art from a page with tags. What nothing was drawn on is transparent, which is known even if every dot is drawn.
+pub(super) fn tagged_artwork(
+    name: &str,
+    size: (u32, u32),
+    dots: (usize, usize),
+    pixels: Vec<u8>,
+    options: &Options,
+) -> Artwork {
+    let opaque = Some(plane_of::<{ kinds::BYTES }>(&pixels, size, dots, |pixel| pixel[0] != 0));
+    let art = opaque_artwork::<{ kinds::BYTES }>(name, name, size, dots, pixels, options);
+    Artwork { opaque, ..art }
 }
 
 /// Art from one picture: reserved colours as layers if the options say so, the rest as colour.
@@ -155,7 +192,7 @@ pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), optio
     }
     rgb.truncate(rgb.len() / 4 * 3);
     let file = path.file_name().map_or_else(|| name.into(), |file| file.to_string_lossy().into_owned());
-    let mut art = opaque_artwork(name, &file, size, dots, rgb, options);
+    let mut art = opaque_artwork::<3>(name, &file, size, dots, rgb, options);
     art.opaque = opaque;
     art.notes.splice(..0, notes);
     art
@@ -169,27 +206,27 @@ pub(super) fn drawing(name: &str, pixels: Pixels, dots: (usize, usize), options:
     art
 }
 
-/// Art from pixels without transparency, three bytes each. `file` is what notes call it.
-fn opaque_artwork(
+/// Art from pixels without transparency: three bytes each, or four with a tag before them. `file` is what notes call it.
+fn opaque_artwork<const N: usize>(
     name: &str,
     file: &str,
     size: (u32, u32),
     dots: (usize, usize),
-    mut rgb: Vec<u8>,
+    mut pixels: Vec<u8>,
     options: &Options,
 ) -> Artwork {
-    let drawn = plane_of::<3>(&rgb, size, dots, |p| *p != [255; 3]);
+    let drawn = plane_of::<N>(&pixels, size, dots, |p| p[N - 3..] != [255; 3]);
     let (mut layers, mut notes) = (Vec::new(), Vec::new());
     if options.reserved {
+        let mut rgb: Vec<u8> =
+            pixels.as_chunks::<N>().0.iter().flat_map(|p| [p[N - 3], p[N - 2], p[N - 1]]).collect();
         let found = reserved::take(&mut rgb, size, dots, options);
         notes.extend(found.notes(file));
         layers = found.layers;
+        let both = pixels.as_chunks_mut::<N>().0.iter_mut().zip(rgb.as_chunks::<3>().0);
+        both.for_each(|(pixel, rgb)| pixel[N - 3..].copy_from_slice(rgb));
     }
-    let white = |bytes: &[u8]| bytes.iter().fold(255, |all, byte| all & byte) == 255;
-    let colour = rgb.par_chunks(1 << 12).any(|bytes| !white(bytes)).then(|| {
-        let full = Colour { width: size.0 as usize, height: size.1 as usize, rgb };
-        full.averaged(dots)
-    });
+    let colour = Colour::of::<N>(pixels.as_chunks().0, size, dots);
     let (width, length) = dots;
     Artwork { name: name.into(), width, length, layers, colour, drawn, opaque: None, notes }
 }

@@ -24,8 +24,9 @@ use super::coverage::Scan;
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
-use super::picture::{self, Pixels};
+use super::picture;
 use super::size::{self, Unstated};
+use super::svg_kinds;
 use crate::process;
 use observe::Observer;
 
@@ -102,7 +103,7 @@ impl Drawing {
     fn draw(self, advance: &dyn Fn()) -> Result<Artwork, LayersError> {
         let Drawing { path, text, groups, mut notes, options } = self;
         let path = path.as_path();
-        let tree = parsed(path, &text, &mut notes)?;
+        let (tree, usual) = parsed(path, &text, &mut notes)?;
         let size = (f64::from(tree.size().width()), f64::from(tree.size().height()));
         let unstated = Unstated::Drawing { rounded_mm: 0.0 };
         let dots = size::dots(path, size, Some((UNITS, UNITS)), unstated, &options, &mut notes)?;
@@ -114,8 +115,10 @@ impl Drawing {
             let mut pixmap = canvas()?;
             resvg::render(&tree, scale, &mut pixmap.as_mut());
             let rgba = straight(pixmap);
-            let pixels = Pixels { path: path.to_path_buf(), width, height, dpi: None, rgba, notes };
-            return Ok(picture::drawing(&stem(path), pixels, dots, &options));
+            let pixels = svg_kinds::tagged(&text, &usual, scale, (width, height), &rgba);
+            let mut art = picture::tagged_artwork(&stem(path), (width, height), dots, pixels, &options);
+            art.notes.splice(..0, notes);
+            return Ok(art);
         }
         let mut art = Artwork::blank(&stem(path), dots);
         for group in groups {
@@ -138,8 +141,12 @@ impl Drawing {
     }
 }
 
-/// The drawing as the renderer understands it.
-fn parsed(path: &Path, text: &str, notes: &mut Vec<String>) -> Result<usvg::Tree, LayersError> {
+/// The drawing as the renderer understands it, and how it was read.
+fn parsed(
+    path: &Path,
+    text: &str,
+    notes: &mut Vec<String>,
+) -> Result<(usvg::Tree, usvg::Options<'static>), LayersError> {
     let mut usual = usvg::Options {
         resources_dir: path.parent().map(Path::to_path_buf),
         shape_rendering: usvg::ShapeRendering::CrispEdges,
@@ -153,8 +160,9 @@ fn parsed(path: &Path, text: &str, notes: &mut Vec<String>) -> Result<usvg::Tree
             path.display()
         ));
     }
-    usvg::Tree::from_str(text, &usual)
-        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))
+    let tree = usvg::Tree::from_str(text, &usual)
+        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))?;
+    Ok((tree, usual))
 }
 
 /// Whether a group holds a picture made of pixels.
@@ -259,7 +267,7 @@ fn groups(path: &Path, text: String, notes: &mut Vec<String>) -> Result<(String,
 }
 
 /// Straight alpha from the renderer's premultiplied alpha.
-fn straight(pixmap: Pixmap) -> Vec<u8> {
+pub(super) fn straight(pixmap: Pixmap) -> Vec<u8> {
     let mut rgba = pixmap.take();
     for pixel in rgba.as_chunks_mut::<4>().0 {
         let alpha = u32::from(pixel[3]);

@@ -38,11 +38,7 @@ impl Press<'_> {
     /// How a page is read, drawn at so many pixels an inch.
     pub(super) fn options(&self, dpi: u16) -> layers::Options {
         let choices = self.choices;
-        // Black text is to be solid, whatever else is on the page.
         let mut reserved = InkSet::EMPTY;
-        if choices.colours.contains(Ink::Black) {
-            reserved = reserved.with(Ink::Black);
-        }
         if choices.spots == Spots::Reserved {
             reserved = layers::Options::default().inks;
         } else if choices.white == layers::White::Reserved {
@@ -69,6 +65,9 @@ impl Press<'_> {
             // What the page itself draws in white or finish is printed whatever is chosen.
             white: Some(choices.white).filter(|&white| white != layers::White::None),
             finish: Some(choices.finish).filter(|&finish| finish != layers::Finish::None),
+            intent: choices.intent,
+            gamma: choices.gamma,
+            halftone: choices.halftone,
             ..layers::Settings::default()
         }
     }

@@ -4,9 +4,11 @@ use inks::InkSet;
 use protocol::ink::{Ink, Kind};
 use serde::Serialize;
 
+use super::super::intent::Intent;
 use super::super::white::White;
 use super::arrange::Order;
 use super::suggest::Accept;
+use crate::halftone::Method;
 
 /// Where glossy finish goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -37,6 +39,12 @@ pub struct Settings {
     pub choke: f64,
     /// Where finish goes; `None` for where the art draws it.
     pub finish: Option<Finish>,
+    /// How colours that the inks do not reach are replaced.
+    pub intent: Intent,
+    /// Exponent that brightens the colours of pictures: values become their power 1 / `gamma`; 0.2 to 5.
+    pub gamma: f64,
+    /// How tones become dots.
+    pub halftone: Method,
     /// The suggestions to follow.
     pub accept: Vec<Accept>,
     /// Dots across in 1/600 inch, as in the options of the reader.
@@ -54,6 +62,9 @@ impl Default for Settings {
             white: None,
             choke: 0.0,
             finish: None,
+            intent: Intent::Auto,
+            gamma: 1.0,
+            halftone: Method::default(),
             accept: Vec::new(),
             across: 1,
         }

@@ -9,6 +9,7 @@ use std::process::{Command, Stdio};
 
 use super::super::coverage;
 use super::super::error::{LayersError, io, wrong};
+use super::super::kinds;
 use super::super::names::stem;
 use crate::process::{self, Process, ProcessError};
 use crate::scratch::Scratch;
@@ -98,6 +99,24 @@ impl Program {
         }
         Ok(picture)
     }
+}
+
+/// Draws a page with the kind of each pixel ([`kinds`]).
+///
+/// # Errors
+/// As [`Program::leaves`].
+pub(super) fn tagged(
+    path: &Path,
+    page: u32,
+    dpi: (f64, f64),
+    folder: &Scratch,
+) -> Result<PathBuf, LayersError> {
+    let picture = folder.path().join("page.pam");
+    let conversions = kinds::conversions().map_err(io(path, "keep the conversion of its colours"))?;
+    let convert = vec![format!("-sSourceObjectICC={}", conversions.path().display())];
+    let options = [one_page(page), crop(Part::CropBox), convert].concat();
+    ghostscript(path, &options, kinds::DEVICE, dpi, &picture, || false)?;
+    Ok(picture)
 }
 
 fn one_page(page: u32) -> Vec<String> {

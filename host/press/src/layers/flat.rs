@@ -1,0 +1,211 @@
+//! Flat colours: the dots that must not be treated as tones of a photograph.
+//!
+//! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
+//! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
+//! tone. If a page draws in more colours than a palette holds, those of shadings are left out first: the ones with a
+//! similar colour on the page. White and black dots of a picture count only in lines and areas; a lone one beside tones is
+//! noise.
+//! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::kinds::Kind;
+use super::resample;
+
+/// A dot that is a tone.
+pub(super) const TONE: u8 = u8::MAX;
+/// Number of white, which is bare paper, whatever drew it.
+pub(super) const WHITE: u8 = 0;
+/// Number of black.
+pub(super) const BLACK: u8 = 1;
+/// The most colours besides white and black.
+const MOST: usize = TONE as usize - 2;
+/// Colours gathered before the palette is chosen.
+const GATHERED: usize = 4096;
+/// Neighbours in a shading differ by at most this much in each of red, green and blue.
+const SIMILAR: u8 = 12;
+/// Rows that are gathered at once.
+const ROWS: usize = 64;
+
+/// Flat colours and where they are.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Flat {
+    /// What draws in each colour, and its sRGB. White and black come first.
+    pub(super) colours: Vec<(Kind, [u8; 3])>,
+    /// For each dot the number of its colour, or [`TONE`].
+    pub(super) index: Vec<u8>,
+}
+
+/// Kind and colour of a pixel of three bytes, or of four with a tag before them.
+#[inline(always)]
+pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (Kind, [u8; 3]) {
+    let kind = if N == 4 { Kind::of(pixel[0]) } else { Kind::Picture };
+    (kind, [pixel[N - 3], pixel[N - 2], pixel[N - 1]])
+}
+
+/// Whether one colour may follow the other in a shading.
+pub(super) fn similar(a: [u8; 3], b: [u8; 3]) -> bool {
+    (0..3).all(|c| a[c].abs_diff(b[c]) <= SIMILAR)
+}
+
+impl Flat {
+    /// The flat colours of pixels.
+    pub(super) fn of<const N: usize>(pixels: &[[u8; N]], width: usize) -> Flat {
+        let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
+        if N == 4 {
+            colours.extend(palette(pixels, width));
+        }
+        let numbers: HashMap<(Kind, [u8; 3]), u8> = colours.iter().copied().zip(0..).skip(2).collect();
+        let number = |pixel: &[u8; N]| match split(pixel) {
+            (_, [255, 255, 255]) => WHITE,
+            (_, [0, 0, 0]) => BLACK,
+            (Kind::Picture, _) => TONE,
+            key => numbers.get(&key).copied().unwrap_or(TONE),
+        };
+        let mut index = vec![WHITE; pixels.len()];
+        index.par_chunks_mut(width).zip(pixels.par_chunks(width)).for_each(|(index, row)| {
+            let mut last = (&row[0], number(&row[0]));
+            for (index, pixel) in index.iter_mut().zip(row) {
+                if pixel != last.0 {
+                    last = (pixel, number(pixel));
+                }
+                *index = last.1;
+            }
+        });
+        let mut flat = Flat { colours, index };
+        flat.forget_noise(pixels, width);
+        flat
+    }
+
+    /// Makes tones of the white and black dots of pictures that lie alone beside tones.
+    fn forget_noise<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize) {
+        let index = &self.index;
+        let busy: Vec<bool> = index.par_chunks(width).map(|row| row.contains(&TONE)).collect();
+        let rows = index.len() / width;
+        let noise: Vec<usize> = (0..rows)
+            .into_par_iter()
+            .filter(|&y| busy[y.saturating_sub(1)..(y + 2).min(rows)].iter().any(|&busy| busy))
+            .flat_map_iter(|y| {
+                (0..width).map(move |x| (x, y)).filter(move |&(x, y)| {
+                    let at = y * width + x;
+                    index[at] <= BLACK
+                        && split(&pixels[at]).0 == Kind::Picture
+                        && is_noise(index, width, (x, y))
+                })
+            })
+            .map(|(x, y)| y * width + x)
+            .collect();
+        noise.into_iter().for_each(|at| self.index[at] = TONE);
+    }
+
+    /// The same at the dots: the colour of the pixel under the middle of each.
+    pub(super) fn at_dots(self, size: (u32, u32), dots: (usize, usize)) -> Flat {
+        Flat { index: resample::nearest(self.index, size, dots), ..self }
+    }
+
+    /// Whether the halftone has nothing to do: every dot is white or black.
+    pub(super) fn is_black_and_white(&self) -> bool {
+        !self.index.is_empty()
+            && self
+                .index
+                .par_chunks(1 << 16)
+                .all(|dots| dots.iter().fold(0, |most, &dot| most.max(dot)) <= BLACK)
+    }
+}
+
+/// Whether a dot touches a tone and none of the eight dots around it is like it.
+fn is_noise(index: &[u8], width: usize, (x, y): (usize, usize)) -> bool {
+    let own = index[y * width + x];
+    let rows = index.chunks_exact(width).skip(y.saturating_sub(1)).take(y.min(1) + 2);
+    let around = rows.flat_map(|row| &row[x.saturating_sub(1)..(x + 2).min(width)]);
+    let (tones, like) = around.fold((0, 0), |(tones, like), &dot| {
+        (tones + usize::from(dot == TONE), like + usize::from(dot == own))
+    });
+    // The dot itself is like itself.
+    tones > 0 && like < 2
+}
+
+/// The colours of text and drawings, text first, then the most frequent.
+fn palette<const N: usize>(pixels: &[[u8; N]], width: usize) -> Vec<(Kind, [u8; 3])> {
+    type Counts = HashMap<(Kind, [u8; 3]), u64>;
+    let add = |counts: &mut Counts, key, dots| {
+        if counts.len() < GATHERED || counts.contains_key(&key) {
+            *counts.entry(key).or_default() += dots;
+        }
+    };
+    let gathered: Vec<Counts> = pixels
+        .par_chunks(width * ROWS)
+        .map(|pixels| {
+            let mut counts = Counts::new();
+            for run in pixels.chunk_by(|a, b| a == b) {
+                match split(&run[0]) {
+                    (Kind::Picture, _) | (_, [255, 255, 255] | [0, 0, 0]) => {}
+                    key => add(&mut counts, key, run.len() as u64),
+                }
+            }
+            counts
+        })
+        .collect();
+    let mut counts = Counts::new();
+    for part in gathered {
+        // In a fixed order, because the number of colours is limited.
+        let mut part: Vec<_> = part.into_iter().collect();
+        part.sort_unstable();
+        part.into_iter().for_each(|(key, dots)| add(&mut counts, key, dots));
+    }
+    let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
+    if colours.len() > MOST {
+        let all: Vec<(Kind, [u8; 3])> = colours.iter().map(|(key, _)| *key).collect();
+        colours.retain(|&((kind, colour), _)| {
+            kind == Kind::Text
+                || !all.iter().any(|&(other, near)| other == kind && near != colour && similar(near, colour))
+        });
+    }
+    colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
+    colours.truncate(MOST);
+    colours.into_iter().map(|(key, _)| key).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dot_of_a_drawing_has_its_colour_and_a_photograph_has_tones() {
+        let (blue, grey) = ([4, 0, 0, 200], [2, 90, 90, 90]);
+        let row = [[0, 255, 255, 255], blue, [1, 0, 0, 200], [1, 0, 0, 0], grey, grey, [1, 255, 255, 255]];
+        let flat = Flat::of(&row, 7);
+        assert_eq!(flat.colours[2..], [(Kind::Text, [0, 0, 200]), (Kind::Drawing, [0, 0, 200])]);
+        assert_eq!(flat.index, [WHITE, 3, 2, BLACK, TONE, TONE, WHITE]);
+    }
+
+    #[test]
+    fn one_bit_art_is_exact_and_noise_in_a_photograph_is_not() {
+        // Single dots among their like are art.
+        let checks: Vec<[u8; 3]> =
+            (0..64).map(|at| [if (at + at / 8) % 2 == 0 { 0 } else { 255 }; 3]).collect();
+        let flat = Flat::of(&checks, 8);
+        assert!(flat.is_black_and_white());
+        assert!(checks.iter().zip(&flat.index).all(|(pixel, &dot)| (pixel[0] == 0) == (dot == BLACK)));
+        // In a grey field one white dot is noise, four are an area.
+        let mut field = vec![[100; 3]; 64];
+        field[9] = [255; 3];
+        [36, 37, 44, 45].into_iter().for_each(|at| field[at] = [255; 3]);
+        let flat = Flat::of(&field, 8);
+        let white: Vec<usize> = (0..64).filter(|&at| flat.index[at] == WHITE).collect();
+        assert_eq!(white, [36, 37, 44, 45]);
+    }
+
+    #[test]
+    fn a_shading_does_not_crowd_out_the_colours_of_text() {
+        let mut pixels: Vec<[u8; 4]> =
+            (0..2000).map(|at| [4, (at / 8) as u8, (at % 8) as u8 * 3, 77]).collect();
+        pixels.extend([[1, 200, 10, 10]; 3]);
+        pixels.extend([[4, 10, 200, 10]; 3]);
+        let flat = Flat::of(&pixels, pixels.len());
+        assert_eq!(flat.colours[2..], [(Kind::Text, [200, 10, 10]), (Kind::Drawing, [10, 200, 10])]);
+        assert_eq!(flat.index.iter().filter(|&&dot| dot == TONE).count(), 2000);
+    }
+}
