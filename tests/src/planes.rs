@@ -38,7 +38,7 @@ pub fn clustered((width, height): (usize, usize), scale: (f64, f64), paper: Pape
     let maps = WeightMaps::new(width, height, count, data).expect("quantised");
     let mix = InkMix { stacks: stacks.collect(), maps, matrix };
     let page = (paper.width(), paper.length());
-    let map = halftone(&mix, page, &Settings::uniform(count, 8), &Silent).expect("a page");
+    let map = halftone(&mix, page, None, &Settings::uniform(count, 8), &Silent).expect("a page");
     (1..9u8)
         .map(|ink| {
             let dots = map.index().chunks_exact(8);

@@ -39,7 +39,7 @@ fn sheet() -> Sheet {
     let matrix = (0..count).map(|i| (0..count).map(|j| if i == j { 1 << 15 } else { 0 }).collect()).collect();
     let mix = InkMix { stacks, maps: WeightMaps::new(width, height, count, data).unwrap(), matrix };
     let page = (PAPER.width(), PAPER.length());
-    let dots = halftone(&mix, page, &Settings::uniform(count, 9), &Silent).unwrap();
+    let dots = halftone(&mix, page, None, &Settings::uniform(count, 9), &Silent).unwrap();
     let (stacks, index) = dots.into_parts();
     Sheet::new(PAPER, stacks, index).unwrap()
 }

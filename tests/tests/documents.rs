@@ -30,6 +30,7 @@ fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
         factor: factor::Settings { bases: Some(4), ..Default::default() },
         gamut: gamut::Settings { intent, ..Default::default() },
         inks,
+        halftone: Default::default(),
         size: Some(Size { width: 80.0, height: Some(80.0) }),
     };
     let (layout, library) = (Layout::centred(Paper::Postcard), Library::builtin());

@@ -62,7 +62,7 @@ fn page() -> (u16, u16) {
 #[divan::bench(args = [8, 57], sample_count = 5)]
 fn one_minimum(bencher: Bencher, count: usize) {
     let (mix, settings) = (document(count), Settings::uniform(count, 9));
-    bencher.bench(|| halftone(&mix, page(), &settings, &Silent).expect("a valid mix"));
+    bencher.bench(|| halftone(&mix, page(), None, &settings, &Silent).expect("a valid mix"));
 }
 
 /// The same with metallic silver, and all stacks on it, at 16 dots.
@@ -70,7 +70,7 @@ fn one_minimum(bencher: Bencher, count: usize) {
 fn two_minima(bencher: Bencher, count: usize) {
     let mix = document(count);
     let settings = Settings::of(&mix.stacks, 9, |ink| if ink == Ink::MetallicSilver { 16 } else { 9 });
-    bencher.bench(|| halftone(&mix, page(), &settings, &Silent).expect("a valid mix"));
+    bencher.bench(|| halftone(&mix, page(), None, &settings, &Silent).expect("a valid mix"));
 }
 
 /// Stacks of the paper's oak leaf: metallic silver and three process inks, with finish on some; five passes.
@@ -78,7 +78,7 @@ fn leaf() -> (InkMix, DotMap) {
     let mut mix = document(8);
     let text = ["substrate", "C", "M", "Y", "MS", "MS+C", "MS+M+Y", "MS+Y+F"];
     mix.stacks = text.map(|stack| stack.parse().expect("known inks")).to_vec();
-    let dots = halftone(&mix, page(), &Settings::uniform(8, 9), &Silent).expect("a valid mix");
+    let dots = halftone(&mix, page(), None, &Settings::uniform(8, 9), &Silent).expect("a valid mix");
     (mix, dots)
 }
 

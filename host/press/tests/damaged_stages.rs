@@ -22,7 +22,7 @@ fn folders() -> tempfile::TempDir {
     let stacks = ["substrate", "MS+C", "Y"].map(|s| s.parse().unwrap()).to_vec();
     let mix = InkMix::new(stacks, maps, vec![vec![0, ONE, 0], vec![ONE / 2, 0, ONE / 2]]).unwrap();
     let paper = Paper::Custom { width: 40, length: 30 };
-    let dots = halftone(&mix, (20, 16), &halftone::Settings::uniform(3, 4), &Silent).unwrap();
+    let dots = halftone(&mix, (20, 16), None, &halftone::Settings::uniform(3, 4), &Silent).unwrap();
     let page = layout::arrange(&dots, &Layout::centred(paper), &Silent).unwrap();
     let passes = separate::separate(&page.sheet, Library::builtin().rules(), &Silent).unwrap();
     for name in ["mix", "dots", "sheet", "passes"] {

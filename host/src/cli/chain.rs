@@ -15,6 +15,7 @@ use appearance::document::{self, ColourSpace, foil};
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, Printable};
 use observe::Observer;
+use press::halftone::Method;
 use press::layout::{self, Size};
 use press::pipeline::{self, document as stages};
 use press::separate;
@@ -131,6 +132,9 @@ pub struct Halftone {
     /// [default: the document's own size, else as large as a4 allows]
     #[arg(long)]
     size: Option<Size>,
+    /// How the stack of each dot is chosen
+    #[arg(long, value_name = "METHOD", default_value = "walk", value_parser = choice::<Method>())]
+    halftone: Method,
     /// Folder of your own ink library; its minimum clusters apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
@@ -149,8 +153,11 @@ impl Halftone {
         let any = layout::Layout { cut: true, ..layout::Layout::centred(Paper::A4) };
         let size = layout::size::dots(pixels, provenance.size_mm, self.size, &any)?;
         let staged = Staged::folder(&named(&self.output, &self.mix, "dots"), Kind::Dots)?;
-        let settings = halftone::Settings::from_library(&mix.stacks, &library);
-        halftone::halftone(&mix, size, &settings, observer)?.save(staged.create()?)?;
+        let settings = halftone::Settings {
+            method: self.halftone,
+            ..halftone::Settings::from_library(&mix.stacks, &library)
+        };
+        halftone::halftone(&mix, size, None, &settings, observer)?.save(staged.create()?)?;
         staged.commit()
     }
 }

@@ -67,6 +67,14 @@ impl Choice for Intent {
     ];
 }
 
+impl Choice for press::halftone::Method {
+    const ALL: &'static [(press::halftone::Method, &'static str, &'static str)] = &[
+        (press::halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
+        (press::halftone::Method::Cells, "cells", "Compact square clusters; solid dots exactly as drawn"),
+        (press::halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
+    ];
+}
+
 impl Choice for White {
     const ALL: &'static [(White, &'static str, &'static str)] = &[
         (White::None, "none", "No white at all, not even where the art draws it"),

@@ -9,12 +9,15 @@ use inks::{InkSet, Library};
 use serde_json::{Value, json};
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
+use super::choice::choice;
 use super::deliver::DeliverArgs;
 use super::job::{self, Places, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
+use appearance::brdf::reflectances;
 use appearance::document::Document;
 use observe::Observer;
+use press::halftone::Method;
 use press::layout::{Layout, Mm, Size};
 use press::pipeline::document::{self, Halftoned, Settings};
 use press::pipeline::{self, Draft, Request};
@@ -45,6 +48,9 @@ pub struct Work {
     pub factor: FactorArgs,
     #[command(flatten)]
     pub gamut: GamutArgs,
+    /// How the stack of each dot is chosen
+    #[arg(long, value_name = "METHOD", default_value = "walk", value_parser = choice::<Method>())]
+    pub halftone: Method,
     #[command(flatten)]
     pub inks: InkArgs,
     #[command(flatten)]
@@ -80,6 +86,7 @@ impl Work {
             factor: self.factor.settings(),
             gamut: self.gamut.settings(self.factor.seed),
             inks,
+            halftone: self.halftone,
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
@@ -159,7 +166,7 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     // The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
     // printer profile do to the page is undone on paper.
     let dots = &halftoned.dots;
-    let stacks = preview::stack_table(dots, library, space);
+    let stacks = reflectances(dots.stacks(), library, space);
     let area = Area::whole(dots);
     let target = match document.as_factored() {
         Some(factored) => Source::Factored(factored),

@@ -26,6 +26,7 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         factor: factor::Settings::default(),
         gamut: gamut::Settings::default(),
         inks: inks::InkSet::default(),
+        halftone: Default::default(),
         size: Some("12x9mm".parse().unwrap()),
     };
     let (layout, library) = (Layout::centred(Paper::Postcard), inks::Library::builtin());

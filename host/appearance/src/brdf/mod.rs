@@ -5,4 +5,5 @@ mod space;
 mod stacks;
 
 pub use space::{Space, SpaceError, Table};
+pub use stacks::reflectances;
 pub(crate) use stacks::rows;

@@ -1,6 +1,6 @@
 //! Stacks of the ink library as rows of a space.
 
-use inks::Entry;
+use inks::{Entry, Library, Stack};
 
 use super::space::{Space, Table};
 
@@ -10,6 +10,21 @@ pub(crate) fn rows<'a>(space: &Space, entries: impl IntoIterator<Item = &'a Entr
     let mut table = Table::new(space.columns());
     for entry in entries {
         table.push(&space.row(&entry.curve_at(space.angles())));
+    }
+    table
+}
+
+/// What stacks reflect (1/sr), one row a stack, as the library has it. Only for half-angle spaces.
+///
+/// A stack the library does not know shows as its longest part from the top that it does know: the uppermost
+/// layers decide most of what is seen.
+pub fn reflectances(stacks: &[Stack], library: &Library, space: &Space) -> Table {
+    let mut table = Table::new(space.columns());
+    for stack in stacks {
+        let layers = stack.layers();
+        let known = (0..=layers.len()).find_map(|below| library.entry(&Stack::new(&layers[below..])));
+        let row = known.map(|entry| space.row(&entry.curve_at(space.angles())));
+        table.push(&row.unwrap_or_else(|| vec![0.0; space.columns()]));
     }
     table
 }

@@ -116,7 +116,7 @@ impl Sketch {
         let maps = WeightMaps::new(share.len(), 1, 2, weights)?;
         let mix = InkMix { stacks, maps, matrix };
         let settings = halftone::Settings::from_library(&mix.stacks, library);
-        let patch = halftone(&mix, (wide, long), &settings, observer)?;
+        let patch = halftone(&mix, (wide, long), None, &settings, observer)?;
         let numbers: Vec<u8> = mix.stacks.iter().map(|stack| self.number(stack)).collect();
         for (row, dots) in patch.index().chunks_exact(width).enumerate() {
             for (column, &dot) in dots.iter().enumerate() {

@@ -181,8 +181,8 @@ mod tests {
         ];
         let stacks = vec![Stack::SUBSTRATE, Stack::new([Ink::Cyan]), Stack::new([Ink::MetallicSilver])];
         let mix = InkMix { stacks, maps: WeightMaps::new(width, height, 2, data).unwrap(), matrix };
-        let settings = Settings { minimum: vec![9, 9, 16] };
-        let dots = halftone(&mix, (600, 500), &settings, &Silent).unwrap();
+        let settings = Settings { minimum: vec![9, 9, 16], ..Default::default() };
+        let dots = halftone(&mix, (600, 500), None, &settings, &Silent).unwrap();
         let tones = tones(&mix, &dots, &Silent).unwrap();
         assert_eq!(tones.len(), 3);
         for (tone, (asked, minimum)) in tones.iter().zip([(0.5, 9), (0.125, 9), (0.375, 16)]) {

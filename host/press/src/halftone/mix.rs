@@ -59,7 +59,7 @@ impl Shape {
 }
 
 /// Maps positions along one side of the rectangle to the document's pixels.
-enum Axis {
+pub(super) enum Axis {
     /// For each half dot: the pixel before it, and the weight of the next pixel in 1/256.
     Between(Vec<(u32, u16)>),
     /// For each dot: its first pixel and its range of `parts`. The parts of a dot sum to [`Axis::FULL`].
@@ -67,9 +67,9 @@ enum Axis {
 }
 
 impl Axis {
-    const FULL: u32 = 1 << 12;
+    pub(super) const FULL: u32 = 1 << 12;
 
-    fn between(dots: usize, pixels: usize) -> Axis {
+    pub(super) fn between(dots: usize, pixels: usize) -> Axis {
         let last = 256 * (pixels as i64 - 1);
         let place = |half: usize| {
             // (half / 2) * pixels / dots - 1/2 pixels, in 1/256, to the nearest.
@@ -80,7 +80,7 @@ impl Axis {
         Axis::Between((0..=2 * dots).map(place).collect())
     }
 
-    fn over(dots: usize, pixels: usize) -> Axis {
+    pub(super) fn over(dots: usize, pixels: usize) -> Axis {
         let (mut spans, mut parts) = (Vec::with_capacity(dots), Vec::new());
         for dot in 0..dots {
             // In units of 1/dots pixel: the dot covers [dot * pixels, (dot + 1) * pixels), a pixel is `dots` wide.
@@ -101,7 +101,7 @@ impl Axis {
     }
 
     /// Calls `with(pixel, part)`; the parts sum to [`Axis::FULL`].
-    fn parts(&self, half: usize, mut with: impl FnMut(usize, u64)) {
+    pub(super) fn parts(&self, half: usize, mut with: impl FnMut(usize, u64)) {
         match self {
             Axis::Between(table) => {
                 let (pixel, fraction) = table[half];

@@ -11,9 +11,12 @@
 //! run along the rectangle's walk, hence no 4-connected cluster, is smaller than the minimum cluster of its stack (unless
 //! the whole rectangle is). The same input gives the same map on any machine with any number of threads.
 
+mod cells;
+pub mod eye;
 pub mod metrics;
 mod mix;
 mod rule;
+mod search;
 
 use inks::{Library, Stack};
 use protocol::ink::Ink;
@@ -22,6 +25,7 @@ use protocol::walk::{Band, MOST, Tile, Walk};
 use rayon::prelude::*;
 
 use crate::sheet::{DotMap, SheetError};
+use appearance::brdf::{Space, Table, reflectances};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 use observe::Observer;
@@ -32,28 +36,54 @@ pub const LARGEST: u16 = 64;
 /// Bands in a strip; the last strip has up to twice as many.
 const STRIP: usize = 16;
 
+/// How the stack of each dot is chosen.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Method {
+    /// Runs along a space-filling walk: the rule of the paper.
+    #[default]
+    Walk,
+    /// Compact cells with error diffusion.
+    Cells,
+    /// Cells, then exchanged where that lessens the error the eye sees.
+    Best,
+}
+
+/// A dot of the map of fixed dots that is halftoned.
+pub const TONE: u8 = u8::MAX;
+
+/// Half angles at which reflectance is compared.
+const SAMPLES: usize = 32;
+
 /// Settings of the halftone.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Settings {
+    /// How the stack of each dot is chosen.
+    pub method: Method,
     /// Minimum cluster of each stack of the mix in dots, 1 to [`LARGEST`]. The paper uses 8 to 16.
     pub minimum: Vec<u16>,
+    /// What each stack reflects, a row of `Space::half_angle(32)` each; only [`Method::Best`] needs it.
+    pub reflectance: Option<Table>,
 }
 
 impl Settings {
     /// The same minimum cluster for all stacks.
     pub fn uniform(stacks: usize, minimum: u16) -> Settings {
-        Settings { minimum: vec![minimum; stacks] }
+        Settings { minimum: vec![minimum; stacks], ..Settings::default() }
     }
 
-    /// The minimum clusters of these stacks in an ink library.
+    /// The default method, with the minimum clusters and the reflectance of these stacks in an ink library.
     pub fn from_library(stacks: &[Stack], library: &Library) -> Settings {
-        Settings { minimum: stacks.iter().map(|stack| library.minimum_cluster(stack)).collect() }
+        Settings {
+            method: Method::default(),
+            minimum: stacks.iter().map(|stack| library.minimum_cluster(stack)).collect(),
+            reflectance: Some(reflectances(stacks, library, &Space::half_angle(SAMPLES))),
+        }
     }
 
     /// For each stack the largest minimum cluster of its layers; `bare` is that of the substrate.
     pub fn of(stacks: &[Stack], bare: u16, ink: impl Fn(Ink) -> u16) -> Settings {
         let minimum = |stack: &Stack| stack.layers().iter().map(|&layer| ink(layer)).max().unwrap_or(bare);
-        Settings { minimum: stacks.iter().map(minimum).collect() }
+        Settings { minimum: stacks.iter().map(minimum).collect(), ..Settings::default() }
     }
 }
 
@@ -113,6 +143,34 @@ pub enum HalftoneError {
         /// The minimum cluster in the settings.
         minimum: u16,
     },
+    /// The search needs to know what each stack reflects.
+    #[error("the search needs the reflectance of {stacks} stacks in {} columns", 3 * SAMPLES)]
+    Reflectance {
+        /// Number of stacks.
+        stacks: usize,
+    },
+    /// The map of fixed dots has another size.
+    #[error("{found} fixed dots are given for {width} x {length} dots")]
+    FixedSize {
+        /// Dots in the map.
+        found: usize,
+        /// Dots across.
+        width: u16,
+        /// Rows.
+        length: u16,
+    },
+    /// A dot is fixed to a stack that the mix does not have.
+    #[error("dot {x}, {y} is fixed to stack {stack} of a mix of {stacks} stacks")]
+    FixedStack {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
+        /// The stack.
+        stack: u8,
+        /// Number of stacks.
+        stacks: usize,
+    },
     /// The dot map is not a halftone of this mix.
     #[error("the dot map is not a halftone of this mix: its stacks differ")]
     OtherStacks,
@@ -141,6 +199,10 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
     if settings.minimum.len() != stacks {
         return Err(HalftoneError::Minima { found: settings.minimum.len(), stacks });
     }
+    let known = |table: &Table| table.len() == stacks && table.columns() == 3 * SAMPLES;
+    if settings.method == Method::Best && !settings.reflectance.as_ref().is_some_and(known) {
+        return Err(HalftoneError::Reflectance { stacks });
+    }
     for (stack, &minimum) in mix.stacks.iter().zip(&settings.minimum) {
         if !(1..=LARGEST).contains(&minimum) {
             return Err(HalftoneError::Minimum { stack: stack.clone(), minimum });
@@ -149,20 +211,59 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
     Ok(crate::sheet::check_stacks(&mix.stacks)?)
 }
 
+fn check_fixed(fixed: &[u8], (width, length): (u16, u16), stacks: usize) -> Result<(), HalftoneError> {
+    let wide = usize::from(width);
+    if fixed.len() != wide * usize::from(length) {
+        return Err(HalftoneError::FixedSize { found: fixed.len(), width, length });
+    }
+    match fixed.iter().position(|&stack| stack != TONE && usize::from(stack) >= stacks) {
+        Some(at) => Err(HalftoneError::FixedStack { x: at % wide, y: at / wide, stack: fixed[at], stacks }),
+        None => Ok(()),
+    }
+}
+
 /// Halftones a mix onto a rectangle of `size` dots: width, then rows.
+///
+/// `fixed` gives for each dot the number of the stack of the mix that is printed there, or [`TONE`] for a dot to halftone.
+/// Dots that the mix gives wholly to one stack are fixed by themselves.
 ///
 /// # Errors
 /// A rectangle without dots or larger than any sheet, a mix or settings that contradict themselves.
 pub fn halftone(
     mix: &InkMix,
     size: (u16, u16),
+    fixed: Option<&[u8]>,
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<DotMap, HalftoneError> {
     check(mix, size, settings)?;
+    if let Some(fixed) = fixed {
+        check_fixed(fixed, size, mix.stacks.len())?;
+    }
+    let (width, length) = (usize::from(size.0), usize::from(size.1));
+    let mut index = match settings.method {
+        Method::Walk => walked(mix, size, &settings.minimum, observer),
+        Method::Cells => cells::cells(mix, (width, length), &settings.minimum, None, observer),
+        Method::Best => {
+            let space = Space::half_angle(SAMPLES);
+            let points =
+                settings.reflectance.as_ref().map(|table| eye::Tangent::of_mix(mix, &space, table).leading());
+            cells::cells(mix, (width, length), &settings.minimum, points.as_deref(), observer)
+        }
+    };
+    if let Some(fixed) = fixed {
+        for (dot, &stack) in index.iter_mut().zip(fixed).filter(|(_, stack)| **stack != TONE) {
+            *dot = stack;
+        }
+    }
+    Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
+}
+
+/// The dots by the rule of the paper.
+fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observer) -> Vec<u8> {
     let walk = Walk::new(size.0, size.1);
     let lattice = mix::Lattice::new(mix, &walk);
-    let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| settings.minimum[usize::from(q)]).collect();
+    let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
 
     let (width, length) = (usize::from(size.0), usize::from(size.1));
     let mut index = vec![0u8; width * length];
@@ -198,7 +299,7 @@ pub fn halftone(
         rule::walk(&mut rule, &mut source, &mut paint);
     });
     observer.end();
-    Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
+    index
 }
 
 /// Places beyond the end of a tile that a short run may overwrite.

@@ -25,7 +25,7 @@ fn plain(width: usize, height: usize, count: usize, at: impl Fn(usize, usize) ->
 }
 
 fn run(mix: &InkMix, size: (u16, u16), minimum: u16) -> DotMap {
-    halftone(mix, size, &Settings::uniform(mix.stacks.len(), minimum), &Silent).unwrap()
+    halftone(mix, size, None, &Settings::uniform(mix.stacks.len(), minimum), &Silent).unwrap()
 }
 
 /// Sizes of the 4-connected components of equal stacks, by flood fill.
@@ -73,7 +73,8 @@ proptest! {
             ((v >> 40) as f64 / (1u64 << 24) as f64).powi(3)
         };
         let mix = plain(9, 7, 5, |x, y| (0..5).map(|q| noise(x, y, q)).collect());
-        let sheet = halftone(&mix, (width, height), &Settings { minimum: minimum.clone() }, &Silent);
+        let settings = Settings { minimum: minimum.clone(), ..Settings::default() };
+        let sheet = halftone(&mix, (width, height), None, &settings, &Silent);
         let clusters = components(&sheet.unwrap());
         for (stack, size) in &clusters {
             prop_assert!(
@@ -197,7 +198,7 @@ fn progress_counts_every_dot_once() {
     }
     let count = Count(AtomicU64::new(0), AtomicU64::new(0));
     let mix = plain(4, 4, 2, |x, _| vec![x as f64, 1.0]);
-    halftone(&mix, (130, 1200), &Settings::uniform(2, 4), &count).unwrap();
+    halftone(&mix, (130, 1200), None, &Settings::uniform(2, 4), &count).unwrap();
     assert_eq!((count.0.into_inner(), count.1.into_inner()), (130 * 1200, 130 * 1200));
 }
 
@@ -206,7 +207,7 @@ fn contradictions_are_named() {
     let mix = plain(2, 2, 2, |_, _| vec![0.5, 0.5]);
     let (page, settings) = ((50, 60), Settings::uniform(2, 9));
     let error = |mix: &InkMix, size: (u16, u16), settings: &Settings| {
-        halftone(mix, size, settings, &Silent).unwrap_err().to_string()
+        halftone(mix, size, None, settings, &Silent).unwrap_err().to_string()
     };
     for size in [(0, 60), (50, 0), (4941, 60), (50, u16::MAX)] {
         assert!(error(&mix, size, &settings).contains("the largest sheet of paper 4940 x 7760"));

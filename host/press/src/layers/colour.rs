@@ -93,7 +93,7 @@ impl Colour {
         // Larger art was refused when its size was decided.
         let (width, height) = (dots.0 as u16, dots.1 as u16);
         let settings = halftone::Settings::from_library(&mix.stacks, library);
-        Ok(halftone(&mix, (width, height), &settings, observer)?.into_parts())
+        Ok(halftone(&mix, (width, height), None, &settings, observer)?.into_parts())
     }
 
     /// The mixture of stacks at every pixel.

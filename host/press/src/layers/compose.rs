@@ -190,7 +190,7 @@ fn tone(
     let mix = InkMix { stacks, maps, matrix: vec![vec![ONE, 0], vec![0, ONE]] };
     let (width, height) = (art.width as u16, art.length as u16);
     let settings = halftone::Settings::from_library(&mix.stacks, library);
-    let dots = halftone(&mix, (width, height), &settings, observer)?;
+    let dots = halftone(&mix, (width, height), None, &settings, observer)?;
     Ok(bits::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 

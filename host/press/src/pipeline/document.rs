@@ -22,6 +22,8 @@ pub struct Settings {
     pub gamut: gamut::Settings,
     /// The inks at hand.
     pub inks: InkSet,
+    /// How dots are chosen.
+    pub halftone: halftone::Method,
     /// Size on paper.
     pub size: Option<Size>,
 }
@@ -79,8 +81,11 @@ pub fn halftoned(
     }
     let printable = Printable::from_library(library, &settings.inks, &factored.space);
     let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
-    let minima = halftone::Settings::from_library(&mapped.mix.stacks, library);
-    let dots = halftone(&mapped.mix, (width, height), &minima, observer)?;
+    let chosen = halftone::Settings {
+        method: settings.halftone,
+        ..halftone::Settings::from_library(&mapped.mix.stacks, library)
+    };
+    let dots = halftone(&mapped.mix, (width, height), None, &chosen, observer)?;
     Ok(Halftoned { factored, factoring, mapped, dots })
 }
 

@@ -29,4 +29,4 @@ pub use materials_picture::{Swatch, materials_picture, mix_in_words};
 pub use probe::Probe;
 pub use radiance::Radiance;
 pub use sheet_picture::{STANDARD_LIGHTS, sheet_picture};
-pub use source::{Source, stack_table};
+pub use source::Source;

@@ -13,7 +13,6 @@ use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::factor::Factored;
 use appearance::weights::ONE;
-use inks::{Library, Stack};
 
 use super::error::{PreviewError, check_size};
 
@@ -101,21 +100,6 @@ impl<'a> Source<'a> {
         let rows = table.map_or_else(Vec::new, |t| t.rows().flatten().map(|&v| v as f32).collect());
         Ok(Lines { source: *self, width, height, samples: samples.max(1), columns, rows })
     }
-}
-
-/// What the stacks of a dot map reflect (1/sr), one row a stack, as the library has it.
-///
-/// A stack the library does not know shows as its longest part from the top that it does know: the uppermost
-/// layers decide most of what is seen.
-pub fn stack_table(dots: &DotMap, library: &Library, space: &Space) -> Table {
-    let mut table = Table::new(space.columns());
-    for stack in dots.stacks() {
-        let layers = stack.layers();
-        let known = (0..=layers.len()).find_map(|below| library.entry(&Stack::new(&layers[below..])));
-        let row = known.map(|entry| space.row(&entry.curve_at(space.angles())));
-        table.push(&row.unwrap_or_else(|| vec![0.0; space.columns()]));
-    }
-    table
 }
 
 fn same(what: &'static str, expected: usize, found: usize) -> Result<(), PreviewError> {
@@ -247,6 +231,7 @@ mod tests {
     use super::*;
     use crate::sheet::Sheet;
     use appearance::weights::{WeightMaps, quantise};
+    use inks::Stack;
     use proptest::prelude::*;
     use protocol::paper::Paper;
 

@@ -1,0 +1,274 @@
+//! Error diffusion of the whole vector of stacks from cell to cell.
+//!
+//! Problem: each cell prints one stack, and the means of many cells must be the mixture.
+//! Method: a cell prints the stack it asks for most, what the cells before it still owe included; the rest goes to four
+//! neighbours, in serpentine rows, by the weights of Floyd and Steinberg, which a hash of the place disturbs in two
+//! pairs (Ulichney): exact weights lock flat tones into patterns. What is owed waits in a slot for each cell of the
+//! next row; where blocks of other cells begin, slots are divided anew.
+//! A strip is diffused by itself, after a block row of lead-in whose dots are thrown away, so that it starts with
+//! debts like any other row.
+//! Cost: about eight operations a stack and cell. Memory: 24 x stacks numbers for each block across.
+
+use super::field::{Field, LANES, Row};
+use super::plan::{BLOCK, Plan};
+
+/// Part of an absent stack's debt that each cell hands to the stacks present.
+const FORGET: f32 = 1.0 / 32.0;
+
+/// Where debts go: to the next cell, and to the cells below: behind, straight down and ahead.
+type Shares = [f32; 4];
+
+pub(super) struct Strip<'a> {
+    field: &'a Field<'a>,
+    plan: &'a Plan,
+    /// Debts that wait: [`BLOCK`] slots a block, as many in use as it has cells across.
+    slots: Vec<f32>,
+    /// The side of cells each block's slots are for.
+    format: Vec<u8>,
+    carry: Vec<f32>,
+    late: Vec<f32>,
+    want: Vec<f32>,
+    debt: Vec<f32>,
+    scratch: Vec<f32>,
+    rows: Vec<Row>,
+    back: bool,
+}
+
+/// A place for dots: rows of the page from `top`, or nowhere.
+pub(super) struct Target<'a> {
+    pub(super) rows: Option<&'a mut [u8]>,
+    pub(super) top: usize,
+}
+
+impl<'a> Strip<'a> {
+    pub(super) fn new(field: &'a Field<'a>, plan: &'a Plan) -> Strip<'a> {
+        let lanes = || vec![0.0; field.lanes];
+        Strip {
+            field,
+            plan,
+            slots: vec![0.0; plan.across * BLOCK * field.lanes],
+            format: vec![BLOCK as u8; plan.across],
+            carry: lanes(),
+            late: lanes(),
+            want: lanes(),
+            debt: lanes(),
+            scratch: Vec::new(),
+            rows: (0..=BLOCK).map(|_| Row::default()).collect(),
+            back: false,
+        }
+    }
+
+    /// One row of blocks.
+    pub(super) fn block_row(&mut self, row: usize, target: &mut Target) {
+        let (plan, across) = (self.plan, self.plan.across);
+        for column in 0..across {
+            self.reformat(column, plan.blocks[row * across + column].size);
+        }
+        for y in 0..BLOCK {
+            let begins =
+                |column: usize| y.is_multiple_of(usize::from(plan.blocks[row * across + column].size));
+            if row * BLOCK + y >= self.field.height || !(0..across).any(begins) {
+                continue;
+            }
+            self.back = !self.back;
+            let mut before = false;
+            for step in 0..across {
+                let column = if self.back { across - 1 - step } else { step };
+                let here = begins(column);
+                if !before {
+                    self.carry.fill(0.0);
+                    self.late.fill(0.0);
+                } else if !here {
+                    self.leave(if self.back { column * BLOCK + BLOCK - 1 } else { column * BLOCK });
+                }
+                if here {
+                    self.cells(row, column, y, target);
+                }
+                before = here;
+            }
+        }
+    }
+
+    /// The cells of a block that begin at row `y` of it.
+    fn cells(&mut self, row: usize, column: usize, y: usize, target: &mut Target) {
+        let plan = self.plan;
+        let block = &plan.blocks[row * plan.across + column];
+        let size = usize::from(block.size);
+        let count = BLOCK / size;
+        let y = row * BLOCK + y;
+        self.field.row(size, y / size, &mut self.rows[size]);
+        for step in 0..count {
+            let cell = if self.back { count - 1 - step } else { step };
+            let x = column * BLOCK + cell * size;
+            if x >= self.field.width {
+                continue;
+            }
+            let whole = block.calm || plan.is_whole(x, y);
+            if whole {
+                self.field.cell(size, x / size, &mut self.rows[size], &mut self.want);
+                let mut area = size * size;
+                if block.owns {
+                    area += self.add_owned((y * self.field.width + x) as u32);
+                }
+                let q = self.decide(x, y, size, area, block.calm);
+                if let Some(rows) = target.rows.as_deref_mut() {
+                    let stack = self.field.stacks[q];
+                    let start = (y - target.top) * self.field.width + x;
+                    for dots in rows[start..].chunks_mut(self.field.width).take(size) {
+                        dots[..size].fill(stack);
+                    }
+                }
+                continue;
+            }
+            let heads: Vec<u32> = plan.heads(x, y).collect();
+            if heads.is_empty() {
+                self.leave(x);
+            }
+            for head in heads {
+                self.want.fill(0.0);
+                let mut area = self.add_fragment(head);
+                area += self.add_owned(plan.fragments[head as usize].seed);
+                let q = self.decide(x, y, size, area, false);
+                if let Some(rows) = target.rows.as_deref_mut() {
+                    for (x, y) in plan.dots(head) {
+                        rows[(y - target.top) * self.field.width + x] = self.field.stacks[q];
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_fragment(&mut self, fragment: u32) -> usize {
+        let mut area = 0;
+        for (x, y) in self.plan.dots(fragment) {
+            self.field.add_dot(x, y, &mut self.scratch, &mut self.want);
+            area += 1;
+        }
+        area
+    }
+
+    fn add_owned(&mut self, owner: u32) -> usize {
+        let plan = self.plan;
+        plan.owned(owner).map(|fragment| self.add_fragment(fragment)).sum()
+    }
+
+    /// What would go to a cell that does not decide now waits in its slot.
+    fn leave(&mut self, x: usize) {
+        let slot = self.slot(x);
+        let lanes = self.field.lanes;
+        for ((slot, carry), late) in
+            self.slots[slot * lanes..][..lanes].iter_mut().zip(&mut self.carry).zip(&mut self.late)
+        {
+            *slot += std::mem::take(carry) + std::mem::take(late);
+        }
+    }
+
+    /// The slot of the cell in column `x`.
+    fn slot(&self, x: usize) -> usize {
+        let block = x / BLOCK;
+        block * BLOCK + x % BLOCK / usize::from(self.format[block])
+    }
+
+    /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present
+    /// stack with most of it; the lowest among equals. Absent stacks hand some of theirs to those present.
+    fn choose(&mut self, slot: usize) -> usize {
+        let slots = self.slots[slot..slot + self.field.lanes].as_chunks::<LANES>().0;
+        let (want, carry) = (self.want.as_chunks::<LANES>().0, self.carry.as_chunks::<LANES>().0);
+        let debt = self.debt.as_chunks_mut::<LANES>().0;
+        let (mut most, mut absent, mut present) =
+            ([f32::NEG_INFINITY; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+        for ((debt, want), (slot, carry)) in debt.iter_mut().zip(want).zip(slots.iter().zip(carry)) {
+            for l in 0..LANES {
+                let sum = want[l] + slot[l] + carry[l];
+                let here = want[l] > 0.0;
+                most[l] = if here && sum > most[l] { sum } else { most[l] };
+                present[l] += if here { 1.0 } else { 0.0 };
+                let handed = if here { 0.0 } else { sum * FORGET };
+                absent[l] += handed;
+                debt[l] = sum - handed;
+            }
+        }
+        let most = most.into_iter().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
+        let is_best = |q: &usize| self.debt[*q] == most && self.want[*q] > 0.0;
+        let best = (0..self.field.lanes).find(is_best).unwrap_or(0);
+        let absent: f32 = absent.iter().sum();
+        if absent != 0.0 {
+            let each = absent / present.iter().sum::<f32>();
+            for (debt, &want) in self.debt.iter_mut().zip(&self.want) {
+                *debt += if want > 0.0 { each } else { 0.0 };
+            }
+        }
+        best
+    }
+
+    /// Decides the stack of a unit that asks for `self.want`, and hands on what it owes.
+    fn decide(&mut self, x: usize, y: usize, size: usize, area: usize, calm: bool) -> usize {
+        let lanes = self.field.lanes;
+        let slot = self.slot(x) * lanes;
+        let best = self.choose(slot);
+        self.debt[best] -= area as f32;
+        let (behind, ahead) =
+            if self.back { (x + size, x.wrapping_sub(1)) } else { (x.wrapping_sub(1), x + size) };
+        let mut shares = disturbed(x, y);
+        if !calm {
+            let to = [(ahead, y), (behind, y + size), (x, y + size), (ahead, y + size)];
+            for (share, (x, y)) in shares.iter_mut().zip(to) {
+                if !self.plan.decides(x, y) {
+                    *share = 0.0;
+                }
+            }
+            let sum: f32 = shares.iter().sum();
+            if sum > 0.0 {
+                shares = shares.map(|share| share / sum);
+            }
+        }
+        let [next, back, down, over] = shares;
+        let (debt, slots) = (self.debt.as_chunks::<LANES>().0, &mut self.slots[slot..slot + lanes]);
+        let (carry, late) = (self.carry.as_chunks_mut::<LANES>().0, self.late.as_chunks_mut::<LANES>().0);
+        let stacks = debt.iter().zip(slots.as_chunks_mut::<LANES>().0).zip(carry.iter_mut().zip(late));
+        for ((debt, slot), (carry, late)) in stacks {
+            for l in 0..LANES {
+                carry[l] = debt[l] * next;
+                slot[l] = late[l] + debt[l] * down;
+                late[l] = debt[l] * over;
+            }
+        }
+        if back > 0.0 {
+            let slot = self.slot(behind) * lanes;
+            for (slot, &debt) in self.slots[slot..slot + lanes].iter_mut().zip(&self.debt) {
+                *slot += debt * back;
+            }
+        }
+        best
+    }
+
+    /// Divides the slots of a block for cells of another side.
+    fn reformat(&mut self, column: usize, size: u8) {
+        let lanes = self.field.lanes;
+        let (old, new) = (usize::from(self.format[column]), usize::from(size));
+        if old == new {
+            return;
+        }
+        self.format[column] = size;
+        let slots = &mut self.slots[column * BLOCK * lanes..][..BLOCK * lanes];
+        let before = slots.to_vec();
+        slots.fill(0.0);
+        for x in 0..BLOCK {
+            let from = &before[x / old * lanes..][..lanes];
+            for (slot, debt) in slots[x / new * lanes..][..lanes].iter_mut().zip(from) {
+                *slot += debt / old as f32;
+            }
+        }
+    }
+}
+
+/// The weights of Floyd and Steinberg, both pairs disturbed by a hash of the place.
+fn disturbed(x: usize, y: usize) -> Shares {
+    let mut hash = (x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77);
+    hash = (hash ^ hash >> 15).wrapping_mul(0x2c1b_3c6d);
+    hash = (hash ^ hash >> 12).wrapping_mul(0x297a_2d39);
+    hash ^= hash >> 15;
+    let noise = |bits: u32| (bits & 0xffff) as f32 / 32768.0 - 1.0;
+    let (a, b) = (0.5 * noise(hash), 1.5 * noise(hash >> 16));
+    [7.0 + a, 3.0 - b, 5.0 + b, 1.0 - a].map(|share| share / 16.0)
+}

@@ -1,0 +1,262 @@
+//! The mixture on the dots of a rectangle: which dots are solid, and what a cell asks for.
+//!
+//! Problem: a cell needs the mean shares of its dots over all stacks; a dot the document gives wholly to one stack
+//! must be known as such before any cell is made.
+//! Method: both axes are separable tables of pixels and parts, the walk's own ([`Axis`]), summed over the dots of a
+//! cell. A row of cells takes its pixels down the axis once and then across for each cell. A dot is solid when all
+//! pixels it reads are, to the same stack.
+//! Cost: pixels x channels a row of cells, then channels x stacks a cell. Memory: a byte a pixel of the document, and
+//! tables of a few bytes a dot of either side. Arithmetic is that of `f32`, each operation rounded once and in a
+//! fixed order: equal on any machine.
+
+use super::super::mix::Axis;
+use appearance::gamut::InkMix;
+use appearance::weights::ONE;
+
+/// Neither solid stack: a dot or pixel that is a tone.
+pub(in crate::halftone) const TONE: u8 = u8::MAX;
+
+/// Stacks are padded to a multiple of this.
+pub(in crate::halftone) const LANES: usize = 8;
+
+/// The pixels under each of a row of equal spans of dots.
+struct Spans {
+    /// First pixel, and where its parts begin.
+    from: Vec<(u32, u32)>,
+    /// Dots of the span that fall on each pixel; a span's parts sum to its dots.
+    parts: Vec<f32>,
+}
+
+impl Spans {
+    fn new(axis: &Axis, dots: usize, size: usize) -> Spans {
+        let (mut from, mut parts) = (Vec::with_capacity(dots.div_ceil(size) + 1), Vec::new());
+        let mut sums: Vec<u64> = Vec::new();
+        for start in (0..dots).step_by(size) {
+            let mut first = usize::MAX;
+            sums.clear();
+            for dot in start..(start + size).min(dots) {
+                axis.parts(2 * dot + 1, |pixel, part| {
+                    first = first.min(pixel);
+                    sums.resize(sums.len().max(pixel - first + 1), 0);
+                    sums[pixel - first] += part;
+                });
+            }
+            from.push((first as u32, parts.len() as u32));
+            parts.extend(sums.iter().map(|&sum| sum as f32 / Axis::FULL as f32));
+        }
+        from.push((0, parts.len() as u32));
+        Spans { from, parts }
+    }
+
+    /// First pixel and the parts of span `i`.
+    fn get(&self, i: usize) -> (usize, &[f32]) {
+        let (first, start) = self.from[i];
+        (first as usize, &self.parts[start as usize..self.from[i + 1].1 as usize])
+    }
+
+    /// First pixel and the one after the last.
+    fn pixels(&self, i: usize) -> (usize, usize) {
+        let (first, parts) = self.get(i);
+        (first, first + parts.len())
+    }
+}
+
+/// A mixture on a rectangle of dots. Stacks are counted among those that have weight.
+pub(in crate::halftone) struct Field<'a> {
+    mix: &'a InkMix,
+    pub(in crate::halftone) width: usize,
+    pub(in crate::halftone) height: usize,
+    /// Numbers in `mix.stacks` of the stacks with weight, ascending.
+    pub(in crate::halftone) stacks: Vec<u8>,
+    /// Stacks and padding: a multiple of [`LANES`].
+    pub(in crate::halftone) lanes: usize,
+    /// Channels with weight.
+    channels: Vec<usize>,
+    /// Share of each stack, row by row of `channels`.
+    matrix: Vec<f32>,
+    /// The stack of each pixel that is wholly one, or [`TONE`].
+    solid: Vec<u8>,
+    /// By size of span: single dots first.
+    across: Vec<(usize, Spans)>,
+    down: Vec<(usize, Spans)>,
+}
+
+impl<'a> Field<'a> {
+    /// A checked mixture on so many dots, to be read in spans of these sizes.
+    pub(in crate::halftone) fn new(
+        mix: &'a InkMix,
+        width: usize,
+        height: usize,
+        sizes: &[usize],
+    ) -> Field<'a> {
+        let maps = &mix.maps;
+        let count = maps.channels();
+        let mut any = vec![0u16; count];
+        for pixel in maps.data().chunks_exact(count) {
+            for (any, weight) in any.iter_mut().zip(pixel) {
+                *any |= weight;
+            }
+        }
+        let channels: Vec<usize> = (0..count).filter(|&i| any[i] > 0).collect();
+        let used = |q: &usize| channels.iter().any(|&i| mix.matrix[i][*q] > 0);
+        let stacks: Vec<u8> = (0..mix.stacks.len()).filter(used).map(|q| q as u8).collect();
+        let lanes = stacks.len().next_multiple_of(LANES);
+        let mut matrix = vec![0.0; channels.len() * lanes];
+        for (row, &channel) in matrix.chunks_exact_mut(lanes).zip(&channels) {
+            for (share, &q) in row.iter_mut().zip(&stacks) {
+                // A weight of ONE, and a share of ONE, make 1.
+                *share = f32::from(mix.matrix[channel][usize::from(q)]) / (f32::from(ONE) * f32::from(ONE));
+            }
+        }
+        // The stack a channel is wholly made of. Number 255 of 256 stacks would be taken for a tone, and is halftoned.
+        let pure: Vec<u8> = mix
+            .matrix
+            .iter()
+            .map(|shares| {
+                let q = stacks.iter().position(|&q| shares[usize::from(q)] == ONE);
+                q.map_or(TONE, |q| q as u8)
+            })
+            .collect();
+        let solid = maps
+            .data()
+            .chunks_exact(count)
+            .map(|pixel| {
+                let mut found = pixel.iter().zip(&pure).filter(|&(&weight, _)| weight > 0).map(|(_, &q)| q);
+                let first = found.next().unwrap_or(TONE);
+                if found.all(|q| q == first) { first } else { TONE }
+            })
+            .collect();
+        let spans = |dots: usize, pixels: usize| {
+            let axis = if pixels > dots { Axis::over(dots, pixels) } else { Axis::between(dots, pixels) };
+            std::iter::once(1)
+                .chain(sizes.iter().copied())
+                .map(|size| (size, Spans::new(&axis, dots, size)))
+                .collect()
+        };
+        let (across, down) = (spans(width, maps.width()), spans(height, maps.height()));
+        Field { mix, width, height, stacks, lanes, channels, matrix, solid, across, down }
+    }
+
+    fn spans(table: &[(usize, Spans)], size: usize) -> &Spans {
+        // Every size that is asked for was given to `new`.
+        table.iter().find(|(known, _)| *known == size).map_or(&table[0].1, |(_, spans)| spans)
+    }
+
+    /// The stack of a dot that is wholly one, or [`TONE`].
+    pub(super) fn class(&self, x: usize, y: usize) -> u8 {
+        let ((left, right), (top, bottom)) = (self.across[0].1.pixels(x), self.down[0].1.pixels(y));
+        let first = self.solid[top * self.mix.maps.width() + left];
+        let same = |row: usize| {
+            self.solid[row * self.mix.maps.width()..][left..right].iter().all(|&class| class == first)
+        };
+        if (top..bottom).all(same) { first } else { TONE }
+    }
+
+    /// For the pixels under a square of one of the sizes, by its place among such squares: marks the stacks that have
+    /// weight there, and says whether any pixel is solid.
+    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) -> bool {
+        let (left, right) = Field::spans(&self.across, size).pixels(column);
+        let (top, bottom) = Field::spans(&self.down, size).pixels(row);
+        let (maps, count) = (&self.mix.maps, self.mix.maps.channels());
+        let mut any = vec![0u16; count];
+        let mut solid = false;
+        for y in top..bottom {
+            let row = y * maps.width();
+            solid |= self.solid[row + left..row + right].iter().any(|&class| class != TONE);
+            for pixel in maps.data()[(row + left) * count..(row + right) * count].chunks_exact(count) {
+                for (any, weight) in any.iter_mut().zip(pixel) {
+                    *any |= weight;
+                }
+            }
+        }
+        for (&channel, shares) in self.channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
+            if any[channel] > 0 {
+                for (present, &share) in present.iter_mut().zip(shares) {
+                    *present |= share > 0.0;
+                }
+            }
+        }
+        solid
+    }
+
+    /// Adds what one dot asks for, in dots.
+    pub(super) fn add_dot(&self, x: usize, y: usize, scratch: &mut Vec<f32>, out: &mut [f32]) {
+        let (across, down) = (&self.across[0].1, &self.down[0].1);
+        let ((left, parts_x), (top, parts_y)) = (across.get(x), down.get(y));
+        let (maps, count) = (&self.mix.maps, self.mix.maps.channels());
+        scratch.clear();
+        scratch.resize(self.channels.len(), 0.0);
+        for (row, &part_y) in parts_y.iter().enumerate() {
+            for (column, &part_x) in parts_x.iter().enumerate() {
+                let at = ((top + row) * maps.width() + left + column) * count;
+                for (sum, &channel) in scratch.iter_mut().zip(&self.channels) {
+                    *sum += part_x * part_y * f32::from(maps.data()[at + channel]);
+                }
+            }
+        }
+        self.shares(scratch, out);
+    }
+
+    /// Adds channels times matrix.
+    fn shares(&self, channels: &[f32], out: &mut [f32]) {
+        for (&weight, shares) in channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
+            if weight > 0.0 {
+                let (out, shares) = (out.as_chunks_mut::<LANES>().0, shares.as_chunks::<LANES>().0);
+                for (out, shares) in out.iter_mut().zip(shares) {
+                    for (out, share) in out.iter_mut().zip(shares) {
+                        *out += weight * share;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Pixels of a row of cells, taken down the axis.
+    pub(in crate::halftone) fn row(&self, size: usize, row: usize, out: &mut Row) {
+        let (first, parts) = Field::spans(&self.down, size).get(row);
+        let (maps, all, count) = (&self.mix.maps, self.mix.maps.channels(), self.channels.len());
+        if out.of == Some((size, row)) {
+            return;
+        }
+        out.of = Some((size, row));
+        out.sums.clear();
+        out.sums.resize(maps.width() * count, 0.0);
+        for (y, &part) in (first..).zip(parts) {
+            let pixels = &maps.data()[y * maps.width() * all..][..maps.width() * all];
+            if count == all {
+                for (sum, &weight) in out.sums.iter_mut().zip(pixels) {
+                    *sum += part * f32::from(weight);
+                }
+                continue;
+            }
+            for (sums, pixel) in out.sums.chunks_exact_mut(count).zip(pixels.chunks_exact(all)) {
+                for (sum, &channel) in sums.iter_mut().zip(&self.channels) {
+                    *sum += part * f32::from(pixel[channel]);
+                }
+            }
+        }
+    }
+
+    /// What a whole cell of a row asks for, in dots: into `out`.
+    pub(in crate::halftone) fn cell(&self, size: usize, column: usize, row: &mut Row, out: &mut [f32]) {
+        let (first, parts) = Field::spans(&self.across, size).get(column);
+        let count = self.channels.len();
+        row.channels.clear();
+        row.channels.resize(count, 0.0);
+        for (sums, &part) in row.sums[first * count..].chunks_exact(count).zip(parts) {
+            for (channel, &sum) in row.channels.iter_mut().zip(sums) {
+                *channel += part * sum;
+            }
+        }
+        out.fill(0.0);
+        self.shares(&row.channels, out);
+    }
+}
+
+/// Sums of [`Field::row`], kept from cell to cell.
+#[derive(Default)]
+pub(in crate::halftone) struct Row {
+    of: Option<(usize, usize)>,
+    sums: Vec<f32>,
+    channels: Vec<f32>,
+}

@@ -1,0 +1,328 @@
+//! The claims of the cells: widths by trying every square, tones by counting, regions by changing their neighbours.
+
+use super::super::eye::{Tangent, error_seen, peak, swing, thin};
+use super::super::{Method, Settings, halftone};
+use super::{Point, cells};
+use crate::sheet::clusters::smallest_clusters;
+use appearance::brdf::{Space, reflectances};
+use appearance::gamut::InkMix;
+use appearance::weights::{ONE, WeightMaps, quantise};
+use inks::{Library, Stack};
+use observe::Silent;
+use proptest::prelude::*;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+
+fn stacks(count: usize) -> Vec<Stack> {
+    let pairs = (0..169).map(|i| Stack::new([Ink::ALL[i % 13], Ink::ALL[i / 13]]));
+    std::iter::once(Stack::SUBSTRATE)
+        .chain(Ink::ALL.map(|ink| Stack::new([ink])))
+        .chain(pairs)
+        .take(count)
+        .collect()
+}
+
+/// Every channel is one stack.
+fn plain(width: usize, height: usize, count: usize, at: impl Fn(usize, usize) -> Vec<f64>) -> InkMix {
+    let mut data = vec![0; width * height * count];
+    for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
+        quantise(&at(pixel % width, pixel / width), out);
+    }
+    let matrix = (0..count).map(|i| (0..count).map(|q| if q == i { ONE } else { 0 }).collect()).collect();
+    InkMix { stacks: stacks(count), maps: WeightMaps::new(width, height, count, data).unwrap(), matrix }
+}
+
+fn side(minimum: u16) -> usize {
+    (1..).find(|side| side * side >= usize::from(minimum)).unwrap()
+}
+
+fn noise(seed: u64, x: usize, y: usize, q: usize) -> f64 {
+    let v = (seed ^ (x * 31 + y * 1009 + q * 7919) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    ((v ^ v >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93) >> 40) as f64 / (1u64 << 24) as f64
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+    /// Tones alone, with a minimum for each stack: the border of the page is the only edge.
+    #[test]
+    fn no_part_is_thinner_than_its_minimum_asks(
+        (width, height) in (12usize..150, 12usize..150),
+        seed in any::<u64>(),
+        minimum in prop::collection::vec(1u16..64, 5),
+    ) {
+        let mix = plain(9, 7, 5, |x, y| {
+            (0..5).map(|q| (noise(seed, x / 3, y / 2, q) - 0.4).max(0.0).powi(2) + if q < 2 { 0.1 } else { 0.0 }).collect()
+        });
+        let dots = cells(&mix, (width, height), &minimum, None, &Silent);
+        let side = |stack: u8| side(minimum[usize::from(stack)]);
+        prop_assert_eq!(thin(width, &dots, side, |_| false), 0);
+    }
+
+    /// Solids of any shape amid tones are exact, and a stack is printed only where it has weight.
+    #[test]
+    fn solids_are_exact_and_nothing_strays(
+        (width, height) in (1usize..120, 1usize..120),
+        seed in any::<u64>(),
+        minimum in prop::collection::vec(1u16..17, 4),
+        grain in 1usize..9,
+    ) {
+        let asked = |x: usize, y: usize| match (noise(seed, x / grain, y / grain, 9) * 4.0) as usize {
+            0 => vec![1.0, 0.0, 0.0, 0.0],
+            1 => vec![0.0, 0.0, 0.0, 1.0],
+            2 => vec![0.3, 0.7, 0.0, 0.0],
+            _ => vec![0.0, 0.2, 0.8, 0.0],
+        };
+        let mix = plain(width, height, 4, asked);
+        let dots = cells(&mix, (width, height), &minimum, None, &Silent);
+        for (at, &dot) in dots.iter().enumerate() {
+            let shares = asked(at % width, at / width);
+            if shares.contains(&1.0) {
+                prop_assert_eq!(shares[usize::from(dot)], 1.0, "dot {}, {}", at % width, at / width);
+            } else {
+                prop_assert!(dot < 3);
+            }
+        }
+    }
+}
+
+/// A disc and slanted bars of solid in a tone: every connected part of the tone keeps its minimum, and what is thin
+/// lies beside a solid that makes it so.
+#[test]
+fn parts_beside_solids_keep_their_minimum() {
+    let (width, height) = (400, 300);
+    let solid = |x: usize, y: usize| {
+        let (dx, dy) = (x as f64 - 140.0, y as f64 - 150.0);
+        dx.hypot(dy) < 100.0 || (x > 250 && (3 * x + y) % 120 < 50)
+    };
+    let mix =
+        plain(width, height, 3, |x, y| if solid(x, y) { vec![0.0, 0.0, 1.0] } else { vec![0.6, 0.3, 0.1] });
+    let dots = cells(&mix, (width, height), &[9; 3], None, &Silent);
+    let free: Vec<bool> = (0..dots.len()).map(|at| solid(at % width, at / width)).collect();
+    // Solids of the same stack may touch a part, so they are numbered apart.
+    let numbered: Vec<u8> = dots.iter().zip(&free).map(|(&dot, &free)| if free { 3 } else { dot }).collect();
+    let least = smallest_clusters(width, &numbered, &std::array::from_fn(|stack| stack as u8));
+    assert!(least[..3].iter().all(|&area| area >= 9), "{:?}", &least[..4]);
+    let tones = free.iter().filter(|&&free| !free).count();
+    let thin_dots = thin(width, &dots, |_| 3, |at| free[at]);
+    assert!(thin_dots as f64 <= 0.003 * tones as f64, "{thin_dots} of {tones}");
+    let beside = |at: usize| {
+        let (x, y) = (at % width, at / width);
+        (y.saturating_sub(4)..(y + 5).min(height))
+            .any(|y| (x.saturating_sub(4)..(x + 5).min(width)).any(|x| solid(x, y)))
+    };
+    assert_eq!(thin(width, &dots, |_| 3, |at| free[at] || beside(at)), 0);
+}
+
+/// A tone in a frame of solid: nothing beyond the frame changes its dots.
+#[test]
+fn no_debt_crosses_a_solid() {
+    let (width, height) = (400, 300);
+    let print = |share: f64| {
+        let mix = plain(width, height, 3, |x, y| {
+            let (dx, dy) = (x as f64 - 190.0, y as f64 - 150.0);
+            match dx.hypot(dy * 1.3) {
+                r if r < 100.0 => vec![0.63, 0.37, 0.0],
+                r if r < 106.0 => vec![0.0, 0.0, 1.0],
+                _ => vec![1.0 - share, share, 0.0],
+            }
+        });
+        cells(&mix, (width, height), &[9, 9, 9], None, &Silent)
+    };
+    let (a, b) = (print(0.2), print(0.81));
+    assert_ne!(a, b);
+    for at in 0..a.len() {
+        let (dx, dy) = ((at % width) as f64 - 190.0, (at / width) as f64 - 150.0);
+        if dx.hypot(dy * 1.3) < 106.0 {
+            assert_eq!(a[at], b[at], "{}, {}", at % width, at / width);
+        }
+    }
+}
+
+#[test]
+fn tones_are_kept_at_any_ratio_of_pixels_to_dots() {
+    for (pixels, dots) in [(1, 700), (37, 640), (300, 600), (600, 600), (900, 600), (1500, 601)] {
+        let mix = plain(pixels, pixels, 4, |x, y| {
+            let t = (x as f64 / pixels as f64 * 5.0).sin().abs() * (1.0 - 0.4 * y as f64 / pixels as f64);
+            vec![0.2, 0.8 * t, 0.75 * (1.0 - t), 0.05 * (1.0 - t)]
+        });
+        let sheet = cells(&mix, (dots, dots), &[9, 9, 16, 9], None, &Silent);
+        for q in 0..4 {
+            let asked: f64 = mix.maps.data().iter().skip(q).step_by(4).map(|&w| f64::from(w)).sum::<f64>()
+                / f64::from(ONE)
+                / (pixels * pixels) as f64;
+            let printed =
+                sheet.iter().filter(|&&dot| usize::from(dot) == q).count() as f64 / (dots * dots) as f64;
+            assert!((printed - asked).abs() < 2e-3, "stack {q} of {pixels} pixels: {printed}, {asked} asked");
+        }
+    }
+}
+
+/// Strips begin like any other row: the tone of the rows at a border of strips is what it is elsewhere.
+#[test]
+fn strips_leave_no_seams() {
+    let mix = plain(1, 1, 3, |_, _| vec![0.85, 0.05, 0.1]);
+    let (width, height) = (2400, 1600);
+    let dots = cells(&mix, (width, height), &[9, 9, 9], None, &Silent);
+    let tone = |row: usize| {
+        let rows = &dots[row * width..(row + 24) * width];
+        rows.iter().filter(|&&s| s == 2).count() as f64 / rows.len() as f64
+    };
+    let worst = |rows: &[usize]| rows.iter().map(|&row| (tone(row) - 0.1).abs()).fold(0.0, f64::max);
+    let inside: Vec<usize> = (48..1536).step_by(24).filter(|row| !(700..830).contains(row)).collect();
+    let (inside, seam) = (worst(&inside), worst(&[744, 756, 768, 780]));
+    assert!(inside < 0.006 && seam < 0.006, "inside {inside}, at the seam {seam}");
+}
+
+/// The search moves dots and takes none away; the error it judges by falls.
+#[test]
+fn the_search_keeps_tones_and_sees_less() {
+    let side = 512;
+    let shares = [0.4, 0.3, 0.2, 0.1];
+    let mix = plain(1, 1, 4, |_, _| shares.to_vec());
+    let points: Vec<Point> = vec![[0.0; 4], [0.3, 0.1, 0.0, 0.0], [0.1, 0.4, 0.1, 0.0], [0.7, 0.6, 0.5, 0.0]];
+    let tangent = Tangent::from_points(&points);
+    let asked: Vec<f32> = (0..side * side).flat_map(|_| shares.map(|share| share as f32)).collect();
+    let print = |points| cells(&mix, (side, side), &[9; 4], points, &Silent);
+    let (plain, best) = (print(None), print(Some(&points[..])));
+    for q in 0..4 {
+        let count = |dots: &[u8]| dots.iter().filter(|&&dot| dot == q).count();
+        assert_eq!(count(&plain), count(&best), "stack {q}");
+    }
+    let seen = |dots: &[u8]| error_seen(side, dots, &asked, &tangent, 0.3);
+    assert!(seen(&best) < 0.85 * seen(&plain), "{} of {}", seen(&best), seen(&plain));
+    assert_eq!(thin(side, &best, |_| 3, |_| false), 0);
+}
+
+#[test]
+fn dots_do_not_depend_on_the_number_of_threads() {
+    let mix = plain(50, 300, 9, |x, y| match (x / 5 + y / 7) % 5 {
+        0 => (0..9).map(|q| if q == 4 { 1.0 } else { 0.0 }).collect(),
+        _ => (0..9).map(|q| ((x * q + y) % 7) as f64 + 0.1).collect(),
+    });
+    let dots = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let points: Vec<Point> = (0..9).map(|q| [q as f32, (q * q % 5) as f32, 0.0, 0.0]).collect();
+        pool.install(|| cells(&mix, (400, 2500), &[9, 9, 16, 9, 9, 8, 8, 9, 9], Some(&points), &Silent))
+    };
+    assert_eq!(dots(1), dots(3));
+}
+
+/// The five patches of the table: name, stacks, minima, shares of each stack at (u, v) of 0 to 1.
+type Patch = (&'static str, [&'static str; 5], [u16; 5], fn(f64, f64) -> [f64; 5]);
+
+const PATCHES: [Patch; 6] = [
+    ("ramp of 4 inks", ["substrate", "C", "M", "Y", "K"], [9; 5], |u, v| {
+        [0.0, (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
+    }),
+    ("5 stacks", ["substrate", "C", "M", "Y", "K"], [9; 5], |_, _| [0.3, 0.25, 0.2, 0.15, 0.1]),
+    ("K 10 %", ["substrate", "K", "C", "M", "Y"], [9; 5], |_, _| [0.9, 0.1, 0.0, 0.0, 0.0]),
+    ("K ramp", ["substrate", "K", "C", "M", "Y"], [9; 5], |u, _| [1.0 - u, u, 0.0, 0.0, 0.0]),
+    ("foil, K, paper", ["substrate", "SF", "K", "C", "M"], [9; 5], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),
+    ("foil of 16", ["substrate", "SF", "K", "C", "M"], [8, 16, 8, 8, 8], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),
+];
+
+/// Prints how each method does on each patch, and how long A4 takes. With a folder in `FOILPRESS_LOOK` it writes
+/// the patches there as pictures of one pixel a dot.
+#[test]
+#[ignore = "a table for docs/decisions/cells.md; takes minutes"]
+fn table_of_methods() {
+    const SIDE: usize = 1024;
+    let (library, space) = (Library::builtin(), Space::half_angle(32));
+    let colours: [[u8; 3]; 5] = [[255, 255, 255], [0, 160, 220], [220, 0, 120], [250, 220, 0], [20, 20, 20]];
+    println!(
+        "{:16} {:6} {:>7} {:>7} {:>6} {:>12} {:>5} {:>5} {:>6}",
+        "", "", "0.3 m", "0.5 m", "peak", "lag", "rows", "cols", "thin %"
+    );
+    for (name, names, minimum, shares) in PATCHES {
+        let flat = shares(0.0, 0.0) == shares(1.0, 1.0);
+        let pixels = if flat { 1 } else { 256 };
+        let at = |i: usize| (i as f64 + 0.5) / pixels as f64;
+        let mut mix = plain(pixels, pixels, 5, |x, y| shares(at(x), at(y)).to_vec());
+        mix.stacks = names.map(|name| name.parse().unwrap()).to_vec();
+        let table = reflectances(&mix.stacks, &library, &space);
+        let mean: Vec<f64> = (0..5)
+            .map(|q| {
+                (0..64)
+                    .map(|i| shares((f64::from(i % 8) + 0.5) / 8.0, (f64::from(i / 8) + 0.5) / 8.0)[q])
+                    .sum::<f64>()
+                    / 64.0
+            })
+            .collect();
+        let tangent = Tangent::new(&space, &table, &mean);
+        let asked: Vec<f32> = (0..SIDE * SIDE)
+            .flat_map(|dot| {
+                let place = |dot: usize| (dot as f64 + 0.5) / SIDE as f64;
+                shares(place(dot % SIDE), place(dot / SIDE)).map(|share| share as f32)
+            })
+            .collect();
+        for method in [Method::Walk, Method::Cells, Method::Best] {
+            let settings = Settings { method, minimum: minimum.to_vec(), reflectance: Some(table.clone()) };
+            let sheet = halftone(&mix, (SIDE as u16, SIDE as u16), None, &settings, &Silent).unwrap();
+            let dots = sheet.index();
+            let error = |metres| error_seen(SIDE, dots, &asked, &tangent, metres);
+            // The rarest stack of the patch, and three of its mean spacings.
+            let rare =
+                (1..5).filter(|&q| mean[q] > 0.0).min_by(|&a, &b| mean[a].total_cmp(&mean[b])).unwrap();
+            let b = side(minimum[rare]);
+            let near = 3.0 * b as f64 / mean[rare].sqrt();
+            let (most, lag) = if flat { peak(SIDE, dots, rare as u8, near, 256) } else { (0.0, (0, 0)) };
+            let (rows, columns) = if flat { swing(SIDE, dots, rare as u8, b) } else { (0.0, 0.0) };
+            let thin = thin(SIDE, dots, |q| side(minimum[usize::from(q)]), |_| false);
+            println!(
+                "{name:16} {:6} {:7.5} {:7.5} {most:6.3} {:>12} {rows:5.2} {columns:5.2} {:6.2}",
+                format!("{method:?}"),
+                error(0.3),
+                error(0.5),
+                format!("{lag:?}"),
+                100.0 * thin as f64 / (SIDE * SIDE) as f64
+            );
+            if let Some(folder) = std::env::var_os("FOILPRESS_LOOK") {
+                let picture = image::RgbImage::from_fn(SIDE as u32, SIDE as u32, |x, y| {
+                    image::Rgb(colours[usize::from(dots[y as usize * SIDE + x as usize])])
+                });
+                let file = format!("{}-{method:?}.png", name.replace([' ', ',', '%'], ""));
+                picture.save(std::path::Path::new(&folder).join(file)).unwrap();
+            }
+        }
+    }
+    for count in [8, 57] {
+        let mix = a4(count);
+        for method in [Method::Walk, Method::Cells, Method::Best] {
+            let settings = Settings {
+                method,
+                minimum: vec![9; count],
+                reflectance: Some(reflectances(&mix.stacks, &library, &space)),
+            };
+            let size = (Paper::A4.width(), Paper::A4.length());
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+            let took = (0..3)
+                .map(|_| {
+                    let start = std::time::Instant::now();
+                    pool.install(|| halftone(&mix, size, None, &settings, &Silent).unwrap());
+                    start.elapsed()
+                })
+                .min()
+                .unwrap();
+            println!("A4, {count} stacks, {method:?}: {took:.2?} on one thread");
+        }
+    }
+}
+
+/// A smooth document of eight bases, a pixel for 4 x 4 dots.
+fn a4(count: usize) -> InkMix {
+    let (width, height, channels) = (1200, 1593, 8);
+    let mut data = vec![0; width * height * channels];
+    for (pixel, out) in data.chunks_exact_mut(channels).enumerate() {
+        let (x, y) = ((pixel % width) as f64 / 190.0, (pixel / width) as f64 / 230.0);
+        let wave = |i: usize| 1.05 + (x * (1.0 + i as f64 * 0.3) + y * (2.0 - i as f64 * 0.2)).sin();
+        quantise(&(0..channels).map(wave).collect::<Vec<_>>(), out);
+    }
+    let matrix = (0..channels)
+        .map(|i| {
+            let mut row = vec![0; count];
+            quantise(&(0..count).map(|q| 1.0 + ((q * 7 + i * 13) % 11) as f64).collect::<Vec<_>>(), &mut row);
+            row
+        })
+        .collect();
+    InkMix { stacks: stacks(count), maps: WeightMaps::new(width, height, channels, data).unwrap(), matrix }
+}
