@@ -10,11 +10,8 @@
 
 use super::rice::Mean;
 
-/// Ones that announce what is not a quotient in a code of cells. Edges beside the lattice are common, so it is low.
-pub(super) const CELL_ONES: u32 = 8;
-
-/// The same in a code of dots.
-pub(super) const DOT_ONES: u32 = 12;
+/// Ones that announce what is not a quotient. Edges beside the lattice are common, so they are few.
+pub(super) const ONES: u32 = 8;
 
 /// Bits of a length that stands plain: no page is wider than 9880 dots.
 pub(super) const LENGTH_BITS: u32 = 14;
@@ -23,10 +20,10 @@ pub(super) const LENGTH_BITS: u32 = 14;
 pub(super) const KIND_BITS: u32 = 2;
 
 /// Bit of a kind: the runs are those of the difference from the row above.
-pub(super) const DIFFERENCE: usize = 2;
+pub(super) const DIFFERENCE: u32 = 2;
 
 /// Bit of a kind: the runs are measured in cells.
-pub(super) const CELLS: usize = 1;
+pub(super) const CELLS: u32 = 1;
 
 /// The means of all codes of a band.
 #[derive(Clone, Copy)]
@@ -46,13 +43,14 @@ impl Model {
     };
 
     /// The mean of run `index` of a row of this kind.
-    pub(super) fn of(&mut self, kind: usize, index: u32) -> &mut Mean {
-        if index == 0 { &mut self.first[kind % 4] } else { &mut self.runs[kind % 4][index as usize % 2] }
+    pub(super) fn of(&mut self, kind: u32, index: u32) -> &mut Mean {
+        let kind = kind as usize % 4;
+        if index == 0 { &mut self.first[kind] } else { &mut self.runs[kind][index as usize % 2] }
     }
 }
 
 /// The unit of run `index` of a row of this kind: the first is measured in dots, since it leads to the lattice.
-pub(super) fn in_cells(kind: usize, index: u32) -> bool {
+pub(super) fn in_cells(kind: u32, index: u32) -> bool {
     kind & CELLS != 0 && index > 0
 }
 
@@ -84,7 +82,7 @@ pub(super) struct Across {
     bits: u32,
     held: u32,
     part: Part,
-    kind: usize,
+    kind: u32,
     /// Number of the run, even ones are off.
     index: u32,
     /// The run under way is measured in dots although its row is in cells.
@@ -145,7 +143,7 @@ impl Across {
             }
             match self.part {
                 Part::Kind => {
-                    self.kind = self.take(KIND_BITS) as usize;
+                    self.kind = self.take(KIND_BITS);
                     if self.kind & DIFFERENCE != 0 && self.y > 0 {
                         rows.copy_within(at - stride..at, at);
                     }
@@ -196,11 +194,10 @@ impl Across {
 
     /// Counts the ones of a code; some bits are held.
     fn count_ones(&mut self, before: u32, row: &mut [u8], width: u16) {
-        let most = if self.cells() { CELL_ONES } else { DOT_ONES };
-        let ones = self.bits.leading_ones().min(self.held).min(most + 1 - before);
+        let ones = self.bits.leading_ones().min(self.held).min(ONES + 1 - before);
         self.drop(ones);
         let count = before + ones;
-        if count > most {
+        if count > ONES {
             return self.number(None, row, width);
         }
         if self.held == 0 {
@@ -208,7 +205,7 @@ impl Across {
             return;
         }
         self.drop(1);
-        self.part = if count < most {
+        self.part = if count < ONES {
             Part::Plain(self.mean().parameter(), count)
         } else if self.cells() {
             self.escaped = true;

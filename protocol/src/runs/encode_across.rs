@@ -2,9 +2,9 @@
 //!
 //! Method: of each different row, and of its difference from the row above, the places where off and on change are
 //! found a word at a time. Each of the four kinds is measured on a copy of the model, and the shortest is written. The
-//! side of the cells is the one that most runs of the band are multiples of, weighed by the bits it spares.
+//! side of the cells is estimated from how many runs are multiples of each.
 
-use super::across::{CELL_ONES, CELLS, DIFFERENCE, DOT_ONES, KIND_BITS, LENGTH_BITS, Model, in_cells};
+use super::across::{CELLS, DIFFERENCE, KIND_BITS, LENGTH_BITS, Model, ONES, in_cells};
 use super::encode::{Bits, MAX_STRIDE};
 use super::rice::Mean;
 use super::{form, stride};
@@ -15,6 +15,9 @@ type Changes = Vec<u16, { MAX_STRIDE * 8 }>;
 
 /// Sides of cells beside 1, and eighths of a bit that each spares a run: the logarithm of the side.
 const SIDES: [(u8, u32); 7] = [(2, 8), (3, 13), (4, 16), (6, 21), (8, 24), (12, 29), (24, 37)];
+
+/// Eighths of a bit that a run in dots takes, roughly; more than any side spares.
+const RUN: u32 = 40;
 
 /// All sides divide this.
 const BLOCK: u16 = 24;
@@ -33,7 +36,7 @@ pub(super) fn put_across(rows: &[u8], width: u16, out: &mut [u8]) -> Option<usiz
     for (row, alike) in different(rows, stride) {
         find_changes(row, &[], &mut changes);
         find_changes(row, above, &mut difference);
-        let of = |kind: usize| if kind & DIFFERENCE != 0 { &difference[..] } else { &changes[..] };
+        let of = |kind: u32| if kind & DIFFERENCE != 0 { &difference[..] } else { &changes[..] };
         let kinds = if side > 1 { DIFFERENCE | CELLS } else { DIFFERENCE };
         let mut best = (u32::MAX, 0);
         for kind in (0..4).filter(|kind| kind & kinds == *kind) {
@@ -48,7 +51,7 @@ pub(super) fn put_across(rows: &[u8], width: u16, out: &mut [u8]) -> Option<usiz
             }
         }
         let kind = best.1;
-        bits.put(kind as u32, KIND_BITS)?;
+        bits.put(kind, KIND_BITS)?;
         Row { kind, changes: of(kind), width, side }
             .put(&mut model, &mut |value, count| bits.put(value, count))?;
         put_dots(&mut model.alike, alike, &mut |value, count| bits.put(value, count))?;
@@ -70,24 +73,33 @@ fn different(rows: &[u8], stride: usize) -> impl Iterator<Item = (&[u8], u32)> {
     })
 }
 
-/// The side of cells that spares most.
+/// The side of cells with which the band is shortest, by a rough count of bits.
 fn side(rows: &[u8], stride: usize, changes: &mut Changes) -> u8 {
-    let mut gains = [0; SIDES.len()];
+    let (mut in_dots, mut in_cells) = (0, [0; SIDES.len()]);
+    let mut above: &[u8] = &[];
     for (row, _) in different(rows, stride) {
-        find_changes(row, &[], changes);
-        let mut lengths = [0u32; BLOCK as usize];
-        for pair in changes.windows(2) {
-            lengths[usize::from((pair[1] - pair[0]) % BLOCK)] += 1;
+        let (mut dots, mut cells) = (u32::MAX, [u32::MAX; SIDES.len()]);
+        for base in [&[][..], above] {
+            find_changes(row, base, changes);
+            let mut lengths = [0u32; BLOCK as usize];
+            for pair in changes.windows(2) {
+                lengths[usize::from((pair[1] - pair[0]) % BLOCK)] += 1;
+            }
+            let all: u32 = lengths.iter().sum();
+            dots = dots.min(all * RUN);
+            for (length, (side, spared)) in cells.iter_mut().zip(SIDES) {
+                let whole: u32 = lengths.iter().step_by(side.into()).sum();
+                *length = (*length).min(whole * (RUN - spared) + (all - whole) * (RUN + (ONES + 1) * 8));
+            }
         }
-        let all: u32 = lengths.iter().sum();
-        for (gain, (side, spared)) in gains.iter_mut().zip(SIDES) {
-            let cells: u32 = lengths.iter().step_by(side.into()).sum();
-            // A row that gains nothing is written in dots.
-            *gain += (cells * spared).saturating_sub((all - cells) * (CELL_ONES + 1) * 8);
+        in_dots += dots;
+        for (sum, length) in in_cells.iter_mut().zip(cells) {
+            *sum += length.min(dots);
         }
+        above = row;
     }
-    let best = gains.iter().zip(SIDES).max_by_key(|(gain, _)| **gain);
-    best.filter(|(gain, _)| **gain > 0).map_or(1, |(_, (side, _))| side)
+    let best = in_cells.iter().zip(SIDES).min_by_key(|(length, _)| **length);
+    best.filter(|(length, _)| **length < in_dots).map_or(1, |(_, (side, _))| side)
 }
 
 /// Finds where `row`, or its difference from `above` if that is not empty, changes between off and on.
@@ -120,7 +132,7 @@ fn wide(bytes: &[u8]) -> u64 {
 
 /// A row to write.
 struct Row<'c> {
-    kind: usize,
+    kind: u32,
     changes: &'c [u16],
     width: u16,
     side: u8,
@@ -140,15 +152,15 @@ impl Row<'_> {
         // The last may be longer than is left.
         let left = u32::from(self.width - from);
         let cells = in_cells(self.kind, index);
-        let (unit, most) = if cells { (side, CELL_ONES) } else { (1, DOT_ONES) };
+        let unit = if cells { side } else { 1 };
         let value = left.div_ceil(unit) - u32::from(index > 0);
         let mean = model.of(self.kind, index);
         let k = mean.parameter();
-        if (value >> k) + k < most {
+        if (value >> k) + k < ONES {
             mean.add(value);
             put_rice(value, k, put)
         } else {
-            put((1 << (most + 1)) - 1, most + 1)
+            put((1 << (ONES + 1)) - 1, ONES + 1)
         }
     }
 
@@ -164,11 +176,11 @@ impl Row<'_> {
         if in_cells(kind, index) {
             let (value, mean) = ((length / side).saturating_sub(1), model.of(kind, index));
             let k = mean.parameter();
-            if length.is_multiple_of(side) && value >> k < CELL_ONES {
+            if length.is_multiple_of(side) && value >> k < ONES {
                 mean.add(value);
                 return put_rice(value, k, put);
             }
-            put((1 << (CELL_ONES + 1)) - 2, CELL_ONES + 1)?;
+            put((1 << (ONES + 1)) - 2, ONES + 1)?;
             kind &= !CELLS;
         }
         put_dots(model.of(kind, index), length - u32::from(index > 0), put)
@@ -179,10 +191,10 @@ impl Row<'_> {
 fn put_dots(mean: &mut Mean, value: u32, put: &mut impl FnMut(u32, u32) -> Option<()>) -> Option<()> {
     let k = mean.parameter();
     mean.add(value);
-    if value >> k < DOT_ONES {
+    if value >> k < ONES {
         return put_rice(value, k, put);
     }
-    put((1 << (DOT_ONES + 1)) - 2, DOT_ONES + 1)?;
+    put((1 << (ONES + 1)) - 2, ONES + 1)?;
     put(value, LENGTH_BITS)
 }
 

@@ -45,11 +45,11 @@
 //! rows of the band are like it; until the band is complete. The first bit of the kind says that the runs are those of the
 //! difference (exclusive or) from the row above, which is blank above the first; the second that they are measured in
 //! cells of `side` dots. The first run is measured in dots and may be 0. Every other is its length less 1 (dot or
-//! cell). Numbers are Rice codes as above, but 12 ones and a zero announce 14 plain bits, and 13 ones mean all that is
-//! left of the row or the band. In a code of cells 8 ones and a zero announce a run measured in dots, which follows as in a row of
-//! the same kind in dots, and 9 ones mean all that is left. Each kind has a count and a sum for its first runs (4 and 32),
-//! its off and its on runs (4 and 32 in dots, 4 and 8 in cells); the numbers of rows have one pair (4 and 8). A row is
-//! complete when it has as many dots as the page is wide, and what would go beyond is cut.
+//! cell). Numbers are Rice codes as above, but with fewer ones: 8 ones and a zero announce 14 plain bits, in a code of
+//! cells a run measured in dots, which follows as in a row of the same kind in dots; 9 ones mean all that is left of the
+//! row or the band. Each kind has a count and a sum for its first runs (4 and 32), its off and its on runs (4 and 32 in
+//! dots, 4 and 8 in cells); the numbers of rows have one pair (4 and 8). A row is complete when it has as many dots as the
+//! page is wide, and what would go beyond is cut.
 
 mod across;
 mod canvas;

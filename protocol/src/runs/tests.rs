@@ -100,15 +100,15 @@ fn across_by_definition(width: usize, height: usize, side: usize, codes: &[u8]) 
         let mut row =
             if kind >= 2 && !rows.is_empty() { rows[rows.len() - 1].clone() } else { vec![false; width] };
         // `None` is what is left.
-        let mut code = |pair: usize, ones: usize| -> Result<Option<usize>, ()> {
+        let mut code = |pair: usize, cells: bool| -> Result<Option<usize>, ()> {
             let (count, sum) = pairs[pair];
             let k = (0..).find(|k| count << k >= sum).unwrap();
-            let quotient = (0..=ones).take_while(|_| bits.next() == Some(1)).count();
-            if quotient == ones + 1 {
+            let quotient = (0..=8).take_while(|_| bits.next() == Some(1)).count();
+            if quotient == 9 {
                 return Ok(None);
             }
-            let escaped = quotient == ones;
-            if escaped && ones == 8 {
+            let escaped = quotient == 8;
+            if escaped && cells {
                 return Err(());
             }
             let plain = if escaped { 14 } else { k };
@@ -123,12 +123,12 @@ fn across_by_definition(width: usize, height: usize, side: usize, codes: &[u8]) 
             let mut unit = 1;
             let mut number = Err(());
             if kind % 2 == 1 && index > 0 {
-                number = code(pair_of(kind, index), 8);
+                number = code(pair_of(kind, index), true);
                 unit = side;
             }
             if number.is_err() {
                 unit = 1;
-                number = code(pair_of(if index > 0 { kind & 2 } else { kind }, index), 12);
+                number = code(pair_of(if index > 0 { kind & 2 } else { kind }, index), false);
             }
             let end = match number.unwrap() {
                 Some(value) => (x + (value + usize::from(index > 0)) * unit).min(width),
@@ -139,7 +139,7 @@ fn across_by_definition(width: usize, height: usize, side: usize, codes: &[u8]) 
             }
             (x, index) = (end, index + 1);
         }
-        let alike = code(12, 12).unwrap().unwrap_or(height);
+        let alike = code(12, false).unwrap().unwrap_or(height);
         let alike = alike.min(height - rows.len() - 1);
         rows.extend(vec![row; alike + 1]);
     }
@@ -338,7 +338,7 @@ proptest! {
         side in 1u8..30,
         codes in prop::collection::vec(any::<u8>(), 3000),
     ) {
-        let stream = [&[form::ACROSS, side], &codes[..], &[0; 3000]].concat();
+        let stream = [&[form::ACROSS, side][..], &codes[..], &[0; 3000]].concat();
         let mut decoder = Decoder::new(width, height);
         let mut memory = vec![0; band_bytes(width)];
         let (_, step) = decoder.step(&stream, &mut memory).unwrap();
@@ -360,8 +360,8 @@ fn the_example_across_is_read_and_written() {
     let stream = [form::ACROSS, 3, 0x50, 0x49, 0x2c, 0x01, 0x80];
     assert_eq!(coded(24, 4, &rows), stream);
     assert_eq!(decoded(24, 4, &stream, core::iter::empty()), Ok(Some(rows)));
-    // Twelve ones and a zero before 14 plain bits; thirteen for all that is left of a row, and of the band.
-    let stream = [form::ACROSS, 1, 0x3f, 0xfc, 0x00, 0x2f, 0xff, 0xff, 0xfe];
+    // Eight ones and a zero before 14 plain bits; nine for all that is left of a row, and of the band.
+    let stream = [form::ACROSS, 1, 0x3f, 0xc0, 0x02, 0xff, 0xff, 0xe0];
     let all = [0x07, 0xff, 0xff].repeat(4);
     assert_eq!(decoded(24, 4, &stream, core::iter::empty()), Ok(Some(all)));
 }
@@ -369,7 +369,7 @@ fn the_example_across_is_read_and_written() {
 #[test]
 fn a_band_of_runs_across_takes_a_row_at_a_time() {
     // A full row and 63 like it.
-    let input = [form::ACROSS, 1, 0x03, 0xff, 0xff, 0xff];
+    let input = [form::ACROSS, 1, 0x03, 0xff, 0xff];
     let (mut decoder, mut memory) = (Decoder::new(4800, 64), vec![0; band_bytes(4800)]);
     let (mut read, mut slices) = (0, 0);
     loop {
