@@ -1,23 +1,22 @@
-//! Pass streams of a full A4 page: eight clustered planes, and pages as people draw them.
+//! Pass streams of a full A4 page: eight planes, halftoned along the walk and in cells.
 //!
 //! Run `cargo bench --bench runs`. Prints the sizes beside the times; decoding is timed on this machine, the
 //! microcontroller's cycles are counted elsewhere.
 
 use divan::Bencher;
-use foilpress_tests::planes::{ROWS, WIDTH, planes};
+use foilpress_tests::planes::{ROWS, WIDTH, cells, planes};
 use protocol::packbits;
 use protocol::runs::{Decoder, MAX_BAND, Step, band_bytes, encode, stride};
 
 fn main() {
-    let (mut packed, mut streams) = (0, 0);
-    for plane in planes() {
-        packed += packed_rows(plane);
-        streams += stream(plane).len();
+    for (name, planes) in [("walk", planes()), ("cells", cells())] {
+        let packed: usize = planes.iter().map(|plane| packed_rows(plane)).sum();
+        let streams: usize = planes.iter().map(|plane| stream(plane).len()).sum();
+        println!(
+            "eight planes, {name}: packed rows {packed} bytes, pass streams {streams}, 1/{:.2}",
+            packed as f64 / streams as f64
+        );
     }
-    println!(
-        "eight planes: packed rows {packed} bytes, pass streams {streams}, 1/{:.2}",
-        packed as f64 / streams as f64
-    );
     divan::main();
 }
 
@@ -39,17 +38,22 @@ fn stream(plane: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// One clustered plane into its stream.
-#[divan::bench(sample_count = 10)]
-fn encode_a_plane(bencher: Bencher) {
-    let plane = &planes()[3];
+/// The fourth plane of a halftone.
+fn plane(method: &str) -> &'static [u8] {
+    if method == "walk" { &planes()[3] } else { &cells()[3] }
+}
+
+/// One plane into its stream.
+#[divan::bench(sample_count = 10, args = ["walk", "cells"])]
+fn encode_a_plane(bencher: Bencher, method: &str) {
+    let plane = plane(method);
     bencher.counter(divan::counter::BytesCount::of_slice(plane)).bench_local(|| stream(plane));
 }
 
 /// And back.
-#[divan::bench(sample_count = 10)]
-fn decode_a_plane(bencher: Bencher) {
-    let plane = &planes()[3];
+#[divan::bench(sample_count = 10, args = ["walk", "cells"])]
+fn decode_a_plane(bencher: Bencher, method: &str) {
+    let plane = plane(method);
     let stream = stream(plane);
     let mut memory = vec![0; band_bytes(WIDTH)];
     let mut decoder = Decoder::new(WIDTH, ROWS);

@@ -70,7 +70,7 @@ const varint = (value) => {
   return [...out, value];
 };
 
-export const hello = () => frame([0, 1, ...varint(0)]);
+export const hello = () => frame([0, 2, ...varint(0)]);
 export const begin = (job, kind, length) => frame([1, ...varint(job), kind, ...varint(length)]);
 export const data = (job, offset, bytes) => frame([2, ...varint(job), ...varint(offset), ...varint(bytes.length), ...bytes]);
 export const cancel = (job) => frame([3, ...varint(job)]);

@@ -42,9 +42,9 @@ for (const [what, settings] of [['the model printer', MODEL], ['a printer that i
   }
 }
 
-for (const [what, settings] of [['the model printer', MODEL], ['a printer that is quicker than the timing', QUICK]]) {
-  test(`decoding keeps the port at work with ${what}`, { skip }, async (t) => {
-    const expected = job('clusters.rgl'), streams = job('clusters.streams');
+for (const [name, what, settings] of [['clusters', 'the model printer', MODEL], ['clusters', 'a printer that is quicker than the timing', QUICK], ['cells', 'a printer that is quicker than the timing', QUICK]]) {
+  test(`decoding ${name} keeps the port at work with ${what}`, { skip }, async (t) => {
+    const expected = job(`${name}.rgl`), streams = job(`${name}.streams`);
     const bench = new Bench(settings);
     await bench.connect('bulk');
     const before = bench.board.cycles;
@@ -59,7 +59,7 @@ for (const [what, settings] of [['the model printer', MODEL], ['a printer that i
   });
 }
 
-const ASKED = [['serial', RAW, 'page', 'rgl'], ['bulk', RAW, 'page', 'rgl'], ['bulk', STREAMS, 'clusters', 'streams'], ['bulk', STREAMS, 'page', 'streams']];
+const ASKED = [['serial', RAW, 'page', 'rgl'], ['bulk', RAW, 'page', 'rgl'], ['bulk', STREAMS, 'clusters', 'streams'], ['bulk', STREAMS, 'cells', 'streams'], ['bulk', STREAMS, 'page', 'streams']];
 
 for (const [way, kind, name, end] of ASKED) {
   test(`how the printer is, is answered within 5 ms while ${name}.${end} goes out over ${way}`, { skip }, async (t) => {

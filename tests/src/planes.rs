@@ -1,10 +1,10 @@
-//! Eight clustered planes, as the halftone makes them.
+//! Eight planes as the halftones make them.
 
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
 use inks::Stack;
 use observe::Silent;
-use press::halftone::{Settings, halftone};
+use press::halftone::{Method, Settings, halftone};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use std::sync::OnceLock;
@@ -20,9 +20,25 @@ pub fn planes() -> &'static [Vec<u8>] {
     PLANES.get_or_init(|| clustered((1200, 1593), (190.0, 230.0), Paper::A4))
 }
 
+/// The same mix in cells, made once.
+pub fn cells() -> &'static [Vec<u8>] {
+    static PLANES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
+    PLANES.get_or_init(|| halftoned(Method::Cells, (1200, 1593), (190.0, 230.0), Paper::A4))
+}
+
 /// Eight stacks of one ink and the bare paper over a whole page, smooth weights given by `size` pixels that turn once in
-/// about 2 pi `scale` of them, clusters of at least 8 dots.
-pub fn clustered((width, height): (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<Vec<u8>> {
+/// about 2 pi `scale` of them, clusters of at least 8 dots along the walk.
+pub fn clustered(size: (usize, usize), scale: (f64, f64), paper: Paper) -> Vec<Vec<u8>> {
+    halftoned(Method::Walk, size, scale, paper)
+}
+
+/// The same by another method.
+pub fn halftoned(
+    method: Method,
+    (width, height): (usize, usize),
+    scale: (f64, f64),
+    paper: Paper,
+) -> Vec<Vec<u8>> {
     let count = 9;
     let mut data = vec![0; width * height * count];
     for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
@@ -38,7 +54,8 @@ pub fn clustered((width, height): (usize, usize), scale: (f64, f64), paper: Pape
     let maps = WeightMaps::new(width, height, count, data).expect("quantised");
     let mix = InkMix { stacks: stacks.collect(), maps, matrix };
     let page = (paper.width(), paper.length());
-    let map = halftone(&mix, page, None, &Settings::uniform(count, 8), &Silent).expect("a page");
+    let settings = Settings { method, ..Settings::uniform(count, 8) };
+    let map = halftone(&mix, page, None, &settings, &Silent).expect("a page");
     (1..9u8)
         .map(|ink| {
             let dots = map.index().chunks_exact(8);

@@ -1,10 +1,11 @@
-//! Pass streams against the printer's own packing: planes as they are halftoned and as people draw them.
+//! Pass streams against the printer's own packing: planes as they are halftoned and as people draw them, wherever they lie.
 
 use embedded_graphics::mono_font::MonoTextStyle;
 use embedded_graphics::mono_font::ascii::FONT_10X20;
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::Text;
+use press::halftone::Method;
 use protocol::packbits;
 use protocol::paper::Paper;
 use protocol::runs::{MAX_BAND, encode, stride};
@@ -166,4 +167,50 @@ fn eight_clustered_planes_are_a_quarter_of_their_packed_rows_at_most() {
     }
     println!("packed rows {packed}, streams {streams}, 1/{:.2}", packed as f64 / streams as f64);
     assert!(4 * streams <= packed, "{streams} for {packed}");
+}
+
+/// A plane of 4800 by 3000 dots with copies of a picture at these corners.
+fn placed(picture: &[u8], (width, height): (usize, usize), corners: &[(usize, usize)]) -> Plane {
+    let mut plane = Plane { width: 4800, rows: 3000, bits: vec![0; 600 * 3000] };
+    for &(left, top) in corners {
+        for y in 0..height {
+            for x in 0..width {
+                if picture[y * width / 8 + x / 8] >> (7 - x % 8) & 1 == 1 {
+                    let x = left + x;
+                    plane.bits[(top + y) * 600 + x / 8] |= 0x80 >> (x % 8);
+                }
+            }
+        }
+    }
+    plane
+}
+
+#[test]
+fn cells_take_no_more_than_clusters_wherever_they_lie() {
+    let paper = Paper::Custom { width: 2400, length: 1280 };
+    let made = |method| planes::halftoned(method, (300, 160), (90.0, 70.0), paper);
+    let size = |pictures: &[Vec<u8>], corners: &[(usize, usize)]| -> usize {
+        pictures.iter().map(|bits| placed(bits, (2400, 1280), corners).stream()).sum()
+    };
+    let packed = |pictures: &[Vec<u8>], corners: &[(usize, usize)]| -> usize {
+        pictures.iter().map(|bits| placed(bits, (2400, 1280), corners).packed()).sum()
+    };
+    let (walk, cells) = (made(Method::Walk), made(Method::Cells));
+    let best = size(&walk, &[(0, 0)]);
+    let places: [(&str, &[(usize, usize)]); 4] = [
+        ("at the corner", &[(0, 0)]),
+        ("beside it", &[(1237, 811)]),
+        ("two copies and a gap", &[(0, 83), (2399 - 40, 83)]),
+        ("two copies, one above the other", &[(605, 3), (605, 1400)]),
+    ];
+    for (name, corners) in places {
+        let (rows, stream) = (packed(&cells, corners), size(&cells, corners));
+        let clusters = size(&walk, corners);
+        println!(
+            "{name}: packed rows {rows}, cells {stream}, 1/{:.1}; clusters {clusters}, 1/{:.1}",
+            rows as f64 / stream as f64,
+            packed(&walk, corners) as f64 / clusters as f64
+        );
+        assert!(stream <= corners.len() * best, "{name}: {stream} bytes, clusters at the corner {best}");
+    }
 }

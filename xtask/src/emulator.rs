@@ -55,6 +55,7 @@ pub fn run(root: &Path) -> Result<()> {
         ("small", 500, 150, discs(500, 150)),
         ("page", 4800, 130, discs(4800, 130)),
         ("clusters", 4800, 256, clusters(4800, 256)),
+        ("cells", 4800, 256, cells(4800, 256)),
     ];
     for (name, width, rows, planes) in made {
         let (printed, streams) = job(width, rows, &planes).context("a test job cannot be made")?;
@@ -158,6 +159,29 @@ fn clusters(width: u16, rows: u16) -> [Vec<u8>; 2] {
             left -= 1;
             if let Some(plane) = planes.get_mut(ink) {
                 let (x, y) = (usize::from(tile.x + dot % EDGE), usize::from(tile.y + dot / EDGE));
+                plane[y * stride + x / 8] |= 0x80 >> (x % 8);
+            }
+        }
+    }
+    planes
+}
+
+/// Two of eight planes of cells of 3 x 3 dots, each of one of eight inks or of bare paper, beside the corner of the page.
+fn cells(width: u16, rows: u16) -> [Vec<u8>; 2] {
+    let stride = runs::stride(width);
+    let mut planes = [(); 2].map(|()| vec![0u8; stride * usize::from(rows)]);
+    let mut random = 1u64;
+    let mut inks = vec![0; usize::from(width).div_ceil(3)];
+    for y in 4..usize::from(rows) {
+        if (y - 4).is_multiple_of(3) {
+            inks.fill_with(|| {
+                random =
+                    random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (random >> 40) as usize % 9
+            });
+        }
+        for x in 7..usize::from(width) {
+            if let Some(plane) = planes.get_mut(inks[(x - 7) / 3]) {
                 plane[y * stride + x / 8] |= 0x80 >> (x % 8);
             }
         }

@@ -10,8 +10,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Version of the message set. It changes only if an old message changes its meaning, not when messages are appended.
-pub const VERSION: u8 = 1;
+/// Version of the link. It changes only if an old message, or the data of a job, changes its meaning, not when messages are
+/// appended.
+pub const VERSION: u8 = 2;
 
 /// Fingerprint of the message set: the CRC-32 over one example of every variant. With equal fingerprints, host and bridge
 /// know the same messages. With different fingerprints but the same version, both understand everything the older knows.
@@ -541,7 +542,7 @@ mod tests {
             assert!(text.contains(&std::format!("`{hex}`")), "docs/wire-format.md does not show `{hex}`");
         };
         let examples = [
-            ToBridge::Hello { version: 1, schema: SCHEMA },
+            ToBridge::Hello { version: VERSION, schema: SCHEMA },
             ToBridge::Begin { job: 7, kind: JobKind::Raw, length: 1061 },
             ToBridge::Data { job: 7, offset: 960, bytes: &[0x1b, 0x65, 0] },
             ToBridge::Cancel { job: 7 },

@@ -1,5 +1,6 @@
 //! Decodes a pass stream into bands of rows, in bounded memory and from input in any portions.
 
+use super::across::{Across, Stop};
 use super::canvas::{Canvas, Laid};
 use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
@@ -10,7 +11,7 @@ use crate::walk::{Band, Tile, Walk};
 pub enum Defect {
     /// A band begins with an unknown form.
     Form,
-    /// A count of bands or rows is 0 or more than remain.
+    /// A count of bands or rows is 0 or more than remain, or the side of cells is 0.
     Count,
     /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
     Row,
@@ -47,6 +48,8 @@ enum State {
     Minimum,
     Runs(Runs),
     Row(Row),
+    Side,
+    Across(Across),
     End,
 }
 
@@ -165,8 +168,8 @@ impl Decoder {
         }
     }
 
-    /// Like [`Decoder::step`], but also stops, with `None`, after every tile it has laid out, and several times within tiles
-    /// that take long. The caller can do other things and then call it again with the rest of the input.
+    /// Like [`Decoder::step`], but also stops, with `None`, after every tile it has laid out, several times within tiles
+    /// that take long, and after every row of runs across. The caller can do other things and then call it again with the rest of the input.
     pub fn slice(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Option<Step>), Defect> {
         let width = self.walk.width();
         let memory = memory.get_mut(..band_bytes(width)).ok_or(Defect::Memory)?;
@@ -188,6 +191,7 @@ impl Decoder {
                             State::Minimum
                         }
                         form::ROWS => State::Row(Row { y: 0, part: RowPart::Head }),
+                        form::ACROSS => State::Side,
                         _ => return Err(Defect::Form),
                     };
                     if byte != form::BLANK {
@@ -215,6 +219,28 @@ impl Decoder {
                     read += used;
                     if !complete {
                         return Ok((read, (!runs.laid).then_some(Step::More)));
+                    }
+                    self.next += 1;
+                    self.follow();
+                    return Ok((read, Some(Step::Band { y: band.y, rows: band.height })));
+                }
+                State::Side => {
+                    let Some(&side) = input.get(read) else { return Ok((read, Some(Step::More))) };
+                    if side == 0 {
+                        return Err(Defect::Count);
+                    }
+                    read += 1;
+                    self.state = State::Across(Across::new(side));
+                }
+                State::Across(across) => {
+                    let rows = &mut memory[..usize::from(band.height) * stride];
+                    let (used, stop) = across.read(&input[read..], rows, stride, width);
+                    read += used;
+                    match stop {
+                        Stop::More => return Ok((read, Some(Step::More))),
+                        // On a microcontroller other tasks wait for their turn.
+                        Stop::Row => return Ok((read, None)),
+                        Stop::Band => {}
                     }
                     self.next += 1;
                     self.follow();

@@ -1,5 +1,6 @@
 //! A plane as a pass stream.
 
+use super::encode_across::put_across;
 use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
 use crate::packbits;
@@ -10,7 +11,7 @@ use heapless::Vec;
 /// buffer for [`encode`].
 pub const MAX_BAND: usize = 1 + EDGE as usize * (2 + MAX_STRIDE);
 
-const MAX_STRIDE: usize = 1235;
+pub(super) const MAX_STRIDE: usize = 1235;
 
 /// A buffer is too small, a page wider than 9880 dots, or `bits` shorter than the plane.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -31,6 +32,7 @@ pub fn encode(
     }
     let mut blank = 0u8;
     let mut table = Table::new();
+    let mut across = false;
     for band in Walk::new(width, height).bands() {
         let from = usize::from(band.y) * stride;
         let rows = &bits[from..from + usize::from(band.height) * stride];
@@ -46,11 +48,23 @@ pub fn encode(
             put(&[form::BLANK, blank]);
             blank = 0;
         }
-        // Runs are written if they are shorter than rows would be.
+        // What was shorter last goes first, so that the other gives up early.
         let limit = rows_length(rows, stride);
-        let length = match put_runs(&band, rows, stride, &mut table, &mut buffer[..limit - 1]) {
-            Some(length) => length,
-            None => put_rows(rows, stride, &mut buffer[..limit]).ok_or(NoRoom)?,
+        let mut code = |across: bool, room: usize| {
+            if across {
+                put_across(rows, width, &mut buffer[..room])
+            } else {
+                put_runs(&band, rows, stride, &mut table, &mut buffer[..room])
+            }
+        };
+        let first = code(across, limit - 1);
+        let length = match (code(!across, first.unwrap_or(limit) - 1), first) {
+            (Some(length), _) => {
+                across = !across;
+                length
+            }
+            (None, Some(length)) => code(across, length).ok_or(NoRoom)?,
+            (None, None) => put_rows(rows, stride, &mut buffer[..limit]).ok_or(NoRoom)?,
         };
         put(&buffer[..length]);
     }
@@ -136,12 +150,13 @@ fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mu
             minimum = minimum.min(last);
         }
         (last, count) = (length, count + 1);
-        Some(())
+        // Every run takes a bit at least.
+        (count as usize <= 8 * out.len()).then_some(())
     })?;
     let [head, codes @ ..] = out else { return None };
     let [least, codes @ ..] = codes else { return None };
     (*head, *least) = (form::RUNS, u8::try_from(minimum).unwrap_or(u8::MAX));
-    let mut bits = Bits { out: codes, at: 0, pending: 0, held: 0 };
+    let mut bits = Bits::new(codes);
     let mut means = [Mean::START; 2];
     let mut index = 0;
     for_each_run(band, rows, stride, table, |length| {
@@ -167,16 +182,20 @@ fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mu
 }
 
 /// Writes bits from the top of each byte.
-struct Bits<'o> {
+pub(super) struct Bits<'o> {
     out: &'o mut [u8],
     at: usize,
     pending: u32,
     held: u32,
 }
 
-impl Bits<'_> {
+impl<'o> Bits<'o> {
+    pub(super) fn new(out: &'o mut [u8]) -> Bits<'o> {
+        Bits { out, at: 0, pending: 0, held: 0 }
+    }
+
     /// Puts the low `count` (at most 21) bits of `value`, which has no others.
-    fn put(&mut self, value: u32, count: u32) -> Option<()> {
+    pub(super) fn put(&mut self, value: u32, count: u32) -> Option<()> {
         self.pending = self.pending << count | value;
         self.held += count;
         while self.held >= 8 {
@@ -187,7 +206,7 @@ impl Bits<'_> {
         Some(())
     }
 
-    fn end(mut self) -> Option<usize> {
+    pub(super) fn end(mut self) -> Option<usize> {
         let rest = (8 - self.held % 8) % 8;
         self.put(0, rest)?;
         Some(self.at)

@@ -1,13 +1,14 @@
-//! Pass streams: one pass as on/off runs along the band walk.
+//! Pass streams: one pass as on/off runs, along the band walk or across the rows.
 //!
-//! Problem: to a raster coder a halftoned plane looks like noise, because its clusters follow the walk and not the rows.
-//! Sent as packed rows, eight planes of an A4 page are some 25 MB. Along the walk the same plane is a sequence of runs
-//! that are never shorter than the minimum cluster.
+//! Problem: to a raster coder a halftoned plane looks like noise, because its clusters follow the walk or are cells on a
+//! lattice. Sent as packed rows, eight planes of an A4 page are some 25 MB. Along the walk, a plane halftoned along it is
+//! a sequence of runs that are never shorter than the minimum cluster; across the rows, cells are runs of whole cells
+//! that are the same in several rows.
 //!
-//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in the shortest of three forms: nothing (blank
-//! bands), runs with adaptive Rice codes, or rows packed as the printer packs them. The last ensures that type, line art
-//! and solids never cost more than in the printer's own language. The decoder holds one band (38 KB for 4800 dots), one
-//! tile's table (8 KB) and some counters, and takes its input in any portions.
+//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in the shortest of four forms: nothing (blank
+//! bands), runs along the walk or across the rows with adaptive Rice codes, or rows packed as the printer packs them. The
+//! last ensures that nothing ever costs more than in the printer's own language. The decoder holds one band (38 KB for
+//! 4800 dots), one tile's table (8 KB) and some counters, and takes its input in any portions.
 //!
 //! Cost: encoding and decoding walk each inked dot once; blank dots are skipped by the run. On eight clustered
 //! planes of a full page the streams are a sixth to a seventh of the packed rows
@@ -22,6 +23,7 @@
 //! band    = 00 count                     count (1..=255) blank bands
 //!         | 01 minimum codes             runs
 //!         | 02 { row }                   rows, as many as the band is high
+//!         | 03 side codes                runs across the rows, side 1..=255
 //! row     = 00 count                     count (1..=64) rows like the one above (blank above the first)
 //!         | varint(2 * length + 1) data  length bytes of PackBits; length 0: a blank row
 //!         | varint(2 * length) data      length (> 0) plain bytes
@@ -38,10 +40,22 @@
 //! added to the sum and 1 to the count, and at a count of 64 both are halved. A run may be said to be longer than
 //! what is left of the band, and is then cut. Bits are filled from the top of each byte; the rest of the last byte
 //! is zero.
+//!
+//! *Runs across* (form 3): a row's kind in two bits, then its runs from left to right, off first, then how many further
+//! rows of the band are like it; until the band is complete. The first bit of the kind says that the runs are those of the
+//! difference (exclusive or) from the row above, which is blank above the first; the second that they are measured in
+//! cells of `side` dots. The first run is measured in dots and may be 0. Every other is its length less 1 (dot or
+//! cell). Numbers are Rice codes as above, but with fewer ones: 8 ones and a zero announce 14 plain bits, in a code of
+//! cells a run measured in dots, which follows as in a row of the same kind in dots; 9 ones mean all that is left of the
+//! row or the band. Each kind has a count and a sum for its first runs (4 and 32), its off and its on runs (4 and 32 in
+//! dots, 4 and 8 in cells); the numbers of rows have one pair (4 and 8). A row is complete when it has as many dots as the
+//! page is wide, and what would go beyond is cut.
 
+mod across;
 mod canvas;
 mod decode;
 mod encode;
+mod encode_across;
 mod header;
 mod rice;
 
@@ -64,6 +78,7 @@ mod form {
     pub const BLANK: u8 = 0;
     pub const RUNS: u8 = 1;
     pub const ROWS: u8 = 2;
+    pub const ACROSS: u8 = 3;
 }
 
 /// Bits of the first run and of an escaped one: the largest band has 65535 x 64 dots at most in theory, and

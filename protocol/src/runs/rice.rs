@@ -3,7 +3,7 @@
 /// Ones that announce a plain value.
 pub(super) const ESCAPE: u32 = 20;
 
-/// Running mean of one colour's runs.
+/// Running mean of values of one sort, such as the lengths of off runs.
 #[derive(Clone, Copy)]
 pub(super) struct Mean {
     sum: u32,
@@ -14,6 +14,9 @@ pub(super) struct Mean {
 
 impl Mean {
     pub(super) const START: Mean = Mean { sum: 32, count: 4, parameter: 3 };
+
+    /// The start for values that are mostly 0 to 3: cells and rows.
+    pub(super) const SHORT: Mean = Mean { sum: 8, count: 4, parameter: 1 };
 
     /// The parameter for the next value: at most 20, because no value counts for more than 2^20.
     pub(super) fn parameter(self) -> u32 {

@@ -81,6 +81,94 @@ fn runs_by_definition(walk: &Walk, start: u32, len: u32, minimum: u32, codes: &[
     dots
 }
 
+/// A band of runs across by the text of the format: strings of bits, each dot by itself.
+fn across_by_definition(width: usize, height: usize, side: usize, codes: &[u8]) -> Vec<Vec<bool>> {
+    let bits: Vec<u8> = codes.iter().flat_map(|byte| (0..8).rev().map(move |i| byte >> i & 1)).collect();
+    let mut bits = bits.into_iter();
+    // Counts and sums: of first runs, of off and on runs for each kind, of rows.
+    let mut pairs = vec![(4usize, 32usize); 13];
+    for pair in [4, 5, 10, 11, 12] {
+        pairs[pair] = (4, 8);
+    }
+    let pair_of = |kind: usize, index: usize| match index {
+        0 => [0, 3, 6, 9][kind],
+        _ => [[2, 1], [5, 4], [8, 7], [11, 10]][kind][index % 2],
+    };
+    let mut rows: Vec<Vec<bool>> = Vec::new();
+    while rows.len() < height {
+        let kind = usize::from(2 * bits.next().unwrap() + bits.next().unwrap());
+        let mut row =
+            if kind >= 2 && !rows.is_empty() { rows[rows.len() - 1].clone() } else { vec![false; width] };
+        // `None` is what is left.
+        let mut code = |pair: usize, cells: bool| -> Result<Option<usize>, ()> {
+            let (count, sum) = pairs[pair];
+            let k = (0..).find(|k| count << k >= sum).unwrap();
+            let quotient = (0..=8).take_while(|_| bits.next() == Some(1)).count();
+            if quotient == 9 {
+                return Ok(None);
+            }
+            let escaped = quotient == 8;
+            if escaped && cells {
+                return Err(());
+            }
+            let plain = if escaped { 14 } else { k };
+            let rest = (0..plain).fold(0, |value, _| value * 2 + usize::from(bits.next().unwrap()));
+            let value = if escaped { rest } else { (quotient << k) + rest };
+            let (count, sum) = (count + 1, sum + value.min(8 << k).min(1 << 20));
+            pairs[pair] = if count == 64 { (32, sum / 2) } else { (count, sum) };
+            Ok(Some(value))
+        };
+        let (mut x, mut index) = (0, 0);
+        while x < width {
+            let mut unit = 1;
+            let mut number = Err(());
+            if kind % 2 == 1 && index > 0 {
+                number = code(pair_of(kind, index), true);
+                unit = side;
+            }
+            if number.is_err() {
+                unit = 1;
+                number = code(pair_of(if index > 0 { kind & 2 } else { kind }, index), false);
+            }
+            let end = match number.unwrap() {
+                Some(value) => (x + (value + usize::from(index > 0)) * unit).min(width),
+                None => width,
+            };
+            for dot in &mut row[x..end] {
+                *dot ^= index % 2 == 1;
+            }
+            (x, index) = (end, index + 1);
+        }
+        let alike = code(12, false).unwrap().unwrap_or(height);
+        let alike = alike.min(height - rows.len() - 1);
+        rows.extend(vec![row; alike + 1]);
+    }
+    rows
+}
+
+/// Cells of `side` from the corner (`left`, `top`), `columns` by `rows` dots, about `share` of them on.
+fn cells(
+    (width, height): (u16, u16),
+    side: u16,
+    (left, top): (u16, u16),
+    (columns, rows): (u16, u16),
+    share: u32,
+    seed: u64,
+) -> Vec<u8> {
+    let mut plane = vec![0; stride(width) * usize::from(height)];
+    for y in top..height.min(top.saturating_add(rows)) {
+        for x in left..width.min(left.saturating_add(columns)) {
+            let cell = u64::from((y - top) / side) << 20 | u64::from((x - left) / side);
+            let mixed = (cell ^ seed).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mixed = (mixed ^ mixed >> 32).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            if (mixed >> 33) as u32 % 100 < share {
+                plane[usize::from(y) * stride(width) + usize::from(x) / 8] |= 0x80 >> (x % 8);
+            }
+        }
+    }
+    plane
+}
+
 /// A plane that has at least `cluster` dots on or off in a row along the walk, about `share` of them on.
 fn clustered(width: u16, height: u16, cluster: u32, share: u32, seed: u64) -> Vec<u8> {
     let walk = Walk::new(width, height);
@@ -134,7 +222,25 @@ fn a_plane() -> impl Strategy<Value = (u16, u16, Vec<u8>)> {
             });
     let noise =
         (1u16..300, 1u16..200, any::<u64>()).prop_map(|(w, h, seed)| (w, h, clustered(w, h, 1, 50, seed)));
-    prop_oneof![clusters, shapes, noise]
+    let lattice = (
+        (1u16..300, 1u16..200),
+        prop::sample::select(vec![1u16, 2, 3, 4, 6, 8, 24]),
+        ((0u16..100, 0u16..70), (1u16..300, 1u16..200)),
+        (0u32..101, any::<u64>()),
+    )
+        .prop_map(|(size, side, (corner, art), (share, seed))| {
+            (size.0, size.1, cells(size, side, corner, art, share, seed))
+        });
+    // Drawn shapes over cells.
+    let mixed = (lattice.clone(), shapes.clone()).prop_map(|((w, h, mut plane), (w2, h2, drawn))| {
+        for y in 0..usize::from(h.min(h2)) {
+            for x in 0..stride(w.min(w2)).saturating_sub(1) {
+                plane[y * stride(w) + x] |= drawn[y * stride(w2) + x];
+            }
+        }
+        (w, h, plane)
+    });
+    prop_oneof![clusters, shapes, noise, lattice, mixed]
 }
 
 proptest! {
@@ -168,7 +274,7 @@ proptest! {
     #[test]
     fn no_bytes_make_the_decoder_fail_other_than_by_a_defect(
         (width, height) in (1u16..400, 1u16..200),
-        form in 0u8..4,
+        form in 0u8..5,
         bytes in prop::collection::vec(prop_oneof![any::<u8>(), Just(0xff), Just(0)], 0..3000),
     ) {
         let stream: Vec<u8> = core::iter::once(form).chain(bytes).collect();
@@ -197,6 +303,86 @@ fn rows_are_those_of_the_format() {
     let rows = [[0xff, 0xff, 0xff], [0xff, 0xff, 0xff], [0, 0, 0], [0, 0, 0], [0x12, 0x34, 0]];
     let stream = [form::ROWS, 5, 0xfe, 0xff, 0, 1, 1, 0, 1, 4, 0x12, 0x34];
     assert_eq!(decoded(24, 5, &stream, core::iter::empty()), Ok(Some(rows.concat())));
+}
+
+#[test]
+fn runs_across_are_those_of_the_format() {
+    for side in [2u16, 3, 4, 6, 8] {
+        for (left, top, share) in [(0, 0, 30), (5, 7, 11), (123, 31, 70)] {
+            let (width, height) = (401, 64);
+            let mut plane = cells((width, height), side, (left, top), (250, 50), share, 9);
+            let mut band = vec![0; MAX_BAND];
+            encode_across::put_across(&plane, width, &mut band).unwrap();
+            assert_eq!((band[0], u16::from(band[1])), (form::ACROSS, side));
+            // A line beside the lattice, slanted.
+            for y in 0..height {
+                plane[usize::from(y) * stride(width) + 40 + usize::from(y / 16)] |= 0x30;
+            }
+            let length = encode_across::put_across(&plane, width, &mut band).unwrap();
+            let rows = across_by_definition(width.into(), height.into(), band[1].into(), &band[2..length]);
+            for (y, row) in rows.iter().enumerate() {
+                for (x, dot) in row.iter().enumerate() {
+                    let bit = plane[y * stride(width) + x / 8] >> (7 - x % 8) & 1 == 1;
+                    assert_eq!(*dot, bit, "side {side}, dot {x}, {y}");
+                }
+            }
+            assert_eq!(decoded(width, height, &band[..length], core::iter::repeat(1)), Ok(Some(plane)));
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_codes_across_mean_what_the_format_says(
+        (width, height) in (1u16..150, 1u16..65),
+        side in 1u8..30,
+        codes in prop::collection::vec(any::<u8>(), 3000),
+    ) {
+        let stream = [&[form::ACROSS, side][..], &codes[..], &[0; 3000]].concat();
+        let mut decoder = Decoder::new(width, height);
+        let mut memory = vec![0; band_bytes(width)];
+        let (_, step) = decoder.step(&stream, &mut memory).unwrap();
+        prop_assert_eq!(step, Step::Band { y: 0, rows: height });
+        let rows = across_by_definition(width.into(), height.into(), side.into(), &stream[2..]);
+        for (y, row) in rows.iter().enumerate() {
+            for (x, dot) in row.iter().enumerate() {
+                prop_assert_eq!(memory[y * stride(width) + x / 8] >> (7 - x % 8) & 1 == 1, *dot);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_example_across_is_read_and_written() {
+    let text = include_str!("../../../docs/wire-format.md");
+    assert!(text.contains("`03 03 50 49 2c 01 80`"));
+    let rows = [[0x0e, 0x07, 0], [0x0e, 0x07, 0], [0x0e, 0x07, 0], [0x0e, 0x07, 0x80]].concat();
+    let stream = [form::ACROSS, 3, 0x50, 0x49, 0x2c, 0x01, 0x80];
+    assert_eq!(coded(24, 4, &rows), stream);
+    assert_eq!(decoded(24, 4, &stream, core::iter::empty()), Ok(Some(rows)));
+    // Eight ones and a zero before 14 plain bits; nine for all that is left of a row, and of the band.
+    let stream = [form::ACROSS, 1, 0x3f, 0xc0, 0x02, 0xff, 0xff, 0xe0];
+    let all = [0x07, 0xff, 0xff].repeat(4);
+    assert_eq!(decoded(24, 4, &stream, core::iter::empty()), Ok(Some(all)));
+}
+
+#[test]
+fn a_band_of_runs_across_takes_a_row_at_a_time() {
+    // A full row and 63 like it.
+    let input = [form::ACROSS, 1, 0x03, 0xff, 0xff];
+    let (mut decoder, mut memory) = (Decoder::new(4800, 64), vec![0; band_bytes(4800)]);
+    let (mut read, mut slices) = (0, 0);
+    loop {
+        let (used, step) = decoder.slice(&input[read..], &mut memory).unwrap();
+        read += used;
+        slices += 1;
+        let dots: u32 = memory.iter().map(|byte| byte.count_ones()).sum();
+        assert_eq!(dots, 4800 * slices);
+        if step.is_some() {
+            assert_eq!((step, slices), (Some(Step::Band { y: 0, rows: 64 }), 64));
+            break;
+        }
+    }
 }
 
 #[test]
@@ -234,7 +420,8 @@ fn blank_bands_are_counted() {
 #[test]
 fn defects_are_found() {
     let defect = |stream: &[u8]| decoded(20, 70, stream, core::iter::empty()).unwrap_err();
-    assert_eq!(defect(&[3]), Defect::Form);
+    assert_eq!(defect(&[4]), Defect::Form);
+    assert_eq!(defect(&[form::ACROSS, 0]), Defect::Count);
     assert_eq!(defect(&[form::BLANK, 0]), Defect::Count);
     assert_eq!(defect(&[form::BLANK, 3]), Defect::Count);
     assert_eq!(defect(&[form::ROWS, 0, 65]), Defect::Count);
