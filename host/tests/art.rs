@@ -352,7 +352,7 @@ fn ten_millimetres_of_choke_are_not_more_than_ten() {
 fn line_art_prints_at_1200_dpi_in_process_inks_and_in_no_other() {
     let bench = Bench::new();
     // Lines of one dot at 1200 dpi, for 120 x 60 dots of 1/1200 inch.
-    let lines = |x: u32, _| Luma([if x % 2 == 0 { 0 } else { 255 }]);
+    let lines = |x: u32, _| Luma([if x.is_multiple_of(2) { 0 } else { 255 }]);
     GrayImage::from_fn(120, 60, lines).save(bench.path("black.png")).unwrap();
     layer(&bench, "white.png", 0..60, 0..40);
     let art = "black.png --dpi 1200 --resolution 1200 --paper postcard";

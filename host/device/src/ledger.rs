@@ -16,7 +16,7 @@ use std::io::{self, BufRead as _, BufReader, Read as _, Seek as _, SeekFrom, Wri
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use press::job::plan::{Cost, Price};
+use press::job::cost::{Cost, Price};
 use protocol::ink::Ink;
 use serde::{Deserialize, Serialize};
 
@@ -324,10 +324,7 @@ fn counted(lines: &[Line], known: impl Fn(&str) -> Option<u64>) -> Vec<Total> {
             let its: Vec<f64> = gave.iter().filter(|(ink, _)| *ink == total.ink).map(|(_, mm)| *mm).collect();
             price.ribbon_mm = (!its.is_empty()).then(|| its.iter().sum::<f64>() / its.len() as f64);
         }
-        total.cost = price.ribbon_mm.map(|mm| Cost {
-            amount: price.cartridge.amount * total.ribbon_mm / mm,
-            currency: price.cartridge.currency.clone(),
-        });
+        total.cost = price.of(total.ribbon_mm);
     }
     totals
 }

@@ -9,7 +9,7 @@ use protocol::ink::Ink;
 use device::ledger::{self, Event, Ledger, totals};
 use device::printers::Printers;
 use device::send::journal::Journal;
-use press::job::plan::Price;
+use press::job::cost::Price;
 use press::job::ribbon;
 use press::layout::Mm;
 

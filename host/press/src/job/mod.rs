@@ -1,5 +1,6 @@
 //! The plan of a job in words, in figures and as a page, and the bytes of a job.
 
+pub mod cost;
 pub(crate) mod fault;
 mod loading;
 pub mod page;

@@ -10,11 +10,12 @@ use protocol::paper::{LEFT, Paper};
 use protocol::rgl::Page;
 use serde::Serialize;
 
+use super::cost::{self, Cost, Price};
 use super::loading;
 use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
-use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Plane, Planned, Separation};
+use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
 use crate::sheet::colours::colours;
 use crate::sheet::{Area, Sheet};
 
@@ -69,32 +70,6 @@ pub struct Plan {
     pub checks: Vec<Check>,
     /// What the readers of the document or art had to assume, in sentences.
     pub notes: Vec<String>,
-}
-
-/// An amount of money.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Cost {
-    /// How much.
-    pub amount: f64,
-    /// Of what, as the owner writes it.
-    pub currency: String,
-}
-
-impl fmt::Display for Cost {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.2} {}", self.amount, self.currency)
-    }
-}
-
-/// What an owner paid for a cartridge.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Price {
-    /// Name of its ink.
-    pub ink: String,
-    /// A whole cartridge.
-    pub cartridge: Cost,
-    /// How much ribbon one gives in millimetres, if that is known.
-    pub ribbon_mm: Option<f64>,
 }
 
 /// A cartridge to load.
@@ -211,7 +186,7 @@ impl Plan {
                 number,
                 ink: planned.ink.name(),
                 dots: planned.dots,
-                share: share(laid.copies.iter().map(|copy| inked(&dots.plane, copy)).sum()),
+                share: share(laid.copies.iter().map(|copy| dots.plane.dots_in(copy)).sum()),
                 estimate: ribbon::of(&dots.plane, dpi),
             })
             .collect();
@@ -250,18 +225,10 @@ impl Plan {
         for cartridge in &mut self.cartridges {
             let Some(price) = prices.iter().find(|price| price.ink == cartridge.ink) else { continue };
             cartridge.price = Some(price.cartridge.clone());
-            cartridge.cost_estimated = price.ribbon_mm.filter(|&mm| mm > 0.0).map(|mm| Cost {
-                amount: price.cartridge.amount * cartridge.ribbon_mm_estimated / mm,
-                currency: price.cartridge.currency.clone(),
-            });
+            cartridge.cost_estimated = price.of(cartridge.ribbon_mm_estimated);
         }
-        self.costs_estimated.clear();
-        for cost in self.cartridges.iter().filter_map(|cartridge| cartridge.cost_estimated.as_ref()) {
-            match self.costs_estimated.iter_mut().find(|sum| sum.currency == cost.currency) {
-                Some(sum) => sum.amount += cost.amount,
-                None => self.costs_estimated.push(cost.clone()),
-            }
-        }
+        let costs = self.cartridges.iter().filter_map(|cartridge| cartridge.cost_estimated.as_ref());
+        self.costs_estimated = cost::sums(costs);
     }
 
     /// What the ribbon costs, in sentences; empty as long as no price is known.
@@ -294,24 +261,6 @@ impl Plan {
         }
         said
     }
-}
-
-/// Dots of a plane with ink in an area.
-fn inked(plane: &Plane, area: &Area) -> u64 {
-    let rows = plane.bits.chunks_exact(plane.stride.max(1)).skip(area.top).take(area.length);
-    let (first, end) = (area.left, (area.left + area.width).min(plane.width));
-    rows.map(|row| {
-        let whole =
-            |from: usize, to: usize| (from..to).map(|byte| u64::from(row[byte].count_ones())).sum::<u64>();
-        let single =
-            |from: usize, to: usize| (from..to).filter(|x| row[x / 8] & 0x80 >> (x % 8) != 0).count() as u64;
-        let (low, high) = (first.next_multiple_of(8), end / 8 * 8);
-        if low > high {
-            return single(first, end);
-        }
-        single(first, low) + whole(low / 8, high / 8) + single(high, end)
-    })
-    .sum()
 }
 
 /// From the corner of the paper to that of an area, in millimetres.
@@ -568,27 +517,7 @@ pub fn grouped(number: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn the_dots_of_an_area_are_counted_one_by_one(
-            width in 1usize..70, length in 1usize..9, seed: u32, corner: (u8, u8), size: (u8, u8)
-        ) {
-            let ink = |x: usize, y: usize| ((x * 9 + y) as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 19 & 1 == 1;
-            let stride = width.div_ceil(8);
-            let mut bits = vec![0u8; stride * length];
-            for (x, y) in (0..length).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| ink(x, y)) {
-                bits[y * stride + x / 8] |= 0x80 >> (x % 8);
-            }
-            let (left, top) = (usize::from(corner.0) % width, usize::from(corner.1) % length);
-            let (wide, long) = (usize::from(size.0) % (width - left + 1), usize::from(size.1) % (length - top + 1));
-            let wanted = (top..top + long).flat_map(|y| (left..left + wide).map(move |x| (x, y))).filter(|&(x, y)| ink(x, y));
-            let area = Area { left, top, width: wide, length: long };
-            prop_assert_eq!(inked(&Plane { width, length, stride, bits }, &area), wanted.count() as u64);
-        }
-    }
+    use super::grouped;
 
     #[test]
     fn thousands_stand_apart() {

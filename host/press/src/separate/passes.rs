@@ -2,6 +2,8 @@
 
 use protocol::ink::Ink;
 
+use crate::sheet::Area;
+
 /// Cartridges the printer holds.
 pub const MOST_CARTRIDGES: usize = 7;
 
@@ -28,6 +30,26 @@ impl Plane {
     /// How many dots have ink.
     pub fn dots(&self) -> u64 {
         self.bits.iter().map(|byte| u64::from(byte.count_ones())).sum()
+    }
+
+    /// How many dots of an area have ink.
+    pub(crate) fn dots_in(&self, area: &Area) -> u64 {
+        let rows = self.bits.chunks_exact(self.stride.max(1)).skip(area.top).take(area.length);
+        let (first, end) = (area.left, (area.left + area.width).min(self.width));
+        rows.map(|row| {
+            let whole = |from: usize, to: usize| {
+                (from..to).map(|byte| u64::from(row[byte].count_ones())).sum::<u64>()
+            };
+            let single = |from: usize, to: usize| {
+                (from..to).filter(|x| row[x / 8] & 0x80 >> (x % 8) != 0).count() as u64
+            };
+            let (low, high) = (first.next_multiple_of(8), end / 8 * 8);
+            if low > high {
+                return single(first, end);
+            }
+            single(first, low) + whole(low / 8, high / 8) + single(high, end)
+        })
+        .sum()
     }
 }
 
@@ -58,4 +80,29 @@ pub struct Plan {
     pub cartridges: Vec<Ink>,
     /// Whether it is certain that fewer passes cannot do.
     pub fewest: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_dots_of_an_area_are_counted_one_by_one(
+            width in 1usize..70, length in 1usize..9, seed: u32, corner: (u8, u8), size: (u8, u8)
+        ) {
+            let ink = |x: usize, y: usize| ((x * 9 + y) as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 19 & 1 == 1;
+            let stride = width.div_ceil(8);
+            let mut bits = vec![0u8; stride * length];
+            for (x, y) in (0..length).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| ink(x, y)) {
+                bits[y * stride + x / 8] |= 0x80 >> (x % 8);
+            }
+            let (left, top) = (usize::from(corner.0) % width, usize::from(corner.1) % length);
+            let (wide, long) = (usize::from(size.0) % (width - left + 1), usize::from(size.1) % (length - top + 1));
+            let wanted = (top..top + long).flat_map(|y| (left..left + wide).map(move |x| (x, y))).filter(|&(x, y)| ink(x, y));
+            let area = Area { left, top, width: wide, length: long };
+            prop_assert_eq!(Plane { width, length, stride, bits }.dots_in(&area), wanted.count() as u64);
+        }
+    }
 }

@@ -127,7 +127,8 @@ fn art_for_1200_dpi_has_twice_as_many_dots_across_and_the_same_size() {
     let bench = Bench::new();
     let fine = Options { across: 2, dpi: Some(1200.0), ..Options::default() };
     // Columns of pixels at 1200 dpi stay columns; two rows become one.
-    let columns: Vec<u8> = (0..20 * 10).map(|at| if at % 20 % 2 == 0 { 0 } else { 255 }).collect();
+    let columns: Vec<u8> =
+        (0..20 * 10).map(|at| if (at % 20usize).is_multiple_of(2) { 0 } else { 255 }).collect();
     let art = read(&[bench.grey("black.png", (20, 10), &columns)], &fine);
     assert_eq!((art.width, art.length), (20, 5));
     assert_eq!(extent(&art.layers[0]), (0, 0, 18, 4, 50));
