@@ -17,6 +17,7 @@ pub(super) mod plan;
 use rayon::prelude::*;
 
 use super::search::{self, Point};
+use super::solids::Solids;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
@@ -33,6 +34,7 @@ pub(super) fn cells(
     mix: &InkMix,
     (width, height): (usize, usize),
     minimum: &[u16],
+    solids: &Solids,
     points: Option<&[Point]>,
     observer: &dyn Observer,
 ) -> Vec<u8> {
@@ -40,14 +42,15 @@ pub(super) fn cells(
     sizes.push(BLOCK);
     sizes.sort_unstable();
     sizes.dedup();
-    let field = Field::new(mix, width, height, &sizes);
+    let field = Field::new(mix, width, height, &sizes, solids);
+    let least: Vec<u16> = field.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
     let own: Vec<usize> = field.stacks.iter().map(|&q| plan::size_of(minimum[usize::from(q)])).collect();
     let mut index = vec![0; width * height];
     observer.begin("halftone", (width * height) as u64);
     let plan = Plan::new(&field, &own, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
-        let mut strip = Strip::new(&field, &plan);
+        let mut strip = Strip::new(&field, &plan, &least);
         if first > 0 {
             strip.block_row(first - 1, &mut Target { rows: None, top: 0 });
         }

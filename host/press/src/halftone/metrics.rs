@@ -162,7 +162,7 @@ fn runs<'s>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::halftone::halftone;
+    use crate::halftone::{Method, halftone};
     use appearance::weights::{WeightMaps, quantise};
     use observe::Silent;
     use protocol::ink::Ink;
@@ -181,13 +181,13 @@ mod tests {
         ];
         let stacks = vec![Stack::SUBSTRATE, Stack::new([Ink::Cyan]), Stack::new([Ink::MetallicSilver])];
         let mix = InkMix { stacks, maps: WeightMaps::new(width, height, 2, data).unwrap(), matrix };
-        let settings = Settings { minimum: vec![9, 9, 16], ..Default::default() };
+        let settings = Settings { method: Method::Walk, minimum: vec![9, 9, 16], reflectance: None };
         let dots = halftone(&mix, (600, 500), None, &settings, &Silent).unwrap();
         let tones = tones(&mix, &dots, &Silent).unwrap();
         assert_eq!(tones.len(), 3);
         for (tone, (asked, minimum)) in tones.iter().zip([(0.5, 9), (0.125, 9), (0.375, 16)]) {
             assert!((tone.asked - asked).abs() < 1e-3, "{tone:?}");
-            assert!((tone.printed - tone.asked).abs() < 1e-4, "{tone:?}");
+            assert!((tone.printed - tone.asked).abs() < 2e-4, "{tone:?}");
             assert!(tone.shortest_run >= minimum && tone.smallest_cluster >= minimum, "{tone:?}");
             assert!(tone.mean_run >= f64::from(minimum) && tone.worst_window < 0.02, "{tone:?}");
         }

@@ -15,11 +15,13 @@ mod cells;
 pub mod eye;
 pub mod metrics;
 mod mix;
+mod regions;
 mod rule;
 mod search;
+mod solids;
 
 use inks::{Library, Stack};
-use protocol::ink::Ink;
+use protocol::ink::{Ink, Kind};
 use protocol::paper::LARGEST as LARGEST_PAGE;
 use protocol::walk::{Band, MOST, Tile, Walk};
 use rayon::prelude::*;
@@ -29,6 +31,8 @@ use appearance::brdf::{Space, Table, reflectances};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 use observe::Observer;
+
+use solids::Solids;
 
 /// The largest minimum cluster.
 pub const LARGEST: u16 = 64;
@@ -40,12 +44,14 @@ const STRIP: usize = 16;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
     /// Runs along a space-filling walk: the rule of the paper.
-    #[default]
     Walk,
     /// Compact cells with error diffusion.
+    #[default]
     Cells,
     /// Cells, then exchanged where that lessens the error the eye sees.
     Best,
+    /// Single dots scattered as evenly as error diffusion can; for process inks alone.
+    Blue,
 }
 
 /// A dot of the map of fixed dots that is halftoned.
@@ -149,6 +155,14 @@ pub enum HalftoneError {
         /// Number of stacks.
         stacks: usize,
     },
+    /// Single dots of this stack would not hold.
+    #[error(
+        "`{stack}` cannot be halftoned in single dots; only stacks of process inks can, so choose another halftone"
+    )]
+    NotProcess {
+        /// The stack.
+        stack: Stack,
+    },
     /// The map of fixed dots has another size.
     #[error("{found} fixed dots are given for {width} x {length} dots")]
     FixedSize {
@@ -196,6 +210,11 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
             return Err(HalftoneError::Sum { row, sum });
         }
     }
+    if settings.method == Method::Blue
+        && let Some(q) = (0..stacks).find(|&q| has_weight(mix, q) && !is_process(&mix.stacks[q]))
+    {
+        return Err(HalftoneError::NotProcess { stack: mix.stacks[q].clone() });
+    }
     if settings.minimum.len() != stacks {
         return Err(HalftoneError::Minima { found: settings.minimum.len(), stacks });
     }
@@ -209,6 +228,19 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
         }
     }
     Ok(crate::sheet::check_stacks(&mix.stacks)?)
+}
+
+/// Whether a stack has weight anywhere.
+fn has_weight(mix: &InkMix, q: usize) -> bool {
+    let maps = &mix.maps;
+    (0..maps.channels()).any(|channel| {
+        mix.matrix[channel][q] > 0
+            && maps.data().iter().skip(channel).step_by(maps.channels()).any(|&weight| weight > 0)
+    })
+}
+
+fn is_process(stack: &Stack) -> bool {
+    stack.layers().iter().all(|ink| ink.kind() == Kind::Process)
 }
 
 fn check_fixed(fixed: &[u8], (width, length): (u16, u16), stacks: usize) -> Result<(), HalftoneError> {
@@ -241,26 +273,31 @@ pub fn halftone(
         check_fixed(fixed, size, mix.stacks.len())?;
     }
     let (width, length) = (usize::from(size.0), usize::from(size.1));
-    let mut index = match settings.method {
-        Method::Walk => walked(mix, size, &settings.minimum, observer),
-        Method::Cells => cells::cells(mix, (width, length), &settings.minimum, None, observer),
+    let solids = Solids::new(mix, width, length, fixed);
+    let cells =
+        |minimum: &[u16], points| cells::cells(mix, (width, length), minimum, &solids, points, observer);
+    let index = match settings.method {
+        Method::Walk => walked(mix, size, &settings.minimum, &solids, observer),
+        Method::Cells => cells(&settings.minimum, None),
         Method::Best => {
             let space = Space::half_angle(SAMPLES);
             let points =
                 settings.reflectance.as_ref().map(|table| eye::Tangent::of_mix(mix, &space, table).leading());
-            cells::cells(mix, (width, length), &settings.minimum, points.as_deref(), observer)
+            cells(&settings.minimum, points.as_deref())
         }
+        Method::Blue => cells(&vec![1; mix.stacks.len()], None),
     };
-    if let Some(fixed) = fixed {
-        for (dot, &stack) in index.iter_mut().zip(fixed).filter(|(_, stack)| **stack != TONE) {
-            *dot = stack;
-        }
-    }
     Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
 }
 
 /// The dots by the rule of the paper.
-fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observer) -> Vec<u8> {
+fn walked(
+    mix: &InkMix,
+    size: (u16, u16),
+    minimum: &[u16],
+    solids: &Solids,
+    observer: &dyn Observer,
+) -> Vec<u8> {
     let walk = Walk::new(size.0, size.1);
     let lattice = mix::Lattice::new(mix, &walk);
     let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
@@ -280,7 +317,18 @@ fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observ
     }
 
     observer.begin("halftone", u64::from(walk.len()));
+    let none = solids.none();
     strips.into_par_iter().for_each(|(bands, rows)| {
+        let top = bands.first().map_or(0, |band| usize::from(band.y));
+        if !none && solids.any(0..width, top..top + rows.len() / width) {
+            let mut rest = rows;
+            for band in bands {
+                let (rows, below) = rest.split_at_mut(usize::from(band.height) * width);
+                rest = below;
+                regions::band(band, &lattice, &minimum, solids, rows, observer);
+            }
+            return;
+        }
         let tiles = || bands.iter().flat_map(|band| band.tiles());
         let dots = bands.iter().map(|band| band.len()).sum();
         let mut rule = rule::Rule::new(&minimum, dots, rule::ABSENT);
@@ -290,7 +338,7 @@ fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observ
             observer,
             rows,
             stride: width,
-            top: bands.first().map_or(0, |band| usize::from(band.y)),
+            top,
             tiles: tiles(),
             tile: None,
             line: [0; MOST + SLACK],

@@ -1,8 +1,9 @@
 //! The claims of the cells: widths by trying every square, tones by counting, regions by changing their neighbours.
 
 use super::super::eye::{Tangent, error_seen, peak, swing, thin};
+use super::super::solids::Solids;
 use super::super::{Method, Settings, halftone};
-use super::{Point, cells};
+use super::Point;
 use crate::sheet::clusters::smallest_clusters;
 use appearance::brdf::{Space, reflectances};
 use appearance::gamut::InkMix;
@@ -30,6 +31,17 @@ fn plain(width: usize, height: usize, count: usize, at: impl Fn(usize, usize) ->
     }
     let matrix = (0..count).map(|i| (0..count).map(|q| if q == i { ONE } else { 0 }).collect()).collect();
     InkMix { stacks: stacks(count), maps: WeightMaps::new(width, height, count, data).unwrap(), matrix }
+}
+
+/// Cells without fixed dots.
+fn cells(
+    mix: &InkMix,
+    (width, height): (usize, usize),
+    minimum: &[u16],
+    points: Option<&[Point]>,
+    observer: &Silent,
+) -> Vec<u8> {
+    super::cells(mix, (width, height), minimum, &Solids::new(mix, width, height, None), points, observer)
 }
 
 fn side(minimum: u16) -> usize {
