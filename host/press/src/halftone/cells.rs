@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use super::search::{self, Point};
 use super::solids::Solids;
+use super::wide::wide;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
@@ -50,15 +51,17 @@ pub(super) fn cells(
     let plan = Plan::new(&field, &own, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
-        let mut strip = Strip::new(&field, &plan, &least);
-        if first > 0 {
-            strip.block_row(first - 1, &mut Target { rows: None, top: 0 });
-        }
-        let mut target = Target { rows: Some(rows), top: first * BLOCK };
-        for row in first..first + count {
-            strip.block_row(row, &mut target);
-            observer.advance((width * BLOCK.min(height - row * BLOCK)) as u64);
-        }
+        wide(|| {
+            let mut strip = Strip::new(&field, &plan, &least);
+            if first > 0 {
+                strip.block_row(first - 1, &mut Target { rows: None, top: 0 });
+            }
+            let mut target = Target { rows: Some(rows), top: first * BLOCK };
+            for row in first..first + count {
+                strip.block_row(row, &mut target);
+                observer.advance((width * BLOCK.min(height - row * BLOCK)) as u64);
+            }
+        });
     });
     if let Some(points) = points {
         let points: Vec<Point> = field.stacks.iter().map(|&q| points[usize::from(q)]).collect();

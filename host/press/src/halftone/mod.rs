@@ -1,15 +1,20 @@
-//! One stack for every dot, in clusters large enough for the inks to hold (section 4.2 of the 2009 paper).
+//! One stack for every dot, in clusters large enough for the inks to hold.
 //!
-//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, without any cluster
-//! smaller than the minimum cluster of its stack.
-//! Method: error diffusion along the band walk ([`protocol::walk`]) of the document's rectangle, by the rule in `rule` on
-//! the mix sampled by `mix`. The walk is cut into strips of 16 bands, which are diffused independently, so that all cores
-//! work and the result does not depend on their number. A strip drops a few dots of debt at its end.
-//! Cost: under 10 ns a dot on one core for 8 stacks, 20 ns for 57. Memory: the map, one byte a dot, and a few
-//! kilobytes a thread. Limits: minimum clusters of 1 to [`LARGEST`] dots.
-//! Guarantees: every dot has a stack with weight in the document. No
-//! run along the rectangle's walk, hence no 4-connected cluster, is smaller than the minimum cluster of its stack (unless
-//! the whole rectangle is). The same input gives the same map on any machine with any number of threads.
+//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, without parts that would not hold
+//! on the paper.
+//! Method: what the art gives wholly to one stack is printed as that stack (`solids`); the tones between are halftoned by one
+//! of these:
+//! - [`Method::Cells`], the default: compact cells with error diffusion (`cells`).
+//! - [`Method::Best`]: the same, then exchanged where the eye sees less of it (`search`, `eye`).
+//! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk ([`protocol::walk`]) of the
+//!   document's rectangle, by the rule in `rule` on the mix sampled by `mix`; among solids region by region (`regions`). The
+//!   walk is cut into strips of 16 bands, which are diffused independently. A strip drops a few dots of debt at its end.
+//! - [`Method::Blue`]: the diffusion of the cells on single dots, for process inks alone.
+//!
+//! Cost and memory: see each module; the map itself has one byte a dot. Limits: minimum clusters of 1 to [`LARGEST`] dots.
+//! Guarantees: every dot has a stack with weight in the document, or the one it is fixed to. No cluster of tones is smaller
+//! than its stack's minimum cluster, but for [`Method::Blue`] and where a whole region of tones is. The same input gives the same
+//! map on any machine with any number of threads.
 
 mod cells;
 pub mod eye;
@@ -19,6 +24,7 @@ mod regions;
 mod rule;
 mod search;
 mod solids;
+mod wide;
 
 use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};

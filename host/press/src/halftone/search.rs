@@ -20,6 +20,7 @@ use rayon::prelude::*;
 
 use super::cells::field::{Field, Row};
 use super::cells::plan::{BLOCK, Plan};
+use super::wide::wide;
 
 /// Where a stack lies among all others.
 pub(super) type Point = [f32; 4];
@@ -85,17 +86,35 @@ impl Kernel {
         table
     }
 
-    /// Values for `count` cells of a side, of which the first lies `x` half dots to the right and all lie `y` below.
-    fn row(&self, size: usize, x: isize, y: isize, count: usize) -> &[Point] {
-        let (half, step) = (Kernel::half(size), 2 * size as isize);
-        let row = x.rem_euclid(step) as usize * (Kernel::DOWN + 1) + y.unsigned_abs();
-        let first = row * (2 * half + 1) + (x.div_euclid(step) + half as isize) as usize;
-        &self.tables[size][first..first + count]
+    /// Where the values begin for cells of a side of which the first lies `x` half dots to the right.
+    #[inline(always)]
+    fn column(size: usize, x: i32) -> Column {
+        let (half, step) = (Kernel::half(size), 2 * size as i32);
+        let (steps, phase) = (x.div_euclid(step), x.rem_euclid(step) as usize);
+        let first = phase * (Kernel::DOWN + 1) * (2 * half + 1);
+        Column { size, first: first + (steps + half as i32) as usize, length: 2 * half + 1 }
     }
 
-    fn at(&self, size: usize, x: isize, y: isize) -> f32 {
-        self.row(size, x, y, 1)[0][0]
+    /// Values for `count` cells from there, all `y` half dots below.
+    #[inline(always)]
+    fn row(&self, column: Column, y: i32, count: usize) -> &[Point] {
+        let first = column.first + y.unsigned_abs() as usize * column.length;
+        &self.tables[column.size][first..first + count]
     }
+
+    /// What two errors in neighbouring cells of a side have less in common than one with itself.
+    fn apart(&self, size: usize, x: i32, y: i32) -> f32 {
+        let at = |x: i32, y: i32| self.row(Kernel::column(size, x), y, 1)[0][0];
+        at(0, 0) - at(x, y)
+    }
+}
+
+/// A column of a table.
+#[derive(Clone, Copy)]
+struct Column {
+    size: usize,
+    first: usize,
+    length: usize,
 }
 
 /// Cells of one side beside each other in a row of blocks, row by row.
@@ -124,11 +143,11 @@ impl Place {
     }
 
     /// Its centre in half dots, from the part's first row.
-    fn centre(&self) -> (isize, isize) {
+    fn centre(&self) -> (i32, i32) {
         let Zone { size, left, .. } = self.zone;
         let x = 2 * left + (2 * self.i + 1) * size;
         let y = 2 * self.row * BLOCK + (2 * self.j + 1) * size;
-        (x as isize, y as isize)
+        (x as i32, y as i32)
     }
 }
 
@@ -136,6 +155,8 @@ impl Place {
 struct Part<'a> {
     kernel: &'a Kernel,
     points: &'a [Point],
+    /// By side of cells, [`Kernel::apart`] of neighbours beside each other and of diagonal ones.
+    apart: [[f32; 2]; BLOCK + 1],
     /// Zones of each row of blocks.
     zones: Vec<Vec<Zone>>,
     /// The error around each cell, as seen from it.
@@ -163,19 +184,22 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], index: &mut [
             tasks.push((rows, dots));
         }
         tasks.into_par_iter().for_each(|(rows, dots)| {
-            let mut part = Part::new(field, plan, points, &kernel, rows.clone(), dots);
             let first = if rows.start > 0 { MARGIN } else { 0 };
             let end = rows.len() - if rows.end < down { MARGIN } else { 0 };
-            for _ in 0..ROUNDS {
-                (first..end).for_each(|row| part.block_row(row));
-            }
-            part.print(field, dots);
+            wide(|| {
+                let mut part = Part::new(field, plan, points, &kernel, rows, dots);
+                for _ in 0..ROUNDS {
+                    (first..end).for_each(|row| part.block_row(row));
+                }
+                part.print(field, dots);
+            });
         });
     }
 }
 
 impl<'a> Part<'a> {
     /// The cells of some rows of blocks, whose dots these are.
+    #[inline(always)]
     fn new(
         field: &Field,
         plan: &Plan,
@@ -184,7 +208,14 @@ impl<'a> Part<'a> {
         rows: Range<usize>,
         dots: &[u8],
     ) -> Part<'a> {
+        let mut apart = [[0.0; 2]; BLOCK + 1];
+        for (size, apart) in apart.iter_mut().enumerate().filter(|&(size, _)| !kernel.tables[size].is_empty())
+        {
+            let step = 2 * size as i32;
+            *apart = [kernel.apart(size, step, 0), kernel.apart(size, step, step)];
+        }
         let mut part = Part {
+            apart,
             kernel,
             points,
             zones: Vec::new(),
@@ -211,8 +242,12 @@ impl<'a> Part<'a> {
         part.each_place(0..rows.len(), |part, place| {
             let error = errors[place.number()];
             if error != [0.0; 4] {
-                part.around(place, REACH, |kernel, cells, seen, (x, y)| {
-                    add(seen, kernel.row(cells.size, x, y, seen.len()), error);
+                part.around(place, REACH, (0, 0), |seen, own, _| {
+                    for (seen, own) in seen.iter_mut().zip(own) {
+                        for c in 0..4 {
+                            seen[c] += own[c] * error[c];
+                        }
+                    }
                 });
             }
         });
@@ -220,6 +255,7 @@ impl<'a> Part<'a> {
     }
 
     /// Calls `with` for each cell of these rows of blocks.
+    #[inline(always)]
     fn each_place(&mut self, rows: Range<usize>, mut with: impl FnMut(&mut Self, Place)) {
         for row in rows {
             for zone in self.zones[row].clone() {
@@ -233,6 +269,7 @@ impl<'a> Part<'a> {
     }
 
     /// The error of each cell: what it prints minus what it asks for. Notes its stack and those it may have.
+    #[inline(always)]
     fn errors(&mut self, field: &Field, plan: &Plan, top: usize, dots: &[u8]) -> Vec<Point> {
         let number: Vec<u8> = (0..=u8::MAX)
             .map(|stack| field.stacks.iter().position(|&known| known == stack).map_or(FIXED, |q| q as u8))
@@ -266,35 +303,39 @@ impl<'a> Part<'a> {
         errors
     }
 
-    /// Calls `with(kernel, zone, what cells see, distance of the first)` for each row of cells up to `reach` dots from a
-    /// place; distances in half dots.
+    /// Calls `with` for each row of cells up to `reach` dots from a place: what they see, the kernel about the place, and
+    /// the kernel about one that is `(right, below)` half dots from there.
     #[inline(always)]
     fn around(
         &mut self,
         place: Place,
         reach: usize,
-        mut with: impl FnMut(&Kernel, Zone, &mut [Point], (isize, isize)),
+        (right, below): (i32, i32),
+        mut with: impl FnMut(&mut [Point], &[Point], &[Point]),
     ) {
         let (cx, cy) = place.centre();
-        let (blocks, reach) = (reach.div_ceil(BLOCK), 2 * reach as isize);
+        let (blocks, reach) = (reach.div_ceil(BLOCK), 2 * reach as i32);
         let rows = place.row.saturating_sub(blocks)..(place.row + blocks + 1).min(self.zones.len());
         for row in rows {
             for &zone in &self.zones[row] {
                 // The cells whose centre is within reach on either side.
-                let first = |cell: usize, left: usize| (2 * left + (2 * cell + 1) * zone.size) as isize;
-                let (left, step) = (first(0, zone.left) - cx, 2 * zone.size as isize);
-                let from = (-reach - left + step - 1).div_euclid(step).clamp(0, zone.columns as isize);
-                let end = ((reach - left).div_euclid(step) + 1).clamp(from, zone.columns as isize);
+                let (left, step) = ((2 * zone.left + zone.size) as i32 - cx, 2 * zone.size as i32);
+                let from = (-reach - left + step - 1).div_euclid(step).clamp(0, zone.columns as i32);
+                let end = ((reach - left).div_euclid(step) + 1).clamp(from, zone.columns as i32);
                 if from == end {
                     continue;
                 }
-                let top = (2 * row * BLOCK + zone.size) as isize - cy;
-                for j in 0..BLOCK / zone.size {
-                    let y = top + step * j as isize;
+                let x = left + from * step;
+                let own = Kernel::column(zone.size, x);
+                let other = Kernel::column(zone.size, x - right);
+                let (top, count) = ((2 * row * BLOCK + zone.size) as i32 - cy, BLOCK / zone.size);
+                for j in 0..count {
+                    let y = top + step * j as i32;
                     if y.abs() <= reach {
                         let line = zone.start + j * zone.columns;
                         let seen = &mut self.seen[line + from as usize..line + end as usize];
-                        with(self.kernel, zone, seen, (left + from * step, y));
+                        let count = seen.len();
+                        with(seen, self.kernel.row(own, y, count), self.kernel.row(other, y - below, count));
                     }
                 }
             }
@@ -318,6 +359,7 @@ impl<'a> Part<'a> {
         (zone.size == place.zone.size && i < zone.columns).then_some(Place { row, zone, i, j: j % count })
     }
 
+    #[inline(always)]
     fn block_row(&mut self, row: usize) {
         self.each_place(row..row + 1, |part, place| {
             if part.stack[place.number()] != FIXED {
@@ -327,10 +369,11 @@ impl<'a> Part<'a> {
     }
 
     /// Makes the exchange of a cell with a neighbour that lessens the error most, if any does.
+    #[inline(always)]
     fn improve(&mut self, place: Place) {
         let (at, size) = (place.number(), place.zone.size);
         let (own, seen, allowed) = (self.stack[at], self.seen[at], self.allowed[at]);
-        let (area, step) = ((size * size) as f32, 2 * size as isize);
+        let (area, step, apart) = ((size * size) as f32, 2 * size as i32, self.apart[size]);
         // Differences below what rounding makes of the sums would go round in circles.
         let (mut least, mut best) = (-1e-5 * area, None);
         let inner =
@@ -356,20 +399,18 @@ impl<'a> Part<'a> {
                 linear += d * (seen[c] - self.seen[b][c]);
                 square += d * d;
             }
-            let apart = self.kernel.at(size, 0, 0) - self.kernel.at(size, dx * step, dy * step);
+            let apart = apart[usize::from(dx != 0 && dy != 0)];
             let change = 2.0 * area * linear + 2.0 * area * area * square * apart;
             if change < least {
-                (least, best) = (change, Some((there, (dx * step, dy * step))));
+                (least, best) = (change, Some((there, (dx as i32 * step, dy as i32 * step))));
             }
         }
-        if let Some((there, (right, below))) = best {
+        if let Some((there, apart)) = best {
             let b = there.number();
             let (from, to) = (self.points[usize::from(own)], self.points[usize::from(self.stack[b])]);
             self.stack.swap(at, b);
             let error: Point = std::array::from_fn(|c| area * (to[c] - from[c]));
-            self.around(place, NEAR, |kernel, zone, seen, (x, y)| {
-                let own = kernel.row(zone.size, x, y, seen.len());
-                let other = kernel.row(zone.size, x - right, y - below, seen.len());
+            self.around(place, NEAR, apart, |seen, own, other| {
                 for ((seen, own), other) in seen.iter_mut().zip(own).zip(other) {
                     for c in 0..4 {
                         seen[c] += (own[c] - other[c]) * error[c];
@@ -391,14 +432,5 @@ impl<'a> Part<'a> {
                 }
             }
         });
-    }
-}
-
-/// Adds an error to what some cells see of it.
-fn add(seen: &mut [Point], kernel: &[Point], error: Point) {
-    for (seen, kernel) in seen.iter_mut().zip(kernel) {
-        for c in 0..4 {
-            seen[c] += kernel[c] * error[c];
-        }
     }
 }

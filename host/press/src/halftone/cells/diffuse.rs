@@ -62,6 +62,7 @@ impl<'a> Strip<'a> {
     }
 
     /// One row of blocks.
+    #[inline(always)]
     pub(super) fn block_row(&mut self, row: usize, target: &mut Target) {
         let (plan, across) = (self.plan, self.plan.across);
         for column in 0..across {
@@ -93,6 +94,7 @@ impl<'a> Strip<'a> {
     }
 
     /// The cells of a block that begin at row `y` of it.
+    #[inline(always)]
     fn cells(&mut self, row: usize, column: usize, y: usize, target: &mut Target) {
         let plan = self.plan;
         let block = &plan.blocks[row * plan.across + column];
@@ -174,6 +176,7 @@ impl<'a> Strip<'a> {
 
     /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present
     /// stack with most of it; the lowest among equals. Absent stacks hand some of theirs to those present.
+    #[inline(always)]
     fn choose(&mut self, slot: usize) -> usize {
         let slots = self.slots[slot..slot + self.field.lanes].as_chunks::<LANES>().0;
         let (want, carry) = (self.want.as_chunks::<LANES>().0, self.carry.as_chunks::<LANES>().0);
@@ -221,6 +224,7 @@ impl<'a> Strip<'a> {
     }
 
     /// Decides the stack of a unit that asks for `self.want`, and hands on what it owes.
+    #[inline(always)]
     fn decide(&mut self, (x, y): (usize, usize), size: usize, area: usize, whole: bool, calm: bool) -> usize {
         let lanes = self.field.lanes;
         let slot = self.slot(x) * lanes;

@@ -162,6 +162,7 @@ impl<'a> Field<'a> {
     }
 
     /// Adds channels times matrix.
+    #[inline(always)]
     fn shares(&self, channels: &[f32], out: &mut [f32]) {
         for (&weight, shares) in channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
             if weight > 0.0 {
@@ -176,6 +177,7 @@ impl<'a> Field<'a> {
     }
 
     /// Pixels of a row of cells, taken down the axis.
+    #[inline(always)]
     pub(in crate::halftone) fn row(&self, size: usize, row: usize, out: &mut Row) {
         let (first, parts) = Field::spans(&self.down, size).get(row);
         let (maps, all, count) = (&self.mix.maps, self.mix.maps.channels(), self.channels.len());
@@ -202,6 +204,7 @@ impl<'a> Field<'a> {
     }
 
     /// What a whole cell of a row asks for, in dots: into `out`.
+    #[inline(always)]
     pub(in crate::halftone) fn cell(&self, size: usize, column: usize, row: &mut Row, out: &mut [f32]) {
         let (first, parts) = Field::spans(&self.across, size).get(column);
         let count = self.channels.len();

@@ -26,7 +26,7 @@ const FULL: u32 = (1 << BLOCK) - 1;
 const SIZES: [usize; 8] = [1, 2, 3, 4, 6, 8, 12, 24];
 
 /// Side of the cells of a stack: the smallest whose square holds the minimum cluster.
-pub(super) fn size_of(minimum: u16) -> usize {
+pub(in crate::halftone) fn size_of(minimum: u16) -> usize {
     SIZES.into_iter().find(|size| size * size >= usize::from(minimum)).unwrap_or(BLOCK)
 }
 
