@@ -367,7 +367,8 @@ mod tests {
         assert_eq!(tones.len(), 3);
         for (tone, (asked, minimum)) in tones.iter().zip([(0.5, 9), (0.125, 9), (0.375, 16)]) {
             assert!((tone.asked - asked).abs() < 1e-3, "{tone:?}");
-            assert!((tone.printed - tone.asked).abs() < 2e-4, "{tone:?}");
+            // The first column is solid, so each of the eight bands drops a few dots of debt.
+            assert!((tone.printed - tone.asked).abs() < 5e-4, "{tone:?}");
             assert!(tone.shortest_run >= minimum && tone.smallest_cluster >= minimum, "{tone:?}");
             assert!(tone.mean_run >= f64::from(minimum) && tone.worst_window < 0.02, "{tone:?}");
         }
