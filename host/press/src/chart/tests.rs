@@ -144,7 +144,10 @@ fn a_machine_that_is_measured_and_corrected_prints_the_crosses_where_they_belong
 #[test]
 fn charts_refuse_what_shows_nothing() {
     let library = Library::builtin();
-    assert!(matches!(ramp(&stack("C"), &stack("C"), Method::Cells, &library, &Silent), Err(ChartError::Same { .. })));
+    assert!(matches!(
+        ramp(&stack("C"), &stack("C"), Method::Cells, &library, &Silent),
+        Err(ChartError::Same { .. })
+    ));
     let small = calibration(Ink::Black, Paper::Postcard, &[]).unwrap_err().to_string();
     assert!(small.contains("postcard") && small.contains("a4"), "{small}");
 }
