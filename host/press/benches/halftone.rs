@@ -9,7 +9,7 @@ use divan::Bencher;
 use inks::{Library, Stack};
 use observe::Silent;
 use press::halftone::metrics::tones;
-use press::halftone::{Settings, halftone};
+use press::halftone::{Method, Settings, halftone};
 use press::separate::{compose, separate};
 use press::sheet::{DotMap, Sheet};
 use protocol::ink::Ink;
@@ -58,18 +58,35 @@ fn page() -> (u16, u16) {
     (Paper::A4.width(), Paper::A4.length())
 }
 
-/// A full A4 page of so many active stacks, all with a minimum of 9 dots.
-#[divan::bench(args = [8, 57], sample_count = 5)]
-fn one_minimum(bencher: Bencher, count: usize) {
-    let (mix, settings) = (document(count), Settings::uniform(count, 9));
+/// What a method needs to know of these stacks; all have a minimum of 9 dots.
+fn settings(mix: &InkMix, method: Method) -> Settings {
+    let count = mix.stacks.len();
+    Settings { method, minimum: vec![9; count], ..Settings::from_library(&mix.stacks, &Library::builtin()) }
+}
+
+/// A full A4 page of so many active stacks by each method.
+#[divan::bench(args = [8, 57], consts = [0, 1, 2], sample_count = 5)]
+fn methods<const METHOD: usize>(bencher: Bencher, count: usize) {
+    let mix = document(count);
+    let settings = settings(&mix, [Method::Walk, Method::Cells, Method::Best][METHOD]);
     bencher.bench(|| halftone(&mix, page(), None, &settings, &Silent).expect("a valid mix"));
 }
 
-/// The same with metallic silver, and all stacks on it, at 16 dots.
+/// The same in single dots of four stacks of process inks.
+#[divan::bench(sample_count = 5)]
+fn single_dots(bencher: Bencher) {
+    let mut mix = document(5);
+    mix.stacks = ["substrate", "C", "M", "Y", "K"].map(|stack| stack.parse().expect("known inks")).to_vec();
+    let settings = settings(&mix, Method::Blue);
+    bencher.bench(|| halftone(&mix, page(), None, &settings, &Silent).expect("a valid mix"));
+}
+
+/// By the walk with metallic silver, and all stacks on it, at 16 dots.
 #[divan::bench(args = [8, 57], sample_count = 5)]
 fn two_minima(bencher: Bencher, count: usize) {
     let mix = document(count);
-    let settings = Settings::of(&mix.stacks, 9, |ink| if ink == Ink::MetallicSilver { 16 } else { 9 });
+    let minima = Settings::of(&mix.stacks, 9, |ink| if ink == Ink::MetallicSilver { 16 } else { 9 });
+    let settings = Settings { method: Method::Walk, ..minima };
     bencher.bench(|| halftone(&mix, page(), None, &settings, &Silent).expect("a valid mix"));
 }
 

@@ -9,7 +9,7 @@ use inks::{InkSet, Library};
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
-use press::layers;
+use press::{halftone, layers};
 
 use super::choice::choice;
 use observe::Observer;
@@ -128,6 +128,14 @@ impl InkArgs {
             None => Library::builtin(),
         })
     }
+}
+
+/// How mixtures become dots.
+#[derive(Args, Debug)]
+pub struct HalftoneArg {
+    /// How the stack of each dot is chosen where the art has tones; solid dots are printed as they are
+    #[arg(long, value_name = "METHOD", default_value = "cells", value_parser = choice::<halftone::Method>())]
+    pub halftone: halftone::Method,
 }
 
 /// How to map materials to the inks.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 
-use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
+use super::args::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
 use super::choice::choice;
 use super::layout::{LayoutArgs, MediaArgs};
 use super::output::{self, Kind, Staged};
@@ -15,7 +15,7 @@ use appearance::document::{self, ColourSpace, foil};
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, Printable};
 use observe::Observer;
-use press::halftone::Method;
+use press::halftone::metrics;
 use press::layout::{self, Size};
 use press::pipeline::{self, document as stages};
 use press::separate;
@@ -132,9 +132,8 @@ pub struct Halftone {
     /// [default: the document's own size, else as large as a4 allows]
     #[arg(long)]
     size: Option<Size>,
-    /// How the stack of each dot is chosen
-    #[arg(long, value_name = "METHOD", default_value = "walk", value_parser = choice::<Method>())]
-    halftone: Method,
+    #[command(flatten)]
+    halftone: HalftoneArg,
     /// Folder of your own ink library; its minimum clusters apply [default: the built-in library]
     #[arg(long, value_name = "DIR")]
     library: Option<PathBuf>,
@@ -154,10 +153,14 @@ impl Halftone {
         let size = layout::size::dots(pixels, provenance.size_mm, self.size, &any)?;
         let staged = Staged::folder(&named(&self.output, &self.mix, "dots"), Kind::Dots)?;
         let settings = halftone::Settings {
-            method: self.halftone,
+            method: self.halftone.halftone,
             ..halftone::Settings::from_library(&mix.stacks, &library)
         };
-        halftone::halftone(&mix, size, None, &settings, observer)?.save(staged.create()?)?;
+        let dots = halftone::halftone(&mix, size, None, &settings, observer)?;
+        dots.save(staged.create()?)?;
+        if let Some(look) = metrics::look(&mix, &dots, &settings)? {
+            observer.note(&look.to_string());
+        }
         staged.commit()
     }
 }

@@ -6,7 +6,7 @@ use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use serde_json::Value;
 
-use super::args::InkArgs;
+use super::args::{HalftoneArg, InkArgs};
 use super::deliver::DeliverArgs;
 use super::job::{Artwork, JobArgs, ResultArgs};
 use super::layout::{MediaArgs, ink};
@@ -22,6 +22,7 @@ use press::sheet::DotMap;
     foilpress chart ramp silver-foil metallic-silver     (figure 2 of the paper)\n  \
     foilpress chart ladder                               (figure 5: four levels of gloss, MS+F to MS)\n  \
     foilpress chart ladder C+M+Y+F C+M+Y\n  \
+    foilpress chart halftone                             (black on paper by each halftone)\n  \
     foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
     foilpress chart registration --inks black,cyan,white\n  \
     foilpress chart calibration --to serial:/dev/ttyACM0")]
@@ -36,6 +37,8 @@ enum Chart {
     Ramp(Ramp),
     /// Print four levels of gloss between a glossy and a dull stack, both clamped and with their differences kept
     Ladder(Ladder),
+    /// Print a ramp and flat patches by each halftone side by side, to see how they differ
+    Halftone(Halftone),
     /// Print a labelled patch of every stack that the chosen inks can make
     Stacks(Stacks),
     /// Print verniers between the first ink and each other ink, to measure how far apart passes land
@@ -51,6 +54,8 @@ struct Ramp {
     first: Stack,
     /// Stack on the right
     second: Stack,
+    #[command(flatten)]
+    halftone: HalftoneArg,
     #[command(flatten)]
     step: StepArgs,
 }
@@ -73,6 +78,20 @@ struct Ladder {
     /// Duller stack
     #[arg(default_value = "MS")]
     dull: Stack,
+    #[command(flatten)]
+    halftone: HalftoneArg,
+    #[command(flatten)]
+    step: StepArgs,
+}
+
+#[derive(ClapArgs, Debug)]
+struct Halftone {
+    /// First stack: short or long names of inks joined by +, from the bottom
+    #[arg(default_value = "K", requires = "second")]
+    first: Stack,
+    /// Second stack; substrate is the bare paper
+    #[arg(default_value = "substrate")]
+    second: Stack,
     #[command(flatten)]
     step: StepArgs,
 }
@@ -123,9 +142,17 @@ const USUAL: &str = "process,metallic-silver,metallic-gold,finish";
 /// Runs `chart`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.chart {
-        Chart::Ramp(Ramp { first, second, step }) => step.run("ramp", chart::ramp, [first, second], observer),
-        Chart::Ladder(Ladder { glossy, dull, step }) => {
-            step.run("ladder", chart::ladder, [glossy, dull], observer)
+        Chart::Ramp(Ramp { first, second, halftone, step }) => {
+            let make = |library: &Library| chart::ramp(first, second, halftone.halftone, library, observer);
+            step.run("ramp", make, [first, second], observer)
+        }
+        Chart::Ladder(Ladder { glossy, dull, halftone, step }) => {
+            let make = |library: &Library| chart::ladder(glossy, dull, halftone.halftone, library, observer);
+            step.run("ladder", make, [glossy, dull], observer)
+        }
+        Chart::Halftone(Halftone { first, second, step }) => {
+            let make = |library: &Library| chart::halftones(first, second, library, observer);
+            step.run("halftone", make, [first, second], observer)
         }
         Chart::Stacks(stacks) => {
             let usual = InkArgs { inks: Some(USUAL.into()), library: stacks.inks.library.clone() };
@@ -161,8 +188,6 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 /// What to do with what was measured on the calibration chart, printed on it.
 const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", "       --distance Dmm"];
 
-type Make = fn(&Stack, &Stack, &Library, &dyn Observer) -> Result<DotMap, chart::ChartError>;
-
 fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Library) -> Artwork<'a> {
     Artwork { name, dots, allowed, library, notes: &[], report: Value::Null, advice: String::new() }
 }
@@ -176,12 +201,12 @@ impl StepArgs {
     fn run(
         &self,
         name: &str,
-        make: Make,
+        make: impl FnOnce(&Library) -> Result<DotMap, chart::ChartError>,
         [first, second]: [&Stack; 2],
         observer: &dyn Observer,
     ) -> Result<()> {
         let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
-        let dots = make(first, second, &library, observer)?;
+        let dots = make(&library)?;
         let name = format!("{name} {first} {second}");
         // Who names a foil wants it.
         let artwork = artwork(&name, &dots, InkSet::ALL, &library);

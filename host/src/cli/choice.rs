@@ -12,6 +12,11 @@ pub trait Choice: Copy + Send + Sync + 'static {
     const ALL: &'static [(Self, &'static str, &'static str)];
 }
 
+/// The name of a value.
+pub fn name<T: Choice + PartialEq>(value: T) -> &'static str {
+    T::ALL.iter().find(|(known, ..)| *known == value).map_or("", |(_, name, _)| name)
+}
+
 /// Reads a value by its name. Help and completion list the names.
 pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     let names = T::ALL.iter().map(|(_, name, help)| {
@@ -70,8 +75,13 @@ impl Choice for Intent {
 impl Choice for press::halftone::Method {
     const ALL: &'static [(press::halftone::Method, &'static str, &'static str)] = &[
         (press::halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
-        (press::halftone::Method::Cells, "cells", "Compact square clusters; solid dots exactly as drawn"),
+        (
+            press::halftone::Method::Cells,
+            "cells",
+            "Compact square clusters, no part thinner than its ink holds",
+        ),
         (press::halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
+        (press::halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
     ];
 }
 

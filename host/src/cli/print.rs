@@ -8,8 +8,8 @@ use image::RgbImage;
 use inks::{InkSet, Library};
 use serde_json::{Value, json};
 
-use super::args::{DocumentArgs, FactorArgs, GamutArgs, InkArgs};
-use super::choice::choice;
+use super::args::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
+use super::choice::name;
 use super::deliver::DeliverArgs;
 use super::job::{self, Places, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
@@ -17,7 +17,7 @@ use super::preset::PresetArg;
 use appearance::brdf::reflectances;
 use appearance::document::Document;
 use observe::Observer;
-use press::halftone::Method;
+use press::halftone::{self, metrics};
 use press::layout::{Layout, Mm, Size};
 use press::pipeline::document::{self, Halftoned, Settings};
 use press::pipeline::{self, Draft, Request};
@@ -48,9 +48,8 @@ pub struct Work {
     pub factor: FactorArgs,
     #[command(flatten)]
     pub gamut: GamutArgs,
-    /// How the stack of each dot is chosen
-    #[arg(long, value_name = "METHOD", default_value = "walk", value_parser = choice::<Method>())]
-    pub halftone: Method,
+    #[command(flatten)]
+    pub halftone: HalftoneArg,
     #[command(flatten)]
     pub inks: InkArgs,
     #[command(flatten)]
@@ -88,7 +87,7 @@ impl Work {
             factor: self.factor.settings(),
             gamut: self.gamut.settings(self.factor.seed),
             inks,
-            halftone: self.halftone,
+            halftone: self.halftone.halftone,
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
@@ -151,7 +150,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
          obvious).",
         pictures.fidelity.mean
     );
-    let report = report(&laid, &pictures.fidelity);
+    let report = report(&laid, &pictures.fidelity, observer)?;
     made.finish(report, (&advice, "sheet.png"), &args.result, &args.deliver, observer)
 }
 
@@ -197,8 +196,12 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
 }
 
 /// What the report of a document says beside what every report says.
-fn report(laid: &Laid, fidelity: &preview::Report) -> Value {
-    let Laid { document, settings, halftoned, .. } = laid;
+fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> Result<Value> {
+    let Laid { document, library, settings, halftoned, .. } = laid;
+    let mix = &halftoned.mapped.mix;
+    let chosen = halftone::Settings::from_library(&mix.stacks, library);
+    let look = metrics::look(mix, &halftoned.dots, &chosen)?;
+    let tones = metrics::tones(mix, &halftoned.dots, observer)?;
     let mapped = &halftoned.mapped.report;
     let bases: Vec<_> = mapped
         .bases
@@ -227,7 +230,7 @@ fn report(laid: &Laid, fidelity: &preview::Report) -> Value {
             "merged_pairs": p.merged, "clamped_share": p.clamped,
         })
     });
-    json!({
+    Ok(json!({
         "document": { "name": document.name, "sha256": document.digest, "notes": document.notes },
         "seed": settings.factor.seed,
         "factoring": halftoned.factoring,
@@ -238,5 +241,6 @@ fn report(laid: &Laid, fidelity: &preview::Report) -> Value {
         "fidelity": {
             "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,
         },
-    })
+        "halftone": { "method": name(settings.halftone), "look": look, "tones": tones },
+    }))
 }

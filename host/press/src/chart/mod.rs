@@ -1,17 +1,19 @@
 //! Charts: dot maps made by the program itself, to look at inks, to measure them, and to measure the printer.
 //!
 //! [`ramp`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
-//! [`registration()`] shows how far passes are apart, [`calibration()`] where the printer starts and how far it feeds. Each gives
+//! [`halftones`] the halftones, [`registration()`] shows how far passes are apart, [`calibration()`] where the printer starts and how far it feeds. Each gives
 //! a [`DotMap`](crate::sheet::DotMap) that is laid out and printed like any other.
 
 pub mod calibration;
 mod error;
+mod methods;
 mod registration;
 mod sketch;
 mod steps;
 
 pub use calibration::calibration;
 pub use error::ChartError;
+pub use methods::halftones;
 pub use registration::registration;
 pub use steps::{ladder, ramp, stacks};
 

@@ -10,7 +10,7 @@ use embedded_graphics::text::{Baseline, Text};
 use inks::{Library, Stack};
 
 use super::error::ChartError;
-use crate::halftone::{self, halftone};
+use crate::halftone::{self, Method, halftone};
 use crate::layout::Mm;
 use crate::sheet::{DotMap, SheetError};
 use appearance::gamut::InkMix;
@@ -93,6 +93,7 @@ impl Sketch {
         (x, y, width, length): Place,
         [a, b]: [&Stack; 2],
         share: &[f64],
+        method: Method,
         library: &Library,
         observer: &dyn Observer,
     ) -> Result<(), ChartError> {
@@ -115,7 +116,8 @@ impl Sketch {
         let (wide, long) = (width as u16, length as u16);
         let maps = WeightMaps::new(share.len(), 1, 2, weights)?;
         let mix = InkMix { stacks, maps, matrix };
-        let settings = halftone::Settings::from_library(&mix.stacks, library);
+        let settings =
+            halftone::Settings { method, ..halftone::Settings::from_library(&mix.stacks, library) };
         let patch = halftone(&mix, (wide, long), None, &settings, observer)?;
         let numbers: Vec<u8> = mix.stacks.iter().map(|stack| self.number(stack)).collect();
         for (row, dots) in patch.index().chunks_exact(width).enumerate() {

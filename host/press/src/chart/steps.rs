@@ -6,12 +6,13 @@ use protocol::paper::Paper;
 
 use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
+use crate::halftone::Method;
 use crate::separate::MOST_CARTRIDGES;
 use crate::sheet::DotMap;
 use observe::Observer;
 
 /// Scale of labels: letters 3.4 mm high.
-const LABEL: usize = 4;
+pub(super) const LABEL: usize = 4;
 /// Shares along a ramp: finer than an eye sees.
 const STEPS: usize = 1024;
 
@@ -21,7 +22,7 @@ const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
 const INKS: [f64; 2] = [0.5, 0.1];
 
 /// What labels and checkerboards are printed in: black, unless the stacks fill all seven places without it.
-fn pen(stacks: &[&Stack]) -> Stack {
+pub(super) fn pen(stacks: &[&Stack]) -> Stack {
     let mut inks: Vec<Ink> = stacks.iter().flat_map(|stack| stack.layers().iter().copied()).collect();
     inks.sort_unstable();
     inks.dedup();
@@ -31,7 +32,7 @@ fn pen(stacks: &[&Stack]) -> Stack {
     Stack::new([other.copied().unwrap_or(Ink::Black)])
 }
 
-fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), ChartError> {
+pub(super) fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), ChartError> {
     if a == b {
         return Err(ChartError::Same { chart, stack: a.clone() });
     }
@@ -40,7 +41,13 @@ fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), ChartError> {
 
 /// Figure 2: all of `a` at the left, all of `b` at the right, 150 mm apart; below it a checkerboard to cut out and hold so
 /// that the ramp reflects it.
-pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) -> Result<DotMap, ChartError> {
+pub fn ramp(
+    a: &Stack,
+    b: &Stack,
+    method: Method,
+    library: &Library,
+    observer: &dyn Observer,
+) -> Result<DotMap, ChartError> {
     two("ramp", a, b)?;
     let (width, strip) = (mm(150.0), mm(30.0));
     let line = LINE * LABEL;
@@ -53,7 +60,7 @@ pub fn ramp(a: &Stack, b: &Stack, library: &Library, observer: &dyn Observer) ->
     sketch.text(0, 0, LABEL, &pen, &a.to_string());
     sketch.text_to(width, 0, LABEL, &pen, &b.to_string());
     let shares: Vec<f64> = (0..STEPS).map(|i| 1.0 - (i as f64 + 0.5) / STEPS as f64).collect();
-    sketch.halftone((0, head, width, strip), [a, b], &shares, library, observer)?;
+    sketch.halftone((0, head, width, strip), [a, b], &shares, method, library, observer)?;
     for tenth in 0..=10 {
         let x = (width - 6) * tenth / 10;
         sketch.fill((x, foot, 6, if tenth % 5 == 0 { mm(3.0) } else { mm(1.5) }), &pen);
@@ -82,6 +89,7 @@ fn ladder_shares(gloss: f64) -> [f64; 2] {
 pub fn ladder(
     glossy: &Stack,
     dull: &Stack,
+    method: Method,
     library: &Library,
     observer: &dyn Observer,
 ) -> Result<DotMap, ChartError> {
@@ -97,7 +105,7 @@ pub fn ladder(
         for (column, gloss) in GLOSS.into_iter().enumerate() {
             let place = (column * step, top + line + mm(1.0), patch, patch);
             let share = ladder_shares(gloss)[row];
-            sketch.halftone(place, [glossy, dull], &[share], library, observer)?;
+            sketch.halftone(place, [glossy, dull], &[share], method, library, observer)?;
             let label = format!("{:.0} %", 100.0 * gloss);
             sketch.text(place.0, place.1 + patch + mm(1.0), LABEL, &pen, &label);
         }

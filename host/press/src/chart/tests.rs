@@ -1,4 +1,5 @@
 use super::*;
+use crate::halftone::Method;
 use crate::layout::{Layout, Mm, Point, Profile, arrange};
 use crate::sheet::DotMap;
 use inks::{Library, Stack};
@@ -23,7 +24,7 @@ fn count(chart: &DotMap, (x, y, width, length): (usize, usize, usize, usize), wa
 
 #[test]
 fn a_ramp_has_the_tone_of_its_place() {
-    let chart = ramp(&stack("MS"), &stack("MS+C"), &Library::builtin(), &Silent).unwrap();
+    let chart = ramp(&stack("MS"), &stack("MS+C"), Method::Cells, &Library::builtin(), &Silent).unwrap();
     let top = chart.index().chunks(chart.width()).position(|row| row.iter().all(|&dot| dot != 0)).unwrap();
     let length = 30 * 600 / 25;
     for tenth in 0..10 {
@@ -38,7 +39,7 @@ fn a_ramp_has_the_tone_of_its_place() {
 
 #[test]
 fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
-    let chart = ladder(&stack("SF"), &stack("MS"), &Library::builtin(), &Silent).unwrap();
+    let chart = ladder(&stack("SF"), &stack("MS"), Method::Cells, &Library::builtin(), &Silent).unwrap();
     let (patch, gap) = (709, 94);
     let share = |row: usize, column: usize| {
         // In the middle of the patch, clear of its labels.
@@ -143,7 +144,27 @@ fn a_machine_that_is_measured_and_corrected_prints_the_crosses_where_they_belong
 #[test]
 fn charts_refuse_what_shows_nothing() {
     let library = Library::builtin();
-    assert!(matches!(ramp(&stack("C"), &stack("C"), &library, &Silent), Err(ChartError::Same { .. })));
+    assert!(matches!(
+        ramp(&stack("C"), &stack("C"), Method::Cells, &library, &Silent),
+        Err(ChartError::Same { .. })
+    ));
     let small = calibration(Ink::Black, Paper::Postcard, &[]).unwrap_err().to_string();
     assert!(small.contains("postcard") && small.contains("a4"), "{small}");
+}
+
+/// Each column has the tones it says, on the same places; its labels stand clear of the patches.
+#[test]
+fn the_halftones_have_the_same_tones() {
+    let print = |a: &str, b: &str| halftones(&stack(a), &stack(b), &Library::builtin(), &Silent).unwrap();
+    let chart = print("K", "substrate");
+    let (patch, column, row) = ((944, 354), 944 + 94, 80 + 24 + 354 + 47);
+    assert_eq!(chart.width(), 4 * column - 94);
+    for method in 0..4 {
+        for (j, want) in [0.5, 0.02, 0.1, 0.3, 0.5].into_iter().enumerate() {
+            let place = (method * column, 80 + 47 + j * row + 80 + 24, patch.0, patch.1);
+            let share = count(&chart, place, "K") as f64 / (patch.0 * patch.1) as f64;
+            assert!((share - want).abs() < 0.003, "method {method}, patch {j}: {share} {want}");
+        }
+    }
+    assert_eq!(print("SF", "MS").width(), 3 * column - 94);
 }

@@ -17,6 +17,8 @@ pub(super) mod plan;
 use rayon::prelude::*;
 
 use super::search::{self, Point};
+use super::solids::Solids;
+use super::wide::wide;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
@@ -33,6 +35,7 @@ pub(super) fn cells(
     mix: &InkMix,
     (width, height): (usize, usize),
     minimum: &[u16],
+    solids: &Solids,
     points: Option<&[Point]>,
     observer: &dyn Observer,
 ) -> Vec<u8> {
@@ -40,22 +43,25 @@ pub(super) fn cells(
     sizes.push(BLOCK);
     sizes.sort_unstable();
     sizes.dedup();
-    let field = Field::new(mix, width, height, &sizes);
+    let field = Field::new(mix, width, height, &sizes, solids);
+    let least: Vec<u16> = field.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
     let own: Vec<usize> = field.stacks.iter().map(|&q| plan::size_of(minimum[usize::from(q)])).collect();
     let mut index = vec![0; width * height];
     observer.begin("halftone", (width * height) as u64);
     let plan = Plan::new(&field, &own, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
-        let mut strip = Strip::new(&field, &plan);
-        if first > 0 {
-            strip.block_row(first - 1, &mut Target { rows: None, top: 0 });
-        }
-        let mut target = Target { rows: Some(rows), top: first * BLOCK };
-        for row in first..first + count {
-            strip.block_row(row, &mut target);
-            observer.advance((width * BLOCK.min(height - row * BLOCK)) as u64);
-        }
+        wide(|| {
+            let mut strip = Strip::new(&field, &plan, &least);
+            if first > 0 {
+                strip.block_row(first - 1, &mut Target { rows: None, top: 0 });
+            }
+            let mut target = Target { rows: Some(rows), top: first * BLOCK };
+            for row in first..first + count {
+                strip.block_row(row, &mut target);
+                observer.advance((width * BLOCK.min(height - row * BLOCK)) as u64);
+            }
+        });
     });
     if let Some(points) = points {
         let points: Vec<Point> = field.stacks.iter().map(|&q| points[usize::from(q)]).collect();

@@ -11,7 +11,10 @@
 //! autocorrelation of 0.05 from chance.
 //! Source: R. Nasanen (1984) for the contrast sensitivity, exp(-f / (0.525 ln L + 3.91)), f in cycles per degree.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
+
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
 
 use appearance::brdf::{Space, Table};
 use appearance::gamut::InkMix;
@@ -66,7 +69,8 @@ impl Tangent {
     }
 
     /// Every two stacks are equally far apart.
-    pub fn plain(stacks: usize) -> Tangent {
+    #[cfg(test)]
+    fn plain(stacks: usize) -> Tangent {
         Tangent {
             points: (0..stacks).map(|q| (0..stacks).map(|i| f64::from(u8::from(i == q))).collect()).collect(),
         }
@@ -101,11 +105,6 @@ impl Tangent {
         Tangent { points }
     }
 
-    /// Stacks at known points.
-    pub fn from_points(points: &[[f32; 4]]) -> Tangent {
-        Tangent { points: points.iter().map(|point| point.iter().map(|&c| f64::from(c)).collect()).collect() }
-    }
-
     /// The four coordinates in which stacks differ most.
     pub fn leading(&self) -> Vec<[f32; 4]> {
         let first =
@@ -124,32 +123,41 @@ fn sensitivity(f: f64) -> f64 {
     (-f / (0.525 * LUMINANCE.ln() + 3.91)).exp()
 }
 
-/// Root mean square of the error seen from a distance in metres, in units of the metric. `index` is the stack of each dot
-/// in rows of `width`, `asked` the share of each stack at each dot; both sides are powers of two.
-pub fn error_seen(width: usize, index: &[u8], asked: &[f32], tangent: &Tangent, metres: f64) -> f64 {
-    let (height, stacks) = (index.len() / width, tangent.points.len());
-    let coordinates = tangent.points.first().map_or(0, Vec::len);
-    // Dots of a degree of the eye's view.
-    let degree = 2.0 * (PI / 360.0).tan() * metres * DOTS;
-    let mut sum = 0.0;
-    for coordinate in 0..coordinates {
-        let mut image: Vec<Complex> = index
-            .iter()
-            .zip(asked.chunks_exact(stacks))
-            .map(|(&dot, shares)| {
-                let mean: f64 =
-                    shares.iter().zip(&tangent.points).map(|(&a, p)| f64::from(a) * p[coordinate]).sum();
-                (tangent.points[usize::from(dot)][coordinate] - mean, 0.0)
-            })
-            .collect();
+/// Root mean square of an error as it is seen from some distances in metres, in units of the metric. Each plane is one
+/// coordinate of the error, in rows of `width` dots.
+pub fn errors_seen(planes: &[Vec<f64>], width: usize, metres: &[f64]) -> Vec<f64> {
+    let mut sums = vec![0.0; metres.len()];
+    let dots = planes.first().map_or(0, Vec::len);
+    // Two real planes make one complex image, whose power is the sum of theirs where frequencies weigh the same both ways.
+    for pair in planes.chunks(2) {
+        let second = |at: usize| pair.get(1).map_or(0.0, |plane| plane[at]);
+        let mut image: Vec<Complex<f64>> =
+            pair[0].iter().enumerate().map(|(at, &first)| Complex::new(first, second(at))).collect();
         transform(&mut image, width);
-        for (at, (re, im)) in image.iter().enumerate() {
-            let (x, y) = (signed(at % width, width), signed(at / width, height));
-            let seen = sensitivity(x.hypot(y) * degree);
-            sum += seen * seen * (re * re + im * im);
+        for (at, value) in image.iter().enumerate() {
+            let f = signed(at % width, width).hypot(signed(at / width, dots / width));
+            for (sum, metres) in sums.iter_mut().zip(metres) {
+                // Dots of a degree of the eye's view.
+                let seen = sensitivity(f * 2.0 * (PI / 360.0).tan() * metres * DOTS);
+                *sum += seen * seen * value.norm_sqr();
+            }
         }
     }
-    (sum / (index.len() as f64 * index.len() as f64)).sqrt()
+    sums.iter().map(|sum| (sum / (dots as f64 * dots as f64)).sqrt()).collect()
+}
+
+/// The error of a halftone in each coordinate. `index` is the stack of each dot, `asked` the share of each stack at each.
+pub fn error_planes(index: &[u8], asked: &[f32], tangent: &Tangent) -> Vec<Vec<f64>> {
+    let stacks = tangent.points.len();
+    let error = |c: usize| {
+        let dots = index.iter().zip(asked.chunks_exact(stacks));
+        dots.map(|(&dot, shares)| {
+            let mean: f64 = shares.iter().zip(&tangent.points).map(|(&a, p)| f64::from(a) * p[c]).sum();
+            tangent.points[usize::from(dot)][c] - mean
+        })
+        .collect()
+    };
+    (0..tangent.points.first().map_or(0, Vec::len)).map(error).collect()
 }
 
 /// Frequency of a coefficient in cycles a dot.
@@ -159,7 +167,7 @@ fn signed(at: usize, length: usize) -> f64 {
 }
 
 /// Largest magnitude of the autocorrelation of a stack's dots at lags of more than `near` and at most `far` dots, and the
-/// lag. 0 for a stack that is everywhere or nowhere. Both sides are powers of two.
+/// lag. 0 for a stack that is everywhere or nowhere.
 pub fn peak(width: usize, index: &[u8], stack: u8, near: f64, far: usize) -> (f64, (i32, i32)) {
     let height = index.len() / width;
     let mean = index.iter().filter(|&&dot| dot == stack).count() as f64 / index.len() as f64;
@@ -169,13 +177,13 @@ pub fn peak(width: usize, index: &[u8], stack: u8, near: f64, far: usize) -> (f6
     }
     // Padded to twice the sides, so that nothing meets its own other end.
     let (wide, high) = (2 * width, 2 * height);
-    let mut image = vec![(0.0, 0.0); wide * high];
+    let mut image = vec![Complex::default(); wide * high];
     for (at, &dot) in index.iter().enumerate() {
-        image[at / width * wide + at % width].0 = f64::from(u8::from(dot == stack)) - mean;
+        image[at / width * wide + at % width].re = f64::from(u8::from(dot == stack)) - mean;
     }
     transform(&mut image, wide);
     for value in &mut image {
-        *value = (value.0 * value.0 + value.1 * value.1, 0.0);
+        *value = Complex::new(value.norm_sqr(), 0.0);
     }
     // The power is symmetric, so the transform back is the transform.
     transform(&mut image, wide);
@@ -189,7 +197,7 @@ pub fn peak(width: usize, index: &[u8], stack: u8, near: f64, far: usize) -> (f6
             }
             let overlap = (width as f64 - f64::from(x.abs())) * (height as f64 - f64::from(y));
             let at = y as usize * wide + x.rem_euclid(wide as i32) as usize;
-            let value = (image[at].0 / (wide * high) as f64 / overlap / variance).abs();
+            let value = (image[at].re / (wide * high) as f64 / overlap / variance).abs();
             if value > most.0 {
                 most = (value, (x, y));
             }
@@ -239,60 +247,21 @@ pub fn thin(width: usize, index: &[u8], side: impl Fn(u8) -> usize, free: impl F
     (0..index.len()).filter(|&at| !free[at] && !covered(at % width, at / width)).count() as u64
 }
 
-type Complex = (f64, f64);
-
-/// Discrete Fourier transform of rows of `width`, in place. Both sides are powers of two.
-fn transform(image: &mut [Complex], width: usize) {
+/// Discrete Fourier transform of rows of `width`, in place.
+fn transform(image: &mut [Complex<f64>], width: usize) {
     let height = image.len() / width;
-    let turns = |n: usize| -> Vec<Complex> {
-        (0..n / 2)
-            .map(|k| {
-                let (s, c) = (-TAU * k as f64 / n as f64).sin_cos();
-                (c, s)
-            })
-            .collect()
-    };
-    let (across, down) = (turns(width), turns(height));
-    for row in image.chunks_exact_mut(width) {
-        line(row, &across);
-    }
-    let mut column = vec![(0.0, 0.0); height];
+    let mut planner = FftPlanner::new();
+    planner.plan_fft_forward(width).process(image);
+    let down = planner.plan_fft_forward(height);
+    let mut column = vec![Complex::default(); height];
     for x in 0..width {
         for (y, value) in column.iter_mut().enumerate() {
             *value = image[y * width + x];
         }
-        line(&mut column, &down);
+        down.process(&mut column);
         for (y, value) in column.iter().enumerate() {
             image[y * width + x] = *value;
         }
-    }
-}
-
-/// One line, by halves (Cooley and Tukey); `turns` are the roots of unity.
-fn line(values: &mut [Complex], turns: &[Complex]) {
-    let n = values.len();
-    if n < 2 {
-        return;
-    }
-    let shift = usize::BITS - n.trailing_zeros();
-    for i in 0..n {
-        let j = i.reverse_bits() >> shift;
-        if i < j {
-            values.swap(i, j);
-        }
-    }
-    let mut half = 1;
-    while half < n {
-        let step = n / (2 * half);
-        for part in values.chunks_exact_mut(2 * half) {
-            let (low, high) = part.split_at_mut(half);
-            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
-                let (c, s) = turns[k * step];
-                let turned = (b.0 * c - b.1 * s, b.0 * s + b.1 * c);
-                (*a, *b) = ((a.0 + turned.0, a.1 + turned.1), (a.0 - turned.0, a.1 - turned.1));
-            }
-        }
-        half *= 2;
     }
 }
 
@@ -300,35 +269,16 @@ fn line(values: &mut [Complex], turns: &[Complex]) {
 mod tests {
     use super::*;
 
-    /// The sum itself, for an image with sides that differ.
-    #[test]
-    fn the_transform_is_the_sum_of_turned_values() {
-        let (width, height) = (8usize, 4usize);
-        let image: Vec<Complex> = (0..32u32).map(|i| (f64::from(i * i % 7), f64::from(i % 3))).collect();
-        let mut fast = image.clone();
-        transform(&mut fast, width);
-        for (at, fast) in fast.iter().enumerate() {
-            let (u, v) = (at % width, at / width);
-            let (mut re, mut im) = (0.0, 0.0);
-            for (i, &(a, b)) in image.iter().enumerate() {
-                let turn = (u * (i % width)) as f64 / width as f64 + (v * (i / width)) as f64 / height as f64;
-                let (s, c) = (-TAU * turn).sin_cos();
-                (re, im) = (re + a * c - b * s, im + a * s + b * c);
-            }
-            assert!(
-                (fast.0 - re).abs() < 1e-9 && (fast.1 - im).abs() < 1e-9,
-                "{at}: {fast:?}, not {re}, {im}"
-            );
-        }
-    }
-
     /// A grating of one frequency: its amplitude over the root of two, times the sensitivity.
     #[test]
     fn a_grating_is_seen_by_its_frequency() {
         let (width, height) = (256, 64);
         let index: Vec<u8> = (0..width * height).map(|at| u8::from(at % 32 < 16)).collect();
         let asked = vec![0.5f32; 2 * width * height];
-        let seen = |metres: f64| error_seen(width, &index, &asked, &Tangent::plain(2), metres);
+        let seen = |metres: f64| {
+            let planes = error_planes(&index, &asked, &Tangent::plain(2));
+            errors_seen(&planes, width, &[metres])[0]
+        };
         // Two coordinates; a square wave of +-1/2 in 32 samples has a first harmonic of 1 / (16 sin(pi/32)).
         let degree = 2.0 * (PI / 360.0).tan() * 4.0 * DOTS;
         let first = 1.0 / (16.0 * (PI / 32.0).sin()) * sensitivity(degree / 32.0);

@@ -1,4 +1,4 @@
-//! Measures how well a sheet keeps the mix and the minimum clusters.
+//! Measures how well a halftone keeps the mix and the minimum clusters, and how it looks.
 //!
 //! Problem: the quality of a halftone depends on its tones, over the page and over a window that the eye averages, and on its
 //! smallest clusters, which decide whether foil sticks.
@@ -7,15 +7,18 @@
 //! rows. Cost: about that of the halftone for tones, 20 ns a run for clusters. Memory: 12 bytes for each run of a row.
 
 use inks::Stack;
-use protocol::walk::{Tile, Walk};
+use protocol::walk::{EDGE, MOST, Tile, Walk};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::eye::{self, Tangent};
 use super::mix::Lattice;
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
-use super::{HalftoneError, Settings, check};
+use super::solids::Solids;
+use super::{HalftoneError, SAMPLES, Settings, TONE, cells, check};
 use crate::sheet::DotMap;
 use crate::sheet::clusters::smallest_clusters;
+use appearance::brdf::Space;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
@@ -159,10 +162,187 @@ fn runs<'s>(
     found
 }
 
+/// How a halftone looks, on some windows of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Look {
+    /// Distance of the eye in metres, and the error seen from there, root mean square in units of the metric.
+    pub seen: Vec<(f64, f64)>,
+    /// Share of the dots that are no solids and lie in parts too thin for their stack, 0..=1.
+    pub thin: f64,
+    /// Of flat windows: the largest autocorrelation of the rarest stack beyond three of its mean spacings.
+    pub peak: Option<f64>,
+    /// Of flat windows: the spread of that stack's share over rows or columns, in units of independent clusters.
+    pub swing: Option<f64>,
+}
+
+impl std::fmt::Display for Look {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let seen: Vec<String> =
+            self.seen.iter().map(|(eye, error)| format!("d {error:.4} from {eye} m")).collect();
+        write!(f, "the eye sees {} of the halftone", seen.join(", "))?;
+        write!(f, "; {:.1} % of its tones are in parts too thin for their inks", 100.0 * self.thin)?;
+        match self.peak {
+            Some(peak) if peak > 0.1 => write!(f, "; a flat area repeats (autocorrelation {peak:.2})"),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Sides of a window, and how many there are along either side of the rectangle.
+const WINDOW: usize = 512;
+const WINDOWS: usize = 4;
+
+/// From how far one looks, in metres.
+const EYES: [f64; 3] = [0.3, 0.5, 1.0];
+
+/// How a halftone of this mix looks, on at most 16 windows of it that lie evenly; `None` without reflectances in the
+/// settings, or for a rectangle smaller than an eighth of a window.
+///
+/// # Errors
+/// As [`super::halftone`], or a dot map of other stacks.
+pub fn look(mix: &InkMix, dots: &DotMap, settings: &Settings) -> Result<Option<Look>, HalftoneError> {
+    let side = |dots: usize| u16::try_from(dots).unwrap_or(u16::MAX);
+    let size = (side(dots.width()), side(dots.length()));
+    check(mix, size, settings)?;
+    if dots.stacks() != mix.stacks {
+        return Err(HalftoneError::OtherStacks);
+    }
+    let Some(table) = &settings.reflectance else { return Ok(None) };
+    let wide = (dots.width().min(WINDOW), dots.length().min(WINDOW));
+    if wide.0.min(wide.1) < WINDOW / 8 {
+        return Ok(None);
+    }
+    let points = Tangent::of_mix(mix, &Space::half_angle(SAMPLES), table).leading();
+    let solids = Solids::new(mix, dots.width(), dots.length(), None);
+    let walk = Walk::new(size.0, size.1);
+    let lattice = Lattice::new(mix, &walk);
+    let starts = |length: usize, window: usize| -> Vec<usize> {
+        let count = (length / window).clamp(1, WINDOWS);
+        (0..count).map(|i| (length - window) * (2 * i + 1) / (2 * count)).collect()
+    };
+    let columns = starts(dots.width(), wide.0);
+    let corners: Vec<(usize, usize)> = starts(dots.length(), wide.1)
+        .into_iter()
+        .flat_map(|y| columns.iter().map(move |&x| (x, y)))
+        .collect();
+    let windows: Vec<Measured> = corners
+        .into_par_iter()
+        .map(|corner| {
+            Window { lattice: &lattice, walk: &walk, dots, corner, wide }.measure(&points, &solids, settings)
+        })
+        .collect();
+    let count = windows.len() as f64;
+    let mean = |eye: usize| (windows.iter().map(|w| w.seen[eye].powi(2)).sum::<f64>() / count).sqrt();
+    let largest = |of: fn(&Measured) -> Option<f64>| windows.iter().filter_map(of).reduce(f64::max);
+    let tones = windows.iter().map(|w| w.tones).sum::<u64>().max(1);
+    Ok(Some(Look {
+        seen: EYES.iter().enumerate().map(|(i, &eye)| (eye, mean(i))).collect(),
+        thin: windows.iter().map(|w| w.thin).sum::<u64>() as f64 / tones as f64,
+        peak: largest(|w| w.flat.map(|flat| flat.0)),
+        swing: largest(|w| w.flat.map(|flat| flat.1)),
+    }))
+}
+
+/// A window of a halftone.
+struct Window<'a> {
+    lattice: &'a Lattice<'a>,
+    walk: &'a Walk,
+    dots: &'a DotMap,
+    corner: (usize, usize),
+    wide: (usize, usize),
+}
+
+/// What was found in a window.
+struct Measured {
+    seen: Vec<f64>,
+    tones: u64,
+    thin: u64,
+    /// Peak and swing, where the window is flat.
+    flat: Option<(f64, f64)>,
+}
+
+impl Window<'_> {
+    fn measure(&self, points: &[[f32; 4]], solids: &Solids, settings: &Settings) -> Measured {
+        let (width, length) = self.wide;
+        let index: Vec<u8> = (0..length)
+            .flat_map(|y| {
+                &self.dots.index()[(self.corner.1 + y) * self.dots.width() + self.corner.0..][..width]
+            })
+            .copied()
+            .collect();
+        let (planes, shares) = self.errors(&index, points);
+        let side = |stack: u8| cells::plan::size_of(settings.minimum[usize::from(stack)]);
+        let free = |at: usize| solids.at(self.corner.0 + at % width, self.corner.1 + at / width) != TONE;
+        let tones = (0..index.len()).filter(|&at| !free(at)).count() as u64;
+        let flat = shares.and_then(|shares| {
+            let rare = (0..shares.len()).filter(|&q| shares[q] > 0.0 && shares[q] < 1.0);
+            let rare = rare.min_by(|&a, &b| shares[a].total_cmp(&shares[b]))?;
+            let (stack, side) = (rare as u8, side(rare as u8));
+            let near = 3.0 * side as f64 / f64::from(shares[rare]).sqrt();
+            let (rows, columns) = eye::swing(width, &index, stack, side);
+            Some((eye::peak(width, &index, stack, near, width.min(length) / 4).0, rows.max(columns)))
+        });
+        Measured {
+            seen: eye::errors_seen(&planes, width, &EYES),
+            tones,
+            thin: eye::thin(width, &index, side, free),
+            flat,
+        }
+    }
+
+    /// The error in each coordinate, and the share of each stack if it is the same everywhere.
+    fn errors(&self, index: &[u8], points: &[[f32; 4]]) -> (Vec<Vec<f64>>, Option<Vec<f32>>) {
+        let ((left, top), (width, length)) = (self.corner, self.wide);
+        let mut planes = vec![vec![0.0; index.len()]; 4];
+        let mut weights = vec![Lanes::default(); blocks(self.lattice.stacks.len())];
+        let (mut first, mut same) = (None, true);
+        for tile in self.walk.bands().flat_map(|band| band.tiles()) {
+            let (x, y) = (usize::from(tile.x), usize::from(tile.y));
+            let beside = x >= left + width || x + usize::from(tile.w) <= left;
+            if beside || y >= top + length || y + usize::from(tile.h) <= top {
+                continue;
+            }
+            let mut curve = [0; MOST];
+            let area = tile.fill(&mut curve);
+            let mut along = self.lattice.along(std::iter::once(tile));
+            let mut done = 0;
+            while done < area {
+                let stretch = along.stretch(&mut weights) as usize;
+                same &= *first.get_or_insert_with(|| weights.clone()) == weights;
+                let mut mean = [0.0; 4];
+                for (lane, &q) in self.lattice.stacks.iter().enumerate() {
+                    let share = f64::from(weights[lane / LANES].0[lane % LANES]) / f64::from(UNIT);
+                    for (mean, coordinate) in mean.iter_mut().zip(points[usize::from(q)]) {
+                        *mean += share * f64::from(coordinate);
+                    }
+                }
+                for &place in &curve[done..(done + stretch).min(area)] {
+                    let (x, y) = (x + usize::from(place % EDGE), y + usize::from(place / EDGE));
+                    if (left..left + width).contains(&x) && (top..top + length).contains(&y) {
+                        let at = (y - top) * width + x - left;
+                        for (c, plane) in planes.iter_mut().enumerate() {
+                            plane[at] = f64::from(points[usize::from(index[at])][c]) - mean[c];
+                        }
+                    }
+                }
+                done += stretch;
+            }
+        }
+        let shares = first.filter(|_| same).map(|weights: Vec<Lanes>| {
+            let mut shares = vec![0.0; self.dots.stacks().len()];
+            for (lane, &q) in self.lattice.stacks.iter().enumerate() {
+                shares[usize::from(q)] = weights[lane / LANES].0[lane % LANES] as f32 / UNIT as f32;
+            }
+            shares
+        });
+        (planes, shares)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::halftone::halftone;
+    use crate::halftone::{Method, halftone};
     use appearance::weights::{WeightMaps, quantise};
     use observe::Silent;
     use protocol::ink::Ink;
@@ -181,13 +361,14 @@ mod tests {
         ];
         let stacks = vec![Stack::SUBSTRATE, Stack::new([Ink::Cyan]), Stack::new([Ink::MetallicSilver])];
         let mix = InkMix { stacks, maps: WeightMaps::new(width, height, 2, data).unwrap(), matrix };
-        let settings = Settings { minimum: vec![9, 9, 16], ..Default::default() };
+        let settings = Settings { method: Method::Walk, minimum: vec![9, 9, 16], reflectance: None };
         let dots = halftone(&mix, (600, 500), None, &settings, &Silent).unwrap();
         let tones = tones(&mix, &dots, &Silent).unwrap();
         assert_eq!(tones.len(), 3);
         for (tone, (asked, minimum)) in tones.iter().zip([(0.5, 9), (0.125, 9), (0.375, 16)]) {
             assert!((tone.asked - asked).abs() < 1e-3, "{tone:?}");
-            assert!((tone.printed - tone.asked).abs() < 1e-4, "{tone:?}");
+            // The first column is solid, so each of the eight bands drops a few dots of debt.
+            assert!((tone.printed - tone.asked).abs() < 5e-4, "{tone:?}");
             assert!(tone.shortest_run >= minimum && tone.smallest_cluster >= minimum, "{tone:?}");
             assert!(tone.mean_run >= f64::from(minimum) && tone.worst_window < 0.02, "{tone:?}");
         }
@@ -197,5 +378,41 @@ mod tests {
         assert_eq!(super::tones(&mix, &two, &Silent), Err(HalftoneError::OtherStacks));
         let total: f64 = tones.iter().map(|tone| tone.runs as f64 * tone.mean_run).sum();
         assert!((total - 300_000.0).abs() < 1e-3);
+    }
+
+    /// A flat patch: the walk repeats and is thin, cells do neither, and less is seen of them.
+    #[test]
+    fn the_look_tells_the_methods_apart() {
+        let stacks: Vec<Stack> = ["substrate", "K"].map(|name| name.parse().unwrap()).to_vec();
+        let mut data = vec![0; 2];
+        quantise(&[0.9, 0.1], &mut data);
+        let whole = appearance::weights::ONE;
+        let mix = InkMix {
+            stacks,
+            maps: WeightMaps::new(1, 1, 2, data).unwrap(),
+            matrix: vec![vec![whole, 0], vec![0, whole]],
+        };
+        let library = inks::Library::builtin();
+        let look = |method| {
+            let settings = Settings { method, ..Settings::from_library(&mix.stacks, &library) };
+            let dots = halftone(&mix, (640, 640), None, &settings, &Silent).unwrap();
+            super::look(&mix, &dots, &settings).unwrap().unwrap()
+        };
+        let (walk, cells, best) = (look(Method::Walk), look(Method::Cells), look(Method::Best));
+        assert!(
+            walk.peak > Some(0.3) && cells.peak < Some(0.1) && best.peak < Some(0.1),
+            "{walk:?} {cells:?}"
+        );
+        assert!(walk.thin > 0.05 && cells.thin == 0.0 && best.thin == 0.0, "{walk:?} {cells:?} {best:?}");
+        for eye in 0..2 {
+            let (walk, cells, best) = (walk.seen[eye].1, cells.seen[eye].1, best.seen[eye].1);
+            assert!(cells < 0.8 * walk && best < cells, "{walk} {cells} {best}");
+        }
+        let other = InkMix { stacks: mix.stacks.iter().rev().cloned().collect(), ..mix.clone() };
+        let settings = Settings::from_library(&mix.stacks, &library);
+        assert!(
+            super::look(&other, &DotMap::new(9, 9, mix.stacks.clone(), vec![0; 81]).unwrap(), &settings)
+                .is_err()
+        );
     }
 }

@@ -195,12 +195,26 @@ impl<'a> Lattice<'a> {
         self.shapes.iter().find(|shape| shape.fits(tile)).unwrap_or(&self.shapes[0])
     }
 
+    /// The mix along these tiles, from a dot of the curve of the first.
+    pub(super) fn along_from<T: Iterator<Item = Tile>>(&self, mut tiles: T, offset: usize) -> Along<'_, T> {
+        let tile = tiles.next().map(|tile| {
+            let shape = self.shape(&tile);
+            // All stretches but the last are equally long.
+            let dots = usize::from(shape.stretches[0].2);
+            (tile, shape, offset / dots, (offset % dots) as u32)
+        });
+        let (skip, tile) =
+            (tile.map_or(0, |tile| tile.3), tile.map(|(tile, shape, at, _)| (tile, shape, at)));
+        Along { tile, skip, ..self.along(tiles) }
+    }
+
     /// The mix along these tiles.
     pub(super) fn along<T: Iterator<Item = Tile>>(&self, tiles: T) -> Along<'_, T> {
         Along {
             lattice: self,
             tiles,
             tile: None,
+            skip: 0,
             weights: vec![0; self.mix.maps.channels()],
             sums: vec![0; self.mix.maps.channels()],
             mixed: None,
@@ -293,6 +307,8 @@ pub(super) struct Along<'a, T> {
     lattice: &'a Lattice<'a>,
     tiles: T,
     tile: Option<(Tile, &'a Shape, usize)>,
+    /// Dots at the beginning of the next stretch that are left out.
+    skip: u32,
     weights: Vec<u32>,
     sums: Vec<u64>,
     /// The place of the last mix, which flat or enlarged documents often need again.
@@ -329,7 +345,7 @@ impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
             _ => lattice.over(x, y, &mut self.sums, &mut self.weights),
         }
         lattice.shares(&self.weights, out);
-        u32::from(dots)
+        u32::from(dots) - std::mem::take(&mut self.skip)
     }
 }
 

@@ -1,25 +1,33 @@
-//! One stack for every dot, in clusters large enough for the inks to hold (section 4.2 of the 2009 paper).
+//! One stack for every dot, in clusters large enough for the inks to hold.
 //!
-//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, without any cluster
-//! smaller than the minimum cluster of its stack.
-//! Method: error diffusion along the band walk ([`protocol::walk`]) of the document's rectangle, by the rule in `rule` on
-//! the mix sampled by `mix`. The walk is cut into strips of 16 bands, which are diffused independently, so that all cores
-//! work and the result does not depend on their number. A strip drops a few dots of debt at its end.
-//! Cost: under 10 ns a dot on one core for 8 stacks, 20 ns for 57. Memory: the map, one byte a dot, and a few
-//! kilobytes a thread. Limits: minimum clusters of 1 to [`LARGEST`] dots.
-//! Guarantees: every dot has a stack with weight in the document. No
-//! run along the rectangle's walk, hence no 4-connected cluster, is smaller than the minimum cluster of its stack (unless
-//! the whole rectangle is). The same input gives the same map on any machine with any number of threads.
+//! Problem: a continuous mix of stacks becomes a [`DotMap`] whose local means are the mix, without parts that would not hold
+//! on the paper.
+//! Method: what the art gives wholly to one stack is printed as that stack (`solids`); the tones between are halftoned by one
+//! of these:
+//! - [`Method::Cells`], the default: compact cells with error diffusion (`cells`).
+//! - [`Method::Best`]: the same, then exchanged where the eye sees less of it (`search`, `eye`).
+//! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk ([`protocol::walk`]) of the
+//!   document's rectangle, by the rule in `rule` on the mix sampled by `mix`; among solids region by region (`regions`). The
+//!   walk is cut into strips of 16 bands, which are diffused independently. A strip drops a few dots of debt at its end.
+//! - [`Method::Blue`]: the diffusion of the cells on single dots, for process inks alone.
+//!
+//! Cost and memory: see each module; the map itself has one byte a dot. Limits: minimum clusters of 1 to [`LARGEST`] dots.
+//! Guarantees: every dot has a stack with weight in the document, or the one it is fixed to. No cluster of tones is smaller
+//! than its stack's minimum cluster, but for [`Method::Blue`] and where a whole region of tones is. The same input gives the same
+//! map on any machine with any number of threads.
 
 mod cells;
 pub mod eye;
 pub mod metrics;
 mod mix;
+mod regions;
 mod rule;
 mod search;
+mod solids;
+mod wide;
 
 use inks::{Library, Stack};
-use protocol::ink::Ink;
+use protocol::ink::{Ink, Kind};
 use protocol::walk::{Band, MOST, Tile, Walk};
 use rayon::prelude::*;
 
@@ -28,6 +36,8 @@ use appearance::brdf::{Space, Table, reflectances};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 use observe::Observer;
+
+use solids::Solids;
 
 /// The largest minimum cluster.
 pub const LARGEST: u16 = 64;
@@ -42,12 +52,14 @@ const STRIP: usize = 16;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
     /// Runs along a space-filling walk: the rule of the paper.
-    #[default]
     Walk,
     /// Compact cells with error diffusion.
+    #[default]
     Cells,
     /// Cells, then exchanged where that lessens the error the eye sees.
     Best,
+    /// Single dots scattered as evenly as error diffusion can; for process inks alone.
+    Blue,
 }
 
 /// A dot of the map of fixed dots that is halftoned.
@@ -151,6 +163,14 @@ pub enum HalftoneError {
         /// Number of stacks.
         stacks: usize,
     },
+    /// Single dots of this stack would not hold.
+    #[error(
+        "`{stack}` cannot be halftoned in single dots; only stacks of process inks can, so choose another halftone"
+    )]
+    NotProcess {
+        /// The stack.
+        stack: Stack,
+    },
     /// The map of fixed dots has another size.
     #[error("{found} fixed dots are given for {width} x {length} dots")]
     FixedSize {
@@ -198,6 +218,11 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
             return Err(HalftoneError::Sum { row, sum });
         }
     }
+    if settings.method == Method::Blue
+        && let Some(q) = (0..stacks).find(|&q| has_weight(mix, q) && !is_process(&mix.stacks[q]))
+    {
+        return Err(HalftoneError::NotProcess { stack: mix.stacks[q].clone() });
+    }
     if settings.minimum.len() != stacks {
         return Err(HalftoneError::Minima { found: settings.minimum.len(), stacks });
     }
@@ -211,6 +236,19 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
         }
     }
     Ok(crate::sheet::check_stacks(&mix.stacks)?)
+}
+
+/// Whether a stack has weight anywhere.
+fn has_weight(mix: &InkMix, q: usize) -> bool {
+    let maps = &mix.maps;
+    (0..maps.channels()).any(|channel| {
+        mix.matrix[channel][q] > 0
+            && maps.data().iter().skip(channel).step_by(maps.channels()).any(|&weight| weight > 0)
+    })
+}
+
+fn is_process(stack: &Stack) -> bool {
+    stack.layers().iter().all(|ink| ink.kind() == Kind::Process)
 }
 
 fn check_fixed(fixed: &[u8], (width, length): (u16, u16), stacks: usize) -> Result<(), HalftoneError> {
@@ -243,26 +281,31 @@ pub fn halftone(
         check_fixed(fixed, size, mix.stacks.len())?;
     }
     let (width, length) = (usize::from(size.0), usize::from(size.1));
-    let mut index = match settings.method {
-        Method::Walk => walked(mix, size, &settings.minimum, observer),
-        Method::Cells => cells::cells(mix, (width, length), &settings.minimum, None, observer),
+    let solids = Solids::new(mix, width, length, fixed);
+    let cells =
+        |minimum: &[u16], points| cells::cells(mix, (width, length), minimum, &solids, points, observer);
+    let index = match settings.method {
+        Method::Walk => walked(mix, size, &settings.minimum, &solids, observer),
+        Method::Cells => cells(&settings.minimum, None),
         Method::Best => {
             let space = Space::half_angle(SAMPLES);
             let points =
                 settings.reflectance.as_ref().map(|table| eye::Tangent::of_mix(mix, &space, table).leading());
-            cells::cells(mix, (width, length), &settings.minimum, points.as_deref(), observer)
+            cells(&settings.minimum, points.as_deref())
         }
+        Method::Blue => cells(&vec![1; mix.stacks.len()], None),
     };
-    if let Some(fixed) = fixed {
-        for (dot, &stack) in index.iter_mut().zip(fixed).filter(|(_, stack)| **stack != TONE) {
-            *dot = stack;
-        }
-    }
     Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
 }
 
 /// The dots by the rule of the paper.
-fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observer) -> Vec<u8> {
+fn walked(
+    mix: &InkMix,
+    size: (u16, u16),
+    minimum: &[u16],
+    solids: &Solids,
+    observer: &dyn Observer,
+) -> Vec<u8> {
     let walk = Walk::new(size.0, size.1);
     let lattice = mix::Lattice::new(mix, &walk);
     let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
@@ -282,7 +325,18 @@ fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observ
     }
 
     observer.begin("halftone", u64::from(walk.len()));
+    let none = solids.none();
     strips.into_par_iter().for_each(|(bands, rows)| {
+        let top = bands.first().map_or(0, |band| usize::from(band.y));
+        if !none && solids.any(0..width, top..top + rows.len() / width) {
+            let mut rest = rows;
+            for band in bands {
+                let (rows, below) = rest.split_at_mut(usize::from(band.height) * width);
+                rest = below;
+                regions::band(band, &lattice, &minimum, solids, rows, observer);
+            }
+            return;
+        }
         let tiles = || bands.iter().flat_map(|band| band.tiles());
         let dots = bands.iter().map(|band| band.len()).sum();
         let mut rule = rule::Rule::new(&minimum, dots, rule::ABSENT);
@@ -292,7 +346,7 @@ fn walked(mix: &InkMix, size: (u16, u16), minimum: &[u16], observer: &dyn Observ
             observer,
             rows,
             stride: width,
-            top: bands.first().map_or(0, |band| usize::from(band.y)),
+            top,
             tiles: tiles(),
             tile: None,
             line: [0; MOST + SLACK],

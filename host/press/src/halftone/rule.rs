@@ -101,6 +101,7 @@ struct Ahead {
 }
 
 /// The stacks with one minimum cluster, and the window of that many dots.
+#[derive(Default)]
 struct Class {
     min_cluster: u32,
     /// -1 for each stack of this class.
@@ -207,6 +208,19 @@ impl Rule {
         }
     }
 
+    /// Begins another walk of `dots` dots with the debts that the one before left.
+    pub(super) fn resume(&mut self, dots: u32) {
+        // At the end all windows are empty, so the demands are the debts.
+        for class in &mut self.classes {
+            *class = Class { until: 0, front: 0, stretch: 0, end: 0, used: 0, ..std::mem::take(class) };
+        }
+        self.horizon = self.classes.len().saturating_sub(1);
+        self.seen.fill(Lanes::default());
+        self.last.fill(Lanes::default());
+        self.ahead.spare.extend(self.ahead.held.drain(..));
+        (self.ahead.first, self.known, self.dots, self.next_check) = (0, 0, dots, self.absent);
+    }
+
     /// Walks to the end.
     #[inline(always)]
     pub(super) fn walk<S: Source, K: Sink>(&mut self, source: &mut S, sink: &mut K) {
@@ -217,13 +231,11 @@ impl Rule {
         let (mut at, mut current) = (0u32, None);
         while at < self.dots {
             let (stack, run) = self.decide(at, current);
-            if at + run < self.dots {
-                for c in 0..self.classes.len() {
-                    self.advance(c, run, source);
-                }
-                let demand = get_mut(&mut self.demand, stack);
-                *demand = demand.wrapping_sub((run as i32).wrapping_mul(UNIT));
+            for c in 0..self.classes.len() {
+                self.advance(c, run, source);
             }
+            let demand = get_mut(&mut self.demand, stack);
+            *demand = demand.wrapping_sub((run as i32).wrapping_mul(UNIT));
             sink.run(stack, run);
             (at, current) = (at + run, Some(stack));
             if at >= self.next_check {

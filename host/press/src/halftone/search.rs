@@ -7,23 +7,26 @@
 //! few products (Analoui and Allebach 1992); the best exchange with one of the eight neighbours is made if it lessens
 //! the error. Only exchanges, no toggles: every stack keeps its dots, so tones need no term of their own. For the
 //! response exp(-f/k) the autocorrelation is known, (1 + (r/a)^2)^(-3/2), a = 1 / (pi k).
-//! Strips of block rows are searched at the same time where they do not reach each other, then what lies between them:
-//! the dots do not depend on the number of threads.
-//! Cost: 4 (2 REACH / 3)^2 products a cell of 3 x 3 dots to begin with, and for each exchange half as many; one
-//! exchange for every two cells, [`PASSES`] rounds. Memory: 44 bytes a cell. Limits: four coordinates, those in which
-//! stacks differ most, about the page's mean mixture; cells beside edges stay as they are, and so do all stacks after
-//! the 64th.
+//! Parts of [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
+//! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
+//! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with, and a third for each exchange, of which there
+//! is about one for four cells. Memory: 45 bytes a cell of the parts at work, 13 MB a thread for A4.
+//! Limits: four coordinates, those in which stacks differ most, about the page's mean mixture; cells beside edges stay
+//! as they are, and so do all stacks after the 64th.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::cells::field::{Field, Row};
 use super::cells::plan::{BLOCK, Plan};
+use super::wide::wide;
 
 /// Where a stack lies among all others.
 pub(super) type Point = [f32; 4];
 
-/// Rounds over the page; more change little.
-const PASSES: usize = 4;
+/// Rounds over a part; more change less than 1 %.
+const ROUNDS: usize = 3;
 
 /// How far an error reaches, in dots to each side: less leaves means unseen, and the search makes worse of them.
 const REACH: usize = 30;
@@ -34,336 +37,398 @@ const NEAR: usize = 20;
 /// From how far the eye looks, in dots: 0.3 m. What is even from near is even from afar.
 const SCALE: f32 = 7.62;
 
-/// Block rows in a strip, and how many at each end its neighbours can reach.
-const STRIP: usize = 24;
+/// Block rows in a part, and how many at each end belong to its neighbours: more than an error reaches.
+const PART: usize = 24;
 const MARGIN: usize = 2;
 
 /// Not to be exchanged.
 const FIXED: u8 = u8::MAX;
 
-/// What the search knows of a cell.
-#[derive(Clone, Copy)]
-struct Cell {
-    /// The error around it, as seen from it.
-    seen: Point,
-    /// Stacks with weight, one bit each. In halves, to keep a cell at 28 bytes.
-    allowed: [u32; 2],
-    /// Its stack, or [`FIXED`].
-    stack: u8,
+/// The autocorrelation of the eye's response, in rows as vectors can take them: for cells of one side, its values at
+/// distances of `phase`, `phase` + 2 sides and so on, in half dots, four times each.
+struct Kernel {
+    /// By side of the cells that see.
+    tables: Vec<Vec<Point>>,
 }
-
-impl Cell {
-    fn allows(&self, stack: u8) -> bool {
-        self.allowed[usize::from(stack / 32)] >> (stack % 32) & 1 == 1
-    }
-}
-
-/// The autocorrelation of the eye's response at distances in half dots.
-struct Kernel(Vec<f32>);
 
 impl Kernel {
-    const SIDE: usize = 2 * REACH + 1;
+    /// Distances down: 0 to this, in half dots.
+    const DOWN: usize = 2 * REACH;
 
-    fn new() -> Kernel {
-        let square = |half: usize| (half as f32 / 2.0 / SCALE).powi(2);
-        let at = |i: usize| {
-            let sum = 1.0 + square(i % Kernel::SIDE) + square(i / Kernel::SIDE);
-            // Roots are rounded once on every machine; powers of 3/2 are not.
-            1.0 / (sum * sum.sqrt())
-        };
-        Kernel((0..Kernel::SIDE * Kernel::SIDE).map(at).collect())
+    fn new(sizes: impl Iterator<Item = usize>) -> Kernel {
+        let mut tables = vec![Vec::new(); BLOCK + 1];
+        for size in sizes.filter(|&size| size > 0) {
+            if tables[size].is_empty() {
+                tables[size] = Kernel::table(size);
+            }
+        }
+        Kernel { tables }
     }
 
-    fn at(&self, x: isize, y: isize) -> f32 {
-        self.0[y.unsigned_abs() * Kernel::SIDE + x.unsigned_abs()]
+    /// Distances to either side in steps.
+    fn half(size: usize) -> usize {
+        REACH / size + 2
+    }
+
+    fn table(size: usize) -> Vec<Point> {
+        let (half, step) = (Kernel::half(size) as isize, 2 * size as isize);
+        let square = |half_dots: isize| (half_dots as f32 / 2.0 / SCALE).powi(2);
+        let mut table = Vec::with_capacity(2 * size * (Kernel::DOWN + 1) * (2 * Kernel::half(size) + 1));
+        for phase in 0..step {
+            for down in 0..=Kernel::DOWN as isize {
+                for i in -half..=half {
+                    let sum = 1.0 + square(phase + i * step) + square(down);
+                    // Roots are rounded once on every machine; powers of 3/2 are not.
+                    table.push([1.0 / (sum * sum.sqrt()); 4]);
+                }
+            }
+        }
+        table
+    }
+
+    /// Where the values begin for cells of a side of which the first lies `x` half dots to the right.
+    #[inline(always)]
+    fn column(size: usize, x: i32) -> Column {
+        let (half, step) = (Kernel::half(size), 2 * size as i32);
+        let (steps, phase) = (x.div_euclid(step), x.rem_euclid(step) as usize);
+        let first = phase * (Kernel::DOWN + 1) * (2 * half + 1);
+        Column { size, first: first + (steps + half as i32) as usize, length: 2 * half + 1 }
+    }
+
+    /// Values for `count` cells from there, all `y` half dots below.
+    #[inline(always)]
+    fn row(&self, column: Column, y: i32, count: usize) -> &[Point] {
+        let first = column.first + y.unsigned_abs() as usize * column.length;
+        &self.tables[column.size][first..first + count]
+    }
+
+    /// What two errors in neighbouring cells of a side have less in common than one with itself.
+    fn apart(&self, size: usize, x: i32, y: i32) -> f32 {
+        let at = |x: i32, y: i32| self.row(Kernel::column(size, x), y, 1)[0][0];
+        at(0, 0) - at(x, y)
+    }
+}
+
+/// A column of a table.
+#[derive(Clone, Copy)]
+struct Column {
+    size: usize,
+    first: usize,
+    length: usize,
+}
+
+/// Cells of one side beside each other in a row of blocks, row by row.
+#[derive(Clone, Copy)]
+struct Zone {
+    size: usize,
+    /// First dot from the left, and cells across.
+    left: usize,
+    columns: usize,
+    /// Its first cell in the part.
+    start: usize,
+}
+
+/// A cell: its row of blocks from the part's first, zone, column and row in the zone.
+#[derive(Clone, Copy)]
+struct Place {
+    row: usize,
+    zone: Zone,
+    i: usize,
+    j: usize,
+}
+
+impl Place {
+    fn number(&self) -> usize {
+        self.zone.start + self.j * self.zone.columns + self.i
+    }
+
+    /// Its centre in half dots, from the part's first row.
+    fn centre(&self) -> (i32, i32) {
+        let Zone { size, left, .. } = self.zone;
+        let x = 2 * left + (2 * self.i + 1) * size;
+        let y = 2 * self.row * BLOCK + (2 * self.j + 1) * size;
+        (x as i32, y as i32)
     }
 }
 
 /// The cells of some rows of blocks.
 struct Part<'a> {
-    plan: &'a Plan,
     kernel: &'a Kernel,
     points: &'a [Point],
-    /// First cell of each block of the page.
-    start: &'a [usize],
-    /// First block row and the one after the last.
-    rows: (usize, usize),
-    cells: &'a mut [Cell],
-}
-
-/// A place for a cell: block across, block down, column and row in it.
-type Place = (usize, usize, usize, usize);
-
-/// Calls `with(range of cells, first distance, step of distances, distance down)` for the cells of blocks in `rows`
-/// up to `reach` dots from a place; distances in half dots.
-fn around(
-    plan: &Plan,
-    start: &[usize],
-    rows: (usize, usize),
-    (bx, by, i, j): Place,
-    reach: usize,
-    mut with: impl FnMut(std::ops::Range<usize>, isize, isize, isize),
-) {
-    let size = plan.size(bx, by);
-    let centre =
-        |block: usize, cell: usize, size: usize| (2 * block * BLOCK + (2 * cell + 1) * size) as isize;
-    let (cx, cy) = (centre(bx, i, size), centre(by, j, size));
-    let blocks = reach.div_ceil(BLOCK);
-    let reach = 2 * reach as isize;
-    for y in by.saturating_sub(blocks).max(rows.0)..(by + blocks + 1).min(rows.1) {
-        for x in bx.saturating_sub(blocks)..(bx + blocks + 1).min(plan.across) {
-            let size = plan.size(x, y);
-            let count = BLOCK / size;
-            // The cells whose centre is within reach on either side.
-            let (left, step) = (centre(x, 0, size) - cx, 2 * size as isize);
-            let first = (-reach - left + step - 1).div_euclid(step).clamp(0, count as isize);
-            let end = ((reach - left).div_euclid(step) + 1).clamp(first, count as isize);
-            if first == end {
-                continue;
-            }
-            for row in 0..count {
-                let dy = centre(y, row, size) - cy;
-                if dy.abs() <= reach {
-                    let from = start[y * plan.across + x] + row * count;
-                    with(from + first as usize..from + end as usize, left + first * step, step, dy);
-                }
-            }
-        }
-    }
+    /// By side of cells, [`Kernel::apart`] of neighbours beside each other and of diagonal ones.
+    apart: [[f32; 2]; BLOCK + 1],
+    /// Zones of each row of blocks.
+    zones: Vec<Vec<Zone>>,
+    /// The error around each cell, as seen from it.
+    seen: Vec<Point>,
+    /// The stack of each, or [`FIXED`].
+    stack: Vec<u8>,
+    /// Stacks with weight on each, one bit each.
+    allowed: Vec<u64>,
 }
 
 /// Exchanges cells of a page that was printed by cells. `points` are those of the stacks of the field.
 pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], index: &mut [u8]) {
-    let kernel = Kernel::new();
-    let mut start = vec![0];
-    for block in 0..plan.across * plan.down() {
-        let count = BLOCK / plan.size(block % plan.across, block / plan.across);
-        start.push(start[block] + count * count);
-    }
-    let mut cells = first_look(field, plan, points, &kernel, &start, index);
-    for _ in 0..PASSES {
-        let down = plan.down();
-        // Strips without their margins, then the margins.
-        let strips: Vec<usize> = (STRIP..down.saturating_sub(MARGIN)).step_by(STRIP).collect();
-        let cuts: Vec<usize> =
-            strips.iter().map(|&row| row.saturating_sub(STRIP / 2)).chain([down]).collect();
-        let inner: Vec<usize> = strips.iter().copied().chain([down]).collect();
-        let near = |row: usize| strips.iter().any(|&cut| row + MARGIN >= cut && row < cut + MARGIN);
-        in_parts(plan, &kernel, points, &start, &inner, &mut cells, |row| !near(row));
-        in_parts(plan, &kernel, points, &start, &cuts, &mut cells, near);
-    }
-    index.par_chunks_mut(BLOCK * field.width).enumerate().for_each(|(by, dots)| {
-        for bx in 0..plan.across {
-            let size = plan.size(bx, by);
-            let count = BLOCK / size;
-            for (at, cell) in cells[start[by * plan.across + bx]..][..count * count].iter().enumerate() {
-                if cell.stack != FIXED {
-                    let corner = at / count * size * field.width + bx * BLOCK + at % count * size;
-                    for row in dots[corner..].chunks_mut(field.width).take(size) {
-                        row[..size].fill(field.stacks[usize::from(cell.stack)]);
-                    }
-                }
-            }
+    let all = (0..plan.down()).flat_map(|by| (0..plan.across).map(move |bx| plan.size(bx, by)));
+    let kernel = Kernel::new(all);
+    let down = plan.down();
+    let whole = (0..down).step_by(PART).map(|top| top..(top + PART).min(down));
+    let ends = (PART..down).step_by(PART).map(|cut| cut - 3 * MARGIN..(cut + 3 * MARGIN).min(down));
+    for parts in [whole.collect::<Vec<_>>(), ends.collect()] {
+        let (mut rest, mut top, mut tasks) = (&mut *index, 0, Vec::new());
+        for rows in parts {
+            let row = BLOCK * field.width;
+            let (_, below) = rest.split_at_mut((rows.start - top) * row);
+            let (dots, below) = below.split_at_mut(((rows.end - rows.start) * row).min(below.len()));
+            (rest, top) = (below, rows.end);
+            tasks.push((rows, dots));
         }
-    });
+        tasks.into_par_iter().for_each(|(rows, dots)| {
+            let first = if rows.start > 0 { MARGIN } else { 0 };
+            let end = rows.len() - if rows.end < down { MARGIN } else { 0 };
+            wide(|| {
+                let mut part = Part::new(field, plan, points, &kernel, rows, dots);
+                for _ in 0..ROUNDS {
+                    (first..end).for_each(|row| part.block_row(row));
+                }
+                part.print(field, dots);
+            });
+        });
+    }
 }
 
-/// Searches the parts that end at these block rows, in those rows that are `mine`.
-fn in_parts(
-    plan: &Plan,
-    kernel: &Kernel,
-    points: &[Point],
-    start: &[usize],
-    ends: &[usize],
-    cells: &mut [Cell],
-    mine: impl Fn(usize) -> bool + Sync,
-) {
-    let (mut rest, mut parts, mut top) = (cells, Vec::new(), 0);
-    for &end in ends {
-        let (cells, below) = rest.split_at_mut(start[end * plan.across] - start[top * plan.across]);
-        rest = below;
-        parts.push(Part { plan, kernel, points, start, rows: (top, end), cells });
-        top = end;
-    }
-    parts.into_par_iter().for_each(|mut part| {
-        for row in part.rows.0..part.rows.1 {
-            if mine(row) {
-                part.block_row(row);
-            }
+impl<'a> Part<'a> {
+    /// The cells of some rows of blocks, whose dots these are.
+    #[inline(always)]
+    fn new(
+        field: &Field,
+        plan: &Plan,
+        points: &'a [Point],
+        kernel: &'a Kernel,
+        rows: Range<usize>,
+        dots: &[u8],
+    ) -> Part<'a> {
+        let mut apart = [[0.0; 2]; BLOCK + 1];
+        for (size, apart) in apart.iter_mut().enumerate().filter(|&(size, _)| !kernel.tables[size].is_empty())
+        {
+            let step = 2 * size as i32;
+            *apart = [kernel.apart(size, step, 0), kernel.apart(size, step, step)];
         }
-    });
-}
-
-/// The cells as they are, with the error around each.
-fn first_look(
-    field: &Field,
-    plan: &Plan,
-    points: &[Point],
-    kernel: &Kernel,
-    start: &[usize],
-    index: &[u8],
-) -> Vec<Cell> {
-    let number: Vec<u8> = (0..=u8::MAX)
-        .map(|stack| field.stacks.iter().position(|&known| known == stack).map_or(FIXED, |q| q as u8))
-        .collect();
-    let empty = Cell { seen: [0.0; 4], allowed: [0; 2], stack: FIXED };
-    let mut cells = vec![empty; start[start.len() - 1]];
-    // Errors first, in the place of what is seen.
-    by_rows(plan, start, &mut cells).into_par_iter().for_each(|(by, cells)| {
-        let mut rows: Vec<Row> = (0..(BLOCK + 1) * BLOCK).map(|_| Row::default()).collect();
-        let mut want = vec![0.0; field.lanes];
-        for bx in 0..plan.across {
-            let size = plan.size(bx, by);
-            let count = BLOCK / size;
-            let first = start[by * plan.across + bx] - start[by * plan.across];
-            for at in 0..count * count {
-                let (x, y) = (bx * BLOCK + at % count * size, by * BLOCK + at / count * size);
-                if x >= field.width || y >= field.height || !plan.is_whole(x, y) {
-                    continue;
-                }
-                let row = &mut rows[size * BLOCK + at / count];
-                field.row(size, y / size, row);
-                field.cell(size, x / size, row, &mut want);
-                let corner = y * field.width + x;
-                let q = number[usize::from(index[corner])];
-                let cell = &mut cells[first + at];
-                let mut error = points[usize::from(q)].map(|coordinate| (size * size) as f32 * coordinate);
-                for (&point, &want) in points.iter().zip(&want) {
-                    for (error, coordinate) in error.iter_mut().zip(point) {
-                        *error -= want * coordinate;
-                    }
-                }
-                cell.seen = error;
-                if q < 64 && plan.owned(corner as u32).next().is_none() {
-                    cell.stack = q;
-                    for (q, _) in want.iter().take(64).enumerate().filter(|&(_, &want)| want > 0.0) {
-                        cell.allowed[q / 32] |= 1 << (q % 32);
-                    }
-                }
+        let mut part = Part {
+            apart,
+            kernel,
+            points,
+            zones: Vec::new(),
+            seen: Vec::new(),
+            stack: Vec::new(),
+            allowed: Vec::new(),
+        };
+        let mut start = 0;
+        for by in rows.clone() {
+            let mut zones: Vec<Zone> = Vec::new();
+            let mut bx = 0;
+            while bx < plan.across {
+                let size = plan.size(bx, by);
+                let end = (bx..plan.across).find(|&x| plan.size(x, by) != size).unwrap_or(plan.across);
+                let columns = (end - bx) * BLOCK / size;
+                zones.push(Zone { size, left: bx * BLOCK, columns, start });
+                (start, bx) = (start + columns * BLOCK / size, end);
             }
+            part.zones.push(zones);
         }
-    });
-    let errors: Vec<Point> = cells.iter().map(|cell| cell.seen).collect();
-    by_rows(plan, start, &mut cells).into_par_iter().for_each(|(by, cells)| {
-        for bx in 0..plan.across {
-            let count = BLOCK / plan.size(bx, by);
-            let first = start[by * plan.across + bx] - start[by * plan.across];
-            for at in 0..count * count {
-                let mut seen = [0.0; 4];
-                let place = (bx, by, at % count, at / count);
-                around(plan, start, (0, plan.down()), place, REACH, |range, dx, step, dy| {
-                    for (error, i) in errors[range].iter().zip(0..) {
-                        let k = kernel.at(dx + i * step, dy);
-                        for (seen, error) in seen.iter_mut().zip(error) {
-                            *seen += k * error;
+        (part.stack, part.allowed) = (vec![FIXED; start], vec![0; start]);
+        let errors = part.errors(field, plan, rows.start, dots);
+        part.seen = vec![[0.0; 4]; start];
+        part.each_place(0..rows.len(), |part, place| {
+            let error = errors[place.number()];
+            if error != [0.0; 4] {
+                part.around(place, REACH, (0, 0), |seen, own, _| {
+                    for (seen, own) in seen.iter_mut().zip(own) {
+                        for c in 0..4 {
+                            seen[c] += own[c] * error[c];
                         }
                     }
                 });
-                cells[first + at].seen = seen;
             }
-        }
-    });
-    cells
-}
-
-/// The cells of each block row.
-fn by_rows<'a>(plan: &Plan, start: &[usize], cells: &'a mut [Cell]) -> Vec<(usize, &'a mut [Cell])> {
-    let (mut rest, mut rows) = (cells, Vec::new());
-    for by in 0..plan.down() {
-        let (cells, below) = rest.split_at_mut(start[(by + 1) * plan.across] - start[by * plan.across]);
-        rest = below;
-        rows.push((by, cells));
-    }
-    rows
-}
-
-impl Part<'_> {
-    /// The cell at a place, by its number in this part.
-    fn number(&self, (bx, by, i, j): Place) -> usize {
-        let count = BLOCK / self.plan.size(bx, by);
-        self.start[by * self.plan.across + bx] - self.start[self.rows.0 * self.plan.across] + j * count + i
+        });
+        part
     }
 
-    /// The place one cell to a side, if there are cells of the same size.
-    fn beside(&self, (bx, by, i, j): Place, dx: isize, dy: isize) -> Option<Place> {
-        let size = self.plan.size(bx, by);
-        let count = BLOCK / size;
-        let step = |block: usize, cell: usize, d: isize| {
-            let at = (block * count + cell).checked_add_signed(d)?;
-            Some((at / count, at % count))
-        };
-        let ((x, i), (y, j)) = (step(bx, i, dx)?, step(by, j, dy)?);
-        let here = x < self.plan.across && y >= self.rows.0 && y < self.rows.1;
-        (here && self.plan.size(x, y) == size).then_some((x, y, i, j))
-    }
-
-    fn block_row(&mut self, by: usize) {
-        for bx in 0..self.plan.across {
-            let size = self.plan.size(bx, by);
-            for j in 0..BLOCK / size {
-                for i in 0..BLOCK / size {
-                    self.improve((bx, by, i, j), size);
+    /// Calls `with` for each cell of these rows of blocks.
+    #[inline(always)]
+    fn each_place(&mut self, rows: Range<usize>, mut with: impl FnMut(&mut Self, Place)) {
+        for row in rows {
+            for zone in self.zones[row].clone() {
+                for j in 0..BLOCK / zone.size {
+                    for i in 0..zone.columns {
+                        with(self, Place { row, zone, i, j });
+                    }
                 }
             }
         }
     }
 
-    /// Makes the exchange of a cell with a neighbour that lessens the error most, if any does.
-    fn improve(&mut self, place: Place, size: usize) {
-        let own = self.cells[self.number(place)];
-        if own.stack == FIXED {
-            return;
-        }
-        let (area, step) = ((size * size) as f32, 2 * size as isize);
-        let apart = [
-            self.kernel.at(0, 0) - self.kernel.at(step, 0),
-            self.kernel.at(0, 0) - self.kernel.at(step, step),
-        ];
-        // Differences below what rounding makes of the sums would go round in circles.
-        let (mut least, mut best) = (-1e-5 * area, None);
-        for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
-            let Some(there) = self.beside(place, dx, dy) else { continue };
-            let other = &self.cells[self.number(there)];
-            if other.stack == own.stack
-                || other.stack == FIXED
-                || !own.allows(other.stack)
-                || !other.allows(own.stack)
-            {
-                continue;
+    /// The error of each cell: what it prints minus what it asks for. Notes its stack and those it may have.
+    #[inline(always)]
+    fn errors(&mut self, field: &Field, plan: &Plan, top: usize, dots: &[u8]) -> Vec<Point> {
+        let number: Vec<u8> = (0..=u8::MAX)
+            .map(|stack| field.stacks.iter().position(|&known| known == stack).map_or(FIXED, |q| q as u8))
+            .collect();
+        let mut errors = vec![[0.0; 4]; self.stack.len()];
+        let mut lines: Vec<Row> = (0..=BLOCK).map(|_| Row::default()).collect();
+        let mut want = vec![0.0; field.lanes];
+        self.each_place(0..self.zones.len(), |part, place| {
+            let Zone { size, left, .. } = place.zone;
+            let (x, y) = (left + place.i * size, (top + place.row) * BLOCK + place.j * size);
+            if x >= field.width || y >= field.height || !plan.is_whole(x, y) {
+                return;
             }
-            let (from, to) = (self.points[usize::from(own.stack)], self.points[usize::from(other.stack)]);
-            let (mut linear, mut square) = (0.0, 0.0);
-            for c in 0..4 {
-                let d = to[c] - from[c];
-                linear += d * (own.seen[c] - other.seen[c]);
-                square += d * d;
+            field.row(size, y / size, &mut lines[size]);
+            field.cell(size, x / size, &mut lines[size], &mut want);
+            let q = number[usize::from(dots[(y - top * BLOCK) * field.width + x])];
+            let mut error = part.points[usize::from(q)].map(|coordinate| (size * size) as f32 * coordinate);
+            for (point, &want) in part.points.iter().zip(&want) {
+                for (error, coordinate) in error.iter_mut().zip(point) {
+                    *error -= want * coordinate;
+                }
             }
-            let change =
-                2.0 * area * linear + 2.0 * area * area * square * apart[usize::from(dx != 0 && dy != 0)];
-            if change < least {
-                (least, best) = (change, Some((there, (dx * step, dy * step))));
+            let at = place.number();
+            errors[at] = error;
+            if q < 64 && plan.owned((y * field.width + x) as u32).next().is_none() {
+                part.stack[at] = q;
+                let here = want.iter().take(64).enumerate().filter(|&(_, &want)| want > 0.0);
+                part.allowed[at] = here.fold(0, |all, (q, _)| all | 1 << q);
             }
-        }
-        if let Some((there, there_by)) = best {
-            let (a, b) = (self.number(place), self.number(there));
-            let (from, to) = (own.stack, self.cells[b].stack);
-            (self.cells[a].stack, self.cells[b].stack) = (to, from);
-            let (from, to) = (self.points[usize::from(from)], self.points[usize::from(to)]);
-            let error: Point = std::array::from_fn(|c| area * (to[c] - from[c]));
-            self.spread(place, there_by, error);
+        });
+        errors
+    }
+
+    /// Calls `with` for each row of cells up to `reach` dots from a place: what they see, the kernel about the place, and
+    /// the kernel about one that is `(right, below)` half dots from there.
+    #[inline(always)]
+    fn around(
+        &mut self,
+        place: Place,
+        reach: usize,
+        (right, below): (i32, i32),
+        mut with: impl FnMut(&mut [Point], &[Point], &[Point]),
+    ) {
+        let (cx, cy) = place.centre();
+        let (blocks, reach) = (reach.div_ceil(BLOCK), 2 * reach as i32);
+        let rows = place.row.saturating_sub(blocks)..(place.row + blocks + 1).min(self.zones.len());
+        for row in rows {
+            for &zone in &self.zones[row] {
+                // The cells whose centre is within reach on either side.
+                let (left, step) = ((2 * zone.left + zone.size) as i32 - cx, 2 * zone.size as i32);
+                let from = (-reach - left + step - 1).div_euclid(step).clamp(0, zone.columns as i32);
+                let end = ((reach - left).div_euclid(step) + 1).clamp(from, zone.columns as i32);
+                if from == end {
+                    continue;
+                }
+                let x = left + from * step;
+                let own = Kernel::column(zone.size, x);
+                let other = Kernel::column(zone.size, x - right);
+                let (top, count) = ((2 * row * BLOCK + zone.size) as i32 - cy, BLOCK / zone.size);
+                for j in 0..count {
+                    let y = top + step * j as i32;
+                    if y.abs() <= reach {
+                        let line = zone.start + j * zone.columns;
+                        let seen = &mut self.seen[line + from as usize..line + end as usize];
+                        let count = seen.len();
+                        with(seen, self.kernel.row(own, y, count), self.kernel.row(other, y - below, count));
+                    }
+                }
+            }
         }
     }
 
-    /// Adds an error at a place, and its opposite a few half dots from there, to what the cells around see.
-    fn spread(&mut self, place: Place, (right, below): (isize, isize), error: Point) {
-        let (kernel, first) = (self.kernel, self.start[self.rows.0 * self.plan.across]);
-        let cells = &mut *self.cells;
-        around(self.plan, self.start, self.rows, place, NEAR, |range, dx, step, dy| {
-            for (cell, i) in cells[range.start - first..range.end - first].iter_mut().zip(0..) {
-                let x = dx + i * step;
-                let k = kernel.at(x, dy) - kernel.at(x - right, dy - below);
-                for (seen, error) in cell.seen.iter_mut().zip(error) {
-                    *seen += k * error;
+    /// The place one cell to a side, if there are cells of the same side.
+    fn beside(&self, place: Place, dx: isize, dy: isize) -> Option<Place> {
+        let (zone, count) = (place.zone, BLOCK / place.zone.size);
+        let x = (zone.left / zone.size + place.i).checked_add_signed(dx)?;
+        let j = (place.row * count + place.j).checked_add_signed(dy)?;
+        let row = j / count;
+        let zone = if row == place.row {
+            zone
+        } else {
+            let zones = self.zones.get(row)?;
+            let at = zones.partition_point(|zone| zone.left <= x * place.zone.size);
+            *zones.get(at.checked_sub(1)?)?
+        };
+        let i = x.checked_sub(zone.left / zone.size)?;
+        (zone.size == place.zone.size && i < zone.columns).then_some(Place { row, zone, i, j: j % count })
+    }
+
+    #[inline(always)]
+    fn block_row(&mut self, row: usize) {
+        self.each_place(row..row + 1, |part, place| {
+            if part.stack[place.number()] != FIXED {
+                part.improve(place);
+            }
+        });
+    }
+
+    /// Makes the exchange of a cell with a neighbour that lessens the error most, if any does.
+    #[inline(always)]
+    fn improve(&mut self, place: Place) {
+        let (at, size) = (place.number(), place.zone.size);
+        let (own, seen, allowed) = (self.stack[at], self.seen[at], self.allowed[at]);
+        let (area, step, apart) = ((size * size) as f32, 2 * size as i32, self.apart[size]);
+        // Differences below what rounding makes of the sums would go round in circles.
+        let (mut least, mut best) = (-1e-5 * area, None);
+        let inner =
+            place.i > 0 && place.i + 1 < place.zone.columns && place.j > 0 && (place.j + 1) * size < BLOCK;
+        for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+            let there = if inner {
+                let (i, j) = (place.i.wrapping_add_signed(dx), place.j.wrapping_add_signed(dy));
+                Place { i, j, ..place }
+            } else if let Some(there) = self.beside(place, dx, dy) {
+                there
+            } else {
+                continue;
+            };
+            let b = there.number();
+            let other = self.stack[b];
+            if other == own || other == FIXED || allowed >> other & self.allowed[b] >> own & 1 == 0 {
+                continue;
+            }
+            let (from, to) = (self.points[usize::from(own)], self.points[usize::from(other)]);
+            let (mut linear, mut square) = (0.0, 0.0);
+            for c in 0..4 {
+                let d = to[c] - from[c];
+                linear += d * (seen[c] - self.seen[b][c]);
+                square += d * d;
+            }
+            let apart = apart[usize::from(dx != 0 && dy != 0)];
+            let change = 2.0 * area * linear + 2.0 * area * area * square * apart;
+            if change < least {
+                (least, best) = (change, Some((there, (dx as i32 * step, dy as i32 * step))));
+            }
+        }
+        if let Some((there, apart)) = best {
+            let b = there.number();
+            let (from, to) = (self.points[usize::from(own)], self.points[usize::from(self.stack[b])]);
+            self.stack.swap(at, b);
+            let error: Point = std::array::from_fn(|c| area * (to[c] - from[c]));
+            self.around(place, NEAR, apart, |seen, own, other| {
+                for ((seen, own), other) in seen.iter_mut().zip(own).zip(other) {
+                    for c in 0..4 {
+                        seen[c] += (own[c] - other[c]) * error[c];
+                    }
+                }
+            });
+        }
+    }
+
+    /// Prints the cells on the rows of the page that they are.
+    fn print(&mut self, field: &Field, dots: &mut [u8]) {
+        self.each_place(0..self.zones.len(), |part, place| {
+            let stack = part.stack[place.number()];
+            if stack != FIXED {
+                let Zone { size, left, .. } = place.zone;
+                let corner = (place.row * BLOCK + place.j * size) * field.width + left + place.i * size;
+                for row in dots[corner..].chunks_mut(field.width).take(size) {
+                    row[..size].fill(field.stacks[usize::from(stack)]);
                 }
             }
         });

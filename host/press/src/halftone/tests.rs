@@ -24,8 +24,13 @@ fn plain(width: usize, height: usize, count: usize, at: impl Fn(usize, usize) ->
     InkMix { stacks: stacks(count), maps: WeightMaps::new(width, height, count, data).unwrap(), matrix }
 }
 
+fn by(method: Method, mix: &InkMix, size: (u16, u16), fixed: Option<&[u8]>, minimum: &[u16]) -> DotMap {
+    let settings = Settings { method, minimum: minimum.to_vec(), ..Settings::of(&mix.stacks, 1, |_| 1) };
+    halftone(mix, size, fixed, &settings, &Silent).unwrap()
+}
+
 fn run(mix: &InkMix, size: (u16, u16), minimum: u16) -> DotMap {
-    halftone(mix, size, None, &Settings::uniform(mix.stacks.len(), minimum), &Silent).unwrap()
+    by(Method::Walk, mix, size, None, &vec![minimum; mix.stacks.len()])
 }
 
 /// Sizes of the 4-connected components of equal stacks, by flood fill.
@@ -60,6 +65,77 @@ fn components(sheet: &DotMap) -> Vec<(u8, usize)> {
     found
 }
 
+/// The 4-connected part of each dot, by its first dot.
+fn labels(width: usize, index: &[u8]) -> Vec<usize> {
+    let mut label: Vec<usize> = (0..index.len()).collect();
+    loop {
+        let mut changed = false;
+        for dot in (0..index.len()).chain((0..index.len()).rev()) {
+            let right = (dot % width + 1 < width).then_some(dot + 1);
+            let below = (dot + width < index.len()).then_some(dot + width);
+            for next in [right, below].into_iter().flatten().filter(|&next| index[next] == index[dot]) {
+                let least = label[dot].min(label[next]);
+                changed |= label[dot] != least || label[next] != least;
+                (label[dot], label[next]) = (least, least);
+            }
+        }
+        if !changed {
+            return label;
+        }
+    }
+}
+
+/// First dot and size of every 4-connected part.
+fn parts(width: usize, index: &[u8]) -> Vec<(usize, usize)> {
+    let label = labels(width, index);
+    let firsts = (0..index.len()).filter(|&dot| label[dot] == dot);
+    firsts.map(|first| (first, label.iter().filter(|&&l| l == first).count())).collect()
+}
+
+/// A tone in a frame of solid: nothing beyond the frame changes its dots, whatever the method.
+#[test]
+fn no_debt_crosses_a_solid() {
+    let print = |method, share: f64| {
+        let mix = plain(400, 300, 3, |x, y| match (x as f64 - 190.0).hypot((y as f64 - 150.0) * 1.3) {
+            r if r < 100.0 => vec![0.63, 0.37, 0.0],
+            r if r < 106.0 => vec![0.0, 0.0, 1.0],
+            _ => vec![1.0 - share, share, 0.0],
+        });
+        by(method, &mix, (400, 300), None, &[9; 3]).into_parts().1
+    };
+    for method in [Method::Walk, Method::Cells, Method::Blue] {
+        let (a, b) = (print(method, 0.2), print(method, 0.81));
+        assert_ne!(a, b);
+        for at in 0..a.len() {
+            let (x, y) = ((at % 400) as f64 - 190.0, (at / 400) as f64 - 150.0);
+            if x.hypot(y * 1.3) < 106.0 {
+                assert_eq!(a[at], b[at], "{method:?}: {}, {}", at % 400, at / 400);
+            }
+        }
+        // The tone inside the frame, of some 24000 dots.
+        let inside = |at: &usize| ((at % 400) as f64 - 190.0).hypot((at / 400) as f64 * 1.3 - 195.0) < 100.0;
+        let all: Vec<usize> = (0..a.len()).filter(inside).collect();
+        let share = all.iter().filter(|&&at| a[at] == 1).count() as f64 / all.len() as f64;
+        assert!((share - 0.37).abs() < 0.004, "{method:?}: {share}");
+    }
+}
+
+#[test]
+fn single_dots_are_for_process_inks_alone() {
+    let mix = plain(1, 1, 6, |_, _| vec![0.5, 0.3, 0.2, 0.0, 0.0, 0.0]);
+    let dots = by(Method::Blue, &mix, (256, 256), None, &[9; 6]);
+    for (q, share) in [(0, 0.5), (1, 0.3), (2, 0.2)] {
+        let printed = dots.index().iter().filter(|&&dot| dot == q).count() as f64 / 65_536.0;
+        assert!((printed - share).abs() < 1e-3, "{q}: {printed}");
+    }
+    let foil = mix.stacks.iter().position(|stack| !is_process(stack)).unwrap();
+    let mut mixed = mix.clone();
+    mixed.matrix[1].swap(1, foil);
+    let settings = Settings { method: Method::Blue, ..Settings::uniform(6, 9) };
+    let said = halftone(&mixed, (9, 9), None, &settings, &Silent).unwrap_err();
+    assert_eq!(said, HalftoneError::NotProcess { stack: mix.stacks[foil].clone() });
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
     #[test]
@@ -73,7 +149,7 @@ proptest! {
             ((v >> 40) as f64 / (1u64 << 24) as f64).powi(3)
         };
         let mix = plain(9, 7, 5, |x, y| (0..5).map(|q| noise(x, y, q)).collect());
-        let settings = Settings { minimum: minimum.clone(), ..Settings::default() };
+        let settings = Settings { method: Method::Walk, minimum: minimum.clone(), ..Settings::default() };
         let sheet = halftone(&mix, (width, height), None, &settings, &Silent);
         let clusters = components(&sheet.unwrap());
         for (stack, size) in &clusters {
@@ -81,6 +157,58 @@ proptest! {
                 *size >= usize::from(minimum[usize::from(*stack)]) || clusters.len() == 1,
                 "{} of {} dots", stack, size
             );
+        }
+    }
+
+    /// Solids of any shape amid tones, given by the mix or fixed: exact by every method. Clusters of tones hold their
+    /// minimum, unless the whole connected region is smaller.
+    #[test]
+    fn solids_are_exact_and_the_walk_between_them_holds(
+        (width, height) in (1usize..150, 1usize..65),
+        seed in any::<u64>(),
+        minimum in prop_oneof![(1u16..17).prop_map(|m| vec![m; 4]), prop::collection::vec(1u16..17, 4)],
+        grain in 1usize..12,
+        method in prop_oneof![3 => Just(Method::Walk), 1 => Just(Method::Cells)],
+    ) {
+        let dice = |x: usize, y: usize, salt: u64| {
+            let v = (seed ^ salt ^ (x / grain * 1009 + y / grain * 7919) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            (v ^ v >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 61
+        };
+        let asked = |x: usize, y: usize| match dice(x, y, 1) {
+            0 => vec![1.0, 0.0, 0.0, 0.0],
+            1 => vec![0.0, 0.0, 0.0, 1.0],
+            2..=4 => vec![0.3, 0.7, 0.0, 0.0],
+            _ => vec![0.1, 0.3, 0.6, 0.0],
+        };
+        let fixed: Vec<u8> =
+            (0..width * height).map(|at| if dice(at % width, at / width, 77) == 0 { 2 } else { TONE }).collect();
+        let mix = plain(width, height, 4, asked);
+        let dots = by(method, &mix, (width as u16, height as u16), Some(&fixed), &minimum);
+        let solid = |at: usize| match fixed[at] {
+            TONE => asked(at % width, at / width).iter().position(|&share| share == 1.0).map(|q| q as u8),
+            stack => Some(stack),
+        };
+        for (at, &dot) in dots.index().iter().enumerate() {
+            match solid(at) {
+                Some(stack) => prop_assert_eq!(dot, stack, "dot {}, {}", at % width, at / width),
+                None => prop_assert!(dot < 3),
+            }
+        }
+        if method == Method::Walk && minimum.iter().all(|&m| m == minimum[0]) {
+            let numbered: Vec<u8> = dots.index().iter().enumerate()
+                .map(|(at, &dot)| if solid(at).is_some() { 9 } else { dot }).collect();
+            let tones: Vec<u8> = numbered.iter().map(|&n| u8::from(n == 9)).collect();
+            for (start, size) in parts(width, &numbered) {
+                if numbered[start] != 9 && size < usize::from(minimum[0]) {
+                    let whole = parts(width, &tones);
+                    let label = labels(width, &tones);
+                    let own = whole.iter().find(|(other, _)| label[*other] == label[start]);
+                    // Rests of which none prints a stack that this one asks for stay alone.
+                    let odd = asked(start % width, start / width)[2] == 0.0
+                        || numbered[start] != 2 && dots.index().contains(&2);
+                    prop_assert!(own.is_some_and(|own| own.1 == size) || odd, "{} dots at {}", size, start);
+                }
+            }
         }
     }
 
@@ -198,7 +326,8 @@ fn progress_counts_every_dot_once() {
     }
     let count = Count(AtomicU64::new(0), AtomicU64::new(0));
     let mix = plain(4, 4, 2, |x, _| vec![x as f64, 1.0]);
-    halftone(&mix, (130, 1200), None, &Settings::uniform(2, 4), &count).unwrap();
+    halftone(&mix, (130, 1200), None, &Settings { method: Method::Walk, ..Settings::uniform(2, 4) }, &count)
+        .unwrap();
     assert_eq!((count.0.into_inner(), count.1.into_inner()), (130 * 1200, 130 * 1200));
 }
 

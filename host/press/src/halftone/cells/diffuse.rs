@@ -21,6 +21,8 @@ type Shares = [f32; 4];
 pub(super) struct Strip<'a> {
     field: &'a Field<'a>,
     plan: &'a Plan,
+    /// Minimum cluster of each stack of the field.
+    minimum: &'a [u16],
     /// Debts that wait: [`BLOCK`] slots a block, as many in use as it has cells across.
     slots: Vec<f32>,
     /// The side of cells each block's slots are for.
@@ -41,11 +43,12 @@ pub(super) struct Target<'a> {
 }
 
 impl<'a> Strip<'a> {
-    pub(super) fn new(field: &'a Field<'a>, plan: &'a Plan) -> Strip<'a> {
+    pub(super) fn new(field: &'a Field<'a>, plan: &'a Plan, minimum: &'a [u16]) -> Strip<'a> {
         let lanes = || vec![0.0; field.lanes];
         Strip {
             field,
             plan,
+            minimum,
             slots: vec![0.0; plan.across * BLOCK * field.lanes],
             format: vec![BLOCK as u8; plan.across],
             carry: lanes(),
@@ -59,6 +62,7 @@ impl<'a> Strip<'a> {
     }
 
     /// One row of blocks.
+    #[inline(always)]
     pub(super) fn block_row(&mut self, row: usize, target: &mut Target) {
         let (plan, across) = (self.plan, self.plan.across);
         for column in 0..across {
@@ -90,6 +94,7 @@ impl<'a> Strip<'a> {
     }
 
     /// The cells of a block that begin at row `y` of it.
+    #[inline(always)]
     fn cells(&mut self, row: usize, column: usize, y: usize, target: &mut Target) {
         let plan = self.plan;
         let block = &plan.blocks[row * plan.across + column];
@@ -110,7 +115,7 @@ impl<'a> Strip<'a> {
                 if block.owns {
                     area += self.add_owned((y * self.field.width + x) as u32);
                 }
-                let q = self.decide(x, y, size, area, block.calm);
+                let q = self.decide((x, y), size, area, true, block.calm);
                 if let Some(rows) = target.rows.as_deref_mut() {
                     let stack = self.field.stacks[q];
                     let start = (y - target.top) * self.field.width + x;
@@ -128,7 +133,7 @@ impl<'a> Strip<'a> {
                 self.want.fill(0.0);
                 let mut area = self.add_fragment(head);
                 area += self.add_owned(plan.fragments[head as usize].seed);
-                let q = self.decide(x, y, size, area, false);
+                let q = self.decide((x, y), size, area, false, false);
                 if let Some(rows) = target.rows.as_deref_mut() {
                     for (x, y) in plan.dots(head) {
                         rows[(y - target.top) * self.field.width + x] = self.field.stacks[q];
@@ -171,6 +176,7 @@ impl<'a> Strip<'a> {
 
     /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present
     /// stack with most of it; the lowest among equals. Absent stacks hand some of theirs to those present.
+    #[inline(always)]
     fn choose(&mut self, slot: usize) -> usize {
         let slots = self.slots[slot..slot + self.field.lanes].as_chunks::<LANES>().0;
         let (want, carry) = (self.want.as_chunks::<LANES>().0, self.carry.as_chunks::<LANES>().0);
@@ -201,11 +207,29 @@ impl<'a> Strip<'a> {
         best
     }
 
+    /// The stack for fragments of so many dots, of which [`Strip::choose`] found `best`. A stack that would not hold gives
+    /// way to the one with most debt that does. Where none does, the stack with the smallest minimum is printed: foil
+    /// in specks would come off and be missed, while ink in a speck is only a little rough.
+    fn holding(&self, best: usize, area: usize) -> usize {
+        let holds = |q: usize| usize::from(self.minimum[q]) <= area;
+        if holds(best) {
+            return best;
+        }
+        let present = (0..self.minimum.len()).filter(|&q| self.want[q] > 0.0);
+        let rank = |&a: &usize, &b: &usize| {
+            let small = |q: usize| if holds(q) { 0 } else { self.minimum[q] };
+            small(b).cmp(&small(a)).then(self.debt[a].total_cmp(&self.debt[b])).then(b.cmp(&a))
+        };
+        present.max_by(rank).unwrap_or(best)
+    }
+
     /// Decides the stack of a unit that asks for `self.want`, and hands on what it owes.
-    fn decide(&mut self, x: usize, y: usize, size: usize, area: usize, calm: bool) -> usize {
+    #[inline(always)]
+    fn decide(&mut self, (x, y): (usize, usize), size: usize, area: usize, whole: bool, calm: bool) -> usize {
         let lanes = self.field.lanes;
         let slot = self.slot(x) * lanes;
         let best = self.choose(slot);
+        let best = if whole { best } else { self.holding(best, area) };
         self.debt[best] -= area as f32;
         let (behind, ahead) =
             if self.back { (x + size, x.wrapping_sub(1)) } else { (x.wrapping_sub(1), x + size) };

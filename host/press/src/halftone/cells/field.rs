@@ -1,20 +1,15 @@
-//! The mixture on the dots of a rectangle: which dots are solid, and what a cell asks for.
+//! The mixture on the dots of a rectangle: what a cell asks for.
 //!
-//! Problem: a cell needs the mean shares of its dots over all stacks; a dot the document gives wholly to one stack
-//! must be known as such before any cell is made.
+//! Problem: a cell needs the mean shares of its dots over all stacks.
 //! Method: both axes are separable tables of pixels and parts, the walk's own ([`Axis`]), summed over the dots of a
-//! cell. A row of cells takes its pixels down the axis once and then across for each cell. A dot is solid when all
-//! pixels it reads are, to the same stack.
-//! Cost: pixels x channels a row of cells, then channels x stacks a cell. Memory: a byte a pixel of the document, and
-//! tables of a few bytes a dot of either side. Arithmetic is that of `f32`, each operation rounded once and in a
+//! cell. A row of cells takes its pixels down the axis once and then across for each cell.
+//! Cost: pixels x channels a row of cells, then channels x stacks a cell. Memory: tables of a few bytes a dot of either side. Arithmetic is that of `f32`, each operation rounded once and in a
 //! fixed order: equal on any machine.
 
 use super::super::mix::Axis;
+use super::super::solids::Solids;
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
-
-/// Neither solid stack: a dot or pixel that is a tone.
-pub(in crate::halftone) const TONE: u8 = u8::MAX;
 
 /// Stacks are padded to a multiple of this.
 pub(in crate::halftone) const LANES: usize = 8;
@@ -74,8 +69,7 @@ pub(in crate::halftone) struct Field<'a> {
     channels: Vec<usize>,
     /// Share of each stack, row by row of `channels`.
     matrix: Vec<f32>,
-    /// The stack of each pixel that is wholly one, or [`TONE`].
-    solid: Vec<u8>,
+    pub(super) solids: &'a Solids<'a>,
     /// By size of span: single dots first.
     across: Vec<(usize, Spans)>,
     down: Vec<(usize, Spans)>,
@@ -88,6 +82,7 @@ impl<'a> Field<'a> {
         width: usize,
         height: usize,
         sizes: &[usize],
+        solids: &'a Solids<'a>,
     ) -> Field<'a> {
         let maps = &mix.maps;
         let count = maps.channels();
@@ -108,24 +103,6 @@ impl<'a> Field<'a> {
                 *share = f32::from(mix.matrix[channel][usize::from(q)]) / (f32::from(ONE) * f32::from(ONE));
             }
         }
-        // The stack a channel is wholly made of. Number 255 of 256 stacks would be taken for a tone, and is halftoned.
-        let pure: Vec<u8> = mix
-            .matrix
-            .iter()
-            .map(|shares| {
-                let q = stacks.iter().position(|&q| shares[usize::from(q)] == ONE);
-                q.map_or(TONE, |q| q as u8)
-            })
-            .collect();
-        let solid = maps
-            .data()
-            .chunks_exact(count)
-            .map(|pixel| {
-                let mut found = pixel.iter().zip(&pure).filter(|&(&weight, _)| weight > 0).map(|(_, &q)| q);
-                let first = found.next().unwrap_or(TONE);
-                if found.all(|q| q == first) { first } else { TONE }
-            })
-            .collect();
         let spans = |dots: usize, pixels: usize| {
             let axis = if pixels > dots { Axis::over(dots, pixels) } else { Axis::between(dots, pixels) };
             std::iter::once(1)
@@ -134,7 +111,7 @@ impl<'a> Field<'a> {
                 .collect()
         };
         let (across, down) = (spans(width, maps.width()), spans(height, maps.height()));
-        Field { mix, width, height, stacks, lanes, channels, matrix, solid, across, down }
+        Field { mix, width, height, stacks, lanes, channels, matrix, solids, across, down }
     }
 
     fn spans(table: &[(usize, Spans)], size: usize) -> &Spans {
@@ -142,27 +119,15 @@ impl<'a> Field<'a> {
         table.iter().find(|(known, _)| *known == size).map_or(&table[0].1, |(_, spans)| spans)
     }
 
-    /// The stack of a dot that is wholly one, or [`TONE`].
-    pub(super) fn class(&self, x: usize, y: usize) -> u8 {
-        let ((left, right), (top, bottom)) = (self.across[0].1.pixels(x), self.down[0].1.pixels(y));
-        let first = self.solid[top * self.mix.maps.width() + left];
-        let same = |row: usize| {
-            self.solid[row * self.mix.maps.width()..][left..right].iter().all(|&class| class == first)
-        };
-        if (top..bottom).all(same) { first } else { TONE }
-    }
-
     /// For the pixels under a square of one of the sizes, by its place among such squares: marks the stacks that have
-    /// weight there, and says whether any pixel is solid.
-    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) -> bool {
+    /// weight there.
+    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) {
         let (left, right) = Field::spans(&self.across, size).pixels(column);
         let (top, bottom) = Field::spans(&self.down, size).pixels(row);
         let (maps, count) = (&self.mix.maps, self.mix.maps.channels());
         let mut any = vec![0u16; count];
-        let mut solid = false;
         for y in top..bottom {
             let row = y * maps.width();
-            solid |= self.solid[row + left..row + right].iter().any(|&class| class != TONE);
             for pixel in maps.data()[(row + left) * count..(row + right) * count].chunks_exact(count) {
                 for (any, weight) in any.iter_mut().zip(pixel) {
                     *any |= weight;
@@ -176,7 +141,6 @@ impl<'a> Field<'a> {
                 }
             }
         }
-        solid
     }
 
     /// Adds what one dot asks for, in dots.
@@ -198,6 +162,7 @@ impl<'a> Field<'a> {
     }
 
     /// Adds channels times matrix.
+    #[inline(always)]
     fn shares(&self, channels: &[f32], out: &mut [f32]) {
         for (&weight, shares) in channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
             if weight > 0.0 {
@@ -212,6 +177,7 @@ impl<'a> Field<'a> {
     }
 
     /// Pixels of a row of cells, taken down the axis.
+    #[inline(always)]
     pub(in crate::halftone) fn row(&self, size: usize, row: usize, out: &mut Row) {
         let (first, parts) = Field::spans(&self.down, size).get(row);
         let (maps, all, count) = (&self.mix.maps, self.mix.maps.channels(), self.channels.len());
@@ -238,6 +204,7 @@ impl<'a> Field<'a> {
     }
 
     /// What a whole cell of a row asks for, in dots: into `out`.
+    #[inline(always)]
     pub(in crate::halftone) fn cell(&self, size: usize, column: usize, row: &mut Row, out: &mut [f32]) {
         let (first, parts) = Field::spans(&self.across, size).get(column);
         let count = self.channels.len();

@@ -13,7 +13,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::field::{Field, TONE};
+use super::super::TONE;
+use super::field::Field;
 
 /// Side of a block in dots. The sides of cells are its divisors.
 pub(in crate::halftone) const BLOCK: usize = 24;
@@ -25,7 +26,7 @@ const FULL: u32 = (1 << BLOCK) - 1;
 const SIZES: [usize; 8] = [1, 2, 3, 4, 6, 8, 12, 24];
 
 /// Side of the cells of a stack: the smallest whose square holds the minimum cluster.
-pub(super) fn size_of(minimum: u16) -> usize {
+pub(in crate::halftone) fn size_of(minimum: u16) -> usize {
     SIZES.into_iter().find(|size| size * size >= usize::from(minimum)).unwrap_or(BLOCK)
 }
 
@@ -79,7 +80,10 @@ impl Plan {
                 let blocks: Vec<Block> = (0..across)
                     .map(|column| {
                         present.fill(false);
-                        let solid = field.survey(BLOCK, column, row, &mut present);
+                        field.survey(BLOCK, column, row, &mut present);
+                        let (left, top) = (column * BLOCK, row * BLOCK);
+                        let solid =
+                            field.solids.any(left..(left + BLOCK).min(width), top..(top + BLOCK).min(height));
                         let needed = sizes
                             .iter()
                             .zip(&present)
@@ -391,10 +395,10 @@ fn cut(field: &Field, column: usize, row: usize, dots: &mut [u8]) -> Mask {
     let mut mask = inside(field, column, row);
     for (y, tones) in mask.iter_mut().enumerate() {
         for x in bits(*tones) {
-            let class = field.class(column * BLOCK + x, row * BLOCK + y);
-            if class != TONE {
+            let stack = field.solids.at(column * BLOCK + x, row * BLOCK + y);
+            if stack != TONE {
                 *tones &= !(1 << x);
-                dots[y * field.width + column * BLOCK + x] = field.stacks[usize::from(class)];
+                dots[y * field.width + column * BLOCK + x] = stack;
             }
         }
     }

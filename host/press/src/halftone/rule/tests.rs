@@ -237,6 +237,48 @@ proptest! {
     }
 }
 
+/// The whole halftone of a mix without solids is the literal rule along the walk, at one dot a pixel.
+#[test]
+fn a_mix_without_solids_is_walked_by_the_literal_rule() {
+    use crate::halftone::{Method, Settings, halftone, mix::Lattice};
+    use appearance::weights::{ONE, WeightMaps, quantise};
+    use inks::Stack;
+    use protocol::{ink::Ink, walk::Walk};
+    for (seed, width, height) in [(1u64, 70u16, 45u16), (2, 129, 66), (3, 64, 200)] {
+        let (wide, high, count) = (usize::from(width), usize::from(height), 4);
+        let noise = |i: usize| ((seed ^ i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 + 1.0;
+        let mut data = vec![0; wide * high * count];
+        for (pixel, out) in data.chunks_exact_mut(count).enumerate() {
+            quantise(&(0..count).map(|q| noise(pixel * 4 + q).powi(2)).collect::<Vec<_>>(), out);
+        }
+        let matrix = (0..count).map(|i| (0..count).map(|q| if q == i { ONE } else { 0 }).collect()).collect();
+        let inks = [Ink::Cyan, Ink::Magenta, Ink::Black].map(|ink| Stack::new([ink]));
+        let mix = appearance::gamut::InkMix {
+            stacks: std::iter::once(Stack::SUBSTRATE).chain(inks).collect(),
+            maps: WeightMaps::new(wide, high, count, data).unwrap(),
+            matrix,
+        };
+        let minimum = vec![9, 4, 16, 9];
+        let settings = Settings { method: Method::Walk, minimum: minimum.clone(), reflectance: None };
+        let dots = halftone(&mix, (width, height), None, &settings, &observe::Silent).unwrap();
+        let walk = Walk::new(width, height);
+        let lattice = Lattice::new(&mix, &walk);
+        let mut along = lattice.along(walk.bands().flat_map(|band| band.tiles()));
+        let (mut stretches, mut at) = (Vec::new(), 0);
+        while at < walk.len() {
+            let mut lanes = vec![Lanes::default(); 1];
+            let dots = along.stretch(&mut lanes);
+            stretches.push((dots, lanes[0].0[..count].to_vec()));
+            at += dots;
+        }
+        for (position, q) in literal(&stretches, &minimum, ABSENT as usize).into_iter().enumerate() {
+            let (x, y) = walk.at(position as u32).unwrap();
+            let found = dots.index()[usize::from(y) * wide + usize::from(x)];
+            assert_eq!(usize::from(found), q, "dot {x}, {y}");
+        }
+    }
+}
+
 /// Hairlines of many stacks, none large enough to be printed: without parking the background would owe
 /// all of them, and a newcomer would then be printed alone for hundreds of dots.
 #[test]
