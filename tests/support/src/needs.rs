@@ -27,6 +27,8 @@ pub enum Need {
     Usb,
     /// dpkg, man and root.
     Package,
+    /// Tesseract, which reads printed text.
+    Reading,
 }
 
 impl Need {
@@ -41,6 +43,7 @@ impl Need {
             Need::Emulator => "emulator",
             Need::Usb => "usb",
             Need::Package => "package",
+            Need::Reading => "reading",
         }
     }
 

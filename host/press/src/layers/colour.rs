@@ -88,11 +88,18 @@ impl Colour {
         if let Some(done) = self.without_tones(&solids) {
             return Ok(done);
         }
-        let (mut mix, flats) = self.mix(&printable, space, settings, observer)?;
+        let mut fit = self.fit(&printable, space, settings, observer)?;
         let fixed = (!self.flat.index.is_empty()).then(|| {
-            let treatments = self.treatments(&mut mix, &flats, &solids);
+            let treatments = self.treatments(&mut fit, &solids);
             outline::fixed(&self.flat, dots.0, &treatments)
         });
+        let fixed = match fixed {
+            Some(fixed) if !fixed.par_chunks(1 << 16).any(|dots| dots.contains(&TONE)) => {
+                return Ok((fit.stacks, fixed));
+            }
+            fixed => fixed,
+        };
+        let mix = self.mix(fit)?;
         // Larger art was refused when its size was decided.
         let size = (dots.0 as u16, dots.1 as u16);
         let toning = halftone::Settings {
@@ -102,14 +109,14 @@ impl Colour {
         Ok(halftone(&mix, size, fixed.as_deref(), &toning, observer)?.into_parts())
     }
 
-    /// The mixture of stacks at every pixel, and that of every flat colour.
-    fn mix(
+    /// Fits the nodes of the lattices that are needed.
+    fn fit(
         &self,
         printable: &Printable,
         space: Space,
         settings: &Settings,
         observer: &dyn Observer,
-    ) -> Result<(InkMix, Vec<Vec<f64>>), LayersError> {
+    ) -> Result<Fit, LayersError> {
         let has_drawings = self.flat.colours.len() > 2 || !self.drawn.is_empty();
         let intents: &[Intent] = match settings.intent {
             Intent::Auto if has_drawings => &[Intent::Perceptual, Intent::Colorimetric],
@@ -117,49 +124,43 @@ impl Colour {
             Intent::Perceptual => &[Intent::Perceptual],
             Intent::Colorimetric => &[Intent::Colorimetric],
         };
-        let of_drawings = intents.len() - 1;
         let lattice = Lattice::new(space, printable, intents, settings.gamma);
         let mut bases = Table::new(lattice.space().columns());
         bases.push(&lattice.paper);
         let maps = WeightMaps::uniform(lattice.width(), lattice.height());
         let factored = Factored { space: lattice.space().clone(), bases, maps };
-        let fit = gamut::Settings {
+        let clamp = gamut::Settings {
             intent: gamut::Intent::Clamp,
             gloss: Gloss::Keep,
             ..gamut::Settings::default()
         };
-        let fitted = gamut::map(&factored, Some(&lattice), printable, &fit, observer)?.mix;
-        let channels = fitted.maps.channels();
-        let steps: [(usize, u32); 256] = std::array::from_fn(step);
-        let nodes = Nodes::new(&fitted.maps);
+        let InkMix { stacks, maps, matrix } =
+            gamut::map(&factored, Some(&lattice), printable, &clamp, observer)?.mix;
+        let channels = maps.channels();
+        let steps = std::array::from_fn(step);
+        Ok(Fit { stacks, matrix, channels, nodes: Nodes::new(&maps), steps, of_drawings: intents.len() - 1 })
+    }
+
+    /// The mixture of stacks at every pixel.
+    fn mix(&self, fit: Fit) -> Result<InkMix, LayersError> {
+        let channels = fit.channels;
         let mut data = vec![0u16; self.width * self.height * channels];
         data.par_chunks_mut(channels << 12).zip(self.rgb.par_chunks(3 << 12)).enumerate().for_each(
             |(block, (out, rgb))| {
-                let mut sums = nodes.scratch();
+                let mut sums = fit.nodes.scratch();
                 let drawn = self.drawn.get(block << 12..).unwrap_or_default();
                 let drawn = drawn.iter().copied().chain(std::iter::repeat(false));
                 for ((out, pixel), drawn) in
                     out.chunks_exact_mut(channels).zip(rgb.as_chunks::<3>().0).zip(drawn)
                 {
-                    let lattice = if drawn { of_drawings } else { 0 };
-                    nodes.between(lattice, pixel.map(|v| steps[usize::from(v)]), &mut sums, out);
+                    let lattice = if drawn { fit.of_drawings } else { 0 };
+                    fit.nodes.between(lattice, pixel.map(|v| fit.steps[usize::from(v)]), &mut sums, out);
                 }
             },
         );
         let maps =
             WeightMaps::new(self.width, self.height, channels, data).map_err(gamut::GamutError::from)?;
-        let (mut sums, mut weights) = (nodes.scratch(), vec![0; channels]);
-        let flats = self.flat.colours.iter().map(|(_, colour)| {
-            nodes.between(of_drawings, colour.map(|v| steps[usize::from(v)]), &mut sums, &mut weights);
-            let share = |stack: usize| -> f64 {
-                let parts = weights.iter().zip(&fitted.matrix);
-                parts.map(|(&weight, row)| f64::from(weight) * f64::from(row[stack])).sum()
-            };
-            let one = f64::from(ONE) * f64::from(ONE);
-            (0..fitted.stacks.len()).map(|stack| share(stack) / one).collect()
-        });
-        let flats = flats.collect();
-        Ok((InkMix { stacks: fitted.stacks, maps, matrix: fitted.matrix }, flats))
+        Ok(InkMix { stacks: fit.stacks, maps, matrix: fit.matrix })
     }
 
     /// The stacks, and that of each dot, if all dots are in colours that are the name of a stack.
@@ -189,17 +190,18 @@ impl Colour {
 
     /// How each flat colour is printed, from the weights of the stacks in its mixture. Stacks that colours name and nothing
     /// else uses are added to the mix.
-    fn treatments(&self, mix: &mut InkMix, flats: &[Vec<f64>], solids: &Solids<'_>) -> Vec<Treatment> {
-        let bodies: Vec<Light> = mix.stacks.iter().map(|stack| solids.body(stack)).collect();
-        let treatment = |(&(_, colour), weights): (&(Kind, [u8; 3]), &Vec<f64>)| {
+    fn treatments(&self, fit: &mut Fit, solids: &Solids<'_>) -> Vec<Treatment> {
+        let bodies: Vec<Light> = fit.stacks.iter().map(|stack| solids.body(stack)).collect();
+        let mut treatment = |&(_, colour): &(Kind, [u8; 3])| {
             if let Some(stack) = solids.named(colour) {
-                let known = mix.stacks.iter().position(|known| *known == stack);
+                let known = fit.stacks.iter().position(|known| *known == stack);
                 return Treatment::Solid(known.unwrap_or_else(|| {
-                    mix.stacks.push(stack);
-                    mix.matrix.iter_mut().for_each(|shares| shares.push(0));
-                    mix.stacks.len() - 1
+                    fit.stacks.push(stack);
+                    fit.matrix.iter_mut().for_each(|shares| shares.push(0));
+                    fit.stacks.len() - 1
                 }) as u8);
             }
+            let weights = &fit.weights(colour)[..bodies.len()];
             let wanted = solids.wanted(colour);
             let mixed =
                 std::array::from_fn(|c| weights.iter().zip(&bodies).map(|(w, body)| w * body[c]).sum());
@@ -217,7 +219,39 @@ impl Colour {
                 Some(stack) => Treatment::Shape { solid: stack as u8, dark: weights[0] < 0.5 },
             }
         };
-        self.flat.colours.iter().zip(flats).map(treatment).collect()
+        self.flat.colours.iter().map(&mut treatment).collect()
+    }
+}
+
+/// The nodes of the lattices, fitted.
+struct Fit {
+    stacks: Vec<Stack>,
+    /// Shares of the stacks in each channel.
+    matrix: Vec<Vec<u16>>,
+    channels: usize,
+    nodes: Nodes,
+    /// Places of the 256 values between nodes.
+    steps: [(usize, u32); 256],
+    /// Number of the lattice for text and drawings.
+    of_drawings: usize,
+}
+
+impl Fit {
+    /// The weights of the stacks in a flat colour.
+    fn weights(&self, colour: [u8; 3]) -> Vec<f64> {
+        let (mut sums, mut weights) = (self.nodes.scratch(), vec![0; self.channels]);
+        self.nodes.between(
+            self.of_drawings,
+            colour.map(|v| self.steps[usize::from(v)]),
+            &mut sums,
+            &mut weights,
+        );
+        let share = |stack: usize| -> f64 {
+            let parts = weights.iter().zip(&self.matrix);
+            parts.map(|(&weight, shares)| f64::from(weight) * f64::from(shares[stack])).sum()
+        };
+        let one = f64::from(ONE) * f64::from(ONE);
+        (0..self.stacks.len()).map(|stack| share(stack) / one).collect()
     }
 }
 
@@ -373,7 +407,7 @@ mod tests {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let settings = Settings { intent, ..Settings::default() };
-        (colour.mix(&printable, space, &settings, &Silent).unwrap().0, printable)
+        (colour.mix(colour.fit(&printable, space, &settings, &Silent).unwrap()).unwrap(), printable)
     }
 
     fn process() -> InkSet {
@@ -506,14 +540,14 @@ mod tests {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
-        let (mut mix, flats) = colour.mix(&printable, space.clone(), &Settings::default(), &Silent).unwrap();
-        let treatments = colour.treatments(&mut mix, &flats, &solids);
+        let mut fit = colour.fit(&printable, space.clone(), &Settings::default(), &Silent).unwrap();
+        let treatments = colour.treatments(&mut fit, &solids);
         let found = |rgb: [u8; 3]| {
             let at = colour.flat.colours.iter().position(|(_, colour)| *colour == rgb).unwrap();
             match treatments[at] {
-                Treatment::Solid(stack) => mix.stacks[usize::from(stack)].to_string(),
+                Treatment::Solid(stack) => fit.stacks[usize::from(stack)].to_string(),
                 Treatment::Shape { solid, dark } => {
-                    format!("{} {}", if dark { "dark" } else { "pale" }, mix.stacks[usize::from(solid)])
+                    format!("{} {}", if dark { "dark" } else { "pale" }, fit.stacks[usize::from(solid)])
                 }
             }
         };

@@ -16,6 +16,7 @@ mod suggest;
 
 use inks::{InkSet, Library, Stack};
 use protocol::ink::{Ink, Kind};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::artwork::{Artwork, Shape};
@@ -195,7 +196,14 @@ fn tone(
         method: settings.halftone,
         ..halftone::Settings::from_library(&mix.stacks, library)
     };
-    let dots = halftone(&mix, (width, height), None, &toning, observer)?;
+    // What the plate has wholly or not at all is no tone.
+    let fixed = coverage.par_iter().map(|&c| match c {
+        0 => 0,
+        255 => 1,
+        _ => halftone::TONE,
+    });
+    let fixed: Vec<u8> = fixed.collect();
+    let dots = halftone(&mix, (width, height), Some(&fixed), &toning, observer)?;
     Ok(bits::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 

@@ -1,4 +1,5 @@
 use super::*;
+use crate::halftone::Method;
 use crate::layers::{Colour, Layer};
 use crate::separate;
 use crate::sheet::Sheet;
@@ -187,6 +188,29 @@ fn tones_become_dots_of_their_mean_and_solids_stay_solid() {
         let inked = (0..width * length).filter(|dot| dot % width / 100 == quarter);
         let share = inked.filter(|&dot| composed.dots.index()[dot] > 0).count() as f64 / 30_000.0;
         assert!((share - wanted).abs() < 0.01, "quarter {quarter}: {share}, not {wanted}");
+    }
+}
+
+#[test]
+fn what_a_plate_has_wholly_or_not_at_all_is_exact_beside_its_tones() {
+    let (width, length) = (120, 60);
+    let mut art = Artwork::blank("plate", (width, length));
+    // Squares of three dots, and a tone that surrounds some of them.
+    let square = |x: usize, y: usize| (x / 3 * 7 + y / 3 * 5) % 3 == 0;
+    let coverage = (0..width * length).map(|dot| match (dot % width, dot / width) {
+        (x, y) if square(x, y) => 255,
+        (60.., _) => 90,
+        _ => 0,
+    });
+    let coverage: Vec<u8> = coverage.collect();
+    let shape = Shape::Tone(coverage.clone());
+    art.layers.push(Layer { ink: Black, name: "black".into(), place: None, shape });
+    for method in [Method::Walk, Method::Cells] {
+        let composed = composed(&art, &Settings { halftone: method, ..with(|_| ()) });
+        for (dot, (&stack, &asked)) in composed.dots.index().iter().zip(&coverage).enumerate() {
+            let wanted = [0, 255].iter().position(|&whole| whole == asked);
+            assert!(wanted.is_none_or(|wanted| usize::from(stack) == wanted), "{method:?}, dot {dot}");
+        }
     }
 }
 

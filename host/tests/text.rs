@@ -1,0 +1,342 @@
+//! Text and line art as people get them: pages through every path, decoded from their jobs, against what was drawn.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use image::{GrayImage, Luma, Rgb, RgbImage};
+use observe::Silent;
+use press::inspect::inspect;
+use protocol::ink::Ink;
+
+use testing::needs::{Need, starts};
+use testing::program::Bench;
+
+/// Dots row by row.
+#[derive(Clone, PartialEq)]
+struct Dots {
+    width: usize,
+    set: Vec<bool>,
+}
+
+impl Dots {
+    fn new(width: usize, length: usize, is: impl Fn(usize, usize) -> bool) -> Dots {
+        Dots { width, set: (0..width * length).map(|at| is(at % width, at / width)).collect() }
+    }
+
+    fn at(&self, x: usize, y: usize) -> bool {
+        self.set[y * self.width + x]
+    }
+
+    fn length(&self) -> usize {
+        self.set.len() / self.width
+    }
+
+    /// First and last column and row of what is set, the last excluded.
+    fn bounds(&self) -> [usize; 4] {
+        let set = || (0..self.set.len()).filter(|&at| self.set[at]);
+        let columns = || set().map(|at| at % self.width);
+        let rows = || set().map(|at| at / self.width);
+        [columns().min(), rows().min(), columns().max(), rows().max()]
+            .map(|side| side.expect("something is drawn"))
+    }
+
+    /// A part of it.
+    fn part(&self, [left, top, right, bottom]: [usize; 4]) -> Dots {
+        Dots::new(right + 1 - left, bottom + 1 - top, |x, y| self.at(left + x, top + y))
+    }
+
+    /// Changes between neighbouring dots: the length of the outline.
+    fn changes(&self) -> usize {
+        let across = (0..self.length()).flat_map(|y| (1..self.width).map(move |x| (x - 1, y, x, y)));
+        let down = (1..self.length()).flat_map(|y| (0..self.width).map(move |x| (x, y - 1, x, y)));
+        across.chain(down).filter(|&(x, y, u, v)| self.at(x, y) != self.at(u, v)).count()
+    }
+
+    fn differences(&self, other: &Dots) -> usize {
+        assert_eq!((self.width, self.length()), (other.width, other.length()));
+        self.set.iter().zip(&other.set).filter(|(a, b)| a != b).count()
+    }
+}
+
+/// The dots of a job that have any of these inks, cut to what is printed at all.
+fn printed(job: &[u8], inks: &[Ink]) -> Dots {
+    let passes = inspect(job, &Silent).passes;
+    let of = |wanted: &dyn Fn(Ink) -> bool| {
+        let planes: Vec<_> = passes.iter().filter(|pass| wanted(pass.ink)).map(|pass| &pass.plane).collect();
+        let (width, length) = (passes[0].plane.width, passes[0].plane.length);
+        let is = |x: usize, y: usize| {
+            planes.iter().any(|plane| plane.bits[y * plane.stride + x / 8] << (x % 8) & 0x80 != 0)
+        };
+        Dots::new(width, length, is)
+    };
+    let all = of(&|_| true);
+    of(&|ink| inks.contains(&ink)).part(all.bounds())
+}
+
+/// Art that must be exact: squares of three dots, black or bare, and a coloured box without which nothing is hard.
+const MODULES: (usize, usize) = (60, 40);
+const BOX: usize = 90;
+
+fn module(x: usize, y: usize) -> bool {
+    let corner = (x == 0 || x + 1 == MODULES.0) && (y == 0 || y + 1 == MODULES.1);
+    corner || (x * 7919 + y * 104_729 + x * y * 31) % 11 < 5
+}
+
+fn pixel(x: u32, y: u32) -> [u8; 3] {
+    let (x, y) = (x as usize / 3, y as usize / 3);
+    match x < MODULES.0 {
+        true if module(x, y) => [0; 3],
+        true => [255; 3],
+        false => [200, 120, 60],
+    }
+}
+
+const SIZE: (u32, u32) = (3 * MODULES.0 as u32 + BOX as u32, 3 * MODULES.1 as u32);
+
+/// Fails if a module is not exactly as drawn, or anything but black is on one.
+fn assert_exact(job: &[u8], path: &str) {
+    let drawn = Dots::new(3 * MODULES.0, 3 * MODULES.1, |x, y| module(x / 3, y / 3));
+    let part = [0, 0, drawn.width - 1, drawn.length() - 1];
+    let (black, all) = (printed(job, &[Ink::Black]), printed(job, &Ink::ALL));
+    assert_eq!((all.width, all.length()), (SIZE.0 as usize, SIZE.1 as usize), "{path}");
+    assert_eq!(black.part(part).differences(&drawn), 0, "{path}: wrong dots of black");
+    assert_eq!(all.part(part).differences(&drawn), 0, "{path}: dots of other inks");
+}
+
+fn job(bench: &Bench, arguments: &str) -> Vec<u8> {
+    // A folder of an earlier job is not replaced.
+    let _ = std::fs::remove_dir_all(bench.path("art.print"));
+    bench.done(&format!("layers {arguments} -o art.print"));
+    std::fs::read(bench.path("art.print/job.rgl")).expect("a job")
+}
+
+#[test]
+fn one_bit_art_is_exact_beside_tones_in_pictures_and_drawings() {
+    let bench = Bench::new();
+    let picture = RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| Rgb(pixel(x, y)));
+    for name in ["art.png", "art.tif"] {
+        picture.save(bench.path(name)).expect("a picture");
+        assert_exact(&job(&bench, &format!("{name} --dpi 600")), name);
+    }
+    let mut svg = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='{}in' height='{}in' viewBox='0 0 {} {}'>",
+        f64::from(SIZE.0) / 600.0,
+        f64::from(SIZE.1) / 600.0,
+        SIZE.0,
+        SIZE.1
+    );
+    for (x, y) in
+        (0..MODULES.1).flat_map(|y| (0..MODULES.0).map(move |x| (x, y))).filter(|&(x, y)| module(x, y))
+    {
+        svg.push_str(&format!("<path d='M{} {}h3v3h-3z'/>", 3 * x, 3 * y));
+    }
+    svg.push_str(&format!(
+        "<rect x='{}' width='{BOX}' height='{}' fill='#c8783c'/></svg>",
+        3 * MODULES.0,
+        SIZE.1
+    ));
+    std::fs::write(bench.path("art.svg"), svg).expect("a drawing");
+    assert_exact(&job(&bench, "art.svg"), "art.svg");
+}
+
+/// Whether Ghostscript is here; else the test is left out.
+fn ghostscript() -> bool {
+    let found = starts("gs");
+    if !found {
+        Need::Queue.skip("there is no Ghostscript");
+    }
+    found
+}
+
+/// A page as PostScript, in points from its lower left corner.
+fn page((width, length): (f64, f64), drawing: &str) -> String {
+    format!(
+        "%!PS\n%%BoundingBox: 0 0 {} {}\n<</PageSize[{width} {length}]>>setpagedevice\n{drawing}\nshowpage\n",
+        width.ceil(),
+        length.ceil()
+    )
+}
+
+/// The job that a queue makes of a file.
+fn queued(bench: &Bench, file: &str) -> Vec<u8> {
+    let mut command = bench.command_of(["cups-filter", "1", "user", "title", "1", "", file]);
+    let output = command.stdin(Stdio::null()).output().expect("the filter starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    output.stdout
+}
+
+fn run(program: &mut Command) -> Vec<u8> {
+    let output = program.output().expect("it starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    output.stdout
+}
+
+fn drawn_by(device: &str, file: &Path) -> Vec<u8> {
+    let device = format!("-sDEVICE={device}");
+    run(Command::new("gs")
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-r600", &device, "-sOutputFile=-"])
+        .arg(file))
+}
+
+#[test]
+fn one_bit_art_is_exact_beside_tones_in_pages() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    // In dots from the lower left corner of a sheet of 4 x 3 inches, clear of the margins.
+    let mut drawing = String::from(".12 .12 scale 300 700 translate 0 setgray\n");
+    for (x, y) in
+        (0..MODULES.1).flat_map(|y| (0..MODULES.0).map(move |x| (x, y))).filter(|&(x, y)| module(x, y))
+    {
+        // A pixel that an area only touches is drawn, too.
+        let (left, bottom) = (3 * x, 3 * (MODULES.1 - 1 - y));
+        drawing.push_str(&format!("{left}.25 {bottom}.25 2.5 2.5 rectfill\n"));
+    }
+    drawing.push_str(&format!(
+        ".784 .471 .235 setrgbcolor {}.25 .25 {BOX} .5 sub {} .5 sub rectfill\n",
+        3 * MODULES.0,
+        SIZE.1
+    ));
+    std::fs::write(bench.path("art.ps"), page((288.0, 216.0), &drawing)).expect("a page");
+    assert_exact(&queued(&bench, "art.ps"), "queue");
+    assert_exact(&job(&bench, "art.ps"), "layers");
+}
+
+const LINE: &str = "The quick brown fox jumps over the lazy dog";
+const FONTS: [&str; 3] = ["Times-Roman", "Helvetica", "Helvetica-Bold"];
+const SIZES: [f64; 4] = [6.0, 8.0, 10.0, 14.0];
+/// A whole number of dots on each side, and of the coarse pixels by which `layers` learns a page's size.
+const SHEET: (f64, f64) = (396.0, 264.0);
+
+/// Lines in all fonts and sizes, after these commands.
+fn lines(before: &str) -> String {
+    let mut drawing = format!("{before}\n");
+    let mut y = SHEET.1 - 54.0;
+    for font in FONTS {
+        for size in SIZES {
+            drawing.push_str(&format!(
+                "/{font} findfont {size} scalefont setfont 20 {y} moveto ({LINE}) show\n"
+            ));
+            y -= 1.4 * size;
+        }
+    }
+    // Marks at the corners, where every version of the page has them.
+    drawing + "12 48 3 3 rectfill 380 48 3 3 rectfill 12 222 3 3 rectfill 380 222 3 3 rectfill"
+}
+
+/// The lines that Tesseract reads.
+fn read(bench: &Bench, text: &Dots) -> Vec<String> {
+    let margin = 60;
+    let (width, length) = (text.width + 2 * margin, text.length() + 2 * margin);
+    let picture = GrayImage::from_fn(width as u32, length as u32, |x, y| {
+        let inside = |at: u32, sides: usize| (at as usize).checked_sub(margin).filter(|&at| at < sides);
+        let ink = inside(x, text.width).zip(inside(y, text.length())).is_some_and(|(x, y)| text.at(x, y));
+        Luma([if ink { 0 } else { 255 }])
+    });
+    picture.save(bench.path("text.png")).expect("a picture");
+    let mut reader = Command::new("tesseract");
+    reader.arg(bench.path("text.png")).args(["-", "--psm", "6", "--dpi", "600"]).env("OMP_THREAD_LIMIT", "1");
+    let words = run(&mut reader);
+    let words = String::from_utf8_lossy(&words);
+    words.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect()
+}
+
+/// Letters to insert, leave out or replace to make one text of another.
+fn edits(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut corner = std::mem::replace(&mut row[0], i + 1);
+        for (j, &y) in b.iter().enumerate() {
+            let least = (row[j] + 1).min(row[j + 1] + 1).min(corner + usize::from(x != y));
+            corner = std::mem::replace(&mut row[j + 1], least);
+        }
+    }
+    row[b.len()]
+}
+
+/// The page without its marks.
+fn without_marks(page: &Dots) -> Dots {
+    page.part([60, 60, page.width - 61, page.length() - 61])
+}
+
+#[test]
+fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
+    if !ghostscript() {
+        return;
+    }
+    let tesseract = starts("tesseract");
+    if !tesseract {
+        Need::Reading.skip("there is no Tesseract (Debian: tesseract-ocr)");
+    }
+    let bench = Bench::new();
+    let file = |text: &str| {
+        std::fs::write(bench.path("page.ps"), page(SHEET, text)).expect("a page");
+        std::fs::write(bench.path("page.pdf"), drawn_by("pdfwrite", &bench.path("page.ps"))).expect("a PDF");
+    };
+    file(&lines("0 setgray"));
+    let bitmap = image::load_from_memory_with_format(
+        &drawn_by("pbmraw", &bench.path("page.pdf")),
+        image::ImageFormat::Pnm,
+    );
+    let bitmap = bitmap.expect("a bitmap").into_luma8();
+    let drawn = Dots::new(bitmap.width() as usize, bitmap.height() as usize, |x, y| {
+        bitmap.get_pixel(x as u32, y as u32).0[0] == 0
+    });
+    let drawn = without_marks(&drawn.part(drawn.bounds()));
+    // Colour, whether a stack prints it, whether the letters are what is not printed.
+    let ground = "0 0 .6 setrgbcolor 12 48 371 177 rectfill 1 setgray";
+    let colours = [
+        ("K", "0 0 0 1 setcmykcolor", true, false),
+        ("RGB black", "0 0 0 setrgbcolor", true, false),
+        ("grey", ".5 setgray", false, false),
+        ("blue", "0 0 .6 setrgbcolor", false, false),
+        ("cyan", "1 0 0 0 setcmykcolor", true, false),
+        ("white on blue", ground, true, true),
+    ];
+    for (name, before, solid, reversed) in colours {
+        file(&lines(before));
+        let text = |job: &[u8]| {
+            let mut dots = without_marks(&printed(job, &Ink::ALL));
+            if reversed {
+                dots.set.iter_mut().for_each(|dot| *dot = !*dot);
+            }
+            dots
+        };
+        let driver = drawn_by("md5k", &bench.path("page.pdf"));
+        let at_queue = text(&queued(&bench, "page.pdf"));
+        let by_layers = text(&job(&bench, "page.pdf"));
+        for (path, found) in [("queue", &at_queue), ("layers", &by_layers)] {
+            let ratio = found.changes() as f64 / drawn.changes() as f64;
+            let most = if solid { 1.05 } else { 1.3 };
+            assert!(ratio <= most, "{name}, {path}: the outline is {ratio:.3} times as long as drawn");
+            if solid {
+                assert_eq!(found.differences(&drawn), 0, "{name}, {path}");
+            }
+        }
+        if !tesseract {
+            continue;
+        }
+        let whole = [LINE; 12].join("\n");
+        let mut errors = [0; 3];
+        for (ours, (errors, found)) in [true, true, false].into_iter().zip(errors.iter_mut().zip([
+            &at_queue,
+            &by_layers,
+            &text(&driver),
+        ])) {
+            let read = read(&bench, found);
+            *errors = edits(&read.join("\n"), &whole);
+            if ours && solid {
+                assert_eq!(read.len(), 12, "{name}: {read:?}");
+                for (line, size) in
+                    read.iter().zip(SIZES.into_iter().cycle()).filter(|(_, size)| *size >= 8.0)
+                {
+                    assert_eq!(edits(line, LINE), 0, "{name}, {size} points: {line}");
+                }
+            }
+        }
+        println!("{name}: errors of queue, layers and md5k {errors:?}");
+        assert!(errors[0] <= errors[2] && errors[1] <= errors[2], "{name}: {errors:?}");
+    }
+}
