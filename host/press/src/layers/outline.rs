@@ -70,9 +70,10 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
             if thin && dark {
                 fixed[run.start as usize..run.end as usize].fill(solid);
             } else if dark || thin && kind == Kind::Text {
-                for x in run.start as usize..run.end as usize {
+                let start = run.start as usize;
+                for (x, dot) in (start..).zip(&mut fixed[start..run.end as usize]) {
                     if at_the_rim(flat, width, (x, y)) {
-                        fixed[x] = solid;
+                        *dot = solid;
                     }
                 }
             }

@@ -196,7 +196,7 @@ fn what_a_plate_has_wholly_or_not_at_all_is_exact_beside_its_tones() {
     let (width, length) = (120, 60);
     let mut art = Artwork::blank("plate", (width, length));
     // Squares of three dots, and a tone that surrounds some of them.
-    let square = |x: usize, y: usize| (x / 3 * 7 + y / 3 * 5) % 3 == 0;
+    let square = |x: usize, y: usize| (x / 3 * 7 + y / 3 * 5).is_multiple_of(3);
     let coverage = (0..width * length).map(|dot| match (dot % width, dot / width) {
         (x, y) if square(x, y) => 255,
         (60.., _) => 90,
