@@ -9,7 +9,7 @@ use anyhow::{Result, bail};
 use crate::{cargo, command};
 
 /// Programs the tests start, and the packages they are in.
-const NEEDED: [(&str, &str); 8] = [
+const NEEDED: [(&str, &str); 9] = [
     ("/usr/sbin/cupsd", "cups-daemon"),
     ("/usr/lib/cups/daemon/cups-deviced", "cups"),
     ("/usr/bin/lp", "cups-client"),
@@ -18,6 +18,7 @@ const NEEDED: [(&str, &str); 8] = [
     ("/usr/bin/gs", "ghostscript"),
     ("/usr/bin/pdftocairo", "poppler-utils"),
     ("/usr/bin/man", "man-db"),
+    ("/usr/bin/tesseract", "tesseract-ocr"),
 ];
 
 /// Installs what is missing.

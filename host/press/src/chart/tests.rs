@@ -157,7 +157,7 @@ fn charts_refuse_what_shows_nothing() {
 fn the_halftones_have_the_same_tones() {
     let print = |a: &str, b: &str| halftones(&stack(a), &stack(b), &Library::builtin(), &Silent).unwrap();
     let chart = print("K", "substrate");
-    let (patch, column, row) = ((944, 354), 944 + 94, 80 + 24 + 354 + 47);
+    let (patch, column, row) = ((945, 354), 945 + 94, 80 + 24 + 354 + 47);
     assert_eq!(chart.width(), 4 * column - 94);
     for method in 0..4 {
         for (j, want) in [0.5, 0.02, 0.1, 0.3, 0.5].into_iter().enumerate() {
