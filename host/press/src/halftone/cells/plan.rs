@@ -216,8 +216,9 @@ impl Plan {
                 for cell_x in (0..BLOCK).step_by(size) {
                     let row = span(cell_x, size);
                     let mut left_over: Mask = [0; BLOCK];
-                    for y in cell_y..cell_y + size {
-                        left_over[y] = block.tone[y] & row;
+                    let rows = cell_y..cell_y + size;
+                    for (rest, tone) in left_over[rows.clone()].iter_mut().zip(&block.tone[rows]) {
+                        *rest = tone & row;
                     }
                     let area: u32 = left_over.iter().map(|bits| bits.count_ones()).sum();
                     if area as usize == size * size {
