@@ -29,6 +29,9 @@ use plan::{BLOCK, Plan};
 /// Block rows in a strip.
 const STRIP: usize = 32;
 
+/// Block rows of lead-in: what 2 % of a stack needs to come to its own.
+const LEAD: usize = 2;
+
 /// Halftones a checked mixture on `width` x `height` dots: a stack of the mixture for each. `minimum` is the smallest
 /// cluster of each stack. With a point for each stack, cells are then exchanged to lessen the error seen ([`search`]).
 pub(super) fn cells(
@@ -53,8 +56,10 @@ pub(super) fn cells(
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
         wide(|| {
             let mut strip = Strip::new(&field, &plan, &least);
-            if first > 0 {
-                strip.block_row(first - 1, &mut Target { rows: None, top: 0 });
+            // At the top of the page its first rows are their own lead-in.
+            for row in 0..LEAD {
+                let row = (first + row).saturating_sub(LEAD);
+                strip.block_row(row, &mut Target { rows: None, top: 0 });
             }
             let mut target = Target { rows: Some(rows), top: first * BLOCK };
             for row in first..first + count {

@@ -5,7 +5,7 @@
 //! neighbours, in serpentine rows, by the weights of Floyd and Steinberg, which a hash of the place disturbs in two
 //! pairs (Ulichney): exact weights lock flat tones into patterns. What is owed waits in a slot for each cell of the
 //! next row; where blocks of other cells begin, slots are divided anew.
-//! A strip is diffused by itself, after a block row of lead-in whose dots are thrown away, so that it starts with
+//! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away, so that it starts with
 //! debts like any other row.
 //! Cost: about eight operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 

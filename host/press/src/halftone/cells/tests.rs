@@ -185,6 +185,19 @@ fn strips_leave_no_seams() {
     assert!(inside < 0.006 && seam < 0.006, "inside {inside}, at the seam {seam}");
 }
 
+/// A faint tone is there from the first rows of a page and of a strip.
+#[test]
+fn faint_tones_begin_where_they_begin() {
+    let mix = plain(1, 1, 2, |_, _| vec![0.98, 0.02]);
+    let (width, height) = (4800, 840);
+    let dots = cells(&mix, (width, height), &[9, 9], None, &Silent);
+    for top in [0, 24, 744, 768, 792] {
+        let rows = &dots[top * width..(top + 24) * width];
+        let share = rows.iter().filter(|&&dot| dot == 1).count() as f64 / rows.len() as f64;
+        assert!((0.015..0.025).contains(&share), "rows from {top}: {share}");
+    }
+}
+
 /// The search moves dots and takes none away; the error it judges by falls.
 #[test]
 fn the_search_keeps_tones_and_sees_less() {
