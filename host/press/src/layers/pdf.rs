@@ -2,8 +2,8 @@
 //!
 //! Problem: pages have spot plates and transparent backgrounds, and their languages are large. A document has several pages,
 //! and nothing of it may be lost in silence.
-//! Method: drafts of all pages ([`draw`]) tell which hold art. If several do, the user chooses one, or names an ink for
-//! each. A page with spot colours that name inks is separated at its final number of dots ([`plates`]). Any other page is
+//! Method: drafts of all pages tell which hold art. If several do, the user chooses one, or names an ink for
+//! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is
 //! drawn with the kind of each pixel ([`kinds`]), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
