@@ -395,6 +395,12 @@ const PAGE: &str = "%!PS
 showpage
 ";
 
+/// A page for each of three inks.
+const PLATES: &str = "%!PS
+<< /PageSize [85 57] >> setpagedevice
+10 10 65 37 rectfill showpage 20 20 20 17 rectfill showpage 50 20 20 17 rectfill showpage
+";
+
 /// A material without maps.
 const HELMET: &str = r#"{"asset": {"version": "2.0"}, "materials": [{"name": "brass", "pbrMetallicRoughness":
 {"baseColorFactor": [0.8, 0.6, 0.2, 1], "metallicFactor": 1, "roughnessFactor": 0.4}}]}"#;
@@ -412,9 +418,11 @@ fn files_of_the_examples(desk: &Desk) {
     image::open(folder.join("docs/pictures/leaf-sheet.jpg")).unwrap().save(folder.join("photo.png")).unwrap();
     fs::write(folder.join("art.svg"), DRAWING).unwrap();
     fs::write(folder.join("page.ps"), PAGE).unwrap();
+    fs::write(folder.join("plates.ps"), PLATES).unwrap();
     fs::write(folder.join("helmet.gltf"), HELMET).unwrap();
     for command in [
         "gs -q -dBATCH -dNOPAUSE -sDEVICE=pdfwrite -sOutputFile=decal.pdf page.ps",
+        "gs -q -dBATCH -dNOPAUSE -sDEVICE=pdfwrite -sOutputFile=plates.pdf plates.ps",
         "foilpress layers white.png --to file:job.rgl",
         "foilpress preset save decal --media film --mirror --paper postcard",
         "foilpress profile set default --cross 20.4x29.7mm --distance 200.3mm",
