@@ -127,8 +127,10 @@ impl<W: Write + Send> Backend<'_, W> {
             None => input.take(LARGEST + 1).read_to_end(&mut job),
         };
         match read {
+            // A filter that made nothing has said why, and the print system shows the last error.
             Ok(_) if job.is_empty() && !self.system.stops() => {
-                Err(self.fail(Exit::Cancel, &"there is nothing to print: the job has no bytes"))
+                self.messages.debug("there is nothing to print: the job has no bytes");
+                Err(Stopped(Exit::Cancel))
             }
             Ok(_) if job.len() as u64 > LARGEST => {
                 Err(self.fail(Exit::Cancel, &"the job is larger than 1 GB; print fewer pages at once"))

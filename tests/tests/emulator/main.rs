@@ -323,7 +323,7 @@ fn an_open_cover_stops_the_job_and_a_closed_one_lets_it_go_on() {
     assert_eq!(bench.printed(), stopped, "bytes were sent to an open printer");
     bench.bridge.desk().printer.close_cover();
     let text = said(child);
-    assert!(text.contains("the printer has stopped") && text.contains("goes on"), "{text}");
+    assert!(text.contains("the printer has stopped") && text.contains("the printer continues"), "{text}");
     bench.came_out(0, &job, 1);
     bench.check();
 }
@@ -349,7 +349,10 @@ fn a_printer_switched_off_in_a_job_costs_the_sheet_and_the_next_one_is_printed_w
     assert_eq!(bench.printed(), lost, "bytes for a printer that is off");
     bench.bridge.desk().switch(true);
     let text: Vec<String> = lines.collect();
-    assert!(next.wait().unwrap().success() && text.iter().any(|line| line.contains("goes on")), "{text:?}");
+    assert!(
+        next.wait().unwrap().success() && text.iter().any(|line| line.contains("the printer continues")),
+        "{text:?}"
+    );
     // The printer has put out what there was of the first.
     bench.came_out(lost, &job, 2);
     assert_eq!(bench.bridge.desk().resets, resets + 1);
