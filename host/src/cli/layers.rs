@@ -16,10 +16,11 @@ use super::job::{Artwork, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use super::shown::Shown;
-use crate::queue::options::GAMMAS;
 use observe::Observer;
 use press::job::plan::grouped;
-use press::layers::{self, Accept, Composed, Finish, Intent, Order, Pages, Room, Suggestion, White, names};
+use press::layers::{
+    self, Accept, Composed, Finish, GAMMAS, Intent, Order, Pages, Room, Suggestion, White, names,
+};
 use press::layout::{Layout, Mm, NoLength, Size};
 use press::pipeline;
 use press::sheet::DOTS_PER_MM;
@@ -108,7 +109,11 @@ fn resolution(text: &str) -> Result<Resolution, String> {
 
 fn gamma(text: &str) -> Result<f64, String> {
     let gamma: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
-    if GAMMAS.contains(&gamma) { Ok(gamma) } else { Err("expected 0.2 to 5".into()) }
+    if GAMMAS.contains(&gamma) {
+        Ok(gamma)
+    } else {
+        Err(format!("expected {} to {}", GAMMAS.start(), GAMMAS.end()))
+    }
 }
 
 fn page(text: &str) -> Result<u32, String> {
@@ -213,7 +218,6 @@ impl LayersArgs {
             finish: self.finish,
             intent: self.intent,
             gamma: self.gamma,
-            halftone: usual.halftone,
             accept: self.accept.clone(),
             ..usual
         })

@@ -8,7 +8,7 @@ use protocol::ink::Ink;
 use protocol::rgl::Media;
 
 use press::halftone::Method;
-use press::layers::{Finish, Intent, White};
+use press::layers::{Finish, GAMMAS, Intent, White};
 use press::layout::{Point, Profile};
 
 /// Keywords for the calibration profile of the queue's printer in its description.
@@ -134,9 +134,6 @@ const INTENT: [(&str, &str, Intent); 3] = [
 
 const GAMMA: [(&str, &str, f64); 3] =
     [("Normal", "Normal (1)", 1.0), ("Lighter", "Lighter (1.3)", 1.3), ("Darker", "Darker (0.8)", 0.8)];
-
-/// The exponents that may be asked for.
-pub const GAMMAS: std::ops::RangeInclusive<f64> = 0.2..=5.0;
 
 const CURL: [(&str, &str, bool); 2] = [("On", "On (paper)", true), ("Off", "Off (decal film)", false)];
 

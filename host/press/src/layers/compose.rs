@@ -35,7 +35,7 @@ use observe::Observer;
 use slot::{COLOURS, Slot};
 
 pub use arrange::Order;
-pub use settings::{Finish, Settings};
+pub use settings::{Finish, GAMMAS, Settings};
 pub use slot::Laid;
 pub use suggest::{Accept, Remedy, Suggestion};
 

@@ -40,7 +40,9 @@ mod window;
 
 pub use artwork::{Artwork, Layer, Shape};
 pub use colour::Colour;
-pub use compose::{Accept, Composed, Finish, Laid, Order, Remedy, Report, Settings, Suggestion, compose};
+pub use compose::{
+    Accept, Composed, Finish, GAMMAS, Laid, Order, Remedy, Report, Settings, Suggestion, compose,
+};
 pub use error::{LayersError, Setting};
 pub use intent::Intent;
 pub use open::{is_art, open};

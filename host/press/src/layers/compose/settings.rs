@@ -22,6 +22,9 @@ pub enum Finish {
     None,
 }
 
+/// The exponents by which pictures may be brightened.
+pub const GAMMAS: std::ops::RangeInclusive<f64> = 0.2..=5.0;
+
 /// How layers become stacks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -41,7 +44,7 @@ pub struct Settings {
     pub finish: Option<Finish>,
     /// How colours that the inks do not reach are replaced.
     pub intent: Intent,
-    /// Exponent that brightens the colours of pictures: values become their power 1 / `gamma`; 0.2 to 5.
+    /// Exponent that brightens the colours of pictures, one of [`GAMMAS`]: values become their power 1 / `gamma`.
     pub gamma: f64,
     /// How tones become dots.
     pub halftone: Method,
