@@ -495,11 +495,15 @@ mod tests {
     fn what_is_no_whole_job_is_cancelled_before_the_first_byte() {
         let rig = Rig::new();
         let good = job(Ink::Cyan, 30);
-        for wrong in [&[][..], b"Hello", &good[..good.len() - 5], &[&good[..], b"x"].concat()] {
+        for wrong in [&b"Hello"[..], &good[..good.len() - 5], &[&good[..], b"x"].concat()] {
             let (exit, said) = rig.run(wrong, &|| false);
             assert_eq!(exit, Exit::Cancel, "{said}");
             assert!(rig.got().is_empty() && said.contains("ERROR: "), "{said}");
         }
+        // What made no bytes has given its reason, and that has to stay the last error.
+        let (exit, said) = rig.run(&[], &|| false);
+        assert_eq!(exit, Exit::Cancel, "{said}");
+        assert!(rig.got().is_empty() && !said.contains("ERROR: "), "{said}");
     }
 
     #[test]
