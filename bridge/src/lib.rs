@@ -8,7 +8,9 @@
 //! | [`turn`] | how long the engine works before others may run |
 //! | [`driver`] | who may use the port and when; questions to the printer; faults; what is logged |
 //! | [`port`] | levels and times of the port's lines, both directions |
+//! | [`keeper`] | how a reset of the board leaves where a job stands |
 //! | [`links`] | which of two ways to the host is answered |
+//! | [`log`] | which piece of the log answers a question |
 //! | [`printer_class`] | the ordinary printer that operating systems see |
 //! | [`lamp`] | what the lamp shows |
 //!
@@ -23,8 +25,10 @@ extern crate std;
 
 pub mod driver;
 pub mod engine;
+pub mod keeper;
 pub mod lamp;
 pub mod links;
+pub mod log;
 pub mod port;
 pub mod printer_class;
 mod ring;

@@ -6,7 +6,7 @@
 //! what arrives at the emulated port is compared with what a file would have held.
 
 use crate::tools::{self, Node};
-use crate::{cargo, firmware};
+use crate::{PROGRAM, cargo, firmware};
 use anyhow::{Context, Result, bail};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
@@ -33,11 +33,11 @@ impl Bench {
     fn new(root: &Path) -> Result<Option<Bench>> {
         let folder = firmware::target(root);
         fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+        let image = firmware::build(root)?;
         let node = match Node::find(&folder) {
             Ok(node) => node,
             Err(missing) => return tools::skip(Need::Emulator, &format!("{missing:#}")).map(|()| None),
         };
-        let image = firmware::build(root)?;
         let scripts = root.join("tests/emulator");
         let mut install =
             node.command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]);
@@ -46,8 +46,17 @@ impl Bench {
     }
 }
 
-/// Builds image and jobs and runs the tests.
-pub fn run(root: &Path) -> Result<()> {
+/// Builds the program and runs the tests with it.
+pub fn alone(root: &Path) -> Result<()> {
+    run_step(
+        "the program",
+        cargo(&["build", "--workspace", "--bin", "foilpress", "--locked"]).current_dir(root),
+    )?;
+    run(root, &firmware::workspace_target(root).join("debug/foilpress"))
+}
+
+/// Builds image and jobs and runs the tests, those at the cables with this program.
+pub fn run(root: &Path, program: &Path) -> Result<()> {
     let Some(bench) = Bench::new(root)? else { return Ok(()) };
     let jobs = bench.folder.join("jobs");
     fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
@@ -71,15 +80,13 @@ pub fn run(root: &Path) -> Result<()> {
         Ok(()) => true,
         Err(missing) => tools::skip(Need::Usb, &format!("{missing:#}")).map(|()| false)?,
     };
-    run_step("the program", cargo(&["build", "--package", "foilpress", "--locked"]).current_dir(root))?;
     // A test each for the board, the program and the printer: two at a time keep two cores at work.
-    let args =
-        ["test", "--package", "foilpress-tests", "--test", "emulator", "--locked", "--", "--test-threads=2"];
+    let args = ["test", "--workspace", "--test", "emulator", "--locked", "--", "--test-threads=2"];
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_IMAGE", &bench.image)
         .env("FOILPRESS_NODE", &bench.node.program)
-        .env("FOILPRESS_PROGRAM", firmware::workspace_target(root).join("debug/foilpress"));
+        .env(PROGRAM, program);
     if has_usb {
         test.env("FOILPRESS_USBFS", usbfs);
     }

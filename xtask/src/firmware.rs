@@ -1,6 +1,6 @@
 //! `cargo xtask firmware`: the bridge's image, and whether it is as small as it is to be.
 
-use crate::{cargo, elf};
+use crate::{cargo, elf, succeed};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -60,6 +60,13 @@ pub fn build(root: &Path) -> Result<PathBuf> {
         bail!("the image is larger than bridge/firmware/budget.toml allows");
     }
     Ok(path)
+}
+
+/// Checks the image's source as `cargo clippy` checks all other.
+pub fn lint(root: &Path) -> Result<()> {
+    let mut lint = cargo(&["clippy", "--release", "--locked", "--", "-D", "warnings"]);
+    lint.current_dir(root.join("bridge/firmware")).env("CARGO_TARGET_DIR", target(root));
+    succeed(&mut lint)
 }
 
 /// Where the image is built: beside the workspace's own artifacts.

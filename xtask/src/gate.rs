@@ -11,14 +11,17 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use crate::firmware::BARE_METAL;
-use crate::{cargo, command, emulator, package, queue, succeed};
+use crate::firmware::{self, BARE_METAL};
+use crate::{PROGRAM, cargo, command, emulator, package, queue, succeed};
 
 /// What the property tests' cases are drawn from.
 const PROPERTY_SEED: &str = "PROPTEST_RNG_SEED";
 
 /// Names the list of tests that were left out; `.cargo/config.toml` sets it.
 const SKIPS: &str = "FOILPRESS_SKIPS";
+
+/// What is built for itself, besides the workspace of all others.
+const WORKSPACES: [&str; 2] = ["bridge/firmware", "fuzz"];
 
 /// The steps that failed.
 #[derive(Default)]
@@ -56,27 +59,32 @@ pub fn run(root: &Path) -> ExitCode {
         eprintln!("print queues and PDF: {error:#}");
     }
     gate.command("bare-metal target", command("rustup", &["target", "add", BARE_METAL]));
-    gate.command("format", cargo(&["fmt", "--all", "--check"]));
+    gate.step("format", || {
+        std::iter::once(Path::new("")).chain(WORKSPACES.map(Path::new)).try_for_each(|workspace| {
+            succeed(cargo(&["fmt", "--all", "--check"]).current_dir(root.join(workspace)))
+        })
+    });
     gate.command(
         "lints",
         cargo(&["clippy", "--workspace", "--all-targets", "--locked", "--", "-D", "warnings"]),
     );
+    gate.step("lints of the firmware", || firmware::lint(root));
     let mut doc = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
     doc.env("RUSTDOCFLAGS", "-D warnings");
     gate.command("documentation", doc);
-    let device =
-        ["build", "-p", "foilpress-protocol", "-p", "foilpress-bridge", "--target", BARE_METAL, "--locked"];
-    gate.command("bare-metal build", cargo(&device));
+    // Every later step builds for the same packages, so that nothing is built twice with other features.
+    let program = firmware::workspace_target(root).join("debug/foilpress");
     let mut test = cargo(&["test", "--workspace", "--locked", "--no-fail-fast"]);
+    test.env(PROGRAM, &program);
     // The gate answers the same for the same tree; `cargo test` by itself goes on looking at new cases.
     if std::env::var_os(PROPERTY_SEED).is_none() {
         test.env(PROPERTY_SEED, "1");
     }
     gate.command("tests", test);
-    gate.step("emulator", || emulator::run(root));
+    gate.step("emulator", || emulator::run(root, &program));
     // The package is tried with the tests of print queues: where they fail, it would.
     if gate.failed.is_empty() {
-        gate.step("package", || package::run_where_possible(root));
+        gate.step("package", || package::run_where_possible(root, &program));
     }
 
     match skips() {

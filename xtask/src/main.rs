@@ -41,11 +41,14 @@ enum Task {
     Queue,
     /// Build the Debian package, try it in a root of its own and, as root, on this computer
     Package {
-        /// Package the build that the tests make: slower, but ready sooner
+        /// Package a build like that of the tests: slower, but ready sooner
         #[arg(long)]
         dev: bool,
     },
 }
+
+/// Names the program to the tests, where it is built already.
+const PROGRAM: &str = "FOILPRESS_PROGRAM";
 
 fn main() -> ExitCode {
     // The workspace, wherever this was started from: it is the folder above this package.
@@ -55,10 +58,10 @@ fn main() -> ExitCode {
         Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),
         Task::Firmware => finish(firmware::build(root).map(drop)),
         Task::Emulator { serve: true } => finish(emulator::serve(root)),
-        Task::Emulator { serve: false } => finish(emulator::run(root)),
+        Task::Emulator { serve: false } => finish(emulator::alone(root)),
         Task::Queue => finish(queue::run()),
-        Task::Package { dev: false } => finish(package::run(root, package::Profile::Release)),
-        Task::Package { dev: true } => finish(package::run(root, package::Profile::Dev)),
+        Task::Package { dev: false } => finish(package::build(root, package::Profile::Release)),
+        Task::Package { dev: true } => finish(package::build(root, package::Profile::Dev)),
     }
 }
 

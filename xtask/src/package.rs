@@ -1,7 +1,6 @@
 //! The Debian package: built, installed into a root of its own and looked at there; as root also installed on this machine,
 //! where it prints through the machine's own print system, and taken away again.
 
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -10,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use testing::needs::Need;
 
-use crate::{cargo, command, queue, succeed, tools};
+use crate::{cargo, command, firmware, queue, succeed, tools};
 
 /// What makes the package; fetched into the build's folder if it is not there.
 const CARGO_DEB: &str = "3.8.0";
@@ -20,26 +19,32 @@ const CARGO_DEB: &str = "3.8.0";
 pub enum Profile {
     /// For users.
     Release,
-    /// The one the tests have built already: the same package of a slower program.
+    /// For a try: the same package of a slower program.
     Dev,
 }
 
-/// Builds the package, tries it, and says where it is.
-pub fn run(root: &Path, profile: Profile) -> Result<()> {
-    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+/// Builds the program and its package, tries it, and says where it is.
+pub fn build(root: &Path, profile: Profile) -> Result<()> {
+    let target = firmware::workspace_target(root);
     let (name, built) = match profile {
         Profile::Release => ("release", target.join("release/foilpress")),
         Profile::Dev => ("dev", target.join("debug/foilpress")),
     };
     succeed(cargo(&["build", "--package", "foilpress", "--locked", "--profile", name]).current_dir(root))?;
+    pack(root, &built, profile)
+}
+
+/// The package of this program.
+fn pack(root: &Path, built: &Path, profile: Profile) -> Result<()> {
+    let target = firmware::workspace_target(root);
     // `cargo-deb` looks for what it packs below the build's folder, in `release`: one of our own, to hold nothing else.
     let target_of_package = target.join("package");
     let folder = target_of_package.join("release");
     let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder)?;
-    fs::copy(&built, folder.join("foilpress"))?;
+    fs::copy(built, folder.join("foilpress"))?;
     let tree = folder.join("tree");
-    succeed(Command::new(&built).arg("generate").arg(&tree))?;
+    succeed(Command::new(built).arg("generate").arg(&tree))?;
     let mut pages = command("gzip", &["-9", "--no-name", "--recursive"]);
     succeed(pages.arg(tree.join("usr/share/man")))?;
     let package = target_of_package.join("foilpress.deb");
@@ -61,12 +66,12 @@ pub fn run(root: &Path, profile: Profile) -> Result<()> {
 }
 
 /// The package of the tests' own build, for the gate; left out with a word where print queues are.
-pub fn run_where_possible(root: &Path) -> Result<()> {
+pub fn run_where_possible(root: &Path, program: &Path) -> Result<()> {
     let possible = is_root() && Path::new("/usr/bin/dpkg").exists() && Path::new("/usr/bin/man").exists();
     if !possible {
         return tools::skip(Need::Package, "the Debian package needs root, dpkg and man");
     }
-    run(root, Profile::Dev)
+    pack(root, program, Profile::Dev)
 }
 
 /// `cargo-deb` in this version.
@@ -213,8 +218,7 @@ fn try_here(root: &Path) -> Result<()> {
     ensure!(version.starts_with("foilpress "), "`foilpress --version` said {version}");
     let page = said(command("man", &["foilpress-queue"]).env("MANWIDTH", "100").env("LC_ALL", "C.UTF-8"))?;
     ensure!(page.contains("SYNOPSIS"), "`man foilpress-queue` shows {page}");
-    let mut queues =
-        cargo(&["test", "--package", "foilpress-tests", "--test", "queue", "--locked", "--quiet"]);
+    let mut queues = cargo(&["test", "--workspace", "--test", "queue", "--locked", "--quiet"]);
     succeed(queues.args(["--", "--ignored", "system::"]).current_dir(root))
 }
 

@@ -72,7 +72,7 @@ async fn main(spawner: Spawner) {
     pins::bring_up();
 
     // Before the first word of the log, and before a byte goes to the printer.
-    let (keeper, checkpoint) = keep::Keeper::new();
+    let (keeper, checkpoint) = keep::keeper();
 
     let number = {
         let mut flash = Flash::<_, Blocking, FLASH_BYTES>::new_blocking(board.FLASH);

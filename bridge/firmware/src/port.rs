@@ -1,12 +1,13 @@
 //! The task at the port: runs the library's [`Driver`] on this board.
 
-use crate::keep::{Keeper, MARKS};
+use crate::keep::Keeper;
 use crate::pins::{self, Ack, Data, Line};
 use crate::shared::{Shared, Side};
 use crate::strobe::{SENT, Strobe};
 use crate::watch::{self, HEARTBEAT};
 use bridge::driver::{self, Clock, Driver, Event, Retained, Sender};
 use bridge::engine::Checkpoint;
+use bridge::keeper::MARKS;
 use bridge::port::{Port, Timing};
 use embassy_futures::select::select3;
 use embassy_futures::yield_now;

@@ -26,9 +26,10 @@
 //! Limits: the handshake is Busy, and all four status lines are heeded. For other handshakes, and for everything else the
 //! port can do, the library's [`Port`](bridge::port::Port) works the same pins.
 
-use crate::keep::{self, MARKS};
+use crate::keep;
 use crate::pins;
 use bridge::driver::TwoBuffers;
+use bridge::keeper::{MARKS, MARKS_BITS};
 use bridge::port::Timing;
 use core::cell::RefCell;
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -333,7 +334,7 @@ impl Strobe {
             w.set_data_size(DataSize::SIZE_BYTE);
             w.set_incr_write(true);
             w.set_ring_sel(true);
-            w.set_ring_size(keep::MARKS_BITS);
+            w.set_ring_size(MARKS_BITS);
             w.set_chain_to(TALLY as u8);
             w.set_en(true);
         });

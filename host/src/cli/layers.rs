@@ -10,6 +10,7 @@ use protocol::rgl::Resolution;
 use serde_json::json;
 
 use super::advice;
+use super::args::HalftoneArg;
 use super::choice::choice;
 use super::deliver::DeliverArgs;
 use super::job::{Artwork, ResultArgs};
@@ -49,9 +50,11 @@ pub struct LayersArgs {
     /// Read one page per ink from a PDF or PostScript file: the ink of each page, such as white,gold,black
     #[arg(long, value_name = "INKS", value_delimiter = ',', value_parser = names::typed, conflicts_with = "page")]
     pub pages: Vec<Ink>,
-    /// Layers to halftone, so that they keep their tones; other layers are solid where they are darker than half
+    /// Layers that keep their tones, and are halftoned; other layers are solid where they are darker than half
     #[arg(long, value_name = "INKS")]
-    pub halftone: Option<String>,
+    pub tones: Option<String>,
+    #[command(flatten)]
+    pub halftone: HalftoneArg,
     /// Inks that may be used: names and the groups process, metallic, clear, foil, all, separated by commas; + and -
     /// change the default [default: all but the foils]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
@@ -195,7 +198,7 @@ impl LayersArgs {
                 (None, inks) => Pages::Inks(inks.to_vec()),
             },
             across: 1,
-            halftone: self.halftone.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--halftone", text))?,
+            tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
             inks: self.inks()?,
             room: Room { width, length, cut: layout.cut },
         })
@@ -218,6 +221,7 @@ impl LayersArgs {
             finish: self.finish,
             intent: self.intent,
             gamma: self.gamma,
+            halftone: self.halftone.halftone,
             accept: self.accept.clone(),
             ..usual
         })

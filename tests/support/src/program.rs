@@ -9,14 +9,16 @@ use std::sync::OnceLock;
 
 use tempfile::TempDir;
 
-/// The program: cargo's own for an integration test of its package, else built now, beside the running test.
+/// The program: cargo's own for an integration test of its package, or the one `FOILPRESS_PROGRAM` names, as the gate does;
+/// else built now, beside the running test.
 ///
 /// # Panics
 /// When it cannot be built.
 pub fn path() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
-        if let Some(program) = std::env::var_os("CARGO_BIN_EXE_foilpress") {
+        let built = ["CARGO_BIN_EXE_foilpress", "FOILPRESS_PROGRAM"].into_iter().find_map(std::env::var_os);
+        if let Some(program) = built {
             return program.into();
         }
         let test = std::env::current_exe().expect("a test has a file");

@@ -29,7 +29,7 @@ use plan::{BLOCK, Plan};
 /// Block rows in a strip.
 const STRIP: usize = 32;
 
-/// Block rows of lead-in: what 2 % of a stack needs to come to its own.
+/// Block rows of lead-in: in these, 2 % of a stack forgets where it began.
 const LEAD: usize = 2;
 
 /// Halftones a checked mixture on `width` x `height` dots: a stack of the mixture for each. `minimum` is the smallest
@@ -56,9 +56,7 @@ pub(super) fn cells(
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
         wide(|| {
             let mut strip = Strip::new(&field, &plan, &least);
-            // At the top of the page its first rows are their own lead-in.
-            for row in 0..LEAD {
-                let row = (first + row).saturating_sub(LEAD);
+            for row in first.saturating_sub(LEAD)..first {
                 strip.block_row(row, &mut Target { rows: None, top: 0 });
             }
             let mut target = Target { rows: Some(rows), top: first * BLOCK };

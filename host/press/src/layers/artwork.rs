@@ -124,7 +124,7 @@ fn layer(
     if toned {
         notes.push(format!("{name}: the plate has tones, so it is halftoned"));
     }
-    let tones = toned || options.halftone.contains(named.ink);
+    let tones = toned || options.tones.contains(named.ink);
     if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
         notes.push(format!(
             "{name}: resampled from {} to {width} x {length} dots; draw at 600 dpi to keep edges exactly as drawn",
@@ -159,7 +159,11 @@ fn soft_edges(name: &str, coverage: &[u8]) -> Option<String> {
     let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
     let inked = coverage.par_iter().filter(|c| (THRESHOLD..255 - PLAIN).contains(c)).count();
     let share = 100.0 * between as f64 / coverage.len().max(1) as f64;
-    let advice = if share > 5.0 { "; if they are tones rather than edges, halftone this layer" } else { "" };
+    let advice = if share > 5.0 {
+        "; if they are tones rather than edges, have this layer keep its tones"
+    } else {
+        ""
+    };
     (between > 0).then(|| {
         format!(
             "{name}: {between} pixels ({share:.2} %) are neither ink nor paper, such as anti-aliased edges; {inked} of \

@@ -18,8 +18,8 @@ pub struct Options {
     pub tolerance: Option<u8>,
     /// Pages of a PDF or PostScript file.
     pub pages: Pages,
-    /// Layers to halftone, so that they keep their tones; all others are ink or paper.
-    pub halftone: InkSet,
+    /// Layers that keep their tones, and are halftoned; all others are ink or paper.
+    pub tones: InkSet,
     /// Dots across in 1/600 inch: 1, or 2 for a print at 1200 x 600 dpi.
     pub across: usize,
     /// The inks that reserved colours may stand for.
@@ -66,7 +66,7 @@ impl Default for Options {
             reserved: false,
             tolerance: None,
             pages: Pages::Only,
-            halftone: InkSet::EMPTY,
+            tones: InkSet::EMPTY,
             across: 1,
             inks: InkSet::default().with(Ink::White),
             room: Room::default(),

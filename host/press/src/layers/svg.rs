@@ -130,7 +130,7 @@ impl Drawing {
             let mut pixmap = canvas()?;
             render_group(node, scale, &mut pixmap);
             let rgba = straight(pixmap);
-            let toned = options.halftone.contains(group.named.ink) || has_picture(node);
+            let toned = options.tones.contains(group.named.ink) || has_picture(node);
             let of = if toned { Scan::of_drawing } else { Scan::of_layer };
             art.add(of(path, (width, height), &rgba), &group.label, group.named, false, &options);
             advance();

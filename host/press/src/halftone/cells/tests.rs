@@ -2,7 +2,7 @@
 
 use super::super::eye::{Tangent, error_planes, errors_seen, peak, swing, thin};
 use super::super::solids::Solids;
-use super::super::{Method, Settings, halftone};
+use super::super::{Method, Settings, TONE, halftone};
 use super::Point;
 use crate::sheet::clusters::smallest_clusters;
 use appearance::brdf::{Space, reflectances};
@@ -237,14 +237,72 @@ fn dots_do_not_depend_on_the_number_of_threads() {
 }
 
 /// The five patches of the table: name, stacks, minima, shares of each stack at (u, v) of 0 to 1.
+/// Exact weights repeat on tones near simple fractions: a half becomes a checkerboard. And where debts begin at nothing and
+/// stay inside a tone, it begins too light, and its last row prints what is left.
+#[test]
+fn flat_tones_neither_repeat_nor_change_at_their_border() {
+    const SIDE: usize = 510;
+    for tone in [0.02, 0.1, 0.2, 0.25, 1.0 / 3.0, 0.4, 0.45, 0.47, 0.48, 0.49, 0.5] {
+        let mix = plain(1, 1, 2, |_, _| vec![1.0 - tone, tone]);
+        let settings = Settings { method: Method::Cells, minimum: vec![9; 2], reflectance: None };
+        let sheet = halftone(&mix, (SIDE as u16, SIDE as u16), None, &settings, &Silent).unwrap();
+        let dots = sheet.index();
+        let (most, lag) = peak(SIDE, dots, 1, 9.0 / tone.sqrt(), SIDE / 4);
+        assert!(most < 0.1, "{tone} repeats by {most:.3} at {lag:?}");
+        let (rows, columns) = swing(SIDE, dots, 1, 3);
+        assert!(rows < 1.1 && columns < 1.1, "{tone} swings by {rows:.2} and {columns:.2}");
+        // Three rows of cells along either side, against independent cells.
+        let inked = |at: &dyn Fn(usize, usize) -> bool| {
+            (0..dots.len()).filter(|&dot| dots[dot] == 1 && at(dot % SIDE, dot / SIDE)).count() as f64 / 9.0
+        };
+        let cells = (SIDE / 3 * 3) as f64;
+        let spread = 3.0 * (cells * tone * (1.0 - tone)).sqrt();
+        for (side, count) in [
+            ("top", inked(&|_, y| y < 9)),
+            ("bottom", inked(&|_, y| y >= SIDE - 9)),
+            ("left", inked(&|x, _| x < 9)),
+            ("right", inked(&|x, _| x >= SIDE - 9)),
+        ] {
+            assert!(
+                (count - cells * tone).abs() < spread,
+                "{tone} at the {side}: {count} of {}",
+                cells * tone
+            );
+        }
+    }
+}
+
+/// Tints in small boxes, which borders cut all around, keep their tones on average.
+#[test]
+fn boxes_of_a_tint_have_its_tone() {
+    const SIDE: usize = 720;
+    for tone in [0.05, 0.1, 0.25, 0.4] {
+        // 48 x 24 dots, and 12 between.
+        let fixed: Vec<u8> = (0..SIDE * SIDE)
+            .map(|at| if at % SIDE % 60 < 48 && at / SIDE % 36 < 24 { TONE } else { 0 })
+            .collect();
+        let flat = plain(1, 1, 2, |_, _| vec![1.0 - tone, tone]);
+        let settings = Settings { method: Method::Cells, minimum: vec![9; 2], reflectance: None };
+        let size = (SIDE as u16, SIDE as u16);
+        let sheet = halftone(&flat, size, Some(&fixed), &settings, &Silent).unwrap();
+        let boxes = fixed.iter().filter(|&&stack| stack == TONE).count() as f64;
+        let inked = sheet.index().iter().filter(|&&stack| stack == 1).count() as f64;
+        assert!((inked / boxes / tone - 1.0).abs() < 0.03, "{tone}: {}", inked / boxes);
+        println!("{tone}: {}", inked / boxes);
+    }
+}
+
 type Patch = (&'static str, [&'static str; 5], [u16; 5], fn(f64, f64) -> [f64; 5]);
 
-const PATCHES: [Patch; 6] = [
+const PATCHES: [Patch; 9] = [
     ("ramp of 4 inks", ["substrate", "C", "M", "Y", "K"], [9; 5], |u, v| {
         [0.0, (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
     }),
     ("5 stacks", ["substrate", "C", "M", "Y", "K"], [9; 5], |_, _| [0.3, 0.25, 0.2, 0.15, 0.1]),
     ("K 10 %", ["substrate", "K", "C", "M", "Y"], [9; 5], |_, _| [0.9, 0.1, 0.0, 0.0, 0.0]),
+    ("K 25 %", ["substrate", "K", "C", "M", "Y"], [9; 5], |_, _| [0.75, 0.25, 0.0, 0.0, 0.0]),
+    ("K 33 %", ["substrate", "K", "C", "M", "Y"], [9; 5], |_, _| [2.0 / 3.0, 1.0 / 3.0, 0.0, 0.0, 0.0]),
+    ("K 50 %", ["substrate", "K", "C", "M", "Y"], [9; 5], |_, _| [0.5, 0.5, 0.0, 0.0, 0.0]),
     ("K ramp", ["substrate", "K", "C", "M", "Y"], [9; 5], |u, _| [1.0 - u, u, 0.0, 0.0, 0.0]),
     ("foil, K, paper", ["substrate", "SF", "K", "C", "M"], [9; 5], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),
     ("foil of 16", ["substrate", "SF", "K", "C", "M"], [8, 16, 8, 8, 8], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),

@@ -59,7 +59,7 @@ fn a_layer_with_tones_keeps_them_and_a_picture_in_a_layer_is_ink_where_it_is_dar
         <g id="white"><rect width="40" height="30" fill="url(#g)"/></g>"##,
     );
     let file = bench.write("art.svg", svg);
-    let toned = Options { halftone: inks::InkSet::of([Ink::White]), ..Options::default() };
+    let toned = Options { tones: inks::InkSet::of([Ink::White]), ..Options::default() };
     let art = read(std::slice::from_ref(&file), &toned);
     let Shape::Tone(tones) = &art.layers[0].shape else { panic!("tones are lost") };
     let mean = tones.iter().map(|&v| f64::from(v)).sum::<f64>() / tones.len() as f64;
