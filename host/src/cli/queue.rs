@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, ExitCode};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Error, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
@@ -309,12 +309,23 @@ pub fn filter(args: &Conventional) -> ExitCode {
     messages.error(&why);
     // The print system shows this message with the job only if it reads it before it sees the filter end; otherwise it
     // shows "Filter failed" alone.
-    std::thread::sleep(HEARD);
+    wait_until_read();
     ExitCode::FAILURE
 }
 
 /// How long the print system may take to read a message.
-const HEARD: Duration = Duration::from_secs(1);
+const HEARD: Duration = Duration::from_secs(10);
+
+/// Waits until standard error has been read, where that can be seen, and for a moment in which it is acted upon.
+fn wait_until_read() {
+    let end = Instant::now() + HEARD;
+    // A pipe says at either end how much is in it.
+    #[cfg(target_os = "linux")]
+    while Instant::now() < end && rustix::io::ioctl_fionread(io::stderr()).is_ok_and(|unread| unread > 0) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_secs(1).min(end.saturating_duration_since(Instant::now())));
+}
 
 fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {
     let (asked, file) = match arguments {

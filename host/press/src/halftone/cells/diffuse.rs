@@ -60,6 +60,8 @@ pub(super) struct Strip<'a> {
     back: bool,
     /// Nothing has been diffused yet.
     fresh: bool,
+    /// By how much decisions are disturbed here, in cells. In the midst of a tone it is found once for a row of a block.
+    disturbance: f32,
 }
 
 /// A place for dots: rows of the page from `top`, or nowhere.
@@ -85,6 +87,7 @@ impl<'a> Strip<'a> {
             rows: (0..=BLOCK).map(|_| Row::default()).collect(),
             back: false,
             fresh: true,
+            disturbance: 0.0,
         }
     }
 
@@ -143,6 +146,9 @@ impl<'a> Strip<'a> {
                 if block.owns {
                     area += self.add_owned((y * self.field.width + x) as u32);
                 }
+                if step == 0 || !block.calm {
+                    self.disturbance = self.disturbing();
+                }
                 let q = self.decide((x, y), size, area, true, block.calm);
                 if let Some(rows) = target.rows.as_deref_mut() {
                     let stack = self.field.stacks[q];
@@ -161,6 +167,7 @@ impl<'a> Strip<'a> {
                 self.want.fill(0.0);
                 let mut area = self.add_fragment(head);
                 area += self.add_owned(plan.fragments[head as usize].seed);
+                self.disturbance = self.disturbing();
                 let q = self.decide((x, y), size, area, false, false);
                 if let Some(rows) = target.rows.as_deref_mut() {
                     for (x, y) in plan.dots(head) {
@@ -202,9 +209,8 @@ impl<'a> Strip<'a> {
         block * BLOCK + x % BLOCK / usize::from(self.format[block])
     }
 
-    /// By how much to disturb the decision of a cell of so many dots that asks for `self.want`, in dots.
-    #[inline(always)]
-    fn disturbance(&self, area: usize) -> f32 {
+    /// By how much to disturb the decision of a cell that asks for `self.want`, in cells: [`DISTURBED`].
+    fn disturbing(&self) -> f32 {
         let (mut first, mut second) = ([0.0f32; LANES], [0.0f32; LANES]);
         for want in self.want.as_chunks::<LANES>().0 {
             for l in 0..LANES {
@@ -216,17 +222,16 @@ impl<'a> Strip<'a> {
         let (_, second) = first.into_iter().chain(second).fold((0.0f32, 0.0f32), |(first, second), want| {
             if want > first { (want, first) } else { (first, second.max(want)) }
         });
-        let area = area as f32;
-        let share = second / area;
+        let share = second / self.want.iter().sum::<f32>();
         let [mut below, ..] = DISTURBED;
         for above in DISTURBED {
             if share < above.0 {
                 let part = (share - below.0).max(0.0) / (above.0 - below.0).max(f32::MIN_POSITIVE);
-                return area * (below.1 + part * (above.1 - below.1));
+                return below.1 + part * (above.1 - below.1);
             }
             below = above;
         }
-        area * below.1
+        below.1
     }
 
     /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present
@@ -285,7 +290,8 @@ impl<'a> Strip<'a> {
     /// Adds to a slot what comes over the border of the tone: the part `missing` of what cells there would owe, were they alike.
     /// Where rows of cells begin, with a `lot`, debts differ from cell to cell as they do in the midst of a tone, or the
     /// first rows would print all at once: a stack drawn by lot is owed more or less, and the commonest less or more.
-    fn begin(&mut self, slot: usize, missing: f32, usual: &impl Fn(f32) -> f32, lot: Option<u32>) {
+    fn begin(&mut self, slot: usize, missing: f32, area: usize, lot: Option<u32>) {
+        let usual = usual(&self.want, area);
         let slots = &mut self.slots[slot..slot + self.field.lanes];
         for (slot, &want) in slots.iter_mut().zip(&self.want) {
             *slot += missing * usual(want);
@@ -296,7 +302,7 @@ impl<'a> Strip<'a> {
         let rare = |q: &usize| *q != common && self.want[*q] > 0.0;
         let count = (0..slots.len()).filter(rare).count();
         let Some(drawn) = (0..slots.len()).filter(rare).nth(lot as usize % count.max(1)) else { return };
-        let area: f32 = self.want.iter().sum();
+        let area = area as f32;
         let share = self.want[drawn] / area;
         let noise = NOISE[(lot >> 16) as usize % NOISE.len()];
         let differs = SPREAD * area * noise * (share * (1.0 - share)).sqrt();
@@ -326,16 +332,17 @@ impl<'a> Strip<'a> {
             missing = 1.0 - comes.map(|(share, _)| share).sum::<f32>();
             begins = shares[2] > 0.0 && !self.plan.decides(x, above);
         }
-        let stays: f32 = shares.iter().sum();
-        let usual = usual(&self.want, area);
         // The first cell of a tone gets nothing, since the last one has nowhere to leave what it owes.
         if missing > 0.0 && missing < 1.0 {
-            self.begin(slot, missing, &usual, begins.then_some(hash));
+            self.begin(slot, missing, area, begins.then_some(hash));
         }
-        let best = self.choose(slot, self.disturbance(area), (hash.wrapping_mul(0x9e37_79b1) >> 24) as u8);
+        let disturbance = self.disturbance * area as f32;
+        let best = self.choose(slot, disturbance, (hash.wrapping_mul(0x9e37_79b1) >> 24) as u8);
         let best = if whole { best } else { self.holding(best, area) };
         self.debt[best] -= area as f32;
-        if !calm && stays > 0.0 {
+        let stays: f32 = shares.iter().sum();
+        if !calm && stays > 0.0 && shares.contains(&0.0) {
+            let usual = usual(&self.want, area);
             for (debt, &want) in self.debt.iter_mut().zip(&self.want) {
                 let usual = usual(want);
                 *debt = usual + (*debt - usual) / stays;
