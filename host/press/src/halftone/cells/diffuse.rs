@@ -18,8 +18,13 @@ use super::plan::{BLOCK, Plan};
 /// Part of an absent stack's debt that each cell hands to the stacks present.
 const FORGET: f32 = 1.0 / 32.0;
 
-/// By how much a decision is disturbed, in cells, for the second largest share of a cell: linear in between.
-const DISTURBED: [(f32, f32); 4] = [(0.2, 0.04), (0.25, 0.13), (0.43, 0.14), (0.48, 0.28)];
+/// By how much the decision of a cell is disturbed, in cells, for the second largest share in it, linear in between: where
+/// there are two stacks, and where others share the cell, which break most patterns themselves.
+const DISTURBED: [(f32, f32, f32); 5] =
+    [(0.2, 0.04, 0.04), (0.25, 0.13, 0.04), (0.33, 0.135, 0.12), (0.43, 0.14, 0.12), (0.48, 0.28, 0.12)];
+
+/// The same where one stack has half of the cell.
+const HALF: f32 = 0.16;
 
 /// The largest difference of a debt above the first row of a tone, in cells, for a stack of share p: times root of p (1 - p).
 const SPREAD: f32 = 1.25;
@@ -219,19 +224,25 @@ impl<'a> Strip<'a> {
                 first[l] = if want[l] > first[l] { want[l] } else { first[l] };
             }
         }
-        let (_, second) = first.into_iter().chain(second).fold((0.0f32, 0.0f32), |(first, second), want| {
-            if want > first { (want, first) } else { (first, second.max(want)) }
-        });
-        let share = second / self.want.iter().sum::<f32>();
-        let [mut below, ..] = DISTURBED;
-        for above in DISTURBED {
+        let (first, second) =
+            first.into_iter().chain(second).fold((0.0f32, 0.0f32), |(first, second), want| {
+                if want > first { (want, first) } else { (first, second.max(want)) }
+            });
+        let all: f32 = self.want.iter().sum();
+        let alone = (1.0 - 4.0 * (all - first - second) / all).max(0.0);
+        // A stack on half the cells makes a checkerboard, whatever the others are.
+        let half = HALF * (1.0 - 20.0 * (first / all - 0.5).abs()).max(0.0);
+        let share = second / all;
+        let between = |&(_, two, more): &(f32, f32, f32)| more + alone * (two - more);
+        let mut below = &DISTURBED[0];
+        for above in &DISTURBED {
             if share < above.0 {
                 let part = (share - below.0).max(0.0) / (above.0 - below.0).max(f32::MIN_POSITIVE);
-                return below.1 + part * (above.1 - below.1);
+                return half.max(between(below) + part * (between(above) - between(below)));
             }
             below = above;
         }
-        below.1
+        half.max(between(below))
     }
 
     /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present

@@ -272,6 +272,31 @@ fn flat_tones_neither_repeat_nor_change_at_their_border() {
     }
 }
 
+#[test]
+fn flat_mixtures_do_not_repeat() {
+    const SIDE: usize = 510;
+    let third = 1.0 / 3.0;
+    for shares in [
+        vec![third; 3],
+        vec![0.5, 0.25, 0.25],
+        vec![0.5, 0.3, 0.2],
+        vec![0.4, 0.4, 0.2],
+        vec![0.48, 0.46, 0.06],
+        vec![0.5, 0.4, 0.1],
+        vec![0.25; 4],
+        vec![0.2; 5],
+        vec![0.3, 0.25, 0.2, 0.15, 0.1],
+    ] {
+        let mix = plain(1, 1, shares.len(), |_, _| shares.clone());
+        let settings = Settings { method: Method::Cells, minimum: vec![9; shares.len()], reflectance: None };
+        let sheet = halftone(&mix, (SIDE as u16, SIDE as u16), None, &settings, &Silent).unwrap();
+        for (stack, share) in shares.iter().enumerate() {
+            let (most, lag) = peak(SIDE, sheet.index(), stack as u8, 9.0 / share.sqrt(), SIDE / 4);
+            assert!(most < 0.1, "{shares:.2?}: {stack} repeats by {most:.3} at {lag:?}");
+        }
+    }
+}
+
 /// Tints in small boxes, which borders cut all around, keep their tones on average.
 #[test]
 fn boxes_of_a_tint_have_its_tone() {
@@ -288,7 +313,6 @@ fn boxes_of_a_tint_have_its_tone() {
         let boxes = fixed.iter().filter(|&&stack| stack == TONE).count() as f64;
         let inked = sheet.index().iter().filter(|&&stack| stack == 1).count() as f64;
         assert!((inked / boxes / tone - 1.0).abs() < 0.03, "{tone}: {}", inked / boxes);
-        println!("{tone}: {}", inked / boxes);
     }
 }
 
