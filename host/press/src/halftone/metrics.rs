@@ -7,10 +7,11 @@
 //! rows. Cost: about that of the halftone for tones, 20 ns a run for clusters. Memory: 12 bytes for each run of a row.
 
 use inks::Stack;
-use protocol::walk::{EDGE, MOST, Tile, Walk};
+use protocol::walk::{Tile, Walk};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::cells::field::{Field, Row};
 use super::eye::{self, Tangent};
 use super::mix::Lattice;
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
@@ -214,8 +215,7 @@ pub fn look(mix: &InkMix, dots: &DotMap, settings: &Settings) -> Result<Option<L
     }
     let points = Tangent::of_mix(mix, &Space::half_angle(SAMPLES), table).leading();
     let solids = Solids::new(mix, dots.width(), dots.length(), None);
-    let walk = Walk::new(size.0, size.1);
-    let lattice = Lattice::new(mix, &walk);
+    let field = Field::new(mix, dots.width(), dots.length(), &[], &solids);
     let starts = |length: usize, window: usize| -> Vec<usize> {
         let count = (length / window).clamp(1, WINDOWS);
         (0..count).map(|i| (length - window) * (2 * i + 1) / (2 * count)).collect()
@@ -227,9 +227,7 @@ pub fn look(mix: &InkMix, dots: &DotMap, settings: &Settings) -> Result<Option<L
         .collect();
     let windows: Vec<Measured> = corners
         .into_par_iter()
-        .map(|corner| {
-            Window { lattice: &lattice, walk: &walk, dots, corner, wide }.measure(&points, &solids, settings)
-        })
+        .map(|corner| Window { field: &field, dots, corner, wide }.measure(&points, &solids, settings))
         .collect();
     let count = windows.len() as f64;
     let mean = |eye: usize| (windows.iter().map(|w| w.seen[eye].powi(2)).sum::<f64>() / count).sqrt();
@@ -245,8 +243,7 @@ pub fn look(mix: &InkMix, dots: &DotMap, settings: &Settings) -> Result<Option<L
 
 /// A window of a halftone.
 struct Window<'a> {
-    lattice: &'a Lattice<'a>,
-    walk: &'a Walk,
+    field: &'a Field<'a>,
     dots: &'a DotMap,
     corner: (usize, usize),
     wide: (usize, usize),
@@ -290,48 +287,35 @@ impl Window<'_> {
         }
     }
 
-    /// The error in each coordinate, and the share of each stack if it is the same everywhere.
+    /// The error in each coordinate, and the share of each stack if it is the same everywhere. What a dot asks for is exact,
+    /// whatever the method has made of it.
     fn errors(&self, index: &[u8], points: &[[f32; 4]]) -> (Vec<Vec<f64>>, Option<Vec<f32>>) {
         let ((left, top), (width, length)) = (self.corner, self.wide);
+        let field = self.field;
         let mut planes = vec![vec![0.0; index.len()]; 4];
-        let mut weights = vec![Lanes::default(); blocks(self.lattice.stacks.len())];
+        let (mut line, mut want) = (Row::default(), vec![0.0; field.lanes]);
         let (mut first, mut same) = (None, true);
-        for tile in self.walk.bands().flat_map(|band| band.tiles()) {
-            let (x, y) = (usize::from(tile.x), usize::from(tile.y));
-            let beside = x >= left + width || x + usize::from(tile.w) <= left;
-            if beside || y >= top + length || y + usize::from(tile.h) <= top {
-                continue;
-            }
-            let mut curve = [0; MOST];
-            let area = tile.fill(&mut curve);
-            let mut along = self.lattice.along(std::iter::once(tile));
-            let mut done = 0;
-            while done < area {
-                let stretch = along.stretch(&mut weights) as usize;
-                same &= *first.get_or_insert_with(|| weights.clone()) == weights;
-                let mut mean = [0.0; 4];
-                for (lane, &q) in self.lattice.stacks.iter().enumerate() {
-                    let share = f64::from(weights[lane / LANES].0[lane % LANES]) / f64::from(UNIT);
+        for y in 0..length {
+            field.row(1, top + y, &mut line);
+            for x in 0..width {
+                field.cell(1, left + x, &mut line, &mut want);
+                same = same && *first.get_or_insert_with(|| want.clone()) == want;
+                let mut mean = [0.0f32; 4];
+                for (&share, &q) in want.iter().zip(&field.stacks) {
                     for (mean, coordinate) in mean.iter_mut().zip(points[usize::from(q)]) {
-                        *mean += share * f64::from(coordinate);
+                        *mean += share * coordinate;
                     }
                 }
-                for &place in &curve[done..(done + stretch).min(area)] {
-                    let (x, y) = (x + usize::from(place % EDGE), y + usize::from(place / EDGE));
-                    if (left..left + width).contains(&x) && (top..top + length).contains(&y) {
-                        let at = (y - top) * width + x - left;
-                        for (c, plane) in planes.iter_mut().enumerate() {
-                            plane[at] = f64::from(points[usize::from(index[at])][c]) - mean[c];
-                        }
-                    }
+                let at = y * width + x;
+                for (c, plane) in planes.iter_mut().enumerate() {
+                    plane[at] = f64::from(points[usize::from(index[at])][c] - mean[c]);
                 }
-                done += stretch;
             }
         }
-        let shares = first.filter(|_| same).map(|weights: Vec<Lanes>| {
+        let shares = first.filter(|_| same).map(|want: Vec<f32>| {
             let mut shares = vec![0.0; self.dots.stacks().len()];
-            for (lane, &q) in self.lattice.stacks.iter().enumerate() {
-                shares[usize::from(q)] = weights[lane / LANES].0[lane % LANES] as f32 / UNIT as f32;
+            for (&share, &q) in want.iter().zip(&field.stacks) {
+                shares[usize::from(q)] = share;
             }
             shares
         });

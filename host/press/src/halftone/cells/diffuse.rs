@@ -20,10 +20,16 @@ const FORGET: f32 = 1.0 / 32.0;
 
 /// By how much the decision of a cell is disturbed, in cells, for the second largest share in it, linear in between: where
 /// there are two stacks, and where others share the cell, which break most patterns themselves.
-const DISTURBED: [(f32, f32, f32); 5] =
-    [(0.2, 0.04, 0.04), (0.25, 0.13, 0.04), (0.33, 0.135, 0.12), (0.43, 0.14, 0.12), (0.48, 0.28, 0.12)];
+const DISTURBED: [(f32, f32, f32); 6] = [
+    (0.2, 0.04, 0.04),
+    (0.25, 0.13, 0.04),
+    (0.3, 0.13, 0.05),
+    (0.33, 0.13, 0.12),
+    (0.43, 0.14, 0.12),
+    (0.48, 0.28, 0.12),
+];
 
-/// The same where one stack has half of the cell.
+/// The same where one stack has half of the cell, which makes a checkerboard of it whatever the others are.
 const HALF: f32 = 0.16;
 
 /// The largest difference of a debt above the first row of a tone, in cells, for a stack of share p: times root of p (1 - p).
@@ -230,9 +236,8 @@ impl<'a> Strip<'a> {
             });
         let all: f32 = self.want.iter().sum();
         let alone = (1.0 - 4.0 * (all - first - second) / all).max(0.0);
-        // A stack on half the cells makes a checkerboard, whatever the others are.
-        let half = HALF * (1.0 - 20.0 * (first / all - 0.5).abs()).max(0.0);
         let share = second / all;
+        let half = HALF * (1.0 - 20.0 * (first / all - 0.5).abs()).max(0.0);
         let between = |&(_, two, more): &(f32, f32, f32)| more + alone * (two - more);
         let mut below = &DISTURBED[0];
         for above in &DISTURBED {
