@@ -68,12 +68,18 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Kills every program at work. Called when this program is interrupted.
+/// Kills every program at work and lets none be started any more. Called when this program is interrupted: who waits for a
+/// killed program takes it for a failure, and may try another way.
 pub fn stop_all() {
-    for child in locked(&RUNNING).iter() {
-        // It may have ended meanwhile.
-        let _ = locked(child).kill();
+    let running = locked(&RUNNING);
+    for child in running.iter() {
+        let mut child = locked(child);
+        // It may have ended meanwhile. A killed program ends at once, but not before it is waited for.
+        let _ = child.kill();
+        let _ = child.wait();
     }
+    // Never released.
+    std::mem::forget(running);
 }
 
 /// Until when the program may go on without progress.
