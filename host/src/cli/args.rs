@@ -11,7 +11,7 @@ use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
-use super::choice::choice;
+use super::choice::{Metric, choice};
 use observe::Observer;
 
 /// What to read.
@@ -145,11 +145,20 @@ pub struct GamutArgs {
     /// one as close as possible, blend lies between, auto clamps unless that would make different materials look alike
     #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
+    /// What "close" means: light counts how much light a material returns beside the shape of its highlight, so that
+    /// metals shine; paper is the distance of the 2009 paper, which counts the shape alone
+    #[arg(long, value_name = "METRIC", default_value = "light", value_parser = choice::<Metric>())]
+    pub metric: Metric,
 }
 
 impl GamutArgs {
     /// The settings meant.
     pub fn settings(&self, seed: u64) -> gamut::Settings {
-        gamut::Settings { intent: self.intent, seed, ..gamut::Settings::default() }
+        gamut::Settings {
+            intent: self.intent,
+            light: self.metric.light(),
+            seed,
+            ..gamut::Settings::default()
+        }
     }
 }

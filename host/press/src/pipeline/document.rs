@@ -3,15 +3,18 @@
 //! Nothing is decided here that a stage does not decide; this is only their order, and the values between them, kept
 //! for those who want to look.
 
+use std::borrow::Cow;
+
 use inks::{InkSet, Library};
 
 use crate::halftone::{self, HalftoneError, halftone};
 use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
 use crate::sheet::DotMap;
-use appearance::document::Document;
+use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
-use appearance::gamut::{self, GamutError, Mapped, Printable};
+use appearance::gamut::{self, Gain, GamutError, Mapped, Printable};
 use observe::Observer;
+use protocol::ink::Ink;
 
 /// What the user may choose.
 #[derive(Clone, Debug)]
@@ -30,14 +33,14 @@ pub struct Settings {
 
 /// A document as dots, and what it went through.
 pub struct Halftoned {
-    /// The document in bases and weight maps.
-    pub factored: Factored,
-    /// What the factoring reports; absent when the document came factored.
+    /// What the factoring reports; absent when the document came factored, or the intent uses no bases.
     pub factoring: Option<factor::Report>,
     /// The mixture of stacks, and what the mapping reports.
     pub mapped: Mapped,
     /// The dots.
     pub dots: DotMap,
+    /// What foils would bring, if the inks are the default, which leaves them out.
+    pub foils: Option<Gain>,
 }
 
 /// Why a document does not become dots: the error of the stage that refused.
@@ -75,32 +78,53 @@ pub fn halftoned(
     let pixels = (materials.width(), materials.height());
     let (width, height) = size::dots(pixels, document.size_mm, settings.size, layout)?;
     layout::check(width.into(), height.into(), layout)?;
-    let (factored, factoring) = factored(document, &settings.factor, observer)?;
-    if let Some(report) = &factoring {
-        observer.note(&report.to_string());
-    }
-    let printable = Printable::from_library(library, &settings.inks, &factored.space);
-    let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
+    let printable = Printable::combined(library, &settings.inks, materials.space());
+    let mut factoring = None;
+    let bases = || {
+        let (factored, report) = factored(document, &settings.factor, observer)?;
+        if let Some(report) = &report {
+            observer.note(&report.to_string());
+        }
+        factoring = report;
+        Ok::<_, StageError>(factored)
+    };
+    let mapped = gamut::map(materials, bases, &printable, &settings.gamut, observer)?;
     let chosen = halftone::Settings {
         method: settings.halftone,
         ..halftone::Settings::from_library(&mapped.mix.stacks, library)
     };
     let dots = halftone(&mapped.mix, (width, height), None, &chosen, observer)?;
-    Ok(Halftoned { factored, factoring, mapped, dots })
+    let foils = match settings.inks == InkSet::default() {
+        true => foils(materials, library, &printable, &settings.gamut)?,
+        false => None,
+    };
+    Ok(Halftoned { factoring, mapped, dots, foils })
+}
+
+/// What foils beside the default inks would bring.
+fn foils(
+    materials: &dyn Materials,
+    library: &Library,
+    printable: &Printable,
+    settings: &gamut::Settings,
+) -> Result<Option<Gain>, GamutError> {
+    let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
+    let more = Printable::combined(library, &all, materials.space());
+    gamut::gain(materials, printable, &more, settings)
 }
 
 /// A document's bases and maps: its own if it came factored.
 ///
 /// # Errors
 /// Those of the factoring.
-pub fn factored(
-    document: &Document,
+pub fn factored<'a>(
+    document: &'a Document,
     settings: &factor::Settings,
     observer: &dyn Observer,
-) -> Result<(Factored, Option<factor::Report>), FactorError> {
+) -> Result<(Cow<'a, Factored>, Option<factor::Report>), FactorError> {
     if let Some(factored) = document.as_factored() {
-        return Ok((factored.clone(), None));
+        return Ok((Cow::Borrowed(factored), None));
     }
     let factoring = factor::factor(document.materials(), settings, observer)?;
-    Ok((factoring.factored, Some(factoring.report)))
+    Ok((Cow::Owned(factoring.factored), Some(factoring.report)))
 }

@@ -14,6 +14,8 @@ mod error;
 mod fidelity;
 mod flat;
 pub mod inks;
+#[cfg(test)]
+mod light_table;
 mod materials_picture;
 mod probe;
 mod radiance;

@@ -16,7 +16,7 @@ fn library(space: &Space) -> Table {
 }
 
 fn hull_of(space: &Space, curves: &Table) -> Hull {
-    Hull::new(space, curves, &vec![0.0; curves.len()]).unwrap()
+    Hull::new(space, curves, &vec![0.0; curves.len()], 0.0).unwrap()
 }
 
 fn mixture(curves: &Table, weights: &[f64]) -> Vec<f64> {
@@ -276,7 +276,7 @@ fn ties_go_to_fewer_layers() {
         let mut price = vec![LAYER_PRICE; 58];
         price[0] = 0.0;
         price[dear] = 3.0 * LAYER_PRICE;
-        let hull = Hull::new(&space, &curves, &price).unwrap();
+        let hull = Hull::new(&space, &curves, &price, 0.0).unwrap();
         let best = Mixer::new().best(&hull, &hull.target(&target).unwrap()).unwrap();
         assert!(best.weights[dear] < 1e-9 && best.weights[cheap] > 0.55, "{:?}", best.weights);
         assert!(best.fit.distance < 1e-3);
@@ -323,11 +323,14 @@ fn bad_numbers_are_named() {
         table.push(&[v; 12]);
         table
     };
-    let error = Hull::new(&space, &row(f64::NAN), &[0.0]).unwrap_err();
+    let error = Hull::new(&space, &row(f64::NAN), &[0.0], 0.0).unwrap_err();
     assert!(matches!(error, MixtureError::Value { column: 0, .. }));
-    assert!(matches!(Hull::new(&space, &row(1.0), &[]), Err(MixtureError::Length { stacks: 1, found: 0 })));
-    assert!(matches!(Hull::new(&space, &Table::new(12), &[]), Err(MixtureError::NoStacks)));
-    let hull = Hull::new(&space, &row(1.0), &[0.0]).unwrap();
+    assert!(matches!(
+        Hull::new(&space, &row(1.0), &[], 0.0),
+        Err(MixtureError::Length { stacks: 1, found: 0 })
+    ));
+    assert!(matches!(Hull::new(&space, &Table::new(12), &[], 0.0), Err(MixtureError::NoStacks)));
+    let hull = Hull::new(&space, &row(1.0), &[0.0], 0.0).unwrap();
     let mut target = vec![1.0; 12];
     target[7] = f64::INFINITY;
     assert!(matches!(hull.target(&target), Err(MixtureError::Value { column: 7, .. })));
