@@ -51,3 +51,36 @@ pub(super) fn choose(
     }
     Ok(chosen)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidates::Printable;
+    use super::*;
+    use crate::brdf::{Space, Table};
+    use inks::Stack;
+
+    /// Substrate, a usual stack that is advised against, its neighbour beyond the list, and one that nobody needs.
+    #[test]
+    fn stacks_that_print_badly_go_where_a_neighbour_serves() {
+        let space = Space::half_angle(8);
+        let stacks: Vec<Stack> = ["substrate", "C+M+Y+F", "C+K+F", "K"].map(|s| s.parse().unwrap()).to_vec();
+        let chosen = |neighbour: f64, target: f64| {
+            let mut curves = Table::new(space.columns());
+            for level in [0.27, 0.004, neighbour, 0.02] {
+                curves.push(&vec![level; space.columns()]);
+            }
+            let warned = vec![false, true, false, false];
+            let printable = Printable { stacks: stacks.clone(), curves, usual: 2, warned };
+            let candidates = Candidates::new(&space, &printable, 0.0).unwrap();
+            let row = candidates.free.target(&vec![target; space.columns()]).unwrap();
+            let targets = Targets { rows: vec![row], importance: vec![1.0] };
+            choose(&candidates, &[0, 1, 2, 3], &targets).unwrap()
+        };
+        // Just as dark: it takes the place of the one that prints badly.
+        assert_eq!(chosen(0.004, 0.003), [0, 2]);
+        // Not nearly: what prints badly is needed, and the other is no help.
+        assert_eq!(chosen(0.03, 0.003), [0, 1]);
+        // Nothing but the substrate is needed, and a usual stack stays if no rule is against it.
+        assert_eq!(chosen(0.03, 0.27), [0]);
+    }
+}
