@@ -63,7 +63,7 @@ impl DocumentArgs {
 /// How to factor the document.
 #[derive(Args, Debug)]
 pub struct FactorArgs {
-    /// Number of bases [default: as many as the document needs]
+    /// Number of bases, where the intent uses them [default: as many as the document needs]
     #[arg(long, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=factor::MOST_BASES as u64))]
     pub bases: Option<usize>,
     /// Method that finds the bases: archetypes, or the paper's kmeans (convex hull) and sacls
@@ -75,6 +75,11 @@ pub struct FactorArgs {
 }
 
 impl FactorArgs {
+    /// Whether something about the bases was chosen.
+    pub fn is_chosen(&self) -> bool {
+        self.bases.is_some() || self.method != Method::default()
+    }
+
     /// The settings meant.
     pub fn settings(&self) -> factor::Settings {
         factor::Settings {

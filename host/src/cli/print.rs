@@ -92,6 +92,12 @@ impl Work {
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
+        if halftoned.mapped.report.intent == Intent::Clamp && self.factor.is_chosen() {
+            observer.note(
+                "every pixel was fitted by itself (intent `clamp`), so --bases and --factor change nothing; --intent basis uses \
+                 bases",
+            );
+        }
         if let Some(words) = halftoned.foils.as_ref().and_then(foils_in_words) {
             observer.note(&words);
         }

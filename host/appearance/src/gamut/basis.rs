@@ -39,14 +39,14 @@ pub(super) fn map(
     let plain = map_rows(bases, candidates)?;
     let rows = |m: &[Mapping]| m.iter().map(|m| m.printed.clone()).collect::<Vec<_>>();
     let printed = rows(&plain);
-    let merged = gloss::merges(space, bases, &printed);
+    let merged = gloss::merges(space, bases, shares, &printed);
     let (mut targets, mut mappings, mut gloss_scale) = (bases.clone(), plain, None);
-    if gloss == Gloss::Scale || gloss == Gloss::WhereMerged && merged > 0 {
+    if gloss == Gloss::Scale || gloss == Gloss::WhereMerged && merged > gloss::FEW_MERGED {
         let factor = gloss::factor(space, bases, &printed);
         if factor < 1.0 {
             let scaled = gloss::scaled(bases, factor);
             let mapped = map_rows(&scaled, candidates)?;
-            if gloss == Gloss::Scale || gloss::merges(space, bases, &rows(&mapped)) < merged {
+            if gloss == Gloss::Scale || gloss::merges(space, bases, shares, &rows(&mapped)) < merged {
                 (targets, mappings, gloss_scale) = (scaled, mapped, Some(factor));
             }
         }

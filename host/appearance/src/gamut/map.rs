@@ -11,6 +11,7 @@ use super::cartridges::Cartridges;
 use super::clamp::Clamped;
 use super::error::GamutError;
 use super::fitted::Targets;
+use super::gloss::FEW_MERGED;
 use super::report::{GivenUp, Mapped, PixelReport, Report};
 use super::settings::{Gloss, Intent, Settings};
 use super::{assemble, basis, blend, cartridges, choice, clamp, sample, typical};
@@ -23,8 +24,6 @@ use crate::weights::WeightMaps;
 const SAMPLE: usize = 1024;
 /// Pixels that cartridges are chosen by.
 const CARTRIDGE_SAMPLE: usize = 256;
-/// Share of merged pairs up to which clamping is the automatic choice.
-const FEW_MERGED: f64 = 0.01;
 
 /// Pixels of that sample from which typical materials are chosen.
 const TYPICAL_SAMPLE: usize = 256;

@@ -24,7 +24,7 @@ pub const LIGHT: f64 = 0.3;
 /// How the gloss of the bases is treated before they are mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Gloss {
-    /// Scale if mapping would otherwise merge different bases and scaling helps.
+    /// Scale if mapping would otherwise merge more than 1 % of pairs of materials and scaling helps.
     #[default]
     WhereMerged,
     /// Keep the gloss.
