@@ -6,7 +6,7 @@ use super::candidates::{Candidates, Printable};
 use super::error::GamutError;
 use super::report::{GivenUp, Mapped, PixelReport, Report};
 use super::settings::{Gloss, Intent, Settings};
-use super::{assemble, basis, blend, cartridges, clamp, sample};
+use super::{assemble, basis, blend, cartridges, clamp, local, sample};
 use crate::brdf::Table;
 use crate::materials::{Factored, Materials};
 use crate::solve::{MixtureError, Target};
@@ -48,7 +48,7 @@ pub fn map(
         Intent::Auto => automatic_intent(document, &candidates, &sample, settings.seed, observer)?,
         chosen => chosen,
     };
-    let gloss = if intent == Intent::Clamp { Gloss::Keep } else { settings.gloss };
+    let gloss = if matches!(intent, Intent::Clamp | Intent::Contrast) { Gloss::Keep } else { settings.gloss };
     let bases = basis::map(&document.space, &document.bases, &candidates, gloss)?;
     if let Some(factor) = bases.gloss_scale {
         observer.note(&format!(
@@ -96,7 +96,7 @@ fn cartridge_targets(
 ) -> Result<(Vec<Target>, Vec<f64>), GamutError> {
     let mut targets = Vec::new();
     let mut importance = Vec::new();
-    if settings.intent != Intent::Clamp {
+    if !matches!(settings.intent, Intent::Clamp | Intent::Contrast) {
         let channels = document.maps.channels();
         let mut sums = vec![0u64; channels];
         for weights in document.maps.data().chunks_exact(channels) {
@@ -156,6 +156,9 @@ fn map_pixels(
         let s = blend::shares(&clamped.distance, &clamped.brightness, pixels.width());
         mean = s.iter().map(|&s| f64::from(s)).sum::<f64>() / s.len() as f64;
         blend::mix(&mut clamped.shares, &s, &document.maps, bases);
+    }
+    if intent == Intent::Contrast {
+        mean = local::keep_contrast(candidates, pixels, &mut clamped, observer)?;
     }
     let report = distances(clamped.distance, clamped.gap, mean);
     let (shares, maps) =

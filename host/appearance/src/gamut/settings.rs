@@ -15,6 +15,8 @@ pub enum Intent {
     Clamp,
     /// Clamped pixels where they are close to the target, the mapped bases elsewhere.
     Blend,
+    /// Clamp in the gamut; outside it, keep differences between neighbouring pixels at the price of closeness.
+    Contrast,
 }
 
 /// How the gloss of the bases is treated before they are mapped.
