@@ -95,6 +95,11 @@ impl Choice for Intent {
             "Map each pixel by itself: lowest error, but differences outside the gamut are lost",
         ),
         (Intent::Blend, "blend", "Clamp where the result is near, use the mapped bases where it is not"),
+        (
+            Intent::Contrast,
+            "contrast",
+            "Clamp what the inks can make; elsewhere keep differences between neighbours, such as scratches and grain",
+        ),
     ];
 }
 

@@ -14,7 +14,7 @@ use super::fitted::Targets;
 use super::gloss::FEW_MERGED;
 use super::report::{GivenUp, Mapped, PixelReport, Report};
 use super::settings::{Gloss, Intent, Settings};
-use super::{assemble, basis, blend, cartridges, choice, clamp, sample, typical};
+use super::{assemble, basis, blend, cartridges, choice, clamp, local, sample, typical};
 use crate::brdf::Table;
 use crate::materials::{Factored, Materials};
 use crate::solve::MixtureError;
@@ -42,11 +42,13 @@ pub fn map<'a, E: From<GamutError>>(
 ) -> Result<Mapped, E> {
     let document = Pixels::new(pixels, printable, settings)?;
     let (chosen, bases) = match settings.intent {
-        Intent::Clamp | Intent::Auto => {
+        Intent::Clamp | Intent::Contrast => {
+            return Ok(document.fitted(&document.choose(None, observer)?, observer)?);
+        }
+        Intent::Auto => {
             let chosen = document.choose(None, observer)?;
-            let clamp = settings.intent == Intent::Clamp || document.clamping_keeps(&chosen, observer)?;
-            if clamp {
-                return Ok(document.clamped(&chosen, observer)?);
+            if document.clamping_keeps(&chosen, observer)? {
+                return Ok(document.fitted(&chosen, observer)?);
             }
             (chosen, factored()?)
         }
@@ -71,7 +73,7 @@ pub fn clamped(
     observer: &dyn Observer,
 ) -> Result<Mapped, GamutError> {
     let document = Pixels::new(pixels, printable, settings)?;
-    document.clamped(&document.choose(None, observer)?, observer)
+    document.fitted(&document.choose(None, observer)?, observer)
 }
 
 /// How much nearer a document gets with more inks: root mean square distances of a sample, in the metric of the settings.
@@ -181,7 +183,8 @@ impl<'a> Pixels<'a> {
         Ok(merged <= FEW_MERGED)
     }
 
-    fn clamped(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<Mapped, GamutError> {
+    /// Fits each pixel, without bases.
+    fn fitted(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<Mapped, GamutError> {
         let Chosen { candidates, given_up, .. } = chosen;
         let few = TYPICAL_SAMPLE.min(self.sample.len());
         let mut some = Table::new(self.sample.columns());
@@ -189,15 +192,23 @@ impl<'a> Pixels<'a> {
         let space = self.pixels.space();
         let (rows, shares) = typical::rows(space, &some);
         let shown = basis::map(space, &rows, &shares, candidates, Gloss::Keep)?;
-        let clamped = clamp::map(candidates, self.pixels, observer)?;
-        let pixels = self.report(&clamped, 1.0);
+        let mut clamped = clamp::map(candidates, self.pixels, observer)?;
+        let mut kept = 1.0;
+        let intent = match self.settings.intent {
+            Intent::Contrast => {
+                kept = local::keep_contrast(candidates, self.pixels, &mut clamped, observer)?;
+                Intent::Contrast
+            }
+            _ => Intent::Clamp,
+        };
+        let pixels = self.report(&clamped, kept);
         let (width, height) = (self.pixels.width(), self.pixels.height());
         let (shares, maps) = assemble::compact(clamped.shares, candidates.len(), width, height)?;
         self.mapped(
             candidates,
             (shares, maps),
             Report {
-                intent: Intent::Clamp,
+                intent,
                 cartridges: Vec::new(),
                 given_up: given_up.clone(),
                 gloss_scale: None,

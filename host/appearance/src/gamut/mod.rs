@@ -5,9 +5,10 @@
 //! Method: by intent. [`Intent::Basis`] maps the document's few bases by eq. 1 and keeps the weight maps (section 4.1 of
 //! the 2009 paper: convex combinations of convex combinations are printable); [`Intent::Clamp`] maps every pixel by eq. 1;
 //! [`Intent::Blend`] changes smoothly from clamping, where the material is in the gamut, to the mapped bases, where it is
-//! far outside. [`Intent::Auto`] clamps unless that merges materials that differ.
-//! Cost: a millisecond per basis; about 10 microseconds per pixel and core for clamp and blend. Limits: the mixture is
-//! exact only for light that does not scatter sideways in the paper.
+//! far outside; [`Intent::Contrast`] clamps in the gamut and outside it keeps differences between neighbours.
+//! [`Intent::Auto`] clamps unless that merges materials that differ.
+//! Cost: a millisecond per basis; about 10 microseconds per pixel and core for clamp and blend, five times that for
+//! contrast. Limits: the mixture is exact only for light that does not scatter sideways in the paper.
 
 mod assemble;
 mod basis;
@@ -20,6 +21,7 @@ mod error;
 pub mod files;
 mod fitted;
 mod gloss;
+mod local;
 mod map;
 mod mix;
 mod prune;

@@ -74,10 +74,10 @@ pub struct MaterialReport {
     pub pruning_cost: f64,
 }
 
-/// The pixels of a clamped or blended mapping.
+/// The pixels of a mapping that fits each of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelReport {
-    /// Root mean square distance d between pixels and their clamped mixtures.
+    /// Root mean square distance d between pixels and their mixtures; for blend, between pixels and their clamped mixtures.
     pub rms: f64,
     /// Root mean square distance in light between them.
     pub light: f64,
@@ -89,6 +89,6 @@ pub struct PixelReport {
     pub gap: f64,
     /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
     pub merged: f64,
-    /// Mean weight of the clamped mixture in the result: 1 for clamp.
+    /// Mean weight of the clamped mixture in the result: 1 for clamp; for contrast, the share of pixels that keep it.
     pub clamped: f64,
 }

@@ -15,6 +15,8 @@ pub enum Intent {
     Clamp,
     /// Clamped pixels where they are close to the target, the mapped bases elsewhere.
     Blend,
+    /// Clamp in the gamut; outside it, keep differences between neighbouring pixels at the price of closeness.
+    Contrast,
 }
 
 /// The weight of the distance in light beside distance d at which metals shine and other materials hardly change;

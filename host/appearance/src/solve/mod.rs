@@ -7,6 +7,7 @@ mod gram;
 mod hull;
 mod mixture;
 mod root;
+mod seen;
 mod simplex;
 pub(crate) mod vector;
 
