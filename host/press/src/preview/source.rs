@@ -125,7 +125,17 @@ pub(super) struct Lines<'a> {
 pub(super) struct Scratch {
     counts: Vec<u32>,
     sums: Vec<u64>,
+    shares: Vec<f32>,
     row: Vec<f32>,
+    mean: Vec<f32>,
+}
+
+/// The mean over one pixel.
+pub(super) enum Mean<'a> {
+    /// The share of each stack, or of each basis.
+    Shares(&'a [f32]),
+    /// The reflectance (1/sr), a row of the space.
+    Row(&'a [f32]),
 }
 
 /// What one of `pixels` equal pixels covers of a side of `size` places: places in a row, with the part of each in
@@ -172,7 +182,7 @@ impl Cover {
     }
 }
 
-impl Lines<'_> {
+impl<'a> Lines<'a> {
     /// Columns of the reflectance of a pixel.
     pub fn columns(&self) -> usize {
         self.columns
@@ -188,87 +198,135 @@ impl Lines<'_> {
         self.height
     }
 
-    /// Writes the mean reflectance (1/sr) of line `y` to `out`, which has `width * columns` places.
-    pub fn read(&self, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
-        let (across, down) = self.source.size();
-        let line = Cover::new(y, self.height, down);
-        // The parts of a pixel sum to this.
-        let scale = 1.0 / (across as f64 * down as f64);
-        match &self.source {
-            Source::Document(materials) => self.read_document(*materials, &line, scratch, out),
-            Source::Factored(factored) => {
-                let maps = &factored.maps;
-                let scale = (scale / f64::from(ONE)) as f32;
-                for (cover, out) in self.across.iter().zip(out.chunks_exact_mut(self.columns)) {
-                    scratch.sums.clear();
-                    scratch.sums.resize(maps.channels(), 0);
-                    for py in line.places.0..line.places.1 {
-                        for px in cover.places.0..cover.places.1 {
-                            let part = u64::from(line.part(py)) * u64::from(cover.part(px));
-                            let weights = maps.at(py * maps.width() + px);
-                            scratch
-                                .sums
-                                .iter_mut()
-                                .zip(weights)
-                                .for_each(|(s, &w)| *s += part * u64::from(w));
-                        }
-                    }
-                    self.mix(scratch.sums.iter().map(|&s| s as f32 * scale), out);
-                }
-            }
-            Source::Print { dots, area, .. } => {
-                let stacks = dots.stacks().len();
-                scratch.counts.clear();
-                scratch.counts.resize(self.width * stacks, 0);
-                for row in line.places.0..line.places.1 {
-                    let start = (area.top + row) * dots.width() + area.left;
-                    let dots = &dots.index()[start..start + area.width];
-                    // A page has fewer than 2^32 dots, so no sum of parts overflows.
-                    let down = line.part(row);
-                    for (cover, counts) in self.across.iter().zip(scratch.counts.chunks_exact_mut(stacks)) {
-                        let (from, to) = cover.places;
-                        counts[usize::from(dots[from])] += down * cover.ends.0;
-                        if to - from > 1 {
-                            counts[usize::from(dots[to - 1])] += down * cover.ends.1;
-                            for &dot in &dots[from + 1..to - 1] {
-                                counts[usize::from(dot)] += down * cover.whole;
-                            }
-                        }
-                    }
-                }
-                for (out, counts) in
-                    out.chunks_exact_mut(self.columns).zip(scratch.counts.chunks_exact(stacks))
-                {
-                    self.mix(counts.iter().map(|&n| n as f32 * scale as f32), out);
-                }
-            }
+    /// The reflectance of what pixels are mixed of, row by row: stacks or bases. Documents have none.
+    pub fn table(&self) -> Option<&'a Table> {
+        match self.source {
+            Source::Document(_) => None,
+            Source::Factored(factored) => Some(&factored.bases),
+            Source::Print { stacks, .. } => Some(stacks),
         }
     }
 
-    fn mix(&self, shares: impl Iterator<Item = f32>, out: &mut [f32]) {
+    /// Writes the mean reflectance (1/sr) of line `y` to `out`, which has `width * columns` places.
+    pub fn read(&self, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
+        let mut pixels = out.chunks_exact_mut(self.columns);
+        self.each(y, scratch, |mean| {
+            let Some(out) = pixels.next() else { return };
+            match mean {
+                Mean::Row(row) => out.copy_from_slice(row),
+                Mean::Shares(shares) => self.mix(shares, out),
+            }
+        });
+    }
+
+    /// Calls `each` with the mean over every pixel of line `y`, from the left.
+    pub fn each(&self, y: usize, scratch: &mut Scratch, each: impl FnMut(Mean)) {
+        let line = Cover::new(y, self.height, self.source.size().1);
+        match &self.source {
+            Source::Document(materials) => self.each_document(*materials, &line, scratch, each),
+            Source::Factored(factored) => self.each_factored(factored, &line, scratch, each),
+            Source::Print { dots, area, .. } => self.each_print(dots, area, &line, scratch, each),
+        }
+    }
+
+    /// The sum of the parts of a pixel.
+    fn whole(&self) -> f64 {
+        let (across, down) = self.source.size();
+        across as f64 * down as f64
+    }
+
+    fn each_factored(
+        &self,
+        factored: &Factored,
+        line: &Cover,
+        scratch: &mut Scratch,
+        mut each: impl FnMut(Mean),
+    ) {
+        let maps = &factored.maps;
+        let scale = (1.0 / self.whole() / f64::from(ONE)) as f32;
+        for cover in &self.across {
+            scratch.sums.clear();
+            scratch.sums.resize(maps.channels(), 0);
+            for py in line.places.0..line.places.1 {
+                for px in cover.places.0..cover.places.1 {
+                    let part = u64::from(line.part(py)) * u64::from(cover.part(px));
+                    let weights = maps.at(py * maps.width() + px);
+                    scratch.sums.iter_mut().zip(weights).for_each(|(s, &w)| *s += part * u64::from(w));
+                }
+            }
+            scratch.shares.clear();
+            scratch.shares.extend(scratch.sums.iter().map(|&sum| sum as f32 * scale));
+            each(Mean::Shares(&scratch.shares));
+        }
+    }
+
+    fn each_print(
+        &self,
+        dots: &DotMap,
+        area: &Area,
+        line: &Cover,
+        scratch: &mut Scratch,
+        mut each: impl FnMut(Mean),
+    ) {
+        let scale = (1.0 / self.whole()) as f32;
+        let stacks = dots.stacks().len();
+        scratch.counts.clear();
+        scratch.counts.resize(self.width * stacks, 0);
+        for row in line.places.0..line.places.1 {
+            let start = (area.top + row) * dots.width() + area.left;
+            let dots = &dots.index()[start..start + area.width];
+            // A page has fewer than 2^32 dots, so no sum of parts overflows.
+            let down = line.part(row);
+            for (cover, counts) in self.across.iter().zip(scratch.counts.chunks_exact_mut(stacks)) {
+                let (from, to) = cover.places;
+                counts[usize::from(dots[from])] += down * cover.ends.0;
+                if to - from > 1 {
+                    counts[usize::from(dots[to - 1])] += down * cover.ends.1;
+                    for &dot in &dots[from + 1..to - 1] {
+                        counts[usize::from(dot)] += down * cover.whole;
+                    }
+                }
+            }
+        }
+        for counts in scratch.counts.chunks_exact(stacks) {
+            scratch.shares.clear();
+            scratch.shares.extend(counts.iter().map(|&n| n as f32 * scale));
+            each(Mean::Shares(&scratch.shares));
+        }
+    }
+
+    fn mix(&self, shares: &[f32], out: &mut [f32]) {
         out.fill(0.0);
-        for (share, row) in shares.zip(self.rows.chunks_exact(self.columns)) {
+        for (&share, row) in shares.iter().zip(self.rows.chunks_exact(self.columns)) {
             if share > 0.0 {
                 out.iter_mut().zip(row).for_each(|(o, &r)| *o += share * r);
             }
         }
     }
 
-    fn read_document(&self, materials: &dyn Materials, line: &Cover, scratch: &mut Scratch, out: &mut [f32]) {
+    fn each_document(
+        &self,
+        materials: &dyn Materials,
+        line: &Cover,
+        scratch: &mut Scratch,
+        mut each: impl FnMut(Mean),
+    ) {
         scratch.row.resize(self.columns, 0.0);
-        let row = &mut scratch.row;
-        for (cover, out) in self.across.iter().zip(out.chunks_exact_mut(self.columns)) {
-            out.fill(0.0);
+        scratch.mean.resize(self.columns, 0.0);
+        let (row, mean) = (&mut scratch.row, &mut scratch.mean);
+        for cover in &self.across {
+            mean.fill(0.0);
             let mut sum = 0.0;
             for (py, down) in line.sampled(self.samples) {
                 for (px, across) in cover.sampled(self.samples) {
                     let part = down as f32 * across as f32;
                     materials.reflectance(py * materials.width() + px, row);
-                    out.iter_mut().zip(row.iter()).for_each(|(o, &r)| *o += part * r);
+                    mean.iter_mut().zip(row.iter()).for_each(|(m, &r)| *m += part * r);
                     sum += part;
                 }
             }
-            out.iter_mut().for_each(|o| *o /= sum);
+            mean.iter_mut().for_each(|m| *m /= sum);
+            each(Mean::Row(mean));
         }
     }
 }
