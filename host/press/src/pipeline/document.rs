@@ -11,6 +11,8 @@ use crate::sheet::DotMap;
 use appearance::document::Document;
 use appearance::factor::{self, FactorError, Factored};
 use appearance::gamut::{self, GamutError, Mapped, Printable};
+use appearance::materials::{Materials, Reduced, resolution};
+use appearance::weights::WeightError;
 use observe::Observer;
 
 /// What the user may choose.
@@ -49,6 +51,9 @@ pub enum StageError {
     /// Its place on the page.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    /// Averaging weight maps. Never seen; if it is, it is a bug worth a report.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
     /// Factoring.
     #[error(transparent)]
     Factor(#[from] FactorError),
@@ -60,7 +65,8 @@ pub enum StageError {
     Halftone(#[from] HalftoneError),
 }
 
-/// Halftones a document at the size it will have on a page of this layout.
+/// Halftones a document at the size it will have on a page of this layout. Detail finer than a cluster of dots is averaged
+/// before anything is fitted to it.
 ///
 /// # Errors
 /// Those of the stages; a size or a layout without room is refused before the long work.
@@ -75,7 +81,23 @@ pub fn halftoned(
     let pixels = (materials.width(), materials.height());
     let (width, height) = size::dots(pixels, document.size_mm, settings.size, layout)?;
     layout::check(width.into(), height.into(), layout)?;
-    let (factored, factoring) = factored(document, &settings.factor, observer)?;
+    let cells = cells((width, height), pixels, library, settings);
+    if let Some((across, down)) = cells {
+        observer.note(&format!(
+            "the print shows {across} x {down} of the document's {} x {} pixels: materials are averaged over its clusters",
+            pixels.0, pixels.1
+        ));
+    }
+    let reduced = cells.map(|cells| Reduced::new(materials, cells));
+    let materials: &dyn Materials = reduced.as_ref().map_or(materials, |reduced| reduced);
+    let (factored, factoring) = match (document.as_factored(), cells) {
+        (Some(factored), Some(cells)) => (factored.reduced(cells)?, None),
+        (Some(factored), None) => (factored.clone(), None),
+        (None, _) => {
+            let factoring = factor::factor(materials, &settings.factor, observer)?;
+            (factoring.factored, Some(factoring.report))
+        }
+    };
     if let Some(report) = &factoring {
         observer.note(&report.to_string());
     }
@@ -87,6 +109,23 @@ pub fn halftoned(
     };
     let dots = halftone(&mapped.mix, (width, height), None, &chosen, observer)?;
     Ok(Halftoned { factored, factoring, mapped, dots })
+}
+
+/// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a
+/// pixel for each cell of the smallest clusters.
+fn cells(
+    (width, height): (u16, u16),
+    pixels: (usize, usize),
+    library: &Library,
+    settings: &Settings,
+) -> Option<(usize, usize)> {
+    let entries = library.at_hand(&settings.inks);
+    let least = entries.into_iter().map(|entry| library.minimum_cluster(&entry.stack)).min().unwrap_or(1);
+    let side = match settings.halftone {
+        halftone::Method::Blue => 1,
+        _ => (1..).find(|side| side * side >= usize::from(least)).unwrap_or(1),
+    };
+    resolution(pixels, (usize::from(width).div_ceil(side), usize::from(height).div_ceil(side)))
 }
 
 /// A document's bases and maps: its own if it came factored.

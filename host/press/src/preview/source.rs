@@ -13,6 +13,7 @@ use crate::sheet::{Area, DotMap};
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::factor::Factored;
+use appearance::materials::Cover;
 use appearance::weights::ONE;
 
 use super::error::{PreviewError, check_size};
@@ -126,7 +127,6 @@ pub(super) struct Scratch {
     counts: Vec<u32>,
     sums: Vec<u64>,
     shares: Vec<f32>,
-    row: Vec<f32>,
     mean: Vec<f32>,
 }
 
@@ -136,50 +136,6 @@ pub(super) enum Mean<'a> {
     Shares(&'a [f32]),
     /// The reflectance (1/sr), a row of the space.
     Row(&'a [f32]),
-}
-
-/// What one of `pixels` equal pixels covers of a side of `size` places: places in a row, with the part of each in
-/// 1/`pixels` of a place. The parts of a pixel sum to `size`, and those of a place, over all pixels, to `pixels`.
-#[derive(Clone, Copy, Debug)]
-struct Cover {
-    /// First place, and the one after the last.
-    places: (usize, usize),
-    /// Parts of the first and of the last place.
-    ends: (u32, u32),
-    /// Part of every place between.
-    whole: u32,
-}
-
-impl Cover {
-    fn new(i: usize, pixels: usize, size: usize) -> Cover {
-        // In 1/pixels of a place.
-        let (start, end) = (i * size, (i + 1) * size);
-        let places = (start / pixels, end.div_ceil(pixels));
-        let first = end.min((places.0 + 1) * pixels) - start;
-        let last = end - start.max((places.1 - 1) * pixels);
-        // Sides of sheets and pictures are below 2^16.
-        Cover { places, ends: (first as u32, last as u32), whole: pixels as u32 }
-    }
-
-    /// The part of a place of this pixel.
-    fn part(&self, place: usize) -> u32 {
-        match place {
-            _ if place == self.places.0 => self.ends.0,
-            _ if place + 1 == self.places.1 => self.ends.1,
-            _ => self.whole,
-        }
-    }
-
-    /// All places with their parts, or `samples` of them, evenly spread and alike, where there are more.
-    fn sampled(&self, samples: usize) -> impl Iterator<Item = (usize, u32)> + use<'_> {
-        let (from, to) = self.places;
-        let count = (to - from).min(samples);
-        (0..count).map(move |i| match count == to - from {
-            true => (from + i, self.part(from + i)),
-            // The centres of equal parts.
-            false => (from + (2 * i + 1) * (to - from) / (2 * count), 1),
-        })
-    }
 }
 
 impl<'a> Lines<'a> {
@@ -249,7 +205,7 @@ impl<'a> Lines<'a> {
             scratch.sums.resize(maps.channels(), 0);
             for py in line.places.0..line.places.1 {
                 for px in cover.places.0..cover.places.1 {
-                    let part = u64::from(line.part(py)) * u64::from(cover.part(px));
+                    let part = u64::from(line.share(py)) * u64::from(cover.share(px));
                     let weights = maps.at(py * maps.width() + px);
                     scratch.sums.iter_mut().zip(weights).for_each(|(s, &w)| *s += part * u64::from(w));
                 }
@@ -276,7 +232,7 @@ impl<'a> Lines<'a> {
             let start = (area.top + row) * dots.width() + area.left;
             let dots = &dots.index()[start..start + area.width];
             // A page has fewer than 2^32 dots, so no sum of parts overflows.
-            let down = line.part(row);
+            let down = line.share(row);
             for (cover, counts) in self.across.iter().zip(scratch.counts.chunks_exact_mut(stacks)) {
                 let (from, to) = cover.places;
                 counts[usize::from(dots[from])] += down * cover.ends.0;
@@ -311,21 +267,18 @@ impl<'a> Lines<'a> {
         scratch: &mut Scratch,
         mut each: impl FnMut(Mean),
     ) {
-        scratch.row.resize(self.columns, 0.0);
         scratch.mean.resize(self.columns, 0.0);
-        let (row, mean) = (&mut scratch.row, &mut scratch.mean);
+        let mean = &mut scratch.mean;
         for cover in &self.across {
+            let shares =
+                |cover: &Cover| cover.sampled(self.samples).map(|(_, share)| f64::from(share)).sum::<f64>();
+            let whole = (shares(line) * shares(cover)) as f32;
             mean.fill(0.0);
-            let mut sum = 0.0;
             for (py, down) in line.sampled(self.samples) {
                 for (px, across) in cover.sampled(self.samples) {
-                    let part = down as f32 * across as f32;
-                    materials.reflectance(py * materials.width() + px, row);
-                    mean.iter_mut().zip(row.iter()).for_each(|(m, &r)| *m += part * r);
-                    sum += part;
+                    materials.add(py * materials.width() + px, down as f32 * across as f32 / whole, mean);
                 }
             }
-            mean.iter_mut().for_each(|m| *m /= sum);
             each(Mean::Row(mean));
         }
     }
@@ -341,24 +294,6 @@ mod tests {
     use protocol::paper::Paper;
 
     proptest! {
-        #[test]
-        fn pixels_cover_a_side_once_and_alike(size in 1usize..300, pixels in 1usize..300) {
-            let mut covered = vec![0; size];
-            for i in 0..pixels {
-                let cover = Cover::new(i, pixels, size);
-                prop_assert!(cover.places.0 < cover.places.1 && cover.places.1 <= size);
-                let parts = (cover.places.0..cover.places.1).map(|place| cover.part(place));
-                prop_assert_eq!(parts.sum::<u32>() as usize, size);
-                for (place, part) in cover.sampled(usize::MAX) {
-                    // By the lengths of intervals: the pixel and the place, on a common scale.
-                    let (from, to) = ((i * size).max(place * pixels), ((i + 1) * size).min((place + 1) * pixels));
-                    prop_assert_eq!(part as usize, to - from);
-                    covered[place] += part as usize;
-                }
-            }
-            prop_assert!(covered.iter().all(|&parts| parts == pixels));
-        }
-
         #[test]
         fn a_line_of_a_sheet_is_the_mean_of_its_dots(
             dots in prop::collection::vec(0u8..3, 12 * 9), width in 1usize..15, height in 1usize..12,
