@@ -174,9 +174,9 @@ fn in_words(given_up: &[GivenUp], most: usize) -> Option<String> {
     };
     let (before, after) = (format!("{:.4}", first.before), format!("{:.4}", last.after));
     let cost = if before == after {
-        format!("the average difference stays at d = {before}")
+        format!("the root mean square difference stays at d = {before}")
     } else {
-        format!("the average difference changes from d = {before} to {after}")
+        format!("the root mean square difference changes from d = {before} to {after}")
     };
     Some(format!("{listed} left out to use at most {most} cartridges; {cost}"))
 }

@@ -4,7 +4,7 @@
 //! Method: a curve is read once at [`ENTRIES`] angles, dense in proportion to its slope at narrow lobes and at grazing angles.
 //! A second table finds the entry for the chord between normal and half vector, `2 sin(theta_h / 2)`, without a root or an
 //! arc sine. Mixing curves and mixing their tables are the same.
-//! Cost: some microseconds a curve; two multiply-adds a value. Error: below 0.1 % of modelled curves (test).
+//! Cost: some microseconds a curve; two multiply-adds a value. Error: below 0.15 % of modelled curves (test).
 
 use inks::Curve;
 
@@ -85,7 +85,7 @@ mod tests {
             for t in exact {
                 let (k, s) = fine.at((2.0 * (t / 2.0).sin()) as f32);
                 let found = table[k] + f64::from(s) * (table[k + 1] - table[k]);
-                let most = if t < 1.52 { 0.001 } else { 0.02 };
+                let most = if t < 1.52 { 0.0015 } else { 0.02 };
                 assert!(
                     (found / f(t) - 1.0).abs() < most,
                     "{diffuse} {alpha} {}: {found} {}",
