@@ -7,6 +7,7 @@
 )]
 
 pub mod albedo;
+mod combine;
 mod curve;
 mod format;
 pub mod ggx;

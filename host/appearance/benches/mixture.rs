@@ -8,11 +8,14 @@ use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
 
+/// Weight of the distance in light.
+const LIGHT: f64 = 0.3;
+
 /// 57 stacks, 32 samples, and thirty surfaces from matte paint to polished metal.
 fn problem() -> (Hull, Vec<Target>) {
     let space = Space::half_angle(32);
     let printable = Printable::from_library(&Library::builtin(), &InkSet::of(Ink::ALL), &space);
-    let hull = Hull::new(&space, &printable.curves, &vec![0.0; printable.stacks.len()]).unwrap();
+    let hull = Hull::new(&space, &printable.curves, &vec![0.0; printable.stacks.len()], LIGHT).unwrap();
     let targets = (0..30)
         .map(|i| {
             let (m, hue) = ((i % 6) as f32 / 5.0, (i % 5) as f32 / 4.0);

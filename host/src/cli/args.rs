@@ -11,7 +11,7 @@ use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
-use super::choice::choice;
+use super::choice::{Metric, choice};
 use observe::Observer;
 
 /// What to read.
@@ -63,7 +63,7 @@ impl DocumentArgs {
 /// How to factor the document.
 #[derive(Args, Debug)]
 pub struct FactorArgs {
-    /// Number of bases [default: as many as the document needs]
+    /// Number of bases, where the intent uses them [default: as many as the document needs]
     #[arg(long, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=factor::MOST_BASES as u64))]
     pub bases: Option<usize>,
     /// Method that finds the bases: archetypes, or the paper's kmeans (convex hull) and sacls
@@ -75,6 +75,11 @@ pub struct FactorArgs {
 }
 
 impl FactorArgs {
+    /// Whether something about the bases was chosen.
+    pub fn is_chosen(&self) -> bool {
+        self.bases.is_some() || self.method != Method::default()
+    }
+
     /// The settings meant.
     pub fn settings(&self) -> factor::Settings {
         factor::Settings {
@@ -145,11 +150,20 @@ pub struct GamutArgs {
     /// one as close as possible, blend lies between, auto clamps unless that would make different materials look alike
     #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
+    /// What "close" means: light counts how much light a material returns beside the shape of its highlight, so that
+    /// metals shine; paper is the distance of the 2009 paper, which counts the shape alone
+    #[arg(long, value_name = "METRIC", default_value = "light", value_parser = choice::<Metric>())]
+    pub metric: Metric,
 }
 
 impl GamutArgs {
     /// The settings meant.
     pub fn settings(&self, seed: u64) -> gamut::Settings {
-        gamut::Settings { intent: self.intent, seed, ..gamut::Settings::default() }
+        gamut::Settings {
+            intent: self.intent,
+            light: self.metric.light(),
+            seed,
+            ..gamut::Settings::default()
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Every step of the chain by itself: each command reads what the one before it wrote. Together they give the job of
 //! `print`, since the steps are the ones that `pipeline` is made of.
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,7 @@ use super::layout::{LayoutArgs, MediaArgs};
 use super::output::{self, Kind, Staged};
 use appearance::document::{self, ColourSpace, foil};
 use appearance::gamut::files::Provenance;
-use appearance::gamut::{self, Printable};
+use appearance::gamut::{self, GamutError, Printable};
 use observe::Observer;
 use press::halftone::metrics;
 use press::layout::{self, Size};
@@ -107,9 +108,11 @@ impl Map {
             })
             .transpose()?;
         let staged = Staged::folder(&named(&self.output, &self.factored, "mix"), Kind::Mix)?;
-        let printable = Printable::from_library(&library, &set, &factored.space);
+        let printable = Printable::combined(&library, &set, &factored.space);
         let materials = document.as_ref().map(|document| document.materials());
-        let mapped = gamut::map(&factored, materials, &printable, &self.gamut.settings(self.seed), observer)?;
+        let pixels = materials.unwrap_or(&*factored);
+        let bases = || Ok::<_, GamutError>(Cow::Borrowed(&*factored));
+        let mapped = gamut::map(pixels, bases, &printable, &self.gamut.settings(self.seed), observer)?;
         let provenance = Provenance {
             document: read.name.clone(),
             mapping: format!("intent {:?}, seed {}", mapped.report.intent, self.seed),

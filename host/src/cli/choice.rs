@@ -2,7 +2,7 @@
 
 use appearance::document::ColourSpace;
 use appearance::factor::Method;
-use appearance::gamut::Intent;
+use appearance::gamut::{self, Intent};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use press::layers::{Accept, Finish, White};
 
@@ -52,6 +52,32 @@ impl Choice for Method {
             "sacls",
             "The paper's sparse alternating constrained least squares: bases may be far from any real material",
         ),
+    ];
+}
+
+/// What mixtures are chosen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Metric {
+    /// Distance d and the distance in light.
+    Light,
+    /// Distance d alone.
+    Paper,
+}
+
+impl Metric {
+    /// The weight of the distance in light.
+    pub fn light(self) -> f64 {
+        match self {
+            Metric::Light => gamut::LIGHT,
+            Metric::Paper => 0.0,
+        }
+    }
+}
+
+impl Choice for Metric {
+    const ALL: &'static [(Metric, &'static str, &'static str)] = &[
+        (Metric::Light, "light", "Distance d and how much light is returned: metals shine"),
+        (Metric::Paper, "paper", "Distance d alone, as in the 2009 paper"),
     ];
 }
 

@@ -20,11 +20,15 @@ use press::files::{read_toml, write_toml};
 pub struct PresetArg {
     /// Load a preset; options given here override it
     ///
-    /// `foilpress preset save` makes a preset. Without --preset the one chosen by `foilpress preset use` applies, if there is
+    /// `foilpress preset save` makes a preset; `paper` is there from the start, the chain of the 2009 paper. Without --preset the one chosen by `foilpress preset use` applies, if there is
     /// one and its options fit the command.
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
 }
+
+/// Presets that are always there, unless one of the same name is saved: the chain of the 2009 paper.
+const BUILT_IN: [(&str, &[(&str, &str)]); 1] =
+    [("paper", &[("factor", "sacls"), ("halftone", "walk"), ("intent", "basis"), ("metric", "paper")])];
 
 /// Arguments of `preset`.
 #[derive(ClapArgs, Debug)]
@@ -109,17 +113,31 @@ impl Preset {
     }
 
     fn load(name: &str) -> Result<Preset> {
-        let folder = presets()?;
-        let path = folders::file(&folder, name)?;
-        if !path.is_file() {
-            let known = folders::names(&folder).unwrap_or_default();
-            bail!(
-                "there is no preset `{name}`{}; `foilpress preset save {name} OPTIONS` creates it",
-                if known.is_empty() { String::new() } else { format!(" (there are: {})", known.join(", ")) }
-            );
+        let path = folders::file(&presets()?, name)?;
+        if path.is_file() {
+            return Ok(read_toml(&path)?);
         }
-        Ok(read_toml(&path)?)
+        match BUILT_IN.iter().find(|(known, _)| *known == name) {
+            Some((_, options)) => {
+                let option = |(name, value): &(&str, &str)| (name.to_string(), value.to_string().into());
+                Ok(Preset { options: options.iter().map(option).collect() })
+            }
+            None => bail!(
+                "there is no preset `{name}` (there are: {}); `foilpress preset save {name} OPTIONS` creates it",
+                names().unwrap_or_default().join(", ")
+            ),
+        }
     }
+}
+
+/// The presets there are, in the order of their names.
+fn names() -> Result<Vec<String>> {
+    let folder = presets()?;
+    let mut names = folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    names.extend(BUILT_IN.iter().map(|(name, _)| name.to_string()));
+    names.sort();
+    names.dedup();
+    Ok(names)
 }
 
 fn presets() -> Result<PathBuf> {
@@ -193,8 +211,7 @@ fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
 }
 
 fn list(json: bool) -> Result<()> {
-    let folder = presets()?;
-    let names = folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let names = names()?;
     let used = in_use();
     if json {
         let preset = |name: &String| {
@@ -211,10 +228,6 @@ fn list(json: bool) -> Result<()> {
         let words = Preset::load(name)?.words()?.join(" ");
         let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
         text.push_str(&format!("{name:<16} {words}{used}\n"));
-    }
-    if names.is_empty() {
-        text =
-            format!("no presets in {}; `foilpress preset save NAME OPTIONS` creates one\n", folder.display());
     }
     show(&text)
 }

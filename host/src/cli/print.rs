@@ -16,6 +16,7 @@ use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use appearance::brdf::reflectances;
 use appearance::document::Document;
+use appearance::gamut::{Gain, Intent};
 use observe::Observer;
 use press::halftone::{self, metrics};
 use press::layout::{Layout, Mm, Size};
@@ -91,6 +92,15 @@ impl Work {
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
+        if halftoned.mapped.report.intent == Intent::Clamp && self.factor.is_chosen() {
+            observer.note(
+                "every pixel was fitted by itself (intent `clamp`), so --bases and --factor change nothing; --intent basis uses \
+                 bases",
+            );
+        }
+        if let Some(words) = halftoned.foils.as_ref().and_then(foils_in_words) {
+            observer.note(&words);
+        }
         Ok(Laid { document, library, settings, layout, halftoned })
     }
 
@@ -104,6 +114,24 @@ impl Work {
             library: &laid.library,
         }
     }
+}
+
+/// What foils would bring, if that can be seen.
+fn foils_in_words(gain: &Gain) -> Option<String> {
+    /// Share of the difference that is worth the trouble.
+    const WORTH: f64 = 0.1;
+    let share = 1.0 - gain.after / gain.before;
+    let names: Vec<&str> = gain.inks.iter().map(|ink| ink.name()).collect();
+    (share >= WORTH).then(|| {
+        format!(
+            "with {} this document would come {:.0} % nearer (root mean square difference {:.3} instead of {:.3}); \
+             --inks +foil allows foils",
+            names.join(" and "),
+            100.0 * share,
+            gain.after,
+            gain.before
+        )
+    })
 }
 
 /// Arguments of `print`.
@@ -163,7 +191,7 @@ struct Pictures {
 
 fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) -> Result<Pictures> {
     let Laid { document, library, halftoned, .. } = laid;
-    let space = &halftoned.factored.space;
+    let space = document.materials().space();
     // The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
     // printer profile do to the page is undone on paper.
     let dots = &halftoned.dots;
@@ -182,13 +210,15 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     ];
     let sheet =
         preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
+    let mapped = &halftoned.mapped.report;
+    let kind = if mapped.intent == Intent::Clamp { "material" } else { "basis" };
     let swatches: Vec<Swatch> = (1..)
-        .zip(&halftoned.mapped.report.bases)
-        .map(|(number, basis)| Swatch {
-            name: format!("basis {number}"),
-            target: &basis.target,
-            printed: &basis.printed,
-            mix: basis.weights.clone(),
+        .zip(&mapped.materials)
+        .map(|(number, material)| Swatch {
+            name: format!("{kind} {number}, {:.0} %", 100.0 * material.share),
+            target: &material.target,
+            printed: &material.printed,
+            mix: material.weights.clone(),
         })
         .collect();
     let materials = preview::materials_picture(space, &swatches, probe, BALL, observer)?;
@@ -203,30 +233,31 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
     let look = metrics::look(mix, &halftoned.dots, &chosen)?;
     let tones = metrics::tones(mix, &halftoned.dots, observer)?;
     let mapped = &halftoned.mapped.report;
-    let bases: Vec<_> = mapped
-        .bases
+    let materials: Vec<_> = mapped
+        .materials
         .iter()
-        .map(|basis| {
-            let mix: Vec<_> = basis
+        .map(|material| {
+            let mix: Vec<_> = material
                 .weights
                 .iter()
                 .map(|(stack, weight)| json!({ "stack": stack, "weight": weight }))
                 .collect();
             json!({
-                "distance": basis.distance, "unscaled_distance": basis.unscaled_distance, "mix": mix,
-                "gap": basis.gap, "gap_is_a_bound": basis.convex, "starts": basis.starts,
-                "starts_agreeing": basis.agreeing, "pruning_cost": basis.pruning_cost,
+                "share": material.share, "distance": material.distance,
+                "unscaled_distance": material.unscaled_distance, "light_distance": material.light, "mix": mix,
+                "gap": material.gap, "gap_is_a_bound": material.convex, "starts": material.starts,
+                "starts_agreeing": material.agreeing, "pruning_cost": material.pruning_cost,
             })
         })
         .collect();
     let given_up: Vec<_> = mapped
         .given_up
         .iter()
-        .map(|g| json!({ "ink": g.ink.name(), "distance_before": g.before, "distance_after": g.after }))
+        .map(|g| json!({ "ink": g.ink.name(), "distance_with": g.with, "distance_without": g.without }))
         .collect();
     let pixels = mapped.pixels.map(|p| {
         json!({
-            "rmse": p.rms, "p95": p.p95, "max": p.max, "largest_gap": p.gap,
+            "rmse": p.rms, "light_rmse": p.light, "p95": p.p95, "max": p.max, "largest_gap": p.gap,
             "merged_pairs": p.merged, "clamped_share": p.clamped,
         })
     });
@@ -235,8 +266,13 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
         "seed": settings.factor.seed,
         "factoring": halftoned.factoring,
         "gamut": {
-            "intent": mapped.intent, "gloss_scale": mapped.gloss_scale, "bases": bases,
+            "intent": mapped.intent, "light_weight": settings.gamut.light,
+            "uses_bases": mapped.intent != Intent::Clamp, "gloss_scale": mapped.gloss_scale, "materials": materials,
             "given_up": given_up, "pixels": pixels,
+            "foils": halftoned.foils.as_ref().map(|gain| json!({
+                "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),
+                "distance_with": gain.after, "distance_without": gain.before,
+            })),
         },
         "fidelity": {
             "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,

@@ -4,11 +4,14 @@
 //! Method: a BRDF is a row of columns j = 3 n + channel over configurations n. Each column carries the factor
 //! c_j from reflectance to reflected radiance and the root W_j of its quadrature weight; the distance is
 //! `d^2 = sum_j W_j^2 (cbrt(f_j c_j) - cbrt(f'_j c_j))^2`, eqs. 2-3 of the 2009 paper's appendix discretised.
+//! That distance says how highlights differ, but calls black and a mirror equal when both miss the highlight of a glossy
+//! target. So a half-angle space also knows the [albedo](Space::albedo), a linear functional of the row, and the
+//! [distance in light](Space::light_distance) between two rows.
 //! Only [`Space::half_angle`] knows what a configuration is, so the same code serves any linear tabulation with its own
 //! quadrature.
 //! Cost: O(columns) per distance. Limits: values below 0 count as 0; cube roots of radiance do not add, only reflectance does.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use inks::Curve;
 
@@ -18,6 +21,7 @@ pub struct Space {
     radiance: Vec<f64>,
     weight: Vec<f64>,
     angles: Vec<f64>,
+    light: Vec<f64>,
 }
 
 /// Why some numbers are not a tabulation.
@@ -61,7 +65,11 @@ impl Space {
             measure.push(dtheta * theta.sin() * theta.cos());
             angles.push(theta);
         }
-        Space { angles, ..Space::interleave(&cosine, &measure) }
+        // 4 sin 2t cos 2t integrated over each cell, up to 45 degrees.
+        let edge = |n: usize| FRAC_PI_2 * (n as f64 / samples as f64).powi(2);
+        let within = |n: usize| -0.5 * (4.0 * edge(n).min(FRAC_PI_4)).cos();
+        let light = (0..samples).map(|n| within(n + 1) - within(n)).take_while(|&q| q > 0.0).collect();
+        Space { angles, light, ..Space::interleave(&cosine, &measure) }
     }
 
     /// Any tabulation: for each configuration, the factor from reflectance to reflected radiance (the cosine at the
@@ -83,6 +91,7 @@ impl Space {
             radiance: cosine.iter().flat_map(|&c| [c; 3]).collect(),
             weight: measure.iter().flat_map(|&m| [m.sqrt(); 3]).collect(),
             angles: Vec::new(),
+            light: Vec::new(),
         }
     }
 
@@ -127,6 +136,27 @@ impl Space {
             sum += d * d;
         }
         sum.sqrt()
+    }
+
+    /// For each configuration, its share in the [albedo](Space::albedo); those left out at the end have none.
+    pub fn light(&self) -> &[f64] {
+        &self.light
+    }
+
+    /// The reflectance (1/sr) of the matt surface that returns as much of the light from the normal as this row, channel by
+    /// channel: `(1/pi) int f(theta_h = theta_o / 2) cos theta_o dOmega`. Zero in spaces without half angles.
+    pub fn albedo<T: Copy + Into<f64>>(&self, row: &[T]) -> [f64; 3] {
+        let mut albedo = [0.0; 3];
+        for (&q, f) in self.light.iter().zip(row.chunks_exact(3)) {
+            albedo.iter_mut().zip(f).for_each(|(a, &f)| *a += q * f.into().max(0.0));
+        }
+        albedo
+    }
+
+    /// How far two rows differ in the light that they return: the distance between the cube roots of their albedos.
+    pub fn light_distance(&self, a: &[f64], b: &[f64]) -> f64 {
+        let both = self.albedo(a).into_iter().zip(self.albedo(b));
+        both.map(|(a, b)| (a.cbrt() - b.cbrt()).powi(2)).sum::<f64>().sqrt()
     }
 
     /// A row of reflectance in 1/sr transformed so that [`Space::distance`] is the Euclidean distance between two results.

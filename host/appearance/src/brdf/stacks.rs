@@ -14,7 +14,7 @@ pub(crate) fn rows<'a>(space: &Space, entries: impl IntoIterator<Item = &'a Entr
     table
 }
 
-/// What stacks reflect (1/sr), one row a stack, as the library has it. Only for half-angle spaces.
+/// What stacks reflect (1/sr), one row a stack, as the library lists them or its model says. Only for half-angle spaces.
 ///
 /// A stack the library does not know shows as its longest part from the top that it does know: the uppermost
 /// layers decide most of what is seen.
@@ -22,9 +22,9 @@ pub fn reflectances(stacks: &[Stack], library: &Library, space: &Space) -> Table
     let mut table = Table::new(space.columns());
     for stack in stacks {
         let layers = stack.layers();
-        let known = (0..=layers.len()).find_map(|below| library.entry(&Stack::new(&layers[below..])));
-        let row = known.map(|entry| space.row(&entry.curve_at(space.angles())));
-        table.push(&row.unwrap_or_else(|| vec![0.0; space.columns()]));
+        let known = (0..=layers.len())
+            .find_map(|below| library.curve_of(&Stack::new(&layers[below..]), space.angles()));
+        table.push(&known.map_or_else(|| vec![0.0; space.columns()], |curve| space.row(&curve)));
     }
     table
 }

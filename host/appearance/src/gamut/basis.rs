@@ -1,4 +1,4 @@
-//! Mapping each basis by eq. 1, with pruning and a certificate.
+//! Mapping single materials by eq. 1, with pruning and a certificate: the bases, or those shown of a clamped document.
 
 use rayon::prelude::*;
 
@@ -6,17 +6,17 @@ use super::candidates::Candidates;
 use super::error::GamutError;
 use super::gloss;
 use super::prune::prune;
-use super::report::BasisReport;
+use super::report::MaterialReport;
 use super::settings::Gloss;
 use crate::brdf::{Space, Table};
 use crate::solve::{Best, Mixer, MixtureError};
 use crate::weights::{ONE, quantise};
 
-/// The mixtures of the bases over the candidates.
+/// The mixtures of materials over the candidates.
 pub(super) struct Bases {
-    /// One row of weights per basis, with sum [`ONE`].
+    /// One row of weights per material, with sum [`ONE`].
     pub shares: Vec<Vec<u16>>,
-    pub reports: Vec<BasisReport>,
+    pub reports: Vec<MaterialReport>,
     pub gloss_scale: Option<f64>,
 }
 
@@ -28,23 +28,25 @@ struct Mapping {
     pruning_cost: f64,
 }
 
+/// Maps each row of `bases`; `shares` are those of the document that they stand for.
 pub(super) fn map(
     space: &Space,
     bases: &Table,
+    shares: &[f64],
     candidates: &Candidates,
     gloss: Gloss,
 ) -> Result<Bases, GamutError> {
     let plain = map_rows(bases, candidates)?;
     let rows = |m: &[Mapping]| m.iter().map(|m| m.printed.clone()).collect::<Vec<_>>();
     let printed = rows(&plain);
-    let merged = gloss::merges(space, bases, &printed);
+    let merged = gloss::merges(space, bases, shares, &printed);
     let (mut targets, mut mappings, mut gloss_scale) = (bases.clone(), plain, None);
-    if gloss == Gloss::Scale || gloss == Gloss::WhereMerged && merged > 0 {
+    if gloss == Gloss::Scale || gloss == Gloss::WhereMerged && merged > gloss::FEW_MERGED {
         let factor = gloss::factor(space, bases, &printed);
         if factor < 1.0 {
             let scaled = gloss::scaled(bases, factor);
             let mapped = map_rows(&scaled, candidates)?;
-            if gloss == Gloss::Scale || gloss::merges(space, bases, &rows(&mapped)) < merged {
+            if gloss == Gloss::Scale || gloss::merges(space, bases, shares, &rows(&mapped)) < merged {
                 (targets, mappings, gloss_scale) = (scaled, mapped, Some(factor));
             }
         }
@@ -61,10 +63,12 @@ pub(super) fn map(
                 .map(|(stack, &w)| (stack.clone(), w))
                 .collect();
             weights.sort_by(|a, b| b.1.total_cmp(&a.1));
-            BasisReport {
+            MaterialReport {
+                share: shares[i],
                 target: targets.row(i).to_vec(),
                 distance: space.distance(targets.row(i), &m.printed),
                 unscaled_distance: space.distance(bases.row(i), &m.printed),
+                light: space.light_distance(bases.row(i), &m.printed),
                 printed: m.printed.clone(),
                 weights,
                 gap: m.best.fit.gap,
@@ -83,7 +87,7 @@ fn map_rows(rows: &Table, candidates: &Candidates) -> Result<Vec<Mapping>, Gamut
         .into_par_iter()
         .map_init(Mixer::new, |mixer, i| {
             map_row(rows.row(i), candidates, mixer)
-                .map_err(|source| GamutError::Mixture { what: format!("basis {i}"), source })
+                .map_err(|source| GamutError::Mixture { what: format!("material {i}"), source })
         })
         .collect()
 }

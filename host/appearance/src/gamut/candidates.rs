@@ -1,6 +1,6 @@
 //! The stacks that can be used, in the form the solver needs.
 
-use inks::{InkSet, Library, Stack};
+use inks::{InkSet, Library, Severity, Stack};
 
 use crate::brdf::{self, Space, Table};
 use crate::solve::{Hull, LAYER_PRICE, MixtureError};
@@ -8,18 +8,40 @@ use crate::solve::{Hull, LAYER_PRICE, MixtureError};
 /// The stacks that can be printed with the available inks, and their curves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Printable {
-    /// The stacks, each once; at most 255 besides the substrate.
+    /// The stacks, each once.
     pub stacks: Vec<Stack>,
     /// Their reflectance in 1/sr, one per row, in the tabulation of the document.
     pub curves: Table,
+    /// How many of them, from the first, are always offered; the others only where a document gains by them.
+    pub usual: usize,
+    /// Whether a rule advises against each: such stacks are left out where that costs next to nothing.
+    pub warned: Vec<bool>,
 }
 
 impl Printable {
+    /// Stacks that no rule is about.
+    pub fn new(stacks: Vec<Stack>, curves: Table) -> Printable {
+        Printable { usual: stacks.len(), warned: vec![false; stacks.len()], stacks, curves }
+    }
+
     /// The stacks of a library that need only these inks, in a half-angle space.
     pub fn from_library(library: &Library, at_hand: &InkSet, space: &Space) -> Printable {
         let entries = library.at_hand(at_hand);
-        let stacks = entries.iter().map(|entry| entry.stack.clone()).collect();
-        Printable { stacks, curves: brdf::rows(space, entries) }
+        let stacks: Vec<Stack> = entries.iter().map(|entry| entry.stack.clone()).collect();
+        let advised =
+            |stack| library.broken_rules(stack).iter().any(|rule| rule.severity == Severity::Warning);
+        let warned = stacks.iter().map(advised).collect();
+        Printable { usual: stacks.len(), stacks, curves: brdf::rows(space, entries), warned }
+    }
+
+    /// Those, and every other stack that the rules allow and the library's model tells apart.
+    pub fn combined(library: &Library, at_hand: &InkSet, space: &Space) -> Printable {
+        let mut printable = Printable::from_library(library, at_hand, space);
+        let others = library.combinations(at_hand);
+        brdf::reflectances(&others, library, space).rows().for_each(|row| printable.curves.push(row));
+        printable.warned.extend(others.iter().map(|_| false));
+        printable.stacks.extend(others);
+        printable
     }
 }
 
@@ -27,7 +49,13 @@ impl Printable {
 pub(super) struct Candidates {
     pub stacks: Vec<Stack>,
     pub inks: Vec<InkSet>,
+    /// Whether each is offered only where a document gains by it.
+    pub extra: Vec<bool>,
+    /// Whether a rule advises against each.
+    pub warned: Vec<bool>,
     pub curves: Table,
+    /// The albedo of each stack.
+    albedo: Vec<[f64; 3]>,
     /// With the price of the layers, which decides ties.
     pub priced: Hull,
     /// Without the price, for reported distances.
@@ -35,15 +63,18 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    pub fn new(space: &Space, printable: &Printable) -> Result<Candidates, MixtureError> {
-        let Printable { stacks, curves } = printable;
+    pub fn new(space: &Space, printable: &Printable, light: f64) -> Result<Candidates, MixtureError> {
+        let Printable { stacks, curves, usual, warned } = printable;
         let price: Vec<f64> = stacks.iter().map(|s| LAYER_PRICE * s.layers().len() as f64).collect();
         Ok(Candidates {
             inks: stacks.iter().map(|s| InkSet::of(s.layers().iter().copied())).collect(),
+            extra: (0..stacks.len()).map(|k| k >= *usual).collect(),
+            warned: warned.clone(),
             stacks: stacks.clone(),
             curves: curves.clone(),
-            priced: Hull::new(space, curves, &price)?,
-            free: Hull::new(space, curves, &vec![0.0; stacks.len()])?,
+            albedo: curves.rows().map(|row| space.albedo(row)).collect(),
+            priced: Hull::new(space, curves, &price, light)?,
+            free: Hull::new(space, curves, &vec![0.0; stacks.len()], light)?,
         })
     }
 
@@ -58,10 +89,23 @@ impl Candidates {
         Candidates {
             stacks: keep.iter().map(|&k| self.stacks[k].clone()).collect(),
             inks: keep.iter().map(|&k| self.inks[k]).collect(),
+            extra: keep.iter().map(|&k| self.extra[k]).collect(),
+            warned: keep.iter().map(|&k| self.warned[k]).collect(),
+            albedo: keep.iter().map(|&k| self.albedo[k]).collect(),
             curves,
             priced: self.priced.subset(keep),
             free: self.free.subset(keep),
         }
+    }
+
+    /// The distance in light between a mixture and a row of the space.
+    pub fn light_distance(&self, weights: &[f64], space: &Space, row: &[f32]) -> f64 {
+        let mut printed = [0.0; 3];
+        for (albedo, &w) in self.albedo.iter().zip(weights).filter(|(_, w)| **w > 0.0) {
+            printed.iter_mut().zip(albedo).for_each(|(sum, a)| *sum += w * a);
+        }
+        let both = space.albedo(row).into_iter().zip(printed);
+        both.map(|(a, b)| (a.cbrt() - b.cbrt()).powi(2)).sum::<f64>().sqrt()
     }
 
     /// The reflectance (1/sr) of a mixture.

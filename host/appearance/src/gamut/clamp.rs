@@ -28,8 +28,10 @@ const ENOUGH: f64 = 1e-7;
 pub(super) struct Clamped {
     /// Interleaved fixed-point weights, one per candidate; those of each pixel sum to [`ONE`](crate::weights::ONE).
     pub shares: Vec<u16>,
-    /// Distance between each pixel and its mixture.
+    /// Distance d between each pixel and its mixture.
     pub distance: Vec<f32>,
+    /// Distance in light between them.
+    pub light: Vec<f32>,
     /// Mean cube root of the radiance of each pixel in the metric: its perceived brightness.
     pub brightness: Vec<f32>,
     /// The largest gap, in squared distance.
@@ -46,14 +48,15 @@ pub(super) fn map(
     let count = distinct.first().len();
     let mut shares = vec![0u16; count * k];
     let mut distance = vec![0f32; count];
+    let mut light = vec![0f32; count];
     let mut brightness = vec![0f32; count];
     observer.begin("fitting pixels to inks", count as u64);
     let gaps: Vec<Result<f64, GamutError>> = shares
         .par_chunks_mut(RUN * k)
-        .zip(distance.par_chunks_mut(RUN))
+        .zip(distance.par_chunks_mut(RUN).zip(light.par_chunks_mut(RUN)))
         .zip(brightness.par_chunks_mut(RUN))
         .zip(distinct.first().par_chunks(RUN))
-        .map(|(((shares, distance), brightness), first)| {
+        .map(|(((shares, (distance, light)), brightness), first)| {
             let mut walker = Walker::new(candidates, pixels.space());
             let mut gap = 0.0f64;
             for (i, &pixel) in first.iter().enumerate() {
@@ -67,6 +70,7 @@ pub(super) fn map(
                     })?;
                 gap = gap.max(met.gap);
                 distance[i] = met.distance as f32;
+                light[i] = met.light as f32;
                 brightness[i] = met.brightness as f32;
             }
             observer.advance(first.len() as u64);
@@ -81,6 +85,7 @@ pub(super) fn map(
     Ok(Clamped {
         shares: distinct.spread(shares, k),
         distance: distinct.spread(&distance, 1),
+        light: distinct.spread(&light, 1),
         brightness: distinct.spread(&brightness, 1),
         gap,
     })
@@ -108,6 +113,7 @@ pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, Ga
 #[derive(Clone, Copy)]
 struct Met {
     pub distance: f64,
+    pub light: f64,
     pub gap: f64,
     pub brightness: f64,
 }
@@ -152,16 +158,18 @@ impl Walker {
         if !self.started {
             self.mixer.tangent(hull, &self.target, &mut self.start)?;
         }
-        let fit = self.mixer.refine(hull, &self.target, &mut self.start, ENOUGH)?;
+        let mut fit = self.mixer.refine(hull, &self.target, &mut self.start, ENOUGH)?;
+        let gap = fit.gap;
         self.weights.copy_from_slice(&self.start);
-        let mut distance = fit.distance;
         if prune(&mut self.weights) {
-            distance = self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?.distance;
+            fit = self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?;
             // Weights that have become small now are not worth another round.
             prune(&mut self.weights);
         }
         quantise(&self.weights, out);
         self.started = true;
-        Ok(Met { distance, gap: fit.gap, brightness: self.target.brightness(hull) / self.measure })
+        let light = candidates.light_distance(&self.weights, pixels.space(), &self.row);
+        let brightness = self.target.brightness(hull) / self.measure;
+        Ok(Met { distance: fit.curve, light, gap, brightness })
     }
 }

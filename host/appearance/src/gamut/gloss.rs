@@ -13,14 +13,19 @@ pub(super) const DIFFERENT: f64 = 0.03;
 /// Two rows that differ are merged if they are printed at less than this share of their distance.
 pub(super) const MERGED: f64 = 0.25;
 
-/// The number of pairs of different bases that are printed alike.
-pub(super) fn merges(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> usize {
-    let mut merged = 0;
+/// Share of merged pairs of materials up to which nothing need be done about them.
+pub(super) const FEW_MERGED: f64 = 0.01;
+
+/// The share of pairs of materials that are different bases printed alike, where each basis has its share of the document.
+pub(super) fn merges(space: &Space, targets: &Table, shares: &[f64], printed: &[Vec<f64>]) -> f64 {
+    let mut merged = 0.0;
     for i in 0..targets.len() {
         for j in 0..i {
             let apart = space.distance(targets.row(i), targets.row(j));
             let left = space.distance(&printed[i], &printed[j]);
-            merged += usize::from(apart > DIFFERENT && left < MERGED * apart);
+            if apart > DIFFERENT && left < MERGED * apart {
+                merged += 2.0 * shares[i] * shares[j];
+            }
         }
     }
     merged

@@ -1,83 +1,286 @@
-//! The order of the steps: choose cartridges, choose the intent, map the bases, map the pixels.
+//! The order of the steps: choose cartridges, choose the intent, map the pixels, the bases or both.
 
+use std::borrow::Cow;
+
+use inks::{InkSet, Stack};
 use observe::Observer;
+use protocol::ink::Ink;
 
 use super::candidates::{Candidates, Printable};
+use super::cartridges::Cartridges;
+use super::clamp::Clamped;
 use super::error::GamutError;
+use super::fitted::Targets;
+use super::gloss::FEW_MERGED;
 use super::report::{GivenUp, Mapped, PixelReport, Report};
 use super::settings::{Gloss, Intent, Settings};
-use super::{assemble, basis, blend, cartridges, clamp, sample};
+use super::{assemble, basis, blend, cartridges, choice, clamp, sample, typical};
 use crate::brdf::Table;
 use crate::materials::{Factored, Materials};
-use crate::solve::{MixtureError, Target};
+use crate::solve::MixtureError;
 use crate::weights::WeightMaps;
 
 /// Pixels that the intent is chosen by and pairs are drawn from.
 const SAMPLE: usize = 1024;
 /// Pixels that cartridges are chosen by.
 const CARTRIDGE_SAMPLE: usize = 256;
-/// Share of merged pairs up to which clamping is the automatic choice.
-const FEW_MERGED: f64 = 0.01;
 
-/// Maps a document to the printer's gamut.
+/// Pixels of that sample from which typical materials are chosen.
+const TYPICAL_SAMPLE: usize = 256;
+
+/// Maps a document to the printer's gamut. `factored` gives its bases and weight maps, and is called only if the intent uses
+/// them. The result depends on the input and the settings alone, not on the number of threads.
 ///
-/// `materials` are the document's pixels for the intents that map each pixel; without them the pixels of the factored
-/// document are used. The result depends on the input and the settings alone, not on the number of threads.
-pub fn map(
-    document: &Factored,
-    materials: Option<&dyn Materials>,
+/// # Errors
+/// Those of `factored`, and of the mapping.
+pub fn map<'a, E: From<GamutError>>(
+    pixels: &dyn Materials,
+    factored: impl FnOnce() -> Result<Cow<'a, Factored>, E>,
+    printable: &Printable,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Mapped, E> {
+    let document = Pixels::new(pixels, printable, settings)?;
+    let (chosen, bases) = match settings.intent {
+        Intent::Clamp | Intent::Auto => {
+            let chosen = document.choose(None, observer)?;
+            let clamp = settings.intent == Intent::Clamp || document.clamping_keeps(&chosen, observer)?;
+            if clamp {
+                return Ok(document.clamped(&chosen, observer)?);
+            }
+            (chosen, factored()?)
+        }
+        Intent::Basis | Intent::Blend => {
+            let bases = factored()?;
+            check_bases(&bases, pixels)?;
+            (document.choose(Some(&bases), observer)?, bases)
+        }
+    };
+    check_bases(&bases, pixels)?;
+    Ok(document.with_bases(&chosen, &bases, observer)?)
+}
+
+/// [`map`] with [`Intent::Clamp`], which needs no bases.
+///
+/// # Errors
+/// Those of the mapping.
+pub fn clamped(
+    pixels: &dyn Materials,
     printable: &Printable,
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Mapped, GamutError> {
-    check(document, materials, printable)?;
-    let all = Candidates::new(&document.space, printable).map_err(in_target("the stacks"))?;
-    let pixels: &dyn Materials = materials.unwrap_or(document);
-    let sampled = sample::pixels(pixels.width() * pixels.height(), SAMPLE, settings.seed);
-    let sample = sample::rows(pixels, &sampled);
+    let document = Pixels::new(pixels, printable, settings)?;
+    document.clamped(&document.choose(None, observer)?, observer)
+}
 
-    let (targets, importance) = cartridge_targets(document, pixels, &all, settings)?;
-    let (allowed, given_up) =
-        cartridges::choose(&all, &targets, &importance, settings.most_cartridges, observer)?;
-    if let Some(words) = in_words(&given_up, settings.most_cartridges) {
-        observer.note(&words);
-    }
-    let candidates = all.subset(&allowed);
+/// How much nearer a document gets with more inks: root mean square distances of a sample, in the metric of the settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gain {
+    /// With the inks at hand.
+    pub before: f64,
+    /// With the others, too.
+    pub after: f64,
+    /// Those of the others that the best cartridges include.
+    pub inks: Vec<Ink>,
+}
 
-    let intent = match settings.intent {
-        Intent::Auto => automatic_intent(document, &candidates, &sample, settings.seed, observer)?,
-        chosen => chosen,
-    };
-    let gloss = if intent == Intent::Clamp { Gloss::Keep } else { settings.gloss };
-    let bases = basis::map(&document.space, &document.bases, &candidates, gloss)?;
-    if let Some(factor) = bases.gloss_scale {
-        observer.note(&format!(
-            "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in print",
-            100.0 * factor
-        ));
+/// What the stacks of `more` would bring beside those at hand, under the same limit of cartridges; `None` if nothing.
+///
+/// # Errors
+/// Those of the mapping.
+pub fn gain(
+    pixels: &dyn Materials,
+    at_hand: &Printable,
+    more: &Printable,
+    settings: &Settings,
+) -> Result<Option<Gain>, GamutError> {
+    let settings = Settings { intent: Intent::Clamp, ..settings.clone() };
+    let inks = |chosen: &Chosen| InkSet::of(chosen.candidates.inks.iter().flat_map(|inks| inks.iter()));
+    let best = |printable| Pixels::new(pixels, printable, &settings)?.choose(None, &observe::Silent);
+    let (now, then) = (best(at_hand)?, best(more)?);
+    let known = InkSet::of(at_hand.stacks.iter().flat_map(|stack| stack.layers().iter().copied()));
+    let inks = inks(&then).iter().filter(|&ink| !known.contains(ink)).collect();
+    let gain = Gain { before: now.distance, after: then.distance, inks };
+    Ok((gain.after < gain.before && !gain.inks.is_empty()).then_some(gain))
+}
+
+/// The pixels of a document, a sample of them, and the stacks.
+struct Pixels<'a> {
+    pixels: &'a dyn Materials,
+    settings: &'a Settings,
+    all: Candidates,
+    sampled: Vec<usize>,
+    sample: Table,
+}
+
+/// The stacks that were chosen, and the cartridges that were not.
+struct Chosen {
+    candidates: Candidates,
+    given_up: Vec<GivenUp>,
+    /// Root mean square distance of the sample with the cartridges that were.
+    distance: f64,
+}
+
+impl<'a> Pixels<'a> {
+    fn new(
+        pixels: &'a dyn Materials,
+        printable: &Printable,
+        settings: &'a Settings,
+    ) -> Result<Self, GamutError> {
+        check_stacks(printable)?;
+        let all =
+            Candidates::new(pixels.space(), printable, settings.light).map_err(in_target("the stacks"))?;
+        let sampled = sample::pixels(pixels.width() * pixels.height(), SAMPLE, settings.seed);
+        let sample = sample::rows(pixels, &sampled);
+        Ok(Pixels { pixels, settings, all, sampled, sample })
     }
 
-    let (shares, maps, mut pixels_report) = if intent == Intent::Basis {
-        (bases.shares, document.maps.clone(), None)
-    } else {
-        let (shares, maps, report) =
-            map_pixels(document, pixels, &candidates, &bases.shares, intent, observer)?;
-        (shares, maps, Some(report))
-    };
-    let (mix, curves) = assemble::assemble(&candidates, shares, maps)?;
-    if let Some(report) = &mut pixels_report {
-        let printed = sample::printed(&mix, &curves, &sampled);
-        report.merged = sample::merged_share(&document.space, &sample, &printed, settings.seed);
+    /// Chooses cartridges, and the stacks that they print, by sampled pixels and by the bases, whichever the intent maps.
+    fn choose(&self, bases: Option<&Factored>, observer: &dyn Observer) -> Result<Chosen, GamutError> {
+        let mut targets = Targets { rows: Vec::new(), importance: Vec::new() };
+        if let Some(bases) = bases {
+            for (i, (row, share)) in bases.bases.rows().zip(bases.shares()).enumerate() {
+                targets.rows.push(self.all.free.target(row).map_err(in_target(format!("basis {i}")))?);
+                targets.importance.push(share);
+            }
+        }
+        if self.settings.intent != Intent::Basis {
+            // A fresh draw: every n-th pixel of the larger sample would favour some columns of the picture.
+            let total = self.pixels.width() * self.pixels.height();
+            let few = sample::pixels(total, CARTRIDGE_SAMPLE, self.settings.seed ^ 1);
+            for (row, pixel) in sample::rows(self.pixels, &few).rows().zip(&few) {
+                targets.rows.push(self.all.free.target(row).map_err(in_target(format!("pixel {pixel}")))?);
+                targets.importance.push(1.0 / few.len() as f64);
+            }
+        }
+        let most = self.settings.most_cartridges;
+        let cartridges = cartridges::choose(&self.all, &targets, most, observer)?;
+        if let Some(words) = in_words(&cartridges, most) {
+            observer.note(&words);
+        }
+        let stacks =
+            choice::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
+        let candidates = self.all.subset(&stacks);
+        check_number(&candidates.stacks)?;
+        Ok(Chosen { candidates, given_up: cartridges.given_up, distance: cartridges.chosen })
     }
-    let report = Report {
-        intent,
-        cartridges: mix.inks(),
-        given_up,
-        gloss_scale: bases.gloss_scale,
-        bases: bases.reports,
-        pixels: pixels_report,
-    };
-    Ok(Mapped { mix, report })
+
+    /// Whether clamping keeps most pairs of sampled materials apart.
+    fn clamping_keeps(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<bool, GamutError> {
+        let clamped = clamp::rows(&chosen.candidates, &self.sample)?;
+        let merged = sample::merged_share(self.pixels.space(), &self.sample, &clamped, self.settings.seed);
+        if merged > FEW_MERGED {
+            observer.note(&format!(
+                "{:.0} % of the pairs of different materials would look alike if each were printed as closely as the inks \
+                 allow, so closeness is traded for difference (intent `blend`); choose intent `clamp` for closeness alone, \
+                 `basis` for differences alone",
+                100.0 * merged
+            ));
+        }
+        Ok(merged <= FEW_MERGED)
+    }
+
+    fn clamped(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<Mapped, GamutError> {
+        let Chosen { candidates, given_up, .. } = chosen;
+        let few = TYPICAL_SAMPLE.min(self.sample.len());
+        let mut some = Table::new(self.sample.columns());
+        (0..few).for_each(|i| some.push(self.sample.row(i * self.sample.len() / few)));
+        let space = self.pixels.space();
+        let (rows, shares) = typical::rows(space, &some);
+        let shown = basis::map(space, &rows, &shares, candidates, Gloss::Keep)?;
+        let clamped = clamp::map(candidates, self.pixels, observer)?;
+        let pixels = self.report(&clamped, 1.0);
+        let (width, height) = (self.pixels.width(), self.pixels.height());
+        let (shares, maps) = assemble::compact(clamped.shares, candidates.len(), width, height)?;
+        self.mapped(
+            candidates,
+            (shares, maps),
+            Report {
+                intent: Intent::Clamp,
+                cartridges: Vec::new(),
+                given_up: given_up.clone(),
+                gloss_scale: None,
+                materials: shown.reports,
+                pixels: Some(pixels),
+            },
+        )
+    }
+
+    fn with_bases(
+        &self,
+        chosen: &Chosen,
+        document: &Factored,
+        observer: &dyn Observer,
+    ) -> Result<Mapped, GamutError> {
+        let Chosen { candidates, given_up, .. } = chosen;
+        let space = self.pixels.space();
+        let bases = basis::map(space, &document.bases, &document.shares(), candidates, self.settings.gloss)?;
+        if let Some(factor) = bases.gloss_scale {
+            observer.note(&format!(
+                "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in print",
+                100.0 * factor
+            ));
+        }
+        let (mixed, pixels) = if self.settings.intent == Intent::Basis {
+            ((bases.shares, document.maps.clone()), None)
+        } else {
+            let mut clamped = clamp::map(candidates, self.pixels, observer)?;
+            let s = blend::shares(&clamped.distance, &clamped.brightness, self.pixels.width());
+            let mean = s.iter().map(|&s| f64::from(s)).sum::<f64>() / s.len() as f64;
+            blend::mix(&mut clamped.shares, &s, &document.maps, &bases.shares);
+            let report = self.report(&clamped, mean);
+            let (width, height) = (self.pixels.width(), self.pixels.height());
+            (assemble::compact(clamped.shares, candidates.len(), width, height)?, Some(report))
+        };
+        self.mapped(
+            candidates,
+            mixed,
+            Report {
+                intent: if pixels.is_some() { Intent::Blend } else { Intent::Basis },
+                cartridges: Vec::new(),
+                given_up: given_up.clone(),
+                gloss_scale: bases.gloss_scale,
+                materials: bases.reports,
+                pixels,
+            },
+        )
+    }
+
+    /// The facts about the pixels that are known before the mix is: all but the merged pairs.
+    fn report(&self, clamped: &Clamped, share: f64) -> PixelReport {
+        let mean_square = |d: &[f32]| d.iter().map(|&d| f64::from(d).powi(2)).sum::<f64>() / d.len() as f64;
+        let mut distance = clamped.distance.clone();
+        let last = distance.len() - 1;
+        let (_, p95, _) = distance.select_nth_unstable_by(last * 95 / 100, f32::total_cmp);
+        let p95 = f64::from(*p95);
+        PixelReport {
+            rms: mean_square(&distance).sqrt(),
+            light: mean_square(&clamped.light).sqrt(),
+            p95,
+            max: f64::from(distance.iter().copied().fold(0.0, f32::max)),
+            gap: clamped.gap,
+            merged: 0.0,
+            clamped: share,
+        }
+    }
+
+    /// The mix, with what the report can say only of it.
+    fn mapped(
+        &self,
+        candidates: &Candidates,
+        (shares, maps): (Vec<Vec<u16>>, WeightMaps),
+        mut report: Report,
+    ) -> Result<Mapped, GamutError> {
+        let (mix, curves) = assemble::assemble(candidates, shares, maps)?;
+        if let Some(pixels) = &mut report.pixels {
+            let printed = sample::printed(&mix, &curves, &self.sampled);
+            let seed = self.settings.seed;
+            pixels.merged = sample::merged_share(self.pixels.space(), &self.sample, &printed, seed);
+        }
+        report.cartridges = mix.inks();
+        Ok(Mapped { mix, report })
+    }
 }
 
 /// Names the target of a failed fit.
@@ -86,140 +289,55 @@ fn in_target(what: impl Into<String>) -> impl FnOnce(MixtureError) -> GamutError
     move |source| GamutError::Mixture { what, source }
 }
 
-/// The targets that cartridges are chosen by, and the importance of each: the bases by their mean weight and sampled
-/// pixels alike, so that the cartridges serve whatever the intent maps.
-fn cartridge_targets(
-    document: &Factored,
-    pixels: &dyn Materials,
-    all: &Candidates,
-    settings: &Settings,
-) -> Result<(Vec<Target>, Vec<f64>), GamutError> {
-    let mut targets = Vec::new();
-    let mut importance = Vec::new();
-    if settings.intent != Intent::Clamp {
-        let channels = document.maps.channels();
-        let mut sums = vec![0u64; channels];
-        for weights in document.maps.data().chunks_exact(channels) {
-            sums.iter_mut().zip(weights).for_each(|(sum, &w)| *sum += u64::from(w));
-        }
-        let total: u64 = sums.iter().sum();
-        for (i, row) in document.bases.rows().enumerate() {
-            targets.push(all.free.target(row).map_err(in_target(format!("basis {i}")))?);
-            importance.push(sums[i] as f64 / total as f64);
-        }
-    }
-    if settings.intent != Intent::Basis {
-        // A fresh draw: every n-th pixel of the larger sample would favour some columns of the picture.
-        let few = sample::pixels(pixels.width() * pixels.height(), CARTRIDGE_SAMPLE, settings.seed ^ 1);
-        for (row, pixel) in sample::rows(pixels, &few).rows().zip(&few) {
-            targets.push(all.free.target(row).map_err(in_target(format!("pixel {pixel}")))?);
-            importance.push(1.0 / few.len() as f64);
-        }
-    }
-    Ok((targets, importance))
-}
-
-/// Clamping, unless it merges more than a few pairs of sampled materials; then blending.
-fn automatic_intent(
-    document: &Factored,
-    candidates: &Candidates,
-    sample: &Table,
-    seed: u64,
-    observer: &dyn Observer,
-) -> Result<Intent, GamutError> {
-    let clamped = clamp::rows(candidates, sample)?;
-    let merged = sample::merged_share(&document.space, sample, &clamped, seed);
-    if merged <= FEW_MERGED {
-        return Ok(Intent::Clamp);
-    }
-    observer.note(&format!(
-        "{:.0} % of the pairs of different materials would look alike if each were printed as closely as the inks allow, \
-         so closeness is traded for difference (intent `blend`); choose intent `clamp` for closeness alone, `basis` for \
-         differences alone",
-        100.0 * merged
-    ));
-    Ok(Intent::Blend)
-}
-
-/// Clamps every pixel, and blends the result with the mapped bases if the intent asks for it.
-fn map_pixels(
-    document: &Factored,
-    pixels: &dyn Materials,
-    candidates: &Candidates,
-    bases: &[Vec<u16>],
-    intent: Intent,
-    observer: &dyn Observer,
-) -> Result<(Vec<Vec<u16>>, WeightMaps, PixelReport), GamutError> {
-    let mut clamped = clamp::map(candidates, pixels, observer)?;
-    let mut mean = 1.0;
-    if intent == Intent::Blend {
-        let s = blend::shares(&clamped.distance, &clamped.brightness, pixels.width());
-        mean = s.iter().map(|&s| f64::from(s)).sum::<f64>() / s.len() as f64;
-        blend::mix(&mut clamped.shares, &s, &document.maps, bases);
-    }
-    let report = distances(clamped.distance, clamped.gap, mean);
-    let (shares, maps) =
-        assemble::compact(clamped.shares, candidates.len(), pixels.width(), pixels.height())?;
-    Ok((shares, maps, report))
-}
-
 /// A sentence that names the inks that were left out and what that costs.
-fn in_words(given_up: &[GivenUp], most: usize) -> Option<String> {
-    let (first, last) = (given_up.first()?, given_up.last()?);
-    let names: Vec<&str> = given_up.iter().map(|given_up| given_up.ink.name()).collect();
-    let listed = match names.split_last() {
-        Some((last, [])) => format!("{last} is"),
-        Some((last, others)) => format!("{} and {last} are", others.join(", ")),
-        None => return None,
+fn in_words(cartridges: &Cartridges, most: usize) -> Option<String> {
+    let names: Vec<&str> = cartridges.given_up.iter().map(|given_up| given_up.ink.name()).collect();
+    let listed = match names.split_last()? {
+        (last, []) => format!("{last} is"),
+        (last, others) => format!("{} and {last} are", others.join(", ")),
     };
-    let (before, after) = (format!("{:.4}", first.before), format!("{:.4}", last.after));
+    let (before, after) = (format!("{:.4}", cartridges.all), format!("{:.4}", cartridges.chosen));
     let cost = if before == after {
-        format!("the root mean square difference stays at d = {before}")
+        format!("the root mean square difference stays at {before}")
     } else {
-        format!("the root mean square difference changes from d = {before} to {after}")
+        format!("the root mean square difference changes from {before} to {after}")
     };
     Some(format!("{listed} left out to use at most {most} cartridges; {cost}"))
 }
 
-fn distances(mut distance: Vec<f32>, gap: f64, clamped: f64) -> PixelReport {
-    let n = distance.len();
-    let squares: f64 = distance.iter().map(|&d| f64::from(d) * f64::from(d)).sum();
-    let (_, p95, _) = distance.select_nth_unstable_by((n - 1) * 95 / 100, f32::total_cmp);
-    let p95 = f64::from(*p95);
-    let max = distance.iter().copied().fold(0.0, f32::max);
-    PixelReport { rms: (squares / n as f64).sqrt(), p95, max: f64::from(max), gap, merged: 0.0, clamped }
-}
-
-fn check(
-    document: &Factored,
-    materials: Option<&dyn Materials>,
-    printable: &Printable,
-) -> Result<(), GamutError> {
-    let Printable { stacks, curves } = printable;
+fn check_stacks(printable: &Printable) -> Result<(), GamutError> {
+    let Printable { stacks, curves, .. } = printable;
     if stacks.is_empty() {
         return Err(GamutError::NothingPrintable);
-    }
-    if stacks.iter().filter(|s| !s.layers().is_empty()).count() > 255 {
-        return Err(GamutError::TooManyStacks { found: stacks.len() });
     }
     if stacks.len() != curves.len() {
         return Err(GamutError::Curves { stacks: stacks.len(), curves: curves.len() });
     }
-    if let Some(i) = (1..stacks.len()).find(|&i| stacks[..i].contains(&stacks[i])) {
-        return Err(GamutError::Twice { stack: stacks[i].clone() });
+    match (1..stacks.len()).find(|&i| stacks[..i].contains(&stacks[i])) {
+        Some(i) => Err(GamutError::Twice { stack: stacks[i].clone() }),
+        None => Ok(()),
     }
+}
+
+/// Whether the index of a sheet can name them all.
+fn check_number(stacks: &[Stack]) -> Result<(), GamutError> {
+    match stacks.iter().filter(|stack| !stack.layers().is_empty()).count() {
+        256.. => Err(GamutError::TooManyStacks { found: stacks.len() }),
+        _ => Ok(()),
+    }
+}
+
+fn check_bases(document: &Factored, pixels: &dyn Materials) -> Result<(), GamutError> {
     let maps = &document.maps;
     if document.bases.len() != maps.channels() {
         return Err(GamutError::Channels { bases: document.bases.len(), channels: maps.channels() });
     }
-    if let Some(m) = materials
-        && (m.width(), m.height()) != (maps.width(), maps.height())
-    {
+    if (pixels.width(), pixels.height()) != (maps.width(), maps.height()) {
         return Err(GamutError::Size {
             width: maps.width(),
             height: maps.height(),
-            found_width: m.width(),
-            found_height: m.height(),
+            found_width: pixels.width(),
+            found_height: pixels.height(),
         });
     }
     Ok(())

@@ -14,9 +14,11 @@ mod basis;
 mod blend;
 mod candidates;
 mod cartridges;
+mod choice;
 mod clamp;
 mod error;
 pub mod files;
+mod fitted;
 mod gloss;
 mod map;
 mod mix;
@@ -26,10 +28,11 @@ mod sample;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod typical;
 
 pub use candidates::Printable;
 pub use error::GamutError;
-pub use map::map;
+pub use map::{Gain, clamped, gain, map};
 pub use mix::{InkMix, MixError};
-pub use report::{BasisReport, GivenUp, Mapped, PixelReport, Report};
-pub use settings::{Gloss, Intent, Settings};
+pub use report::{GivenUp, Mapped, MaterialReport, PixelReport, Report};
+pub use settings::{Gloss, Intent, LIGHT, Settings};

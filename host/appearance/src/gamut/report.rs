@@ -22,38 +22,44 @@ pub struct Report {
     pub intent: Intent,
     /// The inks of the result, in the order of their codes.
     pub cartridges: Vec<Ink>,
-    /// Inks left out because of the number of cartridges, in the order of leaving out.
+    /// Inks left out because of the number of cartridges, those that are missed most first.
     pub given_up: Vec<GivenUp>,
     /// The factor on the gloss of all bases, if it was scaled.
     pub gloss_scale: Option<f64>,
-    /// Each basis before and after mapping.
-    pub bases: Vec<BasisReport>,
+    /// Materials before and after mapping: the bases if the intent uses them, otherwise typical materials of the document,
+    /// those that stand for most of it first.
+    pub materials: Vec<MaterialReport>,
     /// The pixels, for the intents that map them.
     pub pixels: Option<PixelReport>,
 }
 
-/// An ink that was left out.
+/// An ink that was left out: root mean square distances of the sample, in the metric of the settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GivenUp {
     /// The ink.
     pub ink: Ink,
-    /// Root mean square distance between targets and mixtures with the ink.
-    pub before: f64,
-    /// The same without the ink.
-    pub after: f64,
+    /// With this ink beside the cartridges chosen.
+    pub with: f64,
+    /// With the cartridges chosen.
+    pub without: f64,
 }
 
-/// One basis before and after mapping.
+/// One material before and after mapping.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BasisReport {
+pub struct MaterialReport {
+    /// The share of the document that it stands for: the mean weight of a basis, or the share of the sampled pixels that are
+    /// nearest to a typical material.
+    pub share: f64,
     /// The target (1/sr), with scaled gloss if [`Report::gloss_scale`] is set.
     pub target: Vec<f64>,
     /// The reflectance of the mixture (1/sr), from the weights as rounded for the halftoner.
     pub printed: Vec<f64>,
     /// Distance d between the two.
     pub distance: f64,
-    /// Distance d between the printed row and the basis with its original gloss.
+    /// Distance d between the printed row and the material with its original gloss.
     pub unscaled_distance: f64,
+    /// Distance in light between the printed row and the material with its original gloss.
+    pub light: f64,
     /// The stacks of the mixture and their weights, largest first.
     pub weights: Vec<(Stack, f64)>,
     /// Gap of the optimum before pruning, in squared distance; see [`crate::solve::Fit`].
@@ -71,11 +77,13 @@ pub struct BasisReport {
 /// The pixels of a clamped or blended mapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelReport {
-    /// Root mean square distance between pixels and their clamped mixtures.
+    /// Root mean square distance d between pixels and their clamped mixtures.
     pub rms: f64,
-    /// The distance that 95 % of the pixels do not exceed.
+    /// Root mean square distance in light between them.
+    pub light: f64,
+    /// The distance d that 95 % of the pixels do not exceed.
     pub p95: f64,
-    /// The largest distance.
+    /// The largest distance d.
     pub max: f64,
     /// The largest gap of any pixel before pruning, in squared distance.
     pub gap: f64,

@@ -17,10 +17,14 @@ pub enum Intent {
     Blend,
 }
 
+/// The weight of the distance in light beside distance d at which metals shine and other materials hardly change;
+/// `docs/decisions/metric-that-knows-light.md` has the figures.
+pub const LIGHT: f64 = 0.3;
+
 /// How the gloss of the bases is treated before they are mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Gloss {
-    /// Scale if mapping would otherwise merge different bases and scaling helps.
+    /// Scale if mapping would otherwise merge more than 1 % of pairs of materials and scaling helps.
     #[default]
     WhereMerged,
     /// Keep the gloss.
@@ -34,6 +38,9 @@ pub enum Gloss {
 pub struct Settings {
     /// What to do with materials outside the gamut.
     pub intent: Intent,
+    /// Mixtures are chosen by distance d and this times the distance in light ([`LIGHT`]), as sides of a right angle; 0 is
+    /// the metric of the 2009 paper.
+    pub light: f64,
     /// How the gloss of the bases is treated.
     pub gloss: Gloss,
     /// The most cartridges in the result; the printer holds 7.
@@ -44,6 +51,12 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { intent: Intent::Auto, gloss: Gloss::WhereMerged, most_cartridges: 7, seed: 1 }
+        Settings {
+            intent: Intent::Auto,
+            light: LIGHT,
+            gloss: Gloss::WhereMerged,
+            most_cartridges: 7,
+            seed: 1,
+        }
     }
 }

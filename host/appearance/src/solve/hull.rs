@@ -2,7 +2,8 @@
 //!
 //! Problem: the metric compares cube roots of reflected radiance, weighted by column; tables hold reflectance.
 //! Method: both are converted to radiance once, targets also to cube roots, and checked, so that the solver
-//! ([`super::Mixer`]) receives only finite numbers of 0 or more.
+//! ([`super::Mixer`]) receives only finite numbers of 0 or more. With a weight for light, three more columns hold the albedo
+//! of each channel ([`Space::albedo`]); it is linear in the mixture like every other column.
 //! Cost: one multiplication per number and one cube root per column of a target. Limits: radiance below a trillionth of
 //! the brightest stack counts as that much, since the cube root has no finite slope at 0.
 //! Source: the appendix of the 2009 paper.
@@ -61,7 +62,10 @@ pub enum MixtureError {
 /// Stacks that can be mixed: reflected radiance, weights of the columns, prices.
 #[derive(Clone, Debug)]
 pub struct Hull {
+    /// For each column of the space, the factor from reflectance to radiance.
     radiance: Vec<f64>,
+    /// For each configuration, the factor from radiance to its share in the albedo; empty without a weight for light.
+    light: Vec<f64>,
     pub(super) weight: Vec<f64>,
     pub(super) rows: Table,
     pub(super) price: Vec<f64>,
@@ -78,14 +82,28 @@ pub struct Target {
 impl Target {
     /// Integral of the cube root of the target's radiance over the metric's measure, all channels.
     pub(crate) fn brightness(&self, hull: &Hull) -> f64 {
-        self.root.iter().zip(&hull.weight).map(|(root, w)| root * w * w).sum()
+        let curve = self.root.iter().zip(&hull.weight).take(hull.curve_columns());
+        curve.map(|(root, w)| root * w * w).sum()
     }
+}
+
+/// Appends the albedo of each channel to the radiances of a row, given the share of each configuration.
+fn append_albedo(light: &[f64], radiance: &mut Vec<f64>) {
+    if light.is_empty() {
+        return;
+    }
+    let mut albedo = [0.0; 3];
+    for (&q, f) in light.iter().zip(radiance.chunks_exact(3)) {
+        albedo.iter_mut().zip(f).for_each(|(a, &f)| *a += q * f);
+    }
+    radiance.extend(albedo);
 }
 
 impl Hull {
     /// The hull of stacks given as reflectance rows of `space` (1/sr), with the price of each in units of squared distance.
-    /// Prices decide ties; 0 for none.
-    pub fn new(space: &Space, curves: &Table, price: &[f64]) -> Result<Hull, MixtureError> {
+    /// Prices decide ties; 0 for none. `light` is the weight of the distance in light beside that of eqs. 2-3, which is all
+    /// there is if it is 0 or the space has no half angles.
+    pub fn new(space: &Space, curves: &Table, price: &[f64], light: f64) -> Result<Hull, MixtureError> {
         let m = space.columns();
         if curves.is_empty() {
             return Err(MixtureError::NoStacks);
@@ -96,23 +114,32 @@ impl Hull {
         if price.len() != curves.len() {
             return Err(MixtureError::Length { stacks: curves.len(), found: price.len() });
         }
-        let mut rows = Table::new(m);
+        let shares = space.light().iter().zip(space.radiance().chunks_exact(3)).map(|(q, c)| q / c[0]);
+        let light_of_radiance: Vec<f64> = if light > 0.0 { shares.collect() } else { Vec::new() };
+        let mut weight = space.weight().to_vec();
+        if !light_of_radiance.is_empty() {
+            weight.extend([light; 3]);
+        }
+        let mut rows = Table::new(weight.len());
         let mut brightest = 0.0f64;
-        let mut radiance = vec![0.0; m];
+        let mut radiance = Vec::with_capacity(weight.len());
         for row in curves.rows() {
+            radiance.clear();
             for (j, (&f, c)) in row.iter().zip(space.radiance()).enumerate() {
                 if !(f.is_finite() && f >= 0.0) {
                     return Err(MixtureError::Value { what: "a stack", column: j, value: f });
                 }
-                radiance[j] = f * c;
-                brightest = brightest.max(radiance[j]);
+                radiance.push(f * c);
+                brightest = brightest.max(f * c);
             }
+            append_albedo(&light_of_radiance, &mut radiance);
             rows.push(&radiance);
         }
         let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
         Ok(Hull {
             radiance: space.radiance().to_vec(),
-            weight: space.weight().to_vec(),
+            light: light_of_radiance,
+            weight,
             rows,
             price: price.to_vec(),
             darkest: darkest.max(f64::MIN_POSITIVE),
@@ -124,7 +151,8 @@ impl Hull {
         let mut rows = Table::new(self.rows.columns());
         stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
         let price = stacks.iter().map(|&k| self.price[k]).collect();
-        Hull { radiance: self.radiance.clone(), weight: self.weight.clone(), rows, price, ..*self }
+        let (radiance, light) = (self.radiance.clone(), self.light.clone());
+        Hull { radiance, light, weight: self.weight.clone(), rows, price, darkest: self.darkest }
     }
 
     /// Number of stacks.
@@ -137,9 +165,14 @@ impl Hull {
         self.rows.is_empty()
     }
 
-    /// Number of columns.
+    /// Number of columns, those of light included.
     pub(super) fn columns(&self) -> usize {
         self.rows.columns()
+    }
+
+    /// Number of columns of eqs. 2-3, which come first.
+    pub(super) fn curve_columns(&self) -> usize {
+        self.radiance.len()
     }
 
     /// A target from a row of reflectance (1/sr). Values below 0 count as 0.
@@ -155,16 +188,17 @@ impl Hull {
         reflectance: impl ExactSizeIterator<Item = f64>,
         target: &mut Target,
     ) -> Result<(), MixtureError> {
-        let m = self.columns();
-        if reflectance.len() != m {
-            return Err(MixtureError::Columns { what: "the target", expected: m, found: reflectance.len() });
+        let expected = self.radiance.len();
+        if reflectance.len() != expected {
+            return Err(MixtureError::Columns { what: "the target", expected, found: reflectance.len() });
         }
         target.radiance.clear();
         target
             .radiance
             .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
+        append_albedo(&self.light, &mut target.radiance);
         target.root.clear();
-        target.root.resize(m, 0.0);
+        target.root.resize(self.columns(), 0.0);
         for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
             // Values too small for the root count as black.
             let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));

@@ -2,7 +2,7 @@
 //!
 //! Problem: minimise `E(a) = sum_j W_j^2 (cbrt((Aa)_j) - cbrt(t_j))^2 + p'a` over the simplex, where the rows of A
 //! are the stacks' reflected radiances, t is the target's, W are the metric's weights and p is a small price of each stack
-//! that breaks ties toward fewer layers.
+//! that breaks ties toward fewer layers. The albedos may be further columns ([`Hull::new`]).
 //! Method: sequential quadratic steps. At a, the metric is replaced by its Gauss-Newton model, with the exact second
 //! derivative where that is positive. [`Simplex`] minimises the model exactly over the stacks in use and those whose
 //! gradient shows that they would help; Armijo's rule halves the step. The search ends when the gap is small enough or the
@@ -33,8 +33,10 @@ const AGREEMENT: f64 = 1e-6;
 /// How good a mixture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Distance d between mixture and target.
+    /// Distance between mixture and target in the metric of the hull, light included.
     pub distance: f64,
+    /// The part of it that eqs. 2-3 see: distance d.
+    pub curve: f64,
     /// Frank-Wolfe gap in squared distance: where E is convex, no mixture has a value of `d^2 + p'a` lower by more than this.
     pub gap: f64,
     /// Steps taken.
@@ -274,7 +276,9 @@ impl Mixer {
             return Err(SimplexError::NotFinite.into());
         }
         let convex = self.mix.iter().zip(&target.radiance).all(|(f, t)| *f <= 8.0 * t);
-        Ok(Fit { distance: squared.sqrt(), gap: gap.max(0.0), steps, convex })
+        let of_curve = &self.residual[..hull.curve_columns()];
+        let curve = dot(of_curve, of_curve).sqrt();
+        Ok(Fit { distance: squared.sqrt(), curve, gap: gap.max(0.0), steps, convex })
     }
 
     /// Half the gradient for every stack, its price included; closed stacks get one so large that they never join.

@@ -22,10 +22,9 @@ use super::kinds::Kind;
 use super::lattice::{Lattice, Nodes, ends, step};
 use super::outline::{self, Treatment};
 use crate::halftone::{self, halftone};
-use appearance::brdf::{Space, Table};
-use appearance::document::{Materials, SAMPLES};
-use appearance::factor::Factored;
-use appearance::gamut::{self, Gloss, InkMix, Printable};
+use appearance::brdf::Space;
+use appearance::document::SAMPLES;
+use appearance::gamut::{self, InkMix, Printable};
 use appearance::weights::{ONE, WeightMaps};
 use observe::Observer;
 
@@ -125,17 +124,10 @@ impl Colour {
             Intent::Colorimetric => &[Intent::Colorimetric],
         };
         let lattice = Lattice::new(space, printable, intents, settings.gamma);
-        let mut bases = Table::new(lattice.space().columns());
-        bases.push(&lattice.paper);
-        let maps = WeightMaps::uniform(lattice.width(), lattice.height());
-        let factored = Factored { space: lattice.space().clone(), bases, maps };
-        let clamp = gamut::Settings {
-            intent: gamut::Intent::Clamp,
-            gloss: Gloss::Keep,
-            ..gamut::Settings::default()
-        };
-        let InkMix { stacks, maps, matrix } =
-            gamut::map(&factored, Some(&lattice), printable, &clamp, observer)?.mix;
+        // A colour is the light of the whole surface: its rows are flat, so the light would only count it twice.
+        let clamp =
+            gamut::Settings { intent: gamut::Intent::Clamp, light: 0.0, ..gamut::Settings::default() };
+        let InkMix { stacks, maps, matrix } = gamut::clamped(&lattice, printable, &clamp, observer)?.mix;
         let channels = maps.channels();
         let steps = std::array::from_fn(step);
         Ok(Fit { stacks, matrix, channels, nodes: Nodes::new(&maps), steps, of_drawings: intents.len() - 1 })

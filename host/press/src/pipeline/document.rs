@@ -3,17 +3,20 @@
 //! Nothing is decided here that a stage does not decide; this is only their order, and the values between them, kept
 //! for those who want to look.
 
+use std::borrow::Cow;
+
 use inks::{InkSet, Library};
 
 use crate::halftone::{self, HalftoneError, halftone};
 use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
 use crate::sheet::DotMap;
-use appearance::document::Document;
+use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
-use appearance::gamut::{self, GamutError, Mapped, Printable};
-use appearance::materials::{Materials, Reduced, resolution};
+use appearance::gamut::{self, Gain, GamutError, Mapped, Printable};
+use appearance::materials::{Reduced, resolution};
 use appearance::weights::WeightError;
 use observe::Observer;
+use protocol::ink::Ink;
 
 /// What the user may choose.
 #[derive(Clone, Debug)]
@@ -32,14 +35,14 @@ pub struct Settings {
 
 /// A document as dots, and what it went through.
 pub struct Halftoned {
-    /// The document in bases and weight maps.
-    pub factored: Factored,
-    /// What the factoring reports; absent when the document came factored.
+    /// What the factoring reports; absent when the document came factored, or the intent uses no bases.
     pub factoring: Option<factor::Report>,
     /// The mixture of stacks, and what the mapping reports.
     pub mapped: Mapped,
     /// The dots.
     pub dots: DotMap,
+    /// What foils would bring, if the inks are the default, which leaves them out.
+    pub foils: Option<Gain>,
 }
 
 /// Why a document does not become dots: the error of the stage that refused.
@@ -90,25 +93,41 @@ pub fn halftoned(
     }
     let reduced = cells.map(|cells| Reduced::new(materials, cells));
     let materials: &dyn Materials = reduced.as_ref().map_or(materials, |reduced| reduced);
-    let (factored, factoring) = match (document.as_factored(), cells) {
-        (Some(factored), Some(cells)) => (factored.reduced(cells)?, None),
-        (Some(factored), None) => (factored.clone(), None),
+    let printable = Printable::combined(library, &settings.inks, materials.space());
+    let mut factoring = None;
+    let bases = || match (document.as_factored(), cells) {
+        (Some(factored), Some(cells)) => Ok(Cow::Owned(factored.reduced(cells)?)),
+        (Some(factored), None) => Ok(Cow::Borrowed(factored)),
         (None, _) => {
-            let factoring = factor::factor(materials, &settings.factor, observer)?;
-            (factoring.factored, Some(factoring.report))
+            let factor::Factoring { factored, report } = factor::factor(materials, &settings.factor, observer)?;
+            observer.note(&report.to_string());
+            factoring = Some(report);
+            Ok::<_, StageError>(Cow::Owned(factored))
         }
     };
-    if let Some(report) = &factoring {
-        observer.note(&report.to_string());
-    }
-    let printable = Printable::from_library(library, &settings.inks, &factored.space);
-    let mapped = gamut::map(&factored, Some(materials), &printable, &settings.gamut, observer)?;
+    let mapped = gamut::map(materials, bases, &printable, &settings.gamut, observer)?;
     let chosen = halftone::Settings {
         method: settings.halftone,
         ..halftone::Settings::from_library(&mapped.mix.stacks, library)
     };
     let dots = halftone(&mapped.mix, (width, height), None, &chosen, observer)?;
-    Ok(Halftoned { factored, factoring, mapped, dots })
+    let foils = match settings.inks == InkSet::default() {
+        true => foils(materials, library, &printable, &settings.gamut)?,
+        false => None,
+    };
+    Ok(Halftoned { factoring, mapped, dots, foils })
+}
+
+/// What foils beside the default inks would bring.
+fn foils(
+    materials: &dyn Materials,
+    library: &Library,
+    printable: &Printable,
+    settings: &gamut::Settings,
+) -> Result<Option<Gain>, GamutError> {
+    let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
+    let more = Printable::combined(library, &all, materials.space());
+    gamut::gain(materials, printable, &more, settings)
 }
 
 /// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a
@@ -132,14 +151,14 @@ fn cells(
 ///
 /// # Errors
 /// Those of the factoring.
-pub fn factored(
-    document: &Document,
+pub fn factored<'a>(
+    document: &'a Document,
     settings: &factor::Settings,
     observer: &dyn Observer,
-) -> Result<(Factored, Option<factor::Report>), FactorError> {
+) -> Result<(Cow<'a, Factored>, Option<factor::Report>), FactorError> {
     if let Some(factored) = document.as_factored() {
-        return Ok((factored.clone(), None));
+        return Ok((Cow::Borrowed(factored), None));
     }
     let factoring = factor::factor(document.materials(), settings, observer)?;
-    Ok((factoring.factored, Some(factoring.report)))
+    Ok((Cow::Owned(factoring.factored), Some(factoring.report)))
 }

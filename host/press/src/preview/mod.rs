@@ -15,6 +15,8 @@ mod fidelity;
 mod fine;
 mod flat;
 pub mod inks;
+#[cfg(test)]
+mod light_table;
 mod materials_picture;
 mod probe;
 mod radiance;

@@ -16,7 +16,7 @@ fn library(space: &Space) -> Table {
 }
 
 fn hull_of(space: &Space, curves: &Table) -> Hull {
-    Hull::new(space, curves, &vec![0.0; curves.len()]).unwrap()
+    Hull::new(space, curves, &vec![0.0; curves.len()], 0.0).unwrap()
 }
 
 fn mixture(curves: &Table, weights: &[f64]) -> Vec<f64> {
@@ -276,7 +276,7 @@ fn ties_go_to_fewer_layers() {
         let mut price = vec![LAYER_PRICE; 58];
         price[0] = 0.0;
         price[dear] = 3.0 * LAYER_PRICE;
-        let hull = Hull::new(&space, &curves, &price).unwrap();
+        let hull = Hull::new(&space, &curves, &price, 0.0).unwrap();
         let best = Mixer::new().best(&hull, &hull.target(&target).unwrap()).unwrap();
         assert!(best.weights[dear] < 1e-9 && best.weights[cheap] > 0.55, "{:?}", best.weights);
         assert!(best.fit.distance < 1e-3);
@@ -323,11 +323,14 @@ fn bad_numbers_are_named() {
         table.push(&[v; 12]);
         table
     };
-    let error = Hull::new(&space, &row(f64::NAN), &[0.0]).unwrap_err();
+    let error = Hull::new(&space, &row(f64::NAN), &[0.0], 0.0).unwrap_err();
     assert!(matches!(error, MixtureError::Value { column: 0, .. }));
-    assert!(matches!(Hull::new(&space, &row(1.0), &[]), Err(MixtureError::Length { stacks: 1, found: 0 })));
-    assert!(matches!(Hull::new(&space, &Table::new(12), &[]), Err(MixtureError::NoStacks)));
-    let hull = Hull::new(&space, &row(1.0), &[0.0]).unwrap();
+    assert!(matches!(
+        Hull::new(&space, &row(1.0), &[], 0.0),
+        Err(MixtureError::Length { stacks: 1, found: 0 })
+    ));
+    assert!(matches!(Hull::new(&space, &Table::new(12), &[], 0.0), Err(MixtureError::NoStacks)));
+    let hull = Hull::new(&space, &row(1.0), &[0.0], 0.0).unwrap();
     let mut target = vec![1.0; 12];
     target[7] = f64::INFINITY;
     assert!(matches!(hull.target(&target), Err(MixtureError::Value { column: 7, .. })));
@@ -336,4 +339,61 @@ fn bad_numbers_are_named() {
     assert!(matches!(hull.target(&[1.0; 11]), Err(MixtureError::Columns { expected: 12, found: 11, .. })));
     let target = hull.target(&[1.0; 12]).unwrap();
     assert!(Mixer::new().refine(&hull, &target, &mut [1.0, 0.0], 0.0).is_err());
+}
+
+/// With a weight for light, the optimum is that of the distance in light and distance d together, found by a search over all
+/// mixtures of two stacks with the space's own distances.
+#[test]
+fn light_is_weighed_beside_the_curve() {
+    let space = Space::half_angle(32);
+    let all = library(&space);
+    let at = |stack: &str| {
+        let found = Library::builtin().entries().iter().position(|e| e.stack == stack.parse().unwrap());
+        found.unwrap()
+    };
+    let target = surface(&space, 0.02);
+    for light in [0.0, 0.2, 0.5, 2.0] {
+        let mut two = Table::new(space.columns());
+        [at("C+M+Y+F"), at("P+SF")].iter().for_each(|&k| two.push(all.row(k)));
+        let hull = Hull::new(&space, &two, &[0.0; 2], light).unwrap();
+        let best = Mixer::new().best(&hull, &hull.target(&target).unwrap()).unwrap();
+        let both = |s: f64| {
+            let mix = mixture(&two, &[1.0 - s, s]);
+            space.distance(&mix, &target).hypot(light * space.light_distance(&mix, &target))
+        };
+        let scan = (0..=2000).map(|i| both(f64::from(i) / 2000.0)).fold(f64::INFINITY, f64::min);
+        assert!(
+            best.fit.distance <= scan + 1e-9 && scan < best.fit.distance + 1e-5,
+            "{light}: {:?} {scan}",
+            best.fit
+        );
+        assert!((space.distance(&mixture(&two, &best.weights), &target) - best.fit.curve).abs() < 1e-9);
+    }
+}
+
+/// Smooth silver.
+fn surface(space: &Space, alpha: f64) -> Vec<f64> {
+    space
+        .row(&Curve::sampled(space.angles(), |t| [0.97, 0.96, 0.92].map(|f0| f0 * inks::ggx::lobe(t, alpha))))
+}
+
+/// A matt surface returns its own reflectance; of a narrow lobe, by adaptive refinement of the integral.
+#[test]
+fn the_albedo_is_the_integral_it_says() {
+    let space = Space::half_angle(32);
+    let [a, b, c] = space.albedo(&[0.1, 0.2, 0.3].repeat(32));
+    assert!((a - 0.1).abs() < 1e-12 && (b - 0.2).abs() < 1e-12 && (c - 0.3).abs() < 1e-12);
+    for alpha in [0.06, 0.12, 0.3] {
+        let lobe = |t: f64| 0.9 * inks::ggx::lobe(t, alpha);
+        let row: Vec<f64> = space.angles().iter().flat_map(|&t| [lobe(t); 3]).collect();
+        // (1/pi) times the integral over the hemisphere of f(theta_o / 2) cos theta_o.
+        let n = 200_000;
+        let step = std::f64::consts::FRAC_PI_2 / f64::from(n);
+        let sum: f64 = (0..n)
+            .map(|i| (f64::from(i) + 0.5) * step)
+            .map(|t| 2.0 * lobe(0.5 * t) * t.cos() * t.sin() * step)
+            .sum();
+        let found = space.albedo(&row)[0];
+        assert!((found / sum - 1.0).abs() < 0.01, "{alpha}: {found} {sum}");
+    }
 }
