@@ -99,7 +99,8 @@ pub fn halftoned(
         (Some(factored), Some(cells)) => Ok(Cow::Owned(factored.reduced(cells)?)),
         (Some(factored), None) => Ok(Cow::Borrowed(factored)),
         (None, _) => {
-            let factor::Factoring { factored, report } = factor::factor(materials, &settings.factor, observer)?;
+            let factor::Factoring { factored, report } =
+                factor::factor(materials, &settings.factor, observer)?;
             observer.note(&report.to_string());
             factoring = Some(report);
             Ok::<_, StageError>(Cow::Owned(factored))

@@ -4,7 +4,7 @@
 //! Method: a curve is read once at [`ENTRIES`] angles, dense in proportion to its slope at narrow lobes and at grazing angles.
 //! A second table finds the entry for the chord between normal and half vector, `2 sin(theta_h / 2)`, without a root or an
 //! arc sine. Mixing curves and mixing their tables are the same.
-//! Cost: some microseconds a curve; two multiply-adds a value. Error: below 0.15 % of modelled curves (test).
+//! Cost: some microseconds a curve; two multiply-adds a value. Error: below 0.15 % of modelled curves up to 86 degrees (test).
 
 use inks::Curve;
 
@@ -80,14 +80,13 @@ mod tests {
             [(0.0, 0.02), (0.01, 0.02), (0.2, 0.02), (0.005, 0.06), (0.05, 0.2), (0.27, 0.28)]
         {
             let f = |t: f64| diffuse + 0.5 * inks::ggx::lobe(t, alpha);
-            let exact = Vec::from_iter((0..8000).map(|n| 1.565 * (f64::from(n) / 8000.0).powi(2)));
+            let exact = Vec::from_iter((0..8000).map(|n| 1.5 * (f64::from(n) / 8000.0).powi(2)));
             let table: Vec<f64> = fine.angles.iter().map(|&t| f(t)).collect();
             for t in exact {
                 let (k, s) = fine.at((2.0 * (t / 2.0).sin()) as f32);
                 let found = table[k] + f64::from(s) * (table[k + 1] - table[k]);
-                let most = if t < 1.52 { 0.0015 } else { 0.02 };
                 assert!(
-                    (found / f(t) - 1.0).abs() < most,
+                    (found / f(t) - 1.0).abs() < 0.0015,
                     "{diffuse} {alpha} {}: {found} {}",
                     t.to_degrees(),
                     f(t)
