@@ -24,7 +24,7 @@ pub(super) struct Fine {
 /// degrees, where they rise again.
 fn coordinate(theta: f64) -> f64 {
     let (u, cos) = ((theta / std::f64::consts::FRAC_PI_2).sqrt(), theta.cos());
-    (10.0 * u).asinh() - 0.1 * (cos * cos + 1e-3).ln()
+    (10.0 * u).asinh() - 0.15 * (cos * cos + 1e-3).ln()
 }
 
 impl Fine {
