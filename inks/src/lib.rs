@@ -12,6 +12,7 @@ mod curve;
 mod format;
 pub mod ggx;
 pub mod gloss;
+mod knots;
 mod lab;
 mod library;
 mod lobes;
@@ -26,6 +27,7 @@ mod stack;
 
 pub use curve::{Curve, CurveError};
 pub use format::{Caution, FILE_NAME};
+pub use knots::{Knots, Place};
 pub use library::{Cartridge, Entry, Library};
 pub use lobes::{Lobe, Lobes};
 pub use open::LibraryError;

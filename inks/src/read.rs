@@ -492,7 +492,11 @@ fn entry(
         },
     };
     for (quadrature, degrees) in quadratures.iter().zip(INCIDENCES) {
-        let albedo = quadrature.of(&curve).into_iter().fold(0.0, f64::max);
+        let albedo = match &lobes {
+            Some(lobes) => quadrature.sum(|t| lobes.at(t)),
+            None => quadrature.of(&curve),
+        };
+        let albedo = albedo.into_iter().fold(0.0, f64::max);
         if albedo > 1.0 {
             // The error of the quadrature, 2e-4, is far below the difference between the two cases.
             let severity =

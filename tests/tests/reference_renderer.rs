@@ -15,16 +15,20 @@ fn reference() -> Option<PathBuf> {
     needs::path(Need::Reference, "FOILPRESS_REFERENCE").filter(|_| needs::numpy())
 }
 
-/// Diffuse reflectance, F0 and width as a curve of the working grid, so that both sides interpolate the same samples.
-fn curve(space: &Space, (diffuse, f0, alpha): (f64, f64, f64)) -> Curve {
-    Curve::sampled(space.angles(), |t| {
+/// Diffuse reflectance, F0 and width as a curve at these angles.
+fn curve(angles: &[f64], (diffuse, f0, alpha): (f64, f64, f64)) -> Curve {
+    Curve::sampled(angles, |t| {
         let lobe = f0 * inks::ggx::lobe(t, alpha);
         [diffuse + lobe, 0.7 * diffuse + lobe, 0.2 * diffuse + 0.5 * lobe]
     })
 }
 
-fn write_curve(path: &Path, curve: &Curve) {
-    curve.to_csv(std::fs::File::create(path).unwrap()).unwrap();
+/// The lobes themselves, at so many angles that straight lines between them do, which is what the reference draws.
+fn write_curve(path: &Path, material: (f64, f64, f64)) {
+    const ROWS: u32 = 20_000;
+    let angle = |n: u32| std::f64::consts::FRAC_PI_2 * (f64::from(n) / f64::from(ROWS - 1)).powi(2);
+    let angles: Vec<f64> = (0..ROWS).map(angle).collect();
+    curve(&angles, material).to_csv(std::fs::File::create(path).unwrap()).unwrap();
 }
 
 /// NumPy's format, version 1: magic, length of the header, a Python dictionary padded to 64 bytes, then the data.
@@ -68,40 +72,45 @@ fn run(script: &Path, mode: &str, args: &[&str], curve: &Path, out: &Path, size:
     read_npy(out, size * size)
 }
 
-/// Greatest and root-mean-square difference over wholly covered pixels, as shares of the reference's mean.
+/// Greatest difference over wholly covered pixels, as a share of the pixel, and root mean square difference, as a share of the
+/// mean.
 fn difference(ours: &Radiance, theirs: &[[f32; 4]]) -> (f64, f64) {
     let (mut most, mut squares, mut mean, mut n) = (0.0f64, 0.0, 0.0, 0.0);
     for (a, b) in ours.pixels.iter().zip(theirs).filter(|(_, b)| b[3] > 0.999) {
         assert_eq!(a[3], 1.0, "both cover the same pixels");
         for c in 0..3 {
             let d = f64::from(a[c] - b[c]);
-            most = most.max(d.abs());
+            most = most.max(d.abs() / f64::from(b[c]));
             squares += d * d;
             mean += f64::from(b[c]);
             n += 1.0;
         }
     }
     assert!(n > 0.0);
-    (most / (mean / n), (squares / n).sqrt() / (mean / n))
+    (most, (squares / n).sqrt() / (mean / n))
 }
 
-/// White paper and silver foil: the dullest and nearly the sharpest thing that can be printed.
+/// White paper and silver foil on primer: the dullest and the sharpest thing that can be printed.
 const PAPER: (f64, f64, f64) = (0.27, 0.04, 0.28);
-const FOIL: (f64, f64, f64) = (0.005, 0.85, 0.06);
+const FOIL: (f64, f64, f64) = (0.005, 0.85, 0.045);
+/// The sharpest thing that a document can have.
+const MIRROR: (f64, f64, f64) = (0.005, 0.9, 0.02);
+/// Samples of a curve, as everywhere in the program.
+const SAMPLES: usize = 32;
 
 #[test]
 fn a_ball_lit_from_the_eye_is_the_references_ball() {
     let Some(script) = reference() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let space = Space::half_angle(64);
-    for material in [PAPER, FOIL] {
-        let curve = curve(&space, material);
+    let space = Space::half_angle(SAMPLES);
+    for material in [PAPER, FOIL, MIRROR] {
+        let curve = curve(space.angles(), material);
         let (csv, out) = (dir.path().join("curve.csv"), dir.path().join("ball.npy"));
-        write_curve(&csv, &curve);
+        write_curve(&csv, material);
         let theirs = run(&script, "sphere-dir", &[], &csv, &out, 96);
         let (most, rms) = difference(&sphere::under_light(&curve, [0.0, 0.0, 1.0], 96).unwrap(), &theirs);
-        println!("{material:?}: greatest difference {most:.2e}, rms {rms:.2e} of the mean");
-        assert!(most < 1e-4, "{material:?}: {most}");
+        println!("{material:?}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the mean");
+        assert!(most < 0.005 && rms < 0.005, "{material:?}: greatest {most}, rms {rms}");
     }
 }
 
@@ -109,17 +118,17 @@ fn a_ball_lit_from_the_eye_is_the_references_ball() {
 fn balls_under_a_probe_are_the_references_balls() {
     let Some(script) = reference() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let space = Space::half_angle(64);
+    let space = Space::half_angle(SAMPLES);
     let mut cases = vec![(Probe::studio(64), PAPER)];
     match needs::data() {
         Some(data) => cases.push((Probe::read_hdr(&data.join("env/studio.hdr")).unwrap().shrunk(64), FOIL)),
         None => cases.push((Probe::studio(64), FOIL)),
     }
     for (probe, material) in &cases {
-        let curve = curve(&space, *material);
+        let curve = curve(space.angles(), *material);
         let at = |name: &str| dir.path().join(name);
         let (csv, env, out) = (at("curve.csv"), at("env.npy"), at("ball.npy"));
-        write_curve(&csv, &curve);
+        write_curve(&csv, *material);
         write_npy(&env, probe);
         let args = ["--env", env.to_str().unwrap(), "--env-height", "64"];
         let theirs = run(&script, "sphere-env", &args, &csv, &out, 40);
@@ -130,7 +139,7 @@ fn balls_under_a_probe_are_the_references_balls() {
         let inner: Vec<[f32; 4]> =
             theirs.iter().zip(&ours.pixels).map(|(t, o)| if o[3] == 1.0 { *t } else { [0.0; 4] }).collect();
         let (most, rms) = difference(ours, &inner);
-        println!("{material:?}: greatest difference {most:.2e}, rms {rms:.2e} of the mean");
-        assert!(rms < 3e-3 && most < 2e-2, "{material:?}: greatest {most}, rms {rms}");
+        println!("{material:?}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the mean");
+        assert!(rms < 5e-3 && most < 2e-2, "{material:?}: greatest {most}, rms {rms}");
     }
 }

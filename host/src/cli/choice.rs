@@ -40,7 +40,7 @@ impl Choice for Method {
         (
             Method::Archetypes,
             "archetypes",
-            "Corners of the document, fitted in the metric; prints best and reproduces the document nearly as well as any",
+            "Corners of the document, fitted in the metric, kept near its real materials",
         ),
         (
             Method::Kmeans,

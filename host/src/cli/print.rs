@@ -206,7 +206,7 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     let (width, height) = (Mm::of_dots(area.width as i64).0, Mm::of_dots(area.length as i64).0);
     let notes = [
         format!("{width:.0} x {height:.0} mm, {passes} passes"),
-        format!("seen from {EYE} m: mean d {:.3}, 95 % below {:.3}", fidelity.mean, fidelity.p95),
+        format!("seen from {EYE} m: average d {:.3}, 95 % below {:.3}", fidelity.mean, fidelity.p95),
     ];
     let sheet =
         preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;

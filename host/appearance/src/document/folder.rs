@@ -69,7 +69,7 @@ impl Reader<'_, '_> {
         let picture = self.picture(&name)?;
         if picture.colours() == 3 {
             let (red, green) = (picture.channel(0), picture.channel(1));
-            let apart = red.data().iter().zip(green.data()).any(|(a, b)| (a - b).abs() > 0.02);
+            let apart = red.values().zip(green.values()).any(|(a, b)| (a - b).abs() > 0.02);
             if apart {
                 return Err(DocumentError::Picture {
                     path: self.files.folder.join(&name),
@@ -95,7 +95,7 @@ impl Reader<'_, '_> {
             self.source.note(format!("{name}: the colour profile is not applied"));
         }
         let planes = picture.linear(space);
-        let outside = planes.iter().any(|plane| plane.data().iter().any(|v| !(0.0..=1.0).contains(v)));
+        let outside = planes.iter().any(|plane| !plane.is_share());
         if outside {
             self.source.note(format!(
                 "{name}: colours outside 0 to 1 are clamped, because reflectances cannot lie there"
@@ -144,14 +144,14 @@ pub(super) fn open(
     let surfaces = match workflow {
         Workflow::MetallicRoughness => {
             let (roughness, metal) = roughness_metallic(&mut reader, &settings)?;
-            build(reader.size, space, variance.as_ref(), |i| {
+            build(reader.size, space, variance, move |i| {
                 let metal = metal.at(i).clamp(0.0, 1.0);
                 metallic(rgb(&base, i), [dielectric(1.5); 3], roughness.at(i).clamp(0.0, 1.0), metal)
             })
         }
         Workflow::SpecularGlossiness => {
             let (f0, gloss) = specular_glossiness(&mut reader, encoding)?;
-            build(reader.size, space, variance.as_ref(), |i| {
+            build(reader.size, space, variance, move |i| {
                 specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0))
             })
         }
@@ -187,12 +187,12 @@ fn encoding_words(space: ColourSpace, chosen: bool) -> String {
 fn build(
     (width, height): (usize, usize),
     space: Space,
-    variance: Option<&Field>,
-    surface: impl Fn(usize) -> Surface + Sync,
+    variance: Option<Field>,
+    surface: impl Fn(usize) -> Surface + Send + Sync + 'static,
 ) -> Surfaces {
-    Surfaces::build(width, height, space, |i| {
+    Surfaces::build(width, height, space, move |i| {
         let mut surface = surface(i);
-        if let Some(variance) = variance {
+        if let Some(variance) = &variance {
             surface.alpha = relief::widened(surface.alpha, variance.at(i));
         }
         surface

@@ -285,14 +285,15 @@ fn build(
     let fit = |field: Field| field.resized(width, height);
     let base = base.map(fit);
     let variance = variance.map(fit);
-    let rough = |alpha: f32, i: usize| variance.as_ref().map_or(alpha, |v| relief::widened(alpha, v.at(i)));
+    let rough =
+        move |alpha: f32, i: usize| variance.as_ref().map_or(alpha, |v| relief::widened(alpha, v.at(i)));
     let rgb = |fields: &[Field; 3], i: usize| -> [f32; 3] {
         std::array::from_fn(|c| fields[c].at(i).clamp(0.0, 1.0))
     };
     let surfaces = match kind {
         Kind::Metallic { roughness, metal, f0, level } => {
             let (roughness, metal, f0, level) = (fit(roughness), fit(metal), f0.map(fit), fit(level));
-            Surfaces::build(width, height, space, |i| {
+            Surfaces::build(width, height, space, move |i| {
                 let level = level.at(i).clamp(0.0, 1.0);
                 let f0 = rgb(&f0, i).map(|v| v * level);
                 let metal = metal.at(i).clamp(0.0, 1.0);
@@ -303,7 +304,7 @@ fn build(
         }
         Kind::Specular { f0, gloss } => {
             let (f0, gloss) = (f0.map(fit), fit(gloss));
-            Surfaces::build(width, height, space, |i| {
+            Surfaces::build(width, height, space, move |i| {
                 let mut surface = specular(rgb(&base, i), rgb(&f0, i), gloss.at(i).clamp(0.0, 1.0));
                 surface.alpha = rough(surface.alpha, i);
                 surface

@@ -25,6 +25,9 @@ const MOST_SIDE: u64 = 16_384;
 /// The most values (pixels times channels) in one image.
 const MOST_VALUES: u64 = 1 << 28;
 
+/// The most values of floating point in one image: they take four bytes each, and twice that while they are decoded.
+const MOST_FLOATS: u64 = 1 << 26;
+
 /// The values of an image, interleaved, rows from the top.
 #[derive(Clone, Debug)]
 enum Values {
@@ -134,21 +137,23 @@ impl Picture {
     pub fn channel(&self, channel: usize) -> Plane {
         let at = match (channel, self.has_alpha()) {
             (3, false) => {
-                return Plane::new(self.width, self.height, vec![1.0; self.width * self.height]);
+                return Plane::eight(self.width, self.height, vec![u8::MAX; self.width * self.height]);
             }
             (3, true) => self.channels - 1,
             (channel, _) => channel.min(self.colours() - 1),
         };
-        let data = match &self.values {
+        let (width, height, channels) = (self.width, self.height, self.channels);
+        match &self.values {
             Values::Eight(v) => {
-                v.par_chunks_exact(self.channels).map(|p| f32::from(p[at]) / f32::from(u8::MAX)).collect()
+                Plane::eight(width, height, v.par_chunks_exact(channels).map(|p| p[at]).collect())
             }
             Values::Sixteen(v) => {
-                v.par_chunks_exact(self.channels).map(|p| f32::from(p[at]) / f32::from(u16::MAX)).collect()
+                Plane::sixteen(width, height, v.par_chunks_exact(channels).map(|p| p[at]).collect())
             }
-            Values::Float(v) => v.par_chunks_exact(self.channels).map(|p| p[at]).collect(),
-        };
-        Plane::new(self.width, self.height, data)
+            Values::Float(v) => {
+                Plane::new(width, height, v.par_chunks_exact(channels).map(|p| p[at]).collect())
+            }
+        }
     }
 
     /// The default encoding of its colours: linear for floating point, sRGB for integers.
@@ -192,7 +197,7 @@ fn kind(format: ImageFormat) -> Option<&'static str> {
 }
 
 /// Checks that a size is plausible, before anything is allocated.
-fn check_size(path: &Path, width: u64, height: u64, channels: u64) -> Result<(), DocumentError> {
+fn check_size(path: &Path, width: u64, height: u64, channels: u64, most: u64) -> Result<(), DocumentError> {
     let large = |field: &str, found, most| {
         Err(DocumentError::Large { path: path.to_path_buf(), field: field.into(), found, most })
     };
@@ -206,8 +211,8 @@ fn check_size(path: &Path, width: u64, height: u64, channels: u64) -> Result<(),
     if width * height > MOST_PIXELS {
         return large("the number of pixels", width * height, MOST_PIXELS);
     }
-    if width * height * channels > MOST_VALUES {
-        return large("the number of values", width * height * channels, MOST_VALUES);
+    if width * height * channels > most {
+        return large("the number of values", width * height * channels, most);
     }
     Ok(())
 }
@@ -237,7 +242,9 @@ fn decode_image(bytes: &[u8], format: ImageFormat, path: &Path) -> Result<Pictur
     let mut decoder = reader.into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     let channels = u64::from(decoder.color_type().channel_count());
-    check_size(path, u64::from(width), u64::from(height), channels)?;
+    let bytes = decoder.color_type().bytes_per_pixel();
+    let most = if u64::from(bytes) == 4 * channels { MOST_FLOATS } else { MOST_VALUES };
+    check_size(path, u64::from(width), u64::from(height), channels, most)?;
     // A damaged profile does not matter.
     let foreign_profile =
         decoder.icc_profile().is_ok_and(|profile| profile.is_some_and(|bytes| !is_srgb(&bytes)));
@@ -271,7 +278,8 @@ fn decode_exr(bytes: &[u8], path: &Path) -> Result<Picture, DocumentError> {
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &meta.headers {
         let size = header.layer_size;
-        check_size(path, size.width() as u64, size.height() as u64, header.channels.list.len() as u64)?;
+        let channels = header.channels.list.len() as u64;
+        check_size(path, size.width() as u64, size.height() as u64, channels, MOST_FLOATS)?;
     }
     let image = exr::prelude::read()
         .no_deep_data()

@@ -7,10 +7,8 @@
 //! both axes), as for Gaussian slopes. The window is [`WINDOW`] pixels of the base colour: smaller bumps become roughness,
 //! larger shapes are lost. A variance does not depend on sign conventions (+Y up or down), and z follows from x and y, so
 //! maps with two channels work too.
-//! Cost: a few additions per pixel for any window (running sums). Limits: isotropic; the mean slope is dropped.
+//! Cost: a few additions and two roots per pixel for any window (running sums). Limits: isotropic; the mean slope is dropped.
 //! Source: filtering of slope moments in rendering, as in Olano & Baker 2010 (LEAN mapping).
-
-use rayon::prelude::*;
 
 use super::texture::Plane;
 
@@ -20,35 +18,30 @@ pub const WINDOW: usize = 7;
 /// The steepest slope; steeper ones are clamped. An angle of 84 degrees.
 const STEEPEST: f32 = 10.0;
 
-/// The slope variance (mean of both axes) about the local mean, in a square window of `2 radius + 1` pixels that is cut off
+/// The largest variance: whatever has more is as rough as a surface can be, see [`widened`].
+const MOST: f32 = 0.5;
+
+/// The slope variance (mean of both axes), at most [`MOST`], about the local mean, in a square window of `2 radius + 1` pixels that is cut off
 /// at the borders. `x` and `y` are the stored components, 0 to 1, and have the same size; `scale` multiplies the decoded
 /// components like glTF's normal scale.
 pub fn slope_variance(x: &Plane, y: &Plane, scale: f32, radius: usize) -> Plane {
     let (width, height) = (x.width(), x.height());
-    let slopes: Vec<[f32; 2]> = x
-        .data()
-        .par_iter()
-        .zip(y.data())
-        .map(|(&x, &y)| {
-            let (x, y) = (2.0 * x - 1.0, 2.0 * y - 1.0);
-            let z = (1.0 - x * x - y * y).max(0.0).sqrt().max(1.0 / STEEPEST);
-            [x * scale / z, y * scale / z].map(|s| s.clamp(-STEEPEST, STEEPEST))
-        })
-        .collect();
-    // Per column: running sums of s_x, s_y and s_x^2 + s_y^2 over the rows of the window.
-    let mut data = vec![0.0f32; width * height];
-    const BAND: usize = 64;
-    data.par_chunks_mut(width * BAND).enumerate().for_each(|(band, out)| {
+    let slope = |pixel: usize| {
+        let (x, y) = (2.0 * x.at(pixel) - 1.0, 2.0 * y.at(pixel) - 1.0);
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt().max(1.0 / STEEPEST);
+        [x * scale / z, y * scale / z].map(|s| s.clamp(-STEEPEST, STEEPEST))
+    };
+    Plane::coded((width, height), (0.0, MOST), |top, out| {
+        // Per column: running sums of s_x, s_y and s_x^2 + s_y^2 over the rows of the window.
         let mut columns = vec![[0.0f64; 3]; width];
         let add = |columns: &mut [[f64; 3]], y: usize, sign: f64| {
-            for (sum, &[sx, sy]) in columns.iter_mut().zip(&slopes[y * width..][..width]) {
-                let (sx, sy) = (f64::from(sx), f64::from(sy));
+            for (sum, pixel) in columns.iter_mut().zip(y * width..) {
+                let [sx, sy] = slope(pixel).map(f64::from);
                 sum[0] += sign * sx;
                 sum[1] += sign * sy;
                 sum[2] += sign * (sx * sx + sy * sy);
             }
         };
-        let top = band * BAND;
         for y in top.saturating_sub(radius)..(top + radius).min(height) {
             add(&mut columns, y, 1.0);
         }
@@ -78,8 +71,7 @@ pub fn slope_variance(x: &Plane, y: &Plane, scale: f32, radius: usize) -> Plane 
                 *out = (0.5 * both).max(0.0) as f32;
             }
         }
-    });
-    Plane::new(width, height, data)
+    })
 }
 
 /// A microfacet width plus a slope variance: `sqrt(alpha^2 + 2 var)`.
@@ -108,13 +100,13 @@ mod tests {
     fn a_tilted_plane_has_no_variance_and_a_ridge_has_its_own() {
         let flat = Plane::new(40, 30, vec![0.5; 1200]);
         let tilted = Plane::new(40, 30, vec![encode(0.4); 1200]);
-        assert!(slope_variance(&tilted, &flat, 1.0, 3).data().iter().all(|v| v.abs() < 1e-6));
+        assert!(slope_variance(&tilted, &flat, 1.0, 3).values().all(|v| v.abs() < 1e-6));
         // Alternating slopes of +0.3 and -0.3: within 7 columns, 4 of one sign and 3 of the other.
         let ridges =
             Plane::new(40, 30, (0..1200).map(|i| encode(if i % 2 == 0 { 0.3 } else { -0.3 })).collect());
         let var = slope_variance(&ridges, &flat, 1.0, 3);
         let expected = 0.5 * 0.09 * (1.0 - (1.0f32 / 7.0).powi(2));
-        assert!((var.data()[15 * 40 + 20] - expected).abs() < 1e-5, "{} {expected}", var.data()[620]);
+        assert!((var.at(15 * 40 + 20) - expected).abs() < 1e-5, "{} {expected}", var.at(620));
     }
 
     proptest! {
@@ -130,7 +122,7 @@ mod tests {
             let y = Plane::new(w, h, (0..w * h).map(|i| noise(i, 2)).collect());
             let found = slope_variance(&x, &y, 0.7, radius);
             let slope = |i: usize| {
-                let (x, y) = (f64::from(2.0 * x.data()[i] - 1.0), f64::from(2.0 * y.data()[i] - 1.0));
+                let (x, y) = (f64::from(2.0 * x.at(i) - 1.0), f64::from(2.0 * y.at(i) - 1.0));
                 let z = (1.0 - x * x - y * y).max(0.01).sqrt();
                 [0.7 * x / z, 0.7 * y / z]
             };
@@ -146,7 +138,7 @@ mod tests {
                     let mean = [0, 1].map(|k| all.iter().map(|s| s[k]).sum::<f64>() / n);
                     let var = all.iter().map(|s| (s[0] - mean[0]).powi(2) + (s[1] - mean[1]).powi(2)).sum::<f64>()
                         / (2.0 * n);
-                    prop_assert!((f64::from(found.data()[cy * w + cx]) - var).abs() < 1e-5);
+                    prop_assert!((f64::from(found.at(cy * w + cx)) - var.min(0.5)).abs() < 1e-5);
                 }
             }
         }

@@ -44,7 +44,8 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} basis material{}; average difference d = {:.4} between a pixel and its mixture (95 % below {:.4}, worst {:.4})",
+            "{} basis material{}; root mean square difference d = {:.4} between a pixel and its mixture (95 % below {:.4}, \
+             worst {:.4})",
             self.bases,
             if self.bases == 1 { "" } else { "s" },
             self.rmse,

@@ -11,14 +11,12 @@ pub const MOST_BASES: usize = 32;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Corners of the document, fitted in the metric. Reproduces the document nearly as well as bases that are not real
-    /// materials, and prints best.
+    /// Corners of the document, fitted in the metric and kept near its real materials.
     #[default]
     Archetypes,
     /// The paper's convex-hull k-means: real materials and robust, but slightly inside the corners.
     Kmeans,
-    /// Sparse alternating constrained least squares, the paper's other method. Reproduces the document best, with bases that
-    /// may be far from any real material.
+    /// Sparse alternating constrained least squares, the paper's other method: its bases may be far from any real material.
     Sacls,
 }
 

@@ -59,7 +59,7 @@ pub(super) fn weigh(
     observer.end();
     // Reports the first error in reading order, whichever thread found one first.
     runs.into_iter().collect::<Result<(), _>>()?;
-    let maps = WeightMaps::new(width, height, k, distinct.spread(&data, k))?;
+    let maps = WeightMaps::new(width, height, k, distinct.spread(data, k))?;
     Ok((maps, measure(&mut distinct.spread(&distance, 1))))
 }
 

@@ -83,7 +83,7 @@ pub(super) fn map(
         gap = gap.max(run?);
     }
     Ok(Clamped {
-        shares: distinct.spread(&shares, k),
+        shares: distinct.spread(shares, k),
         distance: distinct.spread(&distance, 1),
         light: distinct.spread(&light, 1),
         brightness: distinct.spread(&brightness, 1),

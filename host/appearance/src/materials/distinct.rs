@@ -2,11 +2,13 @@
 //!
 //! Problem: in textures a third to nine tenths of the pixels repeat an earlier one bit for bit, and what has been computed
 //! for a material need not be computed again.
-//! Method: pixels are grouped by a hash of their reflectance and numbered in reading order. Each pixel is then compared
+//! Method: pixels are grouped by their keys ([`Materials::key`]) and numbered in reading order. Each pixel is then compared
 //! in full with the first pixel of its group; one that differs (a hash collision) becomes a material of its own, so a
 //! collision costs time and nothing else.
-//! Cost: two evaluations and one hash per pixel, on all cores; 12 bytes per pixel. Limits: equal means bit for bit.
+//! Cost: one key per pixel, and one evaluation if it is not the first of its group, on all cores; 12 bytes per pixel.
+//! Limits: equal means bit for bit; what is equal only by chance may count as two materials.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 use rayon::prelude::*;
@@ -31,8 +33,7 @@ impl Distinct {
         hashes.par_chunks_mut(RUN).enumerate().for_each(|(run, hashes)| {
             let mut row = vec![0.0; columns];
             for (i, out) in hashes.iter_mut().enumerate() {
-                materials.reflectance(run * RUN + i, &mut row);
-                *out = hash(&row);
+                *out = materials.key(run * RUN + i, &mut row);
             }
         });
         let mut seen: HashMap<u64, u32> = HashMap::new();
@@ -90,8 +91,17 @@ impl Distinct {
         &self.class
     }
 
-    /// Copies the values of the materials, `each` per material, to their pixels.
-    pub fn spread<T: Copy + Default + Send + Sync>(&self, values: &[T], each: usize) -> Vec<T> {
+    /// Copies the values of the materials, `each` per material, to their pixels. Owned values are returned as they are if no
+    /// material repeats, so that they do not take up memory twice.
+    pub fn spread<'a, T: Copy + Default + Send + Sync + 'a>(
+        &self,
+        values: impl Into<Cow<'a, [T]>>,
+        each: usize,
+    ) -> Vec<T> {
+        let values = values.into();
+        if self.class.iter().enumerate().all(|(pixel, &class)| pixel == class as usize) {
+            return values.into_owned();
+        }
         let mut out = vec![T::default(); self.class.len() * each];
         out.par_chunks_mut(RUN * each).zip(self.class.par_chunks(RUN)).for_each(|(out, class)| {
             for (out, &class) in out.chunks_exact_mut(each).zip(class) {
@@ -104,13 +114,6 @@ impl Distinct {
 
 fn bits(row: &[f32]) -> impl Iterator<Item = u32> {
     row.iter().map(|v| v.to_bits())
-}
-
-/// A multiply-and-rotate hash over the bits.
-fn hash(row: &[f32]) -> u64 {
-    bits(row).fold(0x9e37_79b9_7f4a_7c15, |h, v| {
-        (h.rotate_left(5) ^ u64::from(v)).wrapping_mul(0x517c_c1b7_2722_0a95)
-    })
 }
 
 #[cfg(test)]

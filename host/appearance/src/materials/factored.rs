@@ -43,9 +43,13 @@ impl Materials for Factored {
 
     fn reflectance(&self, pixel: usize, out: &mut [f32]) {
         out.fill(0.0);
+        self.add(pixel, 1.0, out);
+    }
+
+    fn add(&self, pixel: usize, part: f32, out: &mut [f32]) {
         for (&weight, basis) in self.maps.at(pixel).iter().zip(self.bases.rows()) {
             if weight > 0 {
-                let weight = f32::from(weight) / f32::from(ONE);
+                let weight = part * (f32::from(weight) / f32::from(ONE));
                 for (out, &value) in out.iter_mut().zip(basis) {
                     *out += weight * value as f32;
                 }

@@ -1,19 +1,24 @@
 //! What the pixels of a document reflect, one by one and never all at once as curves.
 //!
 //! [`Materials`] is all that factoring and gamut mapping know of a document. It is implemented by a surface for every
-//! pixel ([`Surfaces`]), by bases and weight maps ([`Factored`]) and by one material everywhere ([`Uniform`]).
-//! `Distinct` finds the pixels that are equal, so that each material is computed once.
+//! pixel ([`Surfaces`]), by bases and weight maps ([`Factored`]) and by one material everywhere ([`Uniform`]). [`Reduced`]
+//! averages any of them over the cells of a print ([`Cover`]). `Distinct` finds the pixels that are equal, so that each
+//! material is computed once.
 
+mod cover;
 mod distinct;
 mod factored;
 mod pixels;
+mod reduced;
 mod surface;
 mod surfaces;
 mod uniform;
 
+pub use cover::Cover;
 pub(crate) use distinct::Distinct;
 pub use factored::Factored;
 pub use pixels::Materials;
+pub use reduced::{Reduced, resolution};
 pub use surface::Surface;
 pub(crate) use surface::{dielectric, metallic, specular};
 pub use surfaces::Surfaces;

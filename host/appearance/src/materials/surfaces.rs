@@ -4,11 +4,14 @@
 //! Method: lobes are tabulated over ln(alpha) at the angles of the space. A row interpolates between two table rows and
 //! takes three multiply-adds per sample. The interpolation error is `h^2 / 8` of the lobe's second derivative in
 //! ln(alpha) (at most 4 times the lobe), `h = ln(1 / 0.02) / 255`: about 1e-4 of the lobe.
-//! Cost: 28 bytes per pixel; 8 operations per sample, no root, no trigonometry.
+//! Surfaces are computed from the document's maps whenever they are asked for: the maps, as they were decoded, take a fraction
+//! of the memory.
+//! Cost: a logarithm and some look-ups per pixel; 8 operations per sample, no root, no trigonometry.
 
-use rayon::prelude::*;
+use std::fmt;
+use std::sync::Arc;
 
-use super::pixels::Materials;
+use super::pixels::{Materials, hash};
 use super::surface::Surface;
 use crate::brdf::Space;
 
@@ -16,9 +19,6 @@ use crate::brdf::Space;
 const LEAST_ALPHA: f32 = 0.02;
 
 const LEVELS: usize = 256;
-
-/// Pixels handed to a thread at a time.
-const CHUNK: usize = 1 << 14;
 
 /// Lobes for unit f0 at the angles of a space, over ln(alpha).
 #[derive(Clone, Debug)]
@@ -68,46 +68,50 @@ struct Packed {
 }
 
 /// A surface for every pixel. See the module documentation.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Surfaces {
     width: usize,
     height: usize,
     space: Space,
     lobes: Lobes,
-    pixels: Vec<Packed>,
+    surface: Arc<dyn Fn(usize) -> Surface + Send + Sync>,
+}
+
+impl fmt::Debug for Surfaces {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Surfaces({} x {})", self.width, self.height)
+    }
 }
 
 impl Surfaces {
-    /// Builds the surfaces pixel by pixel, rows from the top, on all cores. Values are clamped to their ranges, NaN to the
-    /// lowest value. `width` and `height` are at least 1.
-    #[expect(clippy::manual_clamp, reason = "clamp would keep NaN, max drops it")]
+    /// Surfaces by the number of their pixel, rows from the top. Values are clamped to their ranges, NaN to the lowest value.
+    /// `width` and `height` are at least 1.
     pub(crate) fn build(
         width: usize,
         height: usize,
         space: Space,
-        surface: impl Fn(usize) -> Surface + Sync,
+        surface: impl Fn(usize) -> Surface + Send + Sync + 'static,
     ) -> Surfaces {
-        let mut pixels = vec![Packed { base: [0.0; 3], f0: [0.0; 3], position: 0.0 }; width * height];
-        pixels.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
-            for (i, out) in out.iter_mut().enumerate() {
-                let surface = surface(chunk * CHUNK + i);
-                // `max` before `min`: NaN becomes 0.
-                let unit = |v: f32| v.max(0.0).min(1.0);
-                *out = Packed {
-                    base: surface.diffuse.map(|v| unit(v) * std::f32::consts::FRAC_1_PI),
-                    f0: surface.f0.map(unit),
-                    position: Lobes::position(surface.alpha.max(LEAST_ALPHA).min(1.0)),
-                };
-            }
-        });
         let lobes = Lobes::new(&space);
-        Surfaces { width, height, space, lobes, pixels }
+        Surfaces { width, height, space, lobes, surface: Arc::new(surface) }
+    }
+
+    #[expect(clippy::manual_clamp, reason = "clamp would keep NaN, max drops it")]
+    fn packed(&self, pixel: usize) -> Packed {
+        let surface = (self.surface)(pixel);
+        // `max` before `min`: NaN becomes 0.
+        let unit = |v: f32| v.max(0.0).min(1.0);
+        Packed {
+            base: surface.diffuse.map(|v| unit(v) * std::f32::consts::FRAC_1_PI),
+            f0: surface.f0.map(unit),
+            position: Lobes::position(surface.alpha.max(LEAST_ALPHA).min(1.0)),
+        }
     }
 
     /// The surface of pixel `y * width + x`.
     #[cfg(test)]
     pub(crate) fn surface(&self, pixel: usize) -> Surface {
-        let packed = self.pixels[pixel];
+        let packed = self.packed(pixel);
         Surface {
             diffuse: packed.base.map(|v| v * std::f32::consts::PI),
             f0: packed.f0,
@@ -130,14 +134,27 @@ impl Materials for Surfaces {
     }
 
     fn reflectance(&self, pixel: usize, out: &mut [f32]) {
-        let Packed { base, f0, position } = self.pixels[pixel];
+        let Packed { base, f0, position } = self.packed(pixel);
         let (below, above, s) = self.lobes.around(position);
-        for ((out, &below), &above) in out.chunks_exact_mut(3).zip(below).zip(above) {
+        for ((out, &below), &above) in out.as_chunks_mut::<3>().0.iter_mut().zip(below).zip(above) {
             let lobe = below + s * (above - below);
-            out[0] = base[0] + f0[0] * lobe;
-            out[1] = base[1] + f0[1] * lobe;
-            out[2] = base[2] + f0[2] * lobe;
+            *out = std::array::from_fn(|c| base[c] + f0[c] * lobe);
         }
+    }
+
+    fn add(&self, pixel: usize, part: f32, out: &mut [f32]) {
+        let Packed { base, f0, position } = self.packed(pixel);
+        let (base, f0) = (base.map(|v| part * v), f0.map(|v| part * v));
+        let (below, above, s) = self.lobes.around(position);
+        for ((out, &below), &above) in out.as_chunks_mut::<3>().0.iter_mut().zip(below).zip(above) {
+            let lobe = below + s * (above - below);
+            (0..3).for_each(|c| out[c] += base[c] + f0[c] * lobe);
+        }
+    }
+
+    fn key(&self, pixel: usize, _row: &mut [f32]) -> u64 {
+        let Packed { base: [a, b, c], f0: [d, e, f], position } = self.packed(pixel);
+        hash(&[a, b, c, d, e, f, position])
     }
 }
 
@@ -154,9 +171,12 @@ mod tests {
         ) {
             let space = Space::half_angle(48);
             let surface = Surface { diffuse, f0, alpha };
-            let surfaces = Surfaces::build(1, 1, space.clone(), |_| surface);
+            let surfaces = Surfaces::build(1, 1, space.clone(), move |_| surface);
             let mut row = vec![0.0; space.columns()];
             surfaces.reflectance(0, &mut row);
+            let mut twice = row.clone();
+            surfaces.add(0, 1.0, &mut twice);
+            prop_assert!(twice.iter().zip(&row).all(|(t, r)| (t - 2.0 * r).abs() <= 1e-5 * r));
             let expected = space.row(&surface.curve(space.angles()));
             for (&found, &expected) in row.iter().zip(&expected) {
                 let found = f64::from(found);
@@ -171,7 +191,7 @@ mod tests {
         let space = Space::half_angle(8);
         let wild =
             Surface { diffuse: [f32::NAN, -3.0, 9.0], f0: [f32::INFINITY, f32::NAN, -1.0], alpha: f32::NAN };
-        let surfaces = Surfaces::build(1, 1, space.clone(), |_| wild);
+        let surfaces = Surfaces::build(1, 1, space.clone(), move |_| wild);
         let mut row = vec![f32::NAN; space.columns()];
         surfaces.reflectance(0, &mut row);
         assert!(row.iter().all(|v| v.is_finite() && *v >= 0.0), "{row:?}");

@@ -56,4 +56,8 @@ impl Materials for Uniform {
     fn reflectance(&self, _pixel: usize, out: &mut [f32]) {
         out.copy_from_slice(&self.row);
     }
+
+    fn key(&self, _pixel: usize, _row: &mut [f32]) -> u64 {
+        0
+    }
 }

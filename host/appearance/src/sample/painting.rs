@@ -67,17 +67,17 @@ impl Painting {
     pub fn surfaces(&self, space: Space) -> Surfaces {
         // The steps of the folder reader, in the same order.
         let colour: Vec<f32> = (0..=255u8).map(|v| srgb::decode(f32::from(v) / 255.0)).collect();
-        let linear = |rgb: [u8; 3]| rgb.map(|v| colour[usize::from(v)]);
+        let linear = move |rgb: [u8; 3]| rgb.map(|v| colour[usize::from(v)]);
         let data = |v: u8| f32::from(v) / 255.0;
-        let f0_plain = [dielectric(1.5); 3];
-        match &self.finish {
+        let (width, height, base) = (self.width, self.height, self.base.clone());
+        match self.finish.clone() {
             Finish::Metallic { roughness, metallic: metal } => {
-                Surfaces::build(self.width, self.height, space, |i| {
-                    metallic(linear(self.base[i]), f0_plain, data(roughness[i]), data(metal[i]))
+                Surfaces::build(width, height, space, move |i| {
+                    metallic(linear(base[i]), [dielectric(1.5); 3], data(roughness[i]), data(metal[i]))
                 })
             }
-            Finish::Specular { f0, glossiness } => Surfaces::build(self.width, self.height, space, |i| {
-                specular(linear(self.base[i]), linear(f0[i]), data(glossiness[i]))
+            Finish::Specular { f0, glossiness } => Surfaces::build(width, height, space, move |i| {
+                specular(linear(base[i]), linear(f0[i]), data(glossiness[i]))
             }),
         }
     }

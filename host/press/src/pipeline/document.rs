@@ -13,6 +13,8 @@ use crate::sheet::DotMap;
 use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
 use appearance::gamut::{self, Gain, GamutError, Mapped, Printable};
+use appearance::materials::{Reduced, resolution};
+use appearance::weights::WeightError;
 use observe::Observer;
 use protocol::ink::Ink;
 
@@ -52,6 +54,9 @@ pub enum StageError {
     /// Its place on the page.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    /// Averaging weight maps. Never seen; if it is, it is a bug worth a report.
+    #[error(transparent)]
+    Weights(#[from] WeightError),
     /// Factoring.
     #[error(transparent)]
     Factor(#[from] FactorError),
@@ -63,7 +68,8 @@ pub enum StageError {
     Halftone(#[from] HalftoneError),
 }
 
-/// Halftones a document at the size it will have on a page of this layout.
+/// Halftones a document at the size it will have on a page of this layout. Detail finer than a cluster of dots is averaged
+/// before anything is fitted to it.
 ///
 /// # Errors
 /// Those of the stages; a size or a layout without room is refused before the long work.
@@ -78,15 +84,27 @@ pub fn halftoned(
     let pixels = (materials.width(), materials.height());
     let (width, height) = size::dots(pixels, document.size_mm, settings.size, layout)?;
     layout::check(width.into(), height.into(), layout)?;
+    let cells = cells((width, height), pixels, library, settings);
+    if let Some((across, down)) = cells {
+        observer.note(&format!(
+            "the print shows {across} x {down} of the document's {} x {} pixels: materials are averaged over its clusters",
+            pixels.0, pixels.1
+        ));
+    }
+    let reduced = cells.map(|cells| Reduced::new(materials, cells));
+    let materials: &dyn Materials = reduced.as_ref().map_or(materials, |reduced| reduced);
     let printable = Printable::combined(library, &settings.inks, materials.space());
     let mut factoring = None;
-    let bases = || {
-        let (factored, report) = factored(document, &settings.factor, observer)?;
-        if let Some(report) = &report {
+    let bases = || match (document.as_factored(), cells) {
+        (Some(factored), Some(cells)) => Ok(Cow::Owned(factored.reduced(cells)?)),
+        (Some(factored), None) => Ok(Cow::Borrowed(factored)),
+        (None, _) => {
+            let factor::Factoring { factored, report } =
+                factor::factor(materials, &settings.factor, observer)?;
             observer.note(&report.to_string());
+            factoring = Some(report);
+            Ok::<_, StageError>(Cow::Owned(factored))
         }
-        factoring = report;
-        Ok::<_, StageError>(factored)
     };
     let mapped = gamut::map(materials, bases, &printable, &settings.gamut, observer)?;
     let chosen = halftone::Settings {
@@ -111,6 +129,23 @@ fn foils(
     let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
     let more = Printable::combined(library, &all, materials.space());
     gamut::gain(materials, printable, &more, settings)
+}
+
+/// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a
+/// pixel for each cell of the smallest clusters.
+fn cells(
+    (width, height): (u16, u16),
+    pixels: (usize, usize),
+    library: &Library,
+    settings: &Settings,
+) -> Option<(usize, usize)> {
+    let entries = library.at_hand(&settings.inks);
+    let least = entries.into_iter().map(|entry| library.minimum_cluster(&entry.stack)).min().unwrap_or(1);
+    let side = match settings.halftone {
+        halftone::Method::Blue => 1,
+        _ => (1..).find(|side| side * side >= usize::from(least)).unwrap_or(1),
+    };
+    resolution(pixels, (usize::from(width).div_ceil(side), usize::from(height).div_ceil(side)))
 }
 
 /// A document's bases and maps: its own if it came factored.

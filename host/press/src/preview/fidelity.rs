@@ -308,6 +308,100 @@ mod tests {
         assert!((side / spot_mm(0.5) - 1.0).abs() < 0.05, "{side} mm");
     }
 
+    /// A document of pixels that are no whole number of dots, under dots of two stacks.
+    struct Checked(Space, Table, usize, usize);
+
+    impl Materials for Checked {
+        fn width(&self) -> usize {
+            self.2
+        }
+        fn height(&self) -> usize {
+            self.3
+        }
+        fn space(&self) -> &Space {
+            &self.0
+        }
+        fn reflectance(&self, pixel: usize, out: &mut [f32]) {
+            let (x, y) = (pixel % self.2, pixel / self.2);
+            let share = 0.5 + 0.5 * ((x * 7 + y * 13) as f64 * 0.37).sin();
+            let rows = self.1.row(0).iter().zip(self.1.row(1));
+            out.iter_mut().zip(rows).for_each(|(o, (a, b))| *o = (share * a + (1.0 - share) * b) as f32);
+        }
+    }
+
+    /// Every dot cut into pieces that belong wholly to one cell and to one pixel, each counted by itself.
+    #[test]
+    fn fidelity_is_a_count_over_all_dots() {
+        let space = Space::half_angle(4);
+        let rows = stacks(&space);
+        let (dots, columns) = (90usize, space.columns());
+        let sheet = sheet(90, |i| (i % 90 * 31 + i / 90 * 17) % 11 < 4);
+        for pixels in [(7, 5), (31, 44), (200, 90)] {
+            let document = Checked(space.clone(), rows.clone(), pixels.0, pixels.1);
+            let area = Area::whole(sheet.dots());
+            let print = Source::Print { dots: sheet.dots(), space: &space, stacks: &rows, area };
+            let found = fidelity(&Source::Document(&document), &print, print.size(), 0.5, &Silent).unwrap();
+            let cells = dots / cell_dots(0.5);
+            // Overlaps of two rows of intervals that divide the same side: cell, place and length.
+            let overlaps = |places: usize| {
+                let mut all = Vec::new();
+                for cell in 0..cells {
+                    for place in 0..places {
+                        let from = (cell as f64 / cells as f64).max(place as f64 / places as f64);
+                        let to = ((cell + 1) as f64 / cells as f64).min((place + 1) as f64 / places as f64);
+                        if to > from {
+                            all.push((cell, place, (to - from) * cells as f64));
+                        }
+                    }
+                }
+                all
+            };
+            let mean = |(across, down): (usize, usize), row: &dyn Fn(usize, usize) -> Vec<f64>| {
+                let mut sums = vec![vec![0.0; columns]; cells * cells];
+                for (v, y, part) in overlaps(down) {
+                    for (u, x, share) in overlaps(across) {
+                        let sum = &mut sums[v * cells + u];
+                        sum.iter_mut().zip(row(x, y)).for_each(|(s, f)| *s += part * share * f);
+                    }
+                }
+                sums
+            };
+            let printed =
+                mean((dots, dots), &|x, y| rows.row(usize::from(sheet.index()[y * dots + x])).to_vec());
+            let wanted = mean(pixels, &|x, y| {
+                let mut row = vec![0.0; columns];
+                document.reflectance(y * pixels.0 + x, &mut row);
+                row.iter().map(|&f| f64::from(f)).collect()
+            });
+            let blurred = |cell: &[Vec<f64>], u: usize, v: usize| {
+                let mut sum = vec![0.0; columns];
+                for (dv, a) in [(-1isize, 0.25), (0, 0.5), (1, 0.25)] {
+                    for (du, b) in [(-1isize, 0.25), (0, 0.5), (1, 0.25)] {
+                        let near = |i: usize, d: isize| i.saturating_add_signed(d).min(cells - 1);
+                        let row = &cell[near(v, dv) * cells + near(u, du)];
+                        sum.iter_mut().zip(row).for_each(|(s, f)| *s += a * b * f);
+                    }
+                }
+                sum
+            };
+            let distances: Vec<f64> = (0..cells * cells)
+                .map(|i| {
+                    let (u, v) = (i % cells, i / cells);
+                    space.distance(&blurred(&wanted, u, v), &blurred(&printed, u, v))
+                })
+                .collect();
+            let n = distances.len() as f64;
+            let expected = [
+                distances.iter().sum::<f64>() / n,
+                (distances.iter().map(|d| d * d).sum::<f64>() / n).sqrt(),
+                distances.iter().copied().fold(0.0, f64::max),
+            ];
+            for (found, expected) in [found.mean, found.rmse, found.max].into_iter().zip(expected) {
+                assert!((found / expected - 1.0).abs() < 1e-4, "{pixels:?}: {found}, not {expected}");
+            }
+        }
+    }
+
     #[test]
     fn reports_do_not_depend_on_the_number_of_threads() {
         let space = Space::half_angle(4);

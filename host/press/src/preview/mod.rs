@@ -12,6 +12,7 @@
 mod canvas;
 mod error;
 mod fidelity;
+mod fine;
 mod flat;
 pub mod inks;
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::sheet::{Area, DotMap};
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::factor::Factored;
+use appearance::materials::Cover;
 use appearance::weights::ONE;
 
 use super::error::{PreviewError, check_size};
@@ -125,54 +126,19 @@ pub(super) struct Lines<'a> {
 pub(super) struct Scratch {
     counts: Vec<u32>,
     sums: Vec<u64>,
-    row: Vec<f32>,
+    shares: Vec<f32>,
+    mean: Vec<f32>,
 }
 
-/// What one of `pixels` equal pixels covers of a side of `size` places: places in a row, with the part of each in
-/// 1/`pixels` of a place. The parts of a pixel sum to `size`, and those of a place, over all pixels, to `pixels`.
-#[derive(Clone, Copy, Debug)]
-struct Cover {
-    /// First place, and the one after the last.
-    places: (usize, usize),
-    /// Parts of the first and of the last place.
-    ends: (u32, u32),
-    /// Part of every place between.
-    whole: u32,
+/// The mean over one pixel.
+pub(super) enum Mean<'a> {
+    /// The share of each stack, or of each basis.
+    Shares(&'a [f32]),
+    /// The reflectance (1/sr), a row of the space.
+    Row(&'a [f32]),
 }
 
-impl Cover {
-    fn new(i: usize, pixels: usize, size: usize) -> Cover {
-        // In 1/pixels of a place.
-        let (start, end) = (i * size, (i + 1) * size);
-        let places = (start / pixels, end.div_ceil(pixels));
-        let first = end.min((places.0 + 1) * pixels) - start;
-        let last = end - start.max((places.1 - 1) * pixels);
-        // Sides of sheets and pictures are below 2^16.
-        Cover { places, ends: (first as u32, last as u32), whole: pixels as u32 }
-    }
-
-    /// The part of a place of this pixel.
-    fn part(&self, place: usize) -> u32 {
-        match place {
-            _ if place == self.places.0 => self.ends.0,
-            _ if place + 1 == self.places.1 => self.ends.1,
-            _ => self.whole,
-        }
-    }
-
-    /// All places with their parts, or `samples` of them, evenly spread and alike, where there are more.
-    fn sampled(&self, samples: usize) -> impl Iterator<Item = (usize, u32)> + use<'_> {
-        let (from, to) = self.places;
-        let count = (to - from).min(samples);
-        (0..count).map(move |i| match count == to - from {
-            true => (from + i, self.part(from + i)),
-            // The centres of equal parts.
-            false => (from + (2 * i + 1) * (to - from) / (2 * count), 1),
-        })
-    }
-}
-
-impl Lines<'_> {
+impl<'a> Lines<'a> {
     /// Columns of the reflectance of a pixel.
     pub fn columns(&self) -> usize {
         self.columns
@@ -188,87 +154,132 @@ impl Lines<'_> {
         self.height
     }
 
-    /// Writes the mean reflectance (1/sr) of line `y` to `out`, which has `width * columns` places.
-    pub fn read(&self, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
-        let (across, down) = self.source.size();
-        let line = Cover::new(y, self.height, down);
-        // The parts of a pixel sum to this.
-        let scale = 1.0 / (across as f64 * down as f64);
-        match &self.source {
-            Source::Document(materials) => self.read_document(*materials, &line, scratch, out),
-            Source::Factored(factored) => {
-                let maps = &factored.maps;
-                let scale = (scale / f64::from(ONE)) as f32;
-                for (cover, out) in self.across.iter().zip(out.chunks_exact_mut(self.columns)) {
-                    scratch.sums.clear();
-                    scratch.sums.resize(maps.channels(), 0);
-                    for py in line.places.0..line.places.1 {
-                        for px in cover.places.0..cover.places.1 {
-                            let part = u64::from(line.part(py)) * u64::from(cover.part(px));
-                            let weights = maps.at(py * maps.width() + px);
-                            scratch
-                                .sums
-                                .iter_mut()
-                                .zip(weights)
-                                .for_each(|(s, &w)| *s += part * u64::from(w));
-                        }
-                    }
-                    self.mix(scratch.sums.iter().map(|&s| s as f32 * scale), out);
-                }
-            }
-            Source::Print { dots, area, .. } => {
-                let stacks = dots.stacks().len();
-                scratch.counts.clear();
-                scratch.counts.resize(self.width * stacks, 0);
-                for row in line.places.0..line.places.1 {
-                    let start = (area.top + row) * dots.width() + area.left;
-                    let dots = &dots.index()[start..start + area.width];
-                    // A page has fewer than 2^32 dots, so no sum of parts overflows.
-                    let down = line.part(row);
-                    for (cover, counts) in self.across.iter().zip(scratch.counts.chunks_exact_mut(stacks)) {
-                        let (from, to) = cover.places;
-                        counts[usize::from(dots[from])] += down * cover.ends.0;
-                        if to - from > 1 {
-                            counts[usize::from(dots[to - 1])] += down * cover.ends.1;
-                            for &dot in &dots[from + 1..to - 1] {
-                                counts[usize::from(dot)] += down * cover.whole;
-                            }
-                        }
-                    }
-                }
-                for (out, counts) in
-                    out.chunks_exact_mut(self.columns).zip(scratch.counts.chunks_exact(stacks))
-                {
-                    self.mix(counts.iter().map(|&n| n as f32 * scale as f32), out);
-                }
-            }
+    /// The reflectance of what pixels are mixed of, row by row: stacks or bases. Documents have none.
+    pub fn table(&self) -> Option<&'a Table> {
+        match self.source {
+            Source::Document(_) => None,
+            Source::Factored(factored) => Some(&factored.bases),
+            Source::Print { stacks, .. } => Some(stacks),
         }
     }
 
-    fn mix(&self, shares: impl Iterator<Item = f32>, out: &mut [f32]) {
+    /// Writes the mean reflectance (1/sr) of line `y` to `out`, which has `width * columns` places.
+    pub fn read(&self, y: usize, scratch: &mut Scratch, out: &mut [f32]) {
+        let mut pixels = out.chunks_exact_mut(self.columns);
+        self.each(y, scratch, |mean| {
+            let Some(out) = pixels.next() else { return };
+            match mean {
+                Mean::Row(row) => out.copy_from_slice(row),
+                Mean::Shares(shares) => self.mix(shares, out),
+            }
+        });
+    }
+
+    /// Calls `each` with the mean over every pixel of line `y`, from the left.
+    pub fn each(&self, y: usize, scratch: &mut Scratch, each: impl FnMut(Mean)) {
+        let line = Cover::new(y, self.height, self.source.size().1);
+        match &self.source {
+            Source::Document(materials) => self.each_document(*materials, &line, scratch, each),
+            Source::Factored(factored) => self.each_factored(factored, &line, scratch, each),
+            Source::Print { dots, area, .. } => self.each_print(dots, area, &line, scratch, each),
+        }
+    }
+
+    /// The sum of the parts of a pixel.
+    fn whole(&self) -> f64 {
+        let (across, down) = self.source.size();
+        across as f64 * down as f64
+    }
+
+    fn each_factored(
+        &self,
+        factored: &Factored,
+        line: &Cover,
+        scratch: &mut Scratch,
+        mut each: impl FnMut(Mean),
+    ) {
+        let maps = &factored.maps;
+        let scale = (1.0 / self.whole() / f64::from(ONE)) as f32;
+        for cover in &self.across {
+            scratch.sums.clear();
+            scratch.sums.resize(maps.channels(), 0);
+            for py in line.places.0..line.places.1 {
+                for px in cover.places.0..cover.places.1 {
+                    let part = u64::from(line.share(py)) * u64::from(cover.share(px));
+                    let weights = maps.at(py * maps.width() + px);
+                    scratch.sums.iter_mut().zip(weights).for_each(|(s, &w)| *s += part * u64::from(w));
+                }
+            }
+            scratch.shares.clear();
+            scratch.shares.extend(scratch.sums.iter().map(|&sum| sum as f32 * scale));
+            each(Mean::Shares(&scratch.shares));
+        }
+    }
+
+    fn each_print(
+        &self,
+        dots: &DotMap,
+        area: &Area,
+        line: &Cover,
+        scratch: &mut Scratch,
+        mut each: impl FnMut(Mean),
+    ) {
+        let scale = (1.0 / self.whole()) as f32;
+        let stacks = dots.stacks().len();
+        scratch.counts.clear();
+        scratch.counts.resize(self.width * stacks, 0);
+        for row in line.places.0..line.places.1 {
+            let start = (area.top + row) * dots.width() + area.left;
+            let dots = &dots.index()[start..start + area.width];
+            // A page has fewer than 2^32 dots, so no sum of parts overflows.
+            let down = line.share(row);
+            for (cover, counts) in self.across.iter().zip(scratch.counts.chunks_exact_mut(stacks)) {
+                let (from, to) = cover.places;
+                counts[usize::from(dots[from])] += down * cover.ends.0;
+                if to - from > 1 {
+                    counts[usize::from(dots[to - 1])] += down * cover.ends.1;
+                    for &dot in &dots[from + 1..to - 1] {
+                        counts[usize::from(dot)] += down * cover.whole;
+                    }
+                }
+            }
+        }
+        for counts in scratch.counts.chunks_exact(stacks) {
+            scratch.shares.clear();
+            scratch.shares.extend(counts.iter().map(|&n| n as f32 * scale));
+            each(Mean::Shares(&scratch.shares));
+        }
+    }
+
+    fn mix(&self, shares: &[f32], out: &mut [f32]) {
         out.fill(0.0);
-        for (share, row) in shares.zip(self.rows.chunks_exact(self.columns)) {
+        for (&share, row) in shares.iter().zip(self.rows.chunks_exact(self.columns)) {
             if share > 0.0 {
                 out.iter_mut().zip(row).for_each(|(o, &r)| *o += share * r);
             }
         }
     }
 
-    fn read_document(&self, materials: &dyn Materials, line: &Cover, scratch: &mut Scratch, out: &mut [f32]) {
-        scratch.row.resize(self.columns, 0.0);
-        let row = &mut scratch.row;
-        for (cover, out) in self.across.iter().zip(out.chunks_exact_mut(self.columns)) {
-            out.fill(0.0);
-            let mut sum = 0.0;
+    fn each_document(
+        &self,
+        materials: &dyn Materials,
+        line: &Cover,
+        scratch: &mut Scratch,
+        mut each: impl FnMut(Mean),
+    ) {
+        scratch.mean.resize(self.columns, 0.0);
+        let mean = &mut scratch.mean;
+        for cover in &self.across {
+            let shares =
+                |cover: &Cover| cover.sampled(self.samples).map(|(_, share)| f64::from(share)).sum::<f64>();
+            let whole = (shares(line) * shares(cover)) as f32;
+            mean.fill(0.0);
             for (py, down) in line.sampled(self.samples) {
                 for (px, across) in cover.sampled(self.samples) {
-                    let part = down as f32 * across as f32;
-                    materials.reflectance(py * materials.width() + px, row);
-                    out.iter_mut().zip(row.iter()).for_each(|(o, &r)| *o += part * r);
-                    sum += part;
+                    materials.add(py * materials.width() + px, down as f32 * across as f32 / whole, mean);
                 }
             }
-            out.iter_mut().for_each(|o| *o /= sum);
+            each(Mean::Row(mean));
         }
     }
 }
@@ -283,24 +294,6 @@ mod tests {
     use protocol::paper::Paper;
 
     proptest! {
-        #[test]
-        fn pixels_cover_a_side_once_and_alike(size in 1usize..300, pixels in 1usize..300) {
-            let mut covered = vec![0; size];
-            for i in 0..pixels {
-                let cover = Cover::new(i, pixels, size);
-                prop_assert!(cover.places.0 < cover.places.1 && cover.places.1 <= size);
-                let parts = (cover.places.0..cover.places.1).map(|place| cover.part(place));
-                prop_assert_eq!(parts.sum::<u32>() as usize, size);
-                for (place, part) in cover.sampled(usize::MAX) {
-                    // By the lengths of intervals: the pixel and the place, on a common scale.
-                    let (from, to) = ((i * size).max(place * pixels), ((i + 1) * size).min((place + 1) * pixels));
-                    prop_assert_eq!(part as usize, to - from);
-                    covered[place] += part as usize;
-                }
-            }
-            prop_assert!(covered.iter().all(|&parts| parts == pixels));
-        }
-
         #[test]
         fn a_line_of_a_sheet_is_the_mean_of_its_dots(
             dots in prop::collection::vec(0u8..3, 12 * 9), width in 1usize..15, height in 1usize..12,

@@ -1,0 +1,97 @@
+//! Curves tabulated so finely that straight lines between the entries do.
+//!
+//! Problem: lighting reads millions of values of a curve, and [`Knots`](inks::Knots) takes logarithms for each.
+//! Method: a curve is read once at [`ENTRIES`] angles, dense in proportion to its slope at narrow lobes and at grazing angles.
+//! A second table finds the entry for the chord between normal and half vector, `2 sin(theta_h / 2)`, without a root or an
+//! arc sine. Mixing curves and mixing their tables are the same.
+//! Cost: some microseconds a curve; two multiply-adds a value. Error: below 0.15 % of modelled curves up to 86 degrees (test).
+
+use inks::Curve;
+
+/// Entries of a table.
+pub(super) const ENTRIES: usize = 384;
+
+/// Steps of the table from the chord to a place among the entries.
+const STEPS: usize = 8192;
+
+/// The angles of the entries. See the module text.
+pub(super) struct Fine {
+    angles: Vec<f64>,
+    places: Vec<f32>,
+}
+
+/// The coordinate in which entries are equidistant: it grows with ln theta where lobes fall, and with -ln cos theta near 90
+/// degrees, where they rise again.
+fn coordinate(theta: f64) -> f64 {
+    let (u, cos) = ((theta / std::f64::consts::FRAC_PI_2).sqrt(), theta.cos());
+    (10.0 * u).asinh() - 0.15 * (cos * cos + 1e-3).ln()
+}
+
+impl Fine {
+    pub fn new() -> Fine {
+        let most = std::f64::consts::FRAC_PI_2;
+        let (from, to) = (coordinate(0.0), coordinate(most));
+        let angle = |entry: usize| {
+            let wanted = from + (to - from) * entry as f64 / (ENTRIES - 1) as f64;
+            let (mut low, mut high) = (0.0, most);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if coordinate(middle) < wanted { low = middle } else { high = middle }
+            }
+            0.5 * (low + high)
+        };
+        let angles: Vec<f64> = (0..ENTRIES).map(angle).collect();
+        // Chord / sqrt 2 = sqrt(1 - cos theta), so even steps are dense where curves are steep.
+        let place = |step: usize| {
+            let theta = 2.0 * (std::f64::consts::FRAC_1_SQRT_2 * step as f64 / STEPS as f64).min(1.0).asin();
+            let below = angles.partition_point(|&a| a <= theta).clamp(1, ENTRIES - 1) - 1;
+            let part = (theta - angles[below]) / (angles[below + 1] - angles[below]);
+            // Short of the last entry, so that there is always a next one.
+            (below as f64 + part.clamp(0.0, 1.0)).min((ENTRIES - 1) as f64 - 1e-3) as f32
+        };
+        let places = (0..=STEPS).map(place).collect();
+        Fine { angles, places }
+    }
+
+    /// The curve at every entry.
+    pub fn table(&self, curve: &Curve) -> Vec<[f32; 3]> {
+        self.angles.iter().map(|&t| curve.at(t).map(|v| v as f32)).collect()
+    }
+
+    /// The entry below a chord, and the fraction of the way to the next entry, which exists.
+    #[inline]
+    pub fn at(&self, chord: f32) -> (usize, f32) {
+        let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
+        let (k, s) = (step as usize, step.fract());
+        let place = self.places[k] + s * (self.places[k + 1] - self.places[k]);
+        (place as usize, place.fract())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn straight_lines_between_entries_are_the_curve() {
+        let fine = Fine::new();
+        assert!(fine.angles[0] < 1e-12 && fine.angles.windows(2).all(|pair| pair[0] < pair[1]));
+        for (diffuse, alpha) in
+            [(0.0, 0.02), (0.01, 0.02), (0.2, 0.02), (0.005, 0.06), (0.05, 0.2), (0.27, 0.28)]
+        {
+            let f = |t: f64| diffuse + 0.5 * inks::ggx::lobe(t, alpha);
+            let exact = Vec::from_iter((0..8000).map(|n| 1.5 * (f64::from(n) / 8000.0).powi(2)));
+            let table: Vec<f64> = fine.angles.iter().map(|&t| f(t)).collect();
+            for t in exact {
+                let (k, s) = fine.at((2.0 * (t / 2.0).sin()) as f32);
+                let found = table[k] + f64::from(s) * (table[k + 1] - table[k]);
+                assert!(
+                    (found / f(t) - 1.0).abs() < 0.0015,
+                    "{diffuse} {alpha} {}: {found} {}",
+                    t.to_degrees(),
+                    f(t)
+                );
+            }
+        }
+    }
+}
