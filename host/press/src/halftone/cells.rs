@@ -10,6 +10,9 @@
 //! a fragment. Limits: detail finer than a cell is averaged, unless it is solid; a stack's cells have sides of 1, 2, 3, 4,
 //! 6 or 8 dots.
 
+mod border;
+pub(super) mod cell;
+mod choose;
 mod diffuse;
 pub(super) mod field;
 pub(super) mod plan;
@@ -22,6 +25,7 @@ use super::wide::wide;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
+use choose::Metric;
 use diffuse::{Strip, Target};
 use field::Field;
 use plan::{BLOCK, Plan};
@@ -40,6 +44,7 @@ pub(super) fn cells(
     minimum: &[u16],
     solids: &Solids,
     points: Option<&[Point]>,
+    searched: bool,
     observer: &dyn Observer,
 ) -> Vec<u8> {
     let mut sizes: Vec<usize> = minimum.iter().map(|&minimum| plan::size_of(minimum)).collect();
@@ -49,13 +54,16 @@ pub(super) fn cells(
     let field = Field::new(mix, width, height, &sizes, solids);
     let least: Vec<u16> = field.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
     let own: Vec<usize> = field.stacks.iter().map(|&q| plan::size_of(minimum[usize::from(q)])).collect();
+    let points: Option<Vec<Point>> =
+        points.map(|points| field.stacks.iter().map(|&q| points[usize::from(q)]).collect());
+    let metric = Metric::new(field.lanes, &field.mean(), points.as_deref());
     let mut index = vec![0; width * height];
     observer.begin("halftone", (width * height) as u64);
     let plan = Plan::new(&field, &own, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
         wide(|| {
-            let mut strip = Strip::new(&field, &plan, &least);
+            let mut strip = Strip::new(&field, &plan, &metric, &least);
             for row in first.saturating_sub(LEAD)..first {
                 strip.block_row(row, &mut Target { rows: None, top: 0 });
             }
@@ -66,9 +74,8 @@ pub(super) fn cells(
             }
         });
     });
-    if let Some(points) = points {
-        let points: Vec<Point> = field.stacks.iter().map(|&q| points[usize::from(q)]).collect();
-        search::search(&field, &plan, &points, &mut index);
+    if let Some(points) = points.filter(|_| searched) {
+        search::search(&field, &plan, &points, &least, &mut index);
     }
     plan.print_fragments(&mut index);
     observer.end();

@@ -119,6 +119,24 @@ impl<'a> Field<'a> {
         table.iter().find(|(known, _)| *known == size).map_or(&table[0].1, |(_, spans)| spans)
     }
 
+    /// The share of each stack in all pixels.
+    pub(super) fn mean(&self) -> Vec<f32> {
+        let maps = &self.mix.maps;
+        let mut sums = vec![0u64; maps.channels()];
+        for pixel in maps.data().chunks_exact(maps.channels()) {
+            for (sum, &weight) in sums.iter_mut().zip(pixel) {
+                *sum += u64::from(weight);
+            }
+        }
+        let pixels = (maps.width() * maps.height()) as f64;
+        let channels: Vec<f32> =
+            self.channels.iter().map(|&channel| (sums[channel] as f64 / pixels) as f32).collect();
+        let mut shares = vec![0.0; self.lanes];
+        self.shares(&channels, &mut shares);
+        shares.truncate(self.stacks.len());
+        shares
+    }
+
     /// For the pixels under a square of one of the sizes, by its place among such squares: marks the stacks that have
     /// weight there.
     pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) {

@@ -41,7 +41,8 @@ fn cells(
     points: Option<&[Point]>,
     observer: &Silent,
 ) -> Vec<u8> {
-    super::cells(mix, (width, height), minimum, &Solids::new(mix, width, height, None), points, observer)
+    let solids = Solids::new(mix, width, height, None);
+    super::cells(mix, (width, height), minimum, &solids, points, points.is_some(), observer)
 }
 
 fn side(minimum: u16) -> usize {
@@ -66,8 +67,8 @@ proptest! {
             (0..5).map(|q| (noise(seed, x / 3, y / 2, q) - 0.4).max(0.0).powi(2) + if q < 2 { 0.1 } else { 0.0 }).collect()
         });
         let dots = cells(&mix, (width, height), &minimum, None, &Silent);
-        let side = |stack: u8| side(minimum[usize::from(stack)]);
-        prop_assert_eq!(thin(width, &dots, side, |_| false), 0);
+        let minimum = |stack: u8| minimum[usize::from(stack)].into();
+        prop_assert_eq!(thin(width, &dots, minimum, |_| false), 0);
     }
 
     /// Solids of any shape amid tones are exact, and a stack is printed only where it has weight.
@@ -115,14 +116,14 @@ fn parts_beside_solids_keep_their_minimum() {
     let least = smallest_clusters(width, &numbered, &std::array::from_fn(|stack| stack as u8));
     assert!(least[..3].iter().all(|&area| area >= 9), "{:?}", &least[..4]);
     let tones = free.iter().filter(|&&free| !free).count();
-    let thin_dots = thin(width, &dots, |_| 3, |at| free[at]);
+    let thin_dots = thin(width, &dots, |_| 9, |at| free[at]);
     assert!(thin_dots as f64 <= 0.003 * tones as f64, "{thin_dots} of {tones}");
     let beside = |at: usize| {
         let (x, y) = (at % width, at / width);
         (y.saturating_sub(4)..(y + 5).min(height))
             .any(|y| (x.saturating_sub(4)..(x + 5).min(width)).any(|x| solid(x, y)))
     };
-    assert_eq!(thin(width, &dots, |_| 3, |at| free[at] || beside(at)), 0);
+    assert_eq!(thin(width, &dots, |_| 9, |at| free[at] || beside(at)), 0);
 }
 
 /// A tone in a frame of solid: nothing beyond the frame changes its dots.
@@ -219,7 +220,7 @@ fn the_search_keeps_tones_and_sees_less() {
         errors_seen(&(0..4).map(error).collect::<Vec<_>>(), side, &[0.3])[0]
     };
     assert!(seen(&best) < 0.85 * seen(&plain), "{} of {}", seen(&best), seen(&plain));
-    assert_eq!(thin(side, &best, |_| 3, |_| false), 0);
+    assert_eq!(thin(side, &best, |_| 9, |_| false), 0);
 }
 
 #[test]
@@ -378,7 +379,7 @@ fn table_of_methods() {
             let near = 3.0 * b as f64 / mean[rare].sqrt();
             let (most, lag) = if flat { peak(SIDE, dots, rare as u8, near, 256) } else { (0.0, (0, 0)) };
             let (rows, columns) = if flat { swing(SIDE, dots, rare as u8, b) } else { (0.0, 0.0) };
-            let thin = thin(SIDE, dots, |q| side(minimum[usize::from(q)]), |_| false);
+            let thin = thin(SIDE, dots, |q| minimum[usize::from(q)].into(), |_| false);
             println!(
                 "{name:16} {:6} {:7.5} {:7.5} {most:6.3} {:>12} {rows:5.2} {columns:5.2} {:6.2}",
                 format!("{method:?}"),
@@ -436,4 +437,46 @@ fn a4(count: usize) -> InkMix {
         })
         .collect();
     InkMix { stacks: stacks(count), maps: WeightMaps::new(width, height, channels, data).unwrap(), matrix }
+}
+
+/// Prints how each method does on documents: the folders of `foilpress map` in `FOILPRESS_MIXES`, separated by colons.
+#[test]
+#[ignore = "a table for docs/decisions/cells.md; needs mapped documents"]
+fn table_of_documents() {
+    const SIDE: u16 = 2835;
+    let Some(folders) = std::env::var_os("FOILPRESS_MIXES") else { return };
+    for folder in std::env::split_paths(&folders) {
+        let name = folder.file_stem().unwrap().to_string_lossy().into_owned();
+        let (mix, _) = appearance::gamut::files::load(&folder).unwrap();
+        let settings = Settings::from_library(&mix.stacks, &Library::builtin());
+        let mut walked = Vec::new();
+        for method in [Method::Walk, Method::Cells, Method::Best] {
+            let settings = Settings { method, ..settings.clone() };
+            let start = std::time::Instant::now();
+            let sheet = halftone(&mix, (SIDE, SIDE), None, &settings, &Silent).unwrap();
+            let took = start.elapsed();
+            let look = super::super::metrics::look(&mix, &sheet, &settings).unwrap().unwrap();
+            let tones = super::super::metrics::tones(&mix, &sheet, &Silent).unwrap();
+            let worst = tones.iter().map(|tone| (tone.printed - tone.asked).abs()).fold(0.0, f64::max);
+            let seen: Vec<f64> = look.seen.iter().map(|seen| seen.1).collect();
+            walked = if walked.is_empty() { seen.clone() } else { walked };
+            if let Some(folder) = std::env::var_os("FOILPRESS_LOOK") {
+                std::fs::write(
+                    std::path::Path::new(&folder).join(format!("{name}.{method:?}")),
+                    sheet.index(),
+                )
+                .unwrap();
+            }
+            println!(
+                "{name:16} {:6} {:.5} {:.5}, {:.3} {:.3} of the walk; thin {:.2} %, tones within {:.3} %, {took:.2?}",
+                format!("{method:?}"),
+                seen[0],
+                seen[1],
+                seen[0] / walked[0],
+                seen[1] / walked[1],
+                100.0 * look.thin,
+                100.0 * worst,
+            );
+        }
+    }
 }
