@@ -21,6 +21,9 @@ use super::plan::{BLOCK, Plan};
 /// Part of an absent stack's debt that each cell hands to the stacks present.
 const FORGET: f32 = 1.0 / 32.0;
 
+/// The part of a disturbance that remains where the document is textured itself.
+const TEXTURED: f32 = 0.25;
+
 /// Where debts go: to the next cell, and to the cells below: behind, straight down and ahead.
 type Shares = [f32; 4];
 
@@ -141,7 +144,7 @@ impl<'a> Strip<'a> {
                     area += self.add_owned((y * self.field.width + x) as u32);
                 }
                 if step == 0 || !block.calm {
-                    self.disturbance = disturbing(&self.want);
+                    self.disturbance = disturbing(&self.want) * if block.flat { 1.0 } else { TEXTURED };
                 }
                 let cell = self.decide((x, y), size, area, true, block.calm);
                 if let Some(rows) = target.rows.as_deref_mut() {
@@ -158,7 +161,7 @@ impl<'a> Strip<'a> {
                 self.want.fill(0.0);
                 let mut area = self.add_fragment(head);
                 area += self.add_owned(plan.fragments[head as usize].seed);
-                self.disturbance = disturbing(&self.want);
+                self.disturbance = disturbing(&self.want) * if block.flat { 1.0 } else { TEXTURED };
                 let [q, _] = self.decide((x, y), size, area, false, false).halves;
                 if let Some(rows) = target.rows.as_deref_mut() {
                     for (x, y) in plan.dots(head) {

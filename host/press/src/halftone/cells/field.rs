@@ -138,27 +138,28 @@ impl<'a> Field<'a> {
     }
 
     /// For the pixels under a square of one of the sizes, by its place among such squares: marks the stacks that have
-    /// weight there.
-    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) {
+    /// weight there. Returns by how much the weight of a channel differs at most.
+    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) -> u16 {
         let (left, right) = Field::spans(&self.across, size).pixels(column);
         let (top, bottom) = Field::spans(&self.down, size).pixels(row);
         let (maps, count) = (&self.mix.maps, self.mix.maps.channels());
-        let mut any = vec![0u16; count];
+        let (mut least, mut most) = (vec![u16::MAX; count], vec![0u16; count]);
         for y in top..bottom {
             let row = y * maps.width();
             for pixel in maps.data()[(row + left) * count..(row + right) * count].chunks_exact(count) {
-                for (any, weight) in any.iter_mut().zip(pixel) {
-                    *any |= weight;
+                for ((least, most), &weight) in least.iter_mut().zip(&mut most).zip(pixel) {
+                    (*least, *most) = ((*least).min(weight), (*most).max(weight));
                 }
             }
         }
         for (&channel, shares) in self.channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
-            if any[channel] > 0 {
+            if most[channel] > 0 {
                 for (present, &share) in present.iter_mut().zip(shares) {
                     *present |= share > 0.0;
                 }
             }
         }
+        most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max().unwrap_or(0)
     }
 
     /// Adds what one dot asks for, in dots.

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 use super::super::TONE;
 use super::field::Field;
+use appearance::weights::ONE;
 
 /// Side of a block in dots. The sides of cells are its divisors.
 pub(in crate::halftone) const BLOCK: usize = 24;
@@ -40,9 +41,14 @@ pub(super) struct Block {
     pub(super) owns: bool,
     /// Whether this block and the eight around it consist of whole cells.
     pub(super) calm: bool,
+    /// Whether weights hardly differ over the block, so that tones may lock there.
+    pub(super) flat: bool,
     /// Dots that are tones.
     pub(super) tone: Mask,
 }
+
+/// By how much a weight may differ over a flat block.
+const FLAT: u16 = ONE / 16;
 
 /// Connected tones that are less than a cell.
 pub(super) struct Fragment {
@@ -80,7 +86,7 @@ impl Plan {
                 let blocks: Vec<Block> = (0..across)
                     .map(|column| {
                         present.fill(false);
-                        field.survey(BLOCK, column, row, &mut present);
+                        let flat = field.survey(BLOCK, column, row, &mut present) <= FLAT;
                         let (left, top) = (column * BLOCK, row * BLOCK);
                         let solid =
                             field.solids.any(left..(left + BLOCK).min(width), top..(top + BLOCK).min(height));
@@ -92,7 +98,7 @@ impl Plan {
                         let size = needed.max().unwrap_or(1) as u8;
                         let tone =
                             if solid { cut(field, column, row, dots) } else { inside(field, column, row) };
-                        Block { size, owns: false, calm: false, tone }
+                        Block { size, owns: false, calm: false, flat, tone }
                     })
                     .collect();
                 blocks

@@ -20,8 +20,8 @@ pub(super) struct Kernel {
 }
 
 impl Kernel {
-    /// Distances down: 0 to this, in half dots.
-    const DOWN: usize = 2 * REACH;
+    /// Distances down: 0 to this, in half dots: as far as an error reaches, from the centre of a half.
+    const DOWN: usize = 2 * REACH + BLOCK / 2;
 
     pub(super) fn new(sizes: impl Iterator<Item = usize>) -> Kernel {
         let mut tables = vec![Vec::new(); BLOCK + 1];
