@@ -47,19 +47,19 @@ pub(super) fn cells(
     searched: bool,
     observer: &dyn Observer,
 ) -> Vec<u8> {
-    let mut sizes: Vec<usize> = minimum.iter().map(|&minimum| plan::size_of(minimum)).collect();
+    let sizes_of = |&minimum: &u16| [plan::size_of(minimum), plan::halved_size_of(minimum)];
+    let mut sizes: Vec<usize> = minimum.iter().flat_map(sizes_of).collect();
     sizes.push(BLOCK);
     sizes.sort_unstable();
     sizes.dedup();
     let field = Field::new(mix, width, height, &sizes, solids);
     let least: Vec<u16> = field.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
-    let own: Vec<usize> = field.stacks.iter().map(|&q| plan::size_of(minimum[usize::from(q)])).collect();
     let points: Option<Vec<Point>> =
         points.map(|points| field.stacks.iter().map(|&q| points[usize::from(q)]).collect());
     let metric = Metric::new(field.lanes, &field.mean(), points.as_deref());
     let mut index = vec![0; width * height];
     observer.begin("halftone", (width * height) as u64);
-    let plan = Plan::new(&field, &own, &mut index);
+    let plan = Plan::new(&field, &least, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
         wide(|| {

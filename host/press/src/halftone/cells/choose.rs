@@ -12,10 +12,11 @@
 use super::cell::{Cell, fits_half};
 use super::field::LANES;
 use crate::halftone::search::Point;
+use appearance::weights::ONE;
 
 /// What a stack's own debt weighs, against the mean square of the distance of stacks from the mean of the page: with less, tones
 /// are no longer kept; with more, the dots look less even.
-const OWN: f32 = 0.5;
+const OWN: f32 = 1.0;
 
 /// By how much the decision of a cell is disturbed, in cells, for the second largest share in it, linear in between: where
 /// there are two stacks, and where others share the cell, which break most patterns themselves.
@@ -30,6 +31,12 @@ const DISTURBED: [(f32, f32, f32); 6] = [
 
 /// The same where one stack has half of the cell, which makes a checkerboard of it whatever the others are.
 const HALF: f32 = 0.16;
+
+/// By how much a weight differs over a block where hardly any disturbance is needed.
+const TEXTURED: f32 = 0.03 * ONE as f32;
+
+/// The least of these where cells may be cut and a second stack has more than a tenth of them.
+const CUT: f32 = 0.2;
 
 /// Numbers in -1..1 without order, of mean 0: 256 beginnings, and as many stacks from there.
 pub(super) static NOISE: [f32; 512] = {
@@ -137,8 +144,13 @@ impl<'a> Chooser<'a> {
         }
     }
 
+    /// Whether cells of this side may be cut into halves.
+    pub(super) fn cuts(&self, side: usize) -> bool {
+        !self.small[side].is_empty()
+    }
+
     /// What `area` dots print that ask for `want` and owe `debts`. With a side they are a whole cell, which may be cut into
-    /// halves as `stacked` says.
+    /// halves: which way, and which half comes first, says `turn`.
     #[inline(always)]
     pub(super) fn choose(
         &mut self,
@@ -146,7 +158,7 @@ impl<'a> Chooser<'a> {
         debts: &[f32],
         area: f32,
         side: Option<usize>,
-        stacked: bool,
+        turn: u32,
     ) -> Cell {
         let metric = self.metric;
         metric.products(debts, &mut self.products);
@@ -156,7 +168,7 @@ impl<'a> Chooser<'a> {
         }
         let (whole, gained) = largest(&self.gains, want);
         let small = match side {
-            Some(side) if !self.small[side].is_empty() => &self.small[side],
+            Some(side) if self.cuts(side) => &self.small[side],
             _ => return Cell::whole(whole),
         };
         let halves = self.products.iter_mut().zip(&metric.squares).zip(small);
@@ -173,7 +185,8 @@ impl<'a> Chooser<'a> {
         if 0.5 * (one + other) <= gained {
             return Cell::whole(whole);
         }
-        Cell { halves: [first, second], stacked }
+        let halves = if turn & 2 == 0 { [first, second] } else { [second, first] };
+        Cell { halves, stacked: turn & 1 == 1 }
     }
 }
 
@@ -192,8 +205,10 @@ fn largest(gains: &[f32], want: &[f32]) -> (u8, f32) {
     ((0..gains.len()).find(here).unwrap_or(0) as u8, most)
 }
 
-/// By how much to disturb the decision of a cell that asks for `want`, in cells: [`DISTURBED`].
-pub(super) fn disturbing(want: &[f32]) -> f32 {
+/// By how much to disturb the decision of a cell that asks for `want`, in cells: [`DISTURBED`], and less the more weights of the
+/// document vary around it, for then nothing locks.
+pub(super) fn disturbing(want: &[f32], cut: bool, varies: u16) -> f32 {
+    let flat = (1.0 - f32::from(varies) / TEXTURED).max(0.05);
     let (mut first, mut second) = ([0.0f32; LANES], [0.0f32; LANES]);
     for want in want.as_chunks::<LANES>().0 {
         for l in 0..LANES {
@@ -209,14 +224,15 @@ pub(super) fn disturbing(want: &[f32]) -> f32 {
     let alone = (1.0 - 4.0 * (all - first - second) / all).max(0.0);
     let share = second / all;
     let half = HALF * (1.0 - 20.0 * (first / all - 0.5).abs()).max(0.0);
+    let half = if cut { half.max(CUT * (10.0 * share).min(1.0)) } else { half };
     let between = |&(_, two, more): &(f32, f32, f32)| more + alone * (two - more);
     let mut below = &DISTURBED[0];
     for above in &DISTURBED {
         if share < above.0 {
             let part = (share - below.0).max(0.0) / (above.0 - below.0).max(f32::MIN_POSITIVE);
-            return half.max(between(below) + part * (between(above) - between(below)));
+            return flat * half.max(between(below) + part * (between(above) - between(below)));
         }
         below = above;
     }
-    half.max(between(below))
+    flat * half.max(between(below))
 }

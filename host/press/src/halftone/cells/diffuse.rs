@@ -19,10 +19,7 @@ use super::field::{Field, LANES, Row};
 use super::plan::{BLOCK, Plan};
 
 /// Part of an absent stack's debt that each cell hands to the stacks present.
-const FORGET: f32 = 1.0 / 32.0;
-
-/// The part of a disturbance that remains where the document is textured itself.
-const TEXTURED: f32 = 0.25;
+const FORGET: f32 = 1.0 / 512.0;
 
 /// Where debts go: to the next cell, and to the cells below: behind, straight down and ahead.
 type Shares = [f32; 4];
@@ -144,7 +141,7 @@ impl<'a> Strip<'a> {
                     area += self.add_owned((y * self.field.width + x) as u32);
                 }
                 if step == 0 || !block.calm {
-                    self.disturbance = disturbing(&self.want) * if block.flat { 1.0 } else { TEXTURED };
+                    self.disturbance = disturbing(&self.want, self.chooser.cuts(size), block.varies);
                 }
                 let cell = self.decide((x, y), size, area, true, block.calm);
                 if let Some(rows) = target.rows.as_deref_mut() {
@@ -161,7 +158,7 @@ impl<'a> Strip<'a> {
                 self.want.fill(0.0);
                 let mut area = self.add_fragment(head);
                 area += self.add_owned(plan.fragments[head as usize].seed);
-                self.disturbance = disturbing(&self.want) * if block.flat { 1.0 } else { TEXTURED };
+                self.disturbance = disturbing(&self.want, self.chooser.cuts(size), block.varies);
                 let [q, _] = self.decide((x, y), size, area, false, false).halves;
                 if let Some(rows) = target.rows.as_deref_mut() {
                     for (x, y) in plan.dots(head) {
@@ -277,10 +274,11 @@ impl<'a> Strip<'a> {
             begin(slots, &self.want, missing, area, begins.then_some(hash));
         }
         let disturbance = self.disturbance * area as f32;
-        self.owe(slot, disturbance, (hash.wrapping_mul(0x9e37_79b1) >> 24) as u8);
+        let lot = hash.wrapping_mul(0x9e37_79b1);
+        self.owe(slot, disturbance, (lot >> 24) as u8);
         // What owns fragments is not cut, for they print like its first dot.
         let side = (whole && area == size * size).then_some(size);
-        let mut cell = self.chooser.choose(&self.want, &self.asks, area as f32, side, hash >> 31 == 1);
+        let mut cell = self.chooser.choose(&self.want, &self.asks, area as f32, side, lot >> 16);
         if !whole {
             cell = Cell::whole(self.holding(cell.halves[0].into(), area) as u8);
         }

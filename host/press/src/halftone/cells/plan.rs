@@ -14,6 +14,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::super::TONE;
+use super::cell::fits_half;
 use super::field::Field;
 use appearance::weights::ONE;
 
@@ -31,6 +32,16 @@ pub(in crate::halftone) fn size_of(minimum: u16) -> usize {
     SIZES.into_iter().find(|size| size * size >= usize::from(minimum)).unwrap_or(BLOCK)
 }
 
+/// Side of the cells of a stack where halves of cells may be printed: that with which it takes the fewest dots.
+pub(super) fn halved_size_of(minimum: u16) -> usize {
+    let dots = |size: usize| match size * size {
+        area if fits_half(minimum, size) => area / 2,
+        area if area >= usize::from(minimum) => area,
+        _ => usize::MAX,
+    };
+    SIZES.into_iter().min_by_key(|&size| dots(size)).unwrap_or(BLOCK)
+}
+
 /// Some dots of a block, row by row, the leftmost in the lowest bit.
 pub(super) type Mask = [u32; BLOCK];
 
@@ -41,14 +52,15 @@ pub(super) struct Block {
     pub(super) owns: bool,
     /// Whether this block and the eight around it consist of whole cells.
     pub(super) calm: bool,
-    /// Whether weights hardly differ over the block, so that tones may lock there.
-    pub(super) flat: bool,
+    /// By how much a weight of the document differs over the block.
+    pub(super) varies: u16,
     /// Dots that are tones.
     pub(super) tone: Mask,
 }
 
-/// By how much a weight may differ over a flat block.
-const FLAT: u16 = ONE / 16;
+/// By how much a weight may differ over a block for squares to be printed, where halves would do: these look more even in
+/// tones that are flat, those in all others.
+const FLAT: u16 = ONE / 256;
 
 /// Connected tones that are less than a cell.
 pub(super) struct Fragment {
@@ -75,10 +87,12 @@ pub(in crate::halftone) struct Plan {
 }
 
 impl Plan {
-    /// Plans the cells and prints the solids. `sizes` are those of the stacks of the field.
-    pub(super) fn new(field: &Field, sizes: &[usize], index: &mut [u8]) -> Plan {
+    /// Plans the cells and prints the solids. `minimum` is the smallest cluster of each stack of the field.
+    pub(super) fn new(field: &Field, minimum: &[u16], index: &mut [u8]) -> Plan {
         let (width, height) = (field.width, field.height);
         let across = width.div_ceil(BLOCK);
+        let sizes: Vec<[usize; 2]> =
+            minimum.iter().map(|&minimum| [size_of(minimum), halved_size_of(minimum)]).collect();
         let rows = index.par_chunks_mut(BLOCK * width).enumerate();
         let blocks = rows
             .flat_map_iter(|(row, dots)| {
@@ -86,7 +100,7 @@ impl Plan {
                 let blocks: Vec<Block> = (0..across)
                     .map(|column| {
                         present.fill(false);
-                        let flat = field.survey(BLOCK, column, row, &mut present) <= FLAT;
+                        let varies = field.survey(BLOCK, column, row, &mut present);
                         let (left, top) = (column * BLOCK, row * BLOCK);
                         let solid =
                             field.solids.any(left..(left + BLOCK).min(width), top..(top + BLOCK).min(height));
@@ -94,11 +108,11 @@ impl Plan {
                             .iter()
                             .zip(&present)
                             .filter(|&(_, &present)| present)
-                            .map(|(&size, _)| size);
+                            .map(|(size, _)| size[usize::from(varies > FLAT)]);
                         let size = needed.max().unwrap_or(1) as u8;
                         let tone =
                             if solid { cut(field, column, row, dots) } else { inside(field, column, row) };
-                        Block { size, owns: false, calm: false, flat, tone }
+                        Block { size, owns: false, calm: false, varies, tone }
                     })
                     .collect();
                 blocks

@@ -61,12 +61,17 @@ proptest! {
     fn no_part_is_thinner_than_its_minimum_asks(
         (width, height) in (12usize..150, 12usize..150),
         seed in any::<u64>(),
-        minimum in prop::collection::vec(1u16..64, 5),
+        minimum in prop_oneof![
+            prop::collection::vec(1u16..64, 5),
+            prop::collection::vec(prop_oneof![Just(8u16), Just(16)], 5),
+        ],
+        searched in any::<bool>(),
     ) {
         let mix = plain(9, 7, 5, |x, y| {
             (0..5).map(|q| (noise(seed, x / 3, y / 2, q) - 0.4).max(0.0).powi(2) + if q < 2 { 0.1 } else { 0.0 }).collect()
         });
-        let dots = cells(&mix, (width, height), &minimum, None, &Silent);
+        let points: Vec<Point> = (0..5).map(|q| [q as f32, (q * q % 3) as f32, 0.0, 0.3]).collect();
+        let dots = cells(&mix, (width, height), &minimum, searched.then_some(&points[..]), &Silent);
         let minimum = |stack: u8| minimum[usize::from(stack)].into();
         prop_assert_eq!(thin(width, &dots, minimum, |_| false), 0);
     }
@@ -206,8 +211,10 @@ fn the_search_keeps_tones_and_sees_less() {
     let shares = [0.4, 0.3, 0.2, 0.1];
     let mix = plain(1, 1, 4, |_, _| shares.to_vec());
     let points: Vec<Point> = vec![[0.0; 4], [0.3, 0.1, 0.0, 0.0], [0.1, 0.4, 0.1, 0.0], [0.7, 0.6, 0.5, 0.0]];
-    let print = |points| cells(&mix, (side, side), &[9; 4], points, &Silent);
-    let (plain, best) = (print(None), print(Some(&points[..])));
+    let solids = Solids::new(&mix, side, side, None);
+    let print =
+        |searched| super::cells(&mix, (side, side), &[9; 4], &solids, Some(&points), searched, &Silent);
+    let (plain, best) = (print(false), print(true));
     for q in 0..4 {
         let count = |dots: &[u8]| dots.iter().filter(|&&dot| dot == q).count();
         assert_eq!(count(&plain), count(&best), "stack {q}");
@@ -221,6 +228,90 @@ fn the_search_keeps_tones_and_sees_less() {
     };
     assert!(seen(&best) < 0.85 * seen(&plain), "{} of {}", seen(&best), seen(&plain));
     assert_eq!(thin(side, &best, |_| 9, |_| false), 0);
+}
+
+/// Stacks of which half a cell holds the minimum, beside one that takes whole cells: each keeps its tone, where stacks may stand
+/// in for each other and where not, and the search changes none.
+#[test]
+fn halves_keep_tones_and_the_search_sees_less() {
+    let side = 600;
+    let minimum = [8, 8, 16, 8];
+    let mix = plain(150, 150, 4, |x, y| {
+        let t = (x as f64 / 9.0).sin() * (y as f64 / 7.0).cos() * 0.2;
+        vec![0.4 + t, 0.3 - t, 0.2 + 0.5 * t, 0.1 - 0.5 * t]
+    });
+    let points: Vec<Point> =
+        vec![[0.0; 4], [0.6, 0.1, 0.0, 0.0], [0.65, 0.1, 0.05, 0.0], [0.7, 0.6, 0.5, 0.0]];
+    let solids = Solids::new(&mix, side, side, None);
+    let print =
+        |points, searched| super::cells(&mix, (side, side), &minimum, &solids, points, searched, &Silent);
+    let alike = print(None, false);
+    let (cells, best) = (print(Some(&points[..]), false), print(Some(&points[..]), true));
+    let count = |dots: &[u8], q: usize| dots.iter().filter(|&&dot| usize::from(dot) == q).count();
+    for q in 0..4 {
+        let asked = mix.maps.data().iter().skip(q).step_by(4).map(|&w| f64::from(w)).sum::<f64>();
+        let asked = asked / f64::from(ONE) / (150.0 * 150.0);
+        for dots in [&alike, &cells] {
+            let printed = count(dots, q) as f64 / (side * side) as f64;
+            assert!((printed - asked).abs() < 1.5e-3, "stack {q}: {printed}, {asked} asked");
+        }
+        assert_eq!(count(&cells, q), count(&best, q), "stack {q}");
+    }
+    let solids = Solids::new(&mix, side, side, None);
+    let field = super::field::Field::new(&mix, side, side, &[], &solids);
+    let (mut row, mut want) = (super::field::Row::default(), vec![0.0; field.lanes]);
+    let mut asked = Vec::new();
+    for y in 0..side {
+        field.row(1, y, &mut row);
+        for x in 0..side {
+            field.cell(1, x, &mut row, &mut want);
+            asked.push((0..4).map(|c| (0..4).map(|q| want[q] * points[q][c]).sum()).collect::<Vec<f32>>());
+        }
+    }
+    let seen = |dots: &[u8]| {
+        let error = |c: usize| {
+            let dots = dots.iter().zip(&asked);
+            dots.map(|(&dot, asked)| f64::from(points[usize::from(dot)][c] - asked[c])).collect()
+        };
+        errors_seen(&(0..4).map(error).collect::<Vec<_>>(), side, &[0.3])[0]
+    };
+    let seen = [&alike, &cells, &best].map(|dots| seen(dots));
+    assert!(seen[1] < 0.95 * seen[0] && seen[2] < 0.85 * seen[1], "{seen:?}");
+    for dots in [&alike, &cells, &best] {
+        assert_eq!(thin(side, dots, |q| minimum[usize::from(q)].into(), |_| false), 0);
+    }
+}
+
+/// Flat mixtures of stacks with different minima, by what they reflect.
+#[test]
+fn flat_halves_do_not_repeat() {
+    const SIDE: usize = 528;
+    let third = 1.0 / 3.0;
+    let library = Library::builtin();
+    for (names, shares) in [
+        (["substrate", "SF", "K"], vec![0.5, 0.3, 0.2]),
+        (["substrate", "SF", "K"], vec![third; 3]),
+        (["substrate", "SF", "K"], vec![0.5, 0.25, 0.25]),
+        (["substrate", "SF", "K"], vec![0.7, 0.1, 0.2]),
+        (["substrate", "MS", "K"], vec![0.25, 0.5, 0.25]),
+        (["substrate", "MS", "Y"], vec![0.48, 0.04, 0.48]),
+        (["substrate", "MS", "K"], vec![0.05, 0.48, 0.47]),
+        (["substrate", "MS", "K"], vec![0.72, 0.03, 0.25]),
+    ] {
+        let mut mix = plain(1, 1, shares.len(), |_, _| shares.clone());
+        mix.stacks = names.map(|name| name.parse().unwrap()).to_vec();
+        let settings = Settings::from_library(&mix.stacks, &library);
+        let sheet = halftone(&mix, (SIDE as u16, SIDE as u16), None, &settings, &Silent).unwrap();
+        for (stack, share) in shares.iter().enumerate() {
+            let (most, lag) = peak(SIDE, sheet.index(), stack as u8, 12.0 / share.sqrt(), SIDE / 4);
+            let (rows, columns) = swing(SIDE, sheet.index(), stack as u8, 4);
+            assert!(most < 0.1, "{names:?} {shares:.2?}: {stack} repeats by {most:.3} at {lag:?}");
+            assert!(
+                rows < 1.15 && columns < 1.15,
+                "{names:?} {shares:.2?}: {stack} swings by {rows:.2}, {columns:.2}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -319,7 +410,7 @@ fn boxes_of_a_tint_have_its_tone() {
 
 type Patch = (&'static str, [&'static str; 5], [u16; 5], fn(f64, f64) -> [f64; 5]);
 
-const PATCHES: [Patch; 9] = [
+const PATCHES: [Patch; 10] = [
     ("ramp of 4 inks", ["substrate", "C", "M", "Y", "K"], [9; 5], |u, v| {
         [0.0, (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v]
     }),
@@ -330,6 +421,9 @@ const PATCHES: [Patch; 9] = [
     ("K 50 %", ["substrate", "K", "C", "M", "Y"], [9; 5], |_, _| [0.5, 0.5, 0.0, 0.0, 0.0]),
     ("K ramp", ["substrate", "K", "C", "M", "Y"], [9; 5], |u, _| [1.0 - u, u, 0.0, 0.0, 0.0]),
     ("foil, K, paper", ["substrate", "SF", "K", "C", "M"], [9; 5], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),
+    ("foil ramp", ["substrate", "SF", "K", "C", "M"], [8, 16, 8, 8, 8], |u, v| {
+        [(1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v, 0.0]
+    }),
     ("foil of 16", ["substrate", "SF", "K", "C", "M"], [8, 16, 8, 8, 8], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),
 ];
 
