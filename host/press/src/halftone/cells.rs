@@ -1,8 +1,9 @@
 //! One stack for every dot, in compact cells: the second halftone, beside the walk of the paper.
 //!
 //! Problem: runs along a walk hold their minimum in area but may be one dot thin, and the walk locks on flat tones.
-//! Method: the page is cut into square cells, each as large as its stacks ask for ([`plan`]); each cell prints one stack,
-//! chosen by error diffusion of the whole vector of stacks ([`diffuse`]) on its exact mean mixture ([`field`]). Dots the
+//! Method: the page is cut into square cells, each as large as its stacks ask for ([`plan`]); each prints one stack, or two
+//! in halves that hold them ([`cell`]), chosen ([`choose`]) in error diffusion of the whole vector of stacks ([`diffuse`]) on
+//! its exact mean mixture ([`field`]). Dots the
 //! document gives wholly to one stack are printed as that stack, and no debt crosses them. Strips of [`STRIP`] block
 //! rows are diffused at the same time; the page alone decides where they are cut, so the dots do not depend on the
 //! number of threads.
@@ -37,7 +38,8 @@ const STRIP: usize = 32;
 const LEAD: usize = 2;
 
 /// Halftones a checked mixture on `width` x `height` dots: a stack of the mixture for each. `minimum` is the smallest
-/// cluster of each stack. With a point for each stack, cells are then exchanged to lessen the error seen ([`search`]).
+/// cluster of each stack. With a point for each stack, their distances decide which may stand in for another, and `searched` exchanges cells to
+/// lessen the error seen ([`search`]).
 pub(super) fn cells(
     mix: &InkMix,
     (width, height): (usize, usize),

@@ -105,10 +105,11 @@ impl Tangent {
         Tangent { points }
     }
 
-    /// The four coordinates in which stacks differ most.
+    /// The four coordinates in which stacks differ most, to 1/65536, so that the last bit of a power or a root, which differs
+    /// from machine to machine, changes no dot.
     pub fn leading(&self) -> Vec<[f32; 4]> {
-        let first =
-            |point: &Vec<f64>| std::array::from_fn(|c| point.get(c).map_or(0.0, |&value| value as f32));
+        let round = |value: &f64| ((value * 65536.0).round() / 65536.0) as f32;
+        let first = |point: &Vec<f64>| std::array::from_fn(|c| point.get(c).map_or(0.0, round));
         self.points.iter().map(first).collect()
     }
 

@@ -4,7 +4,7 @@
 //! on the paper.
 //! Method: what the art gives wholly to one stack is printed as that stack (`solids`); the tones between are halftoned by one
 //! of these:
-//! - [`Method::Cells`], the default: compact cells with error diffusion (`cells`).
+//! - [`Method::Cells`], the default: compact cells and halves of them with error diffusion (`cells`).
 //! - [`Method::Best`]: the same, then exchanged where the eye sees less of it (`search`, `eye`).
 //! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk ([`protocol::walk`]) of the
 //!   document's rectangle, by the rule in `rule` on the mix sampled by `mix`; among solids region by region (`regions`). The
@@ -75,7 +75,8 @@ pub struct Settings {
     pub method: Method,
     /// Minimum cluster of each stack of the mix in dots, 1 to [`LARGEST`]. The paper uses 8 to 16.
     pub minimum: Vec<u16>,
-    /// What each stack reflects, a row of `Space::half_angle(32)` each; only [`Method::Best`] needs it.
+    /// What each stack reflects, a row of `Space::half_angle(32)` each. [`Method::Best`] needs it; [`Method::Cells`] looks more
+    /// even with it.
     pub reflectance: Option<Table>,
 }
 

@@ -180,8 +180,17 @@ impl<'a> Part<'a> {
             if errors == [[0.0; 4]; 2] {
                 return;
             }
-            let ends = if cell.is_split() { place.halves(cell.stacked) } else { [(0, 0); 2] };
-            part.around(place, REACH, ends, |seen, first, second| {
+            if !cell.is_split() {
+                let error: Point = std::array::from_fn(|c| errors[0][c] + errors[1][c]);
+                return part.around(place, REACH, [(0, 0); 2], |seen, own, _| {
+                    for (seen, own) in seen.iter_mut().zip(own) {
+                        for c in 0..4 {
+                            seen[c] += own[c] * error[c];
+                        }
+                    }
+                });
+            }
+            part.around(place, REACH, place.halves(cell.stacked), |seen, first, second| {
                 for (seen, (first, second)) in seen.iter_mut().zip(first.iter().zip(second)) {
                     for c in 0..4 {
                         seen[c] += first[c] * errors[0][c] + second[c] * errors[1][c];

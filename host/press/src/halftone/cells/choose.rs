@@ -7,6 +7,7 @@
 //! Where halves hold, it is compared with the best half and the best other half after it.
 //! Near a quarter, a third and above all a half tones lock into patterns, so the decision is disturbed, the more the nearer
 //! two stacks are to sharing the cell.
+//! Limits: without reflectance all stacks are equally far apart; with it one metric is that of the whole page.
 //! Cost: some two dozen operations a stack and cell. Memory: the product of each two stacks.
 
 use super::cell::{Cell, fits_half};
@@ -32,11 +33,11 @@ const DISTURBED: [(f32, f32, f32); 6] = [
 /// The same where one stack has half of the cell, which makes a checkerboard of it whatever the others are.
 const HALF: f32 = 0.16;
 
-/// By how much a weight differs over a block where hardly any disturbance is needed.
-const TEXTURED: f32 = 0.03 * ONE as f32;
-
-/// The least of these where cells may be cut and a second stack has more than a tenth of them.
+/// The least of these where cells may be cut and a second stack has a tenth of them or more.
 const CUT: f32 = 0.2;
+
+/// By how much a weight differs over a block whose cells, if they may be cut, need hardly any disturbance.
+const TEXTURED: f32 = 0.015 * ONE as f32;
 
 /// Numbers in -1..1 without order, of mean 0: 256 beginnings, and as many stacks from there.
 pub(super) static NOISE: [f32; 512] = {
@@ -205,10 +206,10 @@ fn largest(gains: &[f32], want: &[f32]) -> (u8, f32) {
     ((0..gains.len()).find(here).unwrap_or(0) as u8, most)
 }
 
-/// By how much to disturb the decision of a cell that asks for `want`, in cells: [`DISTURBED`], and less the more weights of the
-/// document vary around it, for then nothing locks.
+/// By how much to disturb the decision of a cell that asks for `want`, in cells: [`DISTURBED`]. Where it may be `cut` and the
+/// document varies by itself nothing locks, and hardly any disturbance is needed.
 pub(super) fn disturbing(want: &[f32], cut: bool, varies: u16) -> f32 {
-    let flat = (1.0 - f32::from(varies) / TEXTURED).max(0.05);
+    let flat = if cut { (1.0 - f32::from(varies) / TEXTURED).max(0.05) } else { 1.0 };
     let (mut first, mut second) = ([0.0f32; LANES], [0.0f32; LANES]);
     for want in want.as_chunks::<LANES>().0 {
         for l in 0..LANES {

@@ -1,16 +1,12 @@
 //! Error diffusion of the whole vector of stacks from cell to cell.
 //!
-//! Problem: each cell prints one stack, and the means of many cells must be the mixture.
-//! Method: a cell prints the stack it asks for most, what the cells before it still owe included; the rest goes to four
-//! neighbours, in serpentine rows, by the weights of Floyd and Steinberg, which a hash of the place disturbs in two
-//! pairs (Ulichney): exact weights lock flat tones into patterns. Tones near a quarter, a third and above all a half lock
-//! nevertheless, so the decision is disturbed too, the more the nearer two stacks are to sharing the cell. What is owed
-//! waits in a slot for each cell of the next row; where blocks of other cells begin, slots are divided anew.
-//! In the midst of a tone rare stacks are owed something on average and common ones have had too much ([`usual`]). Beyond
-//! the border of a tone cells would owe that too: it comes in where a tone begins and is forgotten where it ends, and
-//! only what differs from it stays inside. So a tone neither begins too light nor ends in a line of what was left over.
+//! Problem: each cell prints one stack or two, and the means of many cells must be the mixture.
+//! Method: a cell prints what it asks for most ([`Chooser`]), what the cells before it still owe included; the rest goes to
+//! four neighbours, in serpentine rows, by the weights of Floyd and Steinberg, which a hash of the place disturbs in two
+//! pairs (Ulichney): exact weights lock flat tones into patterns. What is owed waits in a slot for each cell of the next row;
+//! where blocks of other cells begin, slots are divided anew. What comes over borders is in [`super::border`].
 //! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away.
-//! Cost: about a dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
+//! Cost: about two dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
 use super::border::{begin, usual};
 use super::cell::Cell;

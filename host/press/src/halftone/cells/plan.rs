@@ -2,12 +2,14 @@
 //!
 //! Problem: a cell must be as large as the inks that may fall on it ask for, and end where a solid begins.
 //! Method: blocks of [`BLOCK`] x [`BLOCK`] dots, each cut into equal cells for the most demanding stack that has
-//! weight in it. A cell that solids or the page's border cut falls into connected fragments. A fragment joins the
+//! weight in it. Stacks that ask for less may have halves of them: 2 x 4 dots hold 8. Where the document is flat and no
+//! stack asks for more, those have squares of 3 x 3 instead. A cell that solids or the page's border cut falls into connected fragments. A fragment joins the
 //! whole cell it shares most border with and prints that cell's stack; where there is none, fragments join each other
 //! until they are as large as a cell.
 //! Cost: one look at each pixel of the document, and at each dot of the blocks that hold solids. Memory: a bit a dot
 //! and 12 bytes a fragment.
-//! Guarantee: within a region of tones, every dot lies in a square of its stack's size that holds no other tone.
+//! Guarantee: within a region of tones, every dot lies in a square or half square of its stack's minimum or more that holds
+//! no other tone. A cell that owns fragments is not halved.
 
 use std::collections::HashMap;
 
@@ -58,9 +60,8 @@ pub(super) struct Block {
     pub(super) tone: Mask,
 }
 
-/// By how much a weight may differ over a block for squares to be printed, where halves would do: these look more even in
-/// tones that are flat, those in all others.
-const FLAT: u16 = ONE / 256;
+/// By how much a weight may differ over a flat block. In flat tones squares look more even than halves, in all others less.
+const FLAT: u16 = ONE / 512;
 
 /// Connected tones that are less than a cell.
 pub(super) struct Fragment {

@@ -4,7 +4,8 @@
 //! Method: every change moves one or two errors from one place to another ([`Shift`]): a whole cell, a half of a cell, or both
 //! halves of one. Cells change places with cells, and halves with halves, a half of a whole cell of a small stack among them;
 //! a cell of two stacks may also turn.
-//! Cost: for each neighbour up to four pairs of halves, sixteen where two whole cells might be cut.
+//! Where a half may lie in four places, that is taken where the error that leaves or comes is seen most or least.
+//! Cost: for each neighbour up to four pairs of halves.
 
 use super::{FIXED, NEAR, Part, Place, Point};
 use crate::halftone::cells::cell::Cell;
@@ -29,7 +30,6 @@ struct Shift {
 struct View {
     place: Place,
     cell: Cell,
-    whole: End,
     /// Halves side by side, then one above the other.
     halves: [[End; 2]; 2],
 }
@@ -42,11 +42,20 @@ struct Best {
 }
 
 impl View {
-    /// The halves that may be changed: those it has, or all four ways to halve a whole cell.
-    fn options(&self) -> impl Iterator<Item = (bool, usize)> + use<> {
+    /// Places of a half that may be changed: its own, or all four if the cell is whole.
+    #[inline(always)]
+    fn places(&self, half: usize) -> impl Iterator<Item = (bool, usize)> + use<> {
         let (split, stacked) = (self.cell.is_split(), self.cell.stacked);
         let all = [(false, 0), (false, 1), (true, 0), (true, 1)];
-        all.into_iter().filter(move |option| !split || option.0 == stacked)
+        all.into_iter().filter(move |&place| !split || place == (stacked, half))
+    }
+
+    /// The place of a half where most of an error is seen.
+    #[inline(always)]
+    fn most(&self, half: usize, error: Point) -> (bool, usize) {
+        let seen = |(stacked, half): (bool, usize)| dot(error, self.halves[usize::from(stacked)][half].seen);
+        let most = |a: (bool, usize), b| if seen(b) > seen(a) { b } else { a };
+        self.places(half).reduce(most).unwrap_or_default()
     }
 
     /// The cell with another stack in a half.
@@ -57,10 +66,12 @@ impl View {
     }
 }
 
+#[inline(always)]
 fn dot(a: Point, b: Point) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
 }
 
+#[inline(always)]
 fn minus(a: Point, b: Point) -> Point {
     std::array::from_fn(|c| a[c] - b[c])
 }
@@ -75,28 +86,30 @@ impl Part<'_> {
             && place.i + 2 < place.zone.columns
             && place.j > 1
             && (place.j + 2) * size < super::BLOCK;
-        let own = self.view(place, (0, 0), inner);
+        let cell = self.cells[place.number()];
+        let own = (self.small[size] != 0).then(|| self.view(place, (0, 0), inner));
         // Differences below what rounding makes of the sums would go round in circles.
         let mut best = Best { change: -1e-5 * area, shifts: [None; 2], cells: [None; 2] };
-        if own.cell.is_split() {
-            self.arrange(&own, &mut best);
+        if let Some(own) = own.as_ref().filter(|own| own.cell.is_split()) {
+            self.arrange(own, &mut best);
         }
+        let step = 2 * size as i32;
         for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
             let Some(there) = self.next_to(place, dx, dy, inner) else { continue };
             let other = self.cells[there.number()];
-            if other == FIXED || other == own.cell {
+            if other == FIXED || other == cell {
                 continue;
             }
-            let step = 2 * size as i32;
-            let there = self.view(there, (dx as i32 * step, dy as i32 * step), inner);
-            if own.cell.is_split() && there.cell.is_split() {
-                self.exchange_halves(&own, &there, &mut best);
-            } else {
-                self.exchange(&own, &there, &mut best);
-                if self.small[size] != 0 {
-                    self.exchange_halves(&own, &there, &mut best);
-                }
+            let at = (dx as i32 * step, dy as i32 * step);
+            if !cell.is_split() && !other.is_split() {
+                self.exchange(place, (there, at), &mut best);
             }
+            let Some(own) = &own else { continue };
+            let there = self.view(there, at, inner);
+            if cell.is_split() != other.is_split() {
+                self.exchange_split(own, &there, &mut best);
+            }
+            self.exchange_halves(own, &there, &mut best);
         }
         for shift in best.shifts.into_iter().flatten() {
             self.around(place, NEAR, [shift.from.at, shift.to.at], |seen, from, to| {
@@ -128,29 +141,26 @@ impl Part<'_> {
     fn view(&self, place: Place, at: (i32, i32), inner: bool) -> View {
         let cell = self.cells[place.number()];
         let seen = self.seen[place.number()];
-        let whole = End { at, seen };
-        let mut halves = [[whole; 2]; 2];
-        if self.small[place.zone.size] != 0 {
-            for (stacked, (dx, dy)) in [(false, (1, 0)), (true, (0, 1))] {
-                let near = |dx, dy| self.next_to(place, dx, dy, inner).map(|place| self.seen[place.number()]);
-                let (before, after) = match (near(-dx, -dy), near(dx, dy)) {
-                    (Some(before), Some(after)) => (before, after),
-                    (Some(before), None) => (before, std::array::from_fn(|c| 2.0 * seen[c] - before[c])),
-                    (None, Some(after)) => (std::array::from_fn(|c| 2.0 * seen[c] - after[c]), after),
-                    (None, None) => (seen, seen),
-                };
-                let ends = place.halves(stacked);
-                for (half, sign) in [(0, -0.125), (1, 0.125)] {
-                    let seen = std::array::from_fn(|c| {
-                        let (slope, bend) = (after[c] - before[c], after[c] + before[c] - 2.0 * seen[c]);
-                        seen[c] + sign * slope + bend / 32.0
-                    });
-                    let at = (at.0 + ends[half].0, at.1 + ends[half].1);
-                    halves[usize::from(stacked)][half] = End { at, seen };
-                }
+        let mut halves = [[End { at, seen }; 2]; 2];
+        for (stacked, (dx, dy)) in [(false, (1, 0)), (true, (0, 1))] {
+            let near = |dx, dy| self.next_to(place, dx, dy, inner).map(|place| self.seen[place.number()]);
+            let (before, after) = match (near(-dx, -dy), near(dx, dy)) {
+                (Some(before), Some(after)) => (before, after),
+                (Some(before), None) => (before, std::array::from_fn(|c| 2.0 * seen[c] - before[c])),
+                (None, Some(after)) => (std::array::from_fn(|c| 2.0 * seen[c] - after[c]), after),
+                (None, None) => (seen, seen),
+            };
+            let ends = place.halves(stacked);
+            for (half, sign) in [(0, -0.125), (1, 0.125)] {
+                let seen = std::array::from_fn(|c| {
+                    let (slope, bend) = (after[c] - before[c], after[c] + before[c] - 2.0 * seen[c]);
+                    seen[c] + sign * slope + bend / 32.0
+                });
+                let at = (at.0 + ends[half].0, at.1 + ends[half].1);
+                halves[usize::from(stacked)][half] = End { at, seen };
             }
         }
-        View { place, cell, whole, halves }
+        View { place, cell, halves }
     }
 
     fn point(&self, stack: u8, dots: f32) -> Point {
@@ -211,27 +221,39 @@ impl Part<'_> {
         }
     }
 
-    /// Two cells change places, of which one at least is whole.
+    /// Two whole cells change places.
     #[inline(always)]
-    fn exchange(&self, own: &View, there: &View, best: &mut Best) {
-        let size = own.place.zone.size;
+    fn exchange(&self, place: Place, (there, at): (Place, (i32, i32)), best: &mut Best) {
+        let size = place.zone.size;
         let area = (size * size) as f32;
+        let (a, b) = (place.number(), there.number());
+        let (own, other) = (self.cells[a], self.cells[b]);
+        if self.allowed[a] >> other.halves[0] & self.allowed[b] >> own.halves[0] & 1 == 0 {
+            return;
+        }
+        let error = minus(self.point(own.halves[0], area), self.point(other.halves[0], area));
+        let from = End { at: (0, 0), seen: self.seen[a] };
+        let to = End { at, seen: self.seen[b] };
+        let cells = [Some((place, other)), Some((there, own))];
+        self.weigh(size, [Some(Shift { error, from, to }), None], cells, best);
+    }
+
+    /// A whole cell and one that is not change places.
+    #[inline(always)]
+    fn exchange_split(&self, own: &View, there: &View, best: &mut Best) {
+        let size = own.place.zone.size;
+        let half = 0.5 * (size * size) as f32;
         let stays = own.cell.halves.iter().all(|&stack| self.allows(there, stack));
         if !stays || !there.cell.halves.iter().all(|&stack| self.allows(own, stack)) {
             return;
         }
-        let cells = [Some((own.place, there.cell)), Some((there.place, own.cell))];
-        if !own.cell.is_split() && !there.cell.is_split() {
-            let error = minus(self.point(own.cell.halves[0], area), self.point(there.cell.halves[0], area));
-            let shift = Shift { error, from: own.whole, to: there.whole };
-            return self.weigh(size, [Some(shift), None], cells, best);
-        }
         let stacked = usize::from(own.cell.stacked || there.cell.stacked);
-        let shifts = [0, 1].map(|half| {
-            let (leaves, comes) = (own.cell.halves[half], there.cell.halves[half]);
-            let error = minus(self.point(leaves, 0.5 * area), self.point(comes, 0.5 * area));
-            Some(Shift { error, from: own.halves[stacked][half], to: there.halves[stacked][half] })
+        let shifts = [0, 1].map(|i| {
+            let (leaves, comes) = (own.cell.halves[i], there.cell.halves[i]);
+            let error = minus(self.point(leaves, half), self.point(comes, half));
+            Some(Shift { error, from: own.halves[stacked][i], to: there.halves[stacked][i] })
         });
+        let cells = [Some((own.place, there.cell)), Some((there.place, own.cell))];
         self.weigh(size, shifts, cells, best);
     }
 
@@ -240,17 +262,19 @@ impl Part<'_> {
     fn exchange_halves(&self, own: &View, there: &View, best: &mut Best) {
         let size = own.place.zone.size;
         let half = 0.5 * (size * size) as f32;
-        for leaving in own.options() {
-            let leaves = own.cell.halves[leaving.1];
+        for i in 0..=usize::from(own.cell.is_split()) {
+            let leaves = own.cell.halves[i];
             if !self.is_small(size, leaves) || !self.allows(there, leaves) {
                 continue;
             }
-            for coming in there.options() {
-                let comes = there.cell.halves[coming.1];
+            for j in 0..=usize::from(there.cell.is_split()) {
+                let comes = there.cell.halves[j];
                 if comes == leaves || !self.is_small(size, comes) || !self.allows(own, comes) {
                     continue;
                 }
                 let error = minus(self.point(leaves, half), self.point(comes, half));
+                let leaving = own.most(i, error);
+                let coming = there.most(j, error.map(|coordinate| -coordinate));
                 let from = own.halves[usize::from(leaving.0)][leaving.1];
                 let to = there.halves[usize::from(coming.0)][coming.1];
                 let cells = [
