@@ -1,8 +1,9 @@
 //! One stack for every dot, in compact cells: the second halftone, beside the walk of the paper.
 //!
 //! Problem: runs along a walk hold their minimum in area but may be one dot thin, and the walk locks on flat tones.
-//! Method: the page is cut into square cells, each as large as its stacks ask for ([`plan`]); each cell prints one stack,
-//! chosen by error diffusion of the whole vector of stacks ([`diffuse`]) on its exact mean mixture ([`field`]). Dots the
+//! Method: the page is cut into square cells, each as large as its stacks ask for ([`plan`]); each prints one stack, or two
+//! in halves that hold them ([`cell`]), chosen ([`choose`]) in error diffusion of the whole vector of stacks ([`diffuse`]) on
+//! its exact mean mixture ([`field`]). Dots the
 //! document gives wholly to one stack are printed as that stack, and no debt crosses them. Strips of [`STRIP`] block
 //! rows are diffused at the same time; the page alone decides where they are cut, so the dots do not depend on the
 //! number of threads.
@@ -10,6 +11,9 @@
 //! a fragment. Limits: detail finer than a cell is averaged, unless it is solid; a stack's cells have sides of 1, 2, 3, 4,
 //! 6 or 8 dots.
 
+mod border;
+pub(super) mod cell;
+mod choose;
 mod diffuse;
 pub(super) mod field;
 pub(super) mod plan;
@@ -22,6 +26,7 @@ use super::wide::wide;
 use appearance::gamut::InkMix;
 use observe::Observer;
 
+use choose::Metric;
 use diffuse::{Strip, Target};
 use field::Field;
 use plan::{BLOCK, Plan};
@@ -33,29 +38,34 @@ const STRIP: usize = 32;
 const LEAD: usize = 2;
 
 /// Halftones a checked mixture on `width` x `height` dots: a stack of the mixture for each. `minimum` is the smallest
-/// cluster of each stack. With a point for each stack, cells are then exchanged to lessen the error seen ([`search`]).
+/// cluster of each stack. With a point for each stack, their distances decide which may stand in for another, and `searched` exchanges cells to
+/// lessen the error seen ([`search`]).
 pub(super) fn cells(
     mix: &InkMix,
     (width, height): (usize, usize),
     minimum: &[u16],
     solids: &Solids,
     points: Option<&[Point]>,
+    searched: bool,
     observer: &dyn Observer,
 ) -> Vec<u8> {
-    let mut sizes: Vec<usize> = minimum.iter().map(|&minimum| plan::size_of(minimum)).collect();
+    let sizes_of = |&minimum: &u16| [plan::size_of(minimum), plan::halved_size_of(minimum)];
+    let mut sizes: Vec<usize> = minimum.iter().flat_map(sizes_of).collect();
     sizes.push(BLOCK);
     sizes.sort_unstable();
     sizes.dedup();
     let field = Field::new(mix, width, height, &sizes, solids);
     let least: Vec<u16> = field.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
-    let own: Vec<usize> = field.stacks.iter().map(|&q| plan::size_of(minimum[usize::from(q)])).collect();
+    let points: Option<Vec<Point>> =
+        points.map(|points| field.stacks.iter().map(|&q| points[usize::from(q)]).collect());
+    let metric = Metric::new(field.lanes, &field.mean(), points.as_deref());
     let mut index = vec![0; width * height];
     observer.begin("halftone", (width * height) as u64);
-    let plan = Plan::new(&field, &own, &mut index);
+    let plan = Plan::new(&field, &least, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
         wide(|| {
-            let mut strip = Strip::new(&field, &plan, &least);
+            let mut strip = Strip::new(&field, &plan, &metric, &least);
             for row in first.saturating_sub(LEAD)..first {
                 strip.block_row(row, &mut Target { rows: None, top: 0 });
             }
@@ -66,9 +76,8 @@ pub(super) fn cells(
             }
         });
     });
-    if let Some(points) = points {
-        let points: Vec<Point> = field.stacks.iter().map(|&q| points[usize::from(q)]).collect();
-        search::search(&field, &plan, &points, &mut index);
+    if let Some(points) = points.filter(|_| searched) {
+        search::search(&field, &plan, &points, &least, &mut index);
     }
     plan.print_fragments(&mut index);
     observer.end();

@@ -282,7 +282,7 @@ impl Window<'_> {
         Measured {
             seen: eye::errors_seen(&planes, width, &EYES),
             tones,
-            thin: eye::thin(width, &index, side, free),
+            thin: eye::thin(width, &index, |stack| settings.minimum[usize::from(stack)].into(), free),
             flat,
         }
     }

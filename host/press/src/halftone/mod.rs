@@ -4,7 +4,7 @@
 //! on the paper.
 //! Method: what the art gives wholly to one stack is printed as that stack (`solids`); the tones between are halftoned by one
 //! of these:
-//! - [`Method::Cells`], the default: compact cells with error diffusion (`cells`).
+//! - [`Method::Cells`], the default: compact cells and halves of them with error diffusion (`cells`).
 //! - [`Method::Best`]: the same, then exchanged where the eye sees less of it (`search`, `eye`).
 //! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk ([`protocol::walk`]) of the
 //!   document's rectangle, by the rule in `rule` on the mix sampled by `mix`; among solids region by region (`regions`). The
@@ -75,7 +75,8 @@ pub struct Settings {
     pub method: Method,
     /// Minimum cluster of each stack of the mix in dots, 1 to [`LARGEST`]. The paper uses 8 to 16.
     pub minimum: Vec<u16>,
-    /// What each stack reflects, a row of `Space::half_angle(32)` each; only [`Method::Best`] needs it.
+    /// What each stack reflects, a row of `Space::half_angle(32)` each. [`Method::Best`] needs it; [`Method::Cells`] looks more
+    /// even with it.
     pub reflectance: Option<Table>,
 }
 
@@ -227,7 +228,8 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
         return Err(HalftoneError::Minima { found: settings.minimum.len(), stacks });
     }
     let known = |table: &Table| table.len() == stacks && table.columns() == 3 * SAMPLES;
-    if settings.method == Method::Best && !settings.reflectance.as_ref().is_some_and(known) {
+    let needed = settings.method == Method::Best;
+    if settings.reflectance.as_ref().map_or(needed, |table| !known(table)) {
         return Err(HalftoneError::Reflectance { stacks });
     }
     for (stack, &minimum) in mix.stacks.iter().zip(&settings.minimum) {
@@ -282,18 +284,18 @@ pub fn halftone(
     }
     let (width, length) = (usize::from(size.0), usize::from(size.1));
     let solids = Solids::new(mix, width, length, fixed);
-    let cells =
-        |minimum: &[u16], points| cells::cells(mix, (width, length), minimum, &solids, points, observer);
+    let points = || {
+        let table = settings.reflectance.as_ref()?;
+        Some(eye::Tangent::of_mix(mix, &Space::half_angle(SAMPLES), table).leading())
+    };
+    let cells = |minimum: &[u16], points: Option<&[_]>, searched| {
+        cells::cells(mix, (width, length), minimum, &solids, points, searched, observer)
+    };
     let index = match settings.method {
         Method::Walk => walked(mix, size, &settings.minimum, &solids, observer),
-        Method::Cells => cells(&settings.minimum, None),
-        Method::Best => {
-            let space = Space::half_angle(SAMPLES);
-            let points =
-                settings.reflectance.as_ref().map(|table| eye::Tangent::of_mix(mix, &space, table).leading());
-            cells(&settings.minimum, points.as_deref())
-        }
-        Method::Blue => cells(&vec![1; mix.stacks.len()], None),
+        Method::Cells => cells(&settings.minimum, points().as_deref(), false),
+        Method::Best => cells(&settings.minimum, points().as_deref(), true),
+        Method::Blue => cells(&vec![1; mix.stacks.len()], None, false),
     };
     Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
 }

@@ -1,51 +1,21 @@
 //! Error diffusion of the whole vector of stacks from cell to cell.
 //!
-//! Problem: each cell prints one stack, and the means of many cells must be the mixture.
-//! Method: a cell prints the stack it asks for most, what the cells before it still owe included; the rest goes to four
-//! neighbours, in serpentine rows, by the weights of Floyd and Steinberg, which a hash of the place disturbs in two
-//! pairs (Ulichney): exact weights lock flat tones into patterns. Tones near a quarter, a third and above all a half lock
-//! nevertheless, so the decision is disturbed too, the more the nearer two stacks are to sharing the cell. What is owed
-//! waits in a slot for each cell of the next row; where blocks of other cells begin, slots are divided anew.
-//! In the midst of a tone rare stacks are owed something on average and common ones have had too much ([`usual`]). Beyond
-//! the border of a tone cells would owe that too: it comes in where a tone begins and is forgotten where it ends, and
-//! only what differs from it stays inside. So a tone neither begins too light nor ends in a line of what was left over.
+//! Problem: each cell prints one stack or two, and the means of many cells must be the mixture.
+//! Method: a cell prints what it asks for most ([`Chooser`]), what the cells before it still owe included; the rest goes to
+//! four neighbours, in serpentine rows, by the weights of Floyd and Steinberg, which a hash of the place disturbs in two
+//! pairs (Ulichney): exact weights lock flat tones into patterns. What is owed waits in a slot for each cell of the next row;
+//! where blocks of other cells begin, slots are divided anew. What comes over borders is in [`super::border`].
 //! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away.
-//! Cost: about a dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
+//! Cost: about two dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
+use super::border::{begin, usual};
+use super::cell::Cell;
+use super::choose::{Chooser, Metric, NOISE, disturbing};
 use super::field::{Field, LANES, Row};
 use super::plan::{BLOCK, Plan};
 
 /// Part of an absent stack's debt that each cell hands to the stacks present.
-const FORGET: f32 = 1.0 / 32.0;
-
-/// By how much the decision of a cell is disturbed, in cells, for the second largest share in it, linear in between: where
-/// there are two stacks, and where others share the cell, which break most patterns themselves.
-const DISTURBED: [(f32, f32, f32); 6] = [
-    (0.2, 0.04, 0.04),
-    (0.25, 0.13, 0.04),
-    (0.3, 0.13, 0.05),
-    (0.33, 0.13, 0.12),
-    (0.43, 0.14, 0.12),
-    (0.48, 0.28, 0.12),
-];
-
-/// The same where one stack has half of the cell, which makes a checkerboard of it whatever the others are.
-const HALF: f32 = 0.16;
-
-/// The largest difference of a debt above the first row of a tone, in cells, for a stack of share p: times root of p (1 - p).
-const SPREAD: f32 = 1.25;
-
-/// Numbers in -1..1 without order, of mean 0: 256 beginnings, and as many stacks from there.
-static NOISE: [f32; 512] = {
-    let (mut noise, mut state, mut i) = ([0.0; 512], 1u32, 0);
-    while i < 256 {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        noise[i] = (state >> 8) as f32 / 8_388_608.0 - 1.0;
-        noise[i + 256] = -noise[i];
-        i += 1;
-    }
-    noise
-};
+const FORGET: f32 = 1.0 / 512.0;
 
 /// Where debts go: to the next cell, and to the cells below: behind, straight down and ahead.
 type Shares = [f32; 4];
@@ -66,6 +36,8 @@ pub(super) struct Strip<'a> {
     late: Vec<f32>,
     want: Vec<f32>,
     debt: Vec<f32>,
+    asks: Vec<f32>,
+    chooser: Chooser<'a>,
     scratch: Vec<f32>,
     rows: Vec<Row>,
     back: bool,
@@ -82,7 +54,12 @@ pub(super) struct Target<'a> {
 }
 
 impl<'a> Strip<'a> {
-    pub(super) fn new(field: &'a Field<'a>, plan: &'a Plan, minimum: &'a [u16]) -> Strip<'a> {
+    pub(super) fn new(
+        field: &'a Field<'a>,
+        plan: &'a Plan,
+        metric: &'a Metric,
+        minimum: &'a [u16],
+    ) -> Strip<'a> {
         let lanes = || vec![0.0; field.lanes];
         Strip {
             field,
@@ -94,6 +71,8 @@ impl<'a> Strip<'a> {
             late: lanes(),
             want: lanes(),
             debt: lanes(),
+            asks: lanes(),
+            chooser: Chooser::new(metric, minimum, BLOCK),
             scratch: Vec::new(),
             rows: (0..=BLOCK).map(|_| Row::default()).collect(),
             back: false,
@@ -158,15 +137,12 @@ impl<'a> Strip<'a> {
                     area += self.add_owned((y * self.field.width + x) as u32);
                 }
                 if step == 0 || !block.calm {
-                    self.disturbance = self.disturbing();
+                    self.disturbance = disturbing(&self.want, self.chooser.cuts(size), block.varies);
                 }
-                let q = self.decide((x, y), size, area, true, block.calm);
+                let cell = self.decide((x, y), size, area, true, block.calm);
                 if let Some(rows) = target.rows.as_deref_mut() {
-                    let stack = self.field.stacks[q];
                     let start = (y - target.top) * self.field.width + x;
-                    for dots in rows[start..].chunks_mut(self.field.width).take(size) {
-                        dots[..size].fill(stack);
-                    }
+                    cell.print(&mut rows[start..], self.field.width, size, &self.field.stacks);
                 }
                 continue;
             }
@@ -178,11 +154,11 @@ impl<'a> Strip<'a> {
                 self.want.fill(0.0);
                 let mut area = self.add_fragment(head);
                 area += self.add_owned(plan.fragments[head as usize].seed);
-                self.disturbance = self.disturbing();
-                let q = self.decide((x, y), size, area, false, false);
+                self.disturbance = disturbing(&self.want, self.chooser.cuts(size), block.varies);
+                let [q, _] = self.decide((x, y), size, area, false, false).halves;
                 if let Some(rows) = target.rows.as_deref_mut() {
                     for (x, y) in plan.dots(head) {
-                        rows[(y - target.top) * self.field.width + x] = self.field.stacks[q];
+                        rows[(y - target.top) * self.field.width + x] = self.field.stacks[usize::from(q)];
                     }
                 }
             }
@@ -220,63 +196,27 @@ impl<'a> Strip<'a> {
         block * BLOCK + x % BLOCK / usize::from(self.format[block])
     }
 
-    /// By how much to disturb the decision of a cell that asks for `self.want`, in cells: [`DISTURBED`].
-    fn disturbing(&self) -> f32 {
-        let (mut first, mut second) = ([0.0f32; LANES], [0.0f32; LANES]);
-        for want in self.want.as_chunks::<LANES>().0 {
-            for l in 0..LANES {
-                let lower = if want[l] < first[l] { want[l] } else { first[l] };
-                second[l] = if lower > second[l] { lower } else { second[l] };
-                first[l] = if want[l] > first[l] { want[l] } else { first[l] };
-            }
-        }
-        let (first, second) =
-            first.into_iter().chain(second).fold((0.0f32, 0.0f32), |(first, second), want| {
-                if want > first { (want, first) } else { (first, second.max(want)) }
-            });
-        let all: f32 = self.want.iter().sum();
-        let alone = (1.0 - 4.0 * (all - first - second) / all).max(0.0);
-        let share = second / all;
-        let half = HALF * (1.0 - 20.0 * (first / all - 0.5).abs()).max(0.0);
-        let between = |&(_, two, more): &(f32, f32, f32)| more + alone * (two - more);
-        let mut below = &DISTURBED[0];
-        for above in &DISTURBED {
-            if share < above.0 {
-                let part = (share - below.0).max(0.0) / (above.0 - below.0).max(f32::MIN_POSITIVE);
-                return half.max(between(below) + part * (between(above) - between(below)));
-            }
-            below = above;
-        }
-        half.max(between(below))
-    }
-
-    /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`, and finds the present
-    /// stack with most of it, as disturbed by `noise` from this number on; the lowest among equals. Absent stacks hand some
-    /// of theirs to those present.
+    /// Adds to `self.want` what waits in a slot and comes from the cell before, into `self.debt`; absent stacks hand some of
+    /// theirs to those present. Into `self.asks` the same, disturbed by `noise` from this number on.
     #[inline(always)]
-    fn choose(&mut self, slot: usize, disturbance: f32, noise: u8) -> usize {
+    fn owe(&mut self, slot: usize, disturbance: f32, noise: u8) {
         let noise = &NOISE[usize::from(noise)..][..self.field.lanes];
         let slots = self.slots[slot..slot + self.field.lanes].as_chunks::<LANES>().0;
         let (want, carry) = (self.want.as_chunks::<LANES>().0, self.carry.as_chunks::<LANES>().0);
-        let debt = self.debt.as_chunks_mut::<LANES>().0;
-        let (mut most, mut absent, mut present) =
-            ([f32::NEG_INFINITY; LANES], [0.0f32; LANES], [0.0f32; LANES]);
+        let (debt, asks) = (self.debt.as_chunks_mut::<LANES>().0, self.asks.as_chunks_mut::<LANES>().0);
+        let (mut absent, mut present) = ([0.0f32; LANES], [0.0f32; LANES]);
         let owed = slots.iter().zip(carry).zip(noise.as_chunks::<LANES>().0);
-        for ((debt, want), ((slot, carry), noise)) in debt.iter_mut().zip(want).zip(owed) {
+        for (((debt, asks), want), ((slot, carry), noise)) in debt.iter_mut().zip(asks).zip(want).zip(owed) {
             for l in 0..LANES {
                 let sum = want[l] + slot[l] + carry[l];
                 let here = want[l] > 0.0;
-                let asks = sum + disturbance * noise[l];
-                most[l] = if here && asks > most[l] { asks } else { most[l] };
                 present[l] += if here { 1.0 } else { 0.0 };
                 let handed = if here { 0.0 } else { sum * FORGET };
                 absent[l] += handed;
                 debt[l] = sum - handed;
+                asks[l] = debt[l] + if here { disturbance * noise[l] } else { 0.0 };
             }
         }
-        let most = most.into_iter().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
-        let is_best = |q: &usize| self.debt[*q] + disturbance * noise[*q] == most && self.want[*q] > 0.0;
-        let best = (0..self.field.lanes).find(is_best).unwrap_or(0);
         let absent: f32 = absent.iter().sum();
         if absent != 0.0 {
             let each = absent / present.iter().sum::<f32>();
@@ -284,10 +224,9 @@ impl<'a> Strip<'a> {
                 *debt += if want > 0.0 { each } else { 0.0 };
             }
         }
-        best
     }
 
-    /// The stack for fragments of so many dots, of which [`Strip::choose`] found `best`. A stack that would not hold gives
+    /// The stack for fragments of so many dots, of which [`Chooser::choose`] found `best`. A stack that would not hold gives
     /// way to the one with most debt that does. Where none does, the stack with the smallest minimum is printed: foil
     /// in specks would come off and be missed, while ink in a speck is only a little rough.
     fn holding(&self, best: usize, area: usize) -> usize {
@@ -303,32 +242,9 @@ impl<'a> Strip<'a> {
         present.max_by(rank).unwrap_or(best)
     }
 
-    /// Adds to a slot what comes over the border of the tone: the part `missing` of what cells there would owe, were they alike.
-    /// Where rows of cells begin, with a `lot`, debts differ from cell to cell as they do in the midst of a tone, or the
-    /// first rows would print all at once: a stack drawn by lot is owed more or less, and the commonest less or more.
-    fn begin(&mut self, slot: usize, missing: f32, area: usize, lot: Option<u32>) {
-        let usual = usual(&self.want, area);
-        let slots = &mut self.slots[slot..slot + self.field.lanes];
-        for (slot, &want) in slots.iter_mut().zip(&self.want) {
-            *slot += missing * usual(want);
-        }
-        let Some(lot) = lot else { return };
-        let most = self.want.iter().copied().fold(0.0, f32::max);
-        let common = self.want.iter().position(|&want| want == most).unwrap_or(0);
-        let rare = |q: &usize| *q != common && self.want[*q] > 0.0;
-        let count = (0..slots.len()).filter(rare).count();
-        let Some(drawn) = (0..slots.len()).filter(rare).nth(lot as usize % count.max(1)) else { return };
-        let area = area as f32;
-        let share = self.want[drawn] / area;
-        let noise = NOISE[(lot >> 16) as usize % NOISE.len()];
-        let differs = SPREAD * area * noise * (share * (1.0 - share)).sqrt();
-        slots[drawn] += differs;
-        slots[common] -= differs;
-    }
-
     /// Decides the stack of a unit that asks for `self.want`, and hands on what it owes.
     #[inline(always)]
-    fn decide(&mut self, (x, y): (usize, usize), size: usize, area: usize, whole: bool, calm: bool) -> usize {
+    fn decide(&mut self, (x, y): (usize, usize), size: usize, area: usize, whole: bool, calm: bool) -> Cell {
         let lanes = self.field.lanes;
         let slot = self.slot(x) * lanes;
         let (behind, ahead) =
@@ -350,12 +266,21 @@ impl<'a> Strip<'a> {
         }
         // The first cell of a tone gets nothing, since the last one has nowhere to leave what it owes.
         if missing > 0.0 && missing < 1.0 {
-            self.begin(slot, missing, area, begins.then_some(hash));
+            let slots = &mut self.slots[slot..slot + lanes];
+            begin(slots, &self.want, missing, area, begins.then_some(hash));
         }
         let disturbance = self.disturbance * area as f32;
-        let best = self.choose(slot, disturbance, (hash.wrapping_mul(0x9e37_79b1) >> 24) as u8);
-        let best = if whole { best } else { self.holding(best, area) };
-        self.debt[best] -= area as f32;
+        let lot = hash.wrapping_mul(0x9e37_79b1);
+        self.owe(slot, disturbance, (lot >> 24) as u8);
+        // What owns fragments is not cut, for they print like its first dot.
+        let side = (whole && area == size * size).then_some(size);
+        let mut cell = self.chooser.choose(&self.want, &self.asks, area as f32, side, lot >> 16);
+        if !whole {
+            cell = Cell::whole(self.holding(cell.halves[0].into(), area) as u8);
+        }
+        for half in cell.halves {
+            self.debt[usize::from(half)] -= 0.5 * area as f32;
+        }
         let stays: f32 = shares.iter().sum();
         if !calm && stays > 0.0 && shares.contains(&0.0) {
             let usual = usual(&self.want, area);
@@ -381,7 +306,7 @@ impl<'a> Strip<'a> {
                 *slot += debt * back;
             }
         }
-        best
+        cell
     }
 
     /// Divides the slots of a block for cells of another side.
@@ -402,16 +327,6 @@ impl<'a> Strip<'a> {
             }
         }
     }
-}
-
-/// The mean debt of a stack in the midst of a flat tone, of which a cell of `area` dots asks for so much of each stack: a part
-/// of what it has less than its equal share. Fitted to mixtures of 2 to 10 stacks of 0.5 to 96 %, within 0.05 of a cell.
-fn usual(want: &[f32], area: usize) -> impl Fn(f32) -> f32 + use<> {
-    let present = want.iter().filter(|&&want| want > 0.0).count().max(1);
-    let area = area as f32;
-    let (equal, most) = (area / present as f32, want.iter().copied().fold(0.0, f32::max));
-    let part = 0.45 + 0.8 * (most / area - 0.8).max(0.0);
-    move |want| if want > 0.0 { part * (equal - want) } else { 0.0 }
 }
 
 fn hash(x: usize, y: usize) -> u32 {

@@ -119,28 +119,47 @@ impl<'a> Field<'a> {
         table.iter().find(|(known, _)| *known == size).map_or(&table[0].1, |(_, spans)| spans)
     }
 
+    /// The share of each stack in all pixels.
+    pub(super) fn mean(&self) -> Vec<f32> {
+        let maps = &self.mix.maps;
+        let mut sums = vec![0u64; maps.channels()];
+        for pixel in maps.data().chunks_exact(maps.channels()) {
+            for (sum, &weight) in sums.iter_mut().zip(pixel) {
+                *sum += u64::from(weight);
+            }
+        }
+        let pixels = (maps.width() * maps.height()) as f64;
+        let channels: Vec<f32> =
+            self.channels.iter().map(|&channel| (sums[channel] as f64 / pixels) as f32).collect();
+        let mut shares = vec![0.0; self.lanes];
+        self.shares(&channels, &mut shares);
+        shares.truncate(self.stacks.len());
+        shares
+    }
+
     /// For the pixels under a square of one of the sizes, by its place among such squares: marks the stacks that have
-    /// weight there.
-    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) {
+    /// weight there. Returns by how much the weight of a channel differs at most.
+    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) -> u16 {
         let (left, right) = Field::spans(&self.across, size).pixels(column);
         let (top, bottom) = Field::spans(&self.down, size).pixels(row);
         let (maps, count) = (&self.mix.maps, self.mix.maps.channels());
-        let mut any = vec![0u16; count];
+        let (mut least, mut most) = (vec![u16::MAX; count], vec![0u16; count]);
         for y in top..bottom {
             let row = y * maps.width();
             for pixel in maps.data()[(row + left) * count..(row + right) * count].chunks_exact(count) {
-                for (any, weight) in any.iter_mut().zip(pixel) {
-                    *any |= weight;
+                for ((least, most), &weight) in least.iter_mut().zip(&mut most).zip(pixel) {
+                    (*least, *most) = ((*least).min(weight), (*most).max(weight));
                 }
             }
         }
         for (&channel, shares) in self.channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
-            if any[channel] > 0 {
+            if most[channel] > 0 {
                 for (present, &share) in present.iter_mut().zip(shares) {
                     *present |= share > 0.0;
                 }
             }
         }
+        most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max().unwrap_or(0)
     }
 
     /// Adds what one dot asks for, in dots.

@@ -2,19 +2,23 @@
 //!
 //! Problem: a cell must be as large as the inks that may fall on it ask for, and end where a solid begins.
 //! Method: blocks of [`BLOCK`] x [`BLOCK`] dots, each cut into equal cells for the most demanding stack that has
-//! weight in it. A cell that solids or the page's border cut falls into connected fragments. A fragment joins the
+//! weight in it. Stacks that ask for less may have halves of them: 2 x 4 dots hold 8. Where the document is flat and no
+//! stack asks for more, those have squares of 3 x 3 instead. A cell that solids or the page's border cut falls into connected fragments. A fragment joins the
 //! whole cell it shares most border with and prints that cell's stack; where there is none, fragments join each other
 //! until they are as large as a cell.
 //! Cost: one look at each pixel of the document, and at each dot of the blocks that hold solids. Memory: a bit a dot
 //! and 12 bytes a fragment.
-//! Guarantee: within a region of tones, every dot lies in a square of its stack's size that holds no other tone.
+//! Guarantee: within a region of tones, every dot lies in a square or half square of its stack's minimum or more that holds
+//! no other tone. A cell that owns fragments is not halved.
 
 use std::collections::HashMap;
 
 use rayon::prelude::*;
 
 use super::super::TONE;
+use super::cell::fits_half;
 use super::field::Field;
+use appearance::weights::ONE;
 
 /// Side of a block in dots. The sides of cells are its divisors.
 pub(in crate::halftone) const BLOCK: usize = 24;
@@ -30,6 +34,16 @@ pub(in crate::halftone) fn size_of(minimum: u16) -> usize {
     SIZES.into_iter().find(|size| size * size >= usize::from(minimum)).unwrap_or(BLOCK)
 }
 
+/// Side of the cells of a stack where halves of cells may be printed: that with which it takes the fewest dots.
+pub(super) fn halved_size_of(minimum: u16) -> usize {
+    let dots = |size: usize| match size * size {
+        area if fits_half(minimum, size) => area / 2,
+        area if area >= usize::from(minimum) => area,
+        _ => usize::MAX,
+    };
+    SIZES.into_iter().min_by_key(|&size| dots(size)).unwrap_or(BLOCK)
+}
+
 /// Some dots of a block, row by row, the leftmost in the lowest bit.
 pub(super) type Mask = [u32; BLOCK];
 
@@ -40,9 +54,14 @@ pub(super) struct Block {
     pub(super) owns: bool,
     /// Whether this block and the eight around it consist of whole cells.
     pub(super) calm: bool,
+    /// By how much a weight of the document differs over the block.
+    pub(super) varies: u16,
     /// Dots that are tones.
     pub(super) tone: Mask,
 }
+
+/// By how much a weight may differ over a flat block. In flat tones squares look more even than halves, in all others less.
+const FLAT: u16 = ONE / 512;
 
 /// Connected tones that are less than a cell.
 pub(super) struct Fragment {
@@ -69,10 +88,12 @@ pub(in crate::halftone) struct Plan {
 }
 
 impl Plan {
-    /// Plans the cells and prints the solids. `sizes` are those of the stacks of the field.
-    pub(super) fn new(field: &Field, sizes: &[usize], index: &mut [u8]) -> Plan {
+    /// Plans the cells and prints the solids. `minimum` is the smallest cluster of each stack of the field.
+    pub(super) fn new(field: &Field, minimum: &[u16], index: &mut [u8]) -> Plan {
         let (width, height) = (field.width, field.height);
         let across = width.div_ceil(BLOCK);
+        let sizes: Vec<[usize; 2]> =
+            minimum.iter().map(|&minimum| [size_of(minimum), halved_size_of(minimum)]).collect();
         let rows = index.par_chunks_mut(BLOCK * width).enumerate();
         let blocks = rows
             .flat_map_iter(|(row, dots)| {
@@ -80,7 +101,7 @@ impl Plan {
                 let blocks: Vec<Block> = (0..across)
                     .map(|column| {
                         present.fill(false);
-                        field.survey(BLOCK, column, row, &mut present);
+                        let varies = field.survey(BLOCK, column, row, &mut present);
                         let (left, top) = (column * BLOCK, row * BLOCK);
                         let solid =
                             field.solids.any(left..(left + BLOCK).min(width), top..(top + BLOCK).min(height));
@@ -88,11 +109,11 @@ impl Plan {
                             .iter()
                             .zip(&present)
                             .filter(|&(_, &present)| present)
-                            .map(|(&size, _)| size);
+                            .map(|(size, _)| size[usize::from(varies > FLAT)]);
                         let size = needed.max().unwrap_or(1) as u8;
                         let tone =
                             if solid { cut(field, column, row, dots) } else { inside(field, column, row) };
-                        Block { size, owns: false, calm: false, tone }
+                        Block { size, owns: false, calm: false, varies, tone }
                     })
                     .collect();
                 blocks
