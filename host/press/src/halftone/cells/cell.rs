@@ -40,12 +40,9 @@ impl Cell {
         let [first, last] = self.halves.map(|half| stacks[usize::from(half)]);
         for (y, row) in dots.chunks_mut(width).take(size).enumerate() {
             let (left, right) = row[..size].split_at_mut(size / 2);
-            if self.stacked {
-                let stack = if y < size / 2 { first } else { last };
-                (left.fill(stack), right.fill(stack));
-            } else {
-                (left.fill(first), right.fill(last));
-            }
+            let upper = if y < size / 2 { first } else { last };
+            left.fill(if self.stacked { upper } else { first });
+            right.fill(if self.stacked { upper } else { last });
         }
     }
 }

@@ -4,6 +4,8 @@ use super::super::eye::{Tangent, error_planes, errors_seen, peak, swing, thin};
 use super::super::solids::Solids;
 use super::super::{Method, Settings, TONE, halftone};
 use super::Point;
+use super::cell::{Cell, fits_half};
+use super::plan::{halved_size_of, size_of};
 use crate::sheet::clusters::smallest_clusters;
 use appearance::brdf::{Space, reflectances};
 use appearance::gamut::InkMix;
@@ -228,6 +230,39 @@ fn the_search_keeps_tones_and_sees_less() {
     };
     assert!(seen(&best) < 0.85 * seen(&plain), "{} of {}", seen(&best), seen(&plain));
     assert_eq!(thin(side, &best, |_| 9, |_| false), 0);
+}
+
+#[test]
+fn a_cell_is_read_as_it_is_printed() {
+    let (width, stacks) = (11, [7u8, 5, 250]);
+    let mut number = [u8::MAX; 256];
+    stacks.iter().enumerate().for_each(|(q, &stack)| number[usize::from(stack)] = q as u8);
+    for size in [2, 4, 6, 8] {
+        for (first, second) in [(0, 0), (0, 2), (2, 1)] {
+            for stacked in [false, true] {
+                let cell = Cell { halves: [first, second], stacked: stacked && first != second };
+                let mut dots = vec![9; width * size];
+                cell.print(&mut dots[3..], width, size, &stacks);
+                assert_eq!(Cell::read(&dots[3..], width, size, &number), cell);
+                let count = |q: u8| dots.iter().filter(|&&dot| dot == stacks[usize::from(q)]).count();
+                let half = if first == second { size * size } else { size * size / 2 };
+                assert_eq!((count(first), count(second)), (half, half));
+            }
+        }
+    }
+}
+
+/// Whole cells and halves hold the minimum, and no stack takes more dots where it may have halves.
+#[test]
+fn sizes_hold_the_minimum() {
+    for minimum in 1..=64u16 {
+        let (size, halved) = (size_of(minimum), halved_size_of(minimum));
+        assert!(size * size >= minimum.into());
+        let dots = if fits_half(minimum, halved) { halved * halved / 2 } else { halved * halved };
+        assert!(dots >= minimum.into() && dots <= size * size, "{minimum}");
+    }
+    assert_eq!([8, 9, 16].map(size_of), [3, 3, 4]);
+    assert_eq!([8, 9, 16].map(halved_size_of), [4, 3, 4]);
 }
 
 /// Stacks of which half a cell holds the minimum, beside one that takes whole cells: each keeps its tone, where stacks may stand
