@@ -24,6 +24,11 @@ fn blend(bencher: Bencher, size: usize) {
     run(bencher, size, Intent::Blend);
 }
 
+#[divan::bench(args = [256, 1024], sample_count = 1)]
+fn contrast(bencher: Bencher, size: usize) {
+    run(bencher, size, Intent::Contrast);
+}
+
 fn run(bencher: Bencher, size: usize, intent: Intent) {
     let pixels = common::Field::rusty_metal(size);
     let printable = Printable::from_library(&Library::builtin(), &InkSet::of(Ink::ALL), pixels.space());

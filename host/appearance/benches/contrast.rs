@@ -138,13 +138,17 @@ fn compare(name: &str, pixels: &Rows, inks: &str) {
             outside = windows.all(wanted.len()).map(|w| windows.mean(&d, w) > OUTSIDE).collect();
         }
         let (ratio, correlation) = windows.contrast(&wanted, &print, |_| true);
-        let (out_ratio, out_correlation) = windows.contrast(&wanted, &print, |w| outside[w]);
+        let out = match outside.contains(&true) {
+            true => windows.contrast(&wanted, &print, |w| outside[w]),
+            false => (f64::NAN, f64::NAN),
+        };
         let rms = (d.iter().map(|d| d * d).sum::<f64>() / d.len() as f64).sqrt();
         d.sort_by(f64::total_cmp);
         let p95 = d[(d.len() - 1) * 95 / 100];
         println!(
-            "| {name} | {inks} | {called} | {rms:.4} | {p95:.4} | {ratio:.3} | {correlation:.3} | {out_ratio:.3} | \
-             {out_correlation:.3} | {seconds:.1} |"
+            "| {name} | {inks} | {called} | {rms:.4} | {p95:.4} | {ratio:.3} | {correlation:.3} | {:.3} | {:.3} | \
+             {seconds:.1} |",
+            out.0, out.1
         );
     }
 }

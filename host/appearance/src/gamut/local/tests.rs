@@ -313,7 +313,8 @@ fn sweeps_reach_the_minimum_of_the_objective() {
     let mut last = start;
     for sweep in 0..200 {
         let pass = if sweep == 0 { Pass::Measure } else { Pass::Solve };
-        let sums = run(&small.candidates, &small.pixels, &mut clamped, &small.free, &regions, pass).unwrap();
+        let sums =
+            run(&small.candidates, &small.pixels, &mut clamped, &small.free, &regions, pass, 1).unwrap();
         regions.take_means(&sums);
         let value = small.objective(&weights(&clamped.shares)).0;
         // The first c are not the means that the objective assumes. Weights are rounded to 1/32768.
