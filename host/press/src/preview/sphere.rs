@@ -282,10 +282,10 @@ impl Tree {
             if cos_i > 0.0 {
                 let (k, s) = fine.at(chord);
                 let (near, far) = (cos_i * (1.0 - s), cos_i * s);
-                for c in 0..3 {
+                (0..3).for_each(|c| {
                     light[k][c] += near * node.light[c];
                     light[k + 1][c] += far * node.light[c];
-                }
+                });
             }
             i = node.next as usize;
         }
