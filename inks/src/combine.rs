@@ -59,7 +59,7 @@ impl Library {
         if !self.is_modelled() {
             return Vec::new();
         }
-        let mut seen: HashSet<Vec<i64>> =
+        let mut seen: HashSet<Vec<u64>> =
             self.at_hand(inks).iter().filter_map(|entry: &&Entry| entry.lobes.as_ref()).map(look).collect();
         let order: Vec<Ink> = UPWARDS.into_iter().filter(|&ink| inks.contains(ink)).collect();
         let mut found = Vec::new();
@@ -87,9 +87,10 @@ impl Library {
 }
 
 /// The reflectance at a few angles, rounded on a logarithmic scale to a thousandth.
-fn look(lobes: &Lobes) -> Vec<i64> {
+fn look(lobes: &Lobes) -> Vec<u64> {
     let at = [0.0, 0.03, 0.1, 0.3, 0.8].into_iter().flat_map(|theta| lobes.at(theta));
-    at.map(|f| (1000.0 * f.max(1e-9).ln()).round() as i64).collect()
+    // Adding 0 turns a negative zero into the positive one.
+    at.map(|f| ((1000.0 * f.max(1e-9).ln()).round() + 0.0).to_bits()).collect()
 }
 
 #[cfg(test)]
