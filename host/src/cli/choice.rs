@@ -109,7 +109,7 @@ impl Choice for press::halftone::Method {
         (
             press::halftone::Method::Cells,
             "cells",
-            "Compact square clusters, no part thinner than its ink holds",
+            "Compact clusters, no part thinner than its ink holds",
         ),
         (press::halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
         (press::halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
