@@ -386,7 +386,9 @@ fn line_art_prints_at_1200_dpi_in_process_inks_and_in_no_other() {
 #[test]
 fn lists_are_there_for_programs() {
     let bench = Bench::new();
-    assert_eq!(json(&bench.done("preset list --json")), Value::Array(Vec::new()));
+    // The preset that is built in.
+    let preset = &json(&bench.done("preset list --json"))[0];
+    assert_eq!((&preset["name"], &preset["options"]["metric"]), (&"paper".into(), &"paper".into()));
     assert_eq!(json(&bench.done("profile list --json")), Value::Array(Vec::new()));
     assert_eq!(json(&bench.done("resume --list --json")), Value::Array(Vec::new()));
     bench.done("preset save decal --media film --mirror");

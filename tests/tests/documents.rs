@@ -63,7 +63,9 @@ fn check(spec: &str, print: &Print, inks: InkSet) {
         .collect();
     for stack in &used {
         assert!(inks.contains_all(stack.layers()), "{spec}: `{stack}` needs an ink that is not at hand");
-        assert!(library.entry(stack).is_some(), "{spec}: `{stack}` is no stack of the library");
+        let listed = library.entry(stack).is_some();
+        assert!(listed || library.broken_rules(stack).is_empty(), "{spec}: rules are against `{stack}`");
+        assert!(library.curve_of(stack, &[0.0]).is_some(), "{spec}: nobody knows what `{stack}` reflects");
         assert!(print.halftoned.mapped.mix.stacks.contains(stack), "{spec}: `{stack}` was not asked for");
     }
     assert!(used.len() > 1, "{spec}: something is printed");

@@ -106,11 +106,7 @@ impl Choice for Intent {
 impl Choice for press::halftone::Method {
     const ALL: &'static [(press::halftone::Method, &'static str, &'static str)] = &[
         (press::halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
-        (
-            press::halftone::Method::Cells,
-            "cells",
-            "Compact clusters, no part thinner than its ink holds",
-        ),
+        (press::halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
         (press::halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
         (press::halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
     ];

@@ -276,6 +276,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
         },
         "fidelity": {
             "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,
+            "light_rmse": fidelity.light_rmse,
         },
         "halftone": { "method": name(settings.halftone), "look": look, "tones": tones },
     }))

@@ -154,7 +154,7 @@ impl Space {
     }
 
     /// How far two rows differ in the light that they return: the distance between the cube roots of their albedos.
-    pub fn light_distance(&self, a: &[f64], b: &[f64]) -> f64 {
+    pub fn light_distance<T: Copy + Into<f64>>(&self, a: &[T], b: &[T]) -> f64 {
         let both = self.albedo(a).into_iter().zip(self.albedo(b));
         both.map(|(a, b)| (a.cbrt() - b.cbrt()).powi(2)).sum::<f64>().sqrt()
     }

@@ -35,6 +35,8 @@ pub struct Report {
     pub p95: f64,
     /// Greatest distance.
     pub max: f64,
+    /// Root of the mean squared distance in light.
+    pub light_rmse: f64,
     /// Width of the map of distances.
     pub width: usize,
     /// Height of the map of distances.
@@ -83,25 +85,30 @@ pub fn fidelity(
     observer.begin("comparing print and document", height as u64);
     let metric = Metric::new(space);
     let mut map = vec![0.0f32; width * height];
-    map.par_chunks_mut(width * CHUNK).enumerate().for_each(|(chunk, out)| {
+    let chunks = map.par_chunks_mut(width * CHUNK).enumerate().map(|(chunk, out)| {
         let first = chunk * CHUNK;
         let count = out.len() / width;
         let a = blurred(&target, first, count);
         let b = blurred(&print, first, count);
         let columns = space.columns();
+        let mut light = 0.0;
         for ((out, a), b) in out.iter_mut().zip(a.chunks_exact(columns)).zip(b.chunks_exact(columns)) {
             *out = metric.distance(a, b);
+            light += space.light_distance(a, b).powi(2);
         }
         observer.advance(count as u64);
+        light
     });
+    let light: Vec<f64> = chunks.collect();
     observer.end();
     let n = map.len() as f64;
+    let light_rmse = (light.iter().sum::<f64>() / n).sqrt();
     let mean = map.iter().map(|&d| f64::from(d)).sum::<f64>() / n;
     let rmse = (map.iter().map(|&d| f64::from(d).powi(2)).sum::<f64>() / n).sqrt();
     let mut sorted = map.clone();
     sorted.sort_unstable_by(f32::total_cmp);
     let at = |share: f64| f64::from(sorted[((sorted.len() - 1) as f64 * share).round() as usize]);
-    Ok(Report { mean, rmse, p95: at(0.95), max: at(1.0), width, height, map })
+    Ok(Report { mean, rmse, p95: at(0.95), max: at(1.0), light_rmse, width, height, map })
 }
 
 /// [`appearance::brdf::Space::distance`] for rows of f32, eight columns at a time. The order of sums is fixed.
@@ -240,6 +247,8 @@ mod tests {
         for value in [report.mean, report.rmse, report.p95, report.max] {
             assert!((value / expected - 1.0).abs() < 1e-5, "{value}, not {expected}");
         }
+        let light = space.light_distance(rows.row(0), rows.row(1));
+        assert!((report.light_rmse / light - 1.0).abs() < 1e-5, "{}, not {light}", report.light_rmse);
         assert_eq!((report.width, report.height), (200 / 12, 200 / 12));
     }
 
