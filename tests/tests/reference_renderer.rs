@@ -73,7 +73,7 @@ fn run(script: &Path, mode: &str, args: &[&str], curve: &Path, out: &Path, size:
 }
 
 /// Greatest difference over wholly covered pixels, as a share of the pixel or, where it is darker, of the mean; and root mean
-/// square difference, as a share of the mean. By itself a pixel at the rim may be farther off: beyond the last sample, at
+/// square difference, as a share of the ball's root mean square. By itself a pixel at the rim may be farther off: beyond the last sample, at
 /// 87 degrees, nobody knows the curve.
 fn difference(ours: &Radiance, theirs: &[[f32; 4]]) -> (f64, f64) {
     let covered = || ours.pixels.iter().zip(theirs).filter(|(_, b)| b[3] > 0.999);
@@ -83,7 +83,8 @@ fn difference(ours: &Radiance, theirs: &[[f32; 4]]) -> (f64, f64) {
     assert!(n > 0.0);
     let mean = each().map(|(_, b)| b).sum::<f64>() / n;
     let most = each().map(|(a, b)| (a - b).abs() / b.max(mean)).fold(0.0, f64::max);
-    (most, (each().map(|(a, b)| (a - b).powi(2)).sum::<f64>() / n).sqrt() / mean)
+    let squares = |value: fn((f64, f64)) -> f64| each().map(value).map(|v| v * v).sum::<f64>();
+    (most, (squares(|(a, b)| a - b) / squares(|(_, b)| b)).sqrt())
 }
 
 /// White paper and silver foil on primer: the dullest and the sharpest thing that can be printed.
@@ -105,7 +106,7 @@ fn a_ball_lit_from_the_eye_is_the_references_ball() {
         write_curve(&csv, material);
         let theirs = run(&script, "sphere-dir", &[], &csv, &out, 96);
         let (most, rms) = difference(&sphere::under_light(&curve, [0.0, 0.0, 1.0], 96).unwrap(), &theirs);
-        println!("{material:?}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the mean");
+        println!("{material:?}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the ball");
         assert!(most < 0.005 && rms < 0.005, "{material:?}: greatest {most}, rms {rms}");
     }
 }
@@ -135,7 +136,7 @@ fn balls_under_a_probe_are_the_references_balls() {
         let inner: Vec<[f32; 4]> =
             theirs.iter().zip(&ours.pixels).map(|(t, o)| if o[3] == 1.0 { *t } else { [0.0; 4] }).collect();
         let (most, rms) = difference(ours, &inner);
-        println!("{material:?}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the mean");
-        assert!(rms < 5e-3 && most < 2e-2, "{material:?}: greatest {most}, rms {rms}");
+        println!("{material:?}: greatest difference {most:.2e} of a pixel, rms {rms:.2e} of the ball");
+        assert!(rms < 5e-3 && most < 5e-3, "{material:?}: greatest {most}, rms {rms}");
     }
 }
