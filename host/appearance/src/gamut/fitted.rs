@@ -10,6 +10,9 @@ use crate::solve::{Hull, Mixer, MixtureError, Target};
 /// Gap in squared distance that decides nothing.
 const ENOUGH: f64 = 1e-8;
 
+/// The weight that must be left of a mixture for it to be a start; the tangent start costs a product of every two stacks.
+const ENOUGH_LEFT: f64 = 0.05;
+
 /// Targets, and the importance of each.
 pub(super) struct Targets {
     pub rows: Vec<Target>,
@@ -56,7 +59,11 @@ impl Targets {
                     return Ok(kept.clone());
                 }
                 let mut a = vec![0.0; allowed.len()];
-                mixer.tangent(&hull, target, &mut a)?;
+                let left: f64 = kept.map_or(0.0, |m| allowed.iter().map(|&k| m.weights[k]).sum());
+                match kept.filter(|_| left > ENOUGH_LEFT) {
+                    Some(m) => a.iter_mut().zip(allowed).for_each(|(a, &k)| *a = m.weights[k] / left),
+                    None => mixer.tangent(&hull, target, &mut a)?,
+                }
                 let distance = mixer.refine(&hull, target, &mut a, ENOUGH)?.distance;
                 let mut weights = vec![0.0; candidates.len()];
                 allowed.iter().zip(&a).for_each(|(&k, &w)| weights[k] = w);
