@@ -84,7 +84,7 @@ const TABLE: [(Fault, [&str; 5]); 11] = [
     //                          send                               print --to                         resume                             queue                          two users
     (BridgeForgets,            ["unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "held ½, held ½, sent ½R1",    "unknown ½, refused ½, sent ½R1"]),
     (RestartBetweenSheets,     ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
-    (KilledBeforeTheFirstByte, ["killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",            "killed 0, busy 0, sent 11"]),
+    (KilledBeforeTheFirstByte, ["killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",            "killed 0, busy 0, sent 11 | killed 0, sent 11"]),
     (KilledInARow,             ["killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",            "killed ½, busy ½, sent 11 | killed ½, sent 11"]),
     (KilledAndForgotten,       ["killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, held ½, sent ½R1", "killed ½, refused ½, sent ½R1"]),
     (LinkLostAndBack,          ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
