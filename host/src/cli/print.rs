@@ -92,9 +92,9 @@ impl Work {
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
-        if halftoned.mapped.report.intent == Intent::Clamp && self.factor.is_chosen() {
+        if !uses_bases(halftoned.mapped.report.intent) && self.factor.is_chosen() {
             observer.note(
-                "every pixel was fitted by itself (intent `clamp`), so --bases and --factor change nothing; --intent basis uses \
+                "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses \
                  bases",
             );
         }
@@ -114,6 +114,11 @@ impl Work {
             library: &laid.library,
         }
     }
+}
+
+/// Whether an intent maps the bases; the others fit each pixel by itself.
+fn uses_bases(intent: Intent) -> bool {
+    matches!(intent, Intent::Basis | Intent::Blend)
 }
 
 /// What foils would bring, if that can be seen.
@@ -211,7 +216,7 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     let sheet =
         preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
     let mapped = &halftoned.mapped.report;
-    let kind = if mapped.intent == Intent::Clamp { "material" } else { "basis" };
+    let kind = if uses_bases(mapped.intent) { "basis" } else { "material" };
     let swatches: Vec<Swatch> = (1..)
         .zip(&mapped.materials)
         .map(|(number, material)| Swatch {
@@ -267,7 +272,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
         "factoring": halftoned.factoring,
         "gamut": {
             "intent": mapped.intent, "light_weight": settings.gamut.light,
-            "uses_bases": mapped.intent != Intent::Clamp, "gloss_scale": mapped.gloss_scale, "materials": materials,
+            "uses_bases": uses_bases(mapped.intent), "gloss_scale": mapped.gloss_scale, "materials": materials,
             "given_up": given_up, "pixels": pixels,
             "foils": halftoned.foils.as_ref().map(|gain| json!({
                 "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),
