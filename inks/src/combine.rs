@@ -2,10 +2,10 @@
 //!
 //! Problem: a modelled library lists some dozens of stacks, but its figures describe every order of its layers, and the best
 //! stack for a document may not be on the list.
-//! Method: all orders of up to three inks that break no rule, not even a note. Of stacks that the model sees alike, such
-//! as two orders of transparent inks, one is enough: one on the list, or else the one with the fewest layers. Cost: one
-//! evaluation of the model for each order that the rules allow, a few hundred. Limits: a library with a measured stack
-//! offers only what was measured.
+//! Method: all sets of up to three inks, laid in one order that is the same for all stacks, that break no rule, not even a
+//! note. With one order a sheet needs one pass for each ink. Of stacks that the model sees alike one is enough: one on the
+//! list, or else the one with the fewest layers. Cost: one evaluation of the model for each set that the rules allow, one or
+//! two hundred. Limits: a library with a measured stack offers only what was measured.
 
 use std::collections::HashSet;
 
@@ -20,8 +20,7 @@ use crate::stack::Stack;
 /// The most layers of a stack that is not on the list.
 const MOST_LAYERS: usize = 3;
 
-/// Inks from the lowest to the uppermost in which orders are tried, so that of two orders that look alike the usual one is
-/// found first.
+/// Inks from the lowest to the uppermost.
 const UPWARDS: [Ink; 13] = [
     Ink::Primer,
     Ink::White,
@@ -66,8 +65,8 @@ impl Library {
         let mut shorter = vec![Vec::new()];
         for _ in 0..MOST_LAYERS {
             let longer = shorter.iter().flat_map(|layers: &Vec<Ink>| {
-                let unused = order.iter().filter(|ink| !layers.contains(ink));
-                unused.map(|&ink| layers.iter().copied().chain([ink]).collect())
+                let above = order.iter().filter(|ink| layers.last().is_none_or(|top| is_above(**ink, *top)));
+                above.map(|&ink| layers.iter().copied().chain([ink]).collect())
             });
             // A rule that a stack breaks is broken by whatever lies on it, too.
             let allowed: Vec<Vec<Ink>> = longer
@@ -84,6 +83,12 @@ impl Library {
         }
         found
     }
+}
+
+/// Whether an ink lies above another one.
+fn is_above(ink: Ink, other: Ink) -> bool {
+    let place = |ink: Ink| UPWARDS.iter().position(|&known| known == ink);
+    place(ink) > place(other)
 }
 
 /// The reflectance at a few angles, rounded on a logarithmic scale to a thousandth.
@@ -108,6 +113,7 @@ mod tests {
             for stack in &found {
                 assert!(library.broken_rules(stack).is_empty() && library.entry(stack).is_none(), "{stack}");
                 assert!(inks.contains_all(stack.layers()) && stack.layers().len() <= MOST_LAYERS, "{stack}");
+                assert!(stack.layers().windows(2).all(|pair| is_above(pair[1], pair[0])), "{stack}");
                 let curve = library.curve_of(stack, &theta).unwrap().rgb().to_vec();
                 let alike = |other: &Vec<[f64; 3]>| {
                     let both = other.iter().flatten().zip(curve.iter().flatten());
@@ -120,8 +126,20 @@ mod tests {
         }
     }
 
+    /// With one order for all stacks no ink needs a second pass.
     #[test]
-    fn black_under_colour_and_finish_is_among_them() {
+    fn the_stacks_on_the_list_have_the_same_order() {
+        for entry in Library::builtin().entries() {
+            assert!(
+                entry.stack.layers().windows(2).all(|pair| is_above(pair[1], pair[0])),
+                "{}",
+                entry.stack
+            );
+        }
+    }
+
+    #[test]
+    fn black_with_colour_under_finish_is_among_them() {
         let found = Library::builtin().combinations(&"process,finish".parse().unwrap());
         for stack in ["C+K", "C+K+F", "M+Y+K"] {
             assert!(found.contains(&stack.parse().unwrap()), "{stack} {found:?}");
