@@ -50,7 +50,7 @@ fn off(target: &super::Radiance, printed: &super::Radiance) -> f64 {
     (sum / all).sqrt()
 }
 
-/// Materials of a document, up to twelve: those that look least alike among a few hundred.
+/// Twelve pixels of a document, evenly spread down its length.
 fn materials(path: &Path, space: &Space) -> Table {
     let document = document::open(&path.display().to_string(), &Options::default(), &Silent).unwrap();
     let pixels = document.materials();
