@@ -90,6 +90,15 @@ impl WeightMaps {
         &self.data[pixel * self.channels..][..self.channels]
     }
 
+    /// The sum of each channel over all pixels; together [`ONE`] times the number of pixels.
+    pub fn totals(&self) -> Vec<u64> {
+        let mut sums = vec![0u64; self.channels];
+        for pixel in self.data.chunks_exact(self.channels) {
+            sums.iter_mut().zip(pixel).for_each(|(sum, &weight)| *sum += u64::from(weight));
+        }
+        sums
+    }
+
     /// All weights, interleaved.
     pub fn data(&self) -> &[u16] {
         &self.data

@@ -16,7 +16,7 @@ use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use appearance::brdf::reflectances;
 use appearance::document::Document;
-use appearance::gamut::{Gain, Intent};
+use appearance::gamut::Gain;
 use observe::Observer;
 use press::halftone::{self, metrics};
 use press::layout::{Layout, Mm, Size};
@@ -92,7 +92,7 @@ impl Work {
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
-        if !uses_bases(halftoned.mapped.report.intent) && self.factor.is_chosen() {
+        if !halftoned.mapped.report.intent.uses_bases() && self.factor.is_chosen() {
             observer.note(
                 "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses \
                  bases",
@@ -114,11 +114,6 @@ impl Work {
             library: &laid.library,
         }
     }
-}
-
-/// Whether an intent maps the bases; the others fit each pixel by itself.
-fn uses_bases(intent: Intent) -> bool {
-    matches!(intent, Intent::Basis | Intent::Blend)
 }
 
 /// What foils would bring, if that can be seen.
@@ -216,7 +211,7 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     let sheet =
         preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
     let mapped = &halftoned.mapped.report;
-    let kind = if uses_bases(mapped.intent) { "basis" } else { "material" };
+    let kind = if mapped.intent.uses_bases() { "basis" } else { "material" };
     let swatches: Vec<Swatch> = (1..)
         .zip(&mapped.materials)
         .map(|(number, material)| Swatch {
@@ -272,7 +267,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
         "factoring": halftoned.factoring,
         "gamut": {
             "intent": mapped.intent, "light_weight": settings.gamut.light,
-            "uses_bases": uses_bases(mapped.intent), "gloss_scale": mapped.gloss_scale, "materials": materials,
+            "uses_bases": mapped.intent.uses_bases(), "gloss_scale": mapped.gloss_scale, "materials": materials,
             "given_up": given_up, "pixels": pixels,
             "foils": halftoned.foils.as_ref().map(|gain| json!({
                 "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),

@@ -88,22 +88,28 @@ pub struct Gain {
 }
 
 /// What the stacks of `more` would bring beside those at hand, under the same limit of cartridges; `None` if nothing.
+/// `before` is the distance with those at hand if a mapping without bases has found it ([`Mapped::sampled`]).
 ///
 /// # Errors
 /// Those of the mapping.
 pub fn gain(
     pixels: &dyn Materials,
     at_hand: &Printable,
+    before: Option<f64>,
     more: &Printable,
     settings: &Settings,
 ) -> Result<Option<Gain>, GamutError> {
     let settings = Settings { intent: Intent::Clamp, ..settings.clone() };
-    let inks = |chosen: &Chosen| InkSet::of(chosen.candidates.inks.iter().flat_map(|inks| inks.iter()));
-    let best = |printable| Pixels::new(pixels, printable, &settings)?.choose(None, &observe::Silent);
-    let (now, then) = (best(at_hand)?, best(more)?);
+    let distance = |printable| -> Result<(f64, InkSet), GamutError> {
+        let document = Pixels::new(pixels, printable, &settings)?;
+        let best = document.cartridges(&document.targets(None)?, &observe::Silent)?;
+        Ok((best.chosen, InkSet::of(best.stacks.iter().flat_map(|&k| document.all.inks[k].iter()))))
+    };
+    let before = before.map_or_else(|| Ok(distance(at_hand)?.0), Ok::<_, GamutError>)?;
+    let (after, best) = distance(more)?;
     let known = InkSet::of(at_hand.stacks.iter().flat_map(|stack| stack.layers().iter().copied()));
-    let inks = inks(&then).iter().filter(|&ink| !known.contains(ink)).collect();
-    let gain = Gain { before: now.distance, after: then.distance, inks };
+    let inks = best.iter().filter(|&ink| !known.contains(ink)).collect();
+    let gain = Gain { before, after, inks };
     Ok((gain.after < gain.before && !gain.inks.is_empty()).then_some(gain))
 }
 
@@ -138,8 +144,8 @@ impl<'a> Pixels<'a> {
         Ok(Pixels { pixels, settings, all, sampled, sample })
     }
 
-    /// Chooses cartridges, and the stacks that they print, by sampled pixels and by the bases, whichever the intent maps.
-    fn choose(&self, bases: Option<&Factored>, observer: &dyn Observer) -> Result<Chosen, GamutError> {
+    /// What cartridges and stacks are chosen by: sampled pixels and the bases, whichever the intent maps.
+    fn targets(&self, bases: Option<&Factored>) -> Result<Targets, GamutError> {
         let mut targets = Targets { rows: Vec::new(), importance: Vec::new() };
         if let Some(bases) = bases {
             for (i, (row, share)) in bases.bases.rows().zip(bases.shares()).enumerate() {
@@ -156,11 +162,22 @@ impl<'a> Pixels<'a> {
                 targets.importance.push(1.0 / few.len() as f64);
             }
         }
+        Ok(targets)
+    }
+
+    fn cartridges(&self, targets: &Targets, observer: &dyn Observer) -> Result<Cartridges, GamutError> {
         let most = self.settings.most_cartridges;
-        let cartridges = cartridges::choose(&self.all, &targets, most, observer)?;
+        let cartridges = cartridges::choose(&self.all, targets, most, observer)?;
         if let Some(words) = in_words(&cartridges, most) {
             observer.note(&words);
         }
+        Ok(cartridges)
+    }
+
+    /// Chooses cartridges, and the stacks that they print.
+    fn choose(&self, bases: Option<&Factored>, observer: &dyn Observer) -> Result<Chosen, GamutError> {
+        let targets = self.targets(bases)?;
+        let cartridges = self.cartridges(&targets, observer)?;
         let stacks =
             choice::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
         let candidates = self.all.subset(&stacks);
@@ -205,7 +222,7 @@ impl<'a> Pixels<'a> {
         let (width, height) = (self.pixels.width(), self.pixels.height());
         let (shares, maps) = assemble::compact(clamped.shares, candidates.len(), width, height)?;
         self.mapped(
-            candidates,
+            chosen,
             (shares, maps),
             Report {
                 intent,
@@ -245,7 +262,7 @@ impl<'a> Pixels<'a> {
             (assemble::compact(clamped.shares, candidates.len(), width, height)?, Some(report))
         };
         self.mapped(
-            candidates,
+            chosen,
             mixed,
             Report {
                 intent: if pixels.is_some() { Intent::Blend } else { Intent::Basis },
@@ -279,7 +296,7 @@ impl<'a> Pixels<'a> {
     /// The mix, with what the report can say only of it.
     fn mapped(
         &self,
-        candidates: &Candidates,
+        Chosen { candidates, distance, .. }: &Chosen,
         (shares, maps): (Vec<Vec<u16>>, WeightMaps),
         mut report: Report,
     ) -> Result<Mapped, GamutError> {
@@ -290,7 +307,7 @@ impl<'a> Pixels<'a> {
             pixels.merged = sample::merged_share(self.pixels.space(), &self.sample, &printed, seed);
         }
         report.cartridges = mix.inks();
-        Ok(Mapped { mix, report })
+        Ok(Mapped { mix, report, sampled: *distance })
     }
 }
 

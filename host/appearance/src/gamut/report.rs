@@ -13,6 +13,9 @@ pub struct Mapped {
     pub mix: InkMix,
     /// The report.
     pub report: Report,
+    /// Root mean square distance, with the cartridges chosen and in the metric of the settings, of what they were chosen by:
+    /// sampled pixels, the bases or both, whichever the intent maps.
+    pub sampled: f64,
 }
 
 /// The report of a mapping.

@@ -19,6 +19,13 @@ pub enum Intent {
     Contrast,
 }
 
+impl Intent {
+    /// Whether it maps the bases; the others fit each pixel by itself.
+    pub fn uses_bases(self) -> bool {
+        matches!(self, Intent::Basis | Intent::Blend)
+    }
+}
+
 /// The weight of the distance in light beside distance d at which metals shine and other materials hardly change;
 /// `docs/decisions/metric-that-knows-light.md` has the figures.
 pub const LIGHT: f64 = 0.3;

@@ -293,7 +293,7 @@ fn fewer_cartridges_are_kept_to_and_cost_distance() {
     let mut last = 0.0;
     for most in [13, 7, 5, 1, 0] {
         let settings = Settings { most_cartridges: most, gloss: Gloss::Keep, ..basis_settings() };
-        let Mapped { mix, report } = map(&document, None, &printable, &settings, &Silent).unwrap();
+        let Mapped { mix, report, .. } = map(&document, None, &printable, &settings, &Silent).unwrap();
         is_printable(&mix, most);
         assert_eq!(report.cartridges, mix.inks());
         let sum: f64 = report.materials.iter().map(|b| b.distance * b.distance).sum();

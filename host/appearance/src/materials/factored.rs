@@ -18,11 +18,7 @@ pub struct Factored {
 impl Factored {
     /// The share of the document that each basis has: its mean weight. They sum to 1.
     pub fn shares(&self) -> Vec<f64> {
-        let channels = self.maps.channels();
-        let mut sums = vec![0u64; channels];
-        for weights in self.maps.data().chunks_exact(channels) {
-            sums.iter_mut().zip(weights).for_each(|(sum, &w)| *sum += u64::from(w));
-        }
+        let sums = self.maps.totals();
         let total: u64 = sums.iter().sum();
         sums.into_iter().map(|sum| sum as f64 / total as f64).collect()
     }

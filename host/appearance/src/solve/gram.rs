@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::brdf::Table;
 
-use super::vector::dot;
+use super::vector::{dot, wide};
 
 /// Inner products `G_ij = a_i . a_j` of `n` rows.
 #[derive(Clone, Debug)]
@@ -34,6 +34,7 @@ impl Gram {
 
     /// Replaces the matrix by the inner products of `n` rows of equal length. Does not allocate if it has held as many
     /// rows before.
+    #[inline(always)]
     pub(crate) fn refill<'a>(&mut self, n: usize, row: impl Fn(usize) -> &'a [f64]) {
         self.n = n;
         self.values.clear();
@@ -65,6 +66,7 @@ impl Gram {
         self.measure();
     }
 
+    #[inline(always)]
     fn measure(&mut self) {
         self.largest = (0..self.n).map(|i| self.values[i * self.n + i]).fold(0.0, f64::max);
         self.shift = if self.largest > 0.0 { self.largest } else { 1.0 };
@@ -111,27 +113,13 @@ impl Gram {
 /// Uses the widest vectors of the processor. The order of additions does not depend on the width, and neither does the
 /// result.
 pub fn inner_products(rows: &Table, x: &[f64], h: &mut [f64]) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        /// The same code, compiled for AVX. It multiplies and adds in separate steps, so results are equal bit for bit.
-        #[target_feature(enable = "avx")]
-        fn wide(rows: &Table, x: &[f64], h: &mut [f64]) {
-            products(rows, x, h);
-        }
-        if is_x86_feature_detected!("avx") {
-            #[expect(unsafe_code, reason = "a call to code compiled for a processor feature")]
-            // SAFETY: the only requirement of `wide` is that the processor has AVX, just detected.
-            unsafe {
-                wide(rows, x, h)
-            };
-            return;
-        }
-    }
-    products(rows, x, h);
+    wide!(fn(rows: &Table, x: &[f64], h: &mut [f64]) -> () {
+        products(rows, x, h);
+    })
 }
 
 #[inline(always)]
-fn products(rows: &Table, x: &[f64], h: &mut [f64]) {
+pub(super) fn products(rows: &Table, x: &[f64], h: &mut [f64]) {
     for (h, row) in h.iter_mut().zip(rows.rows()) {
         *h = dot(row, x);
     }

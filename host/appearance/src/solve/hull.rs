@@ -227,6 +227,7 @@ impl Hull {
     }
 
     /// The reflected radiance of a mixture.
+    #[inline(always)]
     pub(super) fn mix(&self, weights: &[f64], out: &mut [f64]) {
         out.fill(0.0);
         for (k, &w) in weights.iter().enumerate() {

@@ -13,11 +13,11 @@
 //! target. There the gap bounds the error; elsewhere several starts are the only assurance.
 //! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
 
-use super::gram::{Gram, inner_products};
+use super::gram::{Gram, products};
 use super::hull::{DARKEST, Hull, MixtureError, Target};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
-use super::vector::{add_scaled, dot};
+use super::vector::{add_scaled, dot, wide};
 
 /// Relative drop of the objective below which the search ends.
 const DROP: f64 = 1e-12;
@@ -112,6 +112,7 @@ impl Mixer {
         }
     }
 
+    #[inline(always)]
     fn resize(&mut self, hull: &Hull) {
         let (k, m) = (hull.len(), hull.columns());
         for columns in [
@@ -234,6 +235,23 @@ impl Mixer {
         reach: Reach,
         enough: f64,
     ) -> Result<Fit, MixtureError> {
+        let it = self;
+        wide!(fn(
+            it: &mut Mixer, hull: &Hull, target: &Target, a: &mut [f64], reach: Reach, enough: f64,
+        ) -> Result<Fit, MixtureError> {
+            it.descend_plainly(hull, target, a, reach, enough)
+        })
+    }
+
+    #[inline(always)]
+    fn descend_plainly(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        a: &mut [f64],
+        reach: Reach,
+        enough: f64,
+    ) -> Result<Fit, MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
         self.closed.clear();
@@ -282,8 +300,9 @@ impl Mixer {
     }
 
     /// Half the gradient for every stack, its price included; closed stacks get one so large that they never join.
+    #[inline(always)]
     fn price(&mut self, hull: &Hull) {
-        inner_products(&hull.rows, &self.pull, &mut self.slope);
+        products(&hull.rows, &self.pull, &mut self.slope);
         for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
             *slope += 0.5 * price;
         }
@@ -295,6 +314,7 @@ impl Mixer {
     }
 
     /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights.
+    #[inline(always)]
     fn solve_model(&mut self, hull: &Hull, a: &[f64]) -> Result<(), SimplexError> {
         let m = hull.columns();
         for (i, &k) in self.working.iter().enumerate() {
@@ -315,6 +335,7 @@ impl Mixer {
 
     /// Turns `working_weights` into the full step from `a`, and sets the change of the mixture along it. Returns the
     /// decrease the gradient promises (negative) and the change in price, both for the full step.
+    #[inline(always)]
     fn full_step(&mut self, hull: &Hull, a: &[f64]) -> (f64, f64) {
         self.change.fill(0.0);
         let mut promised = 0.0;
@@ -331,6 +352,7 @@ impl Mixer {
 
     /// Halves the step until the objective falls enough (Armijo's rule). Returns the share of the full step taken and the
     /// squared distance there, or `None` if no share helps.
+    #[inline(always)]
     fn search(
         &mut self,
         hull: &Hull,
@@ -355,6 +377,7 @@ impl Mixer {
     }
 
     /// Selects the working stacks: those in use and those that would help most.
+    #[inline(always)]
     fn choose(&mut self, a: &[f64]) {
         self.working.clear();
         let level = dot(&self.slope, a);
@@ -375,6 +398,7 @@ impl Mixer {
     }
 
     /// Returns the squared distance of the trial mixture and sets up the model around it: `pull` and `stiffness`.
+    #[inline(always)]
     fn linearise(&mut self, hull: &Hull, target: &Target) -> f64 {
         let m = self.trial.len();
         let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);

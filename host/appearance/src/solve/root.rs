@@ -7,7 +7,7 @@
 //! correctly rounded operations, so the result is the same on every processor.
 
 /// `x^(-1/3)` for normal positive x. Other inputs give some number or NaN; nothing panics.
-#[inline]
+#[inline(always)]
 pub(super) fn inverse_cbrt(x: f64) -> f64 {
     // Thirds of the upper half: 0x5555_5556 / 2^32 is 1/3 to 2^-33.
     let third = ((x.to_bits() >> 32) * 0x5555_5556) >> 32;

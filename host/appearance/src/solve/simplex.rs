@@ -14,7 +14,7 @@
 //! Source: Lawson & Hanson 1974, chapter 23, with the equality kept exactly instead of by a heavily weighted row.
 
 use super::gram::Gram;
-use super::vector::{add_scaled, dot, dot_short};
+use super::vector::{add_scaled, dot, dot_short, wide};
 
 /// Reduced gradients within this share of the problem's scale count as zero: about a hundred roundings.
 const TOLERANCE: f64 = 4e-14;
@@ -93,25 +93,10 @@ impl Simplex {
     /// Uses the widest vectors of the processor. The order of additions does not depend on the width, and neither does the
     /// result.
     pub fn solve(&mut self, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
-        #[cfg(target_arch = "x86_64")]
-        {
-            /// The same code, compiled for AVX. It multiplies and adds in separate steps, so results are equal bit for bit.
-            #[target_feature(enable = "avx")]
-            fn wide(
-                it: &mut Simplex,
-                gram: &Gram,
-                h: &[f64],
-                a: &mut [f64],
-            ) -> Result<Certificate, SimplexError> {
-                it.solve_plainly(gram, h, a)
-            }
-            if is_x86_feature_detected!("avx") {
-                #[expect(unsafe_code, reason = "a call to code compiled for a processor feature")]
-                // SAFETY: the only requirement of `wide` is that the processor has AVX, just detected.
-                return unsafe { wide(self, gram, h, a) };
-            }
-        }
-        self.solve_plainly(gram, h, a)
+        let it = self;
+        wide!(fn(it: &mut Simplex, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
+            it.solve_plainly(gram, h, a)
+        })
     }
 
     #[inline(always)]
@@ -154,6 +139,7 @@ impl Simplex {
     /// is the gradient at `a`, a point of the simplex. `a` becomes y and `q` the gradient there.
     ///
     /// Near the solution, `q` has digits that `h = Ga - q` would lose.
+    #[inline(always)]
     pub(crate) fn descend(
         &mut self,
         gram: &Gram,
@@ -172,6 +158,7 @@ impl Simplex {
         finish(frank_wolfe_gap(q, a), steps)
     }
 
+    #[inline(always)]
     fn reset(&mut self, n: usize) {
         if self.n != n {
             (self.n, self.edition) = (n, 0);
@@ -242,6 +229,7 @@ impl Simplex {
     }
 
     /// Keeps point `k` from joining until the weights have moved.
+    #[inline(always)]
     fn refuse(&mut self, k: usize) {
         self.place[k] = Place::Refused;
         self.refused.push(k);
@@ -343,6 +331,7 @@ impl Simplex {
 
     /// The last point of the support depends on the others. Moves weight along the direction that leaves the mixture
     /// unchanged, and returns the position of the point that has none left.
+    #[inline(always)]
     fn exchange(&mut self, gram: &Gram, g: &mut [f64], a: &mut [f64]) -> usize {
         let n = self.n;
         let last = self.support.len() - 1;
@@ -376,6 +365,7 @@ impl Simplex {
     }
 
     /// Removes a position of the support; the points after it need new rows of the factor.
+    #[inline(always)]
     fn leave(&mut self, position: usize) {
         self.pending.extend(self.support[position + 1..].iter().rev());
         self.support.truncate(position);

@@ -56,11 +56,9 @@ impl Tangent {
     /// About the mean mixture of a page; the rows of `table` are the reflectances of its stacks.
     pub fn of_mix(mix: &InkMix, space: &Space, table: &Table) -> Tangent {
         let mut shares = vec![0.0; mix.stacks.len()];
-        for (channel, row) in mix.matrix.iter().enumerate() {
-            let weights = mix.maps.data().iter().skip(channel).step_by(mix.maps.channels());
-            let sum = weights.map(|&weight| u64::from(weight)).sum::<u64>() as f64;
+        for (row, sum) in mix.matrix.iter().zip(mix.maps.totals()) {
             for (share, &part) in shares.iter_mut().zip(row) {
-                *share += sum * f64::from(part);
+                *share += sum as f64 * f64::from(part);
             }
         }
         let total: f64 = shares.iter().sum();
@@ -124,11 +122,48 @@ fn sensitivity(f: f64) -> f64 {
     (-f / (0.525 * LUMINANCE.ln() + 3.91)).exp()
 }
 
-/// Root mean square of an error as it is seen from some distances in metres, in units of the metric. Each plane is one
-/// coordinate of the error, in rows of `width` dots.
-pub fn errors_seen(planes: &[Vec<f64>], width: usize, metres: &[f64]) -> Vec<f64> {
-    let mut sums = vec![0.0; metres.len()];
-    let dots = planes.first().map_or(0, Vec::len);
+/// The eye's filter on windows of one size, from some distances.
+pub struct Eye {
+    width: usize,
+    height: usize,
+    distances: usize,
+    /// The squared sensitivity from each distance, for the frequencies of a quarter: the others are these with other signs.
+    seen: Vec<f64>,
+}
+
+impl Eye {
+    /// For windows of `width` x `height` dots, seen from so many metres.
+    pub fn new(width: usize, height: usize, metres: &[f64]) -> Eye {
+        let mut seen = Vec::with_capacity((width / 2 + 1) * (height / 2 + 1) * metres.len());
+        for y in 0..=height / 2 {
+            for x in 0..=width / 2 {
+                let f = (x as f64 / width as f64).hypot(y as f64 / height as f64);
+                // Dots of a degree of the eye's view.
+                let degree = |metres: &f64| 2.0 * (PI / 360.0).tan() * metres * DOTS;
+                seen.extend(metres.iter().map(|metres| sensitivity(f * degree(metres)).powi(2)));
+            }
+        }
+        Eye { width, height, distances: metres.len(), seen }
+    }
+
+    /// Width and height of the windows.
+    pub fn window(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// The squared sensitivities at a coefficient.
+    fn squared(&self, at: usize) -> &[f64] {
+        let (x, y) = (at % self.width, at / self.width);
+        let (x, y) = (x.min(self.width - x), y.min(self.height - y));
+        &self.seen[(y * (self.width / 2 + 1) + x) * self.distances..][..self.distances]
+    }
+}
+
+/// Root mean square of an error as it is seen from the distances of the eye, in units of the metric. Each plane is one
+/// coordinate of the error in a window of the eye's size.
+pub fn errors_seen(planes: &[Vec<f64>], eye: &Eye) -> Vec<f64> {
+    let mut sums = vec![0.0; eye.distances];
+    let (width, dots) = (eye.width, eye.width * eye.height);
     // Two real planes make one complex image, whose power is the sum of theirs where frequencies weigh the same both ways.
     for pair in planes.chunks(2) {
         let second = |at: usize| pair.get(1).map_or(0.0, |plane| plane[at]);
@@ -136,11 +171,8 @@ pub fn errors_seen(planes: &[Vec<f64>], width: usize, metres: &[f64]) -> Vec<f64
             pair[0].iter().enumerate().map(|(at, &first)| Complex::new(first, second(at))).collect();
         transform(&mut image, width);
         for (at, value) in image.iter().enumerate() {
-            let f = signed(at % width, width).hypot(signed(at / width, dots / width));
-            for (sum, metres) in sums.iter_mut().zip(metres) {
-                // Dots of a degree of the eye's view.
-                let seen = sensitivity(f * 2.0 * (PI / 360.0).tan() * metres * DOTS);
-                *sum += seen * seen * value.norm_sqr();
+            for (sum, seen) in sums.iter_mut().zip(eye.squared(at)) {
+                *sum += seen * value.norm_sqr();
             }
         }
     }
@@ -159,12 +191,6 @@ pub fn error_planes(index: &[u8], asked: &[f32], tangent: &Tangent) -> Vec<Vec<f
         .collect()
     };
     (0..tangent.points.first().map_or(0, Vec::len)).map(error).collect()
-}
-
-/// Frequency of a coefficient in cycles a dot.
-fn signed(at: usize, length: usize) -> f64 {
-    let at = if 2 * at > length { at as f64 - length as f64 } else { at as f64 };
-    at / length as f64
 }
 
 /// Largest magnitude of the autocorrelation of a stack's dots at lags of more than `near` and at most `far` dots, and the
@@ -297,7 +323,7 @@ mod tests {
         let asked = vec![0.5f32; 2 * width * height];
         let seen = |metres: f64| {
             let planes = error_planes(&index, &asked, &Tangent::plain(2));
-            errors_seen(&planes, width, &[metres])[0]
+            errors_seen(&planes, &Eye::new(width, height, &[metres]))[0]
         };
         // Two coordinates; a square wave of +-1/2 in 32 samples has a first harmonic of 1 / (16 sin(pi/32)).
         let degree = 2.0 * (PI / 360.0).tan() * 4.0 * DOTS;

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cells::field::{Field, Row};
-use super::eye::{self, Tangent};
+use super::eye::{self, Eye, Tangent};
 use super::mix::Lattice;
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
 use super::solids::Solids;
@@ -225,9 +225,10 @@ pub fn look(mix: &InkMix, dots: &DotMap, settings: &Settings) -> Result<Option<L
         .into_iter()
         .flat_map(|y| columns.iter().map(move |&x| (x, y)))
         .collect();
+    let eye = Eye::new(wide.0, wide.1, &EYES);
     let windows: Vec<Measured> = corners
         .into_par_iter()
-        .map(|corner| Window { field: &field, dots, corner, wide }.measure(&points, &solids, settings))
+        .map(|corner| Window { field: &field, dots, corner, eye: &eye }.measure(&points, &solids, settings))
         .collect();
     let count = windows.len() as f64;
     let mean = |eye: usize| (windows.iter().map(|w| w.seen[eye].powi(2)).sum::<f64>() / count).sqrt();
@@ -246,7 +247,7 @@ struct Window<'a> {
     field: &'a Field<'a>,
     dots: &'a DotMap,
     corner: (usize, usize),
-    wide: (usize, usize),
+    eye: &'a Eye,
 }
 
 /// What was found in a window.
@@ -260,7 +261,7 @@ struct Measured {
 
 impl Window<'_> {
     fn measure(&self, points: &[[f32; 4]], solids: &Solids, settings: &Settings) -> Measured {
-        let (width, length) = self.wide;
+        let (width, length) = self.eye.window();
         let index: Vec<u8> = (0..length)
             .flat_map(|y| {
                 &self.dots.index()[(self.corner.1 + y) * self.dots.width() + self.corner.0..][..width]
@@ -280,7 +281,7 @@ impl Window<'_> {
             Some((eye::peak(width, &index, stack, near, width.min(length) / 4).0, rows.max(columns)))
         });
         Measured {
-            seen: eye::errors_seen(&planes, width, &EYES),
+            seen: eye::errors_seen(&planes, self.eye),
             tones,
             thin: eye::thin(width, &index, |stack| settings.minimum[usize::from(stack)].into(), free),
             flat,
@@ -290,7 +291,7 @@ impl Window<'_> {
     /// The error in each coordinate, and the share of each stack if it is the same everywhere. What a dot asks for is exact,
     /// whatever the method has made of it.
     fn errors(&self, index: &[u8], points: &[[f32; 4]]) -> (Vec<Vec<f64>>, Option<Vec<f32>>) {
-        let ((left, top), (width, length)) = (self.corner, self.wide);
+        let ((left, top), (width, length)) = (self.corner, self.eye.window());
         let field = self.field;
         let mut planes = vec![vec![0.0; index.len()]; 4];
         let (mut line, mut want) = (Row::default(), vec![0.0; field.lanes]);

@@ -113,7 +113,7 @@ pub fn halftoned(
     };
     let dots = halftone(&mapped.mix, (width, height), None, &chosen, observer)?;
     let foils = match settings.inks == InkSet::default() {
-        true => foils(materials, library, &printable, &settings.gamut)?,
+        true => foils(materials, library, &printable, &mapped, &settings.gamut)?,
         false => None,
     };
     Ok(Halftoned { factoring, mapped, dots, foils })
@@ -124,11 +124,13 @@ fn foils(
     materials: &dyn Materials,
     library: &Library,
     printable: &Printable,
+    mapped: &Mapped,
     settings: &gamut::Settings,
 ) -> Result<Option<Gain>, GamutError> {
     let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
     let more = Printable::combined(library, &all, materials.space());
-    gamut::gain(materials, printable, &more, settings)
+    let before = (!mapped.report.intent.uses_bases()).then_some(mapped.sampled);
+    gamut::gain(materials, printable, before, &more, settings)
 }
 
 /// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a

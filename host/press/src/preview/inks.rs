@@ -89,13 +89,24 @@ pub fn save_pass(
     path: &Path,
 ) -> Result<(), FileError> {
     let palette = [ground.0, label(pass.ink, ground.0)];
-    let plane = &pass.plane;
-    let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
-    let dots: Vec<u8> = rows
-        .flat_map(|row| std::iter::repeat_n(row, across))
-        .flat_map(|row| (area.left..area.left + area.width).map(|x| row[x / 8] >> (7 - x % 8) & 1))
-        .collect();
-    write_png(path, (area.width, area.length * across), Kind::Indexed(&palette), &dots)
+    let rows = rows(pass, area).flat_map(|row| std::iter::repeat_n(row, across));
+    let bits: Vec<u8> = rows.flatten().collect();
+    write_png(path, (area.width, area.length * across), Kind::Two(&palette), &bits)
+}
+
+/// The dots of each row of an area of a pass, eight a byte, the first one highest. Those after the last are 0.
+fn rows(pass: &Pass, area: Area) -> impl Iterator<Item = impl Iterator<Item = u8> + Clone> {
+    let Area { left, top, width, length } = area;
+    let (byte, shift) = (left / 8, left % 8);
+    let rows = pass.plane.bits.chunks_exact(pass.plane.stride).skip(top).take(length);
+    rows.map(move |row| {
+        (0..width.div_ceil(8)).map(move |i| {
+            let next = row.get(byte + i + 1).copied().unwrap_or(0);
+            let [eight, _] = (u16::from_be_bytes([row[byte + i], next]) << shift).to_be_bytes();
+            let beyond = (8 * (i + 1)).saturating_sub(width);
+            eight >> beyond << beyond
+        })
+    })
 }
 
 /// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each
@@ -122,26 +133,31 @@ pub fn thumbnail(sheet: &Sheet, across: usize, ground: Ground, longest: usize) -
     })
 }
 
-/// A picture of an area of one pass in its ink, with `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each pixel is the mean of its
-/// dots.
+/// A picture of an area of one pass in its ink, with `across` dots in 1/600 inch; at most `longest` pixels on its longer
+/// side. Each pixel is the mean of its dots.
 ///
 /// # Panics
 /// If the area leaves the plane, which is a bug of the caller.
 pub fn pass_thumbnail(pass: &Pass, area: Area, across: usize, ground: Ground, longest: usize) -> RgbImage {
     let colours = [ground.0, label(pass.ink, ground.0)];
-    let plane = &pass.plane;
     let step = (area.width / across).max(area.length).div_ceil(longest.max(1)).max(1);
     let wide = step * across;
     let (width, height) = (area.width.div_ceil(wide), area.length.div_ceil(step));
     // Dots of each pixel: all of them, and those with ink.
     let mut sums = vec![[0u32; 2]; width * height];
-    let rows = plane.bits.chunks_exact(plane.stride).skip(area.top).take(area.length);
-    for (y, row) in rows.enumerate() {
-        for x in 0..area.width {
-            let at = area.left + x;
-            let sum = &mut sums[y / step * width + x / wide];
-            sum[0] += 1;
-            sum[1] += u32::from(row[at / 8] >> (7 - at % 8) & 1);
+    for (y, row) in rows(pass, area).enumerate() {
+        let sums = &mut sums[y / step * width..][..width];
+        for (i, sum) in sums.iter_mut().enumerate() {
+            sum[0] += wide.min(area.width - i * wide) as u32;
+        }
+        for (i, eight) in row.enumerate().filter(|(_, eight)| *eight != 0) {
+            let (first, last) = (8 * i / wide, (8 * i + 7) / wide);
+            if first == last {
+                sums[first][1] += eight.count_ones();
+            } else {
+                let inked = (0..8).filter(|bit| eight << bit & 0x80 != 0);
+                inked.for_each(|bit| sums[(8 * i + bit) / wide][1] += 1);
+            }
         }
     }
     // The sides of an area fit in u16, and a mean of bytes fits in a byte.

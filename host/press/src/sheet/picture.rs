@@ -16,15 +16,26 @@ const DENSITY: u32 = 23_622;
 pub(crate) enum Kind<'a> {
     /// One bit a dot, rows padded to bytes, 0 black.
     Bits,
+    /// One bit a dot, rows padded to bytes, in two colours.
+    Two(&'a [[u8; 3]; 2]),
     /// One byte a dot, with as many colours as there are stacks.
     Indexed(&'a [[u8; 3]]),
 }
 
-impl Kind<'_> {
+impl<'a> Kind<'a> {
     fn png(self) -> (png::ColorType, png::BitDepth) {
         match self {
             Kind::Bits => (png::ColorType::Grayscale, png::BitDepth::One),
+            Kind::Two(_) => (png::ColorType::Indexed, png::BitDepth::One),
             Kind::Indexed(_) => (png::ColorType::Indexed, png::BitDepth::Eight),
+        }
+    }
+
+    fn colours(self) -> &'a [[u8; 3]] {
+        match self {
+            Kind::Bits => &[],
+            Kind::Two(colours) => colours,
+            Kind::Indexed(colours) => colours,
         }
     }
 }
@@ -48,8 +59,8 @@ pub(crate) fn write_png(
             yppu: DENSITY,
             unit: png::Unit::Meter,
         }));
-        if let Kind::Indexed(colours) = kind {
-            encoder.set_palette(colours.concat());
+        if colour == png::ColorType::Indexed {
+            encoder.set_palette(kind.colours().concat());
         }
         let mut writer = encoder.write_header()?;
         writer.write_image_data(data)?;
@@ -80,9 +91,8 @@ pub(crate) fn read_png(
         _ => format!("{width} x {length} dots, {depth:?} bits {colour:?}"),
     };
     let (colour, depth) = kind.png();
-    let wanted = if let Kind::Indexed(colours) = kind { colours.len() } else { 0 };
     let found = describe(info.width as usize, info.height as usize, info.color_type, info.bit_depth, colours);
-    let expected = describe(width, length, colour, depth, wanted);
+    let expected = describe(width, length, colour, depth, kind.colours().len());
     if found != expected || info.animation_control.is_some() {
         return Err(FileError::Kind { path: path.to_path_buf(), expected, found });
     }

@@ -122,12 +122,7 @@ impl<'a> Field<'a> {
     /// The share of each stack in all pixels.
     pub(super) fn mean(&self) -> Vec<f32> {
         let maps = &self.mix.maps;
-        let mut sums = vec![0u64; maps.channels()];
-        for pixel in maps.data().chunks_exact(maps.channels()) {
-            for (sum, &weight) in sums.iter_mut().zip(pixel) {
-                *sum += u64::from(weight);
-            }
-        }
+        let sums = maps.totals();
         let pixels = (maps.width() * maps.height()) as f64;
         let channels: Vec<f32> =
             self.channels.iter().map(|&channel| (sums[channel] as f64 / pixels) as f32).collect();

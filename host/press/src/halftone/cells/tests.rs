@@ -1,6 +1,6 @@
 //! The claims of the cells: widths by trying every square, tones by counting, regions by changing their neighbours.
 
-use super::super::eye::{Tangent, error_planes, errors_seen, peak, swing, thin};
+use super::super::eye::{Eye, Tangent, error_planes, errors_seen, peak, swing, thin};
 use super::super::solids::Solids;
 use super::super::{Method, Settings, TONE, halftone};
 use super::Point;
@@ -226,7 +226,7 @@ fn the_search_keeps_tones_and_sees_less() {
             let mean: f64 = shares.iter().zip(&points).map(|(a, p)| a * f64::from(p[c])).sum();
             dots.iter().map(|&dot| f64::from(points[usize::from(dot)][c]) - mean).collect()
         };
-        errors_seen(&(0..4).map(error).collect::<Vec<_>>(), side, &[0.3])[0]
+        errors_seen(&(0..4).map(error).collect::<Vec<_>>(), &Eye::new(side, side, &[0.3]))[0]
     };
     assert!(seen(&best) < 0.85 * seen(&plain), "{} of {}", seen(&best), seen(&plain));
     assert_eq!(thin(side, &best, |_| 9, |_| false), 0);
@@ -308,7 +308,7 @@ fn halves_keep_tones_and_the_search_sees_less() {
             let dots = dots.iter().zip(&asked);
             dots.map(|(&dot, asked)| f64::from(points[usize::from(dot)][c] - asked[c])).collect()
         };
-        errors_seen(&(0..4).map(error).collect::<Vec<_>>(), side, &[0.3])[0]
+        errors_seen(&(0..4).map(error).collect::<Vec<_>>(), &Eye::new(side, side, &[0.3]))[0]
     };
     let seen = [&alike, &cells, &best].map(|dots| seen(dots));
     assert!(seen[1] < 0.95 * seen[0] && seen[2] < 0.85 * seen[1], "{seen:?}");
@@ -500,7 +500,7 @@ fn table_of_methods() {
             let settings = Settings { method, minimum: minimum.to_vec(), reflectance: Some(table.clone()) };
             let sheet = halftone(&mix, (SIDE as u16, SIDE as u16), None, &settings, &Silent).unwrap();
             let dots = sheet.index();
-            let seen = errors_seen(&error_planes(dots, &asked, &tangent), SIDE, &[0.3, 0.5]);
+            let seen = errors_seen(&error_planes(dots, &asked, &tangent), &Eye::new(SIDE, SIDE, &[0.3, 0.5]));
             // The rarest stack of the patch, and three of its mean spacings.
             let rare =
                 (1..5).filter(|&q| mean[q] > 0.0).min_by(|&a, &b| mean[a].total_cmp(&mean[b])).unwrap();
