@@ -6,7 +6,7 @@
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::gamut::Printable;
-use appearance::solve::{Gram, Simplex, inner_products};
+use appearance::solve::{Columns, Gram, Simplex};
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
@@ -46,12 +46,13 @@ fn problem(k: usize) -> (Table, Table) {
 #[divan::bench(args = [15, 57])]
 fn scalar_products_and_solve(bencher: Bencher, k: usize) {
     let (stacks, targets) = problem(k);
+    let by_column = Columns::of_rows(&stacks);
     let gram = Gram::of_rows(&stacks);
     let (mut h, mut a) = (vec![0.0; k], vec![0.0; k]);
     let mut simplex = Simplex::new();
     bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
         for t in targets.rows() {
-            inner_products(&stacks, t, &mut h);
+            by_column.products(t, &mut h);
             black_box(simplex.solve(&gram, &h, &mut a).unwrap());
         }
     });
@@ -60,12 +61,13 @@ fn scalar_products_and_solve(bencher: Bencher, k: usize) {
 #[divan::bench(args = [15, 57])]
 fn solve(bencher: Bencher, k: usize) {
     let (stacks, targets) = problem(k);
+    let by_column = Columns::of_rows(&stacks);
     let gram = Gram::of_rows(&stacks);
     let mut h = vec![0.0; k];
     let products: Vec<Vec<f64>> = targets
         .rows()
         .map(|t| {
-            inner_products(&stacks, t, &mut h);
+            by_column.products(t, &mut h);
             h.clone()
         })
         .collect();
@@ -81,12 +83,13 @@ fn solve(bencher: Bencher, k: usize) {
 #[divan::bench(args = [15, 57])]
 fn solve_cold(bencher: Bencher, k: usize) {
     let (stacks, targets) = problem(k);
+    let by_column = Columns::of_rows(&stacks);
     let gram = Gram::of_rows(&stacks);
     let (mut h, mut a) = (vec![0.0; k], vec![0.0; k]);
     let mut simplex = Simplex::new();
     bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
         for t in targets.rows() {
-            inner_products(&stacks, t, &mut h);
+            by_column.products(t, &mut h);
             a.fill(0.0);
             black_box(simplex.solve(&gram, &h, &mut a).unwrap());
         }
@@ -96,6 +99,7 @@ fn solve_cold(bencher: Bencher, k: usize) {
 #[divan::bench(args = [15, 57], sample_count = 10)]
 fn lawson_hanson(bencher: Bencher, k: usize) {
     let (stacks, targets) = problem(k);
+    let by_column = Columns::of_rows(&stacks);
     let mut extended = stacks.clone();
     let heavy = 1e3;
     let mut rows = Table::new(stacks.columns() + 1);
@@ -107,7 +111,7 @@ fn lawson_hanson(bencher: Bencher, k: usize) {
     let mut h = vec![0.0; k];
     bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
         for t in targets.rows() {
-            inner_products(&stacks, t, &mut h);
+            by_column.products(t, &mut h);
             // The tolerance follows the scale of the problem, not that of the heavy row.
             let tolerance = 1e-9 * h.iter().copied().fold(0.0, f64::max);
             h.iter_mut().for_each(|h| *h += heavy * heavy);

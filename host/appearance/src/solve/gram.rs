@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::brdf::Table;
 
-use super::vector::{dot, wide};
+use super::vector::dot;
 
 /// Inner products `G_ij = a_i . a_j` of `n` rows.
 #[derive(Clone, Debug)]
@@ -105,52 +105,5 @@ impl Gram {
     /// turns affinely independent rows into linearly independent ones.
     pub(super) fn shift(&self) -> f64 {
         self.shift
-    }
-}
-
-/// `h_i = a_i . x` for the rows of a table; `x` is as long as a row, and `h` is at most as long as the table.
-///
-/// Uses the widest vectors of the processor. The order of additions does not depend on the width, and neither does the
-/// result.
-pub fn inner_products(rows: &Table, x: &[f64], h: &mut [f64]) {
-    wide!(fn(rows: &Table, x: &[f64], h: &mut [f64]) -> () {
-        products(rows, x, h);
-    })
-}
-
-#[inline(always)]
-pub(super) fn products(rows: &Table, x: &[f64], h: &mut [f64]) {
-    for (h, row) in h.iter_mut().zip(rows.rows()) {
-        *h = dot(row, x);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn vectors_of_any_width_give_the_same_products_bit_for_bit(
-            columns in 1usize..130,
-            rows in 1usize..23,
-            seed in any::<u64>(),
-        ) {
-            let mut state = seed;
-            let mut number = || {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            };
-            let mut table = Table::new(columns);
-            for _ in 0..rows {
-                table.push(&(0..columns).map(|_| number()).collect::<Vec<_>>());
-            }
-            let x: Vec<f64> = (0..columns).map(|_| number()).collect();
-            let (mut plain, mut widest) = (vec![0.0; rows], vec![0.0; rows]);
-            products(&table, &x, &mut plain);
-            inner_products(&table, &x, &mut widest);
-            prop_assert_eq!(plain, widest);
-        }
     }
 }

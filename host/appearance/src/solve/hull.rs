@@ -10,6 +10,7 @@
 
 use crate::brdf::{Space, Table};
 
+use super::columns::Columns;
 use super::root::inverse_cbrt;
 use super::simplex::SimplexError;
 use super::vector::add_scaled;
@@ -68,6 +69,8 @@ pub struct Hull {
     light: Vec<f64>,
     pub(super) weight: Vec<f64>,
     pub(super) rows: Table,
+    /// The same rows by column.
+    pub(super) by_column: Columns,
     pub(super) price: Vec<f64>,
     pub(super) darkest: f64,
 }
@@ -140,6 +143,7 @@ impl Hull {
             radiance: space.radiance().to_vec(),
             light: light_of_radiance,
             weight,
+            by_column: Columns::of_rows(&rows),
             rows,
             price: price.to_vec(),
             darkest: darkest.max(f64::MIN_POSITIVE),
@@ -152,7 +156,8 @@ impl Hull {
         stacks.iter().for_each(|&k| rows.push(self.rows.row(k)));
         let price = stacks.iter().map(|&k| self.price[k]).collect();
         let (radiance, light) = (self.radiance.clone(), self.light.clone());
-        Hull { radiance, light, weight: self.weight.clone(), rows, price, darkest: self.darkest }
+        let (weight, darkest) = (self.weight.clone(), self.darkest);
+        Hull { radiance, light, weight, by_column: Columns::of_rows(&rows), rows, price, darkest }
     }
 
     /// Number of stacks.

@@ -13,7 +13,7 @@
 //! target. There the gap bounds the error; elsewhere several starts are the only assurance.
 //! Source: eq. 1 of the 2009 paper (section 4.1) with the metric of its appendix.
 
-use super::gram::{Gram, products};
+use super::gram::Gram;
 use super::hull::{DARKEST, Hull, MixtureError, Target};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
@@ -302,7 +302,7 @@ impl Mixer {
     /// Half the gradient for every stack, its price included; closed stacks get one so large that they never join.
     #[inline(always)]
     fn price(&mut self, hull: &Hull) {
-        products(&hull.rows, &self.pull, &mut self.slope);
+        hull.by_column.multiply(&self.pull, &mut self.slope);
         for (slope, price) in self.slope.iter_mut().zip(&hull.price) {
             *slope += 0.5 * price;
         }

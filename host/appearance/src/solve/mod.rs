@@ -3,6 +3,7 @@
 //! [`Simplex`] solves the convex quadratic problem exactly. [`Mixer`] solves the perceptual problem (eq. 1) by a short
 //! sequence of such quadratics.
 
+mod columns;
 mod gram;
 mod hull;
 mod mixture;
@@ -11,7 +12,8 @@ mod seen;
 mod simplex;
 pub(crate) mod vector;
 
-pub use gram::{Gram, inner_products};
+pub use columns::Columns;
+pub use gram::Gram;
 pub(crate) use hull::LAYER_PRICE;
 pub use hull::{Hull, MixtureError, Target};
 pub use mixture::{Best, Fit, Mixer};

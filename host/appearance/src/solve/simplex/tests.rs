@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::brdf::Table;
-use crate::solve::gram::inner_products;
+use crate::solve::columns::Columns;
 
 fn table(rows: &[Vec<f64>]) -> Table {
     let mut table = Table::new(rows[0].len());
@@ -27,7 +27,7 @@ fn residual(rows: &Table, a: &[f64], t: &[f64]) -> f64 {
 fn ours(rows: &Table, t: &[f64]) -> (Vec<f64>, Certificate) {
     let gram = Gram::of_rows(rows);
     let mut h = vec![0.0; rows.len()];
-    inner_products(rows, t, &mut h);
+    Columns::of_rows(rows).products(t, &mut h);
     let mut a = vec![0.0; rows.len()];
     let certificate = Simplex::new().solve(&gram, &h, &mut a).unwrap();
     (a, certificate)
@@ -201,7 +201,7 @@ proptest! {
         let (cold, _) = ours(&rows, &t);
         let gram = Gram::of_rows(&rows);
         let mut h = vec![0.0; rows.len()];
-        inner_products(&rows, &t, &mut h);
+        Columns::of_rows(&rows).products(&t, &mut h);
         let mut warm: Vec<f64> = start[..rows.len()].iter().map(|&w| (w - 0.3).max(0.0)).collect();
         let certificate = Simplex::new().solve(&gram, &h, &mut warm).unwrap();
         prop_assert!(certificate.gap < 1e-11);
@@ -216,7 +216,7 @@ proptest! {
         let mut a = vec![1.0 / n as f64; n];
         let mut q = vec![0.0; n];
         let mut h = vec![0.0; n];
-        inner_products(&rows, &t, &mut h);
+        Columns::of_rows(&rows).products(&t, &mut h);
         evaluate(&gram, &h, &a, &mut q);
         Simplex::new().descend(&gram, &mut q, &mut a).unwrap();
         prop_assert!(is_feasible(&a));
