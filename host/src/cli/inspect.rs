@@ -6,8 +6,11 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 
+use serde::Serialize;
+
 use super::output::{Kind, Staged};
 use super::stdio::read_job;
+use device::send::streams;
 use observe::Observer;
 use press::inspect::{Inspected, Inspection, inspect, sheets};
 use press::separate::files::{self, save_plane};
@@ -31,6 +34,15 @@ pub struct Args {
     passes: Option<PathBuf>,
 }
 
+/// What is said of a sheet.
+#[derive(Serialize)]
+struct Summary {
+    #[serde(flatten)]
+    inspection: Inspection,
+    /// Bytes that cross the cable to a bridge, which makes the job of them; absent if a bridge gets it byte for byte.
+    pass_streams: Option<usize>,
+}
+
 /// Runs `inspect`. What could be read is shown even when the stream is no legal job; the exit code then is 1, and no passes
 /// are written.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
@@ -43,7 +55,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let mut summaries = Vec::new();
     let mut written = 0;
     for (number, place) in (1..).zip(&places) {
-        let Inspected { inspection, passes } = inspect(&job[place.clone()], observer);
+        let sheet = &job[place.clone()];
+        let Inspected { inspection, passes } = inspect(sheet, observer);
+        let streams = if inspection.complete { streams::of_job(sheet, observer) } else { None };
+        let pass_streams = streams.map(|streams| streams.len()).filter(|&bytes| bytes < sheet.len());
+        let summary = Summary { inspection, pass_streams };
         if let Some(inside) = inside {
             for pass in &passes {
                 save_plane(&pass.plane, &inside.join(files::name(written, pass.ink)))?;
@@ -54,9 +70,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             if several {
                 writeln!(out, "sheet {number} of {}, from byte {}:", places.len(), place.start)?;
             }
-            write_words(&inspection, &mut out)?;
+            write_words(&summary, &mut out)?;
         }
-        summaries.push(inspection);
+        summaries.push(summary);
     }
     if args.json {
         let text = match &summaries[..] {
@@ -65,7 +81,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         };
         writeln!(out, "{text}")?;
     }
-    let faulty = (1..).zip(&summaries).find_map(|(number, summary)| Some((number, summary.error.as_ref()?)));
+    let faulty = (1..)
+        .zip(&summaries)
+        .find_map(|(number, summary)| Some((number, summary.inspection.error.as_ref()?)));
     // The passes of a stream that is no job are no result: with an error nothing appears.
     let unwritten = if staged.is_some() { "; no passes are written" } else { "" };
     match faulty {
@@ -77,7 +95,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
 }
 
-fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()> {
+fn write_words(summary: &Summary, out: &mut impl std::io::Write) -> Result<()> {
+    let Summary { inspection: summary, pass_streams } = summary;
     let setup = &summary.setup;
     let unknown = "not declared";
     let (across, along) = setup.resolution.unwrap_or_default();
@@ -88,6 +107,10 @@ fn write_words(summary: &Inspection, out: &mut impl std::io::Write) -> Result<()
         if summary.complete { "a complete job" } else { "not a complete job" },
         summary.dialect.map_or(String::new(), |driver| format!(", in the dialect of {driver}'s drivers"))
     )?;
+    if let Some(bytes) = pass_streams {
+        let share = summary.bytes as f64 / *bytes as f64;
+        writeln!(out, "{bytes} bytes as pass streams, which a bridge makes the job of (1/{share:.1})")?;
+    }
     if setup.resolution.is_none() {
         return Ok(writeln!(out, "no page is declared")?);
     }

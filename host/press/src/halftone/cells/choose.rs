@@ -54,8 +54,8 @@ pub(super) static NOISE: [f32; 512] = {
 /// How far stacks are apart: scalar products of the stacks of a field.
 pub(in crate::halftone) struct Metric {
     lanes: usize,
-    /// By coordinate, of each stack, from the mean of the page; nothing where all stacks are equally far apart.
-    coordinates: Vec<Vec<f32>>,
+    /// Of [`LANES`] stacks after another, by coordinate, from the mean of the page; 0 where all stacks are equally far apart.
+    coordinates: Vec<[[f32; LANES]; 4]>,
     /// What a stack's own debt weighs.
     own: f32,
     /// The products of each stack with all others, `lanes` a row.
@@ -68,7 +68,7 @@ impl Metric {
     /// For so many stacks and padding, of which the mean page has these shares. Without points all stacks are equally far
     /// apart.
     pub(in crate::halftone) fn new(lanes: usize, shares: &[f32], points: Option<&[Point]>) -> Metric {
-        let mut coordinates = vec![vec![0.0; lanes]; 4];
+        let mut coordinates = vec![[[0.0; LANES]; 4]; lanes / LANES];
         let mut own = 0.0;
         if let Some(points) = points {
             let mean: Point = std::array::from_fn(|c| {
@@ -76,16 +76,19 @@ impl Metric {
             });
             for (q, (share, point)) in shares.iter().zip(points).enumerate() {
                 for c in 0..4 {
-                    coordinates[c][q] = point[c] - mean[c];
-                    own += OWN * share * coordinates[c][q] * coordinates[c][q];
+                    let from_mean = point[c] - mean[c];
+                    coordinates[q / LANES][c][q % LANES] = from_mean;
+                    own += OWN * share * from_mean * from_mean;
                 }
             }
         }
         if own < f32::MIN_POSITIVE {
-            (own, coordinates) = (1.0, Vec::new());
+            own = 1.0;
+            coordinates.fill([[0.0; LANES]; 4]);
         }
         let product = |a: usize, b: usize| {
-            let sum: f32 = coordinates.iter().map(|line| line[a] * line[b]).sum();
+            let at = |q: usize, c: usize| coordinates[q / LANES][c][q % LANES];
+            let sum: f32 = (0..4).map(|c| at(a, c) * at(b, c)).sum();
             if a == b { sum + own } else { sum }
         };
         let products = (0..lanes * lanes).map(|at| product(at / lanes, at % lanes)).collect();
@@ -93,24 +96,18 @@ impl Metric {
         Metric { lanes, coordinates, own, products, squares }
     }
 
-    /// The product of a vector of debts with each stack.
+    /// The product of a vector of debts with each coordinate.
     #[inline(always)]
-    fn products(&self, debts: &[f32], out: &mut [f32]) {
-        for (out, debt) in out.iter_mut().zip(debts) {
-            *out = self.own * debt;
-        }
-        for line in &self.coordinates {
-            let mut sums = [0.0f32; LANES];
-            for (line, debts) in line.as_chunks::<LANES>().0.iter().zip(debts.as_chunks::<LANES>().0) {
+    fn seen(&self, debts: &[f32]) -> Point {
+        let mut sums = [[0.0f32; LANES]; 4];
+        for (lines, debts) in self.coordinates.iter().zip(debts.as_chunks::<LANES>().0) {
+            for (sums, line) in sums.iter_mut().zip(lines) {
                 for l in 0..LANES {
                     sums[l] += line[l] * debts[l];
                 }
             }
-            let sum: f32 = sums.iter().sum();
-            for (out, line) in out.iter_mut().zip(line) {
-                *out += sum * line;
-            }
         }
+        sums.map(|sums| sums.iter().sum())
     }
 
     fn row(&self, stack: u8) -> &[f32] {
@@ -123,8 +120,7 @@ pub(super) struct Chooser<'a> {
     metric: &'a Metric,
     /// By side of cells, 0 for stacks that half a cell holds and minus infinity for others; nothing where there are none.
     small: Vec<Vec<f32>>,
-    /// What each stack takes from the square of the length of debts, by two and the dots it gets.
-    gains: Vec<f32>,
+    /// The product of a vector of debts with each stack.
     products: Vec<f32>,
 }
 
@@ -137,12 +133,7 @@ impl<'a> Chooser<'a> {
                 (0..metric.lanes).map(|q| if bar(q) { 0.0 } else { f32::NEG_INFINITY }).collect();
             if bars.contains(&0.0) { bars } else { Vec::new() }
         };
-        Chooser {
-            metric,
-            small: (0..=largest).map(small).collect(),
-            gains: vec![0.0; metric.lanes],
-            products: vec![0.0; metric.lanes],
-        }
+        Chooser { metric, small: (0..=largest).map(small).collect(), products: vec![0.0; metric.lanes] }
     }
 
     /// Whether cells of this side may be cut into halves.
@@ -162,27 +153,47 @@ impl<'a> Chooser<'a> {
         turn: u32,
     ) -> Cell {
         let metric = self.metric;
-        metric.products(debts, &mut self.products);
-        for (gain, (product, square)) in self.gains.iter_mut().zip(self.products.iter().zip(&metric.squares))
-        {
-            *gain = product - 0.5 * area * square;
+        let seen = metric.seen(debts);
+        let mut most = Largest::new();
+        let stacks = self.products.as_chunks_mut::<LANES>().0.iter_mut().zip(&metric.coordinates);
+        let stacks = stacks.zip(debts.as_chunks::<LANES>().0).zip(metric.squares.as_chunks::<LANES>().0);
+        for ((((product, lines), debts), squares), want) in stacks.zip(want.as_chunks::<LANES>().0) {
+            let mut gains = [0.0; LANES];
+            for l in 0..LANES {
+                product[l] = metric.own * debts[l];
+                for c in 0..4 {
+                    product[l] += seen[c] * lines[c][l];
+                }
+                gains[l] = product[l] - 0.5 * area * squares[l];
+            }
+            most.see(&gains, want);
         }
-        let (whole, gained) = largest(&self.gains, want);
+        let (whole, gained) = most.found();
         let small = match side {
             Some(side) if self.cuts(side) => &self.small[side],
             _ => return Cell::whole(whole),
         };
-        let halves = self.products.iter_mut().zip(&metric.squares).zip(small);
-        for (gain, ((product, square), bar)) in self.gains.iter_mut().zip(halves) {
-            *product = *product - 0.25 * area * square + bar;
-            *gain = *product;
+        let mut most = Largest::new();
+        let halves = self.products.as_chunks_mut::<LANES>().0.iter_mut().zip(small.as_chunks::<LANES>().0);
+        let halves = halves.zip(metric.squares.as_chunks::<LANES>().0).zip(want.as_chunks::<LANES>().0);
+        for (((product, bar), squares), want) in halves {
+            for l in 0..LANES {
+                product[l] = product[l] - 0.25 * area * squares[l] + bar[l];
+            }
+            most.see(product, want);
         }
-        let (first, one) = largest(&self.gains, want);
-        let halves = self.products.iter().zip(metric.row(first));
-        for (gain, (product, with)) in self.gains.iter_mut().zip(halves) {
-            *gain = product - 0.5 * area * with;
+        let (first, one) = most.found();
+        let mut most = Largest::new();
+        let halves =
+            self.products.as_chunks::<LANES>().0.iter().zip(metric.row(first).as_chunks::<LANES>().0);
+        for ((product, with), want) in halves.zip(want.as_chunks::<LANES>().0) {
+            let mut gains = [0.0; LANES];
+            for l in 0..LANES {
+                gains[l] = product[l] - 0.5 * area * with[l];
+            }
+            most.see(&gains, want);
         }
-        let (second, other) = largest(&self.gains, want);
+        let (second, other) = most.found();
         if 0.5 * (one + other) <= gained {
             return Cell::whole(whole);
         }
@@ -191,19 +202,42 @@ impl<'a> Chooser<'a> {
     }
 }
 
-/// The stack with the largest gain among those that the cell asks for, the lowest among equals.
-#[inline(always)]
-fn largest(gains: &[f32], want: &[f32]) -> (u8, f32) {
-    let mut most = [f32::NEG_INFINITY; LANES];
-    for (gain, want) in gains.as_chunks::<LANES>().0.iter().zip(want.as_chunks::<LANES>().0) {
-        for l in 0..LANES {
-            let gain = if want[l] > 0.0 { gain[l] } else { f32::NEG_INFINITY };
-            most[l] = if gain > most[l] { gain } else { most[l] };
-        }
+/// The stack with the largest gain among those that a cell asks for, the lowest among equals.
+struct Largest {
+    gain: [f32; LANES],
+    /// The first of [`LANES`] stacks among which each gain was.
+    first: [u32; LANES],
+    next: u32,
+}
+
+impl Largest {
+    #[inline(always)]
+    fn new() -> Largest {
+        Largest { gain: [f32::NEG_INFINITY; LANES], first: [0; LANES], next: 0 }
     }
-    let most = most.into_iter().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
-    let here = |q: &usize| gains[*q] == most && want[*q] > 0.0;
-    ((0..gains.len()).find(here).unwrap_or(0) as u8, most)
+
+    /// The gains of the next stacks, and what the cell wants of them.
+    #[inline(always)]
+    fn see(&mut self, gains: &[f32; LANES], want: &[f32; LANES]) {
+        for l in 0..LANES {
+            let better = want[l] > 0.0 && gains[l] > self.gain[l];
+            self.gain[l] = if better { gains[l] } else { self.gain[l] };
+            self.first[l] = if better { self.next } else { self.first[l] };
+        }
+        self.next += LANES as u32;
+    }
+
+    #[inline(always)]
+    fn found(&self) -> (u8, f32) {
+        let (mut stack, mut most) = (0, f32::NEG_INFINITY);
+        for l in 0..LANES {
+            let at = self.first[l] + l as u32;
+            if self.gain[l] > most || self.gain[l] == most && at < stack {
+                (stack, most) = (at, self.gain[l]);
+            }
+        }
+        (stack as u8, most)
+    }
 }
 
 /// By how much to disturb the decision of a cell that asks for `want`, in cells: [`DISTURBED`]. Where it may be `cut` and the

@@ -67,8 +67,8 @@ pub(in crate::halftone) struct Field<'a> {
     pub(in crate::halftone) lanes: usize,
     /// Channels with weight.
     channels: Vec<usize>,
-    /// Share of each stack, row by row of `channels`.
-    matrix: Vec<f32>,
+    /// Share of [`LANES`] stacks after another in each of `channels`.
+    matrix: Vec<[f32; LANES]>,
     pub(super) solids: &'a Solids<'a>,
     /// By size of span: single dots first.
     across: Vec<(usize, Spans)>,
@@ -96,11 +96,14 @@ impl<'a> Field<'a> {
         let used = |q: &usize| channels.iter().any(|&i| mix.matrix[i][*q] > 0);
         let stacks: Vec<u8> = (0..mix.stacks.len()).filter(used).map(|q| q as u8).collect();
         let lanes = stacks.len().next_multiple_of(LANES);
-        let mut matrix = vec![0.0; channels.len() * lanes];
-        for (row, &channel) in matrix.chunks_exact_mut(lanes).zip(&channels) {
-            for (share, &q) in row.iter_mut().zip(&stacks) {
-                // A weight of ONE, and a share of ONE, make 1.
-                *share = f32::from(mix.matrix[channel][usize::from(q)]) / (f32::from(ONE) * f32::from(ONE));
+        let mut matrix = vec![[0.0; LANES]; channels.len() * lanes / LANES];
+        for (lanes, stacks) in matrix.chunks_exact_mut(channels.len().max(1)).zip(stacks.chunks(LANES)) {
+            for (lanes, &channel) in lanes.iter_mut().zip(&channels) {
+                for (share, &q) in lanes.iter_mut().zip(stacks) {
+                    // A weight of ONE, and a share of ONE, make 1.
+                    *share =
+                        f32::from(mix.matrix[channel][usize::from(q)]) / (f32::from(ONE) * f32::from(ONE));
+                }
             }
         }
         let spans = |dots: usize, pixels: usize| {
@@ -147,11 +150,9 @@ impl<'a> Field<'a> {
                 }
             }
         }
-        for (&channel, shares) in self.channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
-            if most[channel] > 0 {
-                for (present, &share) in present.iter_mut().zip(shares) {
-                    *present |= share > 0.0;
-                }
+        for &channel in self.channels.iter().filter(|&&channel| most[channel] > 0) {
+            for (present, &q) in present.iter_mut().zip(&self.stacks) {
+                *present |= self.mix.matrix[channel][usize::from(q)] > 0;
             }
         }
         most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max().unwrap_or(0)
@@ -178,15 +179,15 @@ impl<'a> Field<'a> {
     /// Adds channels times matrix.
     #[inline(always)]
     fn shares(&self, channels: &[f32], out: &mut [f32]) {
-        for (&weight, shares) in channels.iter().zip(self.matrix.chunks_exact(self.lanes)) {
-            if weight > 0.0 {
-                let (out, shares) = (out.as_chunks_mut::<LANES>().0, shares.as_chunks::<LANES>().0);
-                for (out, shares) in out.iter_mut().zip(shares) {
-                    for (out, share) in out.iter_mut().zip(shares) {
-                        *out += weight * share;
-                    }
+        let stacks = out.as_chunks_mut::<LANES>().0.iter_mut();
+        for (out, shares) in stacks.zip(self.matrix.chunks_exact(channels.len().max(1))) {
+            let mut sums = *out;
+            for (weight, shares) in channels.iter().zip(shares) {
+                for l in 0..LANES {
+                    sums[l] += weight * shares[l];
                 }
             }
+            *out = sums;
         }
     }
 
