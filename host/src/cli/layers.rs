@@ -197,7 +197,7 @@ impl LayersArgs {
                 (None, []) => Pages::Only,
                 (None, inks) => Pages::Inks(inks.to_vec()),
             },
-            across: 1,
+            across: layout.resolution.across(1).into(),
             tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
             inks: self.inks()?,
             room: Room { width, length, cut: layout.cut },
@@ -301,9 +301,8 @@ impl Work {
     ) -> Result<T> {
         let library = self.layers.library()?;
         let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
-        let across = self.resolution.across(1).into();
-        let options = layers::Options { across, ..self.layers.options(self.size, &layout)? };
-        let settings = layers::Settings { across, ..self.layers.settings()? };
+        let options = self.layers.options(self.size, &layout)?;
+        let settings = self.layers.settings()?;
         let art = layers::open(&self.layers.art, &options, observer)?;
         let composed = layers::compose(&art, &settings, &library, observer)?;
         let artwork = Artwork {
