@@ -3,13 +3,13 @@
 //! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this printer cannot print on.
 //! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it were a
 //! picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if wanted, everything
-//! else is halftoned in process inks. A page
-//! with spot colours that name inks is separated instead, and its plates are layers. The art is laid where the page has it,
-//! or where the user wants it, on a sheet of the page's size; what lies on the margins is reported in millimetres.
-//! Cost: the page at four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one more
-//! drawing of all pages at a low resolution.
-//! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been drawn, so
-//! white cannot follow it. On a separated page the choice of inks leaves plates out; it does not mix them again.
+//! else is halftoned in process inks. A page with spot colours that name inks is separated, too, and the plates of these are
+//! layers. The art is laid where the page has it, or where the user wants it, on a sheet of the page's size; what lies on the
+//! margins is reported in millimetres.
+//! Cost: the page at a bit or four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one
+//! more drawing of all pages at a low resolution.
+//! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
+//! drawn, so white cannot follow it.
 
 mod drawing;
 mod page;

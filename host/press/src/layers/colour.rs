@@ -429,6 +429,7 @@ fn spread(rgb: &mut [u8], drawn: &mut [bool], plain: &[bool], width: usize) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::intent::oklab;
     use super::*;
     use observe::Silent;
     use protocol::ink::Kind as InkKind;
@@ -521,6 +522,55 @@ mod tests {
                 let (step, asked) =
                     (difference(pair[0], pair[1]), difference(linear(pixels[0]), linear(pixels[1])));
                 assert!(step > 0.08 * asked && step < 1.6 * asked, "{:?}: {step} for {asked}", pixels[1]);
+            }
+        }
+    }
+
+    /// Hue in degrees and colourfulness in CAM16, which the intents do not use.
+    fn cam16(light: Light) -> (f64, f64) {
+        use palette::cam16::{Cam16Jmh, Parameters};
+        use palette::convert::FromColorUnclamped;
+        let light = palette::LinSrgb::new(light[0], light[1], light[2]);
+        let seen = Cam16Jmh::from_xyz(
+            palette::Xyz::from_color_unclamped(light),
+            Parameters::default_static_wp(40.0),
+        );
+        (seen.hue.into_positive_degrees(), seen.colorfulness)
+    }
+
+    #[test]
+    fn hues_are_printed_as_they_are_and_blue_does_not_become_purple() {
+        let levels = [0u8, 51, 102, 153, 204, 255];
+        let reds = || levels.into_iter().flat_map(|r| levels.map(|g| (r, g)));
+        let pixels: Vec<[u8; 3]> = reds().flat_map(|(r, g)| levels.map(|b| [r, g, b])).collect();
+        for intent in [Intent::Perceptual, Intent::Colorimetric] {
+            let turns: Vec<(f64, f64, [u8; 3])> = pixels
+                .iter()
+                .zip(printed(&pixels, intent))
+                .map(|(&pixel, light)| {
+                    ((cam16(linear(pixel)), oklab(linear(pixel))), (cam16(light), oklab(light)), pixel)
+                })
+                // Neither is nearly grey, where hue has no meaning.
+                .filter(|(asked, found, _)| asked.0.1 > 15.0 && found.0.1 > 10.0)
+                .map(|((was, asked), (is, found), pixel)| {
+                    let turned = (asked[1] * found[2] - asked[2] * found[1])
+                        .atan2(asked[1] * found[1] + asked[2] * found[2]);
+                    ((is.0 - was.0 + 540.0).rem_euclid(360.0) - 180.0, turned.to_degrees(), pixel)
+                })
+                .collect();
+            let mean =
+                |of: fn(&(f64, f64, [u8; 3])) -> f64| turns.iter().map(of).sum::<f64>() / turns.len() as f64;
+            let (seen, meant) = (mean(|turn| turn.0.abs()), mean(|turn| turn.1.abs()));
+            assert!(seen < 3.0 && meant < 1.0, "{intent:?}: {seen} degrees in CAM16, {meant} in Oklab");
+            for &(seen, meant, pixel) in &turns {
+                // The darkest lie between two nodes of the lattice.
+                assert!(meant.abs() < 5.0 || pixel.iter().all(|&v| v <= 51), "{pixel:?} turns by {meant}");
+                let [r, g, b] = pixel;
+                // Purple is where CAM16's hue grows.
+                assert!(
+                    b <= 2 * r.max(g) || seen < 3.0,
+                    "{intent:?}: {pixel:?} turns by {seen} towards purple"
+                );
             }
         }
     }
