@@ -19,8 +19,8 @@ use std::time::{Duration, Instant};
 /// 600 dpi.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// How many pages at their limit a document may take altogether: half an hour, unless the limit of a page is another.
-const PAGES_LIMIT: u32 = 30;
+/// How many pages at their limit a document may take altogether: ten minutes, unless the limit of a page is another.
+const PAGES_LIMIT: u32 = 10;
 
 /// The most pages of a document.
 pub const MOST_PAGES: u32 = 1000;

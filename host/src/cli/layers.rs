@@ -204,13 +204,12 @@ impl LayersArgs {
 
     /// How layers become stacks.
     pub fn settings(&self) -> Result<layers::Settings> {
-        let usual = layers::Settings::default();
         Ok(layers::Settings {
             inks: self.inks()?,
             order: self.order.clone().unwrap_or_default(),
             passes: self.passes.clone(),
             knockout: match self.knockout.as_deref() {
-                None => usual.knockout,
+                None => layers::Settings::default().knockout,
                 Some("none") => InkSet::EMPTY,
                 Some(text) => set("--knockout", text)?,
             },
@@ -221,7 +220,6 @@ impl LayersArgs {
             gamma: self.gamma,
             halftone: self.halftone.halftone,
             accept: self.accept.clone(),
-            ..usual
         })
     }
 }
