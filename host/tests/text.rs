@@ -341,10 +341,10 @@ fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
     }
 }
 
-/// Puts white into a mark of the page, so that the page has a plate of its own beside what `drawing` draws.
+/// Adds a patch of white between the marks, so that the page has a plate of its own beside what `drawing` draws.
 fn with_plate(drawing: &str) -> String {
     format!(
-        "{drawing}\n[/Separation (White) /DeviceCMYK {{pop 0 0 0 0}}] setcolorspace 1 setcolor 13 49 1 1 rectfill"
+        "{drawing}\n[/Separation (White) /DeviceCMYK {{pop 0 0 0 0}}] setcolorspace 1 setcolor 200 49 2 2 rectfill"
     )
 }
 
