@@ -4,7 +4,7 @@
 //! running behind their back.
 //! Method: a thread beside each program holds a deadline and kills the program when it passes. Each sign of progress, such
 //! as the next page, moves the deadline; while the caller itself is at work there is none. All pages together have a limit,
-//! too ([`PAGES_LIMIT`]), and [`MOST_PAGES`]: a program may show pages for ever. What a program complains of is
+//! too, and there are at most [`MOST_PAGES`]: a program may show pages for ever. What a program complains of is
 //! read all the time, so it never waits for a full pipe, and its first lines become the error. One list has all programs at
 //! work, and [`stop_all`] kills them when this one is interrupted.
 //! Cost: two threads for each program. Limits: only the program itself is killed, not what it may have started.
