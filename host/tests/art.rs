@@ -67,10 +67,6 @@ fn endless_pages_end_at_the_limit_in_every_path_and_nothing_runs_on() {
             format!("cups-filter 1 me title 1 FoilpressSpots=Named {file}"),
             format!("cups-filter 1 me title 1 FoilpressSpots=Off {file}"),
         ] {
-            // A queue prints pages as long as there are some; whoever prints them stops it.
-            if name == "pages.ps" && command.contains("cups-filter") {
-                continue;
-            }
             let begun = Instant::now();
             let output = bench
                 .command(&command)
@@ -80,8 +76,11 @@ fn endless_pages_end_at_the_limit_in_every_path_and_nothing_runs_on() {
                 .unwrap();
             let said = text(&output.stderr);
             assert_eq!(output.status.code(), Some(1), "{command}: {said}");
-            assert!(said.contains("took more than 2 s and was stopped"), "{command}: {said}");
-            assert!(said.contains("FOILPRESS_TIME_LIMIT"), "{command}: {said}");
+            // A page, or all pages together.
+            let time = said.contains("took more than 2 s and was stopped")
+                || said.contains("took more than 20 s altogether and was stopped");
+            let number = said.contains("more than 1000 pages");
+            assert!(time && said.contains("FOILPRESS_TIME_LIMIT") || number, "{command}: {said}");
             assert!(begun.elapsed() < Duration::from_secs(60), "{command}: {:?}", begun.elapsed());
             assert!(!runs(&file), "{command}: Ghostscript goes on");
             assert!(entries(&scratch).is_empty(), "{command}: {:?}", entries(&scratch));

@@ -97,7 +97,7 @@ fn the_plan_of_art_is_that_of_its_print_and_writes_nothing_else() {
     assert_eq!(bench.entries(), before);
     let report: Value =
         serde_json::from_str(&bench.done(&format!("layers {options} --json -o d.print"))).unwrap();
-    let (mut own, suggestions) = (plan.clone(), plan["art"]["suggestions"].as_array().unwrap());
+    let (mut own, suggestions) = (plan.clone(), plan["suggestions"].as_array().unwrap());
     assert!(suggestions.is_empty(), "white is laid three times: {suggestions:?}");
     assert_eq!(own.as_object_mut().unwrap().remove("art").as_ref(), Some(&report["art"]));
     assert_eq!(own, report["plan"]);
@@ -106,6 +106,12 @@ fn the_plan_of_art_is_that_of_its_print_and_writes_nothing_else() {
     assert!(words.contains("From the art, lowest first"), "{words}");
     let page = fs::read_to_string(bench.path("plan.html")).unwrap();
     assert!(page.contains("MDC-SCWH") && page.ends_with("</html>\n"), "a whole page of this job");
+    assert!(!page.contains("Suggestions"));
+    // One pass of white is too little.
+    bench.done("plan layers white.png --paper postcard --html plan.html");
+    let page = fs::read_to_string(bench.path("plan.html")).unwrap();
+    assert!(page.contains("<h2>Suggestions, followed only when you say so</h2>"), "{page}");
+    assert!(page.contains("<li><b>--accept white-thrice</b>: one pass of white looks grey"), "{page}");
     let said = bench.refused(2, "plan layers white.png --page plan.html");
     assert!(said.contains("--html"), "{said}");
 }

@@ -340,3 +340,120 @@ fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
         assert!(errors[0] <= errors[2] && errors[1] <= errors[2], "{name}: {errors:?}");
     }
 }
+
+/// Adds a patch of white between the marks, so that the page has a plate of its own beside what `drawing` draws.
+fn with_plate(drawing: &str) -> String {
+    format!(
+        "{drawing}\n[/Separation (White) /DeviceCMYK {{pop 0 0 0 0}}] setcolorspace 1 setcolor 200 49 2 2 rectfill"
+    )
+}
+
+#[test]
+fn text_on_a_page_with_a_plate_of_white_keeps_its_outline() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let text = |drawing: &str, by_queue: bool| {
+        std::fs::write(bench.path("page.ps"), page(SHEET, drawing)).expect("a page");
+        let job = if by_queue { queued(&bench, "page.ps") } else { job(&bench, "page.ps") };
+        without_marks(&printed(&job, &Ink::ALL))
+    };
+    let drawn = text(&lines("0 setgray"), true);
+    for (name, before, exact) in [
+        ("K", "0 0 0 1 setcmykcolor", true),
+        ("RGB black", "0 0 0 setrgbcolor", true),
+        ("blue", "0 0 .6 setrgbcolor", false),
+        ("half of K", "0 0 0 .5 setcmykcolor", false),
+    ] {
+        let page = with_plate(&lines(before));
+        for (path, by_queue) in [("queue", true), ("layers", false)] {
+            let found = text(&page, by_queue);
+            let ratio = found.changes() as f64 / drawn.changes() as f64;
+            assert!(ratio <= 1.05, "{name}, {path}: the outline is {ratio:.3} times as long as drawn");
+            if exact {
+                assert_eq!(found.differences(&drawn), 0, "{name}, {path}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_mask_of_one_colour_is_exact_on_pages_and_in_pictures() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let drawn = Dots::new(3 * MODULES.0, 3 * MODULES.1, |x, y| module(x / 3, y / 3));
+    let rows = (0..MODULES.1).map(|y| {
+        let bit = |x: usize| u8::from(x < MODULES.0 && module(x, y));
+        let byte = |at: usize| (0..8).fold(0, |byte, x| byte << 1 | bit(8 * at + x));
+        (0..MODULES.0.div_ceil(8)).map(|at| format!("{:02x}", byte(at))).collect::<String>()
+    });
+    let mask = format!(
+        "{} {} true [{0} 0 0 -{1} 0 {1}] {{<{}>}} imagemask",
+        MODULES.0,
+        MODULES.1,
+        rows.collect::<String>()
+    );
+    for colour in ["0 0 0 1 setcmykcolor", "0 0 .6 setrgbcolor", "1 0 0 0 setcmykcolor"] {
+        let (wide, high) = (drawn.width, drawn.length());
+        let drawing = format!("{colour} .12 .12 scale 300 700 translate {wide} {high} scale {mask}");
+        std::fs::write(bench.path("mask.ps"), page((288.0, 216.0), &drawing)).expect("a page");
+        for (path, job) in [("queue", queued(&bench, "mask.ps")), ("layers", job(&bench, "mask.ps"))] {
+            let found = printed(&job, &Ink::ALL);
+            assert_eq!((found.width, found.length()), (wide, high), "{colour}, {path}");
+            assert_eq!(found.differences(&drawn), 0, "{colour}, {path}: wrong dots");
+        }
+    }
+    let blue = RgbImage::from_fn(drawn.width as u32, drawn.length() as u32, |x, y| {
+        Rgb(if drawn.at(x as usize, y as usize) { [0, 0, 150] } else { [255; 3] })
+    });
+    blue.save(bench.path("blue.png")).expect("a picture");
+    assert_eq!(printed(&job(&bench, "blue.png --dpi 600"), &Ink::ALL).differences(&drawn), 0);
+}
+
+#[test]
+fn text_of_a_drawing_is_read_without_error_and_keeps_its_outline() {
+    if !starts("tesseract") {
+        return Need::Reading.skip("there is no Tesseract (Debian: tesseract-ocr)");
+    }
+    let bench = Bench::new();
+    let fonts = [
+        "font-family='DejaVu Serif'",
+        "font-family='DejaVu Sans'",
+        "font-family='DejaVu Sans' font-weight='bold'",
+    ];
+    let text = |fill: &str| {
+        let mut svg = String::from(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='5.5in' height='3.5in' viewBox='0 0 396 252'>",
+        );
+        let mut y = 20.0;
+        for font in fonts {
+            for size in SIZES {
+                y += 1.45 * size;
+                svg.push_str(&format!(
+                    "<text x='12' y='{y}' {font} font-size='{size}' fill='{fill}'>{LINE}</text>"
+                ));
+            }
+        }
+        std::fs::write(bench.path("text.svg"), svg + "</svg>").expect("a drawing");
+        printed(&job(&bench, "text.svg"), &Ink::ALL)
+    };
+    if !Path::new("/usr/share/fonts/truetype/dejavu/DejaVuSerif.ttf").exists() {
+        return Need::Reading.skip("there are no DejaVu fonts (Debian: fonts-dejavu)");
+    }
+    let black = text("#000");
+    let lines = read(&bench, &black);
+    assert_eq!(lines.len(), 12, "{lines:?}");
+    for (line, size) in lines.iter().zip(SIZES.into_iter().cycle()).filter(|(_, size)| *size >= 8.0) {
+        assert_eq!(edits(line, LINE), 0, "{size} points: {line}");
+    }
+    for fill in ["#000099", "#808080"] {
+        let found = text(fill);
+        let ratio = found.changes() as f64 / black.changes() as f64;
+        println!("{fill}: outline {ratio:.3}, {} wrong dots", found.differences(&black));
+        assert!(ratio <= 1.05, "{fill}: the outline is {ratio:.3} times as long as in black");
+        assert!(edits(&read(&bench, &found).join("\n"), &lines.join("\n")) == 0, "{fill}");
+    }
+}

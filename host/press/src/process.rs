@@ -3,7 +3,8 @@
 //! Problem: a page in PostScript is a program, and it may never end. Whoever waits for it must be told, and nothing may go on
 //! running behind their back.
 //! Method: a thread beside each program holds a deadline and kills the program when it passes. Each sign of progress, such
-//! as the next page, moves the deadline; while the caller itself is at work there is none. What a program complains of is
+//! as the next page, moves the deadline; while the caller itself is at work there is none. All pages together have a limit,
+//! too, and there are at most [`MOST_PAGES`]: a program may show pages for ever. What a program complains of is
 //! read all the time, so it never waits for a full pipe, and its first lines become the error. One list has all programs at
 //! work, and [`stop_all`] kills them when this one is interrupted.
 //! Cost: two threads for each program. Limits: only the program itself is killed, not what it may have started.
@@ -18,11 +19,17 @@ use std::time::{Duration, Instant};
 /// 600 dpi.
 const LIMIT: Duration = Duration::from_secs(60);
 
+/// How many pages at their limit a document may take altogether: ten minutes, unless the limit of a page is another.
+const PAGES_LIMIT: u32 = 10;
+
+/// The most pages of a document.
+pub const MOST_PAGES: u32 = 1000;
+
 /// Environment variable with another limit in seconds, for slow computers.
 pub const LIMIT_VARIABLE: &str = "FOILPRESS_TIME_LIMIT";
 
 /// The most bytes of complaints that are kept.
-const MOST_WORDS: u64 = 1 << 14;
+const MOST_WORDS: u64 = 1 << 16;
 
 /// How often a program is asked whether it has ended.
 const POLL: Duration = Duration::from_millis(5);
@@ -56,6 +63,13 @@ pub enum ProcessError {
     /// It took too long and was stopped.
     #[error("{}", too_long(*.0))]
     TooLong(Duration),
+    /// All pages together took too long, and it was stopped.
+    #[error(
+        "drawing its pages took more than {} s altogether and was stopped; print fewer pages at once; on a slow computer, set \
+         {LIMIT_VARIABLE} to more seconds",
+        .0.as_secs()
+    )]
+    TooLongAltogether(Duration),
     /// The operating system reported an error.
     #[error("it cannot be watched")]
     Io(#[from] io::Error),
@@ -83,6 +97,7 @@ pub fn stop_all() {
 }
 
 /// Until when the program may go on without progress.
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Deadline {
     /// Until then.
     At(Instant),
@@ -94,12 +109,38 @@ enum Deadline {
     Over,
 }
 
-struct Clock<T>(Mutex<T>, Condvar);
+/// The time of a program.
+struct Time {
+    deadline: Deadline,
+    /// Since when it is at work; none while the caller is.
+    since: Option<Instant>,
+    /// What it had left for all pages then.
+    left: Duration,
+}
+
+impl Time {
+    /// The program begins to work or goes on: it has this limit, or what is left for all pages.
+    fn advance(&mut self, now: Instant, limit: Duration) {
+        self.stop(now);
+        self.since = Some(now);
+        self.deadline = Deadline::At(now + limit.min(self.left));
+    }
+
+    /// The program has worked until now.
+    fn stop(&mut self, now: Instant) {
+        if let Some(since) = self.since.take() {
+            self.left = self.left.saturating_sub(now - since);
+        }
+        self.deadline = Deadline::Open;
+    }
+}
+
+struct Clock(Mutex<Time>, Condvar);
 
 /// A program at work. Dropping it kills it.
 pub struct Process {
     child: Arc<Mutex<Child>>,
-    clock: Arc<Clock<Deadline>>,
+    clock: Arc<Clock>,
     limit: Duration,
     words: Option<JoinHandle<String>>,
 }
@@ -126,7 +167,9 @@ impl Process {
         let child = Arc::new(Mutex::new(child));
         running.push(Arc::clone(&child));
         drop(running);
-        let clock = Arc::new(Clock(Mutex::new(Deadline::At(Instant::now() + limit)), Condvar::new()));
+        let mut time = Time { deadline: Deadline::Open, since: None, left: PAGES_LIMIT * limit };
+        time.advance(Instant::now(), limit);
+        let clock = Arc::new(Clock(Mutex::new(time), Condvar::new()));
         let watched = (Arc::clone(&child), Arc::clone(&clock));
         thread::spawn(move || watch(&watched.0, &watched.1));
         Ok(Process { child, clock, limit, words })
@@ -137,25 +180,29 @@ impl Process {
         locked(&self.child).stdout.take()
     }
 
-    /// It has made progress, or it is waited for again: the limit begins anew.
+    /// It has made progress, or it is waited for again: the limit begins anew, as far as the limit of all pages allows.
     pub fn advance(&self) {
-        self.set(Deadline::At(Instant::now() + self.limit));
+        self.change(|time| time.advance(Instant::now(), self.limit));
     }
 
     /// It is not waited for now: there is no limit until [`Process::advance`].
     pub fn pause(&self) {
-        self.set(Deadline::Open);
+        self.change(|time| time.stop(Instant::now()));
     }
 
     /// The error of a program that was killed because its limit has passed.
     pub fn passed(&self) -> Option<ProcessError> {
-        matches!(*locked(&self.clock.0), Deadline::Passed).then_some(ProcessError::TooLong(self.limit))
+        let time = locked(&self.clock.0);
+        (time.deadline == Deadline::Passed).then(|| match time.left < self.limit {
+            true => ProcessError::TooLongAltogether(PAGES_LIMIT * self.limit),
+            false => ProcessError::TooLong(self.limit),
+        })
     }
 
-    fn set(&self, deadline: Deadline) {
-        let mut now = locked(&self.clock.0);
-        if !matches!(*now, Deadline::Passed) {
-            *now = deadline;
+    fn change(&self, change: impl FnOnce(&mut Time)) {
+        let mut time = locked(&self.clock.0);
+        if time.deadline != Deadline::Passed {
+            change(&mut time);
             self.clock.1.notify_one();
         }
     }
@@ -198,7 +245,7 @@ impl Process {
 
 impl Drop for Process {
     fn drop(&mut self) {
-        self.set(Deadline::Over);
+        self.change(|time| time.deadline = Deadline::Over);
         locked(&RUNNING).retain(|other| !Arc::ptr_eq(other, &self.child));
         let mut child = locked(&self.child);
         if !matches!(child.try_wait(), Ok(Some(_))) {
@@ -210,16 +257,16 @@ impl Drop for Process {
 }
 
 /// Kills a program when its deadline has passed.
-fn watch(child: &Mutex<Child>, Clock(deadline, changed): &Clock<Deadline>) {
-    let mut now = locked(deadline);
+fn watch(child: &Mutex<Child>, Clock(time, changed): &Clock) {
+    let mut now = locked(time);
     loop {
-        now = match *now {
+        now = match now.deadline {
             Deadline::Over | Deadline::Passed => return,
             Deadline::Open => changed.wait(now).unwrap_or_else(PoisonError::into_inner),
             Deadline::At(end) => match end.checked_duration_since(Instant::now()) {
                 Some(left) => changed.wait_timeout(now, left).unwrap_or_else(PoisonError::into_inner).0,
                 None => {
-                    *now = Deadline::Passed;
+                    now.deadline = Deadline::Passed;
                     let _ = locked(child).kill();
                     return;
                 }
@@ -272,6 +319,29 @@ mod tests {
         let waiting = Process::start(&mut shell("sleep 0.7"), limit).unwrap();
         waiting.pause();
         waiting.end(|| false).unwrap();
+    }
+
+    #[test]
+    fn progress_for_ever_has_an_end_and_the_callers_own_work_does_not_count() {
+        let (second, begun) = (Duration::from_secs(1), Instant::now());
+        let at = |seconds: u32| begun + seconds * second;
+        let mut time = Time { deadline: Deadline::Open, since: None, left: PAGES_LIMIT * second };
+        // A page takes a second, and the caller as long after each.
+        for page in 0..PAGES_LIMIT {
+            time.advance(at(2 * page), second);
+            assert!(time.deadline == Deadline::At(at(2 * page + 1)), "page {page}");
+            time.stop(at(2 * page + 1));
+            assert!(time.deadline == Deadline::Open);
+        }
+        time.advance(at(2 * PAGES_LIMIT), second);
+        assert!(time.deadline == Deadline::At(at(2 * PAGES_LIMIT)), "nothing is left");
+        // Progress at every third of a second.
+        let mut time = Time { deadline: Deadline::Open, since: None, left: PAGES_LIMIT * second };
+        for third in 0..3 * PAGES_LIMIT {
+            time.advance(begun + third * second / 3, second);
+            let Deadline::At(end) = time.deadline else { panic!("it is at work") };
+            assert!(end <= at(PAGES_LIMIT), "{third}");
+        }
     }
 
     #[test]

@@ -15,8 +15,8 @@ use inks::Stack;
 use protocol::paper::Paper;
 
 pub use area::Area;
-pub(crate) use dots::check_stacks;
 pub use dots::{DotMap, SheetError};
+pub(crate) use dots::{census, check_stacks};
 
 /// Dots in a millimetre at 600 dpi, the resolution of every dot map and sheet.
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;

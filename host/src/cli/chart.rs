@@ -189,7 +189,16 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 const NEXT: [&str; 2] = ["3. foilpress profile set default --cross X,Ymm \\", "       --distance Dmm"];
 
 fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Library) -> Artwork<'a> {
-    Artwork { name, dots, allowed, library, notes: &[], report: Value::Null, advice: String::new() }
+    Artwork {
+        name,
+        dots,
+        allowed,
+        library,
+        notes: &[],
+        suggestions: Vec::new(),
+        report: Value::Null,
+        advice: String::new(),
+    }
 }
 
 fn print(artwork: &Artwork<'_>, args: &JobArgs, observer: &dyn Observer) -> Result<()> {

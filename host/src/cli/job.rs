@@ -17,6 +17,7 @@ use super::ledger;
 use super::output::{self, Kind, Staged};
 use super::shown;
 use observe::Observer;
+use press::job::plan::Suggestion;
 use press::layout::Layout;
 use press::pipeline::{self, Draft, Job, Request};
 use press::preview::inks::{Ground, save_pass, save_sheet};
@@ -112,16 +113,18 @@ pub struct Made {
 
 /// Makes a job, proves it, and writes what every print has: the job, its passes, the plan as a page, and the dots as the
 /// simulated printer printed them: all inks on the ground, and each pass by itself. `notes` are what the readers had to
-/// assume.
+/// assume, `suggestions` what would improve the print.
 pub fn make(
     request: &Request<'_>,
     notes: &[String],
+    suggestions: &[Suggestion],
     places: Places,
     ground: Ground,
     observer: &dyn Observer,
 ) -> Result<Made> {
     let mut job = pipeline::job(request, observer)?;
     job.draft.plan.notes = notes.to_vec();
+    job.draft.plan.suggestions = suggestions.to_vec();
     job.draft.plan.price(&ledger::prices());
     let printout = job.prove(observer)?;
     let Draft { sheet, laid, separation, plan } = &job.draft;
@@ -195,6 +198,8 @@ pub struct Artwork<'a> {
     pub library: &'a Library,
     /// What the readers had to assume.
     pub notes: &'a [String],
+    /// What would improve the print.
+    pub suggestions: Vec<Suggestion>,
     /// What else the report should hold: an object, or null for nothing.
     pub report: Value,
     /// What else to say below the plan; empty for nothing.
@@ -219,7 +224,8 @@ impl<'a> Artwork<'a> {
     ) -> Result<()> {
         let places = Places::new(self.name, result, deliver)?;
         let ground = result.background.unwrap_or_default();
-        let made = make(&self.request(layout, media), self.notes, places, ground, observer)?;
+        let request = self.request(layout, media);
+        let made = make(&request, self.notes, &self.suggestions, places, ground, observer)?;
         made.finish(self.report.clone(), (&self.advice, "preview.png"), result, deliver, observer)
     }
 }

@@ -18,10 +18,8 @@ use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use super::shown::Shown;
 use observe::Observer;
-use press::job::plan::grouped;
-use press::layers::{
-    self, Accept, Composed, Finish, GAMMAS, Intent, Order, Pages, Room, Suggestion, White, names,
-};
+use press::job::plan::{Suggestion, grouped};
+use press::layers::{self, Accept, Composed, Finish, GAMMAS, Intent, Order, Pages, Room, White, names};
 use press::layout::{Layout, Mm, NoLength, Size};
 use press::pipeline;
 use press::sheet::DOTS_PER_MM;
@@ -197,7 +195,7 @@ impl LayersArgs {
                 (None, []) => Pages::Only,
                 (None, inks) => Pages::Inks(inks.to_vec()),
             },
-            across: 1,
+            across: layout.resolution.across(1).into(),
             tones: self.tones.as_deref().map_or(Ok(InkSet::EMPTY), |text| set("--tones", text))?,
             inks: self.inks()?,
             room: Room { width, length, cut: layout.cut },
@@ -206,13 +204,12 @@ impl LayersArgs {
 
     /// How layers become stacks.
     pub fn settings(&self) -> Result<layers::Settings> {
-        let usual = layers::Settings::default();
         Ok(layers::Settings {
             inks: self.inks()?,
             order: self.order.clone().unwrap_or_default(),
             passes: self.passes.clone(),
             knockout: match self.knockout.as_deref() {
-                None => usual.knockout,
+                None => layers::Settings::default().knockout,
                 Some("none") => InkSet::EMPTY,
                 Some(text) => set("--knockout", text)?,
             },
@@ -223,7 +220,6 @@ impl LayersArgs {
             gamma: self.gamma,
             halftone: self.halftone.halftone,
             accept: self.accept.clone(),
-            ..usual
         })
     }
 }
@@ -301,9 +297,8 @@ impl Work {
     ) -> Result<T> {
         let library = self.layers.library()?;
         let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
-        let across = self.resolution.across(1).into();
-        let options = layers::Options { across, ..self.layers.options(self.size, &layout)? };
-        let settings = layers::Settings { across, ..self.layers.settings()? };
+        let options = self.layers.options(self.size, &layout)?;
+        let settings = self.layers.settings()?;
         let art = layers::open(&self.layers.art, &options, observer)?;
         let composed = layers::compose(&art, &settings, &library, observer)?;
         let artwork = Artwork {
@@ -312,10 +307,9 @@ impl Work {
             allowed: settings.inks,
             library: &library,
             notes: &composed.report.notes,
-            report: json!({
-                "art": { "composed": composed.report, "suggestions": suggestions(&composed, &settings.inks) }
-            }),
-            advice: words(&composed, &settings.inks),
+            suggestions: suggestions(&composed, &settings.inks),
+            report: json!({ "art": { "composed": composed.report } }),
+            advice: words(&composed),
         };
         then(&artwork, &layout)
     }
@@ -333,22 +327,25 @@ pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
     args.work.with(observer, |artwork, layout| {
         let mut draft = pipeline::draft(&artwork.request(layout, &args.work.media), observer)?;
         draft.plan.notes = artwork.notes.to_vec();
+        draft.plan.suggestions.clone_from(&artwork.suggestions);
         args.shown.show(page, draft.into(), &artwork.report, &artwork.advice)
     })
 }
 
-/// Suggestions for programs to read.
-fn suggestions(composed: &Composed, allowed: &InkSet) -> Vec<serde_json::Value> {
+/// Suggestions with the options that follow them.
+fn suggestions(composed: &Composed, allowed: &InkSet) -> Vec<Suggestion> {
     let suggestions = composed.suggestions.iter();
     suggestions
-        .map(|Suggestion { text, remedy, dots }| {
-            json!({ "text": text, "how": advice::options_of(remedy, allowed), "dots": dots })
+        .map(|layers::Suggestion { text, remedy, dots }| Suggestion {
+            text: text.clone(),
+            how: advice::options_of(remedy, allowed),
+            dots: *dots,
         })
         .collect()
 }
 
-/// What was laid and what the art needs, in words.
-fn words(composed: &Composed, allowed: &InkSet) -> String {
+/// What was laid, in words.
+fn words(composed: &Composed) -> String {
     let mut text = String::from("\nFrom the art, lowest first:\n");
     for laid in &composed.report.laid {
         let times = if laid.passes > 1 { format!(", {} times", laid.passes) } else { String::new() };
@@ -358,13 +355,6 @@ fn words(composed: &Composed, allowed: &InkSet) -> String {
             grouped(laid.dots),
             laid.from
         ));
-    }
-    if !composed.suggestions.is_empty() {
-        text.push_str("\nSuggestions, followed only when you say so:\n");
-    }
-    for Suggestion { text: why, remedy, dots } in &composed.suggestions {
-        let how = advice::options_of(remedy, allowed);
-        text.push_str(&format!("    {how:<26} {why} ({} dots)\n", grouped(*dots)));
     }
     text
 }

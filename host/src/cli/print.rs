@@ -168,7 +168,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
     let laid = args.work.halftone(document, inks, library, observer)?;
     let ground = args.result.background.unwrap_or_default();
-    let made = job::make(&args.work.request(&laid), &laid.document.notes, places, ground, observer)?;
+    let made = job::make(&args.work.request(&laid), &laid.document.notes, &[], places, ground, observer)?;
     let pictures = pictures(&laid, made.job.draft.separation.passes.len(), &probe, observer)?;
     for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))?;

@@ -17,6 +17,7 @@ use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::ops::Range;
 use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::call::{Call, Exit};
@@ -29,12 +30,18 @@ use device::send::session::{Outcome, Phase, SessionError};
 use device::send::{self, Address, Checked, Destination};
 use observe::Silent;
 use press::inspect::sheets;
+use press::process::Process;
 use system::System;
 
 /// The most bytes of a job: dozens of pages.
 const LARGEST: u64 = 1 << 30;
 /// Records of jobs that ended without success are forgotten after this.
 const FORGET: Duration = Duration::from_secs(30 * 24 * 3600);
+
+/// How long the print system may take to list its jobs, of the half minute until it kills.
+const ANSWER: Duration = Duration::from_secs(3);
+/// The most bytes of such a list.
+const LONGEST_LIST: u64 = 1 << 20;
 
 /// How the backend stops before all is printed.
 struct Stopped(Exit);
@@ -101,13 +108,11 @@ impl<W: Write + Send> Backend<'_, W> {
         for _ in 0..self.call.copies {
             for (place, checked) in places.iter().zip(&checked) {
                 number += 1;
-                if self.system.stops() {
-                    return Ok(());
-                }
                 let own = folder.join(format!("{number:04}"));
-                if !self.sheet(&job, place, checked, &own)? {
+                if self.system.stops() || !self.sheet(&job, place, checked, &own)? {
                     // Of a job without a printed sheet there is nothing to remember: if it is started again, it begins anew.
-                    if number == 1 && self.has_ended(&own) {
+                    // One that was only stopped goes on after its printed sheets.
+                    if self.has_ended(&own) && (number == 1 || self.is_given_up()) {
                         self.forget(&folder);
                     }
                     return Ok(());
@@ -329,6 +334,20 @@ impl<W: Write + Send> Backend<'_, W> {
             && (!folder.exists() || Journal::at(folder).ok().and_then(ended).unwrap_or(false))
     }
 
+    /// Whether the print system has given the job up for good: it lists its jobs, but not this one. When it ends itself, it
+    /// stops jobs in the same way, but then it lists none.
+    fn is_given_up(&self) -> bool {
+        let (queue, job) = &self.call.listed;
+        let mut command = Command::new(&self.call.lister);
+        command.args(["-W", "not-completed", "-o", queue]).stdout(Stdio::piped());
+        let Ok(mut process) = Process::start(&mut command, ANSWER) else { return false };
+        let mut list = String::new();
+        let read = process.output().map(|output| output.take(LONGEST_LIST).read_to_string(&mut list));
+        matches!(read, Some(Ok(_)))
+            && process.end(|| false).is_ok()
+            && !list.lines().any(|line| line.split_whitespace().next() == Some(job))
+    }
+
     fn forget(&self, folder: &Path) {
         if let Err(error) = fs::remove_dir_all(folder)
             && error.kind() != io::ErrorKind::NotFound
@@ -387,6 +406,8 @@ mod tests {
                 to: Destination::Raw(device),
                 journal: folder.path().join("jobs"),
                 in_class: false,
+                listed: ("queue".into(), "queue-7".into()),
+                lister: folder.path().join("lister"),
             };
             let printers = Printers::at(&folder.path().join("printers")).unwrap();
             Rig { folder, call, printers }
@@ -489,6 +510,29 @@ mod tests {
         let (_, said) = rig.run(&two, &|| pages.fetch_add(1, Ordering::SeqCst) > 16);
         assert!(said.contains("PAGE: 1 1") && !said.contains("PAGE: 2 1"), "{said}");
         assert!(rig.call.journal.join("one/0001/done").exists());
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn of_a_cancelled_job_nothing_is_kept_and_of_a_stopped_one_its_printed_sheets_are() {
+        use std::os::unix::fs::PermissionsExt;
+        let rig = Rig::new();
+        let two = [job(Ink::Cyan, 3), job(Ink::Cyan, 400)].concat();
+        let done = rig.call.journal.join("one/0001/done");
+        // The print system lists the job; it has ended itself; it lists others only.
+        for (answer, kept) in [
+            ("[ \"$*\" = '-W not-completed -o queue' ] && echo 'queue-7  me  1024  today'", true),
+            ("exit 1", true),
+            ("echo 'queue-70  me  1024  today'", false),
+        ] {
+            fs::write(&rig.call.lister, format!("#!/bin/sh\n{answer}\n")).unwrap();
+            fs::set_permissions(&rig.call.lister, fs::Permissions::from_mode(0o755)).unwrap();
+            let asked = AtomicUsize::new(0);
+            let (exit, said) = rig.run(&two, &|| asked.fetch_add(1, Ordering::SeqCst) > 16);
+            assert_eq!(exit, Exit::Ok, "{said}");
+            assert_eq!(done.exists(), kept, "{answer}: {said}");
+            let _ = fs::remove_dir_all(&rig.call.journal);
+        }
     }
 
     #[test]

@@ -42,6 +42,10 @@ pub struct Call {
     pub journal: PathBuf,
     /// Whether another printer of a class may do the job.
     pub in_class: bool,
+    /// The queue, and the job as the print system lists it there.
+    pub listed: (String, String),
+    /// The program that lists the jobs of a queue: `lpstat`.
+    pub lister: PathBuf,
 }
 
 /// Why a call cannot be understood.
@@ -87,7 +91,9 @@ impl Call {
             Some(uuid) if !uuid.is_empty() => uuid,
             _ => format!("job-{}-{}", file_name(&job.to_string_lossy()), file_name(&title.to_string_lossy())),
         };
-        let queue = file_name(&text("PRINTER").unwrap_or_default());
+        let queue = text("PRINTER").unwrap_or_default();
+        let listed = (queue.clone(), format!("{queue}-{}", job.to_string_lossy()));
+        let queue = file_name(&queue);
         let folder = match (var("FOILPRESS_JOBS"), var("CUPS_CACHEDIR")) {
             (Some(jobs), _) => PathBuf::from(jobs),
             (None, Some(cache)) => Path::new(&cache).join("foilpress"),
@@ -104,6 +110,8 @@ impl Call {
             to,
             journal: folder.join(if queue.is_empty() { "queue" } else { &queue }),
             in_class: var("CLASS").is_some_and(|class| !class.is_empty()),
+            listed,
+            lister: "lpstat".into(),
         })
     }
 }
@@ -128,6 +136,7 @@ mod tests {
             .unwrap();
         assert_eq!((call.identity.as_str(), call.copies, call.in_class), ("0f0e-x", 3, false));
         assert_eq!(call.journal, Path::new("/var/cache/cups/foilpress/Alps"));
+        assert_eq!(call.listed, ("Alps".into(), "Alps-7".into()));
         // On standard input the filters have made the copies.
         let call = Call::read(&arguments(&["7", "me", "../t", "3", ""]), &environment).unwrap();
         assert_eq!((call.identity.as_str(), call.copies), ("job-7-t", 1));

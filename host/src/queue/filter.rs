@@ -3,13 +3,13 @@
 //! Problem: the print system hands over PDF or pictures of pages, whole sheets with margins this printer cannot print on.
 //! Method: a PDF is drawn by Ghostscript, which also tells what drew each pixel; each page becomes art as if it were a
 //! picture given to `foilpress layers`: text keeps its outline, reserved colours are inks of their own if wanted, everything
-//! else is halftoned in process inks. A page
-//! with spot colours that name inks is separated instead, and its plates are layers. The art is laid where the page has it,
-//! or where the user wants it, on a sheet of the page's size; what lies on the margins is reported in millimetres.
-//! Cost: the page at four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one more
-//! drawing of all pages at a low resolution.
-//! Limits: documents of 1 GB, sheets the printer takes, upright. Transparency is gone when a page has been drawn, so
-//! white cannot follow it. On a separated page the choice of inks leaves plates out; it does not mix them again.
+//! else is halftoned in process inks. A page with spot colours that name inks is separated, too, and the plates of these are
+//! layers. The art is laid where the page has it, or where the user wants it, on a sheet of the page's size; what lies on the
+//! margins is reported in millimetres.
+//! Cost: the page at a bit or four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one
+//! more drawing of all pages at a low resolution.
+//! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
+//! drawn, so white cannot follow it.
 
 mod drawing;
 mod page;
@@ -29,8 +29,9 @@ use super::raster::{self, RasterError};
 use drawing::Drawing;
 use observe::Observer;
 use page::Press;
-use press::layers::{self, LayersError, Window, kinds};
+use press::layers::{self, LayersError, Page};
 use press::pipeline::JobError;
+use press::process::MOST_PAGES;
 
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
@@ -91,6 +92,9 @@ pub enum FilterError {
     /// The document.
     #[error("the document is larger than 1 GB; print fewer pages at once")]
     TooLarge,
+    /// Its pages.
+    #[error("the document has more than {MOST_PAGES} pages; print fewer at once")]
+    TooManyPages,
     /// The plates of a document.
     #[error("cannot read the document's spot colours")]
     Plates(#[source] LayersError),
@@ -158,6 +162,7 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
     let (mut number, mut row) = (0, Vec::new());
     while let Some(page) = reader.next_page()? {
         number += 1;
+        within_limit(number)?;
         let size = (page.width, page.height);
         let paper = page::paper(number, size, page.dpi, press.choices)?;
         let mut rgb = Vec::with_capacity(3 * page.width * page.height);
@@ -166,7 +171,14 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
             rgb.extend_from_slice(&row);
         }
         // Of a PDF the print system has turned the pages itself.
-        let job = picture(number, paper, (size, page.dpi), Pixels::Plain(rgb), press.choices.mirror, press)?;
+        let job = picture(
+            number,
+            paper,
+            (size, page.dpi),
+            Page::plain(rgb, page.width),
+            press.choices.mirror,
+            press,
+        )?;
         for _ in 0..page.copies {
             press.write(&job)?;
         }
@@ -204,27 +216,24 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     Ok(())
 }
 
+/// Refuses a document that shows pages for ever.
+fn within_limit(number: usize) -> Result<(), FilterError> {
+    if number > MOST_PAGES as usize { Err(FilterError::TooManyPages) } else { Ok(()) }
+}
+
 /// Pages as Ghostscript draws them, or one of them.
 fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
     let mut drawing = Drawing::begin(path, only, dpi)?;
     let mut number = only.unwrap_or(1);
     while let Some(size) = drawing.next_page()? {
+        within_limit(number)?;
         let paper = page::paper(number, size, dpi, press.choices)?;
-        let pixels = Pixels::Tagged(drawing.pixels(size)?);
-        let job = picture(number, paper, (size, dpi), pixels, false, press)?;
+        let job = picture(number, paper, (size, dpi), drawing.page(size)?, false, press)?;
         press.write(&job)?;
         number += 1;
     }
     drawing.end()
-}
-
-/// A page that was drawn.
-enum Pixels {
-    /// Three bytes a pixel.
-    Plain(Vec<u8>),
-    /// Four bytes a pixel: what drew it comes first.
-    Tagged(Vec<u8>),
 }
 
 /// The job of a page that is a picture; empty if nothing is on it.
@@ -232,25 +241,17 @@ fn picture(
     number: usize,
     paper: Paper,
     (size, dpi): ((usize, usize), u16),
-    pixels: Pixels,
+    page: Page,
     mirrored: bool,
     press: &Press<'_>,
 ) -> Result<Vec<u8>, FilterError> {
-    let drawn = match &pixels {
-        Pixels::Plain(rgb) => Window::around(rgb, size.0, 3, 255),
-        Pixels::Tagged(pixels) => kinds::bounds(pixels, size.0),
+    let Some(view) = press.view(number, paper, (size, dpi), page.bounds(), mirrored) else {
+        return Ok(Vec::new());
     };
-    let Some(view) = press.view(number, paper, (size, dpi), drawn, mirrored) else { return Ok(Vec::new()) };
-    let (window, name, options) = (&view.window, format!("page {number}"), press.options(dpi));
-    let part = (window.width, window.height);
-    let art = match pixels {
-        Pixels::Plain(rgb) => layers::page(&name, part, dpi, window.cut(rgb, size.0, 3), &options),
-        Pixels::Tagged(pixels) => {
-            let pixels = window.cut(pixels, size.0, kinds::BYTES);
-            layers::tagged_page(&name, part, dpi, pixels, &options)
-        }
-    }
-    .map_err(|source| FilterError::Layers { page: number, source })?;
+    let name = format!("page {number}");
+    let art = page
+        .art(&name, &view.window, dpi, &press.options(dpi))
+        .map_err(|source| FilterError::Layers { page: number, source })?;
     press.job(number, paper, &art, &view, mirrored)
 }
 

@@ -7,7 +7,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::{ImageFormat, RgbImage};
 
-use super::plan::{Plan, grouped};
+use super::plan::{Plan, Suggestion, grouped};
 use super::ribbon;
 
 /// The pictures on the page: what the sheet will look like.
@@ -178,7 +178,7 @@ fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt
     Ok(())
 }
 
-/// What the rules say, and what the readers had to assume.
+/// What the rules say, what the readers had to assume, and what would be better.
 fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
     if !plan.checks.is_empty() {
         writeln!(page, "<h2>Before you print</h2>\n<ul>")?;
@@ -191,6 +191,14 @@ fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
         writeln!(page, "<h2>From reading the files</h2>\n<ul>")?;
         for note in &plan.notes {
             writeln!(page, "<li>{}</li>", escape(note))?;
+        }
+        writeln!(page, "</ul>")?;
+    }
+    if !plan.suggestions.is_empty() {
+        writeln!(page, "<h2>Suggestions, followed only when you say so</h2>\n<ul>")?;
+        for Suggestion { text, how, dots } in &plan.suggestions {
+            let (text, how, dots) = (escape(text), escape(how), grouped(*dots));
+            writeln!(page, "<li><b>{how}</b>: {text} ({dots} dots)</li>")?;
         }
         writeln!(page, "</ul>")?;
     }

@@ -70,6 +70,19 @@ pub struct Plan {
     pub checks: Vec<Check>,
     /// What the readers of the document or art had to assume, in sentences.
     pub notes: Vec<String>,
+    /// What would improve the print.
+    pub suggestions: Vec<Suggestion>,
+}
+
+/// Something that would improve the print, if the user says so.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Suggestion {
+    /// The problem, its reason and its remedy.
+    pub text: String,
+    /// How to ask for it.
+    pub how: String,
+    /// Number of dots concerned.
+    pub dots: u64,
 }
 
 /// A cartridge to load.
@@ -217,6 +230,7 @@ impl Plan {
             stacks: shares(sheet, laid, library),
             checks: checks(subject),
             notes: Vec::new(),
+            suggestions: Vec::new(),
         }
     }
 
@@ -491,6 +505,12 @@ impl fmt::Display for Plan {
             writeln!(f, "\nFrom reading the files:")?;
             for note in &self.notes {
                 writeln!(f, "    {note}")?;
+            }
+        }
+        if !self.suggestions.is_empty() {
+            writeln!(f, "\nSuggestions, followed only when you say so:")?;
+            for Suggestion { text, how, dots } in &self.suggestions {
+                writeln!(f, "    {how:<26} {text} ({} dots)", grouped(*dots))?;
             }
         }
         Ok(())

@@ -40,13 +40,15 @@ pub struct Layer {
     pub shape: Shape,
 }
 
-/// Art at 600 dpi.
+/// Art at 600 dpi, or at 1200 x 600.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Artwork {
     /// Name of the art.
     pub name: String,
     /// Dots across.
     pub width: usize,
+    /// Dots across in 1/600 inch, 1 or 2.
+    pub across: usize,
     /// Rows.
     pub length: usize,
     /// The layers in the order in which they were given.
@@ -67,6 +69,7 @@ impl Artwork {
         Artwork {
             name: name.into(),
             width,
+            across: 1,
             length,
             layers: Vec::new(),
             colour: None,

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::window::Window;
 use crate::separate::Plane;
 
 /// A plane without ink.
@@ -29,6 +30,43 @@ pub(super) fn from<T: Sync>(width: usize, dots: &[T], ink: impl Fn(&T) -> bool +
         }
     });
     plane
+}
+
+/// The smallest window around all ink; `None` without any.
+pub(super) fn bounds(plane: &Plane) -> Option<Window> {
+    // First and last row and byte with ink, and the dots of all rows together.
+    let mut rows = None;
+    let mut dots = vec![0u8; plane.stride];
+    for (y, row) in plane.bits.chunks_exact(plane.stride.max(1)).enumerate() {
+        if row.iter().fold(0, |all, &byte| all | byte) != 0 {
+            rows = Some((rows.map_or(y, |(top, _)| top), y));
+            dots.iter_mut().zip(row).for_each(|(all, &byte)| *all |= byte);
+        }
+    }
+    let (top, bottom) = rows?;
+    let (first, last) = (dots.iter().position(|&byte| byte != 0)?, dots.iter().rposition(|&byte| byte != 0)?);
+    let left = 8 * first + dots[first].leading_zeros() as usize;
+    let right = 8 * last + 7 - dots[last].trailing_zeros() as usize;
+    Some(Window { left, top, width: right + 1 - left, height: bottom + 1 - top })
+}
+
+/// The part of a plane in a window, which lies within it.
+pub(super) fn cut(plane: &Plane, window: &Window) -> Plane {
+    let mut part = blank(window.width, window.height);
+    let (from, shift) = (window.left / 8, window.left % 8);
+    // What lies beyond the last dot of a row is blank.
+    let unused = 8 * part.stride - window.width;
+    let rows = plane.bits.chunks_exact(plane.stride.max(1)).skip(window.top);
+    for (to, row) in part.bits.chunks_exact_mut(part.stride.max(1)).zip(rows) {
+        for (at, byte) in (from..).zip(to.iter_mut()) {
+            let next = row.get(at + 1).map_or(0, |&next| u16::from(next));
+            *byte = ((u16::from(row[at]) << 8 | next) << shift >> 8) as u8;
+        }
+        if let Some(last) = to.last_mut() {
+            *last &= 0xff << unused;
+        }
+    }
+    part
 }
 
 /// Combines `with` into `plane` byte by byte. Both have the same size.

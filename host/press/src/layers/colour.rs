@@ -11,9 +11,10 @@
 //! in such an average: they are fixed. Limits: the accuracy of colours is that of the ink library.
 
 use inks::{InkSet, Library, Stack};
-use protocol::ink::{Ink, Kind as InkKind};
+use protocol::ink::Ink;
 use rayon::prelude::*;
 
+use super::bits;
 use super::compose::Settings;
 use super::error::LayersError;
 use super::flat::{BLACK, Flat, TONE, WHITE, split};
@@ -22,6 +23,7 @@ use super::kinds::Kind;
 use super::lattice::{Lattice, Nodes, ends, step};
 use super::outline::{self, Treatment};
 use crate::halftone::{self, halftone};
+use crate::separate::{Plane, pack};
 use appearance::brdf::Space;
 use appearance::document::SAMPLES;
 use appearance::gamut::{self, InkMix, Printable};
@@ -45,8 +47,12 @@ pub struct Colour {
     pub rgb: Vec<u8>,
     /// For each pixel whether text or a drawing has its colour; empty if none has.
     pub(super) drawn: Vec<bool>,
+    /// Whether the colours are printed on dots of layers, too; an ink of a layer otherwise has its dots to itself.
+    pub(super) overprints: bool,
     /// The dots in flat colours; without any, all are tones.
     pub(super) flat: Flat,
+    /// The black dots, if all others are white; then there is nothing else.
+    pub(super) black: Option<Plane>,
 }
 
 impl Colour {
@@ -64,15 +70,44 @@ impl Colour {
             return None;
         }
         let flat = Flat::of(pixels, size.0 as usize);
-        let mut colour = Colour::default();
-        if !flat.is_black_and_white() {
-            colour = averaged(pixels, &flat, (size.0 as usize, size.1 as usize), dots);
+        if flat.is_black_and_white() {
+            let flat = flat.at_dots(size, dots);
+            return Some(Colour::black(bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
         }
+        let colour = averaged(pixels, &flat, (size.0 as usize, size.1 as usize), dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
+    /// Black dots on white.
+    pub(super) fn black(dots: Plane) -> Colour {
+        Colour { black: Some(dots), ..Colour::default() }
+    }
+
+    /// The plane of each process ink that the colours need.
+    pub(super) fn planes(
+        &self,
+        dots: (usize, usize),
+        inks: &InkSet,
+        settings: &Settings,
+        library: &Library,
+        observer: &dyn Observer,
+    ) -> Result<Vec<(Ink, Plane)>, LayersError> {
+        if let Some(black) = &self.black {
+            let inks = black_inks(inks, library);
+            return Ok(inks.into_iter().map(|ink| (ink, black.clone())).collect());
+        }
+        let (stacks, index) = self.halftone(dots, inks, settings, library, observer)?;
+        let mut inks_of = [0u16; 256];
+        for (inks_of, stack) in inks_of.iter_mut().zip(&stacks) {
+            let has = inks.iter().enumerate().filter(|(_, ink)| stack.layers().contains(ink));
+            *inks_of = has.fold(0, |bits, (at, _)| bits | 1 << at);
+        }
+        let planes = pack::pack(dots.0, &index, &inks_of, inks.len());
+        Ok(inks.iter().zip(planes).collect())
+    }
+
     /// Halftones the colours: stacks of process inks, and the stack of each dot.
-    pub(super) fn halftone(
+    fn halftone(
         &self,
         dots: (usize, usize),
         inks: &InkSet,
@@ -81,8 +116,7 @@ impl Colour {
         observer: &dyn Observer,
     ) -> Result<(Vec<Stack>, Vec<u8>), LayersError> {
         let space = Space::half_angle(SAMPLES);
-        let process = InkSet::of(inks.iter().filter(|ink| ink.kind() == InkKind::Process));
-        let printable = Printable::from_library(library, &process, &space);
+        let printable = Printable::from_library(library, inks, &space);
         let solids = Solids::new(&printable, &space);
         if let Some(done) = self.without_tones(&solids) {
             return Ok(done);
@@ -213,6 +247,16 @@ impl Colour {
         };
         self.flat.colours.iter().map(&mut treatment).collect()
     }
+}
+
+/// The inks of black: black ink or, without it, the darkest stack of these process inks.
+fn black_inks(inks: &InkSet, library: &Library) -> Vec<Ink> {
+    if inks.contains(Ink::Black) {
+        return vec![Ink::Black];
+    }
+    let space = Space::half_angle(SAMPLES);
+    let printable = Printable::from_library(library, inks, &space);
+    printable.stacks[ends(&printable, &space).1].layers().to_vec()
 }
 
 /// The nodes of the lattices, fitted.
@@ -357,7 +401,7 @@ fn averaged<const N: usize>(
     if !drawn.contains(&true) {
         drawn.clear();
     }
-    Colour { width: to.0, height: to.1, rgb, drawn, flat: Flat::default() }
+    Colour { width: to.0, height: to.1, rgb, drawn, ..Colour::default() }
 }
 
 /// Gives plain pixels beside others the colour of one of these: the halftone interpolates between pixels, and a tone must
@@ -385,8 +429,10 @@ fn spread(rgb: &mut [u8], drawn: &mut [bool], plain: &[bool], width: usize) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::intent::oklab;
     use super::*;
     use observe::Silent;
+    use protocol::ink::Kind as InkKind;
 
     /// The mixture of pictures' pixels by an intent, with the reflectance of the stacks.
     fn mixed(pixels: &[[u8; 3]], intent: Intent) -> (InkMix, Printable) {
@@ -476,6 +522,55 @@ mod tests {
                 let (step, asked) =
                     (difference(pair[0], pair[1]), difference(linear(pixels[0]), linear(pixels[1])));
                 assert!(step > 0.08 * asked && step < 1.6 * asked, "{:?}: {step} for {asked}", pixels[1]);
+            }
+        }
+    }
+
+    /// Hue in degrees and colourfulness in CAM16, which the intents do not use.
+    fn cam16(light: Light) -> (f64, f64) {
+        use palette::cam16::{Cam16Jmh, Parameters};
+        use palette::convert::FromColorUnclamped;
+        let light = palette::LinSrgb::new(light[0], light[1], light[2]);
+        let seen = Cam16Jmh::from_xyz(
+            palette::Xyz::from_color_unclamped(light),
+            Parameters::default_static_wp(40.0),
+        );
+        (seen.hue.into_positive_degrees(), seen.colorfulness)
+    }
+
+    #[test]
+    fn hues_are_printed_as_they_are_and_blue_does_not_become_purple() {
+        let levels = [0u8, 51, 102, 153, 204, 255];
+        let reds = || levels.into_iter().flat_map(|r| levels.map(|g| (r, g)));
+        let pixels: Vec<[u8; 3]> = reds().flat_map(|(r, g)| levels.map(|b| [r, g, b])).collect();
+        for intent in [Intent::Perceptual, Intent::Colorimetric] {
+            let turns: Vec<(f64, f64, [u8; 3])> = pixels
+                .iter()
+                .zip(printed(&pixels, intent))
+                .map(|(&pixel, light)| {
+                    ((cam16(linear(pixel)), oklab(linear(pixel))), (cam16(light), oklab(light)), pixel)
+                })
+                // Neither is nearly grey, where hue has no meaning.
+                .filter(|(asked, found, _)| asked.0.1 > 15.0 && found.0.1 > 10.0)
+                .map(|((was, asked), (is, found), pixel)| {
+                    let turned = (asked[1] * found[2] - asked[2] * found[1])
+                        .atan2(asked[1] * found[1] + asked[2] * found[2]);
+                    ((is.0 - was.0 + 540.0).rem_euclid(360.0) - 180.0, turned.to_degrees(), pixel)
+                })
+                .collect();
+            let mean =
+                |of: fn(&(f64, f64, [u8; 3])) -> f64| turns.iter().map(of).sum::<f64>() / turns.len() as f64;
+            let (seen, meant) = (mean(|turn| turn.0.abs()), mean(|turn| turn.1.abs()));
+            assert!(seen < 3.0 && meant < 1.0, "{intent:?}: {seen} degrees in CAM16, {meant} in Oklab");
+            for &(seen, meant, pixel) in &turns {
+                // The darkest lie between two nodes of the lattice.
+                assert!(meant.abs() < 5.0 || pixel.iter().all(|&v| v <= 51), "{pixel:?} turns by {meant}");
+                let [r, g, b] = pixel;
+                // Purple is where CAM16's hue grows.
+                assert!(
+                    b <= 2 * r.max(g) || seen < 3.0,
+                    "{intent:?}: {pixel:?} turns by {seen} towards purple"
+                );
             }
         }
     }

@@ -152,19 +152,14 @@ fn drawn_slots(
             tell("the picture's colours are left out, because no process ink is allowed".into());
             return Ok(slots);
         }
-        let (stacks, index) =
-            colour.halftone((art.width, art.length), &process, settings, library, observer)?;
+        let planes = colour.planes((art.width, art.length), &process, settings, library, observer)?;
         let mut spot = bits::blank(art.width, art.length);
         slots.iter().for_each(|slot| bits::add(&mut spot, &slot.plane));
-        let mut inks_of = [0u16; 256];
-        for (inks_of, stack) in inks_of.iter_mut().zip(&stacks) {
-            let has = process.iter().enumerate().filter(|(_, ink)| stack.layers().contains(ink));
-            *inks_of = has.fold(0, |bits, (at, _)| bits | 1 << at);
-        }
-        let planes = pack::pack(art.width, &index, &inks_of, process.len());
-        for (ink, mut plane) in process.iter().zip(planes) {
-            // Dots of a layer, such as a reserved colour, keep that ink alone.
-            bits::merge(&mut plane, &spot, |dots, spot| dots & !spot);
+        for (ink, mut plane) in planes {
+            if !colour.overprints {
+                // Dots of a layer, such as a reserved colour, keep that ink alone.
+                bits::merge(&mut plane, &spot, |dots, spot| dots & !spot);
+            }
             match slots.iter_mut().find(|slot| slot.ink == ink) {
                 Some(slot) => bits::add(&mut slot.plane, &plane),
                 None => slots.push(Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 }),
@@ -281,7 +276,7 @@ fn stack_up(
     let order: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();
     let mut suggestions = suggest::suggest(dots.stacks(), &counts, &order);
     suggestions.extend(suggest::rare(&laid));
-    let size_mm = ((width / settings.across.max(1)) as f64 * MM, length as f64 * MM);
+    let size_mm = ((width / art.across) as f64 * MM, length as f64 * MM);
     Ok(Composed { report: Report { size_mm, laid, bare: counts[0], notes }, dots, suggestions })
 }
 

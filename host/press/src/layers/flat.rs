@@ -2,7 +2,7 @@
 //!
 //! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
 //! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
-//! tone. If a page draws in more colours than a palette holds, those of shadings are left out first: the ones with a
+//! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are left out first: the ones with a
 //! similar colour on the page. White and black dots of a picture count only in lines and areas; a lone one beside tones is
 //! noise.
 //! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
@@ -11,7 +11,8 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::kinds::Kind;
+use super::kinds::{K_OF_PICTURES, Kind};
+use super::masks::Masks;
 use super::resample;
 
 /// A dot that is a tone.
@@ -54,9 +55,8 @@ impl Flat {
     /// The flat colours of pixels.
     pub(super) fn of<const N: usize>(pixels: &[[u8; N]], width: usize) -> Flat {
         let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
-        if N == 4 {
-            colours.extend(palette(pixels, width));
-        }
+        let masks = Masks::of(pixels, width);
+        colours.extend(palette(pixels, width, &masks));
         let numbers: HashMap<(Kind, [u8; 3]), u8> = colours.iter().copied().zip(0..).skip(2).collect();
         let number = |pixel: &[u8; N]| match split(pixel) {
             (_, [255, 255, 255]) => WHITE,
@@ -74,6 +74,13 @@ impl Flat {
                 *index = last.1;
             }
         });
+        for (stretch, colour) in masks.stretches() {
+            let number = match colour {
+                K_OF_PICTURES if N == 4 => BLACK,
+                colour => numbers.get(&(Kind::Drawing, colour)).copied().unwrap_or(TONE),
+            };
+            index[stretch.start..stretch.end].fill(number);
+        }
         let mut flat = Flat { colours, index };
         flat.forget_noise(pixels, width);
         flat
@@ -128,7 +135,7 @@ fn is_noise(index: &[u8], width: usize, (x, y): (usize, usize)) -> bool {
 }
 
 /// The colours of text and drawings, text first, then the most frequent.
-fn palette<const N: usize>(pixels: &[[u8; N]], width: usize) -> Vec<(Kind, [u8; 3])> {
+fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> Vec<(Kind, [u8; 3])> {
     type Counts = HashMap<(Kind, [u8; 3]), u64>;
     let add = |counts: &mut Counts, key, dots| {
         if counts.len() < GATHERED || counts.contains_key(&key) {
@@ -148,7 +155,8 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize) -> Vec<(Kind, [u8; 
             counts
         })
         .collect();
-    let mut counts = Counts::new();
+    let mut counts: Counts =
+        masks.colours.iter().map(|(&colour, &dots)| ((Kind::Drawing, colour), dots)).collect();
     for part in gathered {
         // In a fixed order, because the number of colours is limited.
         let mut part: Vec<_> = part.into_iter().collect();

@@ -21,6 +21,9 @@ pub const DEVICE: &str = "bitrgbtags";
 /// Bytes of a pixel: its tag, red, green and blue.
 pub const BYTES: usize = 4;
 
+/// What Ghostscript makes of full K and nothing else in a picture, whose colours it converts with a profile.
+pub(super) const K_OF_PICTURES: [u8; 3] = [35, 31, 32];
+
 /// What drew a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 pub enum Kind {
@@ -107,7 +110,8 @@ pub fn bounds(pixels: &[u8], width: usize) -> Option<Window> {
         .enumerate()
         .filter_map(|(y, row)| {
             // Most rows are blank, and all of one is seen faster than its first drawn pixel.
-            if row.iter().fold(255, |all, [_, r, g, b]| all & r & g & b) == 255 {
+            let tag = u32::from_ne_bytes([255, 0, 0, 0]);
+            if row.iter().fold(u32::MAX, |all, pixel| all & (u32::from_ne_bytes(*pixel) | tag)) == u32::MAX {
                 return None;
             }
             Some([y, y, row.iter().position(drawn)?, row.iter().rposition(drawn)?])

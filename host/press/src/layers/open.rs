@@ -46,6 +46,7 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
         [file] => open_file(file, options, observer)?,
         files => named_files(&common_name(files), files, options, observer)?,
     };
+    art.across = options.across.max(1);
     art.name.retain(|c| !c.is_control());
     if art.name.trim().is_empty() {
         art.name = "art".into();

@@ -3,15 +3,15 @@
 //! Problem: pages have spot plates and transparent backgrounds, and their languages are large. A document has several pages,
 //! and nothing of it may be lost in silence.
 //! Method: drafts of all pages tell which hold art. If several do, the user chooses one, or names an ink for
-//! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is
-//! drawn with the kind of each pixel ([`kinds`]), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
+//! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is drawn with the
+//! kind of each pixel ([`kinds`](super::kinds)), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
 mod draw;
 mod plates;
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::path::Path;
 
 use protocol::ink::Ink;
@@ -19,13 +19,12 @@ use protocol::ink::Ink;
 use super::artwork::Artwork;
 use super::coverage::Scan;
 use super::error::{LayersError, io, wrong};
-use super::kinds;
 use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::picture;
 use super::size::{self, Unstated};
 use crate::scratch::Scratch;
-use draw::{DRAFT, Leaf, Part, Program};
+use draw::{DRAFT, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
 pub use plates::{Separated, separated, spots};
@@ -111,7 +110,7 @@ impl Document<'_> {
             // The plates tell of the other spots themselves.
             let mut art = plates::separated_part(self.path, leaf.number, Part::CropBox, dpi)?
                 .whole(&name, self.options);
-            if art.layers.is_empty() {
+            if art.layers.is_empty() && art.colour.is_none() {
                 return Err(LayersError::Nothing { reason: "no plate of the page has a dot".into() });
             }
             notes.retain(|note| !art.notes.contains(note));
@@ -135,17 +134,9 @@ impl Document<'_> {
 
     /// What a page draws, with the kind of each pixel.
     fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, LayersError> {
-        let page = draw::tagged(self.path, leaf.number, dpi, self.folder)?;
-        let damaged = || wrong(self.path, format!("page {} cannot be drawn", leaf.number));
-        let mut file = BufReader::new(File::open(&page).map_err(|_| damaged())?);
-        let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
-        let (Ok(wide), Ok(high)) = (u32::try_from(width), u32::try_from(height)) else {
-            return Err(damaged());
-        };
-        size::check_pixels(self.path, wide, high)?;
-        let mut pixels = vec![0; kinds::BYTES * width * height];
-        file.read_exact(&mut pixels).map_err(io(self.path, "read its page"))?;
-        Ok(picture::tagged_artwork(&stem(self.path), (wide, high), (width, height), pixels, self.options))
+        let Tagged { size, pixels } = draw::tagged(self.path, leaf.number, Part::CropBox, dpi, self.folder)?;
+        let dots = (size.0 as usize, size.1 as usize);
+        Ok(picture::tagged_artwork(&stem(self.path), size, dots, pixels, self.options))
     }
 
     /// One layer for each page, by the rules for pictures that are named after inks.
@@ -207,10 +198,9 @@ impl Document<'_> {
         Ok(Scan::of_drawing(self.path, (pixels.width, pixels.height), &pixels.rgba))
     }
 
-    /// The resolution at which a page has its final number of dots. The draft rounds the page's size to its own pixels, so
-    /// the final size is that of the final drawing.
+    /// The resolution at which a page has its final number of dots.
     fn dpi(&self, leaf: &Leaf, notes: &mut Vec<String>) -> Result<(f64, f64), LayersError> {
-        let unstated = Unstated::Drawing { rounded_mm: 25.4 / DRAFT };
+        let unstated = Unstated::Drawing { rounded_mm: leaf.rounded_mm };
         let dots = size::dots(self.path, leaf.size, Some((DRAFT, DRAFT)), unstated, self.options, notes)?;
         Ok((DRAFT * dots.0 as f64 / leaf.size.0, DRAFT * dots.1 as f64 / leaf.size.1))
     }

@@ -102,56 +102,6 @@ pub(super) fn to_srgb(
     Ok(changed.then(|| format!("{}: its colour profile was applied", path.display())))
 }
 
-/// Art from a page in memory, drawn at `dpi` pixels per inch: sRGB without transparency, three bytes a pixel, row by row
-/// from the top.
-///
-/// # Errors
-/// `rgb` of another length than `size`, or a side of no dots or of more than 65535.
-pub fn page(
-    name: &str,
-    size: (usize, usize),
-    dpi: u16,
-    rgb: Vec<u8>,
-    options: &Options,
-) -> Result<Artwork, LayersError> {
-    page_of::<3>(name, size, dpi, rgb, options)
-}
-
-/// Art from a page that knows what drew each pixel ([`kinds`](super::kinds)), with a tag before each pixel.
-///
-/// # Errors
-/// As [`page`].
-pub fn tagged_page(
-    name: &str,
-    size: (usize, usize),
-    dpi: u16,
-    pixels: Vec<u8>,
-    options: &Options,
-) -> Result<Artwork, LayersError> {
-    page_of::<{ kinds::BYTES }>(name, size, dpi, pixels, options)
-}
-
-fn page_of<const N: usize>(
-    name: &str,
-    size: (usize, usize),
-    dpi: u16,
-    pixels: Vec<u8>,
-    options: &Options,
-) -> Result<Artwork, LayersError> {
-    let problem = || {
-        wrong(
-            Path::new(name),
-            format!("the page is {} x {} pixels; expected 1 to 65535 dots on a side", size.0, size.1),
-        )
-    };
-    if Some(pixels.len()) != size.0.checked_mul(size.1).and_then(|pixels| pixels.checked_mul(N)) {
-        return Err(problem());
-    }
-    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| problem());
-    let dots = size::page_dots(size, dpi.into()).ok_or_else(problem)?;
-    Ok(opaque_artwork::<N>(name, name, (side(size.0)?, side(size.1)?), dots, pixels, options))
-}
-
 /// Art from a page with tags. What nothing was drawn on is transparent, which is known even if every dot is drawn.
 pub(super) fn tagged_artwork(
     name: &str,
@@ -207,7 +157,7 @@ pub(super) fn drawing(name: &str, pixels: Pixels, dots: (usize, usize), options:
 }
 
 /// Art from pixels without transparency: three bytes each, or four with a tag before them. `file` is what notes call it.
-fn opaque_artwork<const N: usize>(
+pub(super) fn opaque_artwork<const N: usize>(
     name: &str,
     file: &str,
     size: (u32, u32),
@@ -227,8 +177,7 @@ fn opaque_artwork<const N: usize>(
         both.for_each(|(pixel, rgb)| pixel[N - 3..].copy_from_slice(rgb));
     }
     let colour = Colour::of::<N>(pixels.as_chunks().0, size, dots);
-    let (width, length) = dots;
-    Artwork { name: name.into(), width, length, layers, colour, drawn, opaque: None, notes }
+    Artwork { layers, colour, drawn, notes, ..Artwork::blank(name, dots) }
 }
 
 /// The dots whose pixel of `N` bytes satisfies `is`.

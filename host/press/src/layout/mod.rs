@@ -26,7 +26,7 @@ pub use rect::Cut;
 pub use settings::{Layout, LayoutError, MOST_REPEATS, Position, Repeat};
 pub use size::{Size, SizeError};
 
-use crate::sheet::{Area, DotMap, Sheet, order};
+use crate::sheet::{self, Area, DotMap, Sheet, order};
 use block::Block;
 use observe::Observer;
 use page::Page;
@@ -66,15 +66,12 @@ impl Laid {
 
     /// How many dots of the copies each stack of the sheet has; what marks take does not count.
     pub fn census(&self, sheet: &Sheet) -> [u64; 256] {
-        let mut census = [0; 256];
-        for copy in &self.copies {
-            for row in sheet.index().chunks_exact(sheet.width()).skip(copy.top).take(copy.length) {
-                for &stack in &row[copy.left..][..copy.width] {
-                    census[usize::from(stack)] += 1;
-                }
-            }
-        }
-        census
+        let rows = |copy: &Area| {
+            let rows = sheet.index().chunks_exact(sheet.width()).skip(copy.top).take(copy.length);
+            let (left, width) = (copy.left, copy.width);
+            rows.map(move |row| &row[left..left + width])
+        };
+        sheet::census(self.copies.iter().flat_map(rows))
     }
 }
 

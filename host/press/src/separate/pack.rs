@@ -42,6 +42,10 @@ pub(crate) fn pack(width: usize, index: &[u8], passes_of: &[u16; 256], passes: u
                 let (whole, rest) = dots.as_chunks::<8>();
                 let start = row * stride;
                 for (at, dots) in whole.iter().enumerate() {
+                    // Most dots are bare, and planes are blank before.
+                    if *dots == [0; 8] && byte[0] == 0 {
+                        continue;
+                    }
                     let bits =
                         transpose(u64::from_be_bytes(dots.map(|dot| byte[usize::from(dot)]))).to_le_bytes();
                     for (plane, bits) in planes.iter_mut().zip(bits) {
@@ -84,6 +88,11 @@ fn masks(planes: &[&Plane], at: usize) -> [usize; 8] {
     masks
 }
 
+/// Whether no plane has any of eight dots.
+fn is_blank(planes: &[&Plane], at: usize) -> bool {
+    planes.iter().all(|plane| plane.bits[at] == 0)
+}
+
 /// How many dots have each combination of 16 planes at most, all of one size; bit p of an entry's number is plane p.
 pub(crate) fn census(planes: &[&Plane], width: usize, length: usize) -> Vec<u64> {
     let stride = width.div_ceil(8);
@@ -92,12 +101,12 @@ pub(crate) fn census(planes: &[&Plane], width: usize, length: usize) -> Vec<u64>
     slabs
         .fold(none, |mut counts, row| {
             for at in 0..stride {
-                let (masks, dots) = (masks(planes, row * stride + at), 8.min(width - 8 * at));
-                if masks.iter().fold(0, |all, mask| all | mask) == 0 {
+                let dots = 8.min(width - 8 * at);
+                if is_blank(planes, row * stride + at) {
                     counts[0] += dots as u64;
                     continue;
                 }
-                for &mask in &masks[..dots] {
+                for &mask in &masks(planes, row * stride + at)[..dots] {
                     counts[mask] += 1;
                 }
             }
@@ -116,6 +125,7 @@ pub(crate) fn unpack(
 ) -> Result<Vec<u8>, (usize, usize)> {
     let stride = width.div_ceil(8);
     let mask_of = |row: usize, at: usize| masks(planes, row * stride + at);
+    let bare = stack_of.first() == Some(&0);
     let mut index = vec![0u8; width * length];
     let bad = index
         .par_chunks_mut(width)
@@ -123,6 +133,9 @@ pub(crate) fn unpack(
         .filter_map(|(row, dots)| {
             let mut bad = None;
             for (at, dots) in dots.chunks_mut(8).enumerate() {
+                if bare && is_blank(planes, row * stride + at) {
+                    continue;
+                }
                 for ((i, dot), mask) in dots.iter_mut().enumerate().zip(mask_of(row, at)) {
                     let stack = stack_of[mask];
                     *dot = stack as u8;

@@ -114,21 +114,35 @@ impl DotMap {
 
     /// How many dots each stack has.
     pub fn census(&self) -> Vec<u64> {
-        let counted = self.index.par_chunks(1 << 20).map(|dots| {
-            // Neighbours are alike: four tables keep their counts from waiting for each other.
-            let mut counts = [[0u32; 256]; 4];
-            let quads = dots.chunks_exact(4);
-            for &dot in quads.remainder() {
-                counts[0][usize::from(dot)] += 1;
+        let counted = self.index.par_chunks(1 << 20).map(|dots| census([dots].into_iter()));
+        let all = counted.reduce(|| [0; 256], |a, b| std::array::from_fn(|stack| a[stack] + b[stack]));
+        all[..self.stacks.len()].to_vec()
+    }
+}
+
+/// How many dots of these rows each stack has.
+pub(crate) fn census<'a>(rows: impl Iterator<Item = &'a [u8]>) -> [u64; 256] {
+    // Neighbours are alike: four tables keep their counts from waiting for each other.
+    let mut counts = [[0u64; 256]; 4];
+    let mut bare = 0;
+    for row in rows {
+        let (blocks, rest) = row.as_chunks::<16>();
+        for block in blocks {
+            // Most dots are bare.
+            if *block == [0; 16] {
+                bare += 16;
+                continue;
             }
-            for quad in quads {
+            for quad in block.as_chunks::<4>().0 {
                 for (count, &dot) in counts.iter_mut().zip(quad) {
                     count[usize::from(dot)] += 1;
                 }
             }
-            (0..self.stacks.len()).map(|i| counts.iter().map(|c| u64::from(c[i])).sum()).collect::<Vec<u64>>()
-        });
-        let none = || vec![0; self.stacks.len()];
-        counted.reduce(none, |a, b| a.into_iter().zip(b).map(|(a, b)| a + b).collect())
+        }
+        for &dot in rest {
+            counts[0][usize::from(dot)] += 1;
+        }
     }
+    counts[0][0] += bare;
+    std::array::from_fn(|stack| counts.iter().map(|count| count[stack]).sum())
 }

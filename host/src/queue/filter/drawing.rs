@@ -1,10 +1,10 @@
 //! Ghostscript at work: the pages of a document with the kind of each pixel, through a pipe.
 
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader};
 use std::path::Path;
 use std::process::{ChildStdout, Command, Stdio};
 
-use press::layers::kinds;
+use press::layers::{Page, kinds};
 use press::process::{self, Process, ProcessError};
 use tempfile::NamedTempFile;
 
@@ -67,12 +67,11 @@ impl Drawing {
         }
     }
 
-    /// The pixels of the page, each with its tag, row by row.
-    pub(super) fn pixels(&mut self, (width, height): (usize, usize)) -> Result<Vec<u8>, FilterError> {
-        let mut pixels = vec![0; kinds::BYTES * width * height];
-        self.pages.read_exact(&mut pixels).map_err(|source| self.cut_short(source))?;
+    /// The page.
+    pub(super) fn page(&mut self, size: (usize, usize)) -> Result<Page, FilterError> {
+        let page = Page::read(&mut self.pages, size).map_err(|source| self.cut_short(source))?;
         self.process.pause();
-        Ok(pixels)
+        Ok(page)
     }
 
     /// Why output ends early: the time limit, if that has passed.

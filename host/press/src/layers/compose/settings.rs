@@ -50,8 +50,6 @@ pub struct Settings {
     pub halftone: Method,
     /// The suggestions to follow.
     pub accept: Vec<Accept>,
-    /// Dots across in 1/600 inch, as in the options of the reader.
-    pub across: usize,
 }
 
 impl Default for Settings {
@@ -69,7 +67,6 @@ impl Default for Settings {
             gamma: 1.0,
             halftone: Method::default(),
             accept: Vec::new(),
-            across: 1,
         }
     }
 }

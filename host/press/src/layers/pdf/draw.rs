@@ -4,6 +4,8 @@
 //! is anti-aliased. Cost: some 0.1 s a page for drafts, seconds for a page. Limits: the time limit of [`process`] for each
 //! page; Ghostscript can read only the file (its safer mode); Poppler knows no plates.
 
+use std::fs::File;
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -11,14 +13,19 @@ use super::super::coverage;
 use super::super::error::{LayersError, io, wrong};
 use super::super::kinds;
 use super::super::names::stem;
-use crate::process::{self, Process, ProcessError};
+use super::super::size::check_pixels;
+use crate::process::{self, MOST_PAGES, Process, ProcessError};
 use crate::scratch::Scratch;
 
 /// Resolution of drafts.
 pub(super) const DRAFT: f64 = 36.0;
 
-/// Drafts of more pages are no progress: a program may show pages for ever.
-const MOST_PAGES: u32 = 1000;
+/// What a size is rounded by that only the draft tells.
+const ROUNDED_MM: f64 = 25.4 / DRAFT;
+
+/// Has Ghostscript say the size of each page in points at its end: a draft rounds it to its own pixels.
+const SAYS_SIZES: &str = "<< /EndPage { exch pop 2 ne dup { (%%PageSize:) print currentpagedevice /PageSize get \
+    { ( ) print 20 string cvs print } forall (\\n) print flush } if } >> setpagedevice";
 
 /// The plates that every page has.
 pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
@@ -27,8 +34,10 @@ pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
 pub(super) struct Leaf {
     /// Its number, from 1.
     pub number: u32,
-    /// Pixels across and down at [`DRAFT`] dots an inch.
+    /// Width and height in pixels of [`DRAFT`] an inch, with their fractions if they are known.
     pub size: (f64, f64),
+    /// What the size may be rounded by, in millimetres.
+    pub rounded_mm: f64,
     /// Whether anything but white is drawn on it.
     pub drawn: bool,
     /// Its plates beside those of [`PROCESS`] that are not blank.
@@ -101,22 +110,39 @@ impl Program {
     }
 }
 
-/// Draws a page with the kind of each pixel ([`kinds`]).
+/// A page with the kind of each pixel ([`kinds`]).
+pub(super) struct Tagged {
+    /// Pixels across and down.
+    pub size: (u32, u32),
+    /// [`kinds::BYTES`] bytes a pixel.
+    pub pixels: Vec<u8>,
+}
+
+/// Draws a page with the kind of each pixel.
 ///
 /// # Errors
-/// As [`Program::leaves`].
+/// As [`Program::leaves`], or too many pixels.
 pub(super) fn tagged(
     path: &Path,
     page: u32,
+    part: Part,
     dpi: (f64, f64),
     folder: &Scratch,
-) -> Result<PathBuf, LayersError> {
+) -> Result<Tagged, LayersError> {
     let picture = folder.path().join("page.pam");
     let conversions = kinds::conversions().map_err(io(path, "keep the conversion of its colours"))?;
     let convert = vec![format!("-sSourceObjectICC={}", conversions.path().display())];
-    let options = [one_page(page), crop(Part::CropBox), convert].concat();
+    let options = [one_page(page), crop(part), convert].concat();
     ghostscript(path, &options, kinds::DEVICE, dpi, &picture, || false)?;
-    Ok(picture)
+    let damaged = || wrong(path, format!("page {page} cannot be drawn"));
+    let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
+    let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
+    let side = |pixels: usize| u32::try_from(pixels).map_err(|_| damaged());
+    let size = (side(width)?, side(height)?);
+    check_pixels(path, size.0, size.1)?;
+    let mut pixels = vec![0; kinds::BYTES * width * height];
+    file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
+    Ok(Tagged { size, pixels })
 }
 
 fn one_page(page: u32) -> Vec<String> {
@@ -144,13 +170,15 @@ fn ghostscript_leaves(
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
     let options =
         [vec!["-sCompression=lzw".into()], only.map_or_else(Vec::new, one_page), crop(part)].concat();
+    let options = [options, vec!["-c".into(), SAYS_SIZES.into()]].concat();
     let mut begun = 0;
     let progressed = || {
         let next = begun < MOST_PAGES && place(begun + 1).exists();
         begun += u32::from(next);
         next && only.is_none()
     };
-    ghostscript(path, &options, "tiffsep", (DRAFT, DRAFT), &to, progressed)?;
+    let said = ghostscript(path, &options, "tiffsep", (DRAFT, DRAFT), &to, progressed)?;
+    let sizes = sizes(&said);
     let mut leaves = Vec::new();
     for number in only.map_or(1..=u32::MAX, |number| number..=number) {
         let draft = place(number);
@@ -165,9 +193,31 @@ fn ghostscript_leaves(
                 }
             }
         }
-        leaves.push(Leaf { number, size: (width.into(), height.into()), drawn, spots });
+        // Of a document in PDF only the pages that are drawn have an end.
+        let stated = if sizes.len() == 1 { sizes.first() } else { sizes.get(number as usize - 1) };
+        let draft = (width.into(), height.into());
+        let (size, rounded_mm) = exact(draft, stated).map_or((draft, ROUNDED_MM), |size| (size, 0.0));
+        leaves.push(Leaf { number, size, rounded_mm, drawn, spots });
     }
     Ok(leaves)
+}
+
+/// The sizes of pages that Ghostscript says ([`SAYS_SIZES`]), in points.
+fn sizes(said: &str) -> Vec<(f64, f64)> {
+    let size = |line: &str| {
+        let mut sides = line.split_whitespace().map(str::parse);
+        Some((sides.next()?.ok()?, sides.next()?.ok()?))
+    };
+    said.lines().filter_map(|line| size(line.strip_prefix("%%PageSize:")?)).collect()
+}
+
+/// What the size of a draft was rounded from, if that is what is stated: what a document says of itself may be wrong.
+fn exact(draft: (f64, f64), stated: Option<&(f64, f64)>) -> Option<(f64, f64)> {
+    let points = 72.0 / DRAFT;
+    let near = |&(x, y): &(f64, f64)| (x - draft.0).abs() <= 1.0 && (y - draft.1).abs() <= 1.0;
+    // A page may lie on its side.
+    let ways = stated.into_iter().flat_map(|&(x, y)| [(x / points, y / points), (y / points, x / points)]);
+    ways.into_iter().find(near)
 }
 
 fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Vec<Leaf>, LayersError> {
@@ -182,7 +232,8 @@ fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Ve
     let leaf = |(number, file): (u32, PathBuf)| {
         let scan = coverage::scan(&file)?;
         let drawn = scan.coverage.iter().any(|&c| c > 0);
-        Ok(Leaf { number, size: (scan.width.into(), scan.height.into()), drawn, spots: Vec::new() })
+        let size = (scan.width.into(), scan.height.into());
+        Ok(Leaf { number, size, rounded_mm: ROUNDED_MM, drawn, spots: Vec::new() })
     };
     drafts.into_iter().map(leaf).collect()
 }
@@ -229,10 +280,11 @@ fn ghostscript(
     command
         .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
         .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
-        .args(options)
         .arg(format!("-r{:.4}x{:.4}", dpi.0, dpi.1))
         .arg(format!("-sDEVICE={device}"))
         .arg(format!("-sOutputFile={}", to.display()))
+        // What they run needs the device.
+        .args(options)
         .arg("-f")
         .arg(file);
     let install = "install it (Debian: apt install ghostscript), or export the page as PNG";
@@ -270,6 +322,25 @@ fn run(
             source,
         },
         ProcessError::Failed(why) => wrong(path, format!("cannot be read: {why}")),
-        ProcessError::TooLong(limit) => wrong(path, process::too_long(limit)),
+        error @ (ProcessError::TooLong(_) | ProcessError::TooLongAltogether(_)) => {
+            wrong(path, error.to_string())
+        }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_has_the_size_that_is_said_of_it_unless_its_draft_is_another() {
+        let said = "noise\n%%PageSize: 595.276 841.89\n%%PageSize: x 1\n%%PageSize: 612 792\n%%PageSize: 7";
+        assert_eq!(sizes(said), [(595.276, 841.89), (612.0, 792.0)]);
+        let a4 = (595.276, 841.89);
+        assert_eq!(exact((298.0, 421.0), Some(&a4)), Some((297.638, 420.945)));
+        assert_eq!(exact((421.0, 298.0), Some(&a4)), Some((420.945, 297.638)));
+        assert_eq!(exact((306.0, 396.0), Some(&a4)), None);
+        assert_eq!(exact((298.0, 421.0), None), None);
+        assert_eq!(exact((298.0, 421.0), Some(&(f64::NAN, 1.0))), None);
+    }
 }

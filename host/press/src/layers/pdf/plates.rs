@@ -6,11 +6,15 @@
 //! printed by its process colours: its plate is added to the process plates, in the shares that Ghostscript gives for its
 //! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
 //! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`spots`] and [`separated`].
-//! Cost: seconds a page. Limits: tints between none and full are taken as proportional.
+//! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
+//! treated like any page: letters keep their outline. On dots of layers the process plates say what overprints.
+//! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
+//! proportional.
 
 use std::path::Path;
 
 use protocol::ink::Kind;
+use rayon::prelude::*;
 
 use super::super::artwork::Artwork;
 use super::super::coverage::{self, Coverage, Scan};
@@ -19,7 +23,8 @@ use super::super::names::{self, Named};
 use super::super::options::Options;
 use super::super::size;
 use super::super::window::Window;
-use super::draw::{PROCESS, Part, Program, plates_beside, separate};
+use super::super::{kinds, picture};
+use super::draw::{PROCESS, Part, Program, Tagged, plates_beside, separate, tagged};
 use crate::scratch::Scratch;
 
 /// Full ink in what Ghostscript says of a spot.
@@ -79,6 +84,8 @@ pub struct Separated {
     pub size: (usize, usize),
     dpi: f64,
     plates: Vec<(String, Named, Vec<u8>)>,
+    /// What is printed beside the plates, with the kind of each pixel.
+    rest: Option<Vec<u8>>,
     notes: Vec<String>,
 }
 
@@ -127,12 +134,39 @@ pub(super) fn separated_part(
             )),
         }
     }
-    for (plate, coverage) in process {
-        if let Some(named) = names::ink(&plate) {
-            plates.push((plate, named, coverage));
+    let toned = |coverage: &[u8]| coverage.par_iter().any(|&c| c != 0 && c != 255);
+    let mut rest = None;
+    if process.iter().any(|(_, coverage)| toned(coverage)) {
+        let Tagged { size, mut pixels } = tagged(path, page, part, dpi, &folder)?;
+        if size != (width, height) {
+            return Err(wrong(path, format!("page {page} differs in size from its plates")));
+        }
+        overprint(&mut pixels, &plates, &process);
+        rest = Some(pixels);
+    } else {
+        for (plate, coverage) in process {
+            if let Some(named) = names::ink(&plate) {
+                plates.push((plate, named, coverage));
+            }
         }
     }
-    Ok(Separated { size: (width as usize, height as usize), dpi: dpi.0, plates, notes })
+    Ok(Separated { size: (width as usize, height as usize), dpi: dpi.0, plates, rest, notes })
+}
+
+/// Replaces what was drawn on the dots of layers, where it shows the layer, with what the process plates have there.
+fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[(String, Vec<u8>)]) {
+    const ROWS: usize = 1 << 16;
+    let of = |name: &str| process.iter().find(|(plate, _)| plate == name).map(|(_, coverage)| &coverage[..]);
+    let inks = PROCESS.map(of);
+    pixels.par_chunks_mut(kinds::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
+        for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
+            if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
+                let [c, m, y, k] = inks.map(|ink| 255 - ink.map_or(0, |coverage| u32::from(coverage[at])));
+                let [_, rgb @ ..] = pixel;
+                *rgb = [c, m, y].map(|v| ((v * k + 127) / 255) as u8);
+            }
+        }
+    });
 }
 
 /// The process colours of a spot's full tint, as shares from 0 to 1 in the order of [`PROCESS`], from what Ghostscript says:
@@ -169,6 +203,7 @@ impl Separated {
         let plates = self.plates.iter();
         plates
             .filter_map(|(.., coverage)| Window::around(coverage, self.size.0, 1, 0))
+            .chain(self.rest.iter().filter_map(|pixels| kinds::bounds(pixels, self.size.0)))
             .reduce(|all, window| all.join(&window))
     }
 
@@ -189,13 +224,23 @@ impl Separated {
     }
 
     fn art_of(self, name: &str, window: &Window, dots: (usize, usize), options: &Options) -> Artwork {
-        let mut art = Artwork::blank(name, dots);
+        // The plates were read from TIFF files, whose sides fit in u32.
+        let size = (window.width as u32, window.height as u32);
+        let mut art = match self.rest {
+            None => Artwork::blank(name, dots),
+            Some(pixels) => {
+                let pixels = window.cut(pixels, self.size.0, kinds::BYTES);
+                picture::opaque_artwork::<{ kinds::BYTES }>(name, name, size, dots, pixels, options)
+            }
+        };
+        if let Some(colour) = &mut art.colour {
+            colour.overprints = true;
+        }
         for (plate, named, coverage) in self.plates {
             let scan = Scan {
                 path: name.into(),
-                // The plates were read from TIFF files, whose sides fit in u32.
-                width: window.width as u32,
-                height: window.height as u32,
+                width: size.0,
+                height: size.1,
                 dpi: None,
                 coverage: window.cut(coverage, self.size.0, 1),
                 by: Coverage::Dark,

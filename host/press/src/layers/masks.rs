@@ -1,0 +1,176 @@
+//! 1-bit art among pictures: masks, stamps, scanned text.
+//!
+//! Problem: a page calls a mask of one colour a picture, and a plain picture does not say what is line art in it; screened as
+//! a photograph, both lose their outline.
+//! Method: a stretch of a row is what lies between white, black and what is no picture. Stretches that touch are one shape. A
+//! shape in exactly one colour is line art: photographs have no such shapes beyond specks, so a colour counts only if its
+//! shapes have [`LEAST`] dots.
+//! Cost: 1 ns a pixel of pictures, 20 ns a stretch. Limits: a mask that touches pixels of another colour is a picture.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::flat::split;
+use super::kinds::Kind;
+
+/// The least dots of a colour in shapes of its own: a square of eight dots.
+const LEAST: u64 = 64;
+
+/// A stretch of a row that is a picture and neither white nor black.
+pub(super) struct Stretch {
+    /// The first pixel.
+    pub start: usize,
+    /// The pixel behind the last.
+    pub end: usize,
+    /// Its colour; of its shape, once the shape is whole. None for several.
+    colour: Option<[u8; 3]>,
+    /// Another stretch of the same shape; at the root, this one.
+    parent: usize,
+}
+
+/// The shapes in one colour, stretch by stretch, and the dots of each of their colours.
+pub(super) struct Masks {
+    stretches: Vec<Stretch>,
+    /// The dots of each colour.
+    pub colours: HashMap<[u8; 3], u64>,
+}
+
+impl Masks {
+    /// The shapes in one colour among the pictures of pixels.
+    pub fn of<const N: usize>(pixels: &[[u8; N]], width: usize) -> Masks {
+        let rows: Vec<Vec<Stretch>> = pixels
+            .par_chunks(width)
+            .enumerate()
+            .map(|(y, row)| stretches_of(row).map(|stretch| stretch.moved(y * width)).collect())
+            .collect();
+        let (mut all, mut above): (Vec<Stretch>, usize) = (Vec::new(), 0);
+        for row in rows {
+            let first = all.len();
+            for mut stretch in row {
+                stretch.parent = all.len();
+                all.push(stretch);
+                let (start, end) = (all[all.len() - 1].start, all[all.len() - 1].end);
+                while above < first && all[above].end + width <= start {
+                    above += 1;
+                }
+                let beneath =
+                    (above..first).take_while(|&at| all[at].start + width < end).collect::<Vec<_>>();
+                for other in beneath {
+                    join(&mut all, other);
+                }
+            }
+            above = first;
+        }
+        let mut colours = HashMap::new();
+        for at in 0..all.len() {
+            let root = root(&mut all, at);
+            all[at].colour = all[root].colour;
+            if let Some(colour) = all[at].colour {
+                *colours.entry(colour).or_default() += (all[at].end - all[at].start) as u64;
+            }
+        }
+        colours.retain(|_, dots| *dots >= LEAST);
+        all.retain(|stretch| stretch.colour.is_some_and(|colour| colours.contains_key(&colour)));
+        Masks { stretches: all, colours }
+    }
+
+    /// The stretches with the colour of each.
+    pub fn stretches(&self) -> impl Iterator<Item = (&Stretch, [u8; 3])> {
+        self.stretches.iter().filter_map(|stretch| Some((stretch, stretch.colour?)))
+    }
+}
+
+impl Stretch {
+    fn moved(self, by: usize) -> Stretch {
+        Stretch { start: self.start + by, end: self.end + by, ..self }
+    }
+}
+
+/// The stretches of a row.
+fn stretches_of<const N: usize>(row: &[[u8; N]]) -> impl Iterator<Item = Stretch> {
+    let drawn = |pixel: &[u8; N]| match split(pixel) {
+        (Kind::Picture, [0, 0, 0] | [255, 255, 255]) => false,
+        (kind, _) => kind == Kind::Picture,
+    };
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        at += row[at..].iter().position(drawn)?;
+        let start = at;
+        at += row[at..].iter().position(|pixel| !drawn(pixel)).unwrap_or(row.len() - at);
+        let (_, colour) = split(&row[start]);
+        let alike = row[start..at].iter().all(|pixel| split(pixel).1 == colour);
+        Some(Stretch { start, end: at, colour: alike.then_some(colour), parent: 0 })
+    })
+}
+
+/// Makes one shape of that of the last stretch and that of another.
+fn join(all: &mut [Stretch], other: usize) {
+    let (a, b) = (root(all, all.len() - 1), root(all, other));
+    let (old, young) = (a.min(b), a.max(b));
+    all[young].parent = old;
+    if all[young].colour != all[old].colour {
+        all[old].colour = None;
+    }
+}
+
+/// The root of a shape. Halves the path to it.
+fn root(all: &mut [Stretch], mut at: usize) -> usize {
+    while all[at].parent != at {
+        all[at].parent = all[all[at].parent].parent;
+        at = all[at].parent;
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn shapes_in_one_colour_are_found(width in 1usize..24, cells in prop::collection::vec(0usize..12, 24..120)) {
+            // White, black, text, and pictures in two colours; mostly bare, so that shapes stay apart.
+            let kinds = [[0, 255, 255, 255], [2, 0, 0, 0], [1, 9, 9, 200], [2, 9, 9, 200], [2, 200, 9, 9]];
+            let pixels: Vec<[u8; 4]> = cells[..cells.len() / width * width].iter()
+                .map(|&cell| kinds[[0, 0, 0, 0, 0, 0, 0, 1, 2, 3, 3, 4][cell]]).collect();
+            // Many times one below the other, so that colours reach their least number of dots.
+            let blank = vec![kinds[0]; width];
+            let pages: Vec<[u8; 4]> = (0..12).flat_map(|_| [&pixels[..], &blank].concat()).collect();
+            let picture = |at: usize| pages[at][0] == 2 && pages[at][1] > 0;
+            // By spreading numbers from dot to neighbour.
+            let mut number: Vec<usize> = (0..pages.len()).collect();
+            let mut changed = true;
+            while std::mem::take(&mut changed) {
+                for at in (0..pages.len()).filter(|&at| picture(at)) {
+                    let right = (at % width + 1 < width).then_some(at + 1);
+                    for next in [right, Some(at + width)].into_iter().flatten() {
+                        if next < pages.len() && picture(next) {
+                            let least = number[at].min(number[next]);
+                            changed |= number[at] != least || number[next] != least;
+                            (number[at], number[next]) = (least, least);
+                        }
+                    }
+                }
+            }
+            let mixed: Vec<usize> =
+                (0..pages.len()).filter(|&at| pages[at] != pages[number[at]]).map(|at| number[at]).collect();
+            let whole: Vec<bool> = (0..pages.len()).map(|at| picture(at) && !mixed.contains(&number[at])).collect();
+            let dots = |colour: [u8; 4]| (0..pages.len()).filter(|&at| whole[at] && pages[at] == colour).count() as u64;
+            let enough = kinds.map(|colour| dots(colour) >= LEAST);
+            let is_enough = |pixel: &[u8; 4]| kinds.iter().zip(enough).any(|(kind, enough)| enough && kind == pixel);
+            let masks = Masks::of(&pages, width);
+            let mut found = vec![false; pages.len()];
+            for (stretch, colour) in masks.stretches() {
+                for at in stretch.start..stretch.end {
+                    prop_assert_eq!(split(&pages[at]).1, colour);
+                    found[at] = true;
+                }
+            }
+            for (at, found) in found.into_iter().enumerate() {
+                prop_assert_eq!(found, whole[at] && is_enough(&pages[at]), "{}", at);
+            }
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Separated TIFF files.
+
+use super::*;
+
+/// A TIFF of 8-bit channels, interleaved, with these tags beside the necessary ones.
+pub(super) fn tiff_file(
+    size: (u32, u32),
+    channels: &[Vec<u8>],
+    photometric: u16,
+    tags: &[(u16, u16, Vec<u8>)],
+) -> Vec<u8> {
+    let n = channels.len() as u16;
+    let data: Vec<u8> = (0..channels[0].len()).flat_map(|at| channels.iter().map(move |c| c[at])).collect();
+    let (short, long) = (|v: u16| v.to_le_bytes().to_vec(), |v: u32| v.to_le_bytes().to_vec());
+    let ratio = [600u32.to_le_bytes(), 1u32.to_le_bytes()].concat();
+    let mut all: Vec<(u16, u16, Vec<u8>)> = vec![
+        (256, 4, long(size.0)),
+        (257, 4, long(size.1)),
+        (258, 3, short(8).repeat(usize::from(n))),
+        (259, 3, short(1)),
+        (262, 3, short(photometric)),
+        (273, 4, long(8)),
+        (277, 3, short(n)),
+        (278, 4, long(size.1)),
+        (279, 4, long(data.len() as u32)),
+        (282, 5, ratio.clone()),
+        (283, 5, ratio),
+        (296, 3, short(2)),
+    ];
+    all.extend_from_slice(tags);
+    all.sort();
+    let start = 8 + data.len().next_multiple_of(2);
+    let mut beyond = start + 2 + 12 * all.len() + 4;
+    let (mut directory, mut values) = ((all.len() as u16).to_le_bytes().to_vec(), Vec::new());
+    for (tag, kind, value) in &all {
+        let unit = match kind {
+            3 => 2,
+            4 => 4,
+            5 => 8,
+            _ => 1,
+        };
+        directory.extend([tag.to_le_bytes(), kind.to_le_bytes()].concat());
+        directory.extend((value.len() as u32 / unit).to_le_bytes());
+        let mut field = value.clone();
+        if value.len() > 4 {
+            field = long(beyond as u32);
+            values.extend_from_slice(value);
+            values.resize(values.len().next_multiple_of(2), 0);
+            beyond += value.len().next_multiple_of(2);
+        }
+        field.resize(4, 0);
+        directory.extend(field);
+    }
+    let mut file = [b"II*\0".to_vec(), long(start as u32), data].concat();
+    file.resize(start, 0);
+    [file, directory, long(0), values].concat()
+}
+
+/// A channel of 20 x 10 with full ink in this rectangle.
+pub(super) fn channel(left: usize, top: usize, right: usize, bottom: usize, inverted: bool) -> Vec<u8> {
+    (0..200)
+        .map(|at| (left..=right).contains(&(at % 20)) && (top..=bottom).contains(&(at / 20)))
+        .map(|ink| if ink != inverted { 255 } else { 0 })
+        .collect()
+}
+
+#[test]
+fn inks_named_by_the_ink_names_tag_are_layers() {
+    let bench = Bench::new();
+    let channels = [channel(1, 1, 18, 8, false), channel(5, 2, 9, 4, false)];
+    let names = (333, 2, b"white\0Gold Foil\0".to_vec());
+    let file = tiff_file((20, 10), &channels, 5, &[(332, 3, vec![2, 0]), names]);
+    let art = read(&[bench.write("spots.tif", file)], &Options::default());
+    let layers: Vec<_> = art.layers.iter().map(|layer| (layer.ink, extent(layer))).collect();
+    assert_eq!(layers, [(Ink::White, (1, 1, 18, 8, 144)), (Ink::GoldFoil, (5, 2, 9, 4, 15))]);
+}
+
+#[test]
+fn photoshops_spot_channels_are_layers_beside_the_process_plates() {
+    let bench = Bench::new();
+    let ink = |a, b, c, d| channel(a, b, c, d, false);
+    let spot = |a, b, c, d| channel(a, b, c, d, true);
+    let none = vec![0; 200];
+    let channels =
+        [none.clone(), ink(0, 0, 3, 3), none.clone(), ink(4, 4, 9, 9), spot(2, 2, 5, 5), spot(0, 0, 19, 0)];
+    let unicode = |name: &str| {
+        let units: Vec<u8> = name.encode_utf16().chain([0]).flat_map(u16::to_be_bytes).collect();
+        [(units.len() as u32 / 2).to_be_bytes().to_vec(), units].concat()
+    };
+    let names = [unicode("white"), unicode("Dieline")].concat();
+    let resource =
+        [b"8BIM\x04\x15\0\0".to_vec(), (names.len() as u32).to_be_bytes().to_vec(), names].concat();
+    let extra = (338, 3, vec![0, 0, 0, 0]);
+    let file = tiff_file((20, 10), &channels, 5, &[extra.clone(), (34377, 1, resource)]);
+    let art = read(&[bench.write("ps.tif", file)], &Options::default());
+    let layers: Vec<_> = art.layers.iter().map(|layer| (layer.ink, extent(layer))).collect();
+    assert_eq!(
+        layers,
+        [(Ink::Magenta, (0, 0, 3, 3, 16)), (Ink::Black, (4, 4, 9, 9, 36)), (Ink::White, (2, 2, 5, 5, 16))]
+    );
+    assert!(art.notes.iter().any(|note| note.contains("channel `Dieline` names no ink")), "{:?}", art.notes);
+    let file = tiff_file((20, 10), &channels, 5, &[extra]);
+    let text = refused(&[bench.write("noname.tif", file)]);
+    assert!(text.contains("channel 5 of 6 has no name"), "{text}");
+}
+
+#[test]
+fn plates_with_tones_keep_them() {
+    let bench = Bench::new();
+    let ramp: Vec<u8> = (0..200).map(|at| (at % 20 * 13) as u8).collect();
+    let none = vec![0; 200];
+    let file =
+        tiff_file((20, 10), &[ramp.clone(), none.clone(), none.clone(), channel(3, 3, 6, 6, false)], 5, &[]);
+    let art = read(&[bench.write("cmyk.tif", file)], &Options::default());
+    assert_eq!(art.layers[0].shape, Shape::Tone(ramp));
+    assert_eq!(art.layers.len(), 2, "blank plates are no layers");
+    assert_eq!((art.layers[1].ink, extent(&art.layers[1])), (Ink::Black, (3, 3, 6, 6, 16)));
+}
