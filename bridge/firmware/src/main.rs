@@ -15,7 +15,7 @@
 //! | `port::serve` | 1 ms, a sent buffer | polls the port's driver |
 //! | `watch::run` | 50 ms | sets the lamp, feeds the watchdog |
 //!
-//! Memory: 32 KiB of stack, lowest; 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the
+//! Memory: 64 KiB of stack, lowest, most of it for the start; 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the
 //! printer has work while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.
 #![no_std]
 #![no_main]

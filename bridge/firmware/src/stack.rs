@@ -6,7 +6,7 @@
 //! filled with a pattern; the lowest word without it says how much was used. The pattern outlives a restart, so the next start
 //! sees it too.
 //!
-//! Cost: one pass over [`BYTES`] at the start, and one for each question, 0.4 ms at most. Limits: a frame that was left
+//! Cost: one pass over [`BYTES`] at the start, and one over its unused part for each question. Limits: a frame that was left
 //! unwritten at its far end is not seen.
 
 use core::ptr::addr_of;

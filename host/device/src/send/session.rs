@@ -76,7 +76,7 @@ pub enum SessionError {
     /// Somebody else's job is being printed.
     #[error(
         "the bridge is printing another job ({0:08x}); wait until it is done, or end it with \
-         `foilpress cancel {0:08x}` on the computer that sent it"
+         `foilpress cancel {0:08x} --to` and the bridge's address"
     )]
     Busy(u32),
     /// The number was used for another job.
@@ -113,6 +113,8 @@ pub struct Session<'d> {
     greeted: bool,
     /// The bridge has told on this link how the jobs before have ended.
     recalled: bool,
+    /// The bridge has shown another job of which bytes have crossed the port.
+    followed: bool,
     /// What the bridge last said of this job since it last restarted.
     progress: Option<Progress>,
     /// The next byte to send.
@@ -141,6 +143,7 @@ impl<'d> Session<'d> {
             bridge: None,
             greeted: false,
             recalled: false,
+            followed: false,
             progress: None,
             next: 0,
             rewound: None,
@@ -165,6 +168,11 @@ impl<'d> Session<'d> {
     /// What the bridge last said of this job.
     pub fn progress(&self) -> Option<&Progress> {
         self.progress.as_ref()
+    }
+
+    /// Whether the bridge has shown another job of which bytes have crossed the port.
+    pub fn followed(&self) -> bool {
+        self.followed
     }
 
     /// The bridge, once it has introduced itself.
@@ -355,11 +363,12 @@ impl<'d> Session<'d> {
 
     /// The bridge tells of another job.
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
+        self.followed |= progress.job != 0 && progress.printed > 0;
         let open = matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling);
         match self.record.phase {
             // Nothing of it has ever left, and the bridge does not have it.
             Phase::Begun if self.record.cancel => {
-                if self.convinced(now) {
+                if self.convinced(now) && self.recalled {
                     self.record.phase = Phase::Ended(Outcome::Cancelled);
                 }
             }
