@@ -128,7 +128,8 @@ unsafe extern "C" {
 
 /// The checksum of the whole image: some milliseconds.
 fn image_checksum() -> u32 {
-    let [from, begin, end] = [&raw const __sidata, &raw const __sdata, &raw const __edata].map(|at| at as usize);
+    let [from, begin, end] =
+        [&raw const __sidata, &raw const __sdata, &raw const __edata].map(|at| at as usize);
     let length = from + (end - begin) - FLASH;
     // SAFETY: flash, which is mapped there as far as the linker has filled it, and which nothing writes while the program runs.
     checksum(unsafe { core::slice::from_raw_parts(FLASH as *const u8, length) })
