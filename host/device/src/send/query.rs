@@ -69,8 +69,8 @@ pub enum QueryError {
     Version(Bridge),
     /// A job is open, so this must wait.
     #[error(
-        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x} --to` and the \
-         bridge's address"
+        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`, which needs the \
+         bridge's address for the job of another user or computer"
     )]
     JobOpen(u32),
     /// The bridge has no such job.

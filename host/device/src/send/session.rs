@@ -75,8 +75,8 @@ pub enum SessionError {
     },
     /// Somebody else's job is being printed.
     #[error(
-        "the bridge is printing another job ({0:08x}); wait until it is done, or end it with \
-         `foilpress cancel {0:08x} --to` and the bridge's address"
+        "the bridge is printing another job ({0:08x}); wait until it is done, or end it with `foilpress cancel {0:08x}`, which \
+         needs the bridge's address for the job of another user or computer"
     )]
     Busy(u32),
     /// The number was used for another job.
