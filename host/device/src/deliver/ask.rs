@@ -76,7 +76,8 @@ fn ask(
     }
     let reply = query.printer(what, patience)?;
     let one_way = match reply {
-        Reply::OneWay => true,
+        // One that negotiates but has no device ID is not told from one that does not negotiate.
+        Reply::OneWay if what != Ask::DeviceId => true,
         Reply::Bytes(_) => false,
         _ => return Ok(reply),
     };
