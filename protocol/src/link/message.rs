@@ -173,6 +173,10 @@ pub enum Handshake {
 
 /// From the bridge to the workstation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is no allocation to put a variant in, and messages are not stored"
+)]
 pub enum ToHost<'a> {
     /// The bridge's answer to [`ToBridge::Hello`].
     Hello {
