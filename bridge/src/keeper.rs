@@ -4,14 +4,18 @@
 //! has. Method: the engine's checkpoint goes into one of two slots in turn, with a number and a checksum, so that a reset
 //! during a write leaves the other. Every byte that crosses the port after it leaves a mark in a ring, written by whatever
 //! sends it. After a reset the marks behind the last checkpoint are counted. Only when a slot is written are the marks
-//! before it cleared.
+//! before it cleared. How earlier jobs have ended changes once in a job, so it has two slots of its own, written before the
+//! checkpoint that follows from it.
 //!
-//! Cost: 64 bytes for each checkpoint and a byte for each mark. Limits: fewer than [`MARKS`] bytes may cross between two
+//! Cost: 64 bytes for each checkpoint, a byte for each mark, 288 bytes at the end of each job. Limits: fewer than [`MARKS`] bytes may cross between two
 //! checkpoints. The board says whether the memory is its own, and holds what it held ([`Memory`]).
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use protocol::link::frame::checksum;
+use protocol::link::message::{PAST, PastJob, Progress};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::engine::Checkpoint;
 
@@ -22,7 +26,12 @@ pub const MARKS: usize = 1 << MARKS_BITS;
 
 /// Bytes of a place for a checkpoint: checksum of the rest, number, position in the ring, length of what follows.
 pub const SLOT: usize = 64;
-const HEAD: usize = 11;
+/// Bytes of a place for what is remembered of earlier jobs.
+pub const PAST_SLOT: usize = 288;
+const HEAD: usize = 12;
+
+/// What of a checkpoint changes with every byte.
+type Position = (Progress, Option<u32>, bool, bool, bool);
 
 /// Memory that outlives a reset. Writes happen in the order in which they are asked for.
 pub trait Memory {
@@ -30,6 +39,10 @@ pub trait Memory {
     fn slots(&self) -> [[u8; SLOT]; 2];
     /// Writes slot 0 or 1.
     fn write(&mut self, which: usize, slot: [u8; SLOT]);
+    /// The two slots for earlier jobs.
+    fn past(&self) -> [[u8; PAST_SLOT]; 2];
+    /// Writes slot 0 or 1 of these.
+    fn write_past(&mut self, which: usize, slot: [u8; PAST_SLOT]);
     /// Whether there is a mark at this place, below [`MARKS`].
     fn is_marked(&self, at: usize) -> bool;
     /// Sets or clears the mark at this place, below [`MARKS`].
@@ -43,26 +56,31 @@ pub struct Keeper<M> {
     /// Position in the ring that belongs to the last checkpoint.
     place: usize,
     last: Option<Checkpoint>,
+    /// What was last written of earlier jobs, and its number.
+    past: [PastJob; PAST],
+    past_number: u32,
 }
 
 impl<M: Memory> Keeper<M> {
     /// Looks for what an earlier run has left; `known` says whether the memory is what such a run left there. To be called
     /// before anything is sent.
     pub fn new(mut memory: M, known: bool) -> (Self, Option<Checkpoint>) {
-        let slots = memory.slots();
-        let found = slots.iter().filter_map(read).filter(|_| known);
-        // Numbers follow each other and may wrap.
-        let found = found.reduce(|a, b| if b.0.wrapping_sub(a.0) == 1 { b } else { a });
-        let Some((number, place, mut checkpoint)) = found else {
+        let found = newest(&memory.slots()).filter(|_| known);
+        let Some((number, place, position)) = found else {
             (0..2).for_each(|which| memory.write(which, [0; SLOT]));
+            (0..2).for_each(|which| memory.write_past(which, [0; PAST_SLOT]));
             (0..MARKS).for_each(|at| memory.mark(at, false));
-            return (Keeper { memory, number: 0, place: 0, last: None }, None);
+            let past = [PastJob::NONE; PAST];
+            return (Keeper { memory, number: 0, place: 0, last: None, past, past_number: 0 }, None);
         };
+        let (past_number, _, past) = newest(&memory.past()).unwrap_or((0, 0, [PastJob::NONE; PAST]));
         let crossed = (0..MARKS).take_while(|at| memory.is_marked((place + at) % MARKS)).count();
         #[expect(clippy::cast_possible_truncation, reason = "at most MARKS")]
         let count = crossed as u32;
-        checkpoint.progress.printed = checkpoint.progress.printed.wrapping_add(count);
-        let mut keeper = Keeper { memory, number, place, last: None };
+        let (mut progress, ends_at, needs_reset, at_rest, one_way): Position = position;
+        progress.printed = progress.printed.wrapping_add(count);
+        let checkpoint = Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past };
+        let mut keeper = Keeper { memory, number, place, last: None, past, past_number };
         keeper.store(checkpoint, place + crossed);
         // What a reset left between a slot and the clearing of its marks would be counted a turn of the ring later.
         (0..MARKS).for_each(|at| keeper.memory.mark(at, false));
@@ -80,8 +98,19 @@ impl<M: Memory> Keeper<M> {
         if self.last == Some(checkpoint) && self.place == place {
             return;
         }
+        // First: a job that has ended and is not remembered would be open again behind a reset.
+        if checkpoint.past != self.past {
+            let number = self.past_number.wrapping_add(1);
+            if let Some(slot) = write(number, 0, &checkpoint.past) {
+                self.memory.write_past((number % 2) as usize, slot);
+                compiler_fence(Ordering::SeqCst);
+                (self.past_number, self.past) = (number, checkpoint.past);
+            }
+        }
         let number = self.number.wrapping_add(1);
-        let Some(slot) = write(number, place, checkpoint) else { return };
+        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, .. } = checkpoint;
+        let position: Position = (progress, ends_at, needs_reset, at_rest, one_way);
+        let Some(slot) = write(number, place, &position) else { return };
         self.number = number;
         self.memory.write((number % 2) as usize, slot);
         compiler_fence(Ordering::SeqCst);
@@ -98,36 +127,40 @@ impl<M: Memory> Keeper<M> {
     }
 }
 
-/// A slot of this checkpoint; none if it should ever be longer than a slot.
-fn write(number: u32, place: usize, checkpoint: Checkpoint) -> Option<[u8; SLOT]> {
-    let mut slot = [0; SLOT];
+/// A slot with this in it; none if it should ever be longer than a slot.
+fn write<const N: usize>(number: u32, place: usize, held: &impl Serialize) -> Option<[u8; N]> {
+    let mut slot = [0; N];
     slot[4..8].copy_from_slice(&number.to_le_bytes());
     slot[8..10].copy_from_slice(&u16::try_from(place).ok()?.to_le_bytes());
-    let Checkpoint { progress, ends_at, needs_reset } = checkpoint;
-    let used = postcard::to_slice(&(progress, ends_at, needs_reset), &mut slot[HEAD..]).ok()?.len();
-    slot[10] = u8::try_from(used).ok()?;
+    let used = postcard::to_slice(held, &mut slot[HEAD..]).ok()?.len();
+    slot[10..12].copy_from_slice(&u16::try_from(used).ok()?.to_le_bytes());
     let sum = checksum(&slot[4..]);
     slot[..4].copy_from_slice(&sum.to_le_bytes());
     Some(slot)
 }
 
-/// Number, position in the ring and checkpoint of a slot, if it is whole.
-fn read(slot: &[u8; SLOT]) -> Option<(u32, usize, Checkpoint)> {
+/// Number, position in the ring and content of a slot, if it is whole.
+fn read<const N: usize, T: DeserializeOwned>(slot: &[u8; N]) -> Option<(u32, usize, T)> {
     let word = |at: usize| u32::from_le_bytes([slot[at], slot[at + 1], slot[at + 2], slot[at + 3]]);
+    let half = |at: usize| usize::from(u16::from_le_bytes([slot[at], slot[at + 1]]));
     if word(0) != checksum(&slot[4..]) {
         return None;
     }
-    let body = slot.get(HEAD..HEAD + usize::from(slot[10]))?;
-    let (progress, ends_at, needs_reset) = postcard::from_bytes(body).ok()?;
-    let place = usize::from(u16::from_le_bytes([slot[8], slot[9]]));
-    Some((word(4), place, Checkpoint { progress, ends_at, needs_reset }))
+    let body = slot.get(HEAD..HEAD + half(10))?;
+    Some((word(4), half(8), postcard::from_bytes(body).ok()?))
+}
+
+/// The same of the slot that was written last.
+fn newest<const N: usize, T: DeserializeOwned>(slots: &[[u8; N]; 2]) -> Option<(u32, usize, T)> {
+    // Numbers follow each other and may wrap.
+    slots.iter().filter_map(read).reduce(|a, b| if b.0.wrapping_sub(a.0) == 1 { b } else { a })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use protocol::link::message::{Fault, JobState, Progress};
+    use protocol::link::message::{Defect, DefectKind, Fault, JobState};
     use std::vec::Vec;
 
     /// A board's memory, until the board has written so many bytes.
@@ -138,6 +171,7 @@ mod tests {
 
     struct Held {
         slots: [[u8; SLOT]; 2],
+        past: [[u8; PAST_SLOT]; 2],
         marks: Vec<bool>,
     }
 
@@ -158,6 +192,18 @@ mod tests {
             for (at, byte) in slot.into_iter().enumerate() {
                 if self.writes() {
                     self.held.slots[which][at] = byte;
+                }
+            }
+        }
+
+        fn past(&self) -> [[u8; PAST_SLOT]; 2] {
+            self.held.past
+        }
+
+        fn write_past(&mut self, which: usize, slot: [u8; PAST_SLOT]) {
+            for (at, byte) in slot.into_iter().enumerate() {
+                if self.writes() {
+                    self.held.past[which][at] = byte;
                 }
             }
         }
@@ -183,7 +229,23 @@ mod tests {
             pass: 0,
             row: 0,
         };
-        Checkpoint { progress, ends_at: Some(printed), needs_reset: printed.is_multiple_of(2) }
+        Checkpoint {
+            progress,
+            ends_at: Some(printed),
+            needs_reset: printed.is_multiple_of(2),
+            at_rest: printed.is_multiple_of(3),
+            one_way: printed.is_multiple_of(5),
+            past: [PastJob::NONE; PAST],
+        }
+    }
+
+    fn position(checkpoint: Checkpoint) -> Position {
+        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, .. } = checkpoint;
+        (progress, ends_at, needs_reset, at_rest, one_way)
+    }
+
+    fn held() -> Held {
+        Held { slots: [[0; SLOT]; 2], past: [[0; PAST_SLOT]; 2], marks: std::vec![false; MARKS] }
     }
 
     proptest! {
@@ -196,7 +258,11 @@ mod tests {
             ),
             rubbish in any::<u8>(),
         ) {
-            let mut held = Held { slots: [[rubbish; SLOT]; 2], marks: std::vec![rubbish > 99; MARKS] };
+            let mut held = Held {
+                slots: [[rubbish; SLOT]; 2],
+                past: [[rubbish; PAST_SLOT]; 2],
+                marks: std::vec![rubbish > 99; MARKS],
+            };
             let mut crossed = 0;
             let (mut keeper, none) = Keeper::new(Board { held: &mut held, left: usize::MAX }, false);
             prop_assert_eq!(none, None);
@@ -230,10 +296,46 @@ mod tests {
         fn a_slot_says_what_was_written_and_a_damaged_one_nothing(
             number in any::<u32>(), place in 0..MARKS, printed in any::<u32>(), byte in 0..SLOT, bit in 0u32..8,
         ) {
-            let mut slot = write(number, place, at(printed)).expect("a checkpoint goes into a slot");
-            prop_assert_eq!(read(&slot), Some((number, place, at(printed))));
+            let held = position(at(printed));
+            let mut slot: [u8; SLOT] = write(number, place, &held).expect("a checkpoint goes into a slot");
+            prop_assert_eq!(read(&slot), Some((number, place, held)));
             slot[byte] ^= 1 << bit;
-            prop_assert_eq!(read(&slot), None);
+            prop_assert_eq!(read::<SLOT, Position>(&slot), None);
+        }
+
+        /// Jobs end one after the other, and a reset comes anywhere. An open job behind it is the one that was open, or one whose
+        /// end is remembered; and none that had ended before is forgotten.
+        #[test]
+        fn a_reset_at_any_instant_leaves_how_jobs_have_ended(lives in prop::collection::vec((0usize..9000, 1u32..6), 1..8)) {
+            let mut held = held();
+            let (mut keeper, _) = Keeper::new(Board { held: &mut held, left: usize::MAX }, false);
+            let mut now = at(0);
+            now.progress.job = 1;
+            keeper.store(now, 0);
+            for (left, jobs) in lives {
+                let (mut keeper, found) = Keeper::new(Board { held: &mut held, left }, true);
+                now = found.expect("a checkpoint");
+                if keeper.memory.left == 0 {
+                    continue;
+                }
+                for _ in 0..jobs {
+                    let job = now.progress.job;
+                    let ended = PastJob { job, state: JobState::Done, printed: job };
+                    if now.past[0] != ended {
+                        now.past.rotate_right(1);
+                        now.past[0] = ended;
+                    }
+                    // The driver looks when the next job is open already.
+                    now.progress.job = job + 1;
+                    keeper.store(now, 0);
+                }
+            }
+            let found = Keeper::new(Board { held: &mut held, left: usize::MAX }, true).1.expect("a checkpoint");
+            let open = found.progress.job;
+            let last = found.past[0].job;
+            prop_assert!(last == open || last == open - 1, "open {open}, last ended {last}");
+            let ended: Vec<u32> = found.past.iter().map(|past| past.job).take_while(|&job| job > 0).collect();
+            prop_assert!(ended.iter().zip((1..=last).rev()).all(|(&job, expected)| job == expected), "{ended:?}");
         }
     }
 
@@ -249,23 +351,28 @@ mod tests {
             pass: u8::MAX,
             row: u16::MAX,
         };
-        assert!(
-            write(all, MARKS - 1, Checkpoint { progress, ends_at: Some(all), needs_reset: true }).is_some()
-        );
+        let position: Position = (progress, Some(all), true, true, true);
+        assert!(write::<SLOT>(all, MARKS - 1, &position).is_some());
+        let state = JobState::Broken(Defect { at: all, what: DefectKind::Truncated });
+        let past = [PastJob { job: all, state, printed: all }; PAST];
+        assert!(write::<PAST_SLOT>(all, 0, &past).is_some());
+        let position: Position = (Progress { state, ..progress }, Some(all), true, true, true);
+        assert!(write::<SLOT>(all, MARKS - 1, &position).is_some());
     }
 
     #[test]
     fn numbers_wrap() {
-        let mut held = Held { slots: [[0; SLOT]; 2], marks: std::vec![false; MARKS] };
-        held.slots[1] = write(u32::MAX, 0, at(1)).expect("a slot");
-        held.slots[0] = write(0, 0, at(2)).expect("a slot");
+        let mut held = held();
+        held.slots[1] = write(u32::MAX, 0, &position(at(1))).expect("a slot");
+        held.slots[0] = write(0, 0, &position(at(2))).expect("a slot");
         assert_eq!(Keeper::new(Board { held: &mut held, left: 0 }, true).1, Some(at(2)));
     }
 
     #[test]
     fn another_images_memory_is_made_empty() {
-        let mut held =
-            Held { slots: [write(5, 3, at(9)).expect("a slot"); 2], marks: std::vec![true; MARKS] };
+        let mut held = held();
+        held.slots = [write(5, 3, &position(at(9))).expect("a slot"); 2];
+        held.marks.fill(true);
         let (keeper, found) = Keeper::new(Board { held: &mut held, left: usize::MAX }, false);
         assert_eq!((found, keeper.place()), (None, 0));
         assert!(held.slots == [[0; SLOT]; 2] && held.marks.iter().all(|set| !set));

@@ -12,9 +12,9 @@ use protocol::runs::{Decoder, Defect, Header, HeaderError, MAX_HEADER, Step, ban
 /// Room for whatever one slice of work writes: the longest row, 9880 dots.
 pub(crate) const WRITE_ROOM: usize = ROW_ROOM + 1235;
 
-/// Bytes of a stream read in one slice of work: some hundred runs, so that a slice takes well under a millisecond on a
-/// microcontroller.
-const SLICE: usize = 64;
+/// Bytes of a stream read in one slice of work: 128 runs at most, each of 6 µs on a microcontroller. With the 0.2 ms of a
+/// [turn](crate::turn) before the last slice, a task keeps the processor for less than a millisecond.
+const SLICE: usize = 16;
 
 /// What a slice of work did.
 pub(crate) struct Worked {

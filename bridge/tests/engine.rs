@@ -5,8 +5,8 @@ use model::{IDENTITY, Job, NONE, Planes, framed, is_a_whole_job, memory, run, se
 use proptest::prelude::*;
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, DATA_MAX, DefectKind, Fault, Handshake, JobKind, JobState, Lines, PortSettings, Progress,
-    Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, DATA_MAX, DefectKind, Fault, Handshake, JobKind, JobState, Lines, PAST, PastJob,
+    PortSettings, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage, VERSION,
 };
 
 struct Rig {
@@ -99,8 +99,105 @@ fn a_raw_job() -> Vec<u8> {
 fn a_greeting_is_answered_with_who_and_where() {
     let said = Rig::new().tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
     let hello = ToHost::Hello { version: VERSION, schema: SCHEMA, boot: 1, serial: 2, firmware: "test" };
-    assert_eq!(said.text, [format!("{hello:?}")]);
+    let past = ToHost::Past([PastJob::NONE; PAST]);
+    assert_eq!(said.text, [format!("{hello:?}"), format!("{past:?}")]);
     assert_eq!(said.progress.unwrap().state, JobState::None);
+}
+
+#[test]
+fn a_hello_of_another_version_is_answered_whatever_is_in_it() {
+    let mut rig = Rig::new();
+    for hello in [&[0, 77][..], &[0, 77, 1, 2, 3, 4, 5, 6, 7, 8, 9], &[0, 1, 2]] {
+        rig.engine.receive(&mut rig.reader, &framed_bytes(hello));
+        let said = rig.said().text;
+        assert!(said[0].starts_with("Hello") && said[0].contains(&format!("version: {VERSION}")), "{said:?}");
+    }
+}
+
+/// Two users, and a queue between them: whoever comes back is told how the own job has ended.
+#[test]
+fn the_last_jobs_are_remembered_with_their_ends_through_resets() {
+    let mut rig = Rig::new();
+    let stream = a_raw_job();
+    let mut expected = Vec::new();
+    for id in 1..=20 {
+        match id % 3 {
+            0 => {
+                rig.tell(ToBridge::Begin { job: id, kind: JobKind::Raw, length: 500 });
+                rig.tell(ToBridge::Cancel { job: id });
+                rig.print();
+                expected.insert(0, PastJob { job: id, state: JobState::Cancelled, printed: 0 });
+            }
+            1 => {
+                let printed = rig.send(id, JobKind::Raw, &stream).printed;
+                expected.insert(0, PastJob { job: id, state: JobState::Done, printed });
+            }
+            _ => {
+                let ended = rig.send(id, JobKind::Raw, &stream[..stream.len() - 3]);
+                assert!(matches!(ended.state, JobState::Broken(_)));
+                expected.insert(0, PastJob { job: id, state: ended.state, printed: ended.printed });
+            }
+        }
+        // Jobs of a plain printer interface are nobody's to come back to.
+        offer(&mut rig, &stream, 500);
+        rig.print();
+        if id % 4 == 0 {
+            let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+            rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+        }
+    }
+    expected.truncate(PAST);
+    let past: [PastJob; PAST] = expected.clone().try_into().unwrap();
+    let told = format!("{:?}", ToHost::Past(past));
+    let said = rig.tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
+    assert_eq!(said.text[1], told);
+    // Whoever goes on with a job that is over hears the same.
+    let said = rig.tell(ToBridge::Data { job: 10, offset: 0, bytes: b"x" });
+    assert_eq!(
+        (said.text, rig.tell(ToBridge::Cancel { job: 10 }).text),
+        (vec![told.clone()], vec![told.clone()])
+    );
+    let said = rig.tell(ToBridge::Begin { job: 10, kind: JobKind::Raw, length: 500 });
+    assert_eq!(said.text, [refused(Refusal::OtherJob, 10), vec![told]].concat());
+    assert_eq!(rig.tell(ToBridge::Cancel { job: 2 }).text, refused(Refusal::NoSuchJob, 2), "too long ago");
+    assert_eq!(rig.engine.progress().state, JobState::Done);
+}
+
+#[test]
+fn a_printer_without_its_supply_gets_nothing_and_no_reset() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
+    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    while rig.engine.work() {}
+    assert!(!rig.engine.output().is_empty());
+    let off = Lines(Lines::IDLE.0 & !Lines::POWER);
+    rig.engine.port(off, Some(Fault::PowerOff));
+    assert!(rig.engine.output().is_empty() && rig.engine.output_behind(3).is_empty());
+    rig.engine.port(Lines::IDLE, None);
+    assert!(!rig.engine.output().is_empty());
+    // A job that ends where a reset is needed waits with it for the supply.
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: 3000 });
+    rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &[b'a'; 500] });
+    rig.print();
+    rig.tell(ToBridge::Cancel { job: 2 });
+    rig.engine.port(off, Some(Fault::PowerOff));
+    assert_eq!((rig.engine.progress().state, rig.engine.task()), (JobState::Lost, None));
+    rig.engine.port(Lines::IDLE, None);
+    assert_eq!(rig.engine.task(), Some(Task::Initialise));
+}
+
+#[test]
+fn the_firmwares_use_is_told_when_asked_for() {
+    let mut rig = Rig::new();
+    assert!(!rig.engine.usage_wanted());
+    rig.tell(ToBridge::Ask { request: 9, what: Ask::Board });
+    assert!(rig.engine.usage_wanted());
+    let usage = Usage { fixed: 1, stack: 2, stack_used: 3, longest_us: 4 };
+    rig.engine.usage(usage);
+    assert_eq!(rig.said().text, [format!("{:?}", ToHost::Board { request: 9, usage })]);
+    assert!(!rig.engine.usage_wanted());
 }
 
 #[test]
@@ -481,7 +578,13 @@ fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
     let mut rig = Rig::new();
     offer(&mut rig, &stream[..1500], 64);
     let mut engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-    assert_eq!((engine.progress().state, engine.task()), (JobState::Lost, Some(Task::Initialise)));
+    assert_eq!(
+        (engine.progress().state, engine.task()),
+        (JobState::Lost, None),
+        "nobody knows yet what is there"
+    );
+    engine.port(Lines::IDLE, None);
+    assert_eq!(engine.task(), Some(Task::Initialise));
 }
 
 #[test]
@@ -608,7 +711,7 @@ proptest! {
 
     #[test]
     fn no_conversation_makes_it_fail(
-        messages in prop::collection::vec((0u8..12, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
+        messages in prop::collection::vec((0u8..13, 0u32..4, 0u32..6000, prop::collection::vec(any::<u8>(), 0..400), any::<u8>()), 0..60),
     ) {
         let mut rig = Rig::new();
         for (kind, job, number, bytes, small) in messages {
@@ -622,6 +725,7 @@ proptest! {
                 8 => ToBridge::Initialise,
                 9 => ToBridge::Drive { data: small, control: small },
                 10 => ToBridge::Probe { request: 1, data: small, control: small },
+                11 => ToBridge::Abandon { job },
                 _ => ToBridge::ReadLog { request: 1, from: number },
             });
             match small % 5 {

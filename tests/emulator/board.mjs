@@ -8,6 +8,9 @@ import { BasePeripheral, RP2040 } from 'rp2040js';
 
 const NS_PER_CYCLE = 8; // 125 MHz
 const FLASH = 0x10000000;
+const NOWHERE = 0x1f000000;
+const RAM = 0x20000000;
+const HARD_FAULT = 3;
 
 // While the processor sleeps, time goes on in steps of at most this, so that what the test does is not late.
 const MOST_NS = 20_000;
@@ -94,6 +97,17 @@ export class Board {
         this.machines.push({ pio, machine, due: 0, idle: 0 });
       }
     }
+    // There is no memory below the first byte, and an access there is a bus error; rp2040js only reports it.
+    for (const access of ['writeUint32', 'writeUint16', 'writeUint8', 'readUint32', 'readUint16', 'readUint8']) {
+      const act = this.chip[access].bind(this.chip);
+      this.chip[access] = (address, value) => {
+        if (address >>> 0 >= NOWHERE && address >>> 0 < RAM) {
+          this.busError = true;
+          return 0;
+        }
+        return act(address, value);
+      };
+    }
     this.watchdogBites = 0;
     this.chip.peripherals[0x40058].onWatchdogTrigger = () => { this.watchdogBites += 1; };
   }
@@ -127,10 +141,25 @@ export class Board {
       this.pass(Math.min(Math.max(alarm, NS_PER_CYCLE), MOST_NS));
     } else {
       this.instructions += 1;
+      const before = chip.core.PC;
       const cycles = chip.core.executeInstruction();
+      if (this.busError) {
+        this.busError = false;
+        // The registers are as far as the instruction came, which a real processor takes back.
+        chip.core.PC = before;
+        this.fault();
+      }
       this.cycles += cycles;
       this.pass(cycles * NS_PER_CYCLE);
     }
+  }
+
+  /// The processor takes the exception of a fault, as after an instruction that does not exist. One in its own handler locks it up.
+  fault() {
+    const { core } = this.chip;
+    if (core.IPSR === HARD_FAULT) core.executeInstruction = () => 1;
+    else core.exceptionEntry(HARD_FAULT);
+    this.busError = false;
   }
 
   /// Time passes for everything but the processor.

@@ -3,9 +3,10 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Bench, MS, RAW, STREAMS, job, legal, same, skip } from './bench.mjs';
-import { cancel, configure, data, drive, hello, initialise } from './frames.mjs';
+import { abandon, ask, cancel, configure, data, drive, hello, helloOf, initialise } from './frames.mjs';
 
-const LINES = 0, STATUS = 1, DEVICE_ID = 2;
+const LINES = 0, STATUS = 1, DEVICE_ID = 2, STATUS_AT_REST = 3, BOARD = 4;
+
 test('a composite device appears, with a serial port and bulk endpoints', { skip }, async () => {
   const bench = new Bench();
   await bench.connect('bulk');
@@ -200,7 +201,7 @@ test('the device ID and the status answer are read in nibble mode, and forward p
   const bench = new Bench({ id, status });
   await bench.connect('bulk');
   assert.deepEqual([...(await bench.ask(DEVICE_ID)).answer], id);
-  assert.deepEqual([...(await bench.ask(STATUS)).answer], status);
+  assert.deepEqual([...(await bench.ask(STATUS_AT_REST)).answer], status);
   assert.deepEqual(bench.printer.taken, [5, 1]);
   bench.printer.taken = [];
   const bytes = job('small.rgl');
@@ -271,4 +272,140 @@ test('whenever in a byte the printer is switched off, at most that byte is still
     await bench.pass(5);
   }
   legal(bench.printer);
+});
+
+/// Strobes and pulses of nInit while the printer's supply was absent, but for the byte that was set up already.
+const drivenWithoutSupply = ({ edges }) => {
+  let off = null;
+  return edges.filter(({ at, line, level }) => {
+    if (line === 'power') off = level === 0 ? at : null;
+    return off !== null && at - off > 1000 && level === 0 && (line === 'strobe' || line === 'init');
+  }).length;
+};
+
+// The printer seems ready but for its +5 V: a broken wire, say.
+for (const [what, kind, name, handshake] of [['a raw job', RAW, 'small.rgl', 0], ['a raw job by nAck', RAW, 'small.rgl', 1], ['pass streams', STREAMS, 'small.streams', 0], ['plain text', RAW, null, 0]]) {
+  test(`${what} waits for the printer's +5 V, and then arrives byte for byte`, { skip }, async () => {
+    const bench = new Bench();
+    bench.printer.set('power', 0);
+    await bench.connect('bulk');
+    if (handshake) await bench.say(configure({ setup: 800, strobe: 800, hold: 800, settle: 500, handshake }));
+    const bytes = name ? job(name) : Uint8Array.from({ length: 3000 }, (_, i) => 97 + (i % 26));
+    const expected = name ? job('small.rgl') : bytes;
+    const end = bench.board.now + 400 * MS;
+    let from = 0;
+    await bench.print(3, kind, bytes, { until: (sent) => { from = sent; return bench.board.now > end; } });
+    assert.deepEqual([bench.printer.taken.length, drivenWithoutSupply(bench.printer)], [0, 0]);
+    assert.deepEqual([bench.progress.state, bench.progress.detail], ['stopped', 'power off']);
+    bench.printer.set('power', 1);
+    assert.equal((await bench.print(3, kind, bytes, { from })).state, 'done');
+    same(bench.printer.taken, expected);
+    assert.equal(bench.printer.resets, 0);
+    legal(bench.printer);
+  });
+}
+
+test('what an operating system prints waits for the printer\'s +5 V too', { skip }, async () => {
+  const bench = new Bench();
+  bench.printer.set('power', 0);
+  await bench.connect('bulk');
+  const { out } = bench.device.interfaces.find((one) => one.class === 7);
+  const bytes = job('small.rgl');
+  let written = false;
+  bench.host.write(out, bytes).then(() => { written = true; });
+  await bench.pass(400);
+  assert.deepEqual([bench.printer.taken.length, drivenWithoutSupply(bench.printer)], [0, 0]);
+  bench.printer.set('power', 1);
+  assert.ok(await bench.board.run(() => written && bench.printer.taken.length === bytes.length, 2000 * MS));
+  same(bench.printer.taken, bytes);
+  legal(bench.printer);
+});
+
+test('whenever in a byte the sense line falls, what has crossed is counted, and nothing more crosses', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('page.rgl');
+  const { printer } = bench;
+  for (let id = 3; id < 23; id++) {
+    const had = printer.taken.length;
+    await bench.print(id, RAW, bytes, { until: () => printer.taken.length > had + 300 });
+    printer.later(140 * id, () => printer.set('power', 0));
+    await bench.hear(({ kind, state, job: number }) => kind === 'progress' && state === 'lost' && number === id);
+    assert.equal(bench.progress.printed, printer.taken.length - had);
+    assert.equal(drivenWithoutSupply(printer), 0);
+    printer.set('power', 1);
+    await bench.pass(5);
+  }
+  legal(printer);
+});
+
+test('a host of another version is answered, and so learns which version the bridge has', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  for (const rest of [[], [1, 2, 3, 4, 5, 6, 7, 8, 9], [0]]) {
+    const asked = bench.board.now;
+    await bench.say(helloOf(77, rest));
+    assert.equal((await bench.hear(({ kind, at }) => kind === 'hello' && at > asked)).version, 3);
+  }
+});
+
+test('the status question waits until it is known that the printer stands between two jobs', { skip }, async () => {
+  const status = [2, 0x80, 33, 0, 0x10, ...Array.from({ length: 32 }, (_, i) => (i * 37) & 255), 3];
+  const bench = new Bench({ id: [0, 9, ...new TextEncoder().encode('MFG:A;')], status });
+  await bench.connect('bulk');
+  assert.equal((await bench.ask(STATUS)).answer, 'unsure');
+  assert.deepEqual(bench.printer.taken, []);
+  await bench.say(initialise());
+  await bench.pass(5);
+  assert.deepEqual([...(await bench.ask(STATUS)).answer], status);
+});
+
+test('a printer that has shown that it does not negotiate is not tried again, and gets no question', { skip }, async () => {
+  const bench = new Bench({ negotiates: false });
+  await bench.connect('bulk');
+  await bench.pass(700);
+  const tried = () => bench.printer.edges.filter(({ line, level }) => line === 'selectIn' && level === 1).length;
+  const before = tried();
+  for (let i = 0; i < 5; i++) for (const what of [STATUS_AT_REST, DEVICE_ID]) assert.equal((await bench.ask(what)).answer, 'one-way');
+  assert.deepEqual([tried() - before, bench.printer.taken.length], [0, 0]);
+});
+
+test('a job that is given up ends at once although the printer takes nothing, and the next one prints behind a reset', { skip }, async () => {
+  const bench = new Bench();
+  await bench.connect('bulk');
+  const bytes = job('page.rgl');
+  await bench.print(3, RAW, bytes, { until: () => bench.printer.taken.length > 3000 });
+  bench.printer.change({ paperOut: 1 });
+  await bench.pass(5);
+  await bench.say(abandon(3));
+  await bench.hear(({ kind, state }) => kind === 'progress' && state === 'lost');
+  const had = bench.printer.taken.length;
+  assert.deepEqual([bench.progress.printed, bench.printer.resets], [had, 1]);
+  bench.printer.change({ paperOut: 0 });
+  await bench.pass(5);
+  assert.equal((await bench.print(4, RAW, job('small.rgl'))).state, 'done');
+  same(bench.printer.taken.slice(had), job('small.rgl'));
+});
+
+test('a mute printer keeps nobody waiting: lines are answered while it is asked, and no task runs for a millisecond', { skip }, async (t) => {
+  const bench = new Bench({ id: [0, 9, ...new TextEncoder().encode('MFG:A;')] });
+  await bench.connect('bulk');
+  const request = ++bench.requests;
+  await bench.say(ask(request, STATUS_AT_REST));
+  const waits = [];
+  for (let i = 0; i < 60; i++) {
+    const asked = bench.board.now;
+    waits.push(((await bench.ask(LINES)).at - asked) / MS);
+    await bench.pass(20);
+  }
+  assert.equal((await bench.hear((heard) => heard.request === request, 4000)).answer, 'silent');
+  assert.ok(Math.max(...waits) <= 5, `${Math.max(...waits)} ms`);
+  // And everything else the firmware does: both kinds of jobs, by both senders, the log.
+  assert.equal((await bench.print(3, STREAMS, job('page.streams'))).state, 'done');
+  await bench.say(configure({ setup: 65_535, strobe: 65_535, hold: 65_535, settle: 65_535, handshake: 1 }));
+  await bench.print(4, RAW, job('small.rgl').subarray(0, 2500), { until: () => bench.printer.taken.length > 14_000, limitMs: 60_000 });
+  const { fixed, stack, used, longest } = await bench.ask(BOARD);
+  t.diagnostic(`lines within ${Math.max(...waits).toFixed(2)} ms; no task ran longer than ${longest} us; stack ${used} of ${stack} bytes, other memory ${fixed} bytes`);
+  assert.ok(longest > 50 && longest < 1000, `${longest} us`);
+  assert.ok(used > 1000 && used < stack - 4096 && fixed > 100_000, `${used} of ${stack}, ${fixed}`);
 });

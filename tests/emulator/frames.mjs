@@ -70,7 +70,9 @@ const varint = (value) => {
   return [...out, value];
 };
 
-export const hello = () => frame([0, 2, ...varint(0)]);
+export const hello = () => frame([0, 3, ...varint(0)]);
+/// A Hello of another version, with anything behind its version.
+export const helloOf = (version, rest) => frame([0, version, ...rest]);
 export const begin = (job, kind, length) => frame([1, ...varint(job), kind, ...varint(length)]);
 export const data = (job, offset, bytes) => frame([2, ...varint(job), ...varint(offset), ...varint(bytes.length), ...bytes]);
 export const cancel = (job) => frame([3, ...varint(job)]);
@@ -80,6 +82,7 @@ export const configure = ({ setup, strobe, hold, settle, handshake = 0, patience
 export const initialise = () => frame([6]);
 export const drive = (level, lines) => frame([8, level, lines]);
 export const probe = (request, level, lines) => frame([9, ...varint(request), level, lines]);
+export const abandon = (job) => frame([11, ...varint(job)]);
 export const readLog = (request, from) => frame([10, ...varint(request), ...varint(from)]);
 
 const STATES = ['none', 'printing', 'stopped', 'cancelling', 'done', 'cancelled', 'broken', 'lost'];
@@ -115,12 +118,22 @@ export function parse(message) {
       return { kind: 'lines', request: number(), lines: byte(), fault: byte() ? fault() : null };
     case 3: {
       const [request, which] = [number(), byte()];
-      return { kind: 'answer', request, answer: which === 0 ? bytes() : ['', 'not now', 'one-way', 'silent', 'stopped'][which] };
+      return { kind: 'answer', request, answer: which === 0 ? bytes() : ['', 'not now', 'one-way', 'silent', 'stopped', 'unsure'][which] };
     }
     case 4:
       return { kind: 'refused', reason: byte(), job: number() };
     case 6:
       return { kind: 'log', request: number(), from: number(), end: number(), bytes: bytes() };
+    case 7: {
+      const jobs = Array.from({ length: 16 }, () => {
+        const [job, state] = [number(), STATES[byte()]];
+        const detail = state === 'stopped' ? fault() : state === 'broken' ? [number(), byte()] : undefined;
+        return { job, state, detail, printed: number() };
+      });
+      return { kind: 'past', jobs: jobs.filter(({ job }) => job !== 0) };
+    }
+    case 8:
+      return { kind: 'board', request: number(), fixed: number(), stack: number(), used: number(), longest: number() };
     default:
       return { kind: 'other' };
   }

@@ -75,6 +75,8 @@ test('the port status is that of the lines', { skip }, async () => {
   assert.equal(await bench.portStatus(), 0x18);
   for (const [line, level, status] of [['paperOut', 1, 0x38], ['select', 0, 0x28], ['fault', 0, 0x20], ['power', 0, 0]]) {
     bench.printer.set(line, level);
+    // The lines are read every millisecond.
+    await bench.pass(2);
     assert.equal(await bench.portStatus(), status, line);
   }
 });

@@ -184,7 +184,7 @@ const ON_ITS_WAY = 1_000;
 export class Waveform {
   shortest = { setup: Infinity, strobe: Infinity, hold: Infinity, between: Infinity };
   wrong = [];
-  #level = { busy: 0, paperOut: 0, select: 1, fault: 1, selectIn: 0, data: 0 };
+  #level = { busy: 0, paperOut: 0, select: 1, fault: 1, power: 1, selectIn: 0, data: 0 };
   #dataAt = -Infinity;
   #fallAt = null;
   #riseAt = null;
@@ -210,7 +210,7 @@ export class Waveform {
     } else if (line === 'strobe' && now === 0) {
       this.#least('setup', at - this.#dataAt);
       if (this.#lastFall !== null) this.#least('between', at - this.#lastFall);
-      if ((level.busy || level.paperOut || !level.select || !level.fault) && !onItsWay) this.wrong.push({ at, what: 'strobe while not ready', ...level });
+      if ((level.busy || level.paperOut || !level.select || !level.fault || !level.power) && !onItsWay) this.wrong.push({ at, what: 'strobe while not ready', ...level });
       [this.#fallAt, this.#lastFall] = [at, at];
     } else if (line === 'strobe') {
       if (this.#fallAt !== null) this.#least('strobe', at - this.#fallAt);

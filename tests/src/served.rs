@@ -8,12 +8,12 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use bridge::engine::{Engine, Identity, Memory, Outcome, Task};
+use bridge::engine::{Checkpoint, Engine, Identity, Memory, Outcome, Task};
 use device::send::transport::{Socket, Transport};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
-use protocol::link::message::{Answer, Fault, Lines};
+use protocol::link::message::{Answer, Fault, Lines, Usage};
 
 /// What a test sees of the printer and does to it and the bridge.
 pub struct Port {
@@ -33,6 +33,8 @@ pub struct Port {
     pub maker: Mutex<Option<&'static str>>,
     /// The printer does not say how it is.
     pub one_way: AtomicBool,
+    /// How often the printer was asked how it is.
+    pub asked: AtomicUsize,
     /// How often the printer was reset.
     pub resets: AtomicUsize,
     /// How many bytes had crossed the port at each reset.
@@ -43,6 +45,8 @@ pub struct Port {
     pub garbage: AtomicBool,
     /// The bridge's power goes, and its memory with it.
     pub forget: AtomicBool,
+    /// The bridge restarts, and keeps its memory.
+    pub restart: AtomicBool,
     /// The cartridges that are in.
     cartridges: Vec<Cartridge>,
     /// Bytes of memory for bands.
@@ -62,11 +66,13 @@ impl Port {
             open_cover: false.into(),
             maker: Mutex::default(),
             one_way: false.into(),
+            asked: 0.into(),
             resets: 0.into(),
             reset_at: Mutex::default(),
             cut: false.into(),
             garbage: false.into(),
             forget: false.into(),
+            restart: false.into(),
             cartridges: cartridges.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
             stop: false.into(),
@@ -127,10 +133,15 @@ impl Bridge {
             let port = port.clone();
             move || {
                 let (mut data, mut output, mut band) = (vec![0; 8192], vec![0; 4096], vec![0; port.band]);
+                let mut kept = None;
                 for boot in 1.. {
                     let memory = Memory { data: &mut data, output: &mut output, band: &mut band };
                     let identity = Identity { boot, serial: 7, firmware: "test" };
-                    serve(Engine::new(memory, identity), &mut accept, &port);
+                    let engine = match kept {
+                        Some(checkpoint) => Engine::resume(memory, identity, checkpoint),
+                        None => Engine::new(memory, identity),
+                    };
+                    kept = serve(engine, &mut accept, &port);
                     if is(&port.stop) {
                         break;
                     }
@@ -158,11 +169,18 @@ fn is(flag: &AtomicBool) -> bool {
     flag.load(Ordering::Relaxed)
 }
 
-/// One life of the bridge.
-fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Transport>>, port: &Port) {
+/// One life of the bridge; what it leaves to the next one.
+fn serve(
+    mut engine: Engine<'_>,
+    accept: &mut dyn FnMut() -> Option<Box<dyn Transport>>,
+    port: &Port,
+) -> Option<Checkpoint> {
     let (mut reader, mut buffer) = (Reader::new(), [0; 4096]);
     let mut link: Option<Box<dyn Transport>> = None;
     while !is(&port.stop) && !port.forget.swap(false, Ordering::Relaxed) {
+        if port.restart.swap(false, Ordering::Relaxed) {
+            return Some(engine.checkpoint());
+        }
         if let Some(opened) = accept() {
             engine.link_lost();
             reader.reset();
@@ -193,6 +211,9 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
                 let printed = port.printed.lock().expect("no test panicked with it").len();
                 port.reset_at.lock().expect("no test panicked with it").push(printed);
             }
+            if task == Task::PrinterStatus {
+                port.asked.fetch_add(1, Ordering::Relaxed);
+            }
             let id = port.maker.lock().ok().and_then(|maker| maker.map(device_id));
             engine.done(match (task, &id) {
                 (Task::PrinterStatus, _) if is(&port.one_way) => Outcome::Answer(Answer::OneWay),
@@ -218,6 +239,9 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
         printed.extend_from_slice(&bytes[..count]);
         drop(printed);
         engine.consumed(count);
+        if engine.usage_wanted() {
+            engine.usage(Usage { fixed: 100_000, stack: 32_768, stack_used: 2_000, longest_us: 300 });
+        }
         let mut frame = [0; MAX];
         loop {
             let length = engine.transmit(&mut frame);
@@ -233,6 +257,7 @@ fn serve(mut engine: Engine<'_>, accept: &mut dyn FnMut() -> Option<Box<dyn Tran
             }
         }
     }
+    None
 }
 
 /// A device ID as IEEE 1284 has it: its length, itself counted, then keys and values.

@@ -12,12 +12,11 @@
 //!
 //! # Why this is sound
 //!
-//! *The bytes survive.* The linker puts the section `.uninit` between `.bss` and the stack. The startup code writes
+//! *The bytes survive.* The linker puts the section `.uninit` behind `.bss`. The startup code writes
 //! `.bss` and `.data` only (cortex-m-rt without its features `zero-init-ram` and `paint-stack`, neither of which is on).
-//! On the way to this program the boot ROM and the second-stage boot loader use the end of the memory only, which is the
-//! stack's. What anything else has overwritten, such as a debugger, the checksums of image and slots find. Should the
-//! stack ever grow into the section (it has more than 100 KB), that is memory corruption here as anywhere; there is no
-//! guard.
+//! On the way to this program the boot ROM and the second-stage boot loader use the end of the memory only, which
+//! `memory.x` leaves alone. What anything else has overwritten, such as a debugger, the checksums of image and slots find. The
+//! stack is below all of it and grows away from it ([`crate::stack`]).
 //!
 //! *The bytes may be read.* To the compiler a static without an initial value is uninitialised, and reading it is
 //! undefined whatever the hardware holds. So every access goes through [`kept`], whose empty assembly block stands for
@@ -32,7 +31,7 @@
 //! only raw pointers, so none can be aliased.
 
 use bridge::engine::Checkpoint;
-use bridge::keeper::{self, MARKS, Memory, SLOT};
+use bridge::keeper::{self, MARKS, Memory, PAST_SLOT, SLOT};
 use core::cell::UnsafeCell;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
@@ -40,13 +39,14 @@ use portable_atomic::{AtomicBool, Ordering};
 use protocol::link::frame::checksum;
 
 /// What is left of the next block of [`MARKS`] bytes: alignment would waste it.
-const LOG: usize = MARKS - 2 * SLOT - 12;
+const LOG: usize = MARKS - 2 * SLOT - 2 * PAST_SLOT - 12;
 
 #[repr(C, align(4096))]
 struct Kept {
     marks: [u8; MARKS],
     image: u32,
     slots: [[u8; SLOT]; 2],
+    past: [[u8; PAST_SLOT]; 2],
     /// Bytes logged since the log began, and the same inverted.
     written: [u32; 2],
     log: [u8; LOG],
@@ -95,6 +95,16 @@ impl Memory for Ring {
         unsafe { (&raw mut (*kept()).slots[which % 2]).write_volatile(slot) };
     }
 
+    fn past(&self) -> [[u8; PAST_SLOT]; 2] {
+        // SAFETY: initialised by `kept`; only this uses these slots.
+        unsafe { (&raw const (*kept()).past).read() }
+    }
+
+    fn write_past(&mut self, which: usize, slot: [u8; PAST_SLOT]) {
+        // SAFETY: one of the two slots, which only this uses.
+        unsafe { (&raw mut (*kept()).past[which % 2]).write_volatile(slot) };
+    }
+
     fn is_marked(&self, at: usize) -> bool {
         // SAFETY: a byte of the ring.
         unsafe { mark(at).read_volatile() != 0 }
@@ -109,15 +119,32 @@ impl Memory for Ring {
 /// The checkpoints of this run.
 pub type Keeper = keeper::Keeper<Ring>;
 
-/// The keeper, and what an earlier run has left. To be called before the first word of the log, and before the strobe
-/// engine is started.
+unsafe extern "C" {
+    // Addresses the linker knows: initial values of variables in flash, which are the image's end, and where they go.
+    static __sidata: u32;
+    static __sdata: u32;
+    static __edata: u32;
+}
+
+/// The checksum of the whole image: some milliseconds.
+fn image_checksum() -> u32 {
+    let [from, begin, end] =
+        [&raw const __sidata, &raw const __sdata, &raw const __edata].map(|at| at as usize);
+    let length = from + (end - begin) - FLASH;
+    // SAFETY: flash, which is mapped there as far as the linker has filled it, and which nothing writes while the program runs.
+    checksum(unsafe { core::slice::from_raw_parts(FLASH as *const u8, length) })
+}
+
+/// Where the image begins.
+const FLASH: usize = 0x1000_0000;
+
+/// The keeper, what an earlier run has left, and whether there was one of this image. To be called before the first word of the
+/// log, and before the strobe engine is started.
 ///
 /// Panics when it is called again.
-pub fn keeper() -> (Keeper, Option<Checkpoint>) {
+pub fn keeper() -> (Keeper, Option<Checkpoint>, bool) {
     assert!(!WOKEN.swap(true, Ordering::Relaxed));
-    // The vectors, and with them the address of every handler, and most of the program: 64 KiB take some milliseconds.
-    // SAFETY: flash, which is mapped there, and which nothing writes while the program runs.
-    let image = checksum(unsafe { core::slice::from_raw_parts(0x1000_0000 as *const u8, 0x1_0000) });
+    let image = image_checksum();
     let kept = kept();
     let known = critical_section::with(|_| {
         // SAFETY: fields of the static, initialised by `kept`.
@@ -136,7 +163,7 @@ pub fn keeper() -> (Keeper, Option<Checkpoint>) {
             }
         });
     }
-    (keeper, found)
+    (keeper, found, known)
 }
 
 /// The ring for the DMA: where it begins.

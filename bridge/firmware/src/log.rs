@@ -22,6 +22,14 @@ static STATE: Held =
 /// Someone is in the middle of a frame.
 static TAKEN: AtomicBool = AtomicBool::new(false);
 
+/// The program has ended, wherever it was: in the middle of a frame, perhaps. The next frame is a new one.
+pub fn take_over() {
+    if TAKEN.swap(false, Ordering::Relaxed) {
+        // An empty frame ends what there is of the other.
+        crate::keep::log(&[0]);
+    }
+}
+
 #[defmt::global_logger]
 struct Logger;
 

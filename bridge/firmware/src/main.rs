@@ -15,17 +15,20 @@
 //! | `port::serve` | 1 ms, a sent buffer | polls the port's driver |
 //! | `watch::run` | 50 ms | sets the lamp, feeds the watchdog |
 //!
-//! Memory: 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the printer has work
-//! while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.
+//! Memory: 64 KiB of stack, lowest, most of it for the start; 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the
+//! printer has work while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.
 #![no_std]
 #![no_main]
 
+mod fault;
 mod keep;
 mod log;
 mod pins;
 mod port;
 mod shared;
+mod stack;
 mod strobe;
+mod trace;
 mod usb;
 mod watch;
 
@@ -39,13 +42,13 @@ use embassy_rp::flash::{Blocking, Flash};
 use embassy_rp::pac;
 use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
-use embassy_rp::watchdog::Watchdog;
 use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
 use embassy_time::Instant;
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
 use strobe::{CHUNK, Strobe};
 use usb::{device, link, printer};
+use watch::Life;
 
 bind_interrupts!(struct Interrupts {
     USBCTRL_IRQ => usb_driver::InterruptHandler<USB>;
@@ -70,9 +73,13 @@ async fn main(spawner: Spawner) {
     // Before anything else: the lines at rest.
     let board = embassy_rp::init(Default::default());
     pins::bring_up();
+    // From here on every task has to show that it lives, also while USB starts.
+    let watchdog = watch::start(board.WATCHDOG);
 
     // Before the first word of the log, and before a byte goes to the printer.
-    let (keeper, checkpoint) = keep::keeper();
+    let (keeper, checkpoint, known) = keep::keeper();
+    let used_before = stack::used();
+    stack::fill();
 
     let number = {
         let mut flash = Flash::<_, Blocking, FLASH_BYTES>::new_blocking(board.FLASH);
@@ -103,6 +110,9 @@ async fn main(spawner: Spawner) {
             _ => "power or reset",
         }
     );
+    if known {
+        defmt::info!("the run before used {=u32} of {=u32} bytes of stack", used_before, stack::size());
+    }
     if let Some(checkpoint) = &checkpoint {
         let bridge::engine::Checkpoint { progress, .. } = checkpoint;
         defmt::info!(
@@ -160,13 +170,15 @@ async fn main(spawner: Spawner) {
     let (from_host, to_host) = usb.printer;
     spawner.spawn(printer::run(shared, from_host, to_host).unwrap());
     spawner.spawn(port::serve(shared, driver).unwrap());
-    spawner.spawn(watch::run(shared, Watchdog::new(board.WATCHDOG)).unwrap());
+    spawner.spawn(watch::run(shared, watchdog).unwrap());
+    trace::restart();
     work(shared).await
 }
 
 /// Lets the engine work, a turn at a time.
 async fn work(shared: &'static Shared) {
     loop {
+        watch::show_life(Life::Work);
         let Turn { more, wake_port } =
             shared.engine(|engine| turn::work(engine, || Instant::now().as_ticks()));
         if wake_port {
@@ -189,33 +201,3 @@ fn hex<'a>(bytes: &[u8; 8], text: &'a mut [u8; 16]) -> &'a str {
     }
     core::str::from_utf8(text).unwrap_or("0")
 }
-
-/// A last word, and the buffers off once the byte under way has crossed; the watchdog does the rest. What was sent is marked,
-/// so the job goes on after it.
-///
-/// The word is where the program was: the return addresses on the stack, and whatever looks like one, for `addr2line`.
-/// File and line of every possible panic would take 14 KB of flash.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    cortex_m::interrupt::disable();
-    strobe::halt();
-    pins::enable(false);
-    let mut trace = [0; 8];
-    let (mut at, mut found) = (cortex_m::register::msp::read(), 0);
-    while at < STACK_TOP && found < trace.len() {
-        // SAFETY: a word of the stack in use, which lies between the pointer and its top.
-        let word = unsafe { (at as *const u32).read_volatile() };
-        // Instructions are in flash, and an odd address is that of Thumb code.
-        if (0x1000_0100..0x1002_0000).contains(&word) && word & 1 == 1 {
-            (trace[found], found) = (word, found + 1);
-        }
-        at += 4;
-    }
-    defmt::error!("panic at {:#x}", &trace[..found]);
-    loop {
-        cortex_m::asm::nop();
-    }
-}
-
-/// The end of the memory, where the stack begins.
-const STACK_TOP: u32 = 0x2004_2000;

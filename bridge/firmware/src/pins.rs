@@ -24,8 +24,10 @@ pub const INIT: u8 = 12;
 pub const SELECT_IN: u8 = 13;
 /// nAck. Busy, PError, Select and nFault follow, in this order.
 pub const ACK: u8 = 14;
-/// Busy, the first of the four lines the strobe program looks at.
+/// Busy, the first of the lines the strobe program looks at. The last is [`POWER`].
 pub const BUSY: u8 = 15;
+/// Connected to nothing, and low: the strobe program sees it.
+const UNUSED: u8 = 19;
 /// nOE of the output buffers: high, by a resistor, until the firmware has put the lines to rest.
 pub const ENABLE: u8 = 20;
 /// The printer's +5 V, through a divider.
@@ -96,6 +98,7 @@ pub fn bring_up() {
         (BUSY + 1, Rest::Up),
         (BUSY + 2, Rest::Down),
         (BUSY + 3, Rest::Up),
+        (UNUSED, Rest::Down),
         (POWER, Rest::Down),
     ] {
         input(pin, rest);

@@ -4,28 +4,22 @@ use crate::keep::Keeper;
 use crate::pins::{self, Ack, Data, Line};
 use crate::shared::{Shared, Side};
 use crate::strobe::{SENT, Strobe};
-use crate::watch::{self, HEARTBEAT};
+use crate::watch::{self, Life};
 use bridge::driver::{self, Clock, Driver, Event, Retained, Sender};
 use bridge::engine::Checkpoint;
 use bridge::keeper::MARKS;
 use bridge::port::{Port, Timing};
 use embassy_futures::select::select3;
 use embassy_futures::yield_now;
-use embassy_rp::pac;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal::delay::DelayNs;
-use portable_atomic::Ordering;
 use protocol::link::message::Lines;
 
-/// Waits by counting clock cycles, never less than asked for; and keeps the watchdog quiet meanwhile, since a slow
-/// printer may take its time with a nibble.
+/// Waits by counting clock cycles, never less than asked for.
 pub struct Cycles;
 
 impl DelayNs for Cycles {
     fn delay_ns(&mut self, ns: u32) {
-        if ns >= 1000 {
-            pac::WATCHDOG.load().write_value(pac::watchdog::regs::Load(watch::LOAD));
-        }
         // 125 MHz: a cycle is 8 ns.
         cortex_m::asm::delay(ns.div_ceil(8).max(1));
     }
@@ -132,7 +126,7 @@ impl driver::Board for Pico {
 #[embassy_executor::task]
 pub async fn serve(shared: &'static Shared, driver: &'static mut PicoDriver) -> ! {
     loop {
-        HEARTBEAT.store(true, Ordering::Relaxed);
+        watch::show_life(Life::Port);
         let pause_us = shared.engine(|engine| shared.device_id(|id| driver.poll(engine, id)));
         shared.wake(Side::Work);
         shared.wake(Side::Link);

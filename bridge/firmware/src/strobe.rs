@@ -4,7 +4,7 @@
 //! printer is busy or in trouble, and an exact count of what has crossed the port whenever it stops.
 //!
 //! Method: ten instructions, one byte each round. The program waits for Busy before it changes the data. Then it looks at
-//! Busy, PError, Select and nFault together until all are well, and strobes three ticks later. Behind every strobe it
+//! Busy, PError, Select, nFault and the printer's +5 V together until all are well, and strobes three ticks later. Behind every strobe it
 //! pushes a word. A DMA channel takes these words away, and its counter *is* the number of bytes that have crossed. The
 //! words stay as marks in memory that survives a reset ([`crate::keep`]). A byte in a FIFO or half way through its setup is
 //! not counted and can be taken back.
@@ -23,7 +23,7 @@
 //! Two buffers take turns. The interrupt of the DMA channel starts the second when the first is through, so the
 //! printer never waits for a task to be scheduled. The library keeps the books of the two ([`TwoBuffers`]).
 //!
-//! Limits: the handshake is Busy, and all four status lines are heeded. For other handshakes, and for everything else the
+//! Limits: the handshake is Busy, and all status lines are heeded. For other handshakes, and for everything else the
 //! port can do, the library's [`Port`](bridge::port::Port) works the same pins.
 
 use crate::keep;
@@ -38,7 +38,9 @@ use embassy_rp::interrupt;
 use embassy_rp::pac;
 use embassy_rp::pac::dma::vals::{DataSize, TreqSel};
 use embassy_rp::peripherals::{DMA_CH0, DMA_CH1, PIO0};
-use embassy_rp::pio::program::{Instruction, InstructionOperands, JmpCondition};
+use embassy_rp::pio::program::{
+    Instruction, InstructionOperands, JmpCondition, MovDestination, MovOperation, MovSource,
+};
 use embassy_rp::pio::{Common, Config, Direction, Pin, ShiftDirection, StateMachine};
 use embassy_rp::{Peri, clocks};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -49,8 +51,12 @@ use fixed::types::extra::U8;
 /// Bytes in each of the two buffers: at 2.4 µs, 2.4 ms of work for the printer.
 pub const CHUNK: usize = 1024;
 
-/// Busy low, PError low, Select high, nFault high, as the program reads them from Busy upwards.
-const READY: u8 = 0b1100;
+/// The pins the program looks at, from Busy up to the printer's +5 V. Between them are an unused pin, which rests low, and nOE,
+/// which is low while the buffers drive the cable.
+const LOOKED_AT: u8 = pins::POWER - pins::BUSY + 1;
+
+/// Busy low, PError low, Select high, nFault high, nOE low, +5 V present, as the program reads them from Busy upwards.
+const READY: u32 = 1 << 2 | 1 << 3 | 1 << (pins::POWER - pins::BUSY);
 
 /// The instructions during which a byte crosses: from the strobe to the push that counts it.
 const CROSSING: core::ops::RangeInclusive<u8> = 7..=9;
@@ -156,7 +162,7 @@ impl Strobe {
             "    mov pins, osr   side 1 [3]",
             "before:",
             "    mov isr, null   side 1",
-            "    in pins, 4      side 1",
+            "    in pins, 7      side 1",
             "    mov x, isr      side 1",
             "    jmp x!=y before side 1",
             "    nop             side 0 [7]",
@@ -171,7 +177,7 @@ impl Strobe {
         config.use_program(&loaded, &[&strobe]);
         config.set_out_pins(&data.each_ref());
         config.set_in_pins(&[&busy]);
-        // To the left: the four levels then are a number from 0 to 15 in the register.
+        // To the left: the levels then are a number in the register.
         config.shift_in.direction = ShiftDirection::Left;
         machine.set_config(&config);
         machine.set_pins(embassy_rp::gpio::Level::High, &[&strobe]);
@@ -294,10 +300,12 @@ impl Strobe {
             delay: 0,
             side_set: Some(1),
         };
+        // `set` holds five bits, and these are seven.
         let ready = Instruction {
-            operands: InstructionOperands::SET {
-                destination: embassy_rp::pio::program::SetDestination::Y,
-                data: READY,
+            operands: InstructionOperands::MOV {
+                destination: MovDestination::Y,
+                op: MovOperation::None,
+                source: MovSource::OSR,
             },
             delay: 0,
             side_set: Some(1),
@@ -315,6 +323,8 @@ impl Strobe {
             for _ in 0..8 {
                 self.machine.exec_instr(drain.encode(side_set));
             }
+            self.machine.tx().push(READY);
+            self.machine.exec_instr(drain.encode(side_set));
             self.machine.exec_instr(ready.encode(side_set));
             self.machine.exec_instr(jump.encode(side_set));
         }
@@ -342,4 +352,4 @@ impl Strobe {
     }
 }
 
-const _: () = assert!(pins::BUSY == pins::ACK + 1 && pins::STROBE == pins::DATA + 8);
+const _: () = assert!(pins::BUSY == pins::ACK + 1 && pins::STROBE == pins::DATA + 8 && LOOKED_AT == 7);

@@ -12,8 +12,8 @@ pub trait Clock {
 
 /// A sender that strobes bytes while the processor does something else: a PIO program with DMA, for example.
 ///
-/// It keeps to the Busy handshake and strobes nothing while any of the status lines shows a fault. A byte counts as
-/// sent once its strobe is over.
+/// It keeps to the Busy handshake and strobes nothing while any of the status lines shows a fault or the printer's +5 V is
+/// absent. A byte counts as sent once its strobe is over.
 pub trait Sender {
     /// Sets the times around the strobe, from the next byte on. Only with nothing in flight.
     fn set_timing(&mut self, timing: &Timing);

@@ -5,7 +5,7 @@
 //! engine what has been sent and what the lines show, and moves what can be moved. Whoever gets the port gets it with
 //! nothing in flight. The precedence is
 //!
-//! 1. a status question under way, which takes many polls;
+//! 1. a conversation with the printer or a status question under way, which take many polls;
 //! 2. a task of the engine; meanwhile the engine gives no bytes;
 //! 3. the question for the device ID, between jobs only;
 //! 4. the bytes of a job, which also end a wiring test.
@@ -14,8 +14,10 @@
 //! processor, with another handshake or when some status lines are not heeded. The port on pins also does everything between
 //! jobs: device ID, status, reset, wiring test.
 //!
-//! Cost: a poll takes well below a millisecond, except when the printer is asked something: each answer of
-//! a slow printer to a step of the negotiation may take 40 ms, and other code waits for as long.
+//! While the printer's +5 V is absent nothing is strobed: the engine gives no bytes, the sender gets none and strobes none of
+//! those it has, and they are taken back when the supply counts as gone.
+//!
+//! Cost: a poll takes well below a millisecond, whatever the printer does.
 
 mod board;
 mod introduction;
@@ -30,7 +32,7 @@ use self::introduction::{Action, Introduction};
 use self::question::{Outcome as Ended, StatusQuestion, Step};
 use self::supply::Supply;
 use crate::engine::{Engine, Outcome, Task};
-use crate::port::{AckPin, BadSettings, DataBus, Port, ReverseError, Stop, Timing};
+use crate::port::{AckPin, BadSettings, Conversation, DataBus, Port, Reverse, ReverseError, Stop, Timing};
 use crate::printer_class::DeviceId;
 use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
@@ -47,8 +49,9 @@ const TICK_US: u32 = 1000;
 /// How long to leave alone a printer that is at work on a byte, when the processor sends.
 const BUSY_US: u32 = 100;
 
-/// Bytes the processor sends in one poll: a tenth of a millisecond each at worst.
+/// Bytes the processor sends in one poll, and for how long at most it begins another.
 const HANDFUL: usize = 32;
+const HANDFUL_US: u64 = 300;
 
 /// Who works the pins.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -61,12 +64,24 @@ enum Owner {
     WiringTest,
 }
 
-/// What the printer is to send.
+/// For whom the printer is read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Reverse {
+enum Purpose {
+    /// The driver itself, which asks a printer that was switched on who it is.
+    Introduction,
+    /// The engine's task.
     DeviceId,
-    /// What it has to say, which is the answer to a question.
+    /// The status question.
     Answer,
+}
+
+/// The printer being read.
+struct Talk {
+    purpose: Purpose,
+    conversation: Conversation,
+    text: Text,
+    /// Bytes of the text that came before this conversation.
+    before: usize,
 }
 
 /// The driver of a board `B` and of the port on its pins.
@@ -84,6 +99,11 @@ pub struct Driver<B, D, O, I, A, T> {
     stop: Option<Fault>,
     introduction: Introduction,
     question: Option<StatusQuestion>,
+    talk: Option<Talk>,
+    /// The printer has negotiated since it was switched on.
+    talks: bool,
+    /// The lines as they were last read outside of a conversation, which has other uses for them.
+    lines: Lines,
     /// Job and state that were last written to the log.
     logged: Option<(u32, JobState)>,
 }
@@ -112,6 +132,9 @@ where
             stop: None,
             introduction: Introduction::Waiting,
             question: None,
+            talk: None,
+            talks: false,
+            lines: Lines::IDLE,
             logged: None,
         };
         driver.release_pins();
@@ -122,10 +145,12 @@ where
     /// port or the sender has emptied a buffer; 0 asks for the next poll at once.
     pub fn poll(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId) -> u32 {
         self.count(engine);
-        if self.question.is_some() {
+        if self.talk.is_some() {
+            self.go_on_talking(engine, id);
+        } else if self.question.is_some() {
             self.go_on_asking(engine);
         } else if let Some(task) = engine.task() {
-            self.perform(task, engine, id);
+            self.perform(task, engine);
         }
         let now_us = self.board.now_us();
         self.look(engine, now_us);
@@ -134,14 +159,15 @@ where
             self.release_pins();
         }
         let pause_us = match self.owner {
+            _ if self.talk.is_some() => BUSY_US,
             Owner::Sender => self.feed(engine),
             Owner::Processor => self.send(engine),
             Owner::WiringTest => TICK_US,
         };
         self.keep(engine);
         match &self.question {
-            None => pause_us,
-            Some(question) => pause_us.min(question.pause_us(self.board.now_us())),
+            Some(question) if self.talk.is_none() => pause_us.min(question.pause_us(self.board.now_us())),
+            _ => pause_us,
         }
     }
 
@@ -173,7 +199,8 @@ where
 
     /// Hands bytes to the sender until it is full.
     fn feed(&mut self, engine: &Engine<'_>) -> u32 {
-        while self.board.has_room() {
+        // Without the printer's supply not even for a dropout that costs no sheet.
+        while self.lines.high(Lines::POWER) && self.board.has_room() {
             // The oldest bytes of the output are those in flight already.
             let fresh = engine.output_behind(self.board.in_flight());
             if fresh.is_empty() || self.board.give(fresh) == 0 {
@@ -185,10 +212,14 @@ where
 
     /// Sends some bytes by the processor.
     fn send(&mut self, engine: &mut Engine<'_>) -> u32 {
-        let now_ms = wrapping_ms(self.board.now_us());
+        let start_us = self.board.now_us();
+        let now_ms = wrapping_ms(start_us);
         let output = engine.output();
         let (mut count, mut stop) = (0, None);
         for byte in &output[..output.len().min(HANDFUL)] {
+            if self.board.now_us() - start_us >= HANDFUL_US {
+                break;
+            }
             let written = self.port.write(core::slice::from_ref(byte), now_ms);
             if written.count == 0 {
                 stop = written.stop;
@@ -210,10 +241,15 @@ where
         }
     }
 
-    /// Reads the lines and tells the engine. If that ends a job, what is in flight is taken back.
+    /// Reads the lines and tells the engine. If the printer's supply is gone, what is in flight is taken back before, and what
+    /// has crossed of it counts.
     fn look(&mut self, engine: &mut Engine<'_>, now_us: u64) {
         let lines = self.board.lines();
-        let heeded = lines.heeding(self.heed);
+        self.lines = match self.talk {
+            None => lines,
+            Some(_) => Lines(self.lines.0 & !Lines::POWER | lines.0 & Lines::POWER),
+        };
+        let heeded = self.lines.heeding(self.heed);
         let fault = match self.supply.fault(heeded, now_us) {
             None if heeded.high(Lines::BUSY) && now_us - self.moved_us >= self.patience_us => {
                 Some(Fault::BusyTooLong)
@@ -221,29 +257,28 @@ where
             None => self.stop,
             fault => fault,
         };
-        let before = engine.progress().state;
-        engine.port(lines, fault);
-        if before != JobState::Lost && engine.progress().state == JobState::Lost {
-            self.board.stop();
+        if fault == Some(Fault::PowerOff) {
+            self.talks = false;
+            if self.board.in_flight() > 0 {
+                let sent = self.board.stop();
+                self.consumed(sent, engine);
+            }
         }
+        engine.port(self.lines, fault);
     }
 
     /// Asks a printer that has been switched on for its device ID, when it is time.
     fn introduce(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId, now_us: u64) {
-        let lines = self.board.lines().heeding(self.heed);
-        let free = self.owner != Owner::WiringTest && engine.is_idle();
+        let lines = self.lines.heeding(self.heed);
+        let free = self.owner != Owner::WiringTest && self.talk.is_none() && engine.is_idle();
         match self.introduction.look(lines, free, now_us) {
             Action::Nothing => {}
             Action::Forget => id.forget(),
-            Action::Ask => {
+            Action::Ask if engine.may_negotiate() => {
                 self.take_pins(engine);
-                let mut text = Text::new();
-                // An ID that breaks off is of use all the same.
-                let error = self.read(Reverse::DeviceId, &mut text);
-                let told = matches!(error, None | Some(ReverseError::Silent(_))) && id.learn(&text);
-                self.board.log(if told { Event::DeviceId(text.len()) } else { Event::NoDeviceId });
-                self.release_pins();
+                self.read(Purpose::Introduction, &[]);
             }
+            Action::Ask => {}
         }
     }
 
@@ -273,27 +308,21 @@ where
     }
 
     /// Performs a task of the engine, or begins to.
-    fn perform(&mut self, task: Task, engine: &mut Engine<'_>, id: &mut DeviceId) {
+    fn perform(&mut self, task: Task, engine: &mut Engine<'_>) {
         self.take_pins(engine);
-        let mut text = Text::new();
         let outcome = match task {
             Task::Configure(settings) => match self.configure(&settings) {
                 Ok(()) => Outcome::Done,
                 Err(BadSettings) => Outcome::BadSettings,
             },
-            Task::DeviceId => {
-                let error = self.read(Reverse::DeviceId, &mut text);
-                if error.is_none() {
-                    id.learn(&text);
-                }
-                Outcome::Answer(self.reply(&text, error))
-            }
+            Task::DeviceId => return self.read(Purpose::DeviceId, &[]),
             Task::PrinterStatus => {
-                self.question = Some(StatusQuestion::new(self.board.now_us()));
+                self.question = Some(StatusQuestion::new(self.board.now_us(), self.talks));
                 return self.go_on_asking(engine);
             }
             Task::Initialise => {
                 self.port.initialise();
+                self.talks = false;
                 Outcome::Done
             }
             Task::Bootloader => {
@@ -328,52 +357,96 @@ where
     /// Takes the next step of the status question, if it is due.
     fn go_on_asking(&mut self, engine: &mut Engine<'_>) {
         let Some(mut question) = self.question.take() else { return };
-        let mut text = Text::new();
         let now_us = self.board.now_us();
-        let ended = match question.step(now_us) {
-            Step::Write(bytes) => {
+        let fault = self.board.lines().heeding(self.heed).fault();
+        let ended = match (question.step(now_us), fault) {
+            // One that takes no bytes takes no question. What it has to say does not outlive its supply.
+            (_, Some(fault)) if fault == Fault::PowerOff || !question.is_put() => Some(Ended::Stopped(fault)),
+            (Step::Write(bytes), _) => {
                 let written = self.port.write(bytes, wrapping_ms(now_us));
                 question.written(written, self.board.now_us())
             }
-            Step::Read => {
-                // Shorter than the text may be.
-                let _ = text.extend_from_slice(question.so_far());
-                let error = self.read(Reverse::Answer, &mut text);
-                question.read(&text, error, self.board.now_us())
+            (Step::Read, _) => {
+                self.read(Purpose::Answer, question.so_far());
+                None
             }
-            Step::Wait => None,
-            Step::Over(ended) => Some(ended),
+            (Step::Wait, _) => None,
+            (Step::Over(ended), _) => Some(ended),
         };
+        match ended {
+            None => self.question = Some(question),
+            Some(ended) => self.answer(ended, &[], engine),
+        }
+    }
+
+    /// The status question has ended, with this text if it was answered.
+    fn answer(&mut self, ended: Ended, text: &[u8], engine: &mut Engine<'_>) {
         let answer = match ended {
-            None => {
-                self.question = Some(question);
-                return;
-            }
-            Some(Ended::Answered) => Answer::Bytes(&text),
-            Some(Ended::Failed(error)) => self.reply(&[], Some(error)),
-            Some(Ended::Stopped(fault)) => Answer::Stopped(fault),
-            Some(Ended::Silent) => Answer::Silent,
+            Ended::Answered => Answer::Bytes(text),
+            Ended::Failed(error) => self.reply(&[], Some(error)),
+            Ended::Stopped(fault) => Answer::Stopped(fault),
+            Ended::Silent => Answer::Silent,
         };
         engine.done(Outcome::Answer(answer));
         self.release_pins();
     }
 
-    /// Appends to the text what the printer sends of this, as far as it fits. Returns what has gone wrong.
-    fn read(&mut self, what: Reverse, text: &mut Text) -> Option<ReverseError> {
-        let have = text.len();
+    /// Begins to read what the printer sends, behind what has come before.
+    fn read(&mut self, purpose: Purpose, so_far: &[u8]) {
+        let what = if purpose == Purpose::Answer { Reverse::Answer } else { Reverse::DeviceId };
+        let mut text = Text::new();
+        // Shorter than the text may be.
+        let _ = text.extend_from_slice(so_far);
+        let before = text.len();
         // To its capacity, which always succeeds.
         let _ = text.resize(text.capacity(), 0);
-        let room = &mut text[have..];
-        let result = match what {
-            Reverse::DeviceId => self.port.device_id(room),
-            Reverse::Answer => self.port.read(room),
+        self.talk = Some(Talk { purpose, conversation: Conversation::new(what), text, before });
+    }
+
+    /// Goes on with reading, and at its end passes on what has come.
+    fn go_on_talking(&mut self, engine: &mut Engine<'_>, id: &mut DeviceId) {
+        let Some(talk) = &mut self.talk else { return };
+        let room = &mut talk.text[talk.before..];
+        let Some(result) = self.port.converse(&mut talk.conversation, room, self.board.now_us()) else {
+            return;
         };
-        let fresh = match result {
-            Ok(fresh) | Err(ReverseError::Silent(fresh)) => fresh,
-            Err(_) => 0,
+        let Some(Talk { purpose, mut text, before, .. }) = self.talk.take() else { return };
+        let (fresh, error) = match result {
+            Ok(fresh) => (fresh, None),
+            Err(ReverseError::Silent(fresh)) => (fresh, result.err()),
+            Err(error) => (0, Some(error)),
         };
-        text.truncate(have + fresh);
-        result.err()
+        text.truncate(before + fresh);
+        match error {
+            None | Some(ReverseError::Silent(_) | ReverseError::Refused) => self.talks = true,
+            Some(ReverseError::OneWay) => engine.shown_one_way(),
+            Some(ReverseError::NotIdle) => {}
+        }
+        // An ID that breaks off is of use all the same.
+        let whole = matches!(error, None | Some(ReverseError::Silent(_)));
+        match purpose {
+            Purpose::Introduction => {
+                let told = whole && id.learn(&text);
+                self.board.log(if told { Event::DeviceId(text.len()) } else { Event::NoDeviceId });
+                self.release_pins();
+            }
+            Purpose::DeviceId => {
+                if error.is_none() {
+                    id.learn(&text);
+                }
+                let answer = self.reply(&text, error);
+                engine.done(Outcome::Answer(answer));
+                self.release_pins();
+            }
+            Purpose::Answer => {
+                let now_us = self.board.now_us();
+                let ended = self.question.as_mut().and_then(|question| question.read(&text, error, now_us));
+                if let Some(ended) = ended {
+                    self.question = None;
+                    self.answer(ended, &text, engine);
+                }
+            }
+        }
     }
 
     /// What to tell the engine of what was read.

@@ -1,10 +1,11 @@
 //! The status question: two bytes to the printer, 38 bytes back.
 //!
 //! Problem: a printer may be at work when it is asked, takes its time with the answer, may send it in pieces, and may
-//! send nothing. Method: a state machine that says what to do next and is told what came of it. It offers the question
-//! until the printer has taken both bytes, then reads in nibble mode until the answer is complete, with a pause between
-//! any two attempts. Cost: a poll is at most one attempt, which takes as long as the port does (50 µs when the printer is
-//! busy, 40 ms for each step that a slow printer delays).
+//! send nothing. To one that cannot answer the question is two bytes of text. Method: a state machine that says what to do next
+//! and is told what came of it. Unless the printer is known to negotiate, that is tried first, and what it still had to say is
+//! dropped. Then the question is offered until the printer has taken both bytes, and nibble mode read until the answer is
+//! complete, with a pause between any two attempts. Cost: an attempt to write is one poll of the port's 50 µs; one to read
+//! goes on for as many polls as the printer takes.
 //!
 //! Limits: an answer of fewer than 38 bytes is none. That goes for a single byte, too: what a printer means by one on
 //! this port is not known. A printer that stops inside a byte is taken at its word, and what came is passed on.
@@ -28,6 +29,8 @@ pub(crate) const PAUSE_US: u64 = 10_000;
 
 /// A status question under way.
 pub(crate) struct StatusQuestion {
+    /// Whether the printer negotiates.
+    talks: bool,
     /// Bytes of the question that the printer has taken. With all of them taken, the answer is read.
     taken: usize,
     /// Attempts left to put the question, or to read the answer.
@@ -65,9 +68,9 @@ pub(crate) enum Outcome {
 }
 
 impl StatusQuestion {
-    /// A question that is to be put at `now_us`.
-    pub(crate) fn new(now_us: u64) -> Self {
-        StatusQuestion { taken: 0, left: ATTEMPTS, due_us: now_us, so_far: Vec::new() }
+    /// A question that is to be put at `now_us`. `talks` says whether the printer has been seen to negotiate.
+    pub(crate) fn new(now_us: u64, talks: bool) -> Self {
+        StatusQuestion { talks, taken: 0, left: ATTEMPTS, due_us: now_us, so_far: Vec::new() }
     }
 
     /// For how many µs there is nothing to do.
@@ -82,11 +85,16 @@ impl StatusQuestion {
             Step::Wait
         } else if self.left == 0 {
             Step::Over(Outcome::Silent)
-        } else if self.taken < STATUS.len() {
+        } else if self.talks && self.taken < STATUS.len() {
             Step::Write(&STATUS[self.taken..])
         } else {
             Step::Read
         }
+    }
+
+    /// Whether the printer has taken all of it.
+    pub(crate) fn is_put(&self) -> bool {
+        self.taken == STATUS.len()
     }
 
     /// What has come of the answer so far.
@@ -110,6 +118,10 @@ impl StatusQuestion {
     /// By now this much of the answer has come, what had come before included, and reading ended so; the attempt ended at
     /// `now_us`. Returns the end of the question, if this is it.
     pub(crate) fn read(&mut self, come: &[u8], error: Option<ReverseError>, now_us: u64) -> Option<Outcome> {
+        if !self.talks && matches!(error, None | Some(ReverseError::Silent(_))) {
+            (self.talks, self.due_us) = (true, now_us);
+            return None;
+        }
         match error {
             // Without a byte the printer is at work on the question.
             None | Some(ReverseError::NotIdle) => {}
@@ -169,7 +181,7 @@ mod tests {
         /// behind them, and has an answer exactly if 38 bytes came or the printer stopped behind some.
         #[test]
         fn every_question_comes_to_an_end(reactions in reactions(), took_us in 0u64..45_000) {
-            let (mut now, mut question) = (7u64, StatusQuestion::new(7));
+            let (mut now, mut question) = (7u64, StatusQuestion::new(7, true));
             let (mut put, mut attempts) = (Vec::new(), 0u64);
             let mut come = Vec::new();
             let mut reactions = reactions.into_iter().chain(core::iter::repeat(Reaction::Works));
@@ -239,7 +251,7 @@ mod tests {
 
     /// A question the printer has taken at once.
     fn taken() -> StatusQuestion {
-        let mut question = StatusQuestion::new(0);
+        let mut question = StatusQuestion::new(0, true);
         assert_eq!(question.step(0), Step::Write(&[5, 1]));
         assert_eq!(question.written(Written { count: 2, stop: None }, 0), None);
         question
@@ -247,7 +259,7 @@ mod tests {
 
     #[test]
     fn a_printer_that_takes_no_byte_is_given_up_after_two_seconds() {
-        let (mut question, mut now) = (StatusQuestion::new(0), 0);
+        let (mut question, mut now) = (StatusQuestion::new(0, true), 0);
         for _ in 0..200 {
             assert_eq!(question.step(now), Step::Write(&[5, 1]));
             assert_eq!(question.written(Written { count: 0, stop: Some(Stop::Busy) }, now), None);
@@ -267,6 +279,21 @@ mod tests {
             assert_eq!(ended, (attempt == 200).then_some(Outcome::Silent));
         }
         assert_eq!(now, 2_000_000);
+    }
+
+    #[test]
+    fn a_printer_not_known_to_negotiate_gets_no_byte_before_it_does() {
+        let mut question = StatusQuestion::new(0, false);
+        assert_eq!(question.step(0), Step::Read);
+        // At work on something: it is tried again.
+        assert_eq!(question.read(&[], Some(ReverseError::NotIdle), 0), None);
+        assert_eq!((question.step(0), question.step(10_000)), (Step::Wait, Step::Read));
+        // What it had to say is no answer to this question.
+        assert_eq!(question.read(&[7; 38], None, 10_000), None);
+        assert_eq!((question.step(10_000), question.so_far()), (Step::Write(&[5, 1]), &[][..]));
+        let mut question = StatusQuestion::new(0, false);
+        let way = ReverseError::OneWay;
+        assert_eq!(question.read(&[], Some(way), 40_000), Some(Outcome::Failed(way)));
     }
 
     #[test]

@@ -4,7 +4,8 @@ use super::job::{Cancel, Job, Marks, Phase, positions};
 use super::{Due, Engine, Identity, LEAST_MEMORY, LOCAL, Task};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage, VERSION,
+    hello_version,
 };
 use protocol::rgl::Track;
 
@@ -28,6 +29,8 @@ impl Engine<'_> {
                     bytes = rest;
                     match frame::decode(message) {
                         Ok(message) => self.follow(message),
+                        // A host of another version learns by the answer that it is one.
+                        Err(frame::Unknown) if hello_version(message).is_some() => self.greet(),
                         Err(frame::Unknown) => self.refuse(Refusal::Unknown, 0),
                     }
                 }
@@ -41,13 +44,19 @@ impl Engine<'_> {
 
     fn follow(&mut self, message: ToBridge<'_>) {
         match message {
-            ToBridge::Hello { .. } => (self.due.hello, self.due.progress) = (true, true),
+            ToBridge::Hello { .. } => self.greet(),
             ToBridge::Begin { job, kind, length } => self.begin(job, kind, length),
             ToBridge::Data { job, offset, bytes } => self.take(job, offset, bytes),
             ToBridge::Cancel { job } => self.cancel(job),
             ToBridge::Ask { request, what: Ask::Lines } => self.due.lines = Some(request),
-            ToBridge::Ask { request, what: Ask::Printer } => self.ask(request, Task::PrinterStatus),
-            ToBridge::Ask { request, what: Ask::DeviceId } => self.ask(request, Task::DeviceId),
+            ToBridge::Ask { request, what: Ask::Printer } if !self.at_rest && self.job.is_none() => {
+                self.due.answer = Some((request, Answer::Unsure));
+            }
+            ToBridge::Ask { request, what: Ask::Printer | Ask::PrinterAtRest } => {
+                self.negotiate(request, Task::PrinterStatus);
+            }
+            ToBridge::Ask { request, what: Ask::DeviceId } => self.negotiate(request, Task::DeviceId),
+            ToBridge::Ask { request, what: Ask::Board } => self.due.usage = Some(request),
             ToBridge::Configure(settings) => {
                 // Harmless at any time, and needed most when a job is stuck.
                 if !self.assign(Task::Configure(settings), None) {
@@ -66,7 +75,12 @@ impl Engine<'_> {
             ToBridge::Drive { data, control } => self.between_jobs(Task::Drive { data, control }),
             ToBridge::Probe { request, data, control } => self.ask(request, Task::Probe { data, control }),
             ToBridge::ReadLog { request, from } => self.due.log = Some((request, from)),
+            ToBridge::Abandon { job } => self.abandon(job),
         }
+    }
+
+    fn greet(&mut self) {
+        (self.due.hello, self.due.past, self.due.progress) = (true, true, true);
     }
 
     fn begin(&mut self, id: u32, kind: JobKind, length: u32) {
@@ -90,7 +104,8 @@ impl Engine<'_> {
             }
             return;
         }
-        if self.earlier.contains(&id) {
+        if self.remembered(id).is_some() {
+            self.due.past = true;
             return self.refuse(Refusal::OtherJob, id);
         }
         if !self.open(id, kind, length) {
@@ -102,9 +117,6 @@ impl Engine<'_> {
     fn open(&mut self, id: u32, kind: JobKind, length: u32) -> bool {
         if self.data.capacity() < LEAST_MEMORY || self.output.capacity() < LEAST_MEMORY {
             return false;
-        }
-        if self.last.job != 0 && self.last.job != LOCAL {
-            self.earlier.write(self.last.job);
         }
         self.job = Some(Job::new(id, kind, length));
         self.clear();
@@ -179,6 +191,8 @@ impl Engine<'_> {
             if self.last.job == id {
                 // It has ended, and the host does not know.
                 self.due.progress = true;
+            } else if self.remembered(id).is_some() {
+                self.due.past = true;
             } else {
                 self.refuse(Refusal::NoSuchJob, id);
             }
@@ -209,6 +223,7 @@ impl Engine<'_> {
 
     fn cancel(&mut self, id: u32) {
         self.due.progress = true;
+        let remembered = self.remembered(id).is_some();
         match &mut self.job {
             Some(job) if job.id == id => {
                 // After a reset the data are needed even for this: only they tell what the printer waits for.
@@ -217,13 +232,42 @@ impl Engine<'_> {
                 }
             }
             _ if self.last.job == id => {}
+            _ if remembered => self.due.past = true,
             _ => self.refuse(Refusal::NoSuchJob, id),
+        }
+    }
+
+    /// Ends a job at once, wherever it stands. Only the board can say what has crossed the port by then, so the job ends with the
+    /// reset behind it.
+    fn abandon(&mut self, id: u32) {
+        self.due.progress = true;
+        match &self.job {
+            // The host repeats itself if the board has something else to do.
+            Some(job) if job.id == id => {
+                if self.assign(Task::Initialise, None) {
+                    self.abandoned = Some(id);
+                }
+            }
+            _ if self.last.job == id => {}
+            _ if self.remembered(id).is_some() => self.due.past = true,
+            _ => self.refuse(Refusal::NoSuchJob, id),
+        }
+    }
+
+    /// A question that needs a negotiation with the printer.
+    fn negotiate(&mut self, request: u16, task: Task) {
+        if self.job.is_none() && self.owes_reset && task == Task::PrinterStatus {
+            self.due.answer = Some((request, Answer::Unsure));
+        } else if self.job.is_none() && self.one_way {
+            self.due.answer = Some((request, Answer::OneWay));
+        } else {
+            self.ask(request, task);
         }
     }
 
     fn ask(&mut self, request: u16, task: Task) {
         if self.job.is_some() || !self.assign(task, Some(request)) {
-            self.due.not_now = Some(request);
+            self.due.answer = Some((request, Answer::NotNow));
         }
     }
 
@@ -243,6 +287,9 @@ impl Engine<'_> {
         if let Some((reason, job)) = self.due.refused.take() {
             return wrote(ToHost::Refused { reason, job }, out);
         }
+        if core::mem::take(&mut self.due.past) {
+            return wrote(ToHost::Past(self.past), out);
+        }
         let now = self.progress();
         if self.due.progress || self.worth_reporting(&now) {
             self.due.progress = false;
@@ -252,8 +299,8 @@ impl Engine<'_> {
         if let Some(request) = self.due.lines.take() {
             return wrote(ToHost::Lines { request, lines: self.lines, fault: self.fault }, out);
         }
-        if let Some(request) = self.due.not_now.take() {
-            return wrote(ToHost::Answer { request, answer: Answer::NotNow }, out);
+        if let Some((request, answer)) = self.due.answer.take() {
+            return wrote(ToHost::Answer { request, answer }, out);
         }
         let length = self.frame.len();
         out[..length].copy_from_slice(&self.frame);
@@ -276,6 +323,20 @@ impl Engine<'_> {
         let _ = self.frame.resize_default(MAX);
         let length = frame::write(message, &mut self.frame).unwrap_or(0);
         self.frame.truncate(length);
+    }
+
+    /// Whether the host wants to know the firmware's use of memory and time.
+    pub fn usage_wanted(&self) -> bool {
+        self.due.usage.is_some() && self.frame.is_empty()
+    }
+
+    /// The firmware's use of memory and time, for the host that asked for it.
+    pub fn usage(&mut self, usage: Usage) {
+        if self.usage_wanted()
+            && let Some(request) = self.due.usage.take()
+        {
+            self.prepare(&ToHost::Board { request, usage });
+        }
     }
 
     /// From which byte on the host wants the log, if it does.

@@ -9,14 +9,19 @@
 //! * [`Engine::output`] to the port, [`Engine::consumed`] for what has crossed it, [`Engine::port`] for the state of the
 //!   lines;
 //! * [`Engine::task`] for what only the board can do, [`Engine::done`] for its outcome;
-//! * a piece of the log to [`Engine::log`] when [`Engine::log_wanted`]; [`Engine::transmit`] to the link until it returns
-//!   nothing;
+//! * a piece of the log to [`Engine::log`] when [`Engine::log_wanted`], its own use to [`Engine::usage`] when
+//!   [`Engine::usage_wanted`]; [`Engine::transmit`] to the link until it returns nothing;
 //! * [`Engine::checkpoint`] to memory that outlives a reset, whenever bytes were consumed.
 //!
 //! **One byte, once.** Data carry their offset, and only the byte that comes next is taken. The bytes made from them
 //! depend on nothing but the data, so the bytes at the port are the same however the link behaved. After a reset with a
 //! [`Checkpoint`] the host sends the data again from the beginning. The engine works through them again and leaves out
 //! as many bytes as had crossed the port.
+//!
+//! **What the printer stands in.** A question to the printer is two bytes at its port. They are row data to a printer inside a
+//! job, and nothing to one that cannot answer. So the engine knows whether the printer stands between two jobs: from the end of
+//! a job, a reset or the printer's switch on, and not when the bridge itself has just lost its memory. Nothing is given out
+//! while the printer's supply is absent.
 //!
 //! **Two queues.** Accepted data wait in one, printer bytes in the other, so the port has work while a band is being
 //! decoded, and the link has credit while the printer is busy.
@@ -28,10 +33,10 @@ mod work;
 use self::job::{Cancel, Job, Marks, Phase, positions};
 use crate::ring::Ring;
 use crate::streams::{Streams, WRITE_ROOM};
-use heapless::{HistoryBuf, Vec};
+use heapless::Vec;
 use protocol::link::frame::MAX;
 use protocol::link::message::{
-    Answer, Fault, JobKind, JobState, Lines, PortSettings, Progress, Refusal, ToHost,
+    Answer, Fault, JobKind, JobState, Lines, PAST, PastJob, PortSettings, Progress, Refusal, ToHost,
 };
 use protocol::rgl::Track;
 
@@ -115,6 +120,12 @@ pub struct Checkpoint {
     pub ends_at: Option<u32>,
     /// Whether the printer still has to be reset: after this job or, if it is open, before its first byte.
     pub needs_reset: bool,
+    /// Whether the printer is known to stand between two jobs, if none is open.
+    pub at_rest: bool,
+    /// Whether the printer has shown that it does not negotiate.
+    pub one_way: bool,
+    /// The jobs of the link that have ended, the last one first.
+    pub past: [PastJob; PAST],
 }
 
 /// A task, and the number of the host's question if it answers one.
@@ -141,10 +152,14 @@ struct Due {
     hello: bool,
     progress: bool,
     lines: Option<u16>,
+    past: bool,
     refused: Option<(Refusal, u32)>,
-    not_now: Option<u16>,
+    /// Number of a question that needs no board, and the answer.
+    answer: Option<(u16, Answer<'static>)>,
     /// Number of a question for the log, and from which byte on.
     log: Option<(u16, u32)>,
+    /// Number of a question for the firmware's own use.
+    usage: Option<u16>,
 }
 
 /// The engine. Some 13 KB beside the [`Memory`] it is given.
@@ -164,8 +179,8 @@ pub struct Engine<'m> {
     last: Progress,
     /// Its kind and length, if known.
     last_shape: Option<(JobKind, u32)>,
-    /// Numbers of the jobs before that one.
-    earlier: HistoryBuf<u32, 8>,
+    /// The jobs of the link that have ended, the last one first.
+    past: [PastJob; PAST],
     due: Due,
     /// The progress last sent to the host.
     reported: Progress,
@@ -177,6 +192,12 @@ pub struct Engine<'m> {
     /// A job has ended where the printer's state is not known: the printer gets no byte before it was reset, whatever job
     /// is open now.
     owes_reset: bool,
+    /// The host gives up this job: it ends once the board has nothing in flight, with the printer's reset.
+    abandoned: Option<u32>,
+    /// The printer is known to stand between two jobs, if none is open.
+    at_rest: bool,
+    /// The printer has shown that it does not negotiate, and was not switched off or reset since.
+    one_way: bool,
 }
 
 const NOTHING: Progress =
@@ -199,7 +220,7 @@ impl<'m> Engine<'m> {
             job: None,
             last: NOTHING,
             last_shape: None,
-            earlier: HistoryBuf::new(),
+            past: [PastJob::NONE; PAST],
             due: Due::default(),
             reported: NOTHING,
             frame: Vec::new(),
@@ -207,14 +228,18 @@ impl<'m> Engine<'m> {
             fault: None,
             board: Board::Free,
             owes_reset: false,
+            abandoned: None,
+            at_rest: false,
+            one_way: false,
         }
     }
 
     /// An engine that continues where another one was when it was reset.
     pub fn resume(memory: Memory<'m>, identity: Identity, checkpoint: Checkpoint) -> Self {
         let mut engine = Self::new(memory, identity);
-        let Checkpoint { progress, ends_at, needs_reset } = checkpoint;
-        engine.owes_reset = needs_reset;
+        let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past } = checkpoint;
+        (engine.owes_reset, engine.at_rest, engine.one_way) = (needs_reset, at_rest, one_way);
+        engine.past = past;
         if progress.job == 0 || is_final(progress.state) {
             engine.last = progress;
             return engine;
@@ -222,8 +247,13 @@ impl<'m> Engine<'m> {
         if progress.job == LOCAL {
             // An operating system does not send again what it has sent to a plain printer.
             engine.last = Progress { state: JobState::Lost, ..progress };
+            // Once it is seen to be there.
             engine.owes_reset = true;
-            engine.assign(Task::Initialise, None);
+            return engine;
+        }
+        if let Some(PastJob { state, printed, .. }) = engine.remembered(progress.job) {
+            // The reset came between the job's end and this checkpoint.
+            engine.last = Progress { state, printed, limit: progress.accepted, ..progress };
             return engine;
         }
         engine.job = Some(Job {
@@ -245,7 +275,15 @@ impl<'m> Engine<'m> {
             ends_at: self.job.as_ref().and_then(Job::ends_at),
             // What an open job needs behind it turns out again when the job is worked through again.
             needs_reset: self.owes_reset,
+            at_rest: self.at_rest,
+            one_way: self.one_way,
+            past: self.past,
         }
+    }
+
+    /// How an earlier job of the link has ended, if that is remembered.
+    fn remembered(&self, job: u32) -> Option<PastJob> {
+        self.past.iter().copied().find(|past| job != 0 && past.job == job)
     }
 
     /// Where the job stands.
@@ -278,9 +316,10 @@ impl<'m> Engine<'m> {
 
     /// Bytes for the port after the next `skip`, which are already on their way.
     pub fn output_behind(&self, skip: usize) -> &[u8] {
-        // Nothing else uses the port during a task, and a printer that must be reset gets nothing before that.
+        // Nothing else uses the port during a task, a printer that must be reset gets nothing before that, and one without its
+        // supply nothing at all.
         match self.board {
-            Board::Free if !self.owes_reset => self.output.behind(skip),
+            Board::Free if !self.owes_reset && !self.is_off() => self.output.behind(skip),
             _ => &[],
         }
     }
@@ -302,7 +341,12 @@ impl<'m> Engine<'m> {
     /// one.
     pub fn port(&mut self, lines: Lines, fault: Option<Fault>) {
         (self.lines, self.fault) = (lines, fault);
-        if fault == Some(Fault::PowerOff) && self.job.as_ref().is_some_and(|job| job.printed > 0) {
+        if self.is_off() {
+            // Another one may be behind the cable when it is on again.
+            self.one_way = false;
+            self.at_rest = true;
+        }
+        if self.is_off() && self.job.as_ref().is_some_and(|job| job.printed > 0) {
             // A printer that is switched on again would print the rest of a row as text. If only the cable was pulled,
             // it would read the next job as the rest of the row.
             self.end(JobState::Lost);
@@ -312,9 +356,29 @@ impl<'m> Engine<'m> {
         }
     }
 
+    /// Whether the printer's supply is absent.
+    fn is_off(&self) -> bool {
+        self.fault == Some(Fault::PowerOff)
+    }
+
+    /// The levels of the port's lines when they were last told.
+    pub fn lines(&self) -> Lines {
+        self.lines
+    }
+
     /// Whether no job is open and the board has nothing to do: the printer may be asked something.
     pub fn is_idle(&self) -> bool {
         self.job.is_none() && matches!(self.board, Board::Free)
+    }
+
+    /// Whether a negotiation with the printer may have an answer: it has not shown that it does not negotiate.
+    pub fn may_negotiate(&self) -> bool {
+        !self.one_way
+    }
+
+    /// The printer has not answered a negotiation. It is not tried again before it was switched off or reset.
+    pub fn shown_one_way(&mut self) {
+        self.one_way = true;
     }
 
     /// What the board has to do. Each task is given once.
@@ -329,8 +393,7 @@ impl<'m> Engine<'m> {
         let board = core::mem::replace(&mut self.board, Board::Free);
         let (Board::Assigned(done) | Board::Working(done)) = board else { return };
         if done.task == Task::Initialise {
-            // A printer that is off has not noticed.
-            self.owes_reset &= self.fault == Some(Fault::PowerOff);
+            self.initialised();
         }
         match (outcome, done.request) {
             (Outcome::BadSettings, _) => self.refuse(Refusal::Settings, 0),
@@ -340,7 +403,30 @@ impl<'m> Engine<'m> {
             }
             (Outcome::Done | Outcome::Answer(_) | Outcome::Lines(_), _) => {}
         }
-        if self.owes_reset && self.fault != Some(Fault::PowerOff) {
+        self.reset_if_owed();
+    }
+
+    /// The printer was reset, with nothing in flight.
+    fn initialised(&mut self) {
+        // A printer that is off has not noticed.
+        let noticed = !self.is_off();
+        let abandoned = self.abandoned.take();
+        if let Some(job) = &self.job
+            && abandoned == Some(job.id)
+        {
+            let begun = job.printed > 0;
+            self.end(if begun { JobState::Lost } else { JobState::Cancelled });
+            self.owes_reset |= begun;
+        }
+        self.owes_reset &= !noticed;
+        if noticed {
+            (self.at_rest, self.one_way) = (true, false);
+        }
+    }
+
+    /// Has the printer reset, if it must be and can be.
+    fn reset_if_owed(&mut self) {
+        if self.owes_reset && !self.is_off() {
             self.assign(Task::Initialise, None);
         }
     }

@@ -1,9 +1,9 @@
 //! From accepted data to printer bytes, and how a job ends.
 
 use super::job::{Cancel, Phase, positions};
-use super::{Engine, Task};
+use super::{Engine, LOCAL};
 use crate::streams::WRITE_ROOM;
-use protocol::link::message::{Defect, DefectKind, JobKind, JobState, Progress};
+use protocol::link::message::{Defect, DefectKind, JobKind, JobState, PastJob, Progress};
 
 impl Engine<'_> {
     /// Does a slice of work, if there is any, and returns whether there may be more.
@@ -180,10 +180,9 @@ impl Engine<'_> {
             && self.output.is_empty()
         {
             self.end(state);
-            if needs_reset {
-                self.owes_reset = true;
-                self.assign(Task::Initialise, None);
-            }
+            self.at_rest |= self.last.printed > 0;
+            self.owes_reset |= needs_reset;
+            self.reset_if_owed();
         }
     }
 
@@ -192,6 +191,10 @@ impl Engine<'_> {
         if let Some(job) = self.job.take() {
             self.last = Progress { state, limit: progress.accepted, ..progress };
             self.last_shape = (job.length > 0).then_some((job.kind, job.length));
+            if job.id != LOCAL {
+                self.past.rotate_right(1);
+                self.past[0] = PastJob { job: job.id, state, printed: progress.printed };
+            }
         }
         self.clear();
         self.due.progress = true;

@@ -59,9 +59,10 @@ where
             }
             self.pins.data.put(byte);
             self.delay.delay_ns(self.timing.setup);
-            // The printer may have gone busy or off line in the meantime; the data may stand, nobody latches.
+            // The printer may have gone busy or off line in the meantime; the data may stand, nobody latches. Setting up again and
+            // again could take milliseconds.
             if !self.ready() {
-                continue;
+                break;
             }
             self.pins.ack.arm();
             let Ok(()) = self.pins.strobe.set_low();

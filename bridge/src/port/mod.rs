@@ -5,9 +5,8 @@
 //! for paper, and the caller has a link to serve. Nothing is lost by that, since a byte is counted when it has
 //! been strobed and only then.
 //!
-//! [`Port::device_id`] and [`Port::read`] turn the conversation round. They hold the caller for tens of
-//! milliseconds when the printer is slow, and are for the time between jobs only: old printers take nSelectIn
-//! high for a deselection.
+//! [`Port::converse`] turns the conversation round. It is for the time between jobs only: old printers take nSelectIn
+//! high for a deselection. Nothing here holds the caller for longer than half a millisecond.
 //!
 //! Source: IEEE 1284-1994 events and limits as commonly published, parallel-port FIFO data sheets for the
 //! times around Busy, the Linux parport driver for what printers put up with. Levels are those on the wire.
@@ -19,7 +18,7 @@ mod timing;
 
 pub use forward::{Stop, Written};
 pub use pins::{AckPin, DataBus, Pins, Pins8, Polled};
-pub use reverse::ReverseError;
+pub use reverse::{Conversation, Reverse, ReverseError};
 pub use timing::{BadSettings, Timing};
 
 use embedded_hal::delay::DelayNs;

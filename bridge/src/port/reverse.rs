@@ -1,8 +1,15 @@
 //! Negotiation and nibble mode: bytes from the printer over its five status lines.
 //!
+//! Problem: the standard gives a printer 35 ms for each of its answers, and everything else has to go on meanwhile. Method: a
+//! [`Conversation`] is taken up again and again, each time for a few hundred looks at the lines, and remembers its event. A
+//! printer that answers at once is read without a pause.
+//!
 //! The data lines stay outputs, so one-way buffers do. A printer that does not know IEEE 1284 does not answer
 //! the first step within 35 ms; the lines then go back to where they were and forward printing goes on.
 //! The event numbers are the standard's.
+//!
+//! Cost: [`Port::converse`] looks at the lines [`LOOKS`] times at most, a microsecond apart. Limits: the printer's time counts
+//! from call to call, so a caller that comes late gives it longer.
 
 use super::{AckPin, DataBus, Port};
 use core::convert::Infallible;
@@ -13,7 +20,7 @@ use protocol::link::message::Lines;
 /// Why nothing could be read.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ReverseError {
-    /// The printer is busy or has a fault; it might answer, but its buffered data are not to be risked.
+    /// The printer is busy, so its buffered data are not to be risked; or its supply is absent.
     NotIdle,
     /// No answer to the negotiation: not a 1284 device, or switched off.
     OneWay,
@@ -23,16 +30,74 @@ pub enum ReverseError {
     Silent(usize),
 }
 
-/// Extensibility byte: nibble mode.
-const NIBBLE: u8 = 0x00;
-/// Extensibility byte: device ID in nibble mode.
-const DEVICE_ID: u8 = 0x04;
+/// What the printer is to send.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reverse {
+    /// Its device ID as it sends it, two length bytes and text. The length bytes are not believed (printers send them in either
+    /// order, or wrong): it ends where the printer says that there is no more.
+    DeviceId,
+    /// What it has to say now, often nothing. An answer to a question may take the printer seconds: ask again.
+    Answer,
+}
+
+impl Reverse {
+    /// The extensibility byte: device ID in nibble mode, or nibble mode.
+    fn mode(self) -> u8 {
+        match self {
+            Reverse::DeviceId => 0x04,
+            Reverse::Answer => 0x00,
+        }
+    }
+}
 
 /// Limit of the standard for every answer of the printer, in µs, and what the Linux driver adds to it.
-const ANSWER_US: u32 = 40_000;
+const ANSWER_US: u64 = 40_000;
 
 /// Between two looks, in µs.
-const POLL_US: u32 = 1;
+const LOOK_US: u32 = 1;
+
+/// Looks at the lines before [`Port::converse`] returns to its caller.
+const LOOKS: u32 = 150;
+
+/// What the printer is waited for.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Event {
+    /// Nothing yet: the conversation has not begun.
+    Begin,
+    /// Event 2: it knows IEEE 1284.
+    Known,
+    /// Events 5 and 6: it has taken the mode.
+    Mode,
+    /// Event 9: a nibble is on the lines.
+    Nibble,
+    /// Event 11: it has seen that the nibble was read.
+    Read,
+    /// Event 24, on the way back.
+    Leaving,
+    /// Event 27.
+    Left,
+}
+
+/// A conversation in the reverse direction.
+pub struct Conversation {
+    what: Reverse,
+    event: Event,
+    /// Since when the event is waited for, by the caller's clock.
+    since_us: u64,
+    /// The lower half of the byte under way.
+    low: Option<u8>,
+    /// Bytes in the buffer.
+    count: usize,
+    /// What to report when the port is back in compatibility mode.
+    outcome: Result<usize, ReverseError>,
+}
+
+impl Conversation {
+    /// One that has not begun.
+    pub fn new(what: Reverse) -> Self {
+        Conversation { what, event: Event::Begin, since_us: 0, low: None, count: 0, outcome: Ok(0) }
+    }
+}
 
 impl<D, O, I, A, T> Port<D, O, I, A, T>
 where
@@ -42,112 +107,138 @@ where
     A: AckPin,
     T: DelayNs,
 {
-    /// The device ID as the printer sends it, two length bytes and text; as much as fits `buffer`. The length
-    /// bytes are not believed (printers send them in either order, or wrong): it ends where the printer says
-    /// that there is no more.
-    pub fn device_id(&mut self, buffer: &mut [u8]) -> Result<usize, ReverseError> {
-        self.reverse(DEVICE_ID, buffer)
-    }
-
-    /// What the printer has to say now, as much as fits `buffer`; often nothing. An answer to a question may take
-    /// the printer seconds: ask again.
-    pub fn read(&mut self, buffer: &mut [u8]) -> Result<usize, ReverseError> {
-        self.reverse(NIBBLE, buffer)
-    }
-
-    fn reverse(&mut self, mode: u8, buffer: &mut [u8]) -> Result<usize, ReverseError> {
-        if self.lines().high(Lines::BUSY) {
-            return Err(ReverseError::NotIdle);
-        }
-        self.negotiate(mode)?;
-        let mut count = 0;
-        let outcome = loop {
-            if count == buffer.len() {
-                break Ok(count);
-            }
-            match self.byte() {
-                Ok(Some(byte)) => {
-                    buffer[count] = byte;
-                    count += 1;
-                }
-                Ok(None) => break Ok(count),
-                Err(()) => break Err(ReverseError::Silent(count)),
-            }
-        };
-        self.terminate();
-        outcome
-    }
-
-    /// Events 0 to 6. On failure the port is back in compatibility mode.
-    fn negotiate(&mut self, mode: u8) -> Result<(), ReverseError> {
-        self.pins.data.put(mode);
-        self.delay.delay_us(10);
-        let (Ok(()), Ok(())) = (self.pins.select_in.set_high(), self.pins.auto_feed.set_low());
-        let answer = Lines::PAPER_OUT | Lines::SELECT | Lines::FAULT;
-        if !self.wait(|lines| lines.high(answer) && !lines.high(Lines::ACK)) {
-            self.rest();
-            return Err(ReverseError::OneWay);
-        }
-        let Ok(()) = self.pins.strobe.set_low();
-        self.delay.delay_us(5);
-        let (Ok(()), Ok(())) = (self.pins.strobe.set_high(), self.pins.auto_feed.set_high());
-        if !self.wait(|lines| lines.high(Lines::ACK)) {
-            self.terminate();
-            return Err(ReverseError::OneWay);
-        }
-        // XFlag: 0 says yes to plain nibble mode, which every 1284 device has, and no to everything else.
-        if self.lines().high(Lines::SELECT) != (mode != NIBBLE) {
-            self.terminate();
-            return Err(ReverseError::Refused);
-        }
-        Ok(())
-    }
-
-    /// One byte, low nibble first, or none if the printer has no more.
-    fn byte(&mut self) -> Result<Option<u8>, ()> {
-        if self.lines().high(Lines::FAULT) {
-            return Ok(None);
-        }
-        let low = self.nibble()?;
-        let high = self.nibble()?;
-        Ok(Some(low | high << 4))
-    }
-
-    /// Events 7 to 11.
-    fn nibble(&mut self) -> Result<u8, ()> {
-        let Ok(()) = self.pins.auto_feed.set_low();
-        if !self.wait(|lines| !lines.high(Lines::ACK)) {
-            return Err(());
-        }
-        let lines = self.lines();
-        let Ok(()) = self.pins.auto_feed.set_high();
-        if !self.wait(|lines| lines.high(Lines::ACK)) {
-            return Err(());
-        }
-        let bits = [Lines::FAULT, Lines::SELECT, Lines::PAPER_OUT, Lines::BUSY];
-        Ok(bits.iter().enumerate().fold(0, |nibble, (i, &line)| nibble | u8::from(lines.high(line)) << i))
-    }
-
-    /// Events 22 to 29; a printer that does not follow is left behind by force, which the standard allows at any
-    /// time.
-    fn terminate(&mut self) {
-        let (Ok(()), Ok(())) = (self.pins.select_in.set_low(), self.pins.auto_feed.set_high());
-        if self.wait(|lines| !lines.high(Lines::ACK)) {
-            let Ok(()) = self.pins.auto_feed.set_low();
-            self.wait(|lines| lines.high(Lines::ACK));
-        }
-        self.rest();
-    }
-
-    fn wait(&mut self, until: impl Fn(Lines) -> bool) -> bool {
-        for _ in 0..ANSWER_US / POLL_US {
+    /// Goes on with a conversation: the same buffer each time, which gets as much as fits. Returns how many bytes have come, once
+    /// the port is back in compatibility mode; until then, call it again soon.
+    pub fn converse(
+        &mut self,
+        talk: &mut Conversation,
+        buffer: &mut [u8],
+        now_us: u64,
+    ) -> Option<Result<usize, ReverseError>> {
+        for _ in 0..LOOKS {
             let lines = self.lines();
-            if until(lines) {
-                // The other lines are valid before nAck moves, but ours were not read all at once.
+            if !lines.heeding(self.heed).high(Lines::POWER) {
+                self.rest();
+                return Some(Err(ReverseError::NotIdle));
+            }
+            if self.has_come(talk, lines) {
+                talk.since_us = now_us;
+                if self.go_on(talk, lines, buffer) {
+                    return Some(talk.outcome);
+                }
+            } else if now_us.saturating_sub(talk.since_us) >= ANSWER_US {
+                talk.since_us = now_us;
+                if self.give_up(talk) {
+                    return Some(talk.outcome);
+                }
+            } else {
+                self.delay.delay_us(LOOK_US);
+            }
+        }
+        None
+    }
+
+    /// Whether the lines show the event.
+    fn has_come(&self, talk: &Conversation, lines: Lines) -> bool {
+        let ack = lines.high(Lines::ACK);
+        match talk.event {
+            Event::Begin => true,
+            Event::Known => lines.high(Lines::PAPER_OUT | Lines::SELECT | Lines::FAULT) && !ack,
+            Event::Nibble | Event::Leaving => !ack,
+            // The other lines are valid before nAck moves.
+            Event::Mode | Event::Read | Event::Left => ack,
+        }
+    }
+
+    /// Takes the step behind the event; true at the end.
+    fn go_on(&mut self, talk: &mut Conversation, lines: Lines, buffer: &mut [u8]) -> bool {
+        match talk.event {
+            Event::Begin => {
+                if lines.high(Lines::BUSY) {
+                    talk.outcome = Err(ReverseError::NotIdle);
+                    return true;
+                }
+                self.pins.data.put(talk.what.mode());
+                self.delay.delay_us(10);
+                let (Ok(()), Ok(())) = (self.pins.select_in.set_high(), self.pins.auto_feed.set_low());
+                talk.event = Event::Known;
+            }
+            Event::Known => {
+                let Ok(()) = self.pins.strobe.set_low();
+                self.delay.delay_us(5);
+                let (Ok(()), Ok(())) = (self.pins.strobe.set_high(), self.pins.auto_feed.set_high());
+                talk.event = Event::Mode;
+            }
+            // XFlag: 0 says yes to plain nibble mode, which every 1284 device has, and no to everything else.
+            Event::Mode if lines.high(Lines::SELECT) != (talk.what != Reverse::Answer) => {
+                self.leave(talk, Err(ReverseError::Refused));
+            }
+            Event::Mode => self.next_byte(talk, lines, buffer),
+            Event::Nibble => {
+                let bits = [Lines::FAULT, Lines::SELECT, Lines::PAPER_OUT, Lines::BUSY];
+                let nibble = bits
+                    .iter()
+                    .enumerate()
+                    .fold(0, |nibble, (i, &line)| nibble | u8::from(lines.high(line)) << i);
+                let Ok(()) = self.pins.auto_feed.set_high();
+                if let Some(low) = talk.low.take() {
+                    buffer[talk.count] = low | nibble << 4;
+                    talk.count += 1;
+                } else {
+                    talk.low = Some(nibble);
+                }
+                talk.event = Event::Read;
+            }
+            Event::Read if talk.low.is_some() => self.ask_nibble(talk),
+            Event::Read => self.next_byte(talk, lines, buffer),
+            Event::Leaving => {
+                let Ok(()) = self.pins.auto_feed.set_low();
+                talk.event = Event::Left;
+            }
+            Event::Left => {
+                self.rest();
                 return true;
             }
-            self.delay.delay_us(POLL_US);
         }
         false
+    }
+
+    /// The printer has not come to the event in its time; true at the end. One that does not follow is left behind by force,
+    /// which the standard allows at any time.
+    fn give_up(&mut self, talk: &mut Conversation) -> bool {
+        match talk.event {
+            Event::Begin | Event::Known => talk.outcome = Err(ReverseError::OneWay),
+            Event::Mode => {
+                self.leave(talk, Err(ReverseError::OneWay));
+                return false;
+            }
+            Event::Nibble | Event::Read => {
+                self.leave(talk, Err(ReverseError::Silent(talk.count)));
+                return false;
+            }
+            Event::Leaving | Event::Left => {}
+        }
+        self.rest();
+        true
+    }
+
+    /// Event 7 for the next byte, if there is one and it has room.
+    fn next_byte(&mut self, talk: &mut Conversation, lines: Lines, buffer: &[u8]) {
+        if talk.count == buffer.len() || lines.high(Lines::FAULT) {
+            self.leave(talk, Ok(talk.count));
+        } else {
+            self.ask_nibble(talk);
+        }
+    }
+
+    fn ask_nibble(&mut self, talk: &mut Conversation) {
+        let Ok(()) = self.pins.auto_feed.set_low();
+        talk.event = Event::Nibble;
+    }
+
+    /// Event 22.
+    fn leave(&mut self, talk: &mut Conversation, outcome: Result<usize, ReverseError>) {
+        let (Ok(()), Ok(())) = (self.pins.select_in.set_low(), self.pins.auto_feed.set_high());
+        (talk.event, talk.outcome) = (Event::Leaving, outcome);
     }
 }

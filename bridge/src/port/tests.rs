@@ -39,6 +39,25 @@ fn write_all(cable: &SimulatedPort, port: &mut TestPort, bytes: &[u8]) -> Vec<Fa
     faults
 }
 
+/// Reads as a caller would who has other things to do.
+fn read(
+    cable: &SimulatedPort,
+    port: &mut TestPort,
+    what: Reverse,
+    buffer: &mut [u8],
+) -> Result<usize, ReverseError> {
+    let mut talk = Conversation::new(what);
+    loop {
+        let before = cable.now();
+        let ended = port.converse(&mut talk, buffer, cable.now() / 1000);
+        assert!(cable.now() - before < 500_000, "{} ns without a pause", cable.now() - before);
+        match ended {
+            Some(ended) => return ended,
+            None => cable.pass(100_000),
+        }
+    }
+}
+
 fn settings(timing: Timing, handshake: Handshake) -> PortSettings {
     PortSettings { handshake, ..timing.settings() }
 }
@@ -106,7 +125,7 @@ proptest! {
         let (cable, mut port) = connect(Peripheral { device_id: Some(text.clone()), answer_after, ..Peripheral::default() });
         let mut buffer = [0; 256];
         // A printer slower than the limit is silent, not misread; 500 ns belong to its settling time.
-        let found = port.device_id(&mut buffer);
+        let found = read(&cable, &mut port, Reverse::DeviceId, &mut buffer);
         prop_assert_eq!(found, Ok(text.len()));
         prop_assert_eq!(&buffer[..text.len()], &text[..]);
         write_all(&cable, &mut port, b"after");
@@ -206,7 +225,7 @@ fn a_printer_that_goes_busy_between_two_looks_is_not_strobed() {
 #[test]
 fn a_printer_of_before_1284_goes_on_printing_after_a_negotiation() {
     let (cable, mut port) = connect(Peripheral { negotiates: false, ..Peripheral::default() });
-    assert_eq!(port.device_id(&mut [0; 64]), Err(ReverseError::OneWay));
+    assert_eq!(read(&cable, &mut port, Reverse::DeviceId, &mut [0; 64]), Err(ReverseError::OneWay));
     write_all(&cable, &mut port, b"text");
     assert_eq!(cable.taken(), b"text");
     assert_eq!(check(&cable.edges(), &Timing::DEFAULT), []);
@@ -215,7 +234,7 @@ fn a_printer_of_before_1284_goes_on_printing_after_a_negotiation() {
 #[test]
 fn a_mode_the_printer_does_not_offer_is_refused_and_left() {
     let (cable, mut port) = connect(Peripheral { device_id: None, ..Peripheral::default() });
-    assert_eq!(port.device_id(&mut [0; 64]), Err(ReverseError::Refused));
+    assert_eq!(read(&cable, &mut port, Reverse::DeviceId, &mut [0; 64]), Err(ReverseError::Refused));
     write_all(&cable, &mut port, b"text");
     assert_eq!(cable.taken(), b"text");
 }
@@ -223,19 +242,20 @@ fn a_mode_the_printer_does_not_offer_is_refused_and_left() {
 #[test]
 fn both_nibbles_of_every_byte_arrive() {
     let all: Vec<u8> = (0..=255).collect();
-    let (_, mut port) = connect(Peripheral { reverse_data: all.clone(), ..Peripheral::default() });
+    let (cable, mut port) = connect(Peripheral { reverse_data: all.clone(), ..Peripheral::default() });
     let mut buffer = [0; 300];
-    assert_eq!(port.read(&mut buffer), Ok(256));
+    assert_eq!(read(&cable, &mut port, Reverse::Answer, &mut buffer), Ok(256));
     assert_eq!(buffer[..256], all);
 }
 
 #[test]
 fn an_answer_can_be_read_in_pieces_and_nothing_is_an_answer_too() {
-    let (_, mut port) = connect(Peripheral { reverse_data: vec![1, 2, 3, 4, 5], ..Peripheral::default() });
+    let (cable, mut port) =
+        connect(Peripheral { reverse_data: vec![1, 2, 3, 4, 5], ..Peripheral::default() });
     let mut buffer = [0; 3];
-    assert_eq!((port.read(&mut buffer), buffer), (Ok(3), [1, 2, 3]));
-    assert_eq!((port.read(&mut buffer), buffer), (Ok(2), [4, 5, 3]));
-    assert_eq!(port.read(&mut buffer), Ok(0));
+    assert_eq!((read(&cable, &mut port, Reverse::Answer, &mut buffer), buffer), (Ok(3), [1, 2, 3]));
+    assert_eq!((read(&cable, &mut port, Reverse::Answer, &mut buffer), buffer), (Ok(2), [4, 5, 3]));
+    assert_eq!(read(&cable, &mut port, Reverse::Answer, &mut buffer), Ok(0));
 }
 
 #[test]
@@ -243,7 +263,7 @@ fn a_printer_that_falls_silent_leaves_what_came_and_a_working_port() {
     let device_id = Some(b"\x00\x0dMFG:ALPS;..".to_vec());
     let (cable, mut port) = connect(Peripheral { device_id, dumb_after: Some(9), ..Peripheral::default() });
     let mut buffer = [0; 64];
-    assert_eq!(port.device_id(&mut buffer), Err(ReverseError::Silent(4)));
+    assert_eq!(read(&cable, &mut port, Reverse::DeviceId, &mut buffer), Err(ReverseError::Silent(4)));
     assert_eq!(&buffer[..4], b"\x00\x0dMF");
     write_all(&cable, &mut port, b"text");
     assert_eq!(cable.taken(), b"text");
@@ -253,7 +273,7 @@ fn a_printer_that_falls_silent_leaves_what_came_and_a_working_port() {
 fn a_busy_printer_is_not_negotiated_with() {
     let (cable, mut port) = connect(Peripheral { work: 1_000_000, ..Peripheral::default() });
     write_all(&cable, &mut port, b"x");
-    assert_eq!(port.read(&mut [0; 4]), Err(ReverseError::NotIdle));
+    assert_eq!(read(&cable, &mut port, Reverse::Answer, &mut [0; 4]), Err(ReverseError::NotIdle));
     assert!(cable.edges().iter().all(|edge| edge.line != Line::SelectIn));
 }
 

@@ -1,7 +1,7 @@
 //! A board in virtual time: a sender of two buffers on the simulated lines, memory that survives a reset, a log.
 //!
 //! The sender keeps to the steps of the firmware's PIO program, tick by tick: it waits for Busy to fall, puts the byte on
-//! the data lines, looks at Busy, PError, Select and nFault together until all are well, and strobes three ticks later.
+//! the data lines, looks at Busy, PError, Select, nFault and +5 V together until all are well, and strobes three ticks later.
 //! It runs while the clock does, so the processor's side sees it at any point of a byte. The program itself, its DMA and
 //! its interrupt run in the emulator only.
 
@@ -73,7 +73,8 @@ impl World {
     }
 
     fn is_ready(&self) -> bool {
-        [Line::Busy, Line::PaperOut, Line::Select, Line::Fault].map(|line| self.level(line)) == [0, 0, 1, 1]
+        let lines = [Line::Busy, Line::PaperOut, Line::Select, Line::Fault, Line::Power];
+        lines.map(|line| self.level(line)) == [0, 0, 1, 1, 1]
     }
 
     /// Takes the sender's next step.

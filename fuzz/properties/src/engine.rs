@@ -224,7 +224,6 @@ impl Bench<'_, '_> {
 
     fn answer(&mut self, script: &mut Unstructured<'_>) -> Result<()> {
         let Some(task) = self.engine.task() else { return Ok(()) };
-        self.must_reset &= task != Task::Initialise;
         let outcome = match task {
             Task::PrinterStatus | Task::DeviceId => Outcome::Answer(match script.int_in_range(0..=2)? {
                 0 => Answer::Silent,
@@ -235,6 +234,9 @@ impl Bench<'_, '_> {
             _ => Outcome::Done,
         };
         self.engine.done(outcome);
+        // A job that was given up has ended with its reset.
+        self.look();
+        self.must_reset &= task != Task::Initialise;
         Ok(())
     }
 
@@ -278,8 +280,9 @@ fn step<'m>(
             let what = *script.choose(&[Ask::Lines, Ask::Printer, Ask::DeviceId])?;
             bench.tell(&ToBridge::Ask { request: script.arbitrary()?, what });
         }
-        8 => bench.tell(&match script.int_in_range(0..=3)? {
+        8 => bench.tell(&match script.int_in_range(0..=4)? {
             0 => ToBridge::Initialise,
+            4 => ToBridge::Abandon { job: job.id },
             1 => ToBridge::Bootloader,
             2 => ToBridge::Drive { data: script.arbitrary()?, control: script.arbitrary()? },
             _ => ToBridge::Configure(PortSettings {

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use protocol::link::frame::checksum;
-use protocol::link::message::{JobState, Progress};
+use protocol::link::message::{JobState, PastJob, Progress};
 use serde::{Deserialize, Serialize};
 
 use crate::send::journal::{Journal, JournalError};
@@ -88,15 +88,23 @@ pub(crate) enum Standing {
 }
 
 impl Unfinished {
-    /// Judges by what the bridge, in its start `boot`, says of its last job. A bridge takes a new job only when the last one has
-    /// ended, so within one start another job in its place proves that this one has.
-    pub(crate) fn standing(&self, boot: u32, progress: &Progress) -> Standing {
-        let this = u32::from_str_radix(&self.job, 16) == Ok(progress.job) && progress.job != 0;
-        match progress.state {
-            JobState::Done if this => Standing::Ended { printed: progress.printed, whole: true },
-            JobState::Cancelled | JobState::Broken(_) if this => {
-                Standing::Ended { printed: progress.printed, whole: false }
-            }
+    /// Judges by what the bridge, in its start `boot`, says of its last job and remembers of those before. A bridge takes a new
+    /// job only when the last one has ended, so within one start another job in its place proves that this one has.
+    pub(crate) fn standing<'p>(
+        &self,
+        boot: u32,
+        progress: &Progress,
+        past: impl IntoIterator<Item = &'p PastJob>,
+    ) -> Standing {
+        let is_this = |job: u32| u32::from_str_radix(&self.job, 16) == Ok(job) && job != 0;
+        let past = past.into_iter().find(|past| is_this(past.job));
+        let (state, printed, this) = match past {
+            Some(past) => (past.state, past.printed, true),
+            None => (progress.state, progress.printed, is_this(progress.job)),
+        };
+        match state {
+            JobState::Done if this => Standing::Ended { printed, whole: true },
+            JobState::Cancelled | JobState::Broken(_) if this => Standing::Ended { printed, whole: false },
             _ if this => Standing::WithBridge,
             JobState::None => Standing::ResetOwed,
             // It may have been lost; then the bridge still knows that it has to reset the printer.
@@ -190,6 +198,29 @@ impl Printers {
         self.tidy();
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
         self.write(&self.path("open", printer, job), &Fact { boot, since })
+    }
+
+    /// Whether the printer has shown that it does not negotiate, so that it is not asked again and again.
+    pub fn is_one_way(&self, printer: &Printer) -> bool {
+        self.folder.join(one_way(printer)).symlink_metadata().is_ok()
+    }
+
+    /// Notes whether the printer negotiates. A user may not remove another one's note; then it stays.
+    pub fn note_one_way(&self, printer: &Printer, is: bool) -> Result<(), PrintersError> {
+        let path = self.folder.join(one_way(printer));
+        if is == path.symlink_metadata().is_ok() {
+            return Ok(());
+        }
+        if is {
+            let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+            return self.write(&path, &Fact { boot: None, since });
+        }
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::PermissionDenied => {
+                Err(io_error("remove", &path)(error))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether such a job is noted.
@@ -311,6 +342,11 @@ impl Printers {
     }
 }
 
+/// The name of the file that says that a printer does not negotiate.
+fn one_way(printer: &Printer) -> String {
+    format!("one-way.{}", printer.file_name())
+}
+
 /// The name of the file that closes the one of this name.
 fn closed(open: &str) -> String {
     format!("closed.{}", open.strip_prefix("open.").unwrap_or(open))
@@ -422,12 +458,47 @@ mod tests {
             (5, 0, JobState::None, Standing::ResetOwed),
         ] {
             assert_eq!(
-                job.standing(boot, &progress(job_shown, state)),
+                job.standing(boot, &progress(job_shown, state), &[]),
                 expected,
                 "{boot} {job_shown:x} {state:?}"
             );
         }
         let unknown = Unfinished { boot: None, ..job };
-        assert_eq!(unknown.standing(5, &progress(0xb, JobState::Done)), Standing::ResetOwed);
+        assert_eq!(unknown.standing(5, &progress(0xb, JobState::Done), &[]), Standing::ResetOwed);
+    }
+
+    #[test]
+    fn a_bridge_that_remembers_how_the_job_ended_decides_behind_other_jobs_and_restarts() {
+        let job = Unfinished { job: "0000000a".into(), boot: Some(5) };
+        let other = PastJob { job: 0xb, state: JobState::Done, printed: 4 };
+        for (state, expected) in [
+            (JobState::Done, Standing::Ended { printed: 7, whole: true }),
+            (JobState::Cancelled, Standing::Ended { printed: 7, whole: false }),
+            (JobState::Lost, Standing::WithBridge),
+        ] {
+            let past = [other, PastJob { job: 0xa, state, printed: 7 }];
+            for shown in [JobState::Done, JobState::Printing, JobState::Lost] {
+                assert_eq!(job.standing(6, &progress(0xc, shown), &past), expected, "{state:?}, {shown:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_printer_that_does_not_negotiate_is_remembered_by_its_bridge_until_one_there_does() {
+        let folder = tempfile::tempdir().unwrap();
+        let printers = Printers::at(folder.path()).unwrap();
+        let (one, two) = (Printer::Bridge(1), Printer::Bridge(2));
+        for _ in 0..2 {
+            printers.note_one_way(&one, true).unwrap();
+            assert!(printers.is_one_way(&one) && !printers.is_one_way(&two));
+        }
+        assert_eq!(printers.unfinished(&one).unwrap(), []);
+        // A reset is no other printer.
+        printers.reset(None).unwrap();
+        assert!(printers.is_one_way(&one));
+        for _ in 0..2 {
+            printers.note_one_way(&one, false).unwrap();
+            assert!(!printers.is_one_way(&one));
+        }
     }
 }

@@ -55,7 +55,7 @@ impl DeliverArgs {
         };
         let checked = device::send::check(bytes, observer)?;
         if let Destination::Bridge(address) = to {
-            let cartridges = find_cartridges(address, &checked.inks);
+            let cartridges = find_cartridges(address, &checked.inks, &Printers::of_system()?);
             super::show(&format!("{}\n", cartridges_text(&cartridges)))?;
         }
         if !self.yes {

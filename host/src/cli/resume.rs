@@ -1,14 +1,18 @@
 //! `foilpress resume` and `foilpress cancel`: jobs that have not ended.
 
 use std::io::Write as _;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 
 use super::bridge;
 use super::deliver::{are_copies, go_on};
-use device::send::journal::{Entry, Journal};
-use device::send::query::Query;
+use super::stdio::show;
+use super::terminal::agreed;
+use device::send::journal::{Entry, Journal, JournalError};
+use device::send::query::{Query, is_open};
 use device::send::session::Phase;
 use device::send::{Address, words};
 use observe::Observer;
@@ -39,8 +43,9 @@ pub struct Resume {
 #[command(after_help = "Examples:\n  \
     foilpress cancel                                     (the only unfinished job)\n  \
     foilpress cancel 5f3a9c01\n  \
-    foilpress cancel ffffffff                            (whatever the system is printing through the bridge by itself)\n\n\
-    A sheet that has begun comes out unfinished, and the printer is ready for the next job. Stop a `send` that is \
+    foilpress cancel ffffffff                            (whatever the system is printing through the bridge by itself)\n  \
+    foilpress cancel --to usb: --yes                     (whatever the bridge is printing, whoever has sent it)\n\n\
+    A job that is not this user's is ended after a question, if --to names the bridge that prints it. A sheet that has begun comes out unfinished, and the printer is ready for the next job. Stop a `send` that is \
     still running first (Ctrl-C).")]
 pub struct Cancel {
     /// Number of the job [default: the only unfinished job]
@@ -49,6 +54,9 @@ pub struct Cancel {
     /// Current address of the bridge [default: the address the job was sent to]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
+    /// End the job of another user or computer without asking
+    #[arg(short, long)]
+    yes: bool,
 }
 
 fn number(text: &str) -> Result<u32, String> {
@@ -86,10 +94,77 @@ pub fn cancel(args: &Cancel, observer: &dyn Observer) -> Result<()> {
         return cancel_plain(args.to.as_ref());
     }
     let journal = Journal::of_user()?;
-    let job = journal.open(choose(&journal, args.job)?)?;
-    let address = address(&job.entry, args.to.as_ref())?;
-    go_on(&journal, job, &address, true, observer)
+    let own = match (args.job, &args.to) {
+        (Some(number), _) => journal.open(number).map_err(anyhow::Error::from),
+        (None, None) => choose(&journal, None).and_then(|number| Ok(journal.open(number)?)),
+        // The bridge says which one is open there.
+        (None, Some(to)) => open_at(to)?.map_or_else(
+            || choose(&journal, None).and_then(|number| Ok(journal.open(number)?)),
+            |number| Ok(journal.open(number)?),
+        ),
+    };
+    match (own, &args.to) {
+        (Ok(job), _) => {
+            let address = address(&job.entry, args.to.as_ref())?;
+            go_on(&journal, job, &address, true, observer)
+        }
+        (Err(error), Some(to)) if is_unknown(&error) => cancel_anothers(to, args.job, args.yes),
+        (Err(error), _) => Err(error),
+    }
 }
+
+/// Whether this user's journal has no such job, or none that is not over.
+fn is_unknown(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(JournalError::NoSuchJob(_) | JournalError::Ended(_)))
+}
+
+/// The job that is open at a bridge.
+fn open_at(to: &Address) -> Result<Option<u32>> {
+    let mut link = to.open()?;
+    let query = Query::new(&mut *link, bridge::PATIENCE)?;
+    Ok(Some(query.progress()).filter(|progress| is_open(progress)).map(|progress| progress.job))
+}
+
+/// Ends what is open at a bridge and is not in this user's journal, after a question.
+fn cancel_anothers(to: &Address, job: Option<u32>, yes: bool) -> Result<()> {
+    let mut link = to.open()?;
+    let mut query = Query::new(&mut *link, bridge::PATIENCE)?;
+    let open = *query.progress();
+    if !is_open(&open) || job.is_some_and(|job| job != open.job) {
+        bail!("the bridge does not have this job open; {}", bridge::doing(&open));
+    }
+    let job = open.job;
+    let what = format!(
+        "{}, and it is not in this user's journal: another user or computer may be sending it",
+        bridge::doing(&open)
+    );
+    if !yes && !agreed(&format!("{what}. End it early?")) {
+        bail!("{what}, so it was not cancelled; pass --yes to end it");
+    }
+    // After a restart only the job's data tell where it may end, and its sender has them.
+    if open.limit == 0 {
+        bail!(
+            "the bridge has restarted in the middle of job {job:08x}, and only its sender can end it properly; `foilpress bridge \
+             reset --to {to}` gives it up"
+        );
+    }
+    let mut progress = query.cancel(job, bridge::PATIENCE)?;
+    let start = Instant::now();
+    while is_open(&progress) && progress.job == job && start.elapsed() < ENDING {
+        sleep(Duration::from_millis(200));
+        progress = query.ask_progress(bridge::PATIENCE)?;
+    }
+    show(&format!("{}\n", bridge::doing(&progress)))?;
+    if is_open(&progress) && progress.job == job {
+        bail!(
+            "job {job:08x} ends as soon as the printer takes bytes again; if it does not, `foilpress bridge reset --to {to}` gives it up"
+        );
+    }
+    Ok(())
+}
+
+/// How long to wait for the end of a job that was cancelled.
+const ENDING: Duration = Duration::from_secs(10);
 
 /// Number of whatever the operating system prints through the bridge as through an ordinary printer.
 const PLAIN: u32 = u32::MAX;

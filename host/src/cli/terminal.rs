@@ -164,7 +164,7 @@ impl Caller for Terminal<'_> {
 }
 
 /// Asks the person at the terminal; without one the answer is no.
-fn agreed(question: &str) -> bool {
+pub fn agreed(question: &str) -> bool {
     if !io::stdin().is_terminal() || !io::stderr().is_terminal() {
         return false;
     }

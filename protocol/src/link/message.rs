@@ -12,20 +12,31 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the link. It changes only if an old message, or the data of a job, changes its meaning, not when messages are
 /// appended.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 /// Fingerprint of the message set: the CRC-32 over one example of every variant. With equal fingerprints, host and bridge
 /// know the same messages. With different fingerprints but the same version, both understand everything the older knows.
-pub const SCHEMA: u32 = 0x8432_812c;
+pub const SCHEMA: u32 = 0xf2dc_8310;
+
+/// How many ended jobs a bridge remembers.
+pub const PAST: usize = 16;
 
 /// The most data bytes in one [`ToBridge::Data`]. They fit a frame whatever the other fields are.
 pub const DATA_MAX: usize = 960;
 
+/// The version in a Hello of either side, whatever else its version has in it: these two bytes never change.
+pub fn hello_version(message: &[u8]) -> Option<u8> {
+    match message {
+        [0, version, ..] => Some(*version),
+        _ => None,
+    }
+}
+
 /// From the workstation to the bridge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum ToBridge<'a> {
-    /// A host has connected. Answered by [`ToHost::Hello`] and [`ToHost::Progress`]. Changes nothing: a job under way
-    /// continues.
+    /// A host has connected. Answered by [`ToHost::Hello`], [`ToHost::Past`] and [`ToHost::Progress`], in this order. Changes
+    /// nothing: a job under way continues.
     Hello {
         /// [`VERSION`] of the host.
         version: u8,
@@ -96,6 +107,12 @@ pub enum ToBridge<'a> {
         /// The first byte wanted, counted since the log began. 0 gives the oldest bytes kept.
         from: u32,
     },
+    /// Gives up an open job wherever it stands, and resets the printer. The job is [`JobState::Lost`], or
+    /// [`JobState::Cancelled`] if none of it has crossed the port. Answered by [`ToHost::Progress`].
+    Abandon {
+        /// The job.
+        job: u32,
+    },
 }
 
 /// The kind of a job's data.
@@ -112,10 +129,15 @@ pub enum JobKind {
 pub enum Ask {
     /// The current levels of the port's status lines.
     Lines,
-    /// The printer's own status answer of 38 bytes. Not while a job is open: the question would be row data.
+    /// The printer's own status answer of 38 bytes. Not while a job is open: the question would be row data. Not while the
+    /// bridge does not know whether the printer stands between two jobs ([`Answer::Unsure`]).
     Printer,
     /// The printer's IEEE 1284 device ID. Not while a job is open.
     DeviceId,
+    /// The same as [`Ask::Printer`], by a host that knows that the printer stands between two jobs.
+    PrinterAtRest,
+    /// The firmware's use of its memory and time. Answered by [`ToHost::Board`].
+    Board,
 }
 
 /// How the port is driven.
@@ -151,6 +173,10 @@ pub enum Handshake {
 
 /// From the bridge to the workstation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is no allocation to put a variant in, and messages are not stored"
+)]
 pub enum ToHost<'a> {
     /// The bridge's answer to [`ToBridge::Hello`].
     Hello {
@@ -205,6 +231,44 @@ pub enum ToHost<'a> {
         /// The bytes, at most [`DATA_MAX`].
         bytes: &'a [u8],
     },
+    /// The jobs of the link that have ended, the last one first. Numbers 0 fill the rest.
+    Past([PastJob; PAST]),
+    /// The firmware's use of its memory and time.
+    Board {
+        /// The number of the question.
+        request: u16,
+        /// The use.
+        usage: Usage,
+    },
+}
+
+/// How a job has ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct PastJob {
+    /// The job, or 0.
+    pub job: u32,
+    /// How it has ended.
+    pub state: JobState,
+    /// Bytes that had crossed the port.
+    pub printed: u32,
+}
+
+impl PastJob {
+    /// The place of a job there has not been.
+    pub const NONE: PastJob = PastJob { job: 0, state: JobState::None, printed: 0 };
+}
+
+/// How much of its memory and time the firmware has used since the board started.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct Usage {
+    /// Bytes of memory that belong to something fixed.
+    pub fixed: u32,
+    /// Bytes of memory for the stack.
+    pub stack: u32,
+    /// The most bytes of the stack that were in use at a time.
+    pub stack_used: u32,
+    /// The longest time in µs that one task has kept the processor from the others.
+    pub longest_us: u32,
 }
 
 /// How far a job is. All positions count from the beginning of the job and never go back, except that `accepted` starts
@@ -309,6 +373,8 @@ pub enum Answer<'a> {
     Silent,
     /// The printer does not take bytes at the moment, so it could not be asked.
     Stopped(Fault),
+    /// The bridge does not know whether the printer stands between two jobs, so it was not asked.
+    Unsure,
 }
 
 /// Why the bridge did not act on a message.
@@ -408,6 +474,12 @@ mod tests {
         row: 40,
     };
 
+    /// Job 7 printed, with 300 bytes; job 6 lost behind 4 bytes; 14 empty places.
+    const PAST_BYTES: &[u8] = &[
+        7, 7, 4, 0xac, 2, 6, 7, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+    ];
+
     fn with_state(state: JobState) -> ToHost<'static> {
         ToHost::Progress(Progress { job: 1, state, accepted: 2, limit: 3, printed: 4, pass: 5, row: 6 })
     }
@@ -440,6 +512,9 @@ mod tests {
             (ToBridge::Drive { data: 0xaa, control: 0b0111 }, &[8, 0xaa, 7]),
             (ToBridge::Probe { request: 300, data: 0xaa, control: 0b0111 }, &[9, 0xac, 0x02, 0xaa, 7]),
             (ToBridge::ReadLog { request: 300, from: 1200 }, &[10, 0xac, 0x02, 0xb0, 9]),
+            (ToBridge::Abandon { job: 7 }, &[11, 7]),
+            (ask(Ask::PrinterAtRest), &[4, 0xac, 0x02, 3]),
+            (ask(Ask::Board), &[4, 0xac, 0x02, 4]),
         ]
     }
 
@@ -447,6 +522,10 @@ mod tests {
         let lines = |fault| ToHost::Lines { request: 3, lines: Lines(0x39), fault };
         let answer = |answer| ToHost::Answer { request: 3, answer };
         let refused = |reason| ToHost::Refused { reason, job: 7 };
+        let mut past = [PastJob::NONE; PAST];
+        past[0] = PastJob { job: 7, state: JobState::Done, printed: 300 };
+        past[1] = PastJob { job: 6, state: JobState::Lost, printed: 4 };
+        let usage = Usage { fixed: 1024, stack: 2048, stack_used: 100, longest_us: 9 };
         std::vec![
             (
                 ToHost::Hello { version: 1, schema: 0x80, boot: 5, serial: 0xe660, firmware: "0.1" },
@@ -489,6 +568,9 @@ mod tests {
                 ToHost::LogPart { request: 3, at: 1200, end: 1202, bytes: &[1, 2] },
                 &[6, 3, 0xb0, 9, 0xb2, 9, 2, 1, 2],
             ),
+            (answer(Answer::Unsure), &[3, 3, 5]),
+            (ToHost::Past(past), PAST_BYTES),
+            (ToHost::Board { request: 3, usage }, &[8, 3, 0x80, 8, 0x80, 0x10, 100, 9]),
         ]
     }
 
@@ -530,6 +612,23 @@ mod tests {
     fn the_longest_data_message_fits_a_frame() {
         let message = ToBridge::Data { job: u32::MAX, offset: u32::MAX, bytes: &[0xff; DATA_MAX] };
         assert!(frame::write(&message, &mut [0; frame::MAX]).is_ok());
+    }
+
+    #[test]
+    fn the_version_of_a_hello_is_found_whatever_follows_it() {
+        for (_, bytes) in to_bridge().iter().take(1) {
+            assert_eq!(hello_version(bytes), Some(1));
+        }
+        assert_eq!(hello_version(to_host()[0].1), Some(1));
+        assert_eq!(hello_version(&[0, 77, 1, 2, 3, 4, 5, 6, 7]), Some(77));
+        assert_eq!((hello_version(&[1, 77]), hello_version(&[0]), hello_version(&[])), (None, None, None));
+    }
+
+    #[test]
+    fn the_longest_memory_of_ended_jobs_fits_a_frame() {
+        let state = JobState::Broken(Defect { at: u32::MAX, what: DefectKind::Truncated });
+        let past = [PastJob { job: u32::MAX, state, printed: u32::MAX }; PAST];
+        assert!(frame::write(&ToHost::Past(past), &mut [0; frame::MAX]).is_ok());
     }
 
     #[test]

@@ -28,6 +28,8 @@ pub struct Bench<'m> {
     /// What the engine has said, but for progress.
     pub said: Vec<String>,
     pub progress: Option<Progress>,
+    /// The longest time in ns that the driver has kept the processor.
+    pub longest: u64,
 }
 
 impl<'m> Bench<'m> {
@@ -54,6 +56,7 @@ impl<'m> Bench<'m> {
             random: None,
             said: Vec::new(),
             progress: None,
+            longest: 0,
         }
     }
 
@@ -69,7 +72,9 @@ impl<'m> Bench<'m> {
             clock.pass(20_000);
             clock.now() / 1000
         });
+        let start = self.cable.now();
         let pause_us = self.driver.poll(&mut self.engine, &mut self.id);
+        self.longest = self.longest.max(self.cable.now() - start);
         let pause_us = match &mut self.random {
             Some(random) if pause_us > 0 => random.random_range(0..=pause_us),
             _ => pause_us,

@@ -65,6 +65,7 @@ enum Fault {
     RestartBetweenSheets,
     KilledBeforeTheFirstByte,
     KilledInARow,
+    KilledAtTheEnd,
     KilledAndForgotten,
     LinkLostAndBack,
     PaperOut,
@@ -80,12 +81,13 @@ use Fault::*;
 const CALLERS: [Caller; 5] = [Send, Print, Resume, Queue, TwoUsers];
 
 #[rustfmt::skip]
-const TABLE: [(Fault, [&str; 5]); 11] = [
+const TABLE: [(Fault, [&str; 5]); 12] = [
     //                          send                               print --to                         resume                             queue                          two users
     (BridgeForgets,            ["unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "unknown ½, refused ½, sent ½R1",  "held ½, held ½, sent ½R1",    "unknown ½, refused ½, sent ½R1"]),
     (RestartBetweenSheets,     ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (KilledBeforeTheFirstByte, ["killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",                "killed 0, sent 1",            "killed 0, busy 0, sent 11 | killed 0, sent 11"]),
     (KilledInARow,             ["killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",                "killed ½, sent 1",            "killed ½, busy ½, sent 11 | killed ½, sent 11"]),
+    (KilledAtTheEnd,           ["killed 1, sent 1",                "killed 1, sent 1",                "killed 1, sent 1",                "killed 1, sent 1",            "killed 1, sent 11"]),
     (KilledAndForgotten,       ["killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, unknown ½, refused ½, sent ½R1", "killed ½, held ½, sent ½R1", "killed ½, refused ½, sent ½R1"]),
     (LinkLostAndBack,          ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
     (PaperOut,                 ["sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",                 "sent 1, sent 11",             "sent 1, sent 11"]),
@@ -338,6 +340,16 @@ impl Bench {
             RestartBetweenSheets | ResetOwedByAnother => run.wait(),
             PaperOut => {}
             KilledBeforeTheFirstByte | KilledInARow => run.kill(),
+            KilledAtTheEnd => {
+                // The bridge takes all of a job this small, and finishes the sheet by itself.
+                std::thread::sleep(Duration::from_millis(1000));
+                run.kill();
+                self.set(|port| &port.busy, false);
+                let start = Instant::now();
+                while self.bridge.printed().len() < self.job().len() && start.elapsed() < PATIENCE {
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+            }
             KilledAndForgotten => {
                 run.kill();
                 self.set(|port| &port.forget, true);

@@ -252,15 +252,153 @@ fn a_printer_switched_off_in_a_job_costs_the_sheet_and_is_reset_before_the_next_
 }
 
 #[test]
-fn a_reset_is_refused_while_a_job_is_open() {
+fn a_reset_while_a_job_is_open_is_asked_about_first() {
     let bench = Bench::new(8, 20).queue(JobKind::Streams);
     bench.begun();
     let said = bench.says(1, "bridge reset --to BRIDGE");
-    assert!(said.contains("is printing job"), "{said}");
+    assert!(said.contains("printing job") && said.contains("--yes"), "{said}");
     bench.keep_busy(false);
     assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
     assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 0);
     assert!(bench.printed() == bench.job, "other bytes at the port");
+}
+
+/// A job at the bridge that no journal knows: its sender and all it had on disk are gone.
+fn orphan() -> (Bench, u32) {
+    let bench = Bench::new(8, 20).queue(JobKind::Streams);
+    bench.begun();
+    let number = Journal::at(&bench.jobs()).unwrap().entries().unwrap()[0].record.job;
+    std::fs::remove_dir_all(bench.jobs()).unwrap();
+    let _ = std::fs::remove_dir_all(bench.folder.path().join("printers"));
+    (bench, number)
+}
+
+#[test]
+fn an_orphan_is_cancelled_after_a_question_by_its_number_or_as_what_the_bridge_has_open() {
+    for named in [false, true] {
+        let (bench, number) = orphan();
+        let job = if named { format!("{number:08x} ") } else { String::new() };
+        let said = bench.says(1, &format!("cancel {job}--to BRIDGE"));
+        assert!(said.contains("not in this user's journal") && said.contains("--yes"), "{said}");
+        let said = bench.says(1, &format!("cancel {:08x} --to BRIDGE --yes", number ^ 1));
+        assert!(said.contains("does not have this job"), "{said}");
+        bench.keep_busy(false);
+        let (code, said) = bench.answered(&format!("cancel {job}--to BRIDGE --yes"), "");
+        assert!(code == Some(0) && said.contains(&format!("job {number:08x} was cancelled")), "{said}");
+        let printed = bench.printed();
+        assert!(printed.len() < bench.job.len() && is_a_whole_job(&printed), "{} bytes", printed.len());
+        bench.says(0, "send job.rgl --to BRIDGE");
+        assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
+        assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 0);
+    }
+}
+
+#[test]
+fn an_orphan_at_a_printer_that_takes_nothing_more_is_given_up_by_a_reset() {
+    for restarted in [false, true] {
+        let (bench, number) = orphan();
+        if restarted {
+            // Nobody has the data any more.
+            bench.bridge.port.restart.store(true, Ordering::Relaxed);
+            std::thread::sleep(Duration::from_millis(200));
+            let said = bench.says(1, "cancel --to BRIDGE --yes");
+            assert!(said.contains("bridge reset --to unix:"), "{said}");
+        }
+        let (code, said) = bench.answered("bridge reset --to BRIDGE --yes", "");
+        assert!(code == Some(0) && said.contains(&format!("job {number:08x} is given up")), "{said}");
+        assert_eq!(bench.bridge.port.resets.load(Ordering::Relaxed), 1);
+        let printed = bench.printed();
+        bench.keep_busy(false);
+        bench.says(0, "send job.rgl --to BRIDGE");
+        assert!(bench.printed()[printed.len()..] == bench.job, "other bytes at the port");
+    }
+}
+
+#[test]
+fn a_sheet_that_the_bridge_finished_alone_is_told_behind_others_and_a_restart() {
+    for restarted in [false, true] {
+        let bench = Bench::new(8, 100).queue(JobKind::Streams);
+        bench.begun();
+        // All of it is with the bridge, or the next sender would find it busy.
+        bench.keep_busy(false);
+        let start = std::time::Instant::now();
+        while bench.printed().len() < bench.job.len() && start.elapsed() < Duration::from_secs(5) {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        if bench.printed().len() < bench.job.len() {
+            assert_eq!(resume(&bench.jobs(), false), Outcome::Printed);
+        }
+        // Another user, with a journal of their own, prints at the same bridge.
+        let mut other = bench.program("send job.rgl --to BRIDGE");
+        let other = other.env("FOILPRESS_JOBS", bench.folder.path().join("others")).output().unwrap();
+        assert!(other.status.success(), "{}", String::from_utf8_lossy(&other.stderr));
+        if restarted {
+            bench.bridge.port.restart.store(true, Ordering::Relaxed);
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        let entry = Journal::at(&bench.jobs()).unwrap().entries().unwrap().remove(0);
+        if !matches!(entry.record.phase, Phase::Ended(_)) {
+            let said = bench.says(0, "resume");
+            assert!(said.contains("the printer has taken all"), "{said}");
+        }
+        let entry = Journal::at(&bench.jobs()).unwrap().entries().unwrap().remove(0);
+        assert_eq!(entry.record.phase, Phase::Ended(Outcome::Printed));
+        assert_eq!(entry.record.printed as usize, bench.job.len());
+        // Nothing is owed, and nothing was printed twice.
+        bench.says(0, "send job.rgl --to BRIDGE");
+        assert_eq!((bench.sheets(), bench.bridge.port.resets.load(Ordering::Relaxed)), (3, 0));
+        let (_, status) = bench.answered("bridge status --to BRIDGE", "");
+        assert!(status.contains(" printed, ") || status.matches(" printed").count() >= 2, "{status}");
+    }
+}
+
+#[test]
+fn a_printer_is_asked_only_where_it_can_do_no_harm() {
+    let asked = |bench: &Bench| bench.bridge.port.asked.load(Ordering::Relaxed);
+    // A bridge that has just got its supply, and nothing noted: the computer knows that its printer holds no part of a job.
+    let bench = Bench::new(8, 100);
+    let (_, said) = bench.answered("bridge status --no-negotiate --to BRIDGE", "");
+    assert!(said.contains("printer: not asked\n") && asked(&bench) == 0, "{said}");
+    let (_, said) = bench.answered("bridge status --to BRIDGE", "");
+    assert!(said.contains("white") && asked(&bench) == 1, "{said}");
+    assert!(said.contains("KiB of stack used"), "{said}");
+    // In the middle of a row the bridge loses its memory: the question would be row data.
+    bench.keep_busy(true);
+    let mut child = bench.program("send job.rgl --to BRIDGE").spawn().unwrap();
+    bench.until_it_prints();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    bench.bridge.port.forget.store(true, Ordering::Relaxed);
+    std::thread::sleep(Duration::from_millis(200));
+    let before = asked(&bench);
+    let (_, said) = bench.answered("bridge status --to BRIDGE", "");
+    assert!(said.contains("may be inside a job that the bridge has forgotten"), "{said}");
+    assert_eq!(asked(&bench), before);
+    bench.says(0, "bridge reset --to BRIDGE");
+    let (_, said) = bench.answered("bridge status --to BRIDGE", "");
+    assert!(said.contains("white") && asked(&bench) == before + 1, "{said}");
+}
+
+#[test]
+fn a_one_way_printer_is_remembered_and_asked_again_only_when_the_user_wants_to_know() {
+    let bench = Bench::new(8, 1000);
+    bench.bridge.port.one_way.store(true, Ordering::Relaxed);
+    let asked = || bench.bridge.port.asked.load(Ordering::Relaxed);
+    bench.says(0, "send job.rgl --to BRIDGE");
+    let noted = std::fs::read_dir(bench.folder.path().join("printers"))
+        .unwrap()
+        .any(|file| file.unwrap().file_name().to_string_lossy().starts_with("one-way.bridge-"));
+    assert!(noted);
+    let before = asked();
+    bench.says(0, "send job.rgl --to BRIDGE");
+    // Behind the job its end is asked for, which the bridge itself answers for a printer it knows.
+    assert!(asked() <= before + 1, "{} times", asked() - before);
+    bench.bridge.port.one_way.store(false, Ordering::Relaxed);
+    *bench.bridge.port.maker.lock().unwrap() = Some("ALPS");
+    let (_, said) = bench.answered("bridge status --to BRIDGE", "");
+    assert!(said.contains("white") && said.contains("MFG:ALPS"), "{said}");
+    let said = bench.says(0, "send job.rgl --to BRIDGE");
+    assert!(said.contains("the sheet is out"), "{said}");
 }
 
 #[test]
@@ -313,7 +451,9 @@ fn between_jobs_the_printer_itself_is_asked() {
     assert_eq!(query.progress().state, JobState::None);
     assert_eq!(query.lines(PATIENCE).unwrap(), (Lines::IDLE, None));
     assert_eq!(query.printer(Ask::DeviceId, PATIENCE).unwrap(), Reply::OneWay);
-    let Reply::Bytes(bytes) = query.printer(Ask::Printer, PATIENCE).unwrap() else { panic!("no answer") };
+    let Reply::Bytes(bytes) = query.printer(Ask::PrinterAtRest, PATIENCE).unwrap() else {
+        panic!("no answer")
+    };
     let status = Status::read(&bytes).unwrap();
     assert_eq!(status.errors, ["the cover is open; close it"]);
     assert_eq!(status.cartridges[0].ink, Some("white"));

@@ -1,14 +1,14 @@
 //! The link's endpoints: packets to and from the library's [`Links`](bridge::links::Links), which decides who is answered.
 
 use super::{BulkIn, BulkOut, PACKET, Usb};
-use crate::keep;
 use crate::shared::{Shared, Side};
+use crate::{keep, stack, trace};
 use bridge::links::Way;
 use embassy_futures::select::{Either, select};
 use embassy_usb::class::cdc_acm::{ControlChanged, Receiver, Sender};
 use embassy_usb::driver::{Endpoint, EndpointError, EndpointIn, EndpointOut};
 use protocol::link::frame::MAX;
-use protocol::link::message::DATA_MAX;
+use protocol::link::message::{DATA_MAX, Usage};
 use static_cell::StaticCell;
 
 /// One less than a packet: a full one would have to be followed by an empty one for the host to stop waiting.
@@ -62,6 +62,14 @@ pub async fn answer(shared: &'static Shared, mut serial: Sender<'static, Usb>, m
                 if let Some(from) = engine.log_wanted() {
                     let (at, end, count) = keep::read_log(from, &mut frame[..DATA_MAX]);
                     engine.log(at, end, &frame[..count]);
+                }
+                if engine.usage_wanted() {
+                    engine.usage(Usage {
+                        fixed: stack::fixed(),
+                        stack: stack::size(),
+                        stack_used: stack::used(),
+                        longest_us: trace::longest_us(),
+                    });
                 }
                 engine.transmit(frame)
             });

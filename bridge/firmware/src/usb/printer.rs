@@ -1,7 +1,6 @@
 //! The printer interface's endpoints and requests: packets to the library's [`Intake`], requests to its answers.
 
 use super::{BulkIn, BulkOut, PACKET, Usb};
-use crate::pins;
 use crate::shared::{Shared, Side};
 use bridge::printer_class::{CLASS, End, Intake, Next, Request, Setup, port_status};
 use embassy_futures::select::{Either, Either3, select, select3};
@@ -52,7 +51,8 @@ impl Handler for Requests {
                 Some(bytes.len())
             })?,
             Request::PortStatus => {
-                *buffer.first_mut()? = port_status(pins::status());
+                // As they were last read: a conversation with the printer has other uses for them.
+                *buffer.first_mut()? = port_status(self.shared.engine(|engine| engine.lines()));
                 1
             }
             Request::SoftReset => return None,

@@ -4,8 +4,9 @@ use std::cell::Cell;
 use std::time::Duration;
 
 use protocol::ink::Ink;
-use protocol::link::message::{Ask, Fault, JobKind, Progress};
+use protocol::link::message::{Fault, JobKind, Progress};
 
+use super::ask::{self, Negotiate};
 use super::{Cartridges, Delivery, Ended, Failure, Job, News, Packed, Question, ResetOwed, number};
 use crate::printers::{Printer, Printers, PrintersError, Standing};
 use crate::send::finish::{self, Sheet, await_sheet};
@@ -36,15 +37,26 @@ pub fn reset(query: &mut Query<'_>, printers: &Printers) -> Result<(), Failure> 
     Ok(printers.reset(Some(&Printer::Bridge(query.bridge().serial)))?)
 }
 
+/// Gives up the job that is open at a bridge, whoever has sent it, and has the printer reset; notes for everybody that it was.
+/// Says what the bridge made of it.
+pub fn give_up(query: &mut Query<'_>, job: u32, printers: &Printers) -> Result<Progress, Failure> {
+    let ended = query.abandon(job, BRIDGE)?;
+    // A printer that is off is reset by the bridge when it is back, so the notes stay until then.
+    if !matches!(query.lines(BRIDGE)?, (_, Some(Fault::PowerOff))) {
+        printers.reset(Some(&Printer::Bridge(query.bridge().serial)))?;
+    }
+    Ok(ended)
+}
+
 /// Asks the printer at `address` for the cartridges of these inks. A bridge that does not answer is a reason why they are not
 /// known.
-pub fn find_cartridges(address: &Address, inks: &[Ink]) -> Cartridges {
+pub fn find_cartridges(address: &Address, inks: &[Ink], printers: &Printers) -> Cartridges {
     let ask = || -> Result<Reply, Failure> {
         let mut link = address.open()?;
         let mut query = Query::new(&mut *link, BRIDGE)?;
         match query.lines(BRIDGE)? {
             (_, Some(fault)) => Ok(Reply::Stopped(fault)),
-            (_, None) => Ok(query.printer(Ask::Printer, PRINTER)?),
+            (_, None) => Ok(ask::status(&mut query, printers, Negotiate::Known, PRINTER)?),
         }
     };
     match ask() {
@@ -82,18 +94,21 @@ impl Delivery<'_> {
         let mut query = Query::new(&mut *link, BRIDGE)?;
         self.settle_earlier_jobs(&mut query)?;
         let fault = query.lines(BRIDGE)?.1;
-        let mut ask = |what| match fault {
-            // One that takes no bytes takes no question either.
-            Some(fault) => Ok(Reply::Stopped(fault)),
-            None => query.printer(what, PRINTER),
+        // One that takes no bytes takes no question either.
+        let id = match fault {
+            Some(fault) => Reply::Stopped(fault),
+            None => ask::device_id(&mut query, self.printers, Negotiate::Known, PRINTER)?,
         };
-        if let Some(id) = ask(Ask::DeviceId)?.device_id()
+        if let Some(id) = id.device_id()
             && !is_alps(&id)
             && !self.caller.agrees(&Question::NotAlps { id: &id })
         {
             return Err(Failure::NotAlps(id));
         }
-        let status = ask(Ask::Printer)?;
+        let status = match fault {
+            Some(fault) => Reply::Stopped(fault),
+            None => ask::status(&mut query, self.printers, Negotiate::Known, PRINTER)?,
+        };
         self.caller.tell(&News::Printer(&Cartridges::read(status, inks)));
         Ok(Met { boot: query.bridge().boot })
     }
@@ -105,7 +120,7 @@ impl Delivery<'_> {
         let progress = *query.progress();
         let mut owed = None;
         for unfinished in self.printers.unfinished(&printer)? {
-            match unfinished.standing(boot, &progress) {
+            match unfinished.standing(boot, &progress, query.past()) {
                 Standing::Ended { printed, whole } => {
                     // Whoever sent it was gone before it heard so.
                     self.counted(&unfinished.job, printed.into(), whole);
@@ -274,7 +289,7 @@ impl Delivery<'_> {
         }
         match result {
             Ok(outcome) => {
-                watcher.ended(outcome);
+                watcher.ended(outcome, session.followed());
                 Ok(Attempt::Ended(outcome, session.progress().copied()))
             }
             Err(RunError::Left) => Err(Failure::Left),
@@ -377,7 +392,8 @@ impl<'d, 'a> Watcher<'d, 'a> {
 
     /// What is known of the printer once the job has ended. A bridge that says a job is lost resets the printer by itself, as
     /// long as it does not lose its memory too; so that job stays noted until bytes of another one have crossed the port.
-    fn ended(&self, outcome: Outcome) {
+    /// `followed` says that the bridge has printed another job since: then this one had ended, or was reset away, before it.
+    fn ended(&self, outcome: Outcome, followed: bool) {
         let Some(printer) = self.printer() else { return };
         match outcome {
             Outcome::Printed | Outcome::Cancelled | Outcome::Broken => {
@@ -385,7 +401,8 @@ impl<'d, 'a> Watcher<'d, 'a> {
             }
             Outcome::Lost => {}
             Outcome::Forgotten => {
-                if !self.delivery.printers.knows(&printer, &self.job)
+                if !followed
+                    && !self.delivery.printers.knows(&printer, &self.job)
                     && let Err(error) = self.delivery.printers.begin(&printer, &self.job, None)
                 {
                     self.delivery.note(&with_causes(&error));

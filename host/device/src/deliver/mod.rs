@@ -16,9 +16,10 @@
 //! must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
 //! refuses as pass streams is checked once more, as the ledger needs its passes.
 //! Limits: a raw device tells nothing, so nothing can be resumed there. A computer that shares a bridge with another one over the
-//! network knows only its own jobs; the bridge knows all since it started.
+//! network knows only its own jobs; the bridge knows how the last sixteen have ended.
 //! Source: `docs/wire-format.md`, section 3; `docs/decisions/journal-before-deed.md`, `docs/decisions/reset-owed-by-the-printer.md`.
 
+pub mod ask;
 mod bridge;
 mod raw;
 
@@ -38,7 +39,8 @@ use crate::send::status::Status;
 use crate::send::{Address, Checked, Event, OpenError, Wish, streams, words};
 use observe::{Observer, with_causes};
 
-pub use bridge::{Met, find_cartridges, reset};
+use ask::AskError;
+pub use bridge::{Met, find_cartridges, give_up, reset};
 
 /// Whoever has something sent: hears what happens, and decides what the delivery cannot.
 pub trait Caller {
@@ -142,6 +144,9 @@ pub enum Failure {
     /// A question to the bridge got no answer.
     #[error(transparent)]
     Query(#[from] QueryError),
+    /// A question to the printer got none.
+    #[error(transparent)]
+    Ask(#[from] AskError),
     /// The conversation cannot go on.
     #[error(transparent)]
     Session(#[from] SessionError),
@@ -173,7 +178,7 @@ impl Failure {
     pub fn may_pass(&self) -> bool {
         match self {
             Failure::Open(error) => !matches!(error, OpenError::Forbidden(_) | OpenError::Several(_)),
-            Failure::Query(error) => {
+            Failure::Query(error) | Failure::Ask(AskError::Query(error)) => {
                 matches!(error, QueryError::Link(_) | QueryError::NoAnswer | QueryError::JobOpen(_))
             }
             Failure::Session(error) => matches!(error, SessionError::Busy(_)),
@@ -219,6 +224,10 @@ impl Cartridges {
             Reply::NotNow => Cartridges::Unknown("the bridge has an open job".into()),
             Reply::OneWay => Cartridges::Unknown("the printer's port is one-way".into()),
             Reply::Silent => Cartridges::Unknown("the printer did not answer".into()),
+            Reply::Unsure => Cartridges::Unknown(
+                "the bridge has restarted, and the printer may be inside a job, where a question would be printed".into(),
+            ),
+            Reply::NotAsked => Cartridges::Unknown("the printer was not asked".into()),
             Reply::Stopped(fault) => Cartridges::Unknown(words::fault(fault, None)),
             Reply::Bytes(answer) => match Status::read(&answer) {
                 Err(error) => Cartridges::Unknown(with_causes(&error)),

@@ -65,6 +65,9 @@ pub(crate) fn await_sheet(
         let (now, said) = match query.printer(Ask::Printer, PRINTER_PATIENCE)? {
             Reply::OneWay => return Ok(unknown("the printer's port is one-way")),
             Reply::NotNow => return Ok(unknown("the bridge already has another job")),
+            Reply::Unsure | Reply::NotAsked => {
+                return Ok(unknown("the bridge has restarted, and does not know what the printer is doing"));
+            }
             Reply::Stopped(Fault::PowerOff) => {
                 return Ok(unknown("the printer is switched off or its cable is loose"));
             }

@@ -5,10 +5,11 @@ use std::time::{Duration, Instant};
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, Fault, JobState, Lines, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    Answer, Ask, Fault, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage,
+    VERSION,
 };
 
-use super::session::{Bridge, printable};
+use super::session::{Bridge, other_version, printable, stranger};
 use super::transport::Transport;
 
 /// A question is repeated after this long: frames may be lost.
@@ -27,6 +28,10 @@ pub enum Reply {
     Silent,
     /// It takes no bytes at the moment.
     Stopped(Fault),
+    /// It is not known whether it stands between two jobs, and the question would be row data inside one.
+    Unsure,
+    /// It was not asked, since it has shown that it does not negotiate, or the user does not want it.
+    NotAsked,
 }
 
 impl Reply {
@@ -58,14 +63,14 @@ pub enum QueryError {
     NoAnswer,
     /// Other messages than ours.
     #[error(
-        "bridge {:016x}: its firmware {} speaks version {} of the link, this program version {VERSION}; `foilpress bridge \
-         flash` puts the firmware that came with this program on it",
-        .0.serial, .0.firmware, .0.version
+        "bridge {:016x}: its firmware {} speaks version {} of the link, this program version {VERSION}; {}",
+        .0.serial, .0.firmware, .0.version, other_version(.0.version)
     )]
     Version(Bridge),
     /// A job is open, so this must wait.
     #[error(
-        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
+        "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`, which needs the \
+         bridge's address for the job of another user or computer"
     )]
     JobOpen(u32),
     /// The bridge has no such job.
@@ -95,6 +100,7 @@ pub struct Query<'t> {
     reader: Reader,
     request: u16,
     bridge: Bridge,
+    past: [PastJob; PAST],
     progress: Progress,
 }
 
@@ -106,6 +112,8 @@ enum Heard {
     Answer(u16, Reply),
     Refused(Refusal, u32),
     Log(u16, LogPiece),
+    Past([PastJob; PAST]),
+    Usage(u16, Usage),
 }
 
 impl<'t> Query<'t> {
@@ -119,16 +127,23 @@ impl<'t> Query<'t> {
     pub fn with_any(link: &'t mut dyn Transport, patience: Duration) -> Result<Query<'t>, QueryError> {
         let mut reader = Reader::new();
         let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
-        let mut bridge = None;
-        let (bridge, progress) = exchange(link, &mut reader, &[hello], patience, &mut |heard| {
-            match heard {
-                Heard::Hello(found) => bridge = Some(found),
-                Heard::Progress(progress) => return Some((bridge.clone()?, progress)),
-                _ => {}
-            }
-            None
-        })?;
-        Ok(Query { link, reader, request: 0, bridge, progress })
+        let (mut bridge, mut past) = (None, None);
+        let (bridge, past, progress) =
+            exchange(link, &mut reader, &[hello], patience, &mut |heard| match heard {
+                // The other messages of another version may mean anything.
+                Heard::Hello(found) if found.version != VERSION => Some((found, NO_PAST, NOTHING)),
+                Heard::Hello(found) => {
+                    bridge = Some(found);
+                    None
+                }
+                Heard::Past(found) => {
+                    past = Some(found);
+                    None
+                }
+                Heard::Progress(progress) => Some((bridge.clone()?, past?, progress)),
+                _ => None,
+            })?;
+        Ok(Query { link, reader, request: 0, bridge, past, progress })
     }
 
     /// Who answers.
@@ -139,6 +154,21 @@ impl<'t> Query<'t> {
     /// What it does.
     pub fn progress(&self) -> &Progress {
         &self.progress
+    }
+
+    /// How the jobs before have ended, the last one first.
+    pub fn past(&self) -> impl Iterator<Item = &PastJob> {
+        self.past.iter().filter(|past| past.job != 0)
+    }
+
+    /// How much of its memory and time the firmware has used.
+    pub fn usage(&mut self, patience: Duration) -> Result<Usage, QueryError> {
+        let number = self.next();
+        let question = ToBridge::Ask { request: number, what: Ask::Board };
+        exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
+            Heard::Usage(request, usage) if request == number => Some(usage),
+            _ => None,
+        })
     }
 
     /// The port's lines, and the fault they mean.
@@ -235,6 +265,20 @@ impl<'t> Query<'t> {
         )?
     }
 
+    /// Gives up a job wherever it stands, and has the printer reset; says what the bridge made of it.
+    ///
+    /// Errors: [`QueryError::NoSuchJob`] beside those of every question.
+    pub fn abandon(&mut self, job: u32, patience: Duration) -> Result<Progress, QueryError> {
+        let messages = [ToBridge::Abandon { job }];
+        exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
+            Heard::Progress(progress) if progress.job == job && !is_open(&progress) => Some(Ok(progress)),
+            Heard::Refused(Refusal::NoSuchJob, refused) if refused == job => {
+                Some(Err(QueryError::NoSuchJob(job)))
+            }
+            _ => None,
+        })?
+    }
+
     /// Where the job stands now.
     pub fn ask_progress(&mut self, patience: Duration) -> Result<Progress, QueryError> {
         let hello = ToBridge::Hello { version: VERSION, schema: SCHEMA };
@@ -275,6 +319,16 @@ impl<'t> Query<'t> {
         self.request = self.request.wrapping_add(1);
         self.request
     }
+}
+
+/// Of a bridge that does not say.
+const NO_PAST: [PastJob; PAST] = [PastJob::NONE; PAST];
+const NOTHING: Progress =
+    Progress { job: 0, state: JobState::None, accepted: 0, limit: 0, printed: 0, pass: 0, row: 0 };
+
+/// Whether a job is open.
+pub fn is_open(progress: &Progress) -> bool {
+    matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling)
 }
 
 /// Says `messages`, again and again, until `judge` is content with what is heard.
@@ -323,7 +377,8 @@ fn exchange<T>(
 }
 
 fn heard(message: &[u8]) -> Option<Heard> {
-    Some(match frame::decode(message).ok()? {
+    let Ok(decoded) = frame::decode(message) else { return stranger(message).map(Heard::Hello) };
+    Some(match decoded {
         ToHost::Hello { version, boot, serial, firmware, .. } => {
             Heard::Hello(Bridge { version, boot, serial, firmware: printable(firmware) })
         }
@@ -337,12 +392,15 @@ fn heard(message: &[u8]) -> Option<Heard> {
                 Answer::OneWay => Reply::OneWay,
                 Answer::Silent => Reply::Silent,
                 Answer::Stopped(fault) => Reply::Stopped(fault),
+                Answer::Unsure => Reply::Unsure,
             },
         ),
         ToHost::Refused { reason, job } => Heard::Refused(reason, job),
         ToHost::LogPart { request, at, end, bytes } => {
             Heard::Log(request, LogPiece { at, end, bytes: bytes.to_vec() })
         }
+        ToHost::Past(past) => Heard::Past(past),
+        ToHost::Board { request, usage } => Heard::Usage(request, usage),
         _ => return None,
     })
 }
@@ -351,37 +409,58 @@ fn heard(message: &[u8]) -> Option<Heard> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_bridge_of_other_messages_is_refused_with_the_command_that_helps() {
+    /// What a program says that greets a bridge which answers with these messages.
+    fn greets(messages: &[&[u8]]) -> Result<u8, String> {
         use crate::send::transport::pair;
-        use protocol::link::message::JobState;
-        for (version, fits) in [(VERSION, true), (VERSION + 1, false), (VERSION - 1, false)] {
-            let (mut host, mut board) = pair();
-            let progress = Progress {
-                job: 0,
-                state: JobState::None,
-                accepted: 0,
-                limit: 0,
-                printed: 0,
-                pass: 0,
-                row: 0,
-            };
-            let hello = ToHost::Hello { version, schema: SCHEMA, boot: 1, serial: 0xab, firmware: "9.9" };
-            for message in [hello, ToHost::Progress(progress)] {
-                let mut bytes = [0; frame::MAX];
-                let length = frame::write(&message, &mut bytes).unwrap();
-                assert_eq!(board.send(&bytes[..length]).unwrap(), length);
+        let (mut host, mut board) = pair();
+        for message in messages {
+            let sum = frame::checksum(message).to_le_bytes();
+            let mut coded = vec![0; 2 * MAX];
+            let length = cobs(&[message, &sum[..]].concat(), &mut coded);
+            assert_eq!(board.send(&coded[..length]).unwrap(), length);
+        }
+        Query::new(&mut host, Duration::from_millis(900))
+            .map(|query| query.bridge().version)
+            .map_err(|error| error.to_string())
+    }
+
+    /// Frames bytes as the wire format has it, whatever they are.
+    fn cobs(bytes: &[u8], out: &mut [u8]) -> usize {
+        let (mut code, mut at) = (0, 1);
+        for &byte in bytes {
+            if byte == 0 {
+                out[code] = (at - code) as u8;
+                (code, at) = (at, at + 1);
+            } else {
+                (out[at], at) = (byte, at + 1);
             }
-            match Query::new(&mut host, Duration::from_secs(1)) {
-                Ok(query) => assert!(fits && query.bridge().version == version),
-                Err(error) => {
-                    let said = error.to_string();
-                    assert!(
-                        !fits && said.contains("9.9") && said.contains("foilpress bridge flash"),
-                        "{said}"
-                    );
-                }
+        }
+        out[code] = (at - code) as u8;
+        out[at] = 0;
+        at + 1
+    }
+
+    #[test]
+    fn a_bridge_of_another_version_is_refused_with_the_command_that_helps() {
+        // Hello: version, schema, boot, serial, firmware; then no jobs, and no job.
+        let hello = |version| [0, version, 1, 1, 0xab, 1, 3, b'9', b'.', b'9'];
+        let past = [&[7][..], &[0; 3 * PAST]].concat();
+        let progress = [1, 0, 0, 0, 0, 0, 0, 0];
+        assert_eq!(greets(&[&hello(VERSION), &past, &progress]), Ok(VERSION));
+        // Whatever else another version says, or does not say.
+        let unknown: &[u8] = &[1, 7, 99, 1, 2, 3];
+        for rest in [vec![&past[..], &progress[..]], vec![&progress[..]], vec![unknown], vec![]] {
+            for version in [VERSION - 1, VERSION + 1] {
+                let hello = hello(version);
+                let said = greets(&[&[&hello[..]][..], &rest[..]].concat()).unwrap_err();
+                assert!(said.contains("9.9") && said.contains("foilpress bridge flash"), "{said}");
+                assert!(said.contains(&format!("version {version} of the link")), "{said}");
             }
+        }
+        // A Hello with more in it, or less, than any that is known.
+        for hello in [&[0, VERSION + 1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11][..], &[0, VERSION + 1]] {
+            let said = greets(&[hello]).unwrap_err();
+            assert!(said.contains("speaks version") && said.contains("bridge flash"), "{said}");
         }
     }
 

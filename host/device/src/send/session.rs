@@ -7,7 +7,8 @@
 //! harmless. What must be known after a crash is in the [`Record`], which is made durable *before* the step it
 //! speaks of: [`Session::speak`] saves the record before the first Begin and before the first Data leave. So a job
 //! in [`Phase::Queued`] or [`Phase::Begun`] has certainly not reached the printer and may be begun (again), and one in
-//! [`Phase::Sending`] goes on only if the bridge itself still shows it; if it does not, it is never begun anew.
+//! [`Phase::Sending`] goes on only if the bridge itself still shows it; if it does not, it is never begun anew. How it has ended
+//! since, the bridge remembers, also behind other jobs.
 //! Cost: one pass over the data for framing; nothing is copied but into the outgoing buffer.
 //! Limits: one job at a time. The credit the bridge gives is never exceeded, so the bridge always reads.
 //! Source: `docs/wire-format.md`, section 3.
@@ -16,7 +17,7 @@ use std::time::Duration;
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    DATA_MAX, Fault, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
+    DATA_MAX, Fault, JobState, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION, hello_version,
 };
 use serde::Serialize;
 
@@ -52,8 +53,8 @@ pub struct Bridge {
 pub enum SessionError {
     /// Other messages than ours.
     #[error(
-        "the bridge's firmware {firmware} speaks version {found} of the link, this program version {VERSION}; \
-         `foilpress bridge flash` puts the firmware that came with this program on it"
+        "the bridge's firmware {firmware} speaks version {found} of the link, this program version {VERSION}; {}",
+        other_version(*found)
     )]
     Version {
         /// The bridge's version.
@@ -74,8 +75,8 @@ pub enum SessionError {
     },
     /// Somebody else's job is being printed.
     #[error(
-        "the bridge is printing another job ({0:08x}); wait until it is done, or end it with \
-         `foilpress cancel {0:08x}` on the computer that sent it"
+        "the bridge is printing another job ({0:08x}); wait until it is done, or end it with `foilpress cancel {0:08x}`, which \
+         needs the bridge's address for the job of another user or computer"
     )]
     Busy(u32),
     /// The number was used for another job.
@@ -84,6 +85,21 @@ pub enum SessionError {
     /// The bridge takes no job at all.
     #[error("the bridge has no memory for a job; flash the firmware that came with this program")]
     NoMemory,
+}
+
+/// What to do about a bridge of another version.
+pub(super) fn other_version(found: u8) -> &'static str {
+    if found < VERSION {
+        "`foilpress bridge flash` puts the firmware that came with this program on it"
+    } else {
+        "install the foilpress its firmware came with, or put this program's firmware on it with `foilpress bridge flash`"
+    }
+}
+
+/// The bridge that has sent a Hello of a version this program does not know.
+pub(super) fn stranger(message: &[u8]) -> Option<Bridge> {
+    let version = hello_version(message).filter(|&version| version != VERSION)?;
+    Some(Bridge { version, boot: 0, serial: 0, firmware: "of another release".into() })
 }
 
 /// One job's conversation.
@@ -95,6 +111,10 @@ pub struct Session<'d> {
     bridge: Option<Bridge>,
     /// The link is new: nothing heard on it counts until the bridge has introduced itself.
     greeted: bool,
+    /// The bridge has told on this link how the jobs before have ended.
+    recalled: bool,
+    /// The bridge has shown another job of which bytes have crossed the port.
+    followed: bool,
     /// What the bridge last said of this job since it last restarted.
     progress: Option<Progress>,
     /// The next byte to send.
@@ -122,6 +142,8 @@ impl<'d> Session<'d> {
             reader: Reader::new(),
             bridge: None,
             greeted: false,
+            recalled: false,
+            followed: false,
             progress: None,
             next: 0,
             rewound: None,
@@ -146,6 +168,11 @@ impl<'d> Session<'d> {
     /// What the bridge last said of this job.
     pub fn progress(&self) -> Option<&Progress> {
         self.progress.as_ref()
+    }
+
+    /// Whether the bridge has shown another job of which bytes have crossed the port.
+    pub fn followed(&self) -> bool {
+        self.followed
     }
 
     /// The bridge, once it has introduced itself.
@@ -181,7 +208,7 @@ impl<'d> Session<'d> {
     /// A new link is there, or the old one came back.
     pub fn connected(&mut self, now: Duration) {
         self.reader.reset();
-        self.greeted = false;
+        (self.greeted, self.recalled) = (false, false);
         (self.asked, self.heard, self.moved) = (None, now, now);
         self.doubt = false;
         (self.contradictions, self.contradicted) = (0, None);
@@ -214,10 +241,12 @@ impl<'d> Session<'d> {
                 Read::Damaged(_, rest) => bytes = rest,
                 Read::Message(message, rest) => {
                     bytes = rest;
-                    // A message of a later version is not for us.
-                    if let Ok(message) = frame::decode(message)
-                        && let Err(error) = self.follow(now, message)
-                    {
+                    let followed = match frame::decode(message) {
+                        Ok(message) => self.follow(now, message),
+                        // A message of a later version is not for us; only that there is one.
+                        Err(frame::Unknown) => stranger(message).map_or(Ok(()), |bridge| self.meet(bridge)),
+                    };
+                    if let Err(error) = followed {
                         break Err(error);
                     }
                 }
@@ -237,6 +266,7 @@ impl<'d> Session<'d> {
                 self.meet(Bridge { version, boot, serial, firmware: printable(firmware) })
             }
             ToHost::Progress(progress) if self.greeted => self.place(now, progress),
+            ToHost::Past(past) if self.greeted => self.recall(&past),
             ToHost::Refused { reason, job } if self.greeted && job == self.record.job => {
                 self.refused(now, reason)
             }
@@ -280,14 +310,7 @@ impl<'d> Session<'d> {
         if self.record.phase == Phase::Queued {
             return Err(SessionError::NumberTaken(progress.job));
         }
-        let outcome = match progress.state {
-            JobState::Done => Some(Outcome::Printed),
-            JobState::Cancelled => Some(Outcome::Cancelled),
-            JobState::Broken(_) => Some(Outcome::Broken),
-            JobState::Lost => Some(Outcome::Lost),
-            JobState::None | JobState::Printing | JobState::Stopped(_) | JobState::Cancelling => None,
-        };
-        if let Some(outcome) = outcome {
+        if let Some(outcome) = outcome(progress.state) {
             self.record.phase = Phase::Ended(outcome);
             self.record.printed = progress.printed;
             self.progress = Some(progress);
@@ -324,13 +347,28 @@ impl<'d> Session<'d> {
         Ok(())
     }
 
+    /// The bridge tells how earlier jobs have ended.
+    fn recall(&mut self, past: &[PastJob]) -> Result<(), SessionError> {
+        self.recalled = true;
+        let Some(past) = past.iter().find(|past| past.job == self.record.job) else { return Ok(()) };
+        if self.record.phase == Phase::Queued {
+            return Err(SessionError::NumberTaken(past.job));
+        }
+        if let Some(outcome) = outcome(past.state) {
+            self.record.phase = Phase::Ended(outcome);
+            self.record.printed = past.printed;
+        }
+        Ok(())
+    }
+
     /// The bridge tells of another job.
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
+        self.followed |= progress.job != 0 && progress.printed > 0;
         let open = matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling);
         match self.record.phase {
             // Nothing of it has ever left, and the bridge does not have it.
             Phase::Begun if self.record.cancel => {
-                if self.convinced(now) {
+                if self.convinced(now) && self.recalled {
                     self.record.phase = Phase::Ended(Outcome::Cancelled);
                 }
             }
@@ -340,7 +378,7 @@ impl<'d> Session<'d> {
                 }
             }
             Phase::Sending => {
-                if self.convinced(now) {
+                if self.convinced(now) && self.recalled {
                     // To begin it anew could print it twice.
                     self.record.phase = Phase::Ended(Outcome::Forgotten);
                 }
@@ -463,6 +501,17 @@ impl<'d> Session<'d> {
             self.saved = Some(self.record);
         }
         Ok(())
+    }
+}
+
+/// How a job has ended whose state is this, if it has.
+fn outcome(state: JobState) -> Option<Outcome> {
+    match state {
+        JobState::Done => Some(Outcome::Printed),
+        JobState::Cancelled => Some(Outcome::Cancelled),
+        JobState::Broken(_) => Some(Outcome::Broken),
+        JobState::Lost => Some(Outcome::Lost),
+        JobState::None | JobState::Printing | JobState::Stopped(_) | JobState::Cancelling => None,
     }
 }
 

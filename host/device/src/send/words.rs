@@ -101,14 +101,14 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
             )
         }
         Outcome::Lost => format!(
-            "{}: the sheet is lost{}: the printer was switched off or its cable pulled during the job, or the bridge restarted \
-             and the job's data are gone. The bridge resets the printer before the next job. Take out the sheet, and send the job \
+            "{}: the sheet is lost{}: the printer was switched off or its cable pulled during the job, the bridge restarted \
+             and the job's data are gone, or someone gave the job up with `foilpress bridge reset`. The bridge resets the printer before the next job. Take out the sheet, and send the job \
              again",
             entry.name,
             reached(entry)
         ),
         Outcome::Forgotten => format!(
-            "{}: the bridge no longer knows this job, because it restarted or has printed other jobs since. At least {printed} of \
+            "{}: the bridge no longer knows this job, because it lost its memory or has printed many others since. At least {printed} of \
              {} bytes were printed{}. If the sheet comes out complete, nothing is wrong; otherwise it is lost. {RESET}. The job is \
              not sent again by itself, so that nothing is printed twice",
             entry.name,

@@ -3,12 +3,14 @@
 use std::time::Duration;
 
 use anyhow::{Result, anyhow};
-use protocol::link::message::{Ask, Fault, JobState, Lines, Progress};
+use protocol::link::message::{Fault, JobState, Lines, PastJob, Progress, Usage};
 use serde_json::json;
 
+use device::deliver::ask::{self, Negotiate};
 use device::flash::image::Firmware;
+use device::printers::Printers;
 use device::send::find::{self, Candidate};
-use device::send::query::{Query, Reply, is_alps};
+use device::send::query::{Query, Reply, is_alps, is_open};
 use device::send::session::Bridge;
 use device::send::status::Status;
 use device::send::transport::Transport;
@@ -43,11 +45,6 @@ pub fn doing(progress: &Progress) -> String {
             format!("idle; job {job:08x} was lost; the bridge resets the printer before the next one")
         }
     }
-}
-
-/// Whether a job is open.
-pub fn is_open(progress: &Progress) -> bool {
-    matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling)
 }
 
 /// The lines by their names.
@@ -91,30 +88,53 @@ pub struct Found {
     pub device_id: Reply,
     /// The printer's own status.
     pub status: Reply,
+    /// How the jobs before have ended, the last one first.
+    pub past: Vec<PastJob>,
+    /// The firmware's use of memory and time.
+    pub usage: Usage,
 }
 
 impl Found {
     /// Asks bridge and printer. The printer is asked only while no job is open; a bridge that prints says so instead.
-    pub fn ask(address: &Address) -> Result<Found> {
-        Found::ask_on(&mut *address.open()?)
+    pub fn ask(address: &Address, negotiate: Negotiate) -> Result<Found> {
+        Found::ask_on(&mut *address.open()?, negotiate)
     }
 
     /// The same on a link that is open.
-    pub fn ask_on(link: &mut dyn Transport) -> Result<Found> {
+    pub fn ask_on(link: &mut dyn Transport, negotiate: Negotiate) -> Result<Found> {
+        let printers = Printers::of_system()?;
         let mut query = Query::new(link, PATIENCE)?;
-        let (lines, fault) = query.lines(PATIENCE)?;
-        let mut printer = |what| match fault {
-            Some(fault) => Ok(Reply::Stopped(fault)),
-            None => query.printer(what, PRINTER_PATIENCE),
+        let mut found = Found::of_bridge(&mut query)?;
+        let stopped = found.fault.map(Reply::Stopped);
+        found.device_id = match &stopped {
+            Some(stopped) => stopped.clone(),
+            None => ask::device_id(&mut query, &printers, negotiate, PRINTER_PATIENCE)?,
         };
-        let device_id = printer(Ask::DeviceId)?;
-        let mut status = printer(Ask::Printer)?;
+        found.status = match stopped {
+            Some(stopped) => stopped,
+            None => ask::status(&mut query, &printers, negotiate, PRINTER_PATIENCE)?,
+        };
         // A job may have ended meanwhile, between two of these answers.
-        let progress = query.ask_progress(PATIENCE)?;
-        if status == Reply::NotNow && !is_open(&progress) {
-            status = query.printer(Ask::Printer, PRINTER_PATIENCE)?;
+        found.progress = query.ask_progress(PATIENCE)?;
+        if found.status == Reply::NotNow && !is_open(&found.progress) {
+            found.status = ask::status(&mut query, &printers, negotiate, PRINTER_PATIENCE)?;
         }
-        Ok(Found { bridge: query.bridge().clone(), progress, lines, fault, device_id, status })
+        Ok(found)
+    }
+
+    /// What the bridge itself knows, before the printer is asked.
+    pub fn of_bridge(query: &mut Query<'_>) -> Result<Found> {
+        let (lines, fault) = query.lines(PATIENCE)?;
+        Ok(Found {
+            bridge: query.bridge().clone(),
+            progress: *query.progress(),
+            lines,
+            fault,
+            device_id: Reply::NotNow,
+            status: Reply::NotNow,
+            past: query.past().copied().collect(),
+            usage: query.usage(PATIENCE)?,
+        })
     }
 
     /// As JSON.
@@ -124,6 +144,11 @@ impl Found {
             "serial_number": format!("{:016X}", self.bridge.serial),
             "job": { "number": self.progress.job, "doing": doing(&self.progress),
                      "accepted": self.progress.accepted, "printed": self.progress.printed },
+            "earlier_jobs": self.earlier().map(|past| json!({
+                "number": past.job, "ended": ended(past.state), "printed": past.printed,
+            })).collect::<Vec<_>>(),
+            "firmware": { "memory": self.usage.fixed, "stack": self.usage.stack, "stack_used": self.usage.stack_used,
+                          "longest_us": self.usage.longest_us },
             "lines_high": levels(self.lines),
             "fault": self.fault.map(|fault| words::fault(fault, None)),
             "device_id": self.device_id.device_id(),
@@ -132,6 +157,11 @@ impl Found {
                 _ => None,
             },
         })
+    }
+
+    /// The jobs before the last one.
+    fn earlier(&self) -> impl Iterator<Item = &PastJob> {
+        self.past.iter().filter(|past| past.job != self.progress.job)
     }
 
     /// The printer's device ID, if it sent one.
@@ -146,6 +176,11 @@ impl Found {
             writeln!(out, "    {newer}")?;
         }
         writeln!(out, "job: {}", doing(&self.progress))?;
+        let earlier: Vec<String> =
+            self.earlier().take(4).map(|past| format!("{:08x} {}", past.job, ended(past.state))).collect();
+        if !earlier.is_empty() {
+            writeln!(out, "before: {}", earlier.join(", "))?;
+        }
         writeln!(out, "lines high: {}", levels(self.lines).join(" "))?;
         if let Some(fault) = self.fault {
             writeln!(out, "{}", words::fault(fault, None))?;
@@ -162,16 +197,42 @@ impl Found {
                 Err(error) => writeln!(out, "{}", with_causes(&error))?,
             },
             Reply::NotNow => writeln!(out, "printer: not asked, because a job is open")?,
+            Reply::NotAsked => writeln!(out, "printer: not asked")?,
+            Reply::Unsure => writeln!(
+                out,
+                "printer: not asked, because it may be inside a job that the bridge has forgotten; `foilpress bridge reset` makes \
+                 it ready"
+            )?,
             Reply::OneWay => writeln!(out, "printer: its port is one-way, so it cannot be asked")?,
             Reply::Silent => writeln!(out, "printer: did not answer in time")?,
             Reply::Stopped(_) => writeln!(out, "printer: cannot be asked at the moment")?,
         }
+        let Usage { fixed, stack, stack_used, longest_us } = self.usage;
+        writeln!(
+            out,
+            "firmware: {} of {} KiB of stack used, {} KiB of other memory, no task ran longer than {:.1} ms",
+            stack_used.div_ceil(1024),
+            stack / 1024,
+            fixed.div_ceil(1024),
+            f64::from(longest_us) / 1000.0
+        )?;
         Ok(())
+    }
+}
+
+/// How an earlier job has ended, in a word or two.
+fn ended(state: JobState) -> &'static str {
+    match state {
+        JobState::Done => "printed",
+        JobState::Cancelled => "cancelled",
+        JobState::Broken(_) => "not readable",
+        JobState::Lost => "lost",
+        JobState::None | JobState::Printing | JobState::Stopped(_) | JobState::Cancelling => "open",
     }
 }
 
 /// What a bridge answers on the first of its addresses that can be opened.
 pub fn ask(candidate: &Candidate) -> Result<Found> {
     let (_, mut link) = candidate.open()?;
-    Found::ask_on(&mut *link)
+    Found::ask_on(&mut *link, Negotiate::Known)
 }

@@ -7,10 +7,16 @@ use clap::Args as ClapArgs;
 
 use super::found::{Found, only};
 use super::watch;
+use device::deliver::ask::Negotiate;
 use device::send::Address;
 
 /// Arguments of `bridge status`.
 #[derive(ClapArgs, Debug)]
+#[command(
+    after_help = "Examples:\n  foilpress bridge status\n  foilpress bridge status --no-negotiate   (an old printer)\n\n\
+    To ask the printer, the bridge negotiates with it as IEEE 1284 describes, which may take a printer of before 1994 off line. A \
+    printer that has not answered a negotiation is not asked again by other commands."
+)]
 pub struct Args {
     /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
@@ -21,6 +27,9 @@ pub struct Args {
     /// Refresh until interrupted; with --json, print one object on a line whenever something changes
     #[arg(long)]
     watch: bool,
+    /// Do not ask the printer anything, only the bridge
+    #[arg(long)]
+    no_negotiate: bool,
 }
 
 /// Runs `bridge status`.
@@ -29,10 +38,11 @@ pub fn run(args: &Args) -> Result<()> {
         Some(address) => address.clone(),
         None => only()?,
     };
+    let negotiate = if args.no_negotiate { Negotiate::Never } else { Negotiate::Again };
     if args.watch {
-        return watch::run(&address, args.json);
+        return watch::run(&address, args.json, negotiate);
     }
-    let found = Found::ask(&address)?;
+    let found = Found::ask(&address, negotiate)?;
     let mut out = std::io::stdout().lock();
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&found.json())?)?;

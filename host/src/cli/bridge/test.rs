@@ -9,10 +9,10 @@ use clap::Args as ClapArgs;
 use protocol::link::message::Lines;
 use serde_json::json;
 
-use super::found::{PATIENCE, is_open, only};
+use super::found::{PATIENCE, only};
 use crate::cli::output::say_on_interrupt;
 use device::send::Address;
-use device::send::query::{Query, QueryError};
+use device::send::query::{Query, QueryError, is_open};
 use device::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
 
 /// Time between two checks whether the plug has been moved.

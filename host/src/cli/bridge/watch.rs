@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use console::Term;
-use protocol::link::message::Ask;
 use serde_json::json;
 
-use super::found::{Found, PATIENCE, PRINTER_PATIENCE, is_open};
+use super::found::{Found, PATIENCE, PRINTER_PATIENCE};
 use crate::cli::stdio::chain;
+use device::deliver::ask::{self, Negotiate};
+use device::printers::Printers;
 use device::send::Address;
-use device::send::query::{Query, Reply};
+use device::send::query::{Query, Reply, is_open};
 use device::send::transport::Transport;
 
 /// Time between two questions to the bridge.
@@ -73,13 +74,14 @@ impl Screen {
 }
 
 /// Shows bridge and printer for ever. Waits for a bridge that goes away, once it has been connected.
-pub fn run(address: &Address, json: bool) -> Result<()> {
+pub fn run(address: &Address, json: bool, negotiate: Negotiate) -> Result<()> {
+    let printers = Printers::of_system()?;
     let mut screen =
         Screen { json, terminal: std::io::stdout().is_terminal() && !json, shown: String::new() };
     let mut been = false;
     loop {
         let met = match address.open() {
-            Ok(mut link) => follow(&mut *link, &mut screen, &mut been),
+            Ok(mut link) => follow(&mut *link, &printers, negotiate, &mut screen, &mut been),
             Err(error) => Err(error.into()),
         };
         match met {
@@ -96,19 +98,13 @@ pub fn run(address: &Address, json: bool) -> Result<()> {
 /// Follows one connection until it fails. An error of standard output is an [`std::io::Error`].
 fn follow(
     link: &mut dyn Transport,
+    printers: &Printers,
+    negotiate: Negotiate,
     screen: &mut Screen,
     been: &mut bool,
 ) -> Result<std::convert::Infallible> {
     let mut query = Query::new(link, PATIENCE)?;
-    let (lines, fault) = query.lines(PATIENCE)?;
-    let mut found = Found {
-        bridge: query.bridge().clone(),
-        progress: *query.progress(),
-        lines,
-        fault,
-        device_id: Reply::NotNow,
-        status: Reply::NotNow,
-    };
+    let mut found = Found::of_bridge(&mut query)?;
     *been = true;
     let mut asked: Option<Instant> = None;
     loop {
@@ -117,9 +113,9 @@ fn follow(
             (None, true) => found.status = Reply::NotNow,
             (None, false) if asked.is_none_or(|at| at.elapsed() >= ASK) => {
                 if !matches!(found.device_id, Reply::Bytes(_) | Reply::OneWay) {
-                    found.device_id = query.printer(Ask::DeviceId, PRINTER_PATIENCE)?;
+                    found.device_id = ask::device_id(&mut query, printers, negotiate, PRINTER_PATIENCE)?;
                 }
-                found.status = query.printer(Ask::Printer, PRINTER_PATIENCE)?;
+                found.status = ask::status(&mut query, printers, negotiate, PRINTER_PATIENCE)?;
                 asked = Some(Instant::now());
             }
             (None, false) => {}
