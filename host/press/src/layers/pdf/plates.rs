@@ -13,6 +13,7 @@
 
 use std::path::Path;
 
+use palette::{LinSrgb, Srgb};
 use protocol::ink::Kind;
 use rayon::prelude::*;
 
@@ -162,8 +163,10 @@ fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[
         for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
             if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
                 let [c, m, y, k] = inks.map(|ink| 255 - ink.map_or(0, |coverage| u32::from(coverage[at])));
+                // Half of an ink leaves half of the light, as in what was drawn beside the layers.
+                let light = [c, m, y].map(|v| (v * k) as f32 / (255.0 * 255.0));
                 let [_, rgb @ ..] = pixel;
-                *rgb = [c, m, y].map(|v| ((v * k + 127) / 255) as u8);
+                *rgb = Srgb::<u8>::from_linear(LinSrgb::from(light)).into();
             }
         }
     });
