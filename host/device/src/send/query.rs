@@ -112,7 +112,7 @@ enum Heard {
     Answer(u16, Reply),
     Refused(Refusal, u32),
     Log(u16, LogPiece),
-    Past([PastJob; PAST]),
+    Past(Box<[PastJob; PAST]>),
     Usage(u16, Usage),
 }
 
@@ -137,7 +137,7 @@ impl<'t> Query<'t> {
                     None
                 }
                 Heard::Past(found) => {
-                    past = Some(found);
+                    past = Some(*found);
                     None
                 }
                 Heard::Progress(progress) => Some((bridge.clone()?, past?, progress)),
@@ -399,7 +399,7 @@ fn heard(message: &[u8]) -> Option<Heard> {
         ToHost::LogPart { request, at, end, bytes } => {
             Heard::Log(request, LogPiece { at, end, bytes: bytes.to_vec() })
         }
-        ToHost::Past(past) => Heard::Past(past),
+        ToHost::Past(past) => Heard::Past(Box::new(past)),
         ToHost::Board { request, usage } => Heard::Usage(request, usage),
         _ => return None,
     })
