@@ -357,7 +357,10 @@ fn text_on_a_page_with_a_plate_of_white_keeps_its_outline() {
     let text = |drawing: &str, by_queue: bool| {
         std::fs::write(bench.path("page.ps"), page(SHEET, drawing)).expect("a page");
         let job = if by_queue { queued(&bench, "page.ps") } else { job(&bench, "page.ps") };
-        without_marks(&printed(&job, &Ink::ALL))
+        // Marks may end on either side of a dot; the letters begin where they are drawn.
+        let inks: Vec<Ink> = Ink::ALL.into_iter().filter(|&ink| ink != Ink::White).collect();
+        let page = without_marks(&printed(&job, &inks));
+        page.part(page.bounds())
     };
     let drawn = text(&lines("0 setgray"), true);
     for (name, before, exact) in [
