@@ -67,6 +67,14 @@ function reach(bench, all, name) {
   throw new Error(`${name} was never reached`);
 }
 
+/// Runs until the program is about to write an entry of its log.
+function reachLog(bench, all) {
+  // The printer goes, which is logged.
+  bench.printer.later(0, () => bench.printer.change({ paperOut: 1 }));
+  reach(bench, all, '4keep3log');
+  bench.printer.own.paperOut = 0;
+}
+
 const FAILURES = {
   'a fault of the processor': {
     text: 'fault at ',
@@ -80,10 +88,7 @@ const FAILURES = {
     text: 'fault at ',
     strike(bench, all) {
       bench.say(readLog(1, 0)).catch(() => {});
-      // The printer goes, which is logged.
-      bench.printer.later(0, () => bench.printer.change({ paperOut: 1 }));
-      reach(bench, all, '4keep3log');
-      bench.printer.own.paperOut = 0;
+      reachLog(bench, all);
       const { PC } = bench.board.chip.core;
       bench.board.fault();
       return PC;
@@ -91,8 +96,10 @@ const FAILURES = {
   },
   'a stack that grows beyond its end': {
     text: 'fault: the stack has grown beyond its ',
-    strike({ board }) {
-      board.chip.core.SP = 0x20000008;
+    strike(bench, all) {
+      // At a function's beginning, which puts registers on the stack.
+      reachLog(bench, all);
+      bench.board.chip.core.SP = 0x20000008;
     },
   },
 };
