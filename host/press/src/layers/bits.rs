@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::window::Window;
 use crate::separate::Plane;
+use crate::sheet::Area;
 
 /// A plane without ink.
 pub(super) fn blank(width: usize, length: usize) -> Plane {
@@ -51,22 +52,9 @@ pub(super) fn bounds(plane: &Plane) -> Option<Window> {
 }
 
 /// The part of a plane in a window, which lies within it.
-pub(super) fn cut(plane: &Plane, window: &Window) -> Plane {
-    let mut part = blank(window.width, window.height);
-    let (from, shift) = (window.left / 8, window.left % 8);
-    // What lies beyond the last dot of a row is blank.
-    let unused = 8 * part.stride - window.width;
-    let rows = plane.bits.chunks_exact(plane.stride.max(1)).skip(window.top);
-    for (to, row) in part.bits.chunks_exact_mut(part.stride.max(1)).zip(rows) {
-        for (at, byte) in (from..).zip(to.iter_mut()) {
-            let next = row.get(at + 1).map_or(0, |&next| u16::from(next));
-            *byte = ((u16::from(row[at]) << 8 | next) << shift >> 8) as u8;
-        }
-        if let Some(last) = to.last_mut() {
-            *last &= 0xff << unused;
-        }
-    }
-    part
+pub(super) fn cut(plane: &Plane, &Window { left, top, width, height }: &Window) -> Plane {
+    let rows = plane.rows_in(Area { left, top, width, length: height });
+    Plane { width, length: height, stride: width.div_ceil(8), bits: rows.flatten().collect() }
 }
 
 /// Combines `with` into `plane` byte by byte. Both have the same size.

@@ -89,24 +89,9 @@ pub fn save_pass(
     path: &Path,
 ) -> Result<(), FileError> {
     let palette = [ground.0, label(pass.ink, ground.0)];
-    let rows = rows(pass, area).flat_map(|row| std::iter::repeat_n(row, across));
-    let bits: Vec<u8> = rows.flatten().collect();
+    let rows = pass.plane.rows_in(area).map(Iterator::collect::<Vec<u8>>);
+    let bits: Vec<u8> = rows.flat_map(|row| row.repeat(across)).collect();
     write_png(path, (area.width, area.length * across), Kind::Two(&palette), &bits)
-}
-
-/// The dots of each row of an area of a pass, eight a byte, the first one highest. Those after the last are 0.
-fn rows(pass: &Pass, area: Area) -> impl Iterator<Item = impl Iterator<Item = u8> + Clone> {
-    let Area { left, top, width, length } = area;
-    let (byte, shift) = (left / 8, left % 8);
-    let rows = pass.plane.bits.chunks_exact(pass.plane.stride).skip(top).take(length);
-    rows.map(move |row| {
-        (0..width.div_ceil(8)).map(move |i| {
-            let next = row.get(byte + i + 1).copied().unwrap_or(0);
-            let [eight, _] = (u16::from_be_bytes([row[byte + i], next]) << shift).to_be_bytes();
-            let beyond = (8 * (i + 1)).saturating_sub(width);
-            eight >> beyond << beyond
-        })
-    })
 }
 
 /// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each
@@ -145,7 +130,7 @@ pub fn pass_thumbnail(pass: &Pass, area: Area, across: usize, ground: Ground, lo
     let (width, height) = (area.width.div_ceil(wide), area.length.div_ceil(step));
     // Dots of each pixel: all of them, and those with ink.
     let mut sums = vec![[0u32; 2]; width * height];
-    for (y, row) in rows(pass, area).enumerate() {
+    for (y, row) in pass.plane.rows_in(area).enumerate() {
         let sums = &mut sums[y / step * width..][..width];
         for (i, sum) in sums.iter_mut().enumerate() {
             sum[0] += wide.min(area.width - i * wide) as u32;

@@ -32,24 +32,28 @@ impl Plane {
         self.bits.iter().map(|byte| u64::from(byte.count_ones())).sum()
     }
 
+    /// The dots of each row of an area, eight a byte, the first one highest. Those after the last are 0.
+    ///
+    /// # Panics
+    /// If the area leaves the plane, which is a bug of the caller.
+    pub(crate) fn rows_in(&self, area: Area) -> impl Iterator<Item = impl Iterator<Item = u8>> {
+        let Area { left, top, width, length } = area;
+        let (first, shift) = (left / 8, left % 8);
+        let rows = self.bits.chunks_exact(self.stride.max(1)).skip(top).take(length);
+        rows.map(move |row| {
+            (0..width.div_ceil(8)).map(move |i| {
+                let next = row.get(first + i + 1).copied().unwrap_or(0);
+                let [eight, _] = (u16::from_be_bytes([row[first + i], next]) << shift).to_be_bytes();
+                let beyond = (8 * (i + 1)).saturating_sub(width);
+                eight >> beyond << beyond
+            })
+        })
+    }
+
     /// How many dots of an area have ink.
     pub(crate) fn dots_in(&self, area: &Area) -> u64 {
-        let rows = self.bits.chunks_exact(self.stride.max(1)).skip(area.top).take(area.length);
-        let (first, end) = (area.left, (area.left + area.width).min(self.width));
-        rows.map(|row| {
-            let whole = |from: usize, to: usize| {
-                (from..to).map(|byte| u64::from(row[byte].count_ones())).sum::<u64>()
-            };
-            let single = |from: usize, to: usize| {
-                (from..to).filter(|x| row[x / 8] & 0x80 >> (x % 8) != 0).count() as u64
-            };
-            let (low, high) = (first.next_multiple_of(8), end / 8 * 8);
-            if low > high {
-                return single(first, end);
-            }
-            single(first, low) + whole(low / 8, high / 8) + single(high, end)
-        })
-        .sum()
+        let width = area.width.min(self.width.saturating_sub(area.left));
+        self.rows_in(Area { width, ..*area }).flatten().map(|eight| u64::from(eight.count_ones())).sum()
     }
 }
 
