@@ -7,7 +7,7 @@
 //! [`Intent::Blend`] changes smoothly from clamping, where the material is in the gamut, to the mapped bases, where it is
 //! far outside; [`Intent::Contrast`] clamps in the gamut and outside it keeps differences between neighbours.
 //! [`Intent::Auto`] clamps unless that merges materials that differ.
-//! Cost: a millisecond per basis; about 10 microseconds per pixel and core for clamp and blend, three times that for
+//! Cost: a millisecond per basis; 7 to 10 microseconds per pixel and core for clamp and blend, three times that for
 //! contrast. Limits: the mixture is exact only for light that does not scatter sideways in the paper.
 
 mod assemble;
@@ -25,6 +25,7 @@ mod local;
 mod map;
 mod mix;
 mod prune;
+mod recent;
 mod report;
 mod sample;
 mod settings;

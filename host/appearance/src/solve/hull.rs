@@ -88,6 +88,13 @@ impl Target {
         let curve = self.root.iter().zip(&hull.weight).take(hull.curve_columns());
         curve.map(|(root, w)| root * w * w).sum()
     }
+
+    /// The weighted cube roots of evenly spaced columns: a rough measure of how far two targets are apart.
+    pub(crate) fn summary<const N: usize>(&self, hull: &Hull) -> [f32; N] {
+        let m = self.root.len();
+        let column = |i: usize| (2 * i + 1) * m / (2 * N);
+        std::array::from_fn(|i| (self.root[column(i)] * hull.weight[column(i)]) as f32)
+    }
 }
 
 /// Appends the albedo of each channel to the radiances of a row, given the share of each configuration.

@@ -191,12 +191,12 @@ impl std::fmt::Display for Look {
 
 /// Sides of a window, and how many there are along either side of the rectangle.
 const WINDOW: usize = 512;
-const WINDOWS: usize = 4;
+const WINDOWS: usize = 3;
 
 /// From how far one looks, in metres.
 const EYES: [f64; 3] = [0.3, 0.5, 1.0];
 
-/// How a halftone of this mix looks, on at most 16 windows of it that lie evenly; `None` without reflectances in the
+/// How a halftone of this mix looks, on at most 9 windows of it that lie evenly; `None` without reflectances in the
 /// settings, or for a rectangle smaller than an eighth of a window.
 ///
 /// # Errors
