@@ -8,6 +8,7 @@ use protocol::link::message::DefectKind;
 use protocol::rgl::JobWriter;
 use protocol::rgl::job::ROW_ROOM;
 use protocol::runs::{Decoder, Defect, Header, HeaderError, MAX_HEADER, Step, band_bytes, stride};
+use protocol::walk::Placed;
 
 /// Room for whatever one slice of work writes: the longest row, 9880 dots.
 pub(crate) const WRITE_ROOM: usize = ROW_ROOM + 1235;
@@ -65,7 +66,7 @@ impl<'m> Streams<'m> {
     pub(crate) fn new(band: &'m mut [u8]) -> Self {
         Streams {
             band,
-            decoder: Decoder::new(0, 0),
+            decoder: Decoder::new(Placed::whole(0, 0)),
             writer: None,
             stage: Stage::Header,
             written: Written::Nothing,
@@ -184,7 +185,7 @@ impl<'m> Streams<'m> {
                 let writer = JobWriter::new(header.setup().clone(), header.rows())
                     .map_err(|_| DefectKind::Forbidden)?;
                 self.writer = Some(writer);
-                self.decoder.resize(header.columns(), header.rows());
+                self.decoder.begin(*header.walk());
                 self.stride = stride(header.columns());
                 self.stage = Stage::Read;
                 return Ok(i + 1);

@@ -16,6 +16,7 @@ use protocol::link::message::{DATA_MAX, JobKind, JobState, ToBridge};
 use protocol::paper::Paper;
 use protocol::rgl::Page;
 use protocol::runs::{Header, MAX_BAND, MAX_HEADER, encode};
+use protocol::walk::Placed;
 
 const PAPER: Paper = Paper::Custom { width: 900, length: 610 };
 const INKS: [Ink; 3] = [Ink::MetallicSilver, Ink::Cyan, Ink::Finish];
@@ -52,7 +53,7 @@ fn streams(passes: &[Pass]) -> Vec<u8> {
     let length = header.write(&mut out);
     let (mut bytes, mut buffer) = (out[..length].to_vec(), vec![0; MAX_BAND]);
     for pass in passes {
-        encode(PAPER.width(), PAPER.length(), &pass.plane.bits, &mut buffer, |band| {
+        encode(&Placed::whole(PAPER.width(), PAPER.length()), &pass.plane.bits, &mut buffer, |band| {
             bytes.extend_from_slice(band)
         })
         .unwrap();

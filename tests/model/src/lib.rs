@@ -12,6 +12,7 @@ use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{self, JobSetup, JobWriter, Order, Page, Step};
 use protocol::runs::{Header, MAX_BAND, MAX_HEADER, encode, stride};
+use protocol::walk::{Frame, Placed};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -54,6 +55,8 @@ pub struct Planes {
     pub width: u16,
     pub rows: u16,
     pub bits: Vec<Vec<u8>>,
+    /// Where the walk goes.
+    pub walk: Placed,
 }
 
 impl Planes {
@@ -77,7 +80,10 @@ impl Planes {
                 plane
             })
             .collect();
-        Planes { inks, width, rows, bits }
+        let (x, y) = (random.random_range(0..width), random.random_range(0..rows));
+        let size = (random.random_range(1..=width - x), random.random_range(1..=rows - y));
+        let walk = Placed::new(width, rows, Frame { x, y, width: size.0, height: size.1 }).unwrap();
+        Planes { inks, width, rows, bits, walk }
     }
 
     fn page() -> Page {
@@ -108,11 +114,11 @@ impl Planes {
     pub fn streams(&self) -> Vec<u8> {
         let header = Header::new(Self::page(), &self.inks, None, self.width, self.rows).unwrap();
         let mut out = [0; MAX_HEADER];
-        let length = header.write(&mut out);
+        let length = header.framed(self.walk.frame()).unwrap().write(&mut out);
         let mut bytes = out[..length].to_vec();
         let mut buffer = vec![0; MAX_BAND];
         for plane in &self.bits {
-            encode(self.width, self.rows, plane, &mut buffer, |band| bytes.extend_from_slice(band)).unwrap();
+            encode(&self.walk, plane, &mut buffer, |band| bytes.extend_from_slice(band)).unwrap();
         }
         bytes
     }
