@@ -8,7 +8,6 @@ use protocol::link::message::DefectKind;
 use protocol::rgl::JobWriter;
 use protocol::rgl::job::ROW_ROOM;
 use protocol::runs::{Decoder, Defect, Header, HeaderError, MAX_HEADER, Step, band_bytes, stride};
-use protocol::walk::Placed;
 
 /// Room for whatever one slice of work writes: the longest row, 9880 dots.
 pub(crate) const WRITE_ROOM: usize = ROW_ROOM + 1235;
@@ -53,7 +52,7 @@ enum Written {
 /// The job under way.
 pub(crate) struct Streams<'m> {
     band: &'m mut [u8],
-    decoder: Decoder,
+    decoder: &'m mut Decoder,
     writer: Option<JobWriter>,
     stage: Stage,
     written: Written,
@@ -63,10 +62,10 @@ pub(crate) struct Streams<'m> {
 }
 
 impl<'m> Streams<'m> {
-    pub(crate) fn new(band: &'m mut [u8]) -> Self {
+    pub(crate) fn new(band: &'m mut [u8], decoder: &'m mut Decoder) -> Self {
         Streams {
             band,
-            decoder: Decoder::new(Placed::whole(0, 0)),
+            decoder,
             writer: None,
             stage: Stage::Header,
             written: Written::Nothing,

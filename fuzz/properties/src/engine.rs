@@ -14,7 +14,7 @@ use protocol::link::message::{
 };
 use protocol::paper::Paper;
 use protocol::rgl::{Order, Page, Step, parse};
-use protocol::runs::{Header, MAX_HEADER};
+use protocol::runs::{Decoder, Header, MAX_HEADER};
 use protocol::walk::Frame;
 
 /// Lives of the bridge in a script.
@@ -49,15 +49,21 @@ struct Board {
     data: [u8; 2100],
     output: [u8; 2048],
     band: [u8; 2048],
+    decoder: Decoder,
 }
 
 impl Board {
     fn new() -> Board {
-        Board { data: [0; 2100], output: [0; 2048], band: [0; 2048] }
+        Board { data: [0; 2100], output: [0; 2048], band: [0; 2048], decoder: Decoder::default() }
     }
 
     fn memory(&mut self) -> Memory<'_> {
-        Memory { data: &mut self.data, output: &mut self.output, band: &mut self.band }
+        Memory {
+            data: &mut self.data,
+            output: &mut self.output,
+            band: &mut self.band,
+            decoder: &mut self.decoder,
+        }
     }
 }
 

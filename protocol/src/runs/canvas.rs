@@ -121,9 +121,9 @@ impl Canvas {
             self.lay_squares(tile.orientation, first..end, &mut dots);
         }
         let (at, shift) = (usize::from(tile.x / 8), u32::from(tile.x % 8));
-        for (row, &[left, right]) in rows.chunks_mut(stride).zip(&dots) {
+        for (row, &[left, right]) in rows.chunks_exact_mut(stride).zip(&dots) {
             if left | right != 0 {
-                merge(left, right, shift, &mut row[at..]);
+                put(left, right, shift, &mut row[at..]);
             }
         }
         Laid::Whole
@@ -191,13 +191,22 @@ impl Canvas {
     }
 }
 
-/// Adds 64 dots to a row, beginning at bit `shift` (0 to 7) of its first byte.
-fn merge(left: u32, right: u32, shift: u32, row: &mut [u8]) {
-    // Shifted twice, since `shift` may be 0. Then there is no ninth byte.
-    let words = [left >> shift, left << 1 << (31 - shift) | right >> shift, right << 1 << (31 - shift)];
-    let bytes = words.iter().flat_map(|word| word.to_be_bytes());
-    for (byte, dots) in row.iter_mut().zip(bytes.take(if shift == 0 { 8 } else { 9 })) {
-        *byte |= dots;
+/// Puts 64 dots into a row, beginning at bit `shift` (0 to 7) of its first byte. Only the first and the last byte are shared with
+/// other tiles.
+#[expect(clippy::cast_possible_truncation, reason = "bytes of words")]
+fn put(left: u32, right: u32, shift: u32, row: &mut [u8]) {
+    if shift == 0 {
+        if let Some(row) = row.first_chunk_mut::<8>() {
+            row[..4].copy_from_slice(&left.to_be_bytes());
+            row[4..].copy_from_slice(&right.to_be_bytes());
+        }
+    } else if let Some(row) = row.first_chunk_mut::<9>() {
+        let middle = left << (32 - shift) | right >> shift;
+        let left = left >> shift;
+        row[0] |= (left >> 24) as u8;
+        (row[1], row[2], row[3]) = ((left >> 16) as u8, (left >> 8) as u8, left as u8);
+        row[4..8].copy_from_slice(&middle.to_be_bytes());
+        row[8] |= (right << (8 - shift)) as u8;
     }
 }
 

@@ -116,6 +116,13 @@ pub struct Decoder {
     canvas: Canvas,
 }
 
+impl Default for Decoder {
+    /// A decoder for planes without a dot, until [`Decoder::begin`].
+    fn default() -> Decoder {
+        Decoder::new(Placed::whole(0, 0))
+    }
+}
+
 impl Decoder {
     /// A decoder for planes with this walk.
     pub fn new(walk: Placed) -> Decoder {

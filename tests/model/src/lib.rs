@@ -11,7 +11,7 @@ use protocol::link::message::{Answer, Fault, JobKind, JobState, Lines, Progress,
 use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{self, JobSetup, JobWriter, Order, Page, Step};
-use protocol::runs::{Header, MAX_BAND, MAX_HEADER, encode, stride};
+use protocol::runs::{Decoder, Header, MAX_BAND, MAX_HEADER, encode, stride};
 use protocol::walk::{Frame, Placed};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -21,7 +21,8 @@ pub const IDENTITY: Identity = Identity { boot: 1, serial: 2, firmware: "test" }
 /// Memory for an engine; leaked, because tests have plenty and an engine borrows it for good.
 pub fn memory(data: usize, output: usize, band: usize) -> Memory<'static> {
     let leak = |size| Box::leak(vec![0; size].into_boxed_slice());
-    Memory { data: leak(data), output: leak(output), band: leak(band) }
+    let decoder = Box::leak(Box::default());
+    Memory { data: leak(data), output: leak(output), band: leak(band), decoder }
 }
 
 /// The memory of one engine after the other.
@@ -29,15 +30,21 @@ pub struct Board {
     data: Vec<u8>,
     output: Vec<u8>,
     band: Vec<u8>,
+    decoder: Box<Decoder>,
 }
 
 impl Board {
     pub fn new(data: usize, output: usize) -> Self {
-        Board { data: vec![0; data], output: vec![0; output], band: vec![0; 40_000] }
+        Board { data: vec![0; data], output: vec![0; output], band: vec![0; 40_000], decoder: Box::default() }
     }
 
     pub fn memory(&mut self) -> Memory<'_> {
-        Memory { data: &mut self.data, output: &mut self.output, band: &mut self.band }
+        Memory {
+            data: &mut self.data,
+            output: &mut self.output,
+            band: &mut self.band,
+            decoder: &mut self.decoder,
+        }
     }
 }
 
