@@ -35,9 +35,9 @@ mod watch;
 
 use bridge::engine::{Engine, Identity, Memory};
 use bridge::turn::{self, Turn};
+use core::ffi::CStr;
 use embassy_executor::Spawner;
 use embassy_futures::yield_now;
-use core::ffi::CStr;
 use embassy_rp::binary_info::{EntryAddr, rp_program_name, rp_program_version};
 use embassy_rp::clocks::{self, RoscRng};
 use embassy_rp::pac;
