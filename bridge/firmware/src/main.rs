@@ -38,7 +38,8 @@ use bridge::turn::{self, Turn};
 use core::ffi::CStr;
 use embassy_executor::Spawner;
 use embassy_futures::yield_now;
-use embassy_rp::binary_info::{EntryAddr, rp_program_name, rp_program_version};
+use embassy_rp::binary_info::consts::{ID_RP_PROGRAM_VERSION_STRING, TAG_RASPBERRY_PI};
+use embassy_rp::binary_info::{self, EntryAddr, rp_program_name};
 use embassy_rp::clocks::{self, RoscRng};
 use embassy_rp::pac;
 use embassy_rp::peripherals::{PIO0, USB};
@@ -60,7 +61,10 @@ bind_interrupts!(struct Interrupts {
 /// The program's name and version in the image, for whoever is to flash it.
 #[unsafe(link_section = ".bi_entries")]
 #[used]
-static PROGRAM: [EntryAddr; 2] = [rp_program_name!(c"foilpress-bridge"), rp_program_version!(VERSION)];
+static PROGRAM: [EntryAddr; 2] = [
+    rp_program_name!(c"foilpress-bridge"),
+    binary_info::str!(TAG_RASPBERRY_PI, ID_RP_PROGRAM_VERSION_STRING, VERSION),
+];
 
 const VERSION: &CStr = match CStr::from_bytes_with_nul(board::VERSION.as_bytes()) {
     Ok(version) => version,
