@@ -52,7 +52,7 @@ enum Written {
 /// The job under way.
 pub(crate) struct Streams<'m> {
     band: &'m mut [u8],
-    decoder: Decoder,
+    decoder: &'m mut Decoder,
     writer: Option<JobWriter>,
     stage: Stage,
     written: Written,
@@ -62,10 +62,10 @@ pub(crate) struct Streams<'m> {
 }
 
 impl<'m> Streams<'m> {
-    pub(crate) fn new(band: &'m mut [u8]) -> Self {
+    pub(crate) fn new(band: &'m mut [u8], decoder: &'m mut Decoder) -> Self {
         Streams {
             band,
-            decoder: Decoder::new(0, 0),
+            decoder,
             writer: None,
             stage: Stage::Header,
             written: Written::Nothing,
@@ -184,7 +184,7 @@ impl<'m> Streams<'m> {
                 let writer = JobWriter::new(header.setup().clone(), header.rows())
                     .map_err(|_| DefectKind::Forbidden)?;
                 self.writer = Some(writer);
-                self.decoder.resize(header.columns(), header.rows());
+                self.decoder.begin(*header.walk());
                 self.stride = stride(header.columns());
                 self.stage = Stage::Read;
                 return Ok(i + 1);

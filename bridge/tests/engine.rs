@@ -8,6 +8,7 @@ use protocol::link::message::{
     Answer, Ask, DATA_MAX, DefectKind, Fault, Handshake, JobKind, JobState, Lines, PAST, PastJob,
     PortSettings, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage, VERSION,
 };
+use protocol::walk::Placed;
 
 struct Rig {
     engine: Engine<'static>,
@@ -602,8 +603,14 @@ fn a_raw_job_cancelled_before_its_first_row_has_not_touched_the_printer() {
 
 #[test]
 fn a_cancel_that_comes_too_late_changes_nothing() {
-    let stream =
-        Planes { width: 8, rows: 1, inks: vec![protocol::ink::Ink::Black], bits: vec![vec![1]] }.printed();
+    let stream = Planes {
+        width: 8,
+        rows: 1,
+        inks: vec![protocol::ink::Ink::Black],
+        bits: vec![vec![1]],
+        walk: Placed::whole(8, 1),
+    }
+    .printed();
     let mut rig = Rig::new();
     rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
     rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream });
@@ -657,8 +664,13 @@ fn pass_streams_with_a_defect_are_brought_to_an_end() {
 
 #[test]
 fn a_page_too_wide_for_the_memory_is_refused_before_the_first_byte() {
-    let planes =
-        Planes { width: 4800, rows: 10, inks: vec![protocol::ink::Ink::Black], bits: vec![vec![1; 6000]] };
+    let planes = Planes {
+        width: 4800,
+        rows: 10,
+        inks: vec![protocol::ink::Ink::Black],
+        bits: vec![vec![1; 6000]],
+        walk: Placed::whole(4800, 10),
+    };
     let mut rig = Rig {
         engine: Engine::new(memory(2048, 2048, 38_399), IDENTITY),
         reader: Reader::new(),

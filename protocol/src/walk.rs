@@ -25,6 +25,10 @@
 
 use heapless::Vec;
 
+mod placed;
+
+pub use placed::{Frame, Placed, PlacedBand};
+
 /// Largest height of a band, and largest width and height of a tile.
 pub const EDGE: u16 = 64;
 

@@ -10,6 +10,7 @@ use device::send::session::{Outcome, Record, Session};
 use device::send::transport::{Socket, Transport, pair};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{Ask, JobKind, Lines, ToBridge, ToHost};
+use protocol::runs::Decoder;
 use std::convert::Infallible;
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -143,7 +144,8 @@ fn talk(session: &mut Session<'_>, link: &mut dyn Transport, start: Instant) -> 
 /// A bridge whose port takes [`PORT`] bytes a second.
 fn bridge(mut link: Box<dyn Transport>, stop: &AtomicBool) {
     let (mut data, mut output, mut band) = (vec![0; 12 << 10], vec![0; 40 << 10], vec![0; 38_400]);
-    let memory = Memory { data: &mut data, output: &mut output, band: &mut band };
+    let memory =
+        Memory { data: &mut data, output: &mut output, band: &mut band, decoder: &mut Decoder::default() };
     let mut engine = Engine::new(memory, Identity { boot: 1, serial: 1, firmware: "bench" });
     let (mut reader, mut frame, mut buffer) = (Reader::new(), [0; MAX], [0; 1024]);
     let (mut then, mut allowed) = (Instant::now(), 0.0);

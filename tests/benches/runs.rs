@@ -7,6 +7,7 @@ use divan::Bencher;
 use foilpress_tests::planes::{ROWS, WIDTH, cells, planes};
 use protocol::packbits;
 use protocol::runs::{Decoder, MAX_BAND, Step, band_bytes, encode, stride};
+use protocol::walk::Placed;
 
 fn main() {
     for (name, planes) in [("walk", planes()), ("cells", cells())] {
@@ -34,7 +35,8 @@ fn packed_rows(plane: &[u8]) -> usize {
 
 fn stream(plane: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
-    encode(WIDTH, ROWS, plane, &mut vec![0; MAX_BAND], |band| bytes.extend_from_slice(band)).expect("room");
+    encode(&Placed::whole(WIDTH, ROWS), plane, &mut vec![0; MAX_BAND], |band| bytes.extend_from_slice(band))
+        .expect("room");
     bytes
 }
 
@@ -56,7 +58,7 @@ fn decode_a_plane(bencher: Bencher, method: &str) {
     let plane = plane(method);
     let stream = stream(plane);
     let mut memory = vec![0; band_bytes(WIDTH)];
-    let mut decoder = Decoder::new(WIDTH, ROWS);
+    let mut decoder = Decoder::new(Placed::whole(WIDTH, ROWS));
     bencher.counter(divan::counter::BytesCount::of_slice(plane)).bench_local(|| {
         decoder.restart();
         let mut left = &stream[..];

@@ -14,6 +14,7 @@ use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Troubl
 use protocol::ink::Ink;
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines, Usage};
+use protocol::runs::Decoder;
 
 /// What a test sees of the printer and does to it and the bridge.
 pub struct Port {
@@ -133,9 +134,15 @@ impl Bridge {
             let port = port.clone();
             move || {
                 let (mut data, mut output, mut band) = (vec![0; 8192], vec![0; 4096], vec![0; port.band]);
+                let mut decoder = Box::<Decoder>::default();
                 let mut kept = None;
                 for boot in 1.. {
-                    let memory = Memory { data: &mut data, output: &mut output, band: &mut band };
+                    let memory = Memory {
+                        data: &mut data,
+                        output: &mut output,
+                        band: &mut band,
+                        decoder: &mut decoder,
+                    };
                     let identity = Identity { boot, serial: 7, firmware: "test" };
                     let engine = match kept {
                         Some(checkpoint) => Engine::resume(memory, identity, checkpoint),

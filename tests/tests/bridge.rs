@@ -15,7 +15,8 @@ use protocol::link::frame::{self, MAX, Reader};
 use protocol::link::message::{DATA_MAX, JobKind, JobState, ToBridge};
 use protocol::paper::Paper;
 use protocol::rgl::Page;
-use protocol::runs::{Header, MAX_BAND, MAX_HEADER, encode};
+use protocol::runs::{Decoder, Header, MAX_BAND, MAX_HEADER, encode};
+use protocol::walk::Placed;
 
 const PAPER: Paper = Paper::Custom { width: 900, length: 610 };
 const INKS: [Ink; 3] = [Ink::MetallicSilver, Ink::Cyan, Ink::Finish];
@@ -52,7 +53,7 @@ fn streams(passes: &[Pass]) -> Vec<u8> {
     let length = header.write(&mut out);
     let (mut bytes, mut buffer) = (out[..length].to_vec(), vec![0; MAX_BAND]);
     for pass in passes {
-        encode(PAPER.width(), PAPER.length(), &pass.plane.bits, &mut buffer, |band| {
+        encode(&Placed::whole(PAPER.width(), PAPER.length()), &pass.plane.bits, &mut buffer, |band| {
             bytes.extend_from_slice(band)
         })
         .unwrap();
@@ -63,7 +64,8 @@ fn streams(passes: &[Pass]) -> Vec<u8> {
 /// What crosses the port, and how the job ends; it is cancelled when so many bytes have crossed.
 fn bridged(data: &[u8], cancel_at: Option<usize>) -> (Vec<u8>, JobState) {
     let (mut queue, mut output, mut band) = (vec![0; 4096], vec![0; 4096], vec![0; 8192]);
-    let memory = Memory { data: &mut queue, output: &mut output, band: &mut band };
+    let mut decoder = Decoder::default();
+    let memory = Memory { data: &mut queue, output: &mut output, band: &mut band, decoder: &mut decoder };
     let mut engine = Engine::new(memory, Identity { boot: 1, serial: 1, firmware: "test" });
     let (mut reader, mut frame) = (Reader::new(), [0; MAX]);
     let mut tell = |engine: &mut Engine<'_>, message: ToBridge<'_>| {

@@ -9,6 +9,7 @@ use press::halftone::Method;
 use protocol::packbits;
 use protocol::paper::Paper;
 use protocol::runs::{MAX_BAND, encode, stride};
+use protocol::walk::Placed;
 use std::convert::Infallible;
 
 use foilpress_tests::planes;
@@ -51,7 +52,8 @@ impl Plane {
     fn stream(&self) -> usize {
         let mut length = 0;
         let mut buffer = vec![0; MAX_BAND];
-        encode(self.width, self.rows, &self.bits, &mut buffer, |band| length += band.len()).unwrap();
+        encode(&Placed::whole(self.width, self.rows), &self.bits, &mut buffer, |band| length += band.len())
+            .unwrap();
         length
     }
 }

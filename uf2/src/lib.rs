@@ -2,15 +2,15 @@
 //!
 //! A file is a sequence of 512-byte blocks. Each contains 256 bytes of the image, their address and the number of the block,
 //! so blocks can arrive in any order. The boot loader restarts the board once it has received all blocks, whatever they
-//! contain, so a file must be checked first. [`decode`] accepts exactly one complete image for an RP2040 with the flash of a
-//! Pico; [`Image::check_boot`] checks that the boot ROM would start it.
+//! contain, so a file must be checked first. [`decode`] accepts exactly one complete image for the flash of a Pico or a Pico 2; [`Image::check_boot`] checks that the boot ROM would start it.
 //!
 //! The format has no checksum. [`encode`] adds one to each block after its page, in bytes that boot loaders ignore. If any
 //! block of a file has a checksum, [`decode`] requires a correct one in every block.
 //!
-//! Cost: two passes over the file and a copy of its pages. Limits: no other chips, no files for several chips, no
-//! extensions of the format; the linker and the usual tools do not use these for the RP2040.
-//! Source: Microsoft's description of UF2; RP2040 data sheet, 2.8.1.3.1 (checksum) and 2.8.4 (UF2).
+//! Cost: two passes over the file and a copy of its pages. Limits: no other chips, no files for several chips, no RISC-V, no
+//! extensions of the format; the linker and the usual tools do not use these for the RP2040 and the RP2350.
+//! Source: Microsoft's description of UF2; RP2040 data sheet, 2.8.1.3.1 (checksum) and 2.8.4 (UF2); RP2350 data sheet, 5.5.3
+//! (families) and 5.9.5 (the block of a minimal image).
 #![forbid(unsafe_code)]
 #![warn(
     clippy::cast_possible_truncation,
@@ -31,10 +31,65 @@ const PAGE_BYTES: u32 = 256;
 pub const BLOCK: usize = 512;
 /// Bytes of flash that are erased together.
 pub const SECTOR: u32 = 4096;
-/// The flash of a Pico, 2 MiB, as the processor sees it.
-pub const FLASH: Range<u32> = 0x1000_0000..0x1020_0000;
-/// The largest possible file: every page of the flash once.
-pub const LARGEST_FILE: usize = (FLASH.end - FLASH.start) as usize / PAGE * BLOCK;
+/// Where the flash begins, as the processor sees it.
+pub const START: u32 = 0x1000_0000;
+/// The largest possible file: every page of the larger flash once.
+pub const LARGEST_FILE: usize = (4 << 20) / PAGE * BLOCK;
+
+/// The chips of the boards the bridge runs on.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Chip {
+    /// Of a Raspberry Pi Pico.
+    Rp2040,
+    /// Of a Raspberry Pi Pico 2, running on its Arm processors.
+    Rp2350,
+}
+
+impl Chip {
+    /// Both.
+    pub const ALL: [Chip; 2] = [Chip::Rp2040, Chip::Rp2350];
+
+    /// The board's name.
+    pub fn board(self) -> &'static str {
+        match self {
+            Chip::Rp2040 => "Pico",
+            Chip::Rp2350 => "Pico 2",
+        }
+    }
+
+    /// The board's flash, as the processor sees it: 2 or 4 MiB.
+    pub fn flash(self) -> Range<u32> {
+        match self {
+            Chip::Rp2040 => START..START + (2 << 20),
+            Chip::Rp2350 => START..START + (4 << 20),
+        }
+    }
+
+    /// The number by which a file names it.
+    pub fn family(self) -> u32 {
+        match self {
+            Chip::Rp2040 => 0xE48B_FF56,
+            Chip::Rp2350 => 0xE48B_FF59,
+        }
+    }
+
+    fn of_family(family: u32) -> Option<Chip> {
+        Chip::ALL.into_iter().find(|chip| chip.family() == family)
+    }
+
+    fn memory(self) -> Range<u32> {
+        match self {
+            Chip::Rp2040 => 0x2000_0000..0x2004_2000,
+            Chip::Rp2350 => 0x2000_0000..0x2008_2000,
+        }
+    }
+}
+
+impl std::fmt::Display for Chip {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.board())
+    }
+}
 
 const MAGIC: [u32; 3] = [0x0A32_4655, 0x9E5D_5157, 0x0AB1_6F30];
 /// Marks the checksum, which follows it and covers everything before the mark.
@@ -42,12 +97,13 @@ const CHECKED: u32 = 0x4352_4331;
 /// Offset of the mark in a block.
 const CHECK: usize = 32 + PAGE;
 const FAMILY_PRESENT: u32 = 0x2000;
-const RP2040: u32 = 0xE48B_FF56;
-/// The families of the RP2350 on the Pico 2.
+/// The RP2350's other families: any chip, data, Arm without security, RISC-V.
 const RP2350: Range<u32> = 0xE48B_FF57..0xE48B_FF5C;
-const MEMORY: Range<u32> = 0x2000_0000..0x2004_2000;
-/// Address of the vector table, after the second-stage boot loader.
-const VECTORS: u32 = FLASH.start + PAGE_BYTES;
+/// The block of an RP2350's image: its first and last word, and bytes in which the boot ROM looks for it.
+const BLOCK_MARKS: (u32, u32) = (0xffff_ded3, 0xab12_3579);
+const BLOCK_WITHIN: u32 = 4096;
+/// Its only item, an image for the Arm processors of an RP2350 in their secure state, and the mark that no other follows.
+const IMAGE_TYPE: [u32; 2] = [0x1021_0142, 0x0000_01ff];
 
 /// What is wrong with an image or a file. Blocks are counted from 0 in the order of the file.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
@@ -55,9 +111,11 @@ const VECTORS: u32 = FLASH.start + PAGE_BYTES;
 pub enum Uf2Error {
     /// Bytes outside the flash.
     #[error(
-        "the image has {length} bytes at {address:#010x}, at least partly outside the Pico's flash (0x10000000 to 0x10200000)"
+        "the image has {length} bytes at {address:#010x}, at least partly outside the {chip}'s flash (0x10000000 to {:#010x})", .chip.flash().end
     )]
     NotFlash {
+        /// Whose flash.
+        chip: Chip,
         /// Address of the first.
         address: u64,
         /// Number of bytes.
@@ -70,7 +128,7 @@ pub enum Uf2Error {
     #[error("the file is empty")]
     Empty,
     /// More than fits in the flash.
-    #[error("the file has {0} bytes; the largest file for a Pico has {LARGEST_FILE}")]
+    #[error("the file has {0} bytes; the largest file for a Pico 2 has {LARGEST_FILE}")]
     TooLarge(usize),
     /// The file is truncated, or not made of blocks.
     #[error("the file has {0} bytes, which is not a multiple of 512; was it copied completely?")]
@@ -79,8 +137,10 @@ pub enum Uf2Error {
     #[error("block {0} is not a UF2 block: this is not a UF2 file, or it is damaged")]
     Magic(usize),
     /// The block is for another chip.
-    #[error("block {at} is for {}, not for the Pico's RP2040", chip(*.family))]
+    #[error("block {at} is for {}, not for {}", chip(*.family), expected_words(*.expected))]
     Family {
+        /// The chip of the blocks before it, if there are any.
+        expected: Option<Chip>,
         /// The block.
         at: usize,
         /// Its family, 0 if it gives none.
@@ -103,9 +163,11 @@ pub enum Uf2Error {
     },
     /// The address is not a page of the flash.
     #[error(
-        "block {at} has the address {address:#010x}, which is not a page of the Pico's flash (0x10000000 to 0x10200000)"
+        "block {at} has the address {address:#010x}, which is not a page of the {chip}'s flash (0x10000000 to {:#010x})", .chip.flash().end
     )]
     Address {
+        /// Whose flash.
+        chip: Chip,
         /// The block.
         at: usize,
         /// Its address.
@@ -154,8 +216,13 @@ pub enum Uf2Error {
         /// The checksum in the last four bytes.
         found: u32,
     },
-    /// There is no program after the first page.
-    #[error("the image has no program after its first page (stack {stack:#010x}, start {start:#010x})")]
+    /// The boot ROM would not find it.
+    #[error(
+        "the first 4096 bytes have no block that tells the boot ROM what the image is: the board would not start"
+    )]
+    NoBlock,
+    /// There is no program where the boot ROM looks for it.
+    #[error("the image has no program where the board starts it (stack {stack:#010x}, start {start:#010x})")]
     NoProgram {
         /// The first word of the vector table.
         stack: u32,
@@ -167,18 +234,35 @@ pub enum Uf2Error {
 fn chip(family: u32) -> String {
     match family {
         0 => "an unspecified chip".into(),
-        family if RP2350.contains(&family) => "the RP2350 of a Pico 2".into(),
+        0xE48B_FF56 => "the RP2040 of a Pico".into(),
+        0xE48B_FF59 => "the RP2350 of a Pico 2".into(),
+        family if RP2350.contains(&family) => {
+            format!("an RP2350 used in another way (family {family:#010x})")
+        }
         family => format!("another chip (family {family:#010x})"),
+    }
+}
+
+fn expected_words(chip: Option<Chip>) -> String {
+    match chip {
+        None => "the RP2040 of a Pico or the Arm processors of a Pico 2".into(),
+        Some(chip) => format!("{}, as those before it", self::chip(chip.family())),
     }
 }
 
 /// The contents of the flash: pages of 256 bytes and their addresses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
+    chip: Chip,
     pages: BTreeMap<u32, [u8; PAGE]>,
 }
 
 impl Image {
+    /// The chip it is for.
+    pub fn chip(&self) -> Chip {
+        self.chip
+    }
+
     /// The pages in ascending order, each with its address (a multiple of 256).
     pub fn pages(&self) -> impl ExactSizeIterator<Item = (u32, &[u8; PAGE])> {
         self.pages.iter().map(|(&address, page)| (address, page))
@@ -198,7 +282,7 @@ impl Image {
             let Some(page) = self.pages.get(&start) else { break };
             let rest = &page[(at - start) as usize..];
             bytes.extend_from_slice(&rest[..rest.len().min(length - bytes.len())]);
-            // Cannot overflow: the last page ends at 0x1020_0000.
+            // Cannot overflow: the last page ends at 0x1040_0000.
             at = start + PAGE_BYTES;
         }
         bytes
@@ -209,19 +293,47 @@ impl Image {
         Some(u32::from_le_bytes(self.read(address, 4).try_into().ok()?))
     }
 
-    /// Checks that the boot ROM would start it and find a program: the checksum of the first page, and a vector table
-    /// after it.
-    pub fn check_boot(&self) -> Result<(), Uf2Error> {
-        let first = self.pages.get(&FLASH.start).ok_or(Uf2Error::NoBoot)?;
-        let expected = Crc::<u32>::new(&CRC_32_MPEG_2).checksum(&first[..PAGE - 4]);
-        let found = word(first, PAGE - 4);
-        if expected != found {
-            return Err(Uf2Error::BootChecksum { expected, found });
+    /// The page without which the boot ROM starts nothing: of an RP2040 the first, which has a checksum, of an RP2350 the one
+    /// where its block begins.
+    pub fn boot_page(&self) -> u32 {
+        match self.chip {
+            Chip::Rp2040 => START,
+            Chip::Rp2350 => self.block().map_or(START, page_of),
         }
-        let (stack, start) = (self.word(VECTORS).unwrap_or(0), self.word(VECTORS + 4).unwrap_or(0));
+    }
+
+    /// The address of an RP2350's block.
+    fn block(&self) -> Option<u32> {
+        (START..START + BLOCK_WITHIN).step_by(4).find(|&at| {
+            self.word(at) == Some(BLOCK_MARKS.0)
+                && [self.word(at + 4), self.word(at + 8)] == IMAGE_TYPE.map(Some)
+                && self.word(at + 16) == Some(BLOCK_MARKS.1)
+        })
+    }
+
+    /// Checks that the boot ROM would start it and find a program: of an RP2040 the checksum of the first page, of an RP2350 its
+    /// block; and a vector table, which an RP2040 has behind its first page.
+    pub fn check_boot(&self) -> Result<(), Uf2Error> {
+        let first = self.pages.get(&START).ok_or(Uf2Error::NoBoot)?;
+        let vectors = match self.chip {
+            Chip::Rp2040 => {
+                let expected = Crc::<u32>::new(&CRC_32_MPEG_2).checksum(&first[..PAGE - 4]);
+                let found = word(first, PAGE - 4);
+                if expected != found {
+                    return Err(Uf2Error::BootChecksum { expected, found });
+                }
+                START + PAGE_BYTES
+            }
+            Chip::Rp2350 => {
+                self.block().ok_or(Uf2Error::NoBlock)?;
+                START
+            }
+        };
+        let (stack, start) = (self.word(vectors).unwrap_or(0), self.word(vectors + 4).unwrap_or(0));
+        let memory = self.chip.memory();
         // The stack grows downward from this address; an odd start address means Thumb code.
-        let sound = stack > MEMORY.start
-            && stack <= MEMORY.end
+        let sound = stack > memory.start
+            && stack <= memory.end
             && stack.is_multiple_of(4)
             && start % 2 == 1
             && self.word(start & !3).is_some();
@@ -231,13 +343,14 @@ impl Image {
 
 /// Writes a file from pieces of flash, each with its address. Gaps inside a sector are filled with ff, so that nothing
 /// depends on what the ROM does with missing pages.
-pub fn encode(pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
+pub fn encode(chip: Chip, pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
+    let flash = chip.flash();
     let mut pages = BTreeMap::<u32, ([u8; PAGE], [bool; PAGE])>::new();
     for &(address, bytes) in pieces {
         let end = address.saturating_add(bytes.len() as u64);
-        let inside = |start: &u32| *start >= FLASH.start && end <= FLASH.end.into();
+        let inside = |start: &u32| *start >= flash.start && end <= flash.end.into();
         let Some(start) = u32::try_from(address).ok().filter(inside) else {
-            return Err(Uf2Error::NotFlash { address, length: bytes.len() });
+            return Err(Uf2Error::NotFlash { chip, address, length: bytes.len() });
         };
         for (at, &byte) in (start..).zip(bytes) {
             let page = pages.entry(page_of(at)).or_insert(([0xff; PAGE], [false; PAGE]));
@@ -254,12 +367,12 @@ pub fn encode(pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
             pages.entry(page).or_insert(([0xff; PAGE], [false; PAGE]));
         }
     }
-    // At most 8192 pages.
+    // At most 16384 pages.
     let total = u32::try_from(pages.len()).unwrap_or(u32::MAX);
     let mut file = Vec::with_capacity(pages.len() * BLOCK);
     for (number, (address, (bytes, _))) in (0..).zip(pages) {
         let block = file.len();
-        let words = [MAGIC[0], MAGIC[1], FAMILY_PRESENT, address, PAGE_BYTES, number, total, RP2040];
+        let words = [MAGIC[0], MAGIC[1], FAMILY_PRESENT, address, PAGE_BYTES, number, total, chip.family()];
         file.extend(words.iter().flat_map(|word| word.to_le_bytes()));
         file.extend(bytes);
         let checksum = checksum(&file[block..]);
@@ -271,7 +384,7 @@ pub fn encode(pieces: &[(u64, &[u8])]) -> Result<Vec<u8>, Uf2Error> {
     Ok(file)
 }
 
-/// Reads the image in a file. Fails unless it is one complete image for a Pico: every block once, every page once, all of
+/// Reads the image in a file. Fails unless it is one complete image for a Pico or a Pico 2: every block once, every page once, all of
 /// them inside the flash. Detects damage if [`encode`] wrote the file.
 pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
     if file.is_empty() {
@@ -288,6 +401,7 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
         return Err(Uf2Error::Length(file.len()));
     }
     let blocks = file.len() / BLOCK;
+    let mut chip = None;
     let mut pages = BTreeMap::new();
     let mut numbers = vec![false; blocks];
     for (at, block) in file.chunks_exact(BLOCK).enumerate() {
@@ -297,14 +411,14 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
         let [flags, address, size, number, total] = [8, 12, 16, 20, 24].map(|offset| word(block, offset));
         // Without this flag the field has another meaning.
         let family = if flags & FAMILY_PRESENT == 0 { 0 } else { word(block, 28) };
-        if family != RP2040 {
-            return Err(Uf2Error::Family { at, family });
-        }
+        let one = Chip::of_family(family).filter(|&one| chip.is_none_or(|chip| chip == one));
+        let Some(one) = one else { return Err(Uf2Error::Family { expected: chip, at, family }) };
+        chip = Some(one);
         if flags != FAMILY_PRESENT || size != PAGE_BYTES {
             return Err(Uf2Error::Kind { at, flags, size });
         }
-        if !FLASH.contains(&address) || !address.is_multiple_of(PAGE_BYTES) {
-            return Err(Uf2Error::Address { at, address });
+        if !one.flash().contains(&address) || !address.is_multiple_of(PAGE_BYTES) {
+            return Err(Uf2Error::Address { chip: one, at, address });
         }
         if total as usize != blocks {
             return Err(Uf2Error::Total { at, total, blocks });
@@ -327,7 +441,7 @@ pub fn decode(file: &[u8]) -> Result<Image, Uf2Error> {
     {
         return Err(Uf2Error::Checksum(at));
     }
-    Ok(Image { pages })
+    chip.map(|chip| Image { chip, pages }).ok_or(Uf2Error::Empty)
 }
 
 /// The address of the page that contains an address.

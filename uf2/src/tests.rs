@@ -48,12 +48,12 @@ fn bootable() -> Vec<u8> {
 }
 
 fn file() -> Vec<u8> {
-    encode(&[(0x1000_0000, &bootable())]).unwrap()
+    encode(Chip::Rp2040, &[(0x1000_0000, &bootable())]).unwrap()
 }
 
 #[test]
 fn the_first_block_follows_the_format() {
-    let file = encode(&[(0x1000_0000, b"boot")]).unwrap();
+    let file = encode(Chip::Rp2040, &[(0x1000_0000, b"boot")]).unwrap();
     let mut expected = b"UF2\n\x57\x51\x5d\x9e\x00\x20\x00\x00\x00\x00\x00\x10\x00\x01\x00\x00".to_vec();
     expected.extend(b"\x00\x00\x00\x00\x10\x00\x00\x00\x56\xff\x8b\xe4boot\xff");
     assert_eq!(file[..expected.len()], expected);
@@ -64,12 +64,12 @@ fn the_first_block_follows_the_format() {
 
 #[test]
 fn images_outside_flash_and_overlaps_are_refused() {
-    let error = encode(&[(0x2000_0000, &[0])]).unwrap_err();
-    assert_eq!(error, Uf2Error::NotFlash { address: 0x2000_0000, length: 1 });
-    assert!(encode(&[(0x101f_ffff, &[0])]).is_ok());
-    assert!(encode(&[(0x101f_ffff, &[0, 0])]).is_err());
-    assert!(encode(&[(u64::MAX, &[0])]).is_err());
-    let overlap = encode(&[(0x1000_0000, &[0; 10]), (0x1000_0009, &[0])]).unwrap_err();
+    let error = encode(Chip::Rp2040, &[(0x2000_0000, &[0])]).unwrap_err();
+    assert_eq!(error, Uf2Error::NotFlash { chip: Chip::Rp2040, address: 0x2000_0000, length: 1 });
+    assert!(encode(Chip::Rp2040, &[(0x101f_ffff, &[0])]).is_ok());
+    assert!(encode(Chip::Rp2040, &[(0x101f_ffff, &[0, 0])]).is_err());
+    assert!(encode(Chip::Rp2040, &[(u64::MAX, &[0])]).is_err());
+    let overlap = encode(Chip::Rp2040, &[(0x1000_0000, &[0; 10]), (0x1000_0009, &[0])]).unwrap_err();
     assert_eq!(overlap, Uf2Error::Overlap(0x1000_0009));
 }
 
@@ -79,10 +79,10 @@ fn an_image_that_the_boot_rom_starts_passes_and_a_damaged_first_page_does_not() 
     for byte in [0, 100, 251, 252, 255] {
         let mut damaged = bootable();
         damaged[byte] ^= 0x10;
-        let image = decode(&encode(&[(0x1000_0000, &damaged)]).unwrap()).unwrap();
+        let image = decode(&encode(Chip::Rp2040, &[(0x1000_0000, &damaged)]).unwrap()).unwrap();
         assert!(matches!(image.check_boot(), Err(Uf2Error::BootChecksum { .. })), "byte {byte}");
     }
-    let later = decode(&encode(&[(0x1000_1000, &bootable())]).unwrap()).unwrap();
+    let later = decode(&encode(Chip::Rp2040, &[(0x1000_1000, &bootable())]).unwrap()).unwrap();
     assert_eq!(later.check_boot(), Err(Uf2Error::NoBoot));
 }
 
@@ -98,7 +98,7 @@ fn an_image_without_a_program_is_refused() {
         let mut image = bootable();
         image[256..260].copy_from_slice(&stack.to_le_bytes());
         image[260..264].copy_from_slice(&start.to_le_bytes());
-        let image = decode(&encode(&[(0x1000_0000, &image)]).unwrap()).unwrap();
+        let image = decode(&encode(Chip::Rp2040, &[(0x1000_0000, &image)]).unwrap()).unwrap();
         assert_eq!(image.check_boot(), Err(Uf2Error::NoProgram { stack, start }));
     }
 }
@@ -142,13 +142,17 @@ fn every_fault_has_its_error() {
     assert_eq!(decode(b"\x7fELF\x01\x01\x01 and so on"), Err(Uf2Error::Magic(0)));
     assert_eq!(decode(&vec![0; LARGEST_FILE + 512]), Err(Uf2Error::TooLarge(LARGEST_FILE + 512)));
     assert_eq!(edited(3, 1, 0), Uf2Error::Magic(3));
-    assert_eq!(edited(3, 7, 0xE48B_FF59), Uf2Error::Family { at: 3, family: 0xE48B_FF59 });
+    assert_eq!(
+        edited(3, 7, 0xE48B_FF59),
+        Uf2Error::Family { expected: Some(Chip::Rp2040), at: 3, family: 0xE48B_FF59 }
+    );
+    assert_eq!(edited(0, 7, 0xE48B_FF5A), Uf2Error::Family { expected: None, at: 0, family: 0xE48B_FF5A });
     assert!(edited(3, 7, 0xE48B_FF59).to_string().contains("Pico 2"));
-    assert_eq!(edited(3, 2, 0), Uf2Error::Family { at: 3, family: 0 });
+    assert_eq!(edited(3, 2, 0), Uf2Error::Family { expected: Some(Chip::Rp2040), at: 3, family: 0 });
     assert_eq!(edited(3, 2, 0x2001), Uf2Error::Kind { at: 3, flags: 0x2001, size: 256 });
     assert_eq!(edited(3, 4, 476), Uf2Error::Kind { at: 3, flags: 0x2000, size: 476 });
     for address in [0x1000_0380, 0x1020_0000, 0x0fff_ff00, 0x2000_0000] {
-        assert_eq!(edited(3, 3, address), Uf2Error::Address { at: 3, address });
+        assert_eq!(edited(3, 3, address), Uf2Error::Address { chip: Chip::Rp2040, at: 3, address });
     }
     assert_eq!(edited(3, 3, 0x1000_0000), Uf2Error::Twice { at: 3, address: 0x1000_0000 });
     assert_eq!(edited(3, 5, 2), Uf2Error::Number { at: 3, number: 2, twice: true });
@@ -157,6 +161,39 @@ fn every_fault_has_its_error() {
     assert_eq!(decode(&file[512..]), Err(Uf2Error::Total { at: 0, total: 16, blocks: 15 }));
     let doubled = [&file[..], &file[..]].concat();
     assert_eq!(decode(&doubled), Err(Uf2Error::Total { at: 0, total: 16, blocks: 32 }));
+}
+
+/// An image for an RP2350: a vector table of 68 words, the block of the data sheet's minimal image behind it.
+fn bootable_2350() -> Vec<u8> {
+    let mut image: Vec<u8> = (0..5000u32).map(|i| ((i * i) >> 3) as u8).collect();
+    image[..4].copy_from_slice(&0x2008_2000u32.to_le_bytes());
+    image[4..8].copy_from_slice(&0x1000_0201u32.to_le_bytes());
+    image[272..292].copy_from_slice(b"\xd3\xde\xff\xff\x42\x01\x21\x10\xff\x01\0\0\0\0\0\0\x79\x35\x12\xab");
+    image
+}
+
+#[test]
+fn an_image_for_a_pico_2_is_known_by_its_family_and_starts_by_its_block() {
+    let encoded = |image: &[u8]| decode(&encode(Chip::Rp2350, &[(0x1000_0000, image)]).unwrap()).unwrap();
+    let image = encoded(&bootable_2350());
+    assert_eq!((image.chip(), image.boot_page(), image.check_boot()), (Chip::Rp2350, 0x1000_0100, Ok(())));
+    for byte in 272..292 {
+        let mut damaged = bootable_2350();
+        damaged[byte] ^= 1;
+        // The link to the next block is any number.
+        let expected = if (284..288).contains(&byte) { Ok(()) } else { Err(Uf2Error::NoBlock) };
+        assert_eq!(encoded(&damaged).check_boot(), expected, "byte {byte}");
+    }
+    let mut late = bootable_2350();
+    late.resize(9000, 0);
+    late.copy_within(272..292, 4096);
+    late[272] = 0;
+    assert_eq!(encoded(&late).check_boot(), Err(Uf2Error::NoBlock));
+    // An RP2040 would not start it, and its flash is smaller.
+    let other = decode(&encode(Chip::Rp2040, &[(0x1000_0000, &bootable_2350())]).unwrap()).unwrap();
+    assert!(matches!(other.check_boot(), Err(Uf2Error::BootChecksum { .. })));
+    assert!(encode(Chip::Rp2350, &[(0x103f_ffff, &[0])]).is_ok());
+    assert!(encode(Chip::Rp2350, &[(0x103f_ffff, &[0, 0])]).is_err());
 }
 
 proptest! {
@@ -168,14 +205,14 @@ proptest! {
         more in proptest::collection::vec(any::<u8>(), 0..600),
     ) {
         let second = start + bytes.len() as u32 + gap;
-        let at = |offset: u32| u64::from(FLASH.start + offset);
-        let file = encode(&[(at(second), &more), (at(start), &bytes)]).unwrap();
+        let at = |offset: u32| u64::from(START + offset);
+        let file = encode(Chip::Rp2040, &[(at(second), &more), (at(start), &bytes)]).unwrap();
         let mut expected = vec![0xff; 64 * 1024];
         expected[start as usize..][..bytes.len()].copy_from_slice(&bytes);
         expected[second as usize..][..more.len()].copy_from_slice(&more);
         let mut flash = vec![0xff; 64 * 1024];
         for (address, page) in decode(&file).unwrap().pages() {
-            flash[(address - FLASH.start) as usize..][..PAGE].copy_from_slice(page);
+            flash[(address - START) as usize..][..PAGE].copy_from_slice(page);
         }
         prop_assert!(flash == expected);
         let mut written = vec![0xff; 64 * 1024];
@@ -188,7 +225,7 @@ proptest! {
         order in Just((0..48).collect::<Vec<usize>>()).prop_shuffle(),
     ) {
         let bytes: Vec<u8> = (0..3 * 4096u32).map(|i| (i.wrapping_mul(0x9e37_79b9) >> 24) as u8).collect();
-        let file = encode(&[(0x1000_0000, &bytes)]).unwrap();
+        let file = encode(Chip::Rp2040, &[(0x1000_0000, &bytes)]).unwrap();
         let shuffled: Vec<u8> = order.iter().flat_map(|&i| file[i * BLOCK..][..BLOCK].to_vec()).collect();
         prop_assert_eq!(decode(&shuffled), decode(&file));
     }
@@ -206,7 +243,7 @@ proptest! {
             let mut flash = vec![0xff; 0x20_0000];
             prop_assert!(rom(&file, &mut flash));
             for (address, page) in image.pages() {
-                prop_assert_eq!(&flash[(address - FLASH.start) as usize..][..PAGE], page);
+                prop_assert_eq!(&flash[(address - START) as usize..][..PAGE], page);
             }
         }
     }

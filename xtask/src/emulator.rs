@@ -13,7 +13,7 @@ use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{JobSetup, JobWriter, Page};
 use protocol::runs::{self, Header, MAX_BAND, MAX_HEADER};
-use protocol::walk::{EDGE, Walk};
+use protocol::walk::{EDGE, Frame, Placed, Walk};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -60,14 +60,17 @@ pub fn run(root: &Path, program: &Path) -> Result<()> {
     let Some(bench) = Bench::new(root)? else { return Ok(()) };
     let jobs = bench.folder.join("jobs");
     fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
+    // A picture that lies as the halftone does not expect it: no tile begins with a byte.
+    let placed = Frame { x: 101, y: 3, width: 4600, height: 256 };
     let made = [
-        ("small", 500, 150, discs(500, 150)),
-        ("page", 4800, 130, discs(4800, 130)),
-        ("clusters", 4800, 256, clusters(4800, 256)),
-        ("cells", 4800, 256, cells(4800, 256)),
+        ("small", Placed::whole(500, 150), discs(500, 150)),
+        ("page", Placed::whole(4800, 130), discs(4800, 130)),
+        ("clusters", Placed::whole(4800, 256), clusters(4800, 256, Frame::whole(4800, 256))),
+        ("placed", Placed::new(4800, 260, placed).context("a picture within")?, clusters(4800, 260, placed)),
+        ("cells", Placed::whole(4800, 256), cells(4800, 256)),
     ];
-    for (name, width, rows, planes) in made {
-        let (printed, streams) = job(width, rows, &planes).context("a test job cannot be made")?;
+    for (name, walk, planes) in made {
+        let (printed, streams) = job(&walk, &planes).context("a test job cannot be made")?;
         fs::write(jobs.join(format!("{name}.rgl")), printed)?;
         fs::write(jobs.join(format!("{name}.streams")), streams)?;
     }
@@ -148,11 +151,11 @@ fn discs(width: u16, rows: u16) -> [Vec<u8>; 2] {
 
 /// Two of eight planes as the halftone makes them: clusters of eight dots or somewhat more along the walk, each of one
 /// of eight inks or of bare paper.
-fn clusters(width: u16, rows: u16) -> [Vec<u8>; 2] {
+fn clusters(width: u16, rows: u16, frame: Frame) -> [Vec<u8>; 2] {
     let stride = runs::stride(width);
     let mut planes = [(); 2].map(|()| vec![0u8; stride * usize::from(rows)]);
     let (mut random, mut left, mut ink) = (1u64, 0, 0);
-    for tile in Walk::new(width, rows).bands().flat_map(|band| band.tiles()) {
+    for tile in Walk::new(frame.width, frame.height).bands().flat_map(|band| band.tiles()) {
         let mut dots = vec![0; usize::from(tile.area())];
         tile.fill(&mut dots);
         for dot in dots {
@@ -165,7 +168,8 @@ fn clusters(width: u16, rows: u16) -> [Vec<u8>; 2] {
             }
             left -= 1;
             if let Some(plane) = planes.get_mut(ink) {
-                let (x, y) = (usize::from(tile.x + dot % EDGE), usize::from(tile.y + dot / EDGE));
+                let (x, y) = (frame.x + tile.x + dot % EDGE, frame.y + tile.y + dot / EDGE);
+                let (x, y) = (usize::from(x), usize::from(y));
                 plane[y * stride + x / 8] |= 0x80 >> (x % 8);
             }
         }
@@ -197,7 +201,8 @@ fn cells(width: u16, rows: u16) -> [Vec<u8>; 2] {
 }
 
 /// A job of two inks as the printer's language and as pass streams.
-fn job(width: u16, rows: u16, planes: &[Vec<u8>; 2]) -> Option<(Vec<u8>, Vec<u8>)> {
+fn job(walk: &Placed, planes: &[Vec<u8>; 2]) -> Option<(Vec<u8>, Vec<u8>)> {
+    let (width, rows) = (walk.width(), walk.height());
     let inks = [Ink::White, Ink::Black];
     let stride = runs::stride(width);
     let page = Page::plain(Paper::A4);
@@ -218,11 +223,11 @@ fn job(width: u16, rows: u16, planes: &[Vec<u8>; 2]) -> Option<(Vec<u8>, Vec<u8>
     printed.extend_from_slice(&out[..length]);
 
     let mut head = [0; MAX_HEADER];
-    let length = Header::new(page, &inks, None, width, rows).ok()?.write(&mut head);
+    let length = Header::new(page, &inks, None, width, rows).ok()?.framed(walk.frame())?.write(&mut head);
     let mut streams = head[..length].to_vec();
     let mut buffer = vec![0; MAX_BAND];
     for plane in planes {
-        runs::encode(width, rows, plane, &mut buffer, |band| streams.extend_from_slice(band)).ok()?;
+        runs::encode(walk, plane, &mut buffer, |band| streams.extend_from_slice(band)).ok()?;
     }
     Some((printed, streams))
 }

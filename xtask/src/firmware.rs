@@ -1,14 +1,46 @@
-//! `cargo xtask firmware`: the bridge's image, and whether it is as small as it is to be.
+//! `cargo xtask firmware`: the bridge's images, one for each board, and whether they are as small as they are to be.
 
 use crate::{cargo, elf, succeed};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// Where the microcontroller's code is built for: Cortex-M0+, no atomics with compare-and-swap.
-pub const BARE_METAL: &str = "thumbv6m-none-eabi";
+/// A board the firmware is built for.
+struct Board {
+    /// What is to run it.
+    chip: uf2::Chip,
+    /// The feature of the firmware that chooses it.
+    feature: &'static str,
+    /// What the compiler makes code for.
+    target: &'static str,
+    /// What the image is called.
+    name: &'static str,
+    /// Bytes of memory.
+    memory: usize,
+}
 
-/// Flash and static memory the image may take.
+/// The Pico: Cortex-M0+, no atomics with compare-and-swap. The Pico 2: Cortex-M33.
+const BOARDS: [Board; 2] = [
+    Board {
+        chip: uf2::Chip::Rp2040,
+        feature: "pico",
+        target: "thumbv6m-none-eabi",
+        name: "foilpress-bridge",
+        memory: 264 << 10,
+    },
+    Board {
+        chip: uf2::Chip::Rp2350,
+        feature: "pico2",
+        target: "thumbv8m.main-none-eabihf",
+        name: "foilpress-bridge-pico2",
+        memory: 520 << 10,
+    },
+];
+
+/// What the compiler makes code for; `rustup target add` brings them.
+pub const BARE_METAL: [&str; 2] = [BOARDS[0].target, BOARDS[1].target];
+
+/// Flash and static memory an image may take.
 struct Budget {
     flash: usize,
     memory: usize,
@@ -16,18 +48,28 @@ struct Budget {
 
 const MEMORY: u32 = 0x2000_0000;
 
-/// Builds the image and writes it as UF2; gives the path of that.
+/// Builds the images and writes them as UF2; gives the path of the Pico's.
 pub fn build(root: &Path) -> Result<PathBuf> {
+    let [pico, pico2] = &BOARDS;
+    build_for(pico2, root)?;
+    build_for(pico, root)
+}
+
+fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
     let folder = root.join("bridge/firmware");
     let target = target(root);
     let mut build = cargo(&["build", "--release", "--locked"]);
-    // The folder's own settings name the processor, the linker's scripts and what is logged.
-    build.current_dir(&folder).env("CARGO_TARGET_DIR", &target);
+    // The folder's own settings name the linker's script and what is logged.
+    build.args(board.arguments()).current_dir(&folder).env("CARGO_TARGET_DIR", &target);
     let status = build.status().context("cargo cannot be started")?;
     if !status.success() {
-        bail!("the firmware does not build ({status})");
+        bail!(
+            "the firmware for the {} does not build ({status}); `rustup target add {}`?",
+            board.chip,
+            board.target
+        );
     }
-    let program = target.join(BARE_METAL).join("release/foilpress-firmware");
+    let program = target.join(board.target).join("release/foilpress-firmware");
     let bytes = fs::read(&program).with_context(|| format!("{} cannot be read", program.display()))?;
     let segments = elf::segments(&bytes)?;
     let pieces: Vec<(u64, &[u8])> = segments
@@ -42,11 +84,11 @@ pub fn build(root: &Path) -> Result<PathBuf> {
         .map(|segment| segment.size as usize)
         .sum();
 
-    let image = uf2::encode(&pieces)?;
+    let image = uf2::encode(board.chip, &pieces)?;
     // What the ROM would read has to be the image, and one it starts.
     let read = uf2::decode(&image)?;
     read.check_boot().context("is `link-rp.x` among the linker's scripts?")?;
-    let path = target.join("foilpress-bridge.uf2");
+    let path = target.join(board.name).with_extension("uf2");
     fs::write(&path, &image).with_context(|| format!("{} cannot be written", path.display()))?;
     // The log is read with it.
     let elf = path.with_extension("elf");
@@ -54,7 +96,10 @@ pub fn build(root: &Path) -> Result<PathBuf> {
 
     let budget = budget(&folder.join("budget.toml"))?;
     println!("flash   {flash:>7} of {:>7} bytes", budget.flash);
-    println!("memory  {memory:>7} of {:>7} bytes, static; the rest of 270336 is stack", budget.memory);
+    println!(
+        "memory  {memory:>7} of {:>7} bytes, static; the {} has {}",
+        budget.memory, board.chip, board.memory
+    );
     println!("{} ({} pages)", path.display(), read.pages().len());
     if flash > budget.flash || memory > budget.memory {
         bail!("the image is larger than bridge/firmware/budget.toml allows");
@@ -64,9 +109,20 @@ pub fn build(root: &Path) -> Result<PathBuf> {
 
 /// Checks the image's source as `cargo clippy` checks all other.
 pub fn lint(root: &Path) -> Result<()> {
-    let mut lint = cargo(&["clippy", "--release", "--locked", "--", "-D", "warnings"]);
-    lint.current_dir(root.join("bridge/firmware")).env("CARGO_TARGET_DIR", target(root));
-    succeed(&mut lint)
+    for board in &BOARDS {
+        let mut lint = cargo(&["clippy", "--release", "--locked"]);
+        lint.args(board.arguments()).args(["--", "-D", "warnings"]);
+        lint.current_dir(root.join("bridge/firmware")).env("CARGO_TARGET_DIR", target(root));
+        succeed(&mut lint)?;
+    }
+    Ok(())
+}
+
+impl Board {
+    /// What chooses it in a build.
+    fn arguments(&self) -> [&'static str; 5] {
+        ["--no-default-features", "--features", self.feature, "--target", self.target]
+    }
 }
 
 /// Where the image is built: beside the workspace's own artifacts.

@@ -58,7 +58,7 @@ pub fn run(root: &Path) -> ExitCode {
     if let Err(error) = queue::install() {
         eprintln!("print queues and PDF: {error:#}");
     }
-    gate.command("bare-metal target", command("rustup", &["target", "add", BARE_METAL]));
+    gate.command("bare-metal targets", command("rustup", &[&["target", "add"][..], &BARE_METAL].concat()));
     gate.step("format", || {
         std::iter::once(Path::new("")).chain(WORKSPACES.map(Path::new)).try_for_each(|workspace| {
             succeed(cargo(&["fmt", "--all", "--check"]).current_dir(root.join(workspace)))

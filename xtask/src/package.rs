@@ -30,7 +30,19 @@ pub fn build(root: &Path, profile: Profile) -> Result<()> {
         Profile::Release => ("release", target.join("release/foilpress")),
         Profile::Dev => ("dev", target.join("debug/foilpress")),
     };
-    succeed(cargo(&["build", "--package", "foilpress", "--locked", "--profile", name]).current_dir(root))?;
+    // The program holds the bridge's images, so that it can flash a board wherever it is installed.
+    let image = firmware::build(root)?;
+    let mut program = cargo(&["build", "--package", "foilpress", "--locked", "--profile", name]);
+    succeed(program.current_dir(root).env("FOILPRESS_FIRMWARE", &image))?;
+    let bytes = fs::read(&built)?;
+    for image in [image.clone(), image.with_file_name("foilpress-bridge-pico2.uf2")] {
+        let image = fs::read(&image)?;
+        ensure!(
+            bytes.windows(image.len()).any(|part| part == image),
+            "{} has no firmware inside",
+            built.display()
+        );
+    }
     pack(root, &built, profile)
 }
 

@@ -10,7 +10,7 @@
 //! A panic tells the return addresses on the stack, and whatever looks like one, for `addr2line`. File and line of every possible
 //! panic would take 14 KB of flash.
 
-use crate::{log, pins, stack, strobe};
+use crate::{board, log, pins, stack, strobe};
 
 /// Room for the handler below the pointer; with less, it begins again at the top of the stack, whose content nobody needs then.
 const ROOM: u32 = 1024;
@@ -75,7 +75,7 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
         // SAFETY: a word of the stack in use, which lies between the pointer and its top.
         let word = unsafe { (at as *const u32).read_volatile() };
         // Instructions are in flash, and an odd address is that of Thumb code.
-        if (0x1000_0100..0x1002_0000).contains(&word) && word & 1 == 1 {
+        if board::CODE.contains(&word) && word & 1 == 1 {
             (trace[found], found) = (word, found + 1);
         }
         at += 4;

@@ -14,8 +14,8 @@
 //!
 //! *The bytes survive.* The linker puts the section `.uninit` behind `.bss`. The startup code writes
 //! `.bss` and `.data` only (cortex-m-rt without its features `zero-init-ram` and `paint-stack`, neither of which is on).
-//! On the way to this program the boot ROM and the second-stage boot loader use the end of the memory only, which
-//! `memory.x` leaves alone. What anything else has overwritten, such as a debugger, the checksums of image and slots find. The
+//! On the way to this program the boot ROM and the second-stage boot loader use the end of the memory only, which the
+//! board's memory map leaves alone. What anything else has overwritten, such as a debugger, the checksums of image and slots find. The
 //! stack is below all of it and grows away from it ([`crate::stack`]).
 //!
 //! *The bytes may be read.* To the compiler a static without an initial value is uninitialised, and reading it is
@@ -30,6 +30,7 @@
 //! processor access them byte by byte, the processor with volatile accesses. No reference to this memory is ever made,
 //! only raw pointers, so none can be aliased.
 
+use crate::board::FLASH;
 use bridge::engine::Checkpoint;
 use bridge::keeper::{self, MARKS, Memory, PAST_SLOT, SLOT};
 use core::cell::UnsafeCell;
@@ -134,9 +135,6 @@ fn image_checksum() -> u32 {
     // SAFETY: flash, which is mapped there as far as the linker has filled it, and which nothing writes while the program runs.
     checksum(unsafe { core::slice::from_raw_parts(FLASH as *const u8, length) })
 }
-
-/// Where the image begins.
-const FLASH: usize = 0x1000_0000;
 
 /// The keeper, what an earlier run has left, and whether there was one of this image. To be called before the first word of the
 /// log, and before the strobe engine is started.

@@ -1,4 +1,4 @@
-//! The bridge on a Raspberry Pi Pico.
+//! The bridge on a Raspberry Pi Pico or Pico 2.
 //!
 //! Every decision is in the library `bridge`, where it is tested without a board. Here is what the board adds: pins, a
 //! strobe engine of PIO and DMA, a USB device, flash, memory that survives a reset, a watchdog, and the calls between
@@ -20,6 +20,7 @@
 #![no_std]
 #![no_main]
 
+mod board;
 mod fault;
 mod keep;
 mod log;
@@ -34,16 +35,18 @@ mod watch;
 
 use bridge::engine::{Engine, Identity, Memory};
 use bridge::turn::{self, Turn};
+use core::ffi::CStr;
 use embassy_executor::Spawner;
 use embassy_futures::yield_now;
-use embassy_rp::binary_info::{EntryAddr, rp_cargo_version, rp_program_name};
-use embassy_rp::clocks::RoscRng;
-use embassy_rp::flash::{Blocking, Flash};
+use embassy_rp::binary_info::consts::{ID_RP_PROGRAM_VERSION_STRING, TAG_RASPBERRY_PI};
+use embassy_rp::binary_info::{self, EntryAddr, rp_program_name};
+use embassy_rp::clocks::{self, RoscRng};
 use embassy_rp::pac;
 use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
 use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
 use embassy_time::Instant;
+use protocol::runs::Decoder;
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
 use strobe::{CHUNK, Strobe};
@@ -58,12 +61,18 @@ bind_interrupts!(struct Interrupts {
 /// The program's name and version in the image, for whoever is to flash it.
 #[unsafe(link_section = ".bi_entries")]
 #[used]
-static PROGRAM: [EntryAddr; 2] = [rp_program_name!(c"foilpress-bridge"), rp_cargo_version!()];
+static PROGRAM: [EntryAddr; 2] = [
+    rp_program_name!(c"foilpress-bridge"),
+    binary_info::str!(TAG_RASPBERRY_PI, ID_RP_PROGRAM_VERSION_STRING, VERSION),
+];
+
+const VERSION: &CStr = match CStr::from_bytes_with_nul(board::VERSION.as_bytes()) {
+    Ok(version) => version,
+    Err(_) => panic!("it ends with a zero"),
+};
 
 // The library counts time in µs, and a tick is one: converted they would be divided, by a processor that cannot.
 const _: () = assert!(embassy_time::TICK_HZ == 1_000_000);
-
-const FLASH_BYTES: usize = 2 * 1024 * 1024;
 
 /// 64 rows of 9880 dots, as `protocol::runs::band_bytes` counts them.
 const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
@@ -71,39 +80,40 @@ const WIDEST_BAND: usize = 9880_usize.div_ceil(8) * 64;
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     // Before anything else: the lines at rest.
-    let board = embassy_rp::init(Default::default());
+    let peripherals = embassy_rp::init(Default::default());
     pins::bring_up();
     // From here on every task has to show that it lives, also while USB starts.
-    let watchdog = watch::start(board.WATCHDOG);
+    let watchdog = watch::start(peripherals.WATCHDOG);
 
     // Before the first word of the log, and before a byte goes to the printer.
     let (keeper, checkpoint, known) = keep::keeper();
     let used_before = stack::used();
     stack::fill();
 
-    let number = {
-        let mut flash = Flash::<_, Blocking, FLASH_BYTES>::new_blocking(board.FLASH);
-        let mut number = [0; 8];
-        // A board whose flash does not tell has number 0, which is as good as any if it is the only one.
-        let _ = flash.blocking_unique_id(&mut number);
-        number
-    };
+    // Times are counted in cycles of this clock.
+    assert!(clocks::clk_sys_freq() == board::CLOCK_HZ);
+
+    let number = board::serial_number(peripherals.FLASH);
     let identity = Identity {
         boot: RoscRng.next_u32(),
         serial: u64::from_be_bytes(number),
-        firmware: env!("CARGO_PKG_VERSION"),
+        firmware: VERSION.to_str().unwrap_or_default(),
     };
 
     static DATA: ConstStaticCell<[u8; 12 * 1024]> = ConstStaticCell::new([0; 12 * 1024]);
     static OUTPUT: ConstStaticCell<[u8; 36 * 1024]> = ConstStaticCell::new([0; 36 * 1024]);
     static BAND: ConstStaticCell<[u8; WIDEST_BAND]> = ConstStaticCell::new([0; WIDEST_BAND]);
     static SHARED: StaticCell<Shared> = StaticCell::new();
-    let memory = Memory { data: DATA.take(), output: OUTPUT.take(), band: BAND.take() };
+    // In its place from the beginning: on the stack it would be there twice.
+    static DECODER: StaticCell<Decoder> = StaticCell::new();
+    let decoder = DECODER.init_with(Decoder::default);
+    let memory = Memory { data: DATA.take(), output: OUTPUT.take(), band: BAND.take(), decoder };
     let reason = pac::WATCHDOG.reason().read();
     defmt::info!(
-        "bridge {=str} {=u64:x} up, after {=str}",
+        "bridge {=str} {=u64:x} up on a {=str}, after {=str}",
         identity.firmware,
         identity.serial,
+        board::NAME,
         match (reason.timer(), reason.force()) {
             (true, _) => "the watchdog's bite",
             (_, true) => "a restart",
@@ -129,19 +139,19 @@ async fn main(spawner: Spawner) {
         })
     });
 
-    let Pio { mut common, sm0, .. } = Pio::new(board.PIO0, Interrupts);
+    let Pio { mut common, sm0, .. } = Pio::new(peripherals.PIO0, Interrupts);
     let data = [
-        common.make_pio_pin(board.PIN_2),
-        common.make_pio_pin(board.PIN_3),
-        common.make_pio_pin(board.PIN_4),
-        common.make_pio_pin(board.PIN_5),
-        common.make_pio_pin(board.PIN_6),
-        common.make_pio_pin(board.PIN_7),
-        common.make_pio_pin(board.PIN_8),
-        common.make_pio_pin(board.PIN_9),
+        common.make_pio_pin(peripherals.PIN_2),
+        common.make_pio_pin(peripherals.PIN_3),
+        common.make_pio_pin(peripherals.PIN_4),
+        common.make_pio_pin(peripherals.PIN_5),
+        common.make_pio_pin(peripherals.PIN_6),
+        common.make_pio_pin(peripherals.PIN_7),
+        common.make_pio_pin(peripherals.PIN_8),
+        common.make_pio_pin(peripherals.PIN_9),
     ];
-    let strobe_pin = common.make_pio_pin(board.PIN_10);
-    let busy = common.make_pio_pin(board.PIN_15);
+    let strobe_pin = common.make_pio_pin(peripherals.PIN_10);
+    let busy = common.make_pio_pin(peripherals.PIN_15);
     static BUFFERS: ConstStaticCell<[[u8; CHUNK]; 2]> = ConstStaticCell::new([[0; CHUNK]; 2]);
     let [first, second] = BUFFERS.take();
     let mut strobe = Strobe::new(
@@ -151,7 +161,7 @@ async fn main(spawner: Spawner) {
         strobe_pin,
         busy,
         [first, second],
-        (board.DMA_CH0, board.DMA_CH1),
+        (peripherals.DMA_CH0, peripherals.DMA_CH1),
     );
     strobe.set_place(keeper.place());
     pins::bring_up();
@@ -161,7 +171,7 @@ async fn main(spawner: Spawner) {
 
     static SERIAL: StaticCell<[u8; 16]> = StaticCell::new();
     let serial_number = hex(&number, SERIAL.init([0; 16]));
-    let usb = device::build(usb_driver::Driver::new(board.USB, Interrupts), serial_number, shared);
+    let usb = device::build(usb_driver::Driver::new(peripherals.USB, Interrupts), serial_number, shared);
     // The pools hold one of each task, and each is spawned once.
     spawner.spawn(device::run(usb.device).unwrap());
     spawner.spawn(link::serial(shared, usb.serial_in, usb.serial_lines).unwrap());

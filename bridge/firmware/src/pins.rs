@@ -5,6 +5,7 @@
 //! handshake; [`lend_to_pio`] and [`take_back`] are the only places where they change hands, and nStrobe is high at
 //! both ends of either.
 
+use crate::board;
 use bridge::port::{AckPin, DataBus, Pins};
 use core::convert::Infallible;
 use embassy_rp::pac;
@@ -26,7 +27,7 @@ pub const SELECT_IN: u8 = 13;
 pub const ACK: u8 = 14;
 /// Busy, the first of the lines the strobe program looks at. The last is [`POWER`].
 pub const BUSY: u8 = 15;
-/// Connected to nothing, and low: the strobe program sees it.
+/// Connected to nothing, and held low: the strobe program sees it.
 const UNUSED: u8 = 19;
 /// nOE of the output buffers: high, by a resistor, until the firmware has put the lines to rest.
 pub const ENABLE: u8 = 20;
@@ -69,7 +70,7 @@ fn input(pin: u8, rest: Rest) {
         w.set_od(true);
         w.set_schmitt(true);
         w.set_pue(matches!(rest, Rest::Up));
-        w.set_pde(matches!(rest, Rest::Down));
+        w.set_pde(matches!(rest, Rest::Down) && board::PULL_DOWN);
     });
     function(pin, SIO);
 }
@@ -88,8 +89,8 @@ fn output(pin: u8) {
 /// was high by its resistor, so nothing strobed.
 pub fn bring_up() {
     out_set().write_value(AT_REST | 1 << ENABLE);
-    out_clear().write_value(1 << SELECT_IN | 0xff << DATA | 1 << LAMP);
-    for pin in [ENABLE, STROBE, AUTO_FEED, INIT, SELECT_IN, LAMP].into_iter().chain(DATA..DATA + 8) {
+    out_clear().write_value(1 << SELECT_IN | 0xff << DATA | 1 << LAMP | 1 << UNUSED);
+    for pin in [ENABLE, STROBE, AUTO_FEED, INIT, SELECT_IN, LAMP, UNUSED].into_iter().chain(DATA..DATA + 8) {
         output(pin);
     }
     for (pin, rest) in [
@@ -98,7 +99,6 @@ pub fn bring_up() {
         (BUSY + 1, Rest::Up),
         (BUSY + 2, Rest::Down),
         (BUSY + 3, Rest::Up),
-        (UNUSED, Rest::Down),
         (POWER, Rest::Down),
     ] {
         input(pin, rest);

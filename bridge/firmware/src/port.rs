@@ -1,5 +1,6 @@
 //! The task at the port: runs the library's [`Driver`] on this board.
 
+use crate::board;
 use crate::keep::Keeper;
 use crate::pins::{self, Ack, Data, Line};
 use crate::shared::{Shared, Side};
@@ -20,8 +21,7 @@ pub struct Cycles;
 
 impl DelayNs for Cycles {
     fn delay_ns(&mut self, ns: u32) {
-        // 125 MHz: a cycle is 8 ns.
-        cortex_m::asm::delay(ns.div_ceil(8).max(1));
+        cortex_m::asm::delay(board::cycles(ns).max(1));
     }
 }
 

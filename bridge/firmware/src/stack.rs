@@ -1,7 +1,7 @@
 //! The stack: what is below it, and how much of it was ever used.
 //!
 //! Problem: a stack that grows too far writes over variables, and the board then fails somewhere else. Method: the stack is the
-//! *lowest* part of the memory (`memory.x`). Below it there is no memory, so the first access beyond its end is a bus error, which
+//! *lowest* part of the memory ([the board's](crate::board) map). Below it there is no memory, so the first access beyond its end is a bus error, which
 //! is a [fault](crate::fault). Nothing needs to be configured, and nothing can be forgotten. At the start the unused part is
 //! filled with a pattern; the lowest word without it says how much was used. The pattern outlives a restart, so the next start
 //! sees it too.

@@ -26,8 +26,8 @@
 //! Limits: the handshake is Busy, and all status lines are heeded. For other handshakes, and for everything else the
 //! port can do, the library's [`Port`](bridge::port::Port) works the same pins.
 
-use crate::keep;
 use crate::pins;
+use crate::{board, keep};
 use bridge::driver::TwoBuffers;
 use bridge::keeper::{MARKS, MARKS_BITS};
 use bridge::port::Timing;
@@ -62,7 +62,7 @@ const READY: u32 = 1 << 2 | 1 << 3 | 1 << (pins::POWER - pins::BUSY);
 const CROSSING: core::ops::RangeInclusive<u8> = 7..=9;
 
 /// Words of the DMA counter between two starts of it.
-const COUNTER: u32 = u32::MAX;
+const COUNTER: u32 = board::COUNT_MAX;
 
 const FEED: usize = 0;
 const TALLY: usize = 1;
@@ -78,7 +78,7 @@ fn start(address: u32, length: u32) {
     let channel = pac::DMA.ch(FEED);
     channel.read_addr().write_value(address);
     channel.write_addr().write_value(pac::PIO0.txf(0).as_ptr() as u32);
-    channel.trans_count().write_value(length);
+    board::set_count(channel, length);
     compiler_fence(Ordering::SeqCst);
     channel.ctrl_trig().write(|w| {
         w.set_treq_sel(TreqSel::PIO0_TX0);
@@ -111,7 +111,7 @@ fn DMA_IRQ_1() {
 
 /// Stops the machine for good, no byte being cut in two, with the last one counted.
 pub fn halt() {
-    pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << FEED));
+    board::abort(FEED);
     let machine = pac::PIO0.sm(0);
     // The program is the only one, loaded at the beginning. A byte takes ten microseconds at most with the slowest timing; a machine
     // that waits for the printer is not crossing.
@@ -200,9 +200,9 @@ impl Strobe {
         self.machine.set_clock_divider(FixedU32::<U8>::from_bits(divider));
     }
 
-    /// Whether there is a buffer to fill.
+    /// Whether there is a buffer to fill. Before the counter is used up it needs a moment without any, to be started anew.
     pub fn has_room(&self) -> bool {
-        self.books.free().is_some()
+        self.tally <= COUNTER / 2 && self.books.free().is_some()
     }
 
     /// Bytes handed over that have not crossed the port.
@@ -232,7 +232,7 @@ impl Strobe {
 
     /// How many bytes have crossed the port since this was last asked.
     pub fn crossed(&mut self) -> usize {
-        let tally = COUNTER - pac::DMA.ch(TALLY).trans_count().read();
+        let tally = COUNTER - board::count(pac::DMA.ch(TALLY));
         let fresh = tally - self.tally;
         self.tally = tally;
         self.place = (self.place + fresh as usize) % MARKS;
@@ -261,7 +261,7 @@ impl Strobe {
     pub fn stop(&mut self) -> usize {
         critical_section::with(|token| NEXT.borrow_ref_mut(token).take());
         pac::DMA.inte(1).modify(|w| *w &= !(1 << FEED));
-        pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << FEED));
+        board::abort(FEED);
         while feeding() {}
         // An aborted channel may raise its interrupt.
         pac::DMA.ints(1).write_value(1 << FEED);
@@ -333,11 +333,11 @@ impl Strobe {
 
     fn start_tally(&mut self) {
         let channel = pac::DMA.ch(TALLY);
-        pac::DMA.chan_abort().write(|w| w.set_chan_abort(1 << TALLY));
+        board::abort(TALLY);
         while channel.ctrl_trig().read().busy() {}
         channel.read_addr().write_value(pac::PIO0.rxf(0).as_ptr() as u32);
         channel.write_addr().write_value(keep::marks() as u32 + self.place as u32);
-        channel.trans_count().write_value(COUNTER);
+        board::set_count(channel, COUNTER);
         channel.ctrl_trig().write(|w| {
             w.set_treq_sel(TreqSel::PIO0_RX0);
             // What was pushed is the state of the lines, which was `READY` and not zero.

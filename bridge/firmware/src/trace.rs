@@ -4,16 +4,11 @@
 //! the executor calls back before and after each turn of a task; the longest turn is kept. Limits: interrupts that come in a
 //! turn count as part of it; what runs before the tasks, at the start, does not count.
 
-use embassy_rp::pac;
+use crate::board::now_us;
 use portable_atomic::{AtomicU32, Ordering};
 
 static BEGAN_US: AtomicU32 = AtomicU32::new(0);
 static LONGEST_US: AtomicU32 = AtomicU32::new(0);
-
-/// The lower half of the clock, which is enough for a difference.
-fn now_us() -> u32 {
-    pac::TIMER.timerawl().read()
-}
 
 /// The present turn begins only now: what came before was the start of the board.
 pub fn restart() {

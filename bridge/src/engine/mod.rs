@@ -39,6 +39,7 @@ use protocol::link::message::{
     Answer, Fault, JobKind, JobState, Lines, PAST, PastJob, PortSettings, Progress, Refusal, ToHost,
 };
 use protocol::rgl::Track;
+use protocol::runs::Decoder;
 
 /// The memory of an engine.
 pub struct Memory<'m> {
@@ -50,6 +51,8 @@ pub struct Memory<'m> {
     /// One band: 38,400 bytes for 4800 dots, 79,040 for the widest page at 1200 dpi. Jobs that need more are
     /// refused.
     pub band: &'m mut [u8],
+    /// Eleven kilobytes of tables and counters; any, whatever it has decoded.
+    pub decoder: &'m mut Decoder,
 }
 
 /// Least size of [`Memory::data`] and [`Memory::output`]. With less, the engine takes no job.
@@ -212,7 +215,7 @@ impl<'m> Engine<'m> {
             identity,
             data: Ring::new(memory.data),
             output: Ring::new(memory.output),
-            streams: Streams::new(memory.band),
+            streams: Streams::new(memory.band, memory.decoder),
             ahead: Track::new(),
             sent: Track::new(),
             marks: Marks::new(),

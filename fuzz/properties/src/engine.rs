@@ -14,7 +14,8 @@ use protocol::link::message::{
 };
 use protocol::paper::Paper;
 use protocol::rgl::{Order, Page, Step, parse};
-use protocol::runs::{Header, MAX_HEADER};
+use protocol::runs::{Decoder, Header, MAX_HEADER};
+use protocol::walk::Frame;
 
 /// Lives of the bridge in a script.
 const LIVES: usize = 4;
@@ -48,15 +49,21 @@ struct Board {
     data: [u8; 2100],
     output: [u8; 2048],
     band: [u8; 2048],
+    decoder: Decoder,
 }
 
 impl Board {
     fn new() -> Board {
-        Board { data: [0; 2100], output: [0; 2048], band: [0; 2048] }
+        Board { data: [0; 2100], output: [0; 2048], band: [0; 2048], decoder: Decoder::default() }
     }
 
     fn memory(&mut self) -> Memory<'_> {
-        Memory { data: &mut self.data, output: &mut self.output, band: &mut self.band }
+        Memory {
+            data: &mut self.data,
+            output: &mut self.output,
+            band: &mut self.band,
+            decoder: &mut self.decoder,
+        }
     }
 }
 
@@ -108,7 +115,11 @@ fn header(script: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     let (columns, rows) = (script.int_in_range(1..=300)?, script.int_in_range(1..=200)?);
     let header = Header::new(Page::plain(Paper::A4), &[Ink::White, Ink::Cyan], None, columns, rows);
     let mut out = [0; MAX_HEADER];
-    let length = header.expect("a page with room for it").write(&mut out);
+    let header = header.expect("a page with room for it");
+    let (x, y) = (script.int_in_range(0..=columns - 1)?, script.int_in_range(0..=rows - 1)?);
+    let (width, height) = (script.int_in_range(1..=columns - x)?, script.int_in_range(1..=rows - y)?);
+    let header = header.framed(Frame { x, y, width, height }).expect("a picture within it");
+    let length = header.write(&mut out);
     Ok(out[..length].to_vec())
 }
 

@@ -23,7 +23,8 @@ fn taken(file: &[u8], image: &Image) {
     }
     let _ = image.check_boot();
     let pieces: Vec<(u64, &[u8])> = image.pages().map(|(at, page)| (at.into(), &page[..])).collect();
-    let again = decode(&encode(&pieces).expect("pages of flash, each once")).expect("what was encoded");
+    let again =
+        decode(&encode(image.chip(), &pieces).expect("pages of flash, each once")).expect("what was encoded");
     assert!(image.pages().all(|(at, page)| again.read(at, PAGE) == page));
     // Whole sectors, the rest of them blank.
     assert_eq!(again.sectors(), image.sectors());

@@ -119,7 +119,7 @@ impl<W: std::io::Write> Visit<W> {
             }
         };
         let drives = drive::find();
-        for board in &found {
+        for (_, board) in &found {
             self.trouble(
                 "\na board is in its boot loader, without firmware: `foilpress bridge flash` installs it; to leave the boot loader, \
                  unplug the board and plug it in again",
@@ -127,10 +127,10 @@ impl<W: std::io::Write> Visit<W> {
             let Some(closed) = board.closed.filter(|_| drives.is_empty()) else { continue };
             self.forbidden |= board.is_forbidden();
             self.trouble(&format!(
-                "    it cannot be opened ({closed}), and its drive RPI-RP2 is not mounted"
+                "    it cannot be opened ({closed}), and its drive (RPI-RP2 or RP2350) is not mounted"
             ))?;
         }
-        for drive in drives.iter().skip(found.len()) {
+        for (_, drive) in drives.iter().skip(found.len()) {
             self.trouble(&format!(
                 "\na board's drive is mounted at {}: `foilpress bridge flash` installs firmware on it",
                 drive.display()

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the link. It changes only if an old message, or the data of a job, changes its meaning, not when messages are
 /// appended.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 
 /// Fingerprint of the message set: the CRC-32 over one example of every variant. With equal fingerprints, host and bridge
 /// know the same messages. With different fingerprints but the same version, both understand everything the older knows.

@@ -3,11 +3,11 @@
 //! Problem: a microcontroller has some thirty clock cycles for every dot of the page, including those without ink, and
 //! setting a single dot costs a dozen. Method: runs are filled into a line of 4096 bits, a word at a time, and a complete
 //! tile is then laid out in the band. In a full tile, sixteen consecutive dots are a square of four by four, walked in one
-//! of four ways, so four look-ups turn sixteen bits of the line into four nibbles of four rows. A tile that is inked all
-//! over is filled row by row. Tiles of other sizes, which occur only at the right and lower edge of a page, are laid out
-//! dot by dot from a table.
+//! of four ways, so four look-ups turn sixteen bits of the line into four nibbles of four rows. The rows of the tile are then
+//! shifted to its place in the band, which may begin at any column. Tiles of other sizes, which occur only at the right
+//! and lower edges of a picture and around it, are laid out dot by dot from a table.
 //!
-//! Cost: two or three operations a dot where there is ink, none for words without; 8 KB for the table, 1.5 KB for the
+//! Cost: three operations a dot where there is ink, none for words without; 8 KB for the table, 1.5 KB for the
 //! order of the squares. Limits: those of the walk.
 
 use crate::walk::{EDGE, MOST, Orientation, Tile};
@@ -109,27 +109,33 @@ impl Canvas {
         if first >= end {
             return Laid::Blank;
         }
-        let whole = (tile.w, tile.h) == (EDGE, EDGE) && tile.x.is_multiple_of(8);
-        if !whole {
+        if (tile.w, tile.h) != (EDGE, EDGE) {
             return self.lay_dots(tile, rows, stride);
         }
         self.used = UNUSED;
+        let mut dots = [[0; 2]; EDGE as usize];
         if self.line.iter().all(|&word| word == u32::MAX) {
-            let at = usize::from(tile.x / 8);
-            for row in rows.chunks_mut(stride) {
-                row[at..at + usize::from(EDGE / 8)].fill(0xff);
-            }
+            dots.fill([u32::MAX; 2]);
             self.line.fill(0);
         } else {
-            self.lay_squares(tile, first..end, rows, stride);
+            self.lay_squares(tile.orientation, first..end, &mut dots);
+        }
+        let (at, shift) = (usize::from(tile.x / 8), u32::from(tile.x % 8));
+        for (row, &[left, right]) in rows.chunks_exact_mut(stride).zip(&dots) {
+            if left | right != 0 {
+                put(left, right, shift, &mut row[at..]);
+            }
         }
         Laid::Whole
     }
 
-    fn lay_squares(&mut self, tile: &Tile, words: core::ops::Range<usize>, rows: &mut [u8], stride: usize) {
-        let squares =
-            self.squares[tile.orientation as usize].get_or_insert_with(|| squares(tile.orientation));
-        let left = usize::from(tile.x / 8);
+    fn lay_squares(
+        &mut self,
+        orientation: Orientation,
+        words: core::ops::Range<usize>,
+        rows: &mut [[u32; 2]; EDGE as usize],
+    ) {
+        let squares = self.squares[orientation as usize].get_or_insert_with(|| squares(orientation));
         let pairs = squares.chunks_exact(2).zip(&mut self.line);
         for (pair, word) in pairs.take(words.end).skip(words.start) {
             let word = core::mem::take(word);
@@ -143,12 +149,10 @@ impl Canvas {
                     laid[0][nibble(12)] | laid[1][nibble(8)] | laid[2][nibble(4)] | laid[3][nibble(0)],
                 );
                 let (row, column) = (usize::from(square.place >> 4), usize::from(square.place & 15));
-                // The left square of a byte has its top nibble.
-                let shift = if column.is_multiple_of(2) { 4 } else { 0 };
-                let mut at = row * 4 * stride + left + column / 2;
-                for from in [12, 8, 4, 0] {
-                    rows[at] |= (((dots >> from & 15) << shift) & 0xff) as u8;
-                    at += stride;
+                // Eight squares to a word.
+                let (word, shift) = (column / 8, 28 - column % 8 * 4);
+                for (row, from) in rows[row * 4..row * 4 + 4].iter_mut().zip([12, 8, 4, 0]) {
+                    row[word] |= (dots >> from & 15) << shift;
                 }
             }
         }
@@ -184,6 +188,25 @@ impl Canvas {
         }
         self.used = UNUSED;
         Laid::Whole
+    }
+}
+
+/// Puts 64 dots into a row, beginning at bit `shift` (0 to 7) of its first byte. Only the first and the last byte are shared with
+/// other tiles.
+#[expect(clippy::cast_possible_truncation, reason = "bytes of words")]
+fn put(left: u32, right: u32, shift: u32, row: &mut [u8]) {
+    if shift == 0 {
+        if let Some(row) = row.first_chunk_mut::<8>() {
+            row[..4].copy_from_slice(&left.to_be_bytes());
+            row[4..].copy_from_slice(&right.to_be_bytes());
+        }
+    } else if let Some(row) = row.first_chunk_mut::<9>() {
+        let middle = left << (32 - shift) | right >> shift;
+        let left = left >> shift;
+        row[0] |= (left >> 24) as u8;
+        (row[1], row[2], row[3]) = ((left >> 16) as u8, (left >> 8) as u8, left as u8);
+        row[4..8].copy_from_slice(&middle.to_be_bytes());
+        row[8] |= (right << (8 - shift)) as u8;
     }
 }
 

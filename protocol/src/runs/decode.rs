@@ -4,7 +4,7 @@ use super::across::{Across, Stop};
 use super::canvas::{Canvas, Laid};
 use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
-use crate::walk::{Band, Tile, Walk};
+use crate::walk::{Placed, PlacedBand, Tile};
 
 /// What is wrong with a stream.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -109,23 +109,24 @@ enum Run {
 
 /// Decodes one pass of a page.
 pub struct Decoder {
-    walk: Walk,
+    walk: Placed,
     next: usize,
-    band: Option<Band>,
+    band: Option<PlacedBand>,
     state: State,
     canvas: Canvas,
 }
 
+impl Default for Decoder {
+    /// A decoder for planes without a dot, until [`Decoder::begin`].
+    fn default() -> Decoder {
+        Decoder::new(Placed::whole(0, 0))
+    }
+}
+
 impl Decoder {
-    /// A decoder for a plane of `width` by `height` dots.
-    pub fn new(width: u16, height: u16) -> Decoder {
-        let mut decoder = Decoder {
-            walk: Walk::new(width, height),
-            next: 0,
-            band: None,
-            state: State::End,
-            canvas: Canvas::new(),
-        };
+    /// A decoder for planes with this walk.
+    pub fn new(walk: Placed) -> Decoder {
+        let mut decoder = Decoder { walk, next: 0, band: None, state: State::End, canvas: Canvas::new() };
         decoder.restart();
         decoder
     }
@@ -137,8 +138,8 @@ impl Decoder {
     }
 
     /// Starts the stream of another page.
-    pub fn resize(&mut self, width: u16, height: u16) {
-        self.walk = Walk::new(width, height);
+    pub fn begin(&mut self, walk: Placed) {
+        self.walk = walk;
         self.restart();
     }
 
@@ -149,14 +150,14 @@ impl Decoder {
 
     /// The band to come, or the end.
     fn follow(&mut self) {
-        self.band = self.walk.bands().nth(self.next);
+        self.band = self.walk.band(self.next);
         self.state = if self.band.is_some() { State::Form } else { State::End };
     }
 
     /// Reads until a band is complete and returns how many bytes of `input` it has read. `memory` needs [`band_bytes`]
     /// bytes and must stay the same, unchanged, until the band is complete.
     ///
-    /// After a defect only [`Decoder::restart`] and [`Decoder::resize`] help.
+    /// After a defect only [`Decoder::restart`] and [`Decoder::begin`] help.
     pub fn step(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Step), Defect> {
         let mut read = 0;
         loop {
@@ -202,7 +203,7 @@ impl Decoder {
                     let Some(&count) = input.get(read) else { return Ok((read, Some(Step::More))) };
                     let end = self.next + usize::from(count);
                     let last = end.checked_sub(1).filter(|&last| last >= self.next).ok_or(Defect::Count)?;
-                    let last = self.walk.bands().nth(last).ok_or(Defect::Count)?;
+                    let last = self.walk.band(last).ok_or(Defect::Count)?;
                     read += 1;
                     self.next = end;
                     self.follow();
@@ -263,7 +264,7 @@ impl Decoder {
 
 /// Where the dots of a runs band go.
 struct Place<'d> {
-    band: Band,
+    band: PlacedBand,
     stride: usize,
     memory: &'d mut [u8],
     canvas: &'d mut Canvas,
@@ -422,7 +423,7 @@ impl Runs {
             }
             self.lay(place);
             if self.tile.is_none() {
-                self.tile = place.band.tiles().nth(self.tiles);
+                self.tile = place.band.tile(self.tiles);
                 self.tiles += 1;
                 // There is a next tile: the run ends within the band.
                 let Some(tile) = &self.tile else { return };

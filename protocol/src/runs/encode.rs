@@ -4,7 +4,7 @@ use super::encode_across::put_across;
 use super::rice::{ESCAPE, Mean};
 use super::{PLAIN_BITS, band_bytes, form, stride};
 use crate::packbits;
-use crate::walk::{Band, EDGE, MOST, Tile, Walk};
+use crate::walk::{EDGE, MOST, Placed, PlacedBand, Tile};
 use heapless::Vec;
 
 /// The most bytes one band can take, whatever its content, on the widest page (9880 dots at 1200 dpi): the size of the
@@ -17,23 +17,23 @@ pub(super) const MAX_STRIDE: usize = 1235;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct NoRoom;
 
-/// Encodes a plane of `width` by `height` dots: 8 dots to a byte, most significant bit left, 1 = ink, rows padded to
-/// whole bytes with zeros. `put` receives the stream band by band. `buffer` needs [`MAX_BAND`] bytes.
+/// Encodes a plane: 8 dots to a byte, most significant bit left, 1 = ink, rows padded to whole bytes with zeros. `put`
+/// receives the stream band by band. `buffer` needs [`MAX_BAND`] bytes.
 pub fn encode(
-    width: u16,
-    height: u16,
+    placed: &Placed,
     bits: &[u8],
     buffer: &mut [u8],
     mut put: impl FnMut(&[u8]),
 ) -> Result<(), NoRoom> {
+    let width = placed.width();
     let stride = stride(width);
-    if stride > MAX_STRIDE || buffer.len() < MAX_BAND || bits.len() < stride * usize::from(height) {
+    if stride > MAX_STRIDE || buffer.len() < MAX_BAND || bits.len() < stride * usize::from(placed.height()) {
         return Err(NoRoom);
     }
     let mut blank = 0u8;
     let mut table = Table::new();
     let mut across = false;
-    for band in Walk::new(width, height).bands() {
+    for band in placed.bands() {
         let from = usize::from(band.y) * stride;
         let rows = &bits[from..from + usize::from(band.height) * stride];
         if rows.iter().all(|&byte| byte == 0) {
@@ -113,7 +113,7 @@ fn gather(tile: &Tile, rows: &[u8], stride: usize, words: &mut [u64; EDGE as usi
 
 /// Calls `run` with the length of every run of the band, off first, possibly 0.
 fn for_each_run(
-    band: &Band,
+    band: &PlacedBand,
     rows: &[u8],
     stride: usize,
     table: &mut Table,
@@ -142,7 +142,13 @@ fn for_each_run(
     run(length)
 }
 
-fn put_runs(band: &Band, rows: &[u8], stride: usize, table: &mut Table, out: &mut [u8]) -> Option<usize> {
+fn put_runs(
+    band: &PlacedBand,
+    rows: &[u8],
+    stride: usize,
+    table: &mut Table,
+    out: &mut [u8],
+) -> Option<usize> {
     // The band cuts the first and the last run, so they say nothing about the clusters.
     let (mut minimum, mut last, mut count) = (u32::from(u8::MAX), 0, 0u32);
     for_each_run(band, rows, stride, table, |length| {

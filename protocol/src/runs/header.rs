@@ -1,43 +1,46 @@
 //! The header before the pass streams of a job: the page, the planes' size, the inks.
 //!
 //! ```text
-//! header = version (01) resolution media media paper width width length length curl
-//!          shift-x shift-x shift-y shift-y columns columns rows rows consent passes { ink }
+//! header = version (02) resolution media media paper width width length length curl
+//!          shift-x shift-x shift-y shift-y columns columns rows rows consent passes
+//!          x x y y across across down down { ink }
 //! ```
 //!
 //! Resolution, media, paper and ink codes are those of the printer's language; two-byte numbers are
 //! little-endian. `width` and `length` are the printable area in 1/600 inch of a custom sheet (code 0), and 0
 //! for every other. `curl` is 1 if the printer corrects curl; `consent` is 1 if the user has agreed to foil. `columns`
-//! and `rows` are the size of the planes in dots. One stream follows for each pass.
+//! and `rows` are the size of the planes in dots. `x`, `y`, `across` and `down` are the rectangle of the picture whose walk the streams
+//! follow, which lies within the planes: all of them if there is no such picture. One stream follows for each pass.
 
 use crate::ink::Ink;
 use crate::paper::Paper;
 use crate::rgl::command::PaperCode;
 use crate::rgl::order::MAX_PASSES;
 use crate::rgl::{Fault, FoilConsent, JobSetup, Media, Page, Resolution};
+use crate::walk::{Frame, Placed};
 use heapless::Vec;
 
 /// Bytes before the inks.
-const FIXED: usize = 20;
+const FIXED: usize = 28;
 
 /// The longest header.
 pub const MAX_HEADER: usize = FIXED + MAX_PASSES;
 
-const VERSION: u8 = 1;
+/// 1 had no frame.
+const VERSION: u8 = 2;
 
 /// A job's page, planes and inks. Making one proves that it can be printed.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Header {
     setup: JobSetup,
     consent: bool,
-    columns: u16,
-    rows: u16,
+    walk: Placed,
 }
 
 /// Why bytes are no header.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum HeaderError {
-    /// Not version 1, or an unknown code or flag.
+    /// Not version 2, or an unknown code or flag.
     Unknown,
     /// The printer must not be sent this.
     Forbidden(Fault),
@@ -65,7 +68,18 @@ impl Header {
         if u32::from(rows) + u32::from(page.resolution.along(page.shift_y)) > u32::from(page.length()) {
             return Err(Fault::TooManyRows);
         }
-        Ok(Header { setup, consent: consent.is_some(), columns, rows })
+        Ok(Header { setup, consent: consent.is_some(), walk: Placed::whole(columns, rows) })
+    }
+
+    /// The same job, whose planes are coded along the walk of a picture at `frame`. `None` if that has no dot or does not lie
+    /// within the planes.
+    pub fn framed(self, frame: Frame) -> Option<Header> {
+        Placed::new(self.columns(), self.rows(), frame).map(|walk| Header { walk, ..self })
+    }
+
+    /// The walk along which the planes are coded.
+    pub fn walk(&self) -> &Placed {
+        &self.walk
     }
 
     /// Page and inks.
@@ -75,12 +89,12 @@ impl Header {
 
     /// Dots across a plane.
     pub fn columns(&self) -> u16 {
-        self.columns
+        self.walk.width()
     }
 
     /// Rows of a plane.
     pub fn rows(&self) -> u16 {
-        self.rows
+        self.walk.height()
     }
 
     /// Writes the header to the beginning of `out` and returns its length.
@@ -99,13 +113,18 @@ impl Header {
             PaperCode::of(page.paper).code(),
         ]);
         out[9] = u8::from(page.curl_correction);
+        let frame = self.walk.frame();
         let words = [
             (5, width),
             (7, length),
             (10, page.shift_x),
             (12, page.shift_y),
-            (14, self.columns),
-            (16, self.rows),
+            (14, self.columns()),
+            (16, self.rows()),
+            (20, frame.x),
+            (22, frame.y),
+            (24, frame.width),
+            (26, frame.height),
         ];
         for (at, word) in words {
             out[at..at + 2].copy_from_slice(&word.to_le_bytes());
@@ -158,8 +177,9 @@ impl Header {
         }
         let page = Page { paper, media, resolution, curl_correction, shift_x: word(10), shift_y: word(12) };
         let consent = consent.then(FoilConsent::given_by_the_user);
-        let header = Header::new(page, &inks, consent, word(14), word(16));
-        header.map(|header| Some((header, FIXED + count))).map_err(HeaderError::Forbidden)
+        let header = Header::new(page, &inks, consent, word(14), word(16)).map_err(HeaderError::Forbidden)?;
+        let frame = Frame { x: word(20), y: word(22), width: word(24), height: word(26) };
+        header.framed(frame).map(|header| Some((header, FIXED + count))).ok_or(HeaderError::Unknown)
     }
 }
 
@@ -173,7 +193,10 @@ mod tests {
         fn a_header_that_can_be_read_is_written_alike(
             changes in prop::collection::vec((0..FIXED + 2, any::<u8>()), 0..4),
         ) {
-            let mut bytes = [1, 3, 0, 0, 4, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0xc0, 0x02, 0xe4, 0x08, 0, 2, 0x0b, 0x00];
+            let mut bytes = [
+                2, 3, 0, 0, 4, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0xc0, 0x02, 0xe4, 0x08, 0, 2, 9, 1, 3, 0, 0x58, 0, 0x60, 0,
+                0x0b, 0x00,
+            ];
             for (at, value) in changes {
                 bytes[at] = value;
             }
@@ -199,6 +222,7 @@ mod tests {
             let foil = Some(FoilConsent::given_by_the_user());
             let inks = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::GoldFoil];
             let header = Header::new(page, &inks, foil, 2000, 2500).unwrap();
+            let header = header.framed(Frame { x: 100, y: 7, width: 1900, height: 2001 }).unwrap();
             let mut out = [0; MAX_HEADER];
             let length = header.write(&mut out);
             assert_eq!(Header::read(&out[..length]), Ok(Some((header, length))));
@@ -212,8 +236,35 @@ mod tests {
             Header::new(Page::plain(Paper::A4), &[Ink::White, Ink::Black], None, 4800, 6372).unwrap();
         let mut out = [0; MAX_HEADER];
         let length = header.write(&mut out);
-        let expected = [1, 3, 0, 0, 4, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0xc0, 0x12, 0xe4, 0x18, 0, 2, 0x0b, 0x00];
+        let expected = [
+            2, 3, 0, 0, 4, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0xc0, 0x12, 0xe4, 0x18, 0, 2, 0, 0, 0, 0, 0xc0, 0x12,
+            0xe4, 0x18, 0x0b, 0x00,
+        ];
         assert_eq!(out[..length], expected);
+        let frame = Frame { x: 0x0302, y: 0x0504, width: 0x0706, height: 0x0908 };
+        let length = header.framed(frame).unwrap().write(&mut out);
+        assert_eq!(out[..20], expected[..20]);
+        assert_eq!(out[20..length], [2, 3, 4, 5, 6, 7, 8, 9, 0x0b, 0x00]);
+    }
+
+    #[test]
+    fn a_picture_that_does_not_lie_within_its_planes_has_no_header() {
+        let header = Header::new(Page::plain(Paper::A4), &[Ink::White], None, 1000, 900).unwrap();
+        let mut out = [0; MAX_HEADER];
+        let length = header.write(&mut out);
+        for (at, words) in [
+            (20, [1u16, 0, 1000, 900]),
+            (20, [0, 1, 1000, 900]),
+            (20, [0, 0, 0, 900]),
+            (20, [0, 0, 1000, 0]),
+            (20, [u16::MAX, u16::MAX, 1, 1]),
+            (20, [0, 0, u16::MAX, u16::MAX]),
+        ] {
+            for (place, word) in out[at..].chunks_exact_mut(2).zip(words) {
+                place.copy_from_slice(&word.to_le_bytes());
+            }
+            assert_eq!(Header::read(&out[..length]), Err(HeaderError::Unknown), "{words:?}");
+        }
     }
 
     #[test]

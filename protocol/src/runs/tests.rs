@@ -4,14 +4,18 @@ use crate::ink::Ink;
 use crate::paper::Paper;
 use crate::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use crate::rgl::{JobSetup, JobWriter, Page};
-use crate::walk::Walk;
+use crate::walk::{Frame, Placed, Walk};
 use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec;
 
 fn coded(width: u16, height: u16, bits: &[u8]) -> Vec<u8> {
+    coded_along(Placed::whole(width, height), bits)
+}
+
+fn coded_along(walk: Placed, bits: &[u8]) -> Vec<u8> {
     let mut stream = Vec::new();
-    encode(width, height, bits, &mut vec![0; MAX_BAND], |bytes| stream.extend_from_slice(bytes)).unwrap();
+    encode(&walk, bits, &mut vec![0; MAX_BAND], |bytes| stream.extend_from_slice(bytes)).unwrap();
     stream
 }
 
@@ -20,9 +24,18 @@ fn decoded(
     width: u16,
     height: u16,
     stream: &[u8],
+    sizes: impl Iterator<Item = usize>,
+) -> Result<Option<Vec<u8>>, Defect> {
+    decoded_along(Placed::whole(width, height), stream, sizes)
+}
+
+fn decoded_along(
+    walk: Placed,
+    stream: &[u8],
     mut sizes: impl Iterator<Item = usize>,
 ) -> Result<Option<Vec<u8>>, Defect> {
-    let mut decoder = Decoder::new(width, height);
+    let width = walk.width();
+    let mut decoder = Decoder::new(walk);
     let mut memory = vec![0xee; band_bytes(width)];
     let (mut plane, mut left) = (Vec::new(), stream);
     let stride = stride(width);
@@ -46,8 +59,9 @@ fn decoded(
     }
 }
 
-/// A runs band by the text of the format: a list of bits, each dot asked for by its position.
-fn runs_by_definition(walk: &Walk, start: u32, len: u32, minimum: u32, codes: &[u8]) -> Vec<(u16, u16)> {
+/// A runs band by the text of the format: a list of bits and the band's dots, one after the other.
+fn runs_by_definition(order: &[(u16, u16)], minimum: u32, codes: &[u8]) -> Vec<(u16, u16)> {
+    let len = order.len() as u32;
     let mut bits = codes.iter().flat_map(|byte| (0..8).rev().map(move |i| u32::from(byte >> i & 1)));
     let (mut sums, mut counts) = ([32u32; 2], [4u32; 2]);
     let (mut on, mut position, mut dots, mut first) = (0, 0, Vec::new(), true);
@@ -72,7 +86,7 @@ fn runs_by_definition(walk: &Walk, start: u32, len: u32, minimum: u32, codes: &[
         first = false;
         for at in position..(position + length).min(len) {
             if on == 1 {
-                dots.push(walk.at(start + at).unwrap());
+                dots.push(order[at as usize]);
             }
         }
         position += length;
@@ -258,6 +272,54 @@ proptest! {
     }
 
     #[test]
+    fn a_stream_along_any_pictures_walk_is_its_plane(
+        (width, height, plane) in a_plane(),
+        corner in any::<[prop::sample::Index; 4]>(),
+        sizes in prop::collection::vec(0usize..50, 1..20).prop_map(|mut sizes| { sizes.push(1); sizes }),
+    ) {
+        let [x, y, w, h] = corner;
+        let (x, y) = (x.index(width.into()) as u16, y.index(height.into()) as u16);
+        let frame = Frame { x, y, width: w.index((width - x).into()) as u16 + 1, height: h.index((height - y).into()) as u16 + 1 };
+        let walk = Placed::new(width, height, frame).unwrap();
+        let stream = coded_along(walk, &plane);
+        prop_assert_eq!(decoded_along(walk, &stream, core::iter::empty()), Ok(Some(plane.clone())));
+        prop_assert_eq!(decoded_along(walk, &stream, sizes.into_iter().cycle()), Ok(Some(plane.clone())));
+        // Bands of few rows cost a byte each for their form at most, when rows are packed.
+        let bands = walk.bands().count();
+        let rows = printed(width, height, &plane);
+        prop_assert!(stream.len() <= rows.max(2) + 3 * bands, "{} bytes for {rows}", stream.len());
+        // Other bytes are no worse along it.
+        let _ = decoded_along(walk, &plane, core::iter::empty());
+    }
+
+    #[test]
+    fn a_band_beside_the_picture_is_what_the_format_says(
+        (left, right, w, h) in (0u16..200, 0u16..200, 1u16..300, 1u16..65),
+        codes in prop::collection::vec(any::<u8>(), 3000),
+    ) {
+        let walk = Placed::new(left + w + right, h, Frame { x: left, y: 0, width: w, height: h }).unwrap();
+        // The picture's dots, those to the left of it, those to the right.
+        let mut order = Vec::new();
+        for (x0, width) in [(left, w), (0, left), (left + w, right)] {
+            let own = Walk::new(width, h);
+            order.extend((0..own.len()).map(|at| own.at(at).unwrap()).map(|(x, y)| (x0 + x, y)));
+        }
+        let stream = [&[form::RUNS, 3][..], &codes[..], &[0; 20000]].concat();
+        let stride = stride(walk.width());
+        let mut decoder = Decoder::new(walk);
+        let mut memory = vec![0; band_bytes(walk.width())];
+        // A band of odd height may be several.
+        prop_assume!(walk.bands().count() == 1);
+        let (_, step) = decoder.step(&stream, &mut memory).unwrap();
+        prop_assert_eq!(step, Step::Band { y: 0, rows: h });
+        let mut expected = vec![0; memory.len()];
+        for (x, y) in runs_by_definition(&order, 3, &stream[2..]) {
+            expected[usize::from(y) * stride + usize::from(x) / 8] |= 0x80 >> (x % 8);
+        }
+        prop_assert!(memory == expected);
+    }
+
+    #[test]
     fn no_plane_costs_more_than_in_the_printers_own_language((width, height, plane) in a_plane()) {
         let (stream, rows) = (coded(width, height, &plane).len(), printed(width, height, &plane));
         // A page without a dot has no row, but a stream of blank bands.
@@ -290,7 +352,8 @@ fn runs_are_those_of_the_format() {
         assert_eq!((stream[0], stream[1]), (form::RUNS, 8));
         let walk = Walk::new(width, height);
         let mut rebuilt = vec![0; plane.len()];
-        for (x, y) in runs_by_definition(&walk, 0, walk.len(), u32::from(stream[1]), &stream[2..]) {
+        let order: Vec<_> = (0..walk.len()).map(|at| walk.at(at).unwrap()).collect();
+        for (x, y) in runs_by_definition(&order, u32::from(stream[1]), &stream[2..]) {
             rebuilt[usize::from(y) * stride(width) + usize::from(x) / 8] |= 0x80 >> (x % 8);
         }
         assert_eq!(rebuilt, plane);
@@ -339,7 +402,7 @@ proptest! {
         codes in prop::collection::vec(any::<u8>(), 3000),
     ) {
         let stream = [&[form::ACROSS, side][..], &codes[..], &[0; 3000]].concat();
-        let mut decoder = Decoder::new(width, height);
+        let mut decoder = Decoder::new(Placed::whole(width, height));
         let mut memory = vec![0; band_bytes(width)];
         let (_, step) = decoder.step(&stream, &mut memory).unwrap();
         prop_assert_eq!(step, Step::Band { y: 0, rows: height });
@@ -370,7 +433,7 @@ fn the_example_across_is_read_and_written() {
 fn a_band_of_runs_across_takes_a_row_at_a_time() {
     // A full row and 63 like it.
     let input = [form::ACROSS, 1, 0x03, 0xff, 0xff];
-    let (mut decoder, mut memory) = (Decoder::new(4800, 64), vec![0; band_bytes(4800)]);
+    let (mut decoder, mut memory) = (Decoder::new(Placed::whole(4800, 64)), vec![0; band_bytes(4800)]);
     let (mut read, mut slices) = (0, 0);
     loop {
         let (used, step) = decoder.slice(&input[read..], &mut memory).unwrap();
@@ -393,7 +456,7 @@ fn a_run_over_many_tiles_is_laid_out_a_little_at_a_time() {
             // Twenty zeros, twenty ones, the length in twenty bits, four to fill the byte.
             let bits = ((1 << 20) - 1) << 24 | u64::from(band.len()) << 4;
             let mut input = &[&[form::RUNS, 0][..], &bits.to_be_bytes()].concat()[..];
-            let mut decoder = Decoder::new(width, band.height);
+            let mut decoder = Decoder::new(Placed::whole(width, band.height));
             let mut memory = vec![0; band_bytes(width)];
             let mut before = 0;
             loop {
@@ -408,6 +471,30 @@ fn a_run_over_many_tiles_is_laid_out_a_little_at_a_time() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_halftoned_picture_costs_the_same_wherever_it_lies() {
+    let (w, h) = (1000, 500);
+    let picture = clustered(w, h, 8, 30, 5);
+    let alone = coded(w, h, &picture).len();
+    for (x, y) in [(0, 0), (1, 0), (333, 129), (2005, 77)] {
+        let (width, height) = (4800, 1000);
+        let mut plane = vec![0; stride(width) * usize::from(height)];
+        for row in 0..h {
+            for column in 0..w {
+                if picture[usize::from(row) * stride(w) + usize::from(column) / 8] << (column % 8) & 0x80 != 0
+                {
+                    let (x, y) = (x + column, y + row);
+                    plane[usize::from(y) * stride(width) + usize::from(x) / 8] |= 0x80 >> (x % 8);
+                }
+            }
+        }
+        let frame = Frame { x, y, width: w, height: h };
+        let placed = coded_along(Placed::new(width, height, frame).unwrap(), &plane).len();
+        // What is blank beside it costs a code a band, and a run cut by the edge may be the shortest.
+        assert!(placed < alone + alone / 40 + 80, "{placed} bytes at {x}, {y}, {alone} alone");
     }
 }
 
@@ -430,7 +517,7 @@ fn defects_are_found() {
     assert_eq!(defect(&[form::ROWS, 6, 1, 2, 0x18, 0]), Defect::Row);
     assert_eq!(defect(&[form::ROWS, 5, 1, 7, 1]), Defect::Row);
     assert_eq!(defect(&[form::ROWS, 5, 0x80, 7, 1]), Defect::Row);
-    let mut decoder = Decoder::new(4800, 64);
+    let mut decoder = Decoder::new(Placed::whole(4800, 64));
     assert_eq!(decoder.step(&[1], &mut [0; 100]), Err(Defect::Memory));
 }
 

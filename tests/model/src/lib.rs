@@ -11,7 +11,8 @@ use protocol::link::message::{Answer, Fault, JobKind, JobState, Lines, Progress,
 use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
 use protocol::rgl::{self, JobSetup, JobWriter, Order, Page, Step};
-use protocol::runs::{Header, MAX_BAND, MAX_HEADER, encode, stride};
+use protocol::runs::{Decoder, Header, MAX_BAND, MAX_HEADER, encode, stride};
+use protocol::walk::{Frame, Placed};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -20,7 +21,8 @@ pub const IDENTITY: Identity = Identity { boot: 1, serial: 2, firmware: "test" }
 /// Memory for an engine; leaked, because tests have plenty and an engine borrows it for good.
 pub fn memory(data: usize, output: usize, band: usize) -> Memory<'static> {
     let leak = |size| Box::leak(vec![0; size].into_boxed_slice());
-    Memory { data: leak(data), output: leak(output), band: leak(band) }
+    let decoder = Box::leak(Box::default());
+    Memory { data: leak(data), output: leak(output), band: leak(band), decoder }
 }
 
 /// The memory of one engine after the other.
@@ -28,15 +30,21 @@ pub struct Board {
     data: Vec<u8>,
     output: Vec<u8>,
     band: Vec<u8>,
+    decoder: Box<Decoder>,
 }
 
 impl Board {
     pub fn new(data: usize, output: usize) -> Self {
-        Board { data: vec![0; data], output: vec![0; output], band: vec![0; 40_000] }
+        Board { data: vec![0; data], output: vec![0; output], band: vec![0; 40_000], decoder: Box::default() }
     }
 
     pub fn memory(&mut self) -> Memory<'_> {
-        Memory { data: &mut self.data, output: &mut self.output, band: &mut self.band }
+        Memory {
+            data: &mut self.data,
+            output: &mut self.output,
+            band: &mut self.band,
+            decoder: &mut self.decoder,
+        }
     }
 }
 
@@ -54,6 +62,8 @@ pub struct Planes {
     pub width: u16,
     pub rows: u16,
     pub bits: Vec<Vec<u8>>,
+    /// Where the walk goes.
+    pub walk: Placed,
 }
 
 impl Planes {
@@ -77,7 +87,10 @@ impl Planes {
                 plane
             })
             .collect();
-        Planes { inks, width, rows, bits }
+        let (x, y) = (random.random_range(0..width), random.random_range(0..rows));
+        let size = (random.random_range(1..=width - x), random.random_range(1..=rows - y));
+        let walk = Placed::new(width, rows, Frame { x, y, width: size.0, height: size.1 }).unwrap();
+        Planes { inks, width, rows, bits, walk }
     }
 
     fn page() -> Page {
@@ -108,11 +121,11 @@ impl Planes {
     pub fn streams(&self) -> Vec<u8> {
         let header = Header::new(Self::page(), &self.inks, None, self.width, self.rows).unwrap();
         let mut out = [0; MAX_HEADER];
-        let length = header.write(&mut out);
+        let length = header.framed(self.walk.frame()).unwrap().write(&mut out);
         let mut bytes = out[..length].to_vec();
         let mut buffer = vec![0; MAX_BAND];
         for plane in &self.bits {
-            encode(self.width, self.rows, plane, &mut buffer, |band| bytes.extend_from_slice(band)).unwrap();
+            encode(&self.walk, plane, &mut buffer, |band| bytes.extend_from_slice(band)).unwrap();
         }
         bytes
     }

@@ -8,10 +8,10 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use observe::Observer;
+use uf2::Chip;
 
-/// The file that names the board of a drive, and its entry for an RP2040.
+/// The file that names the board of a drive.
 const INFO: &str = "INFO_UF2.TXT";
-const BOARD: &str = "RPI-RP2";
 const NAME: &str = "foilpress-bridge.uf2";
 const PIECE: usize = 16 * 1024;
 
@@ -39,24 +39,28 @@ pub enum DriveError {
     },
 }
 
-/// Whether this is the drive of a board in its boot loader.
-pub fn is_board(place: &Path) -> bool {
+/// The chip of the board in its boot loader whose drive this is, if it is one.
+pub fn board(place: &Path) -> Option<Chip> {
     const LONGEST: u64 = 4096;
     let mut text = Vec::new();
     let read = File::open(place.join(INFO)).and_then(|file| file.take(LONGEST).read_to_end(&mut text));
-    read.is_ok()
-        && String::from_utf8_lossy(&text)
-            .lines()
-            .filter_map(|line| line.split_once(':'))
-            .any(|(key, value)| key.trim() == "Board-ID" && value.trim() == BOARD)
+    read.ok()?;
+    let text = String::from_utf8_lossy(&text);
+    let mut entries = text.lines().filter_map(|line| line.split_once(':'));
+    let (_, name) = entries.find(|(key, _)| key.trim() == "Board-ID")?;
+    match name.trim() {
+        "RPI-RP2" => Some(Chip::Rp2040),
+        "RP2350" => Some(Chip::Rp2350),
+        _ => None,
+    }
 }
 
 /// The drives of boards in their boot loader, where they are mounted.
-pub fn find() -> Vec<PathBuf> {
-    let mut found: Vec<PathBuf> = mounted().into_iter().filter(|place| is_board(place)).collect();
-    found.sort();
-    found.dedup();
-    found
+pub fn find() -> Vec<(Chip, PathBuf)> {
+    let mut places = mounted();
+    places.sort();
+    places.dedup();
+    places.into_iter().filter_map(|place| board(&place).map(|chip| (chip, place))).collect()
 }
 
 #[cfg(target_os = "linux")]
@@ -120,9 +124,9 @@ pub fn copy(drive: &Path, file: &[u8], observer: &dyn Observer) -> Result<(), Dr
     observer.end();
     match result {
         // The board restarts as soon as it has all blocks, before the file is closed.
-        Err(_) if written == file.len() && !is_board(drive) => Ok(()),
+        Err(_) if written == file.len() && board(drive).is_none() => Ok(()),
         Ok(()) => Ok(()),
-        Err(_) if !is_board(drive) => {
+        Err(_) if board(drive).is_none() => {
             Err(DriveError::Gone { drive: drive.into(), written, length: file.len() })
         }
         Err(source) => Err(DriveError::Refused { drive: drive.into(), source }),
@@ -143,12 +147,13 @@ mod tests {
 
     #[test]
     fn a_drive_is_known_by_what_it_says_and_not_by_its_name() {
-        assert!(is_board(drive("RPI-RP2").path()));
-        assert!(!is_board(drive("RP2350").path()));
+        assert_eq!(board(drive("RPI-RP2").path()), Some(Chip::Rp2040));
+        assert_eq!(board(drive("RP2350").path()), Some(Chip::Rp2350));
+        assert_eq!(board(drive("RPI").path()), None);
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("RPI-RP2")).unwrap();
-        assert!(!is_board(&folder.path().join("RPI-RP2")));
-        assert!(!is_board(Path::new("/no/such/drive")));
+        assert_eq!(board(&folder.path().join("RPI-RP2")), None);
+        assert_eq!(board(Path::new("/no/such/drive")), None);
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The firmware in a file, checked before anything is erased: a damaged file or another program is refused.
 //!
-//! A program for the RP2040 states its name in its *binary info*, which the tools of the board read too: a header in the
+//! A program for the boards states its name in its *binary info*, which the tools of the board read too: a header in the
 //! first sector points to a table of entries, some of which are strings with an identifier.
 //! Source: RP2040 C/C++ SDK, `pico_binary_info`.
 
-use uf2::{Image, Uf2Error};
+use uf2::{Chip, Image, Uf2Error};
 
 /// The program's name in its binary info.
 const NAME: &str = "foilpress-bridge";
@@ -41,6 +41,7 @@ fn named(program: &Option<String>) -> String {
 /// A complete image of the bridge's firmware.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Firmware {
+    file: Vec<u8>,
     image: Image,
     version: String,
 }
@@ -55,22 +56,34 @@ impl Firmware {
             return Err(ImageError::OtherProgram(name));
         }
         let version = entry(&image, PROGRAM_VERSION).unwrap_or_else(|| "of no version".into());
-        Ok(Firmware { image, version })
+        Ok(Firmware { file: file.to_vec(), image, version })
     }
 
-    /// The firmware included in this program, if any.
-    pub fn embedded() -> Option<Result<Firmware, ImageError>> {
-        Firmware::embedded_file().map(Firmware::read)
+    /// The firmware included in this program, for each board or for none. Released programs are built with
+    /// `FOILPRESS_FIRMWARE` naming what `cargo xtask firmware` writes.
+    pub fn embedded() -> Result<Vec<Firmware>, ImageError> {
+        FILES.iter().map(|(file, _)| Firmware::read(file)).collect()
     }
 
-    /// The file of that firmware. Released programs are built with `FOILPRESS_FIRMWARE` naming what `cargo xtask firmware` writes.
-    pub fn embedded_file() -> Option<&'static [u8]> {
-        FILE
+    /// The included firmware for the board of a bridge that reports this version.
+    pub fn embedded_for(version: &str) -> Option<Firmware> {
+        Firmware::embedded().ok()?.into_iter().find(|firmware| firmware.chip() == chip_of(version))
     }
 
-    /// The ELF file it was made from, which is needed to decode its log.
-    pub fn embedded_program() -> Option<&'static [u8]> {
-        PROGRAM
+    /// The ELF file that firmware was made from, which is needed to decode its log.
+    pub fn embedded_program_for(version: &str) -> Option<&'static [u8]> {
+        let is_its = |file: &[u8]| Firmware::read(file).is_ok_and(|ours| ours.chip() == chip_of(version));
+        FILES.iter().find(|(file, _)| is_its(file)).and_then(|&(_, program)| program)
+    }
+
+    /// The file it was read from.
+    pub fn file(&self) -> &[u8] {
+        &self.file
+    }
+
+    /// The chip it is for.
+    pub fn chip(&self) -> Chip {
+        self.image.chip()
     }
 
     /// The image for the flash.
@@ -84,11 +97,17 @@ impl Firmware {
     }
 }
 
+/// The chip of a bridge that reports this version: a Pico does not name itself.
+fn chip_of(version: &str) -> Chip {
+    let named = |chip: &Chip| version.ends_with(&format!("({chip})"));
+    Chip::ALL.into_iter().find(named).unwrap_or(Chip::Rp2040)
+}
+
 include!(concat!(env!("OUT_DIR"), "/firmware.rs"));
 
 /// A string of the program's binary info.
 fn entry(image: &Image, wanted: u32) -> Option<String> {
-    let first = uf2::FLASH.start;
+    let first = uf2::START;
     // Behind the vector table, wherever that ends; five words.
     let header = (first..first + uf2::SECTOR)
         .step_by(4)
@@ -151,13 +170,31 @@ pub(super) mod tests {
     }
 
     pub fn file(name: &str, version: &str, length: usize, seed: u32) -> Vec<u8> {
-        uf2::encode(&[(0x1000_0000, &program(name, version, length, seed))]).unwrap()
+        uf2::encode(Chip::Rp2040, &[(0x1000_0000, &program(name, version, length, seed))]).unwrap()
     }
 
     #[test]
     fn the_bridges_firmware_is_known_and_tells_its_version() {
         let firmware = Firmware::read(&file("foilpress-bridge", "1.2.3", 5000, 9)).unwrap();
         assert_eq!(firmware.version(), "1.2.3");
+    }
+
+    /// The same for a Pico 2: the vector table at the beginning, a block behind it.
+    pub fn file_2350(version: &str, length: usize, seed: u32) -> Vec<u8> {
+        let mut image = program("foilpress-bridge", version, length, seed);
+        let words = [0xffff_ded3u32, 0x1021_0142, 0x0000_01ff, 0, 0xab12_3579];
+        for (at, word) in
+            [(0, 0x2008_0000), (4, 0x1000_0201)].into_iter().chain((0x124..).step_by(4).zip(words))
+        {
+            image[at..at + 4].copy_from_slice(&word.to_le_bytes());
+        }
+        uf2::encode(Chip::Rp2350, &[(0x1000_0000, &image)]).unwrap()
+    }
+
+    #[test]
+    fn the_firmware_of_each_board_is_told_by_what_a_bridge_reports() {
+        assert_eq!(Firmware::read(&file_2350("1.2.3 (Pico 2)", 5000, 9)).unwrap().chip(), Chip::Rp2350);
+        assert_eq!([chip_of("1.2.3"), chip_of("1.2.3 (Pico 2)")], Chip::ALL);
     }
 
     #[test]
@@ -167,7 +204,7 @@ pub(super) mod tests {
         assert!(error.to_string().contains("MicroPython"));
         let mut nameless = program("x", "1", 5000, 9);
         nameless[0x1c0] ^= 1;
-        let nameless = uf2::encode(&[(0x1000_0000, &nameless)]).unwrap();
+        let nameless = uf2::encode(Chip::Rp2040, &[(0x1000_0000, &nameless)]).unwrap();
         assert_eq!(Firmware::read(&nameless), Err(ImageError::OtherProgram(None)));
     }
 
@@ -181,14 +218,14 @@ pub(super) mod tests {
             for (at, value) in edits {
                 image[at] = value;
             }
-            let _ = Firmware::read(&uf2::encode(&[(0x1000_0000, &image)]).unwrap());
+            let _ = Firmware::read(&uf2::encode(Chip::Rp2040, &[(0x1000_0000, &image)]).unwrap());
         }
     }
 
     #[test]
     fn what_this_program_was_built_with_is_the_bridges_firmware() {
-        if let Some(firmware) = Firmware::embedded() {
-            firmware.unwrap();
+        for firmware in Firmware::embedded().unwrap() {
+            assert_eq!(chip_of(firmware.version()), firmware.chip());
         }
     }
 }

@@ -1,8 +1,8 @@
 //! New firmware for a bridge.
 //!
 //! Problem: install the firmware of a file on a board, whatever it runs now, so that an interrupted attempt can be repeated.
-//! Method: read and check the file; bring the bridge into its boot loader by a message of the link, or use a board that is
-//! already there; write through [PICOBOOT](picoboot) and read back, or copy to the board's [drive] where the boot loader may
+//! Method: read and check the files; bring the bridge into its boot loader by a message of the link, or use a board that is
+//! already there; see which board it is and choose its image; write through [PICOBOOT](picoboot) and read back, or copy to the board's [drive] where the boot loader may
 //! not be opened; wait until the bridge is back and reports its version.
 //! Limits: one board in its boot loader at a time, since such boards cannot be told apart.
 
@@ -27,6 +27,7 @@ use drive::DriveError;
 use image::Firmware;
 use observe::Observer;
 use picoboot::{Picoboot, Pipe, WriteError};
+use uf2::Chip;
 
 /// Time between two checks of what is plugged in.
 const POLL: Duration = Duration::from_millis(250);
@@ -70,6 +71,14 @@ pub enum FlashError {
         "the bridge is printing job {0:08x}; wait until it is done, or end it with `foilpress cancel {0:08x}`"
     )]
     Printing(u32),
+    /// The firmware is for another board.
+    #[error("this board is a {board}, but the firmware is for a {}; nothing was written, and the board starts what it had", .firmware.board())]
+    OtherBoard {
+        /// The board.
+        board: Chip,
+        /// What there is an image for.
+        firmware: Chip,
+    },
     /// No board appeared in its boot loader.
     #[error(
         "the bridge was told to enter its boot loader, but no board appeared there; hold its BOOTSEL button while plugging it in \
@@ -78,7 +87,7 @@ pub enum FlashError {
     NoLoader,
     /// Neither the boot loader nor the drive of the board can be opened.
     #[error(
-        "cannot open the board in its boot loader, and its drive RPI-RP2 is not mounted (`foilpress doctor` says what to set up; \
+        "cannot open the board in its boot loader, and its drive (RPI-RP2 or RP2350) is not mounted (`foilpress doctor` says what to set up; \
          or mount the drive and repeat this command)"
     )]
     Closed(#[source] io::Error),
@@ -111,12 +120,12 @@ pub trait Computer {
 
     /// The bridges that run.
     fn bridges(&mut self) -> Vec<Candidate>;
-    /// How many boards are in their boot loader.
-    fn boards(&mut self) -> usize;
+    /// The boards in their boot loader.
+    fn boards(&mut self) -> Vec<Chip>;
     /// Opens the boot loader of the only board there.
     fn open(&mut self) -> io::Result<Self::Board>;
     /// The mounted drives of such boards.
-    fn drives(&mut self) -> Vec<PathBuf>;
+    fn drives(&mut self) -> Vec<(Chip, PathBuf)>;
     /// Tells a bridge to enter its boot loader; returns its number.
     fn enter(&mut self, bridge: &Candidate) -> Result<u64, FlashError>;
     /// The bridge that answers there, if one does.
@@ -125,17 +134,16 @@ pub trait Computer {
     fn wait(&mut self, time: Duration);
 }
 
-/// Installs `firmware`, read from `file`, on the bridge at `to`, or on the only board. Returns the bridge as it introduces
-/// itself afterwards.
+/// Installs one of `images`, that of the board, on the bridge at `to`, or on the only board. Returns the bridge as it
+/// introduces itself afterwards.
 pub fn run(
-    firmware: &Firmware,
-    file: &[u8],
+    images: &[Firmware],
     to: Option<&Address>,
     computer: &mut impl Computer,
     observer: &dyn Observer,
 ) -> Result<Bridge, FlashError> {
     let bridges = computer.bridges();
-    let waiting = computer.boards().max(computer.drives().len());
+    let waiting = waiting_boards(computer);
     let number = match (to, waiting) {
         (Some(_), 1..) => return Err(FlashError::AnotherBoard),
         (None, 2..) => return Err(FlashError::SeveralBoards(waiting)),
@@ -153,7 +161,7 @@ pub fn run(
             }
         },
     };
-    write(firmware, file, computer, observer)?;
+    let firmware = write(images, computer, observer)?;
     observer.note("waiting for the bridge to restart");
     let known: Vec<u64> = bridges.iter().filter_map(Candidate::number).collect();
     let expected = |found: u64| match number {
@@ -189,23 +197,40 @@ fn enter(
 }
 
 fn waiting_boards(computer: &mut impl Computer) -> usize {
-    computer.boards().max(computer.drives().len())
+    computer.boards().len().max(computer.drives().len())
 }
 
-fn write(
-    firmware: &Firmware,
-    file: &[u8],
+/// The image for a board.
+fn for_board(images: &[Firmware], board: Chip) -> Result<&Firmware, FlashError> {
+    let other = images.first().map_or(board, Firmware::chip);
+    images
+        .iter()
+        .find(|firmware| firmware.chip() == board)
+        .ok_or(FlashError::OtherBoard { board, firmware: other })
+}
+
+/// Writes the image of the board that waits; returns which.
+fn write<'f>(
+    images: &'f [Firmware],
     computer: &mut impl Computer,
     observer: &dyn Observer,
-) -> Result<(), FlashError> {
-    let closed = match computer.boards() {
+) -> Result<&'f Firmware, FlashError> {
+    let closed = match computer.boards()[..] {
         // Even if the USB library cannot list the board, its drive may be mounted.
-        0 => io::Error::from(ErrorKind::NotFound),
-        1 => match computer.open() {
-            Ok(board) => return Ok(Picoboot::write(board, firmware.image(), observer)?),
-            Err(error) => error,
+        [] => io::Error::from(ErrorKind::NotFound),
+        [chip] => match (computer.open(), for_board(images, chip)) {
+            (Ok(board), Ok(firmware)) => {
+                observer.note(&format!("a {chip}: writing firmware {}", firmware.version()));
+                Picoboot::write(board, firmware.image(), observer)?;
+                return Ok(firmware);
+            }
+            (Ok(board), Err(error)) => {
+                Picoboot::restart(board, chip)?;
+                return Err(error);
+            }
+            (Err(error), _) => error,
         },
-        several => return Err(FlashError::SeveralBoards(several)),
+        ref several => return Err(FlashError::SeveralBoards(several.len())),
     };
     match &until(computer, DRIVE_PATIENCE, |computer| {
         Some(computer.drives()).filter(|found| !found.is_empty())
@@ -213,12 +238,14 @@ fn write(
     .unwrap_or_default()[..]
     {
         [] => Err(FlashError::Closed(closed)),
-        [drive] => {
+        [(chip, drive)] => {
+            let firmware = for_board(images, *chip)?;
             observer.note(&format!(
                 "the boot loader cannot be opened ({closed}); using its drive, {}",
                 drive.display()
             ));
-            Ok(drive::copy(drive, file, observer)?)
+            drive::copy(drive, firmware.file(), observer)?;
+            Ok(firmware)
         }
         several => Err(FlashError::SeveralBoards(several.len())),
     }
@@ -253,17 +280,17 @@ impl Computer for ThisComputer {
         find::survey().bridges
     }
 
-    fn boards(&mut self) -> usize {
-        usb::boards().map_or(0, |boards| boards.len())
+    fn boards(&mut self) -> Vec<Chip> {
+        usb::boards().map_or(Vec::new(), |boards| boards.iter().map(|(chip, _)| *chip).collect())
     }
 
     fn open(&mut self) -> io::Result<Box<dyn Pipe>> {
         let boards = usb::boards()?;
-        let board = boards.first().ok_or(ErrorKind::NotFound)?;
+        let (_, board) = boards.first().ok_or(ErrorKind::NotFound)?;
         Ok(Box::new(usb::open(board)?))
     }
 
-    fn drives(&mut self) -> Vec<PathBuf> {
+    fn drives(&mut self) -> Vec<(Chip, PathBuf)> {
         drive::find()
     }
 

@@ -2,22 +2,22 @@
 //!
 //! Problem: write an image to the flash and verify it; after an interruption at any point it must be possible to flash the
 //! board again, without its BOOTSEL button where possible.
-//! Method: the boot ROM starts the program in flash only if the checksum of the first page is right, and waits in its boot
-//! loader otherwise. So the sector with that page is erased first and the page itself is written last, after everything else
-//! was read back and compared. An interruption leaves the old program, the boot loader, or the whole new program.
+//! Method: the boot ROM starts the program in flash only if one page is right, and waits in its boot loader otherwise: the first
+//! page with its checksum on an RP2040, the one with the image's block on an RP2350 ([`Image::boot_page`]). So the sector with that
+//! page, which is the first, is erased first and the page itself is written last, after everything else was read back and compared. An interruption leaves the old program, the boot loader, or the whole new program.
 //! Cost: an erase (some 50 ms) and a write for each 4096 bytes, 25 of them for the bridge's firmware; then a read.
 //! Limits: the image's own sectors; nothing else in the flash is touched.
-//! Source: RP2040 data sheet, 2.8.5.
+//! Source: RP2040 data sheet, 2.8.5; RP2350 data sheet, 5.6.
 
 use std::io;
 
-use uf2::{FLASH, Image, PAGE, SECTOR};
+use uf2::{Chip, Image, PAGE, SECTOR, START};
 
 use observe::Observer;
 
 const MAGIC: u32 = 0x431f_d10b;
 const SECTOR_BYTES: usize = SECTOR as usize;
-/// Where the stack of the program that is started begins, and when: after this answer has left.
+/// Where the stack of an RP2040's program that is started begins, and when: after this answer has left.
 const STACK: u32 = 0x2004_2000;
 const REBOOT_MS: u32 = 500;
 
@@ -61,6 +61,8 @@ pub enum Command {
     Exclusive,
     /// Start the program.
     Reboot,
+    /// The same, as an RP2350 has it.
+    Reboot2,
     /// Erase sectors.
     Erase,
     /// Read flash.
@@ -76,6 +78,7 @@ impl Command {
         match self {
             Command::Exclusive => 0x01,
             Command::Reboot => 0x02,
+            Command::Reboot2 => 0x0a,
             Command::Erase => 0x03,
             Command::Read => 0x84,
             Command::Write => 0x05,
@@ -86,7 +89,7 @@ impl Command {
     fn words(self) -> &'static str {
         match self {
             Command::Exclusive => "to give this program exclusive access",
-            Command::Reboot => "to restart",
+            Command::Reboot | Command::Reboot2 => "to restart",
             Command::Erase => "to erase",
             Command::Read => "to read",
             Command::Write => "to write",
@@ -171,6 +174,22 @@ impl<P: Pipe> Picoboot<P> {
         result
     }
 
+    /// Starts what is in the flash of a board.
+    pub fn restart(pipe: P, chip: Chip) -> Result<(), WriteError> {
+        let mut board = Picoboot { pipe, token: 0 };
+        board.pipe.reset().map_err(|source| WriteError::Gone { doing: "being contacted".into(), source })?;
+        board.reboot(chip)
+    }
+
+    fn reboot(&mut self, chip: Chip) -> Result<(), WriteError> {
+        let bytes = |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
+        match chip {
+            Chip::Rp2040 => self.command(Command::Reboot, 0, &bytes(&[0, STACK, REBOOT_MS]), Data::None),
+            // A normal start, which needs no parameters.
+            Chip::Rp2350 => self.command(Command::Reboot2, 0, &bytes(&[0, REBOOT_MS, 0, 0]), Data::None),
+        }
+    }
+
     fn write_all(&mut self, image: &Image, observer: &dyn Observer) -> Result<(), WriteError> {
         self.pipe.reset().map_err(|source| WriteError::Gone { doing: "being contacted".into(), source })?;
         self.command(Command::Exclusive, 0, &[1], Data::None)?;
@@ -180,11 +199,17 @@ impl<P: Pipe> Picoboot<P> {
         let steps = sectors.len() as u64;
         observer.begin("writing the firmware", steps);
         // First the sector without which the board does not start the old program.
-        self.erase(FLASH.start)?;
+        let last = (image.boot_page() - START) as usize;
+        let last = last..last + PAGE;
+        self.erase(START)?;
         for &sector in &sectors {
             let bytes = contents(image, sector);
-            if sector == FLASH.start {
-                self.write_at(sector + PAGE as u32, &bytes[PAGE..])?;
+            if sector == START {
+                for part in
+                    [0..last.start, last.end..SECTOR_BYTES].into_iter().filter(|part| !part.is_empty())
+                {
+                    self.write_at(sector + part.start as u32, &bytes[part])?;
+                }
             } else {
                 self.erase(sector)?;
                 self.write_at(sector, &bytes)?;
@@ -196,20 +221,18 @@ impl<P: Pipe> Picoboot<P> {
         observer.begin("verifying the firmware", steps);
         for &sector in &sectors {
             let mut expected = contents(image, sector);
-            if sector == FLASH.start {
-                expected[..PAGE].fill(0xff);
+            if sector == START {
+                expected[last.clone()].fill(0xff);
             }
             self.compare(sector, &expected)?;
             observer.advance(1);
         }
         observer.end();
 
-        let first = contents(image, FLASH.start);
-        self.write_at(FLASH.start, &first[..PAGE])?;
-        self.compare(FLASH.start, &first)?;
-        let arguments: Vec<u8> =
-            [0, STACK, REBOOT_MS].iter().flat_map(|word: &u32| word.to_le_bytes()).collect();
-        self.command(Command::Reboot, 0, &arguments, Data::None)
+        let first = contents(image, START);
+        self.write_at(START + last.start as u32, &first[last])?;
+        self.compare(START, &first)?;
+        self.reboot(image.chip())
     }
 
     fn erase(&mut self, sector: u32) -> Result<(), WriteError> {
@@ -304,7 +327,7 @@ fn contents(image: &Image, sector: u32) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::image::{Firmware, tests::file, tests::program};
+    use super::super::image::{Firmware, tests::file, tests::file_2350, tests::program};
     use super::super::rom::{Board, Rom};
     use super::*;
     use observe::Silent;
@@ -353,6 +376,30 @@ mod tests {
             assert!(read < last_write, "sector {sector:#x}");
         }
         assert_eq!(log[log.len() - 2..], [(0x84, 0x1000_0000), (2, 0)]);
+    }
+
+    #[test]
+    fn a_pico_2_cut_off_at_any_transfer_starts_a_whole_program_or_waits_to_be_flashed_again() {
+        let image = |seed| Firmware::read(&file_2350("1 (Pico 2)", LENGTH, seed)).unwrap().image().clone();
+        let whole = |image: &Image| image.pages().flat_map(|(_, page)| *page).collect::<Vec<u8>>();
+        let (old, new) = (image(1), image(2));
+        let mut waits = 0;
+        for transfers in 0.. {
+            let board = Board::of(Chip::Rp2350);
+            Picoboot::write(Rom::new(&board), &old, &Silent).unwrap();
+            assert!(board.borrow().restarted && board.borrow().starts());
+            (board.borrow_mut().restarted, board.borrow_mut().transfers_left) = (false, Some(transfers));
+            let result = Picoboot::write(Rom::new(&board), &new, &Silent);
+            let board = board.borrow();
+            let holds = |image: &Image| board.flash.starts_with(&whole(image));
+            assert!(!board.starts() || holds(&old) || holds(&new), "after {transfers} transfers");
+            waits += u32::from(!board.starts());
+            if result.is_ok() {
+                assert!(holds(&new) && board.starts() && board.log.last().unwrap().0 == 0x0a);
+                break;
+            }
+        }
+        assert!(waits > 20, "the cable was cut in the middle {waits} times");
     }
 
     #[test]

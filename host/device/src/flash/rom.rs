@@ -7,12 +7,13 @@ use std::rc::Rc;
 
 use super::image::tests::crc_mpeg_2;
 use super::picoboot::Pipe;
+use uf2::Chip;
 
-pub const FLASH_BYTES: usize = 2 << 20;
 const FLASH: u32 = 0x1000_0000;
 
 /// The part of the board that outlives a lost cable.
 pub struct Board {
+    pub chip: Chip,
     pub flash: Vec<u8>,
     /// What was asked of it: command and address.
     pub log: Vec<(u8, u32)>,
@@ -27,8 +28,14 @@ pub struct Board {
 
 impl Board {
     pub fn new() -> Rc<RefCell<Board>> {
+        Board::of(Chip::Rp2040)
+    }
+
+    pub fn of(chip: Chip) -> Rc<RefCell<Board>> {
+        let bytes = if chip == Chip::Rp2040 { 2 << 20 } else { 4 << 20 };
         Rc::new(RefCell::new(Board {
-            flash: vec![0xff; FLASH_BYTES],
+            chip,
+            flash: vec![0xff; bytes],
             log: Vec::new(),
             restarted: false,
             transfers_left: None,
@@ -39,6 +46,10 @@ impl Board {
 
     /// What the chip does when it is switched on: starts the program in flash, or stays in its boot loader.
     pub fn starts(&self) -> bool {
+        if self.chip == Chip::Rp2350 {
+            let block = b"\xd3\xde\xff\xff\x42\x01\x21\x10\xff\x01\0\0\0\0\0\0\x79\x35\x12\xab";
+            return self.flash[..4096].windows(20).any(|bytes| bytes == block);
+        }
         crc_mpeg_2(&self.flash[..252]).to_le_bytes() == self.flash[252..256]
     }
 }
@@ -107,7 +118,8 @@ impl Rom {
         self.board.borrow_mut().log.push((self.command, address));
         let expected = match self.command {
             0x01 => 1,
-            0x02 => 12,
+            0x02 if self.board.borrow().chip == Chip::Rp2040 => 12,
+            0x0a if self.board.borrow().chip == Chip::Rp2350 => 16,
             0x03 | 0x84 | 0x05 => 8,
             0x06 => 0,
             _ => return self.refuse(1),
@@ -133,7 +145,8 @@ impl Rom {
                 0x05 => 256,
                 _ => 1,
             };
-            if at >= FLASH_BYTES || length > FLASH_BYTES - at {
+            let bytes = self.board.borrow().flash.len();
+            if at >= bytes || length > bytes - at {
                 return self.refuse(4);
             }
             if !at.is_multiple_of(unit) || !length.is_multiple_of(unit) {
@@ -154,6 +167,7 @@ impl Rom {
         match self.command {
             0x01 => self.exclusive = message[16] > 0,
             0x06 => self.out_of_xip = true,
+            0x0a => assert_eq!((word(16), word(20), word(24), word(28)), (0, 500, 0, 0), "a plain restart"),
             _ => assert_eq!((word(16), word(20)), (0, 0x2004_2000), "a plain restart"),
         }
         self.phase = Phase::AckIn;
@@ -186,7 +200,7 @@ impl Pipe for Rom {
         self.transfer()?;
         match std::mem::replace(&mut self.phase, Phase::Command) {
             Phase::AckIn => {
-                self.board.borrow_mut().restarted = self.command == 0x02;
+                self.board.borrow_mut().restarted = matches!(self.command, 0x02 | 0x0a);
                 Ok(0)
             }
             Phase::DataIn { at, length } => {

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use super::image::tests::file;
+use super::image::tests::{file, file_2350};
 use super::rom::{Board, Rom};
 use super::*;
 use observe::Silent;
@@ -82,8 +82,8 @@ impl Desk {
     }
 
     fn flash(&mut self, version: &str, to: Option<&Address>) -> Result<Bridge, FlashError> {
-        let file = file("foilpress-bridge", version, 20_000, 5);
-        run(&Firmware::read(&file).unwrap(), &file, to, self, &Silent)
+        let images = [file("foilpress-bridge", version, 20_000, 5), file_2350(version, 20_000, 5)];
+        run(&images.map(|file| Firmware::read(&file).unwrap()), to, self, &Silent)
     }
 }
 
@@ -96,9 +96,10 @@ impl Computer for Desk {
         own.into_iter().chain(self.other_bridges.iter().copied()).map(candidate).collect()
     }
 
-    fn boards(&mut self) -> usize {
+    fn boards(&mut self) -> Vec<Chip> {
         self.live();
-        self.other_boards + usize::from(self.state == State::Loader)
+        let chip = self.board.borrow().chip;
+        vec![chip; self.other_boards + usize::from(self.state == State::Loader)]
     }
 
     fn open(&mut self) -> io::Result<Rom> {
@@ -108,10 +109,13 @@ impl Computer for Desk {
         }
     }
 
-    fn drives(&mut self) -> Vec<PathBuf> {
+    fn drives(&mut self) -> Vec<(Chip, PathBuf)> {
         self.live();
         let there = self.drive.as_ref().filter(|_| self.state == State::Loader);
-        there.map(|drive| drive.path().to_path_buf()).into_iter().collect()
+        there
+            .map(|drive| (drive::board(drive.path()).unwrap(), drive.path().to_path_buf()))
+            .into_iter()
+            .collect()
     }
 
     fn enter(&mut self, bridge: &Candidate) -> Result<u64, FlashError> {
@@ -147,6 +151,36 @@ fn a_running_bridge_is_flashed_and_says_its_new_version() {
     let mut desk = desk(State::Running);
     assert_eq!(desk.flash("9.8.7", None).unwrap().firmware, "9.8.7");
     assert_eq!(desk.asked, 1);
+}
+
+#[test]
+fn a_pico_2_is_known_in_its_boot_loader_and_gets_its_own_image() {
+    for state in [State::Running, State::Loader] {
+        let mut desk = desk(state);
+        desk.board = Board::of(Chip::Rp2350);
+        assert_eq!(desk.flash("9.8.7 (Pico 2)", None).unwrap().firmware, "9.8.7 (Pico 2)");
+        let board = desk.board.borrow();
+        assert!(board.starts() && board.flash[0x124..0x128] == *b"\xd3\xde\xff\xff");
+    }
+    // And through its drive.
+    let mut desk = desk(State::Running);
+    desk.board = Board::of(Chip::Rp2350);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("INFO_UF2.TXT"), "Board-ID: RP2350\n").unwrap();
+    (desk.drive, desk.closed) = (Some(folder), Some(ErrorKind::PermissionDenied));
+    desk.flash("9.8.8", None).unwrap();
+    assert_eq!(uf2::decode(&desk.copied().unwrap()).unwrap().chip(), Chip::Rp2350);
+}
+
+#[test]
+fn a_board_without_an_image_is_left_as_it_was_and_started_again() {
+    let mut desk = desk(State::Running);
+    desk.board = Board::of(Chip::Rp2350);
+    let pico = Firmware::read(&file("foilpress-bridge", "1", 20_000, 5)).unwrap();
+    let error = run(&[pico], None, &mut desk, &Silent).unwrap_err();
+    assert!(error.to_string().contains("this board is a Pico 2, but the firmware is for a Pico;"), "{error}");
+    let board = desk.board.borrow();
+    assert!(board.restarted && board.flash.iter().all(|&byte| byte == 0xff));
 }
 
 #[test]

@@ -3,13 +3,20 @@
 use std::io::{self, ErrorKind};
 use std::time::Duration;
 
+use uf2::Chip;
+
 use rusb::{Direction, Recipient, RequestType};
 
 use super::picoboot::Pipe;
 use crate::send::usb::{Attached, Pair, attached, translated};
 
-/// The boot ROM of an RP2040.
-const RP2040: (u16, u16) = (0x2e8a, 0x0003);
+/// The boot ROM of a chip.
+fn numbers(chip: Chip) -> (u16, u16) {
+    match chip {
+        Chip::Rp2040 => (0x2e8a, 0x0003),
+        Chip::Rp2350 => (0x2e8a, 0x000f),
+    }
+}
 
 /// Control requests of PICOBOOT.
 const INTERFACE_RESET: u8 = 0x41;
@@ -21,9 +28,13 @@ const CONTROL_PATIENCE: Duration = Duration::from_secs(1);
 /// Erasing a sector takes up to 0.4 s, by its data sheet; the command is answered when it is done.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The boards that wait in their boot loader. They all have the same serial number.
-pub fn boards() -> io::Result<Vec<Attached>> {
-    attached(RP2040)
+/// The boards that wait in their boot loader. Those of one kind may all have the same serial number.
+pub fn boards() -> io::Result<Vec<(Chip, Attached)>> {
+    let mut all = Vec::new();
+    for chip in Chip::ALL {
+        all.extend(attached(numbers(chip))?.into_iter().map(|board| (chip, board)));
+    }
+    Ok(all)
 }
 
 /// Opens a board's boot loader for this program alone.

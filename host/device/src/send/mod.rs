@@ -13,6 +13,7 @@ pub mod find;
 pub mod finish;
 pub mod journal;
 pub mod log;
+mod picture;
 pub mod query;
 pub mod raw;
 mod record;

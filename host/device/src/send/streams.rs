@@ -4,7 +4,7 @@
 //! Method: the job is read back into its page and planes, these are coded ([`protocol::runs`]), and what a bridge
 //! would make of the code is made here and compared with the job, byte for byte. A job that does not come back the
 //! same (another driver's packing, a leading reset, one plane of black in its own mode) is sent byte for byte instead.
-//! Cost: the job is parsed once for its commands and once for its dots, and compared once; one plane for each thread is held at a time. Limits: the job must be one whole legal one.
+//! Cost: the job is parsed once for its commands and twice for its dots, and compared once; one plane for each thread is held at a time. Limits: the job must be one whole legal one.
 //! Source: `docs/wire-format.md`, section 4.
 
 use protocol::ink::{Ink, Kind};
@@ -17,24 +17,37 @@ use protocol::rgl::{
 use protocol::runs::{self, Decoder, Header, MAX_BAND, MAX_HEADER, band_bytes, encode, stride};
 use rayon::prelude::*;
 
+use super::picture::Traces;
 use observe::Observer;
 
 /// The pass streams that stand for this job, or nothing if none do.
 pub fn of_job(job: &[u8], observer: &dyn Observer) -> Option<Vec<u8>> {
     let parts = Parts::read(job)?;
-    let mut head = [0; MAX_HEADER];
-    let length = parts.header.write(&mut head);
-    let mut streams = head[..length].to_vec();
     let (columns, rows) = (parts.header.columns(), parts.header.rows());
-    observer.begin("pass streams", 2 * job.len() as u64);
+    let drawn = |commands: &[u8]| {
+        let mut plane = vec![0; stride(columns) * usize::from(rows)];
+        draw(commands, columns, &mut plane).map(|()| plane)
+    };
+    observer.begin("pass streams", 3 * job.len() as u64);
+    let traces = parts
+        .passes
+        .par_iter()
+        .map(|commands| {
+            observer.advance(commands.len() as u64);
+            drawn(commands).map(|plane| Traces::of(&plane, columns))
+        })
+        .try_reduce(Traces::none, |one, other| Some(one.and(other)))?;
+    let header = parts.header.framed(traces.frame(columns, rows))?;
+    let mut head = [0; MAX_HEADER];
+    let length = header.write(&mut head);
+    let mut streams = head[..length].to_vec();
     let coded: Option<Vec<Vec<u8>>> = parts
         .passes
         .par_iter()
         .map(|commands| {
-            let mut plane = vec![0; stride(columns) * usize::from(rows)];
-            draw(commands, columns, &mut plane)?;
+            let plane = drawn(commands)?;
             let (mut stream, mut buffer) = (Vec::new(), vec![0; MAX_BAND]);
-            encode(columns, rows, &plane, &mut buffer, |band| stream.extend_from_slice(band)).ok()?;
+            encode(header.walk(), &plane, &mut buffer, |band| stream.extend_from_slice(band)).ok()?;
             observer.advance(commands.len() as u64);
             Some(stream)
         })
@@ -78,7 +91,7 @@ pub fn expand(streams: &[u8], put: &mut dyn FnMut(&[u8]) -> bool) -> Result<(), 
     let mut left = &streams[length..];
     let (columns, stride) = (header.columns(), stride(header.columns()));
     let mut writer = JobWriter::new(header.setup().clone(), header.rows())?;
-    let mut decoder = Decoder::new(columns, header.rows());
+    let mut decoder = Decoder::new(*header.walk());
     let mut memory = vec![0; band_bytes(columns)];
     let mut out = vec![0; COMMAND_ROOM.max(ROW_ROOM + stride)];
     let count = writer.begin(&mut out)?;

@@ -34,29 +34,28 @@ pub struct Args {
 
 /// Runs `bridge flash`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let file = match (&args.from, Firmware::embedded_file()) {
-        (Some(path), _) => read(path)?,
-        (None, Some(file)) => file.to_vec(),
-        (None, None) => bail!(
+    let images = match &args.from {
+        Some(path) => vec![Firmware::read(&read(path)?).with_context(|| path.display().to_string())?],
+        None => Firmware::embedded().context("the firmware in this program")?,
+    };
+    if images.is_empty() {
+        bail!(
             "this program was built without firmware; build it with `cargo xtask firmware` in the project's folder, then run \
              `foilpress bridge flash --from FILE.uf2`"
-        ),
-    };
-    let firmware = Firmware::read(&file).with_context(|| match &args.from {
-        Some(path) => path.display().to_string(),
-        None => "the firmware in this program".into(),
-    })?;
-    observer.note(&format!("firmware {}", firmware.version()));
+        );
+    }
+    for firmware in &images {
+        observer.note(&format!("firmware {} for a {}", firmware.version(), firmware.chip()));
+    }
     output::say_on_interrupt(
         "the board is unchanged or waits in its boot loader; run the same command again, and if the board is not found, hold its \
          BOOTSEL button while plugging it in",
     );
-    let bridge =
-        flash::run(&firmware, &file, args.to.as_ref(), &mut ThisComputer, observer).map_err(|error| {
-            let which = matches!(error, FlashError::SeveralBridges(_));
-            let error = anyhow::Error::from(error);
-            if which { error.context("choose a bridge with --to") } else { error }
-        })?;
+    let bridge = flash::run(&images, args.to.as_ref(), &mut ThisComputer, observer).map_err(|error| {
+        let which = matches!(error, FlashError::SeveralBridges(_));
+        let error = anyhow::Error::from(error);
+        if which { error.context("choose a bridge with --to") } else { error }
+    })?;
     show(&format!("bridge {:016x} runs firmware {}\n", bridge.serial, bridge.firmware))
 }
 

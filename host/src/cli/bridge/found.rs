@@ -65,7 +65,7 @@ fn levels(lines: Lines) -> Vec<&'static str> {
 
 /// A hint about a bridge that works but runs other firmware than this program includes.
 pub fn newer_firmware(bridge: &Bridge) -> Option<String> {
-    let ours = Firmware::embedded()?.ok()?;
+    let ours = Firmware::embedded_for(&bridge.firmware)?;
     (ours.version() != bridge.firmware).then(|| {
         format!(
             "this program includes firmware {}; `foilpress bridge flash` installs it on the bridge",

@@ -36,6 +36,12 @@ pub struct Args {
 
 /// Runs `bridge log`.
 pub fn run(args: &Args) -> Result<()> {
+    let address = match &args.to {
+        Some(address) => address.clone(),
+        None => only()?,
+    };
+    let mut link = address.open()?;
+    let mut query = Query::new(&mut *link, PATIENCE)?;
     let program = match &args.elf {
         Some(path) => {
             let what = || format!("cannot read {}", path.display());
@@ -44,7 +50,7 @@ pub fn run(args: &Args) -> Result<()> {
             }
             std::fs::read(path).with_context(what)?
         }
-        None => match Firmware::embedded_program() {
+        None => match Firmware::embedded_program_for(&query.bridge().firmware) {
             Some(program) => program.to_vec(),
             None => bail!(
                 "this program was built without firmware; name the ELF file of the bridge's firmware with --elf (`cargo xtask \
@@ -52,12 +58,6 @@ pub fn run(args: &Args) -> Result<()> {
             ),
         },
     };
-    let address = match &args.to {
-        Some(address) => address.clone(),
-        None => only()?,
-    };
-    let mut link = address.open()?;
-    let mut query = Query::new(&mut *link, PATIENCE)?;
     let raw = log::read(&mut query, PATIENCE)?;
     let log = log::decode(&raw, &program)?;
     let mut out = std::io::stdout().lock();
