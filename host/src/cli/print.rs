@@ -58,22 +58,27 @@ pub struct Work {
 }
 
 /// A document's dots and how they lie on the page.
-struct Laid {
-    document: Document,
-    library: Library,
-    settings: Settings,
+pub struct Laid {
+    pub document: Document,
+    pub library: Library,
+    pub settings: Settings,
     layout: Layout,
-    halftoned: Halftoned,
+    pub halftoned: Halftoned,
 }
 
 impl Work {
     /// The plan of the document. Nothing is written.
     pub fn draft(&self, observer: &dyn Observer) -> Result<Draft> {
-        let (inks, library) = self.inks.at_hand()?;
-        let laid = self.halftone(self.document.open(observer)?, inks, library, observer)?;
+        let laid = self.laid(observer)?;
         let mut draft = pipeline::draft(&self.request(&laid), observer)?;
         draft.plan.notes.clone_from(&laid.document.notes);
         Ok(draft)
+    }
+
+    /// The document's dots. Nothing is written.
+    pub fn laid(&self, observer: &dyn Observer) -> Result<Laid> {
+        let (inks, library) = self.inks.at_hand()?;
+        self.halftone(self.document.open(observer)?, inks, library, observer)
     }
 
     fn halftone(

@@ -95,9 +95,11 @@ impl Lit {
         let used: Vec<usize> = (0..channels).filter(|&i| most[i] > 0.0).collect();
         let stride = used.len().next_multiple_of(LANES);
         let mut weights = vec![0.0; width * height * stride];
-        weights.par_chunks_exact_mut(stride).zip(shares.par_chunks_exact(channels)).for_each(|(out, pixel)| {
-            out.iter_mut().zip(&used).for_each(|(out, &i)| *out = pixel[i]);
-        });
+        weights.par_chunks_exact_mut(stride).zip(shares.par_chunks_exact(channels)).for_each(
+            |(out, pixel)| {
+                out.iter_mut().zip(&used).for_each(|(out, &i)| *out = pixel[i]);
+            },
+        );
         let mut levels = vec![Level { width, height, weights }];
         while let Some(last) = levels.last()
             && last.width.max(last.height) > 1

@@ -143,7 +143,8 @@ impl<'a> Renderer<'a> {
         let mut out = vec![0.0; 3 * stride];
         for (light, entry) in light.iter().zip(self.table.chunks_exact(3 * stride)) {
             if *light != [0.0; 3] {
-                for (c, (out, f)) in out.chunks_exact_mut(stride).zip(entry.chunks_exact(stride)).enumerate() {
+                for (c, (out, f)) in out.chunks_exact_mut(stride).zip(entry.chunks_exact(stride)).enumerate()
+                {
                     out.iter_mut().zip(f).for_each(|(out, &f)| *out += light[c] * f);
                 }
             }
@@ -182,7 +183,8 @@ impl<'a> Renderer<'a> {
         };
         let ((left, right, across), (top, bottom, down)) = (split(u, level.width), split(v, level.height));
         let place = |x: usize, y: usize| &level.weights[(y * level.width + x) * stride..][..stride];
-        let parts = [(1.0 - across) * (1.0 - down), across * (1.0 - down), (1.0 - across) * down, across * down];
+        let parts =
+            [(1.0 - across) * (1.0 - down), across * (1.0 - down), (1.0 - across) * down, across * down];
         let corners = [place(left, top), place(right, top), place(left, bottom), place(right, bottom)];
         let corners = corners.map(|corner| corner.as_chunks::<LANES>().0);
         for (i, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
@@ -353,7 +355,8 @@ mod tests {
         let v = unit(scene.camera.towards);
         let [right, up] = right_and_up(v);
         let step = scene.camera.height / side as f64;
-        let (px, py) = ((x as f64 + 0.5 - side as f64 / 2.0) * step, (side as f64 / 2.0 - y as f64 - 0.5) * step);
+        let (px, py) =
+            ((x as f64 + 0.5 - side as f64 / 2.0) * step, (side as f64 / 2.0 - y as f64 - 0.5) * step);
         let window = sum(sum([0.0; 3], px, right), py, up);
         let (o, d) = match scene.camera.distance {
             Some(distance) => (v.map(|c| c * distance), unit(sum(window, -distance, v))),
@@ -364,7 +367,9 @@ mod tests {
         for light in &scene.lights {
             let (l, e) = match *light {
                 Light::Far(l) => (unit(l), 1.0),
-                Light::Near(at) => (unit(sum(at, -1.0, p)), dot(at, at) / dot(sum(at, -1.0, p), sum(at, -1.0, p))),
+                Light::Near(at) => {
+                    (unit(sum(at, -1.0, p)), dot(at, at) / dot(sum(at, -1.0, p), sum(at, -1.0, p)))
+                }
             };
             let h = unit(sum(l, -1.0, d));
             let f = lobe(dot(n, h).min(1.0).acos());
@@ -391,7 +396,8 @@ mod tests {
                 vec![Light::Near([0.1, -0.05, 0.3]), Light::Far(direction(-60.0, 40.0))],
             ] {
                 for (turn, tip) in [(0.0, 0.0), (0.3, -0.2)] {
-                    scene.camera = Camera::whole(direction(towards.0, towards.1), distance, [0.12, 0.12], 1.0);
+                    scene.camera =
+                        Camera::whole(direction(towards.0, towards.1), distance, [0.12, 0.12], 1.0);
                     scene.lights.clone_from(&lights);
                     scene.pose = Pose { turn, tip, curl: None };
                     for (x, y) in [(20, 20), (12, 25), (30, 16)] {
@@ -449,7 +455,12 @@ mod tests {
         for azimuth in [-89.0, -60.0, -20.0, 45.0, 80.0, 89.0] {
             for distance in [None, Some(0.3)] {
                 let scene = Scene {
-                    camera: Camera { towards: direction(azimuth, 0.0), distance, middle: [0.0; 2], height: 0.15 },
+                    camera: Camera {
+                        towards: direction(azimuth, 0.0),
+                        distance,
+                        middle: [0.0; 2],
+                        height: 0.15,
+                    },
                     pose: Pose { curl: Some(r), ..Pose::default() },
                     lights: vec![Light::Far(direction(azimuth, 0.0))],
                     probe: None,

@@ -101,7 +101,9 @@ impl Scene {
         if let Some(d) = distance
             && d * eye[2] < 1e-3
         {
-            return camera(format!("the eye is {d} m from the sheet, inside it for all that matters; go farther away"));
+            return camera(format!(
+                "the eye is {d} m from the sheet, inside it for all that matters; go farther away"
+            ));
         }
         for (i, light) in self.lights.iter().enumerate() {
             let (Light::Far(v) | Light::Near(v)) = *light;

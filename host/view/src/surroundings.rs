@@ -247,7 +247,10 @@ mod tests {
                 let l = probe.direction(x, y);
                 let h = unit(std::array::from_fn(|c| l[c] + v[c]));
                 let radiance = f64::from(probe.rgb()[y * probe.width() + x][0]);
-                sum += radiance * probe.solid_angle(y) * dot(n, l).max(0.0) * f(dot(n, h).clamp(-1.0, 1.0).acos());
+                sum += radiance
+                    * probe.solid_angle(y)
+                    * dot(n, l).max(0.0)
+                    * f(dot(n, h).clamp(-1.0, 1.0).acos());
             }
         }
         sum
@@ -261,7 +264,12 @@ mod tests {
             let lit = uniform([0.1, 0.1], |t| [f(t); 3]);
             let r = 0.08;
             let scene = Scene {
-                camera: Camera { towards: direction(20.0, 10.0), distance: Some(0.5), middle: [0.0; 2], height: 0.12 },
+                camera: Camera {
+                    towards: direction(20.0, 10.0),
+                    distance: Some(0.5),
+                    middle: [0.0; 2],
+                    height: 0.12,
+                },
                 pose: Pose { turn: 0.2, tip: 0.1, curl: Some(r) },
                 lights: Vec::new(),
                 probe: Some(probe.clone()),
