@@ -12,7 +12,8 @@ use inks::Library;
 use serde_json::json;
 
 use super::output::Staged;
-use super::print::{Laid, Work};
+use super::preset::PresetArg;
+use super::print::{DotsArgs, Laid};
 use super::stdio::read_job;
 use appearance::brdf::{Space, reflectances};
 use appearance::document::SAMPLES;
@@ -23,7 +24,7 @@ use press::pipeline::document::factored;
 use press::preview::{Exposure, Probe, Radiance, Source, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
-use view::page::{LONGEST, Subject, Target, page};
+use view::page::{Subject, Target, page};
 use view::{Camera, Light, Lit, Pose, Renderer, Scene, direction, mapped};
 
 /// Pixels of the longer side of the picture in the page.
@@ -128,7 +129,9 @@ fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], Strin
 )]
 pub struct Args {
     #[command(flatten)]
-    work: Work,
+    dots: DotsArgs,
+    #[command(flatten)]
+    preset: PresetArg,
     /// File to write: a page (.html), a picture (.png), or linear radiance (.exr)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -194,13 +197,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     let probe = args.light_probe.as_deref().map(Probe::read_hdr).transpose()?;
     let staged = Staged::file(&args.output)?;
-    let shown = Shown::open(&args.work, observer)?;
+    let shown = Shown::open(&args.dots, observer)?;
     let what = args.show.unwrap_or(Show::Printed);
     if shown.target.is_none() && what != Show::Printed {
         bail!(
             "--show {}: {} has printed dots and no document; leave --show out, or name a document",
             if what == Show::Document { "document" } else { "mapped" },
-            args.work.document.document
+            args.dots.document.document
         );
     }
     let longest = if format == Format::Page { STILL } else { args.pixels.into() };
@@ -323,7 +326,7 @@ impl Args {
 }
 
 impl Shown {
-    fn open(work: &Work, observer: &dyn Observer) -> Result<Shown> {
+    fn open(work: &DotsArgs, observer: &dyn Observer) -> Result<Shown> {
         let path = Path::new(&work.document.document);
         if let Some(dots) = printed(path, observer)? {
             let name =

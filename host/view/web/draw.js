@@ -50,7 +50,11 @@ export class Drawing {
     gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA16F, 1, 1, 1);
   }
 
-  /** @param {GLenum} target */
+  /**
+   * @param {GLenum} target
+   * @param {GLenum} filter between texels
+   * @param {GLenum} least between texels and levels
+   */
   #texture(target, filter = this.gl.NEAREST, least = filter) {
     const { gl } = this;
     const texture = gl.createTexture();

@@ -4,6 +4,7 @@
 precision highp float;
 precision highp int;
 precision highp sampler2DArray;
+precision highp usampler2D;
 precision highp usampler2DArray;
 
 const int LIT = 0, DIFFERENCE = 1, STACKS = 2, PASS = 3;
