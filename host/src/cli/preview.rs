@@ -17,7 +17,7 @@ use super::print::{DotsArgs, Laid};
 use super::stdio::read_job;
 use appearance::brdf::{Space, reflectances};
 use appearance::document::SAMPLES;
-use appearance::factor::Factored;
+use appearance::factor::{self, Factored};
 use observe::Observer;
 use press::layout::Mm;
 use press::pipeline::document::factored;
@@ -26,6 +26,9 @@ use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
 use view::page::{Subject, Target, page};
 use view::{Camera, Light, Lit, Pose, Renderer, Scene, direction, mapped};
+
+/// Bases of a document whose print needs none, so that the picture of it is close.
+const BASES: usize = 12;
 
 /// Pixels of the longer side of the picture in the page.
 const STILL: usize = 800;
@@ -336,7 +339,10 @@ impl Shown {
         }
         let Laid { document, library, settings, halftoned, .. } = work.laid(observer)?;
         let space = document.materials().space().clone();
-        let bases = factored(&document, &settings.factor, observer)?.0.into_owned();
+        let uses_bases = halftoned.mapped.report.intent.uses_bases();
+        let bases = settings.factor.bases.or((!uses_bases).then_some(BASES));
+        let bases =
+            factored(&document, &factor::Settings { bases, ..settings.factor }, observer)?.0.into_owned();
         let mix = &halftoned.mapped.mix;
         let words = |row: &Vec<u16>| {
             let parts = mix.stacks.iter().cloned().zip(row.iter().map(|&share| f64::from(share)));

@@ -557,7 +557,7 @@ function build() {
   const metres = (/** @type {number} */ v) => (v > 1.02 ? 0 : 0.1 * 30 ** v);
   const inMetres = (/** @type {number} */ v) => (metres(v) ? `${metres(v).toFixed(2)} m` : 'far');
   slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: inMetres });
-  slider(light, 'exposure', { min: -5, max: 5, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v > 0 ? '+' : ''}${v.toFixed(1)} stops` });
+  slider(light, 'exposure', { min: -5, max: 5, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v >= 0.05 ? '+' : ''}${Math.abs(v) < 0.05 ? '0' : v.toFixed(1)} EV` });
   const turned = (/** @type {'turn' | 'tip'} */ which) => (/** @type {number} */ v) => {
     state[which] = v;
     faceTheEye();
