@@ -20,7 +20,7 @@ async function visit(how, run) {
     await browser.close();
   }
 }
-const desk = { width: 1200, height: 800 };
+const desk = { width: 900, height: 640 };
 const phone = { width: 390, height: 780, touch: true };
 
 /** A place on the sheet, beside lamp and handle. */

@@ -90,7 +90,7 @@ impl Lit {
         let channels = rows.len();
         let most = shares
             .par_chunks_exact(channels)
-            .fold(|| vec![0.0f32; channels], |most, pixel| greatest(most, pixel))
+            .fold(|| vec![0.0f32; channels], greatest)
             .reduce(|| vec![0.0; channels], |most, pixel| greatest(most, &pixel));
         let used: Vec<usize> = (0..channels).filter(|&i| most[i] > 0.0).collect();
         let stride = used.len().next_multiple_of(LANES);

@@ -134,7 +134,6 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
     });
     observer.advance(1);
     let target = subject.target.as_ref();
-    let layer = |factored: &Factored, name: &dyn Fn(usize) -> String| layer(factored, subject.size, name);
     let document = target.map(|t| layer(t.document, &|i| format!("basis {}", i + 1))).transpose()?;
     observer.advance(1);
     let mapped =
@@ -235,10 +234,9 @@ fn tables(space: &Space, rows: &[&[f64]]) -> Vec<u8> {
     rows.par_iter().map(table).collect::<Vec<_>>().concat()
 }
 
-fn layer(factored: &Factored, size: [f64; 2], name: &dyn Fn(usize) -> String) -> Result<Layer, ViewError> {
+fn layer(factored: &Factored, name: &dyn Fn(usize) -> String) -> Result<Layer, ViewError> {
     let pixels = (factored.maps.width(), factored.maps.height());
     let (width, height) = fit(pixels, LONGEST);
-    let _ = size;
     let shares = Source::Factored(factored).shares(width, height)?.ok_or(ViewError::NotFactored)?;
     let channels = factored.bases.len();
     let totals = factored.maps.totals();

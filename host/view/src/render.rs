@@ -234,15 +234,15 @@ impl Seen {
     fn new(scene: &Scene, size: [f64; 2], width: usize, height: usize) -> Seen {
         let frame = Frame::new(&scene.pose);
         let towards = unit(scene.camera.towards);
-        let [right, up] = right_and_up(towards).map(|axis| frame.into_sheet(axis));
+        let [right, up] = right_and_up(towards).map(|axis| frame.in_sheet(axis));
         let pixel = scene.camera.height / height as f64;
         let [x, y] = scene.camera.middle;
         let (left, top) = (x - 0.5 * width as f64 * pixel, y + 0.5 * height as f64 * pixel);
         let f32s = |v: [f64; 3]| v.map(|c| c as f32);
-        let towards = frame.into_sheet(towards);
+        let towards = frame.in_sheet(towards);
         let light = |light: &Light| match *light {
-            Light::Far(v) => Light::Far(frame.into_sheet(unit(v))),
-            Light::Near(at) => Light::Near(frame.into_sheet(at)),
+            Light::Far(v) => Light::Far(frame.in_sheet(unit(v))),
+            Light::Near(at) => Light::Near(frame.in_sheet(at)),
         };
         Seen {
             eye: scene.camera.distance.map(|distance| f32s(towards.map(|c| c * distance))),
@@ -300,7 +300,9 @@ impl Seen {
         let mut place = [along.unwrap_or(at[0]), at[1]];
         let mut covered = 1.0;
         for i in 0..2 {
-            let width = (steps[0][i] * steps[0][i] + steps[1][i] * steps[1][i]).sqrt();
+            // At the silhouette of a bent sheet a step goes to infinity, which must not blur its edge into the air.
+            let width =
+                (steps[0][i] * steps[0][i] + steps[1][i] * steps[1][i]).sqrt().min(0.1 * self.half[i]);
             covered *= ((self.half[i] - place[i].abs()) / width.max(1e-12) + 0.5).clamp(0.0, 1.0);
             place[i] = place[i].clamp(-self.half[i], self.half[i]);
         }

@@ -91,7 +91,7 @@ impl Scene {
         }
         self.check_pose(size)?;
         let frame = Frame::new(&self.pose);
-        let eye = frame.into_sheet(unit(towards));
+        let eye = frame.in_sheet(unit(towards));
         if eye[2] < 1e-3 {
             return camera(
                 "the eye is behind the sheet or at its edge; turn the view or the sheet so that they face each other".into(),
@@ -153,7 +153,7 @@ impl Frame {
     }
 
     /// A vector of the world in the sheet's axes.
-    pub fn into_sheet(&self, v: [f64; 3]) -> [f64; 3] {
+    pub fn in_sheet(&self, v: [f64; 3]) -> [f64; 3] {
         self.0.map(|axis| dot(axis, v))
     }
 }
@@ -235,7 +235,7 @@ mod tests {
     fn turning_and_tipping_face_where_they_say() {
         let facing = |turn: f64, tip: f64, v| {
             let pose = Pose { turn: turn.to_radians(), tip: tip.to_radians(), curl: None };
-            Frame::new(&pose).into_sheet(v)[2]
+            Frame::new(&pose).in_sheet(v)[2]
         };
         assert!((facing(30.0, 0.0, direction(30.0, 0.0)) - 1.0).abs() < 1e-12);
         assert!((facing(0.0, 25.0, direction(0.0, 25.0)) - 1.0).abs() < 1e-12);

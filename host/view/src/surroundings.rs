@@ -53,7 +53,7 @@ impl Field {
         let probe = probe.shrunk(ROWS);
         let frame = Frame::new(&scene.pose);
         let tree = Tree::new(&probe, &frame);
-        let towards = frame.into_sheet(unit(scene.camera.towards));
+        let towards = frame.in_sheet(unit(scene.camera.towards));
         let nodes = if scene.pose.curl.is_none() && scene.camera.distance.is_none() { 1 } else { NODES };
         let step = 3 * lit.stride;
         observer.begin("lighting by the probe", nodes as u64);
@@ -177,7 +177,7 @@ impl Tree {
         }
         let here = self.nodes.len();
         self.nodes.push(Node {
-            towards: frame.into_sheet(towards).map(|c| c as f32),
+            towards: frame.in_sheet(towards).map(|c| c as f32),
             light: light.map(|v| v as f32),
             reach: reach as f32,
             next: 0,
@@ -221,10 +221,10 @@ impl Tree {
             if cos > 0.0 {
                 let (k, s) = fine.at(chord);
                 let (near, far) = (cos * (1.0 - s), cos * s);
-                for c in 0..3 {
+                (0..3).for_each(|c| {
                     light[k][c] += near * node.light[c];
                     light[k + 1][c] += far * node.light[c];
-                }
+                });
             }
             i = node.next as usize;
         }
@@ -277,12 +277,12 @@ mod tests {
             let frame = Frame::new(&scene.pose);
             let side = 60;
             let picture = Renderer::new(&lit).render(&scene, side, side, &Silent).unwrap();
-            let eye = frame.into_sheet(direction(20.0, 10.0).map(|c| 0.5 * c));
+            let eye = frame.in_sheet(direction(20.0, 10.0).map(|c| 0.5 * c));
             let back = |v: [f64; 3]| -> [f64; 3] {
-                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| frame.into_sheet(e));
+                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| frame.in_sheet(e));
                 std::array::from_fn(|c| dot(axes[c], v))
             };
-            let [right, up] = crate::scene::right_and_up(direction(20.0, 10.0)).map(|a| frame.into_sheet(a));
+            let [right, up] = crate::scene::right_and_up(direction(20.0, 10.0)).map(|a| frame.in_sheet(a));
             let mut worst = 0.0f64;
             let mut compared = 0;
             for (x, y) in [(30, 30), (22, 17), (37, 40), (25, 33), (40, 21)] {

@@ -150,7 +150,7 @@ void main() {
   ex -= d * (dot(n, ex) / facing);
   ey -= d * (dot(n, ey) / facing);
   vec2 sx = vec2(ex.x * n.z - ex.z * n.x, ex.y), sy = vec2(ey.x * n.z - ey.z * n.x, ey.y);
-  vec2 width = sqrt(sx * sx + sy * sy);
+  vec2 width = min(sqrt(sx * sx + sy * sy), 0.05 * sheet);
   vec2 inside = clamp((0.5 * sheet - abs(place)) / max(width, 1e-12) + 0.5, 0.0, 1.0);
   float covered = inside.x * inside.y;
   if (covered <= 0.0) return;
