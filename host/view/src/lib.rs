@@ -25,4 +25,4 @@ mod surroundings;
 pub use error::ViewError;
 pub use lit::{Lit, fit, mapped};
 pub use render::Renderer;
-pub use scene::{Camera, Light, Pose, Scene, direction};
+pub use scene::{Camera, Light, Pose, Scene, direction, proportions};

@@ -6,7 +6,7 @@
 //! half angle, entry by entry ([`Fine`]), so a light costs one lookup and one product of weights and entries:
 //! `L = sum_k w_k f_k(theta_h) E cos_i`. Rows run in parallel. A light probe is integrated on a grid over the sheet
 //! ([`Field`](crate::surroundings)).
-//! Cost: 12 ns a pixel and core for eight bases and one light.
+//! Cost: for each pixel four places of two levels, and two entries of the table for each light.
 //! Limits: one bounce and no shadows, which the outside of a cylinder does not need; the picture is filtered alike in all
 //! directions, so a sheet seen at a grazing angle is soft across; edges of the sheet are smooth, the silhouette of a bent one
 //! is not. The back of a sheet is never seen: all of a bent one lies behind its middle, where [`Scene::check`] wants the eye

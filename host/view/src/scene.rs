@@ -17,6 +17,13 @@ pub fn direction(azimuth: f64, elevation: f64) -> [f64; 3] {
     [a.sin() * e.cos(), e.sin(), a.cos() * e.cos()]
 }
 
+/// Pixels across and down of a picture in the proportions of a sheet, whose longer side has `longest`.
+pub fn proportions([width, height]: [f64; 2], longest: usize) -> (usize, usize) {
+    let side =
+        |side: f64| ((side / width.max(height) * longest as f64).round() as usize).max(16.min(longest));
+    (side(width), side(height))
+}
+
 /// The eye, and what it sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -228,6 +235,12 @@ mod tests {
             assert!(dot(right, v).abs() < 1e-12 && dot(up, v).abs() < 1e-12 && dot(right, up).abs() < 1e-12);
             assert!(right[1] == 0.0 && up[1] > 0.0);
         }
+    }
+
+    #[test]
+    fn pictures_have_the_proportions_of_the_sheet() {
+        assert_eq!(proportions([0.12, 0.09], 1024), (1024, 768));
+        assert_eq!(proportions([0.01, 1.0], 100), (16, 100));
     }
 
     /// A sheet turned to the right faces an eye on the right, and one tipped back an eye above.
