@@ -168,7 +168,7 @@ pub(crate) mod tests {
     fn every_level_holds_all_weights() {
         let space = Space::half_angle(4);
         let mut bases = Table::new(space.columns());
-        (0..3).for_each(|i| bases.push(&vec![0.1 * f64::from(i); 12]));
+        (0..3).for_each(|i| bases.push(&[0.1 * f64::from(i); 12]));
         // The second basis is nowhere.
         let data = (0..70 * 45u16).flat_map(|i| [i * 7 % ONE, 0, ONE - i * 7 % ONE]).collect();
         let maps = WeightMaps::new(70, 45, 3, data).unwrap();
