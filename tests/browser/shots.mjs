@@ -8,8 +8,12 @@ const { browser, page, complaints } = await open(file, { width: Number(width) + 
 await page.addStyleTag({
   content: `#stage { position: fixed !important; top: 0; left: 0; width: ${width}px !important; height: ${height}px !important; border-radius: 0 !important }`,
 });
+await page.waitForTimeout(1000);
 for (const [i, state] of JSON.parse(await readFile(states, 'utf8')).entries()) {
   await page.evaluate((hash) => { location.hash = hash; }, state);
+  // The page writes its own address when it rests: the same view, in other words.
+  await page.waitForFunction((hash) => location.hash !== `#${hash}`, state);
+  await page.waitForTimeout(300);
   await rested(page);
   const url = await page.evaluate(() => document.querySelector('canvas').toDataURL('image/png'));
   await writeFile(`${folder}/${i}.png`, Buffer.from(url.split(',')[1], 'base64'));
