@@ -35,12 +35,13 @@ const ELSEWHERE: [(&str, &str); 16] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 8] = [
+const DOCUMENTS: [(&str, &str); 9] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
     ("docs/guide/decals.md", "docs/guide/decal"),
     ("docs/guide/page.md", "."),
+    ("docs/guide/preview.md", "."),
     ("docs/guide/queue.md", "."),
     ("docs/emulator.md", "."),
     ("docs/wiring.md", "."),

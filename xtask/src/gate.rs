@@ -12,7 +12,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 
 use crate::firmware::{self, BARE_METAL};
-use crate::{PROGRAM, cargo, command, emulator, package, queue, succeed};
+use crate::{PROGRAM, cargo, command, emulator, package, preview, queue, succeed};
 
 /// What the property tests' cases are drawn from.
 const PROPERTY_SEED: &str = "PROPTEST_RNG_SEED";
@@ -82,6 +82,7 @@ pub fn run(root: &Path) -> ExitCode {
     }
     gate.command("tests", test);
     gate.step("emulator", || emulator::run(root, &program));
+    gate.step("preview", || preview::run(root));
     // The package is tried with the tests of print queues: where they fail, it would.
     if gate.failed.is_empty() {
         gate.step("package", || package::run_where_possible(root, &program));

@@ -7,6 +7,7 @@ mod emulator;
 mod firmware;
 mod gate;
 mod package;
+mod preview;
 mod queue;
 mod tools;
 
@@ -37,6 +38,8 @@ enum Task {
         #[arg(long)]
         serve: bool,
     },
+    /// Test the preview's page in a real browser; installs Chromium if it is missing (apt needs root)
+    Preview,
     /// Test print queues on a private print server; installs CUPS if it is missing (needs root)
     Queue,
     /// Build the Debian package, try it in a root of its own and, as root, on this computer
@@ -59,6 +62,7 @@ fn main() -> ExitCode {
         Task::Firmware => finish(firmware::build(root).map(drop)),
         Task::Emulator { serve: true } => finish(emulator::serve(root)),
         Task::Emulator { serve: false } => finish(emulator::alone(root)),
+        Task::Preview => finish(preview::run(root)),
         Task::Queue => finish(queue::run()),
         Task::Package { dev: false } => finish(package::build(root, package::Profile::Release)),
         Task::Package { dev: true } => finish(package::build(root, package::Profile::Dev)),

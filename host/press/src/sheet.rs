@@ -15,6 +15,7 @@ use inks::Stack;
 use protocol::paper::Paper;
 
 pub use area::Area;
+pub use colours::{colours, label};
 pub use dots::{DotMap, SheetError};
 pub(crate) use dots::{census, check_stacks};
 

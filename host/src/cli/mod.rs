@@ -23,6 +23,7 @@ mod output;
 mod permission;
 mod plan;
 mod preset;
+mod preview;
 mod print;
 mod progress;
 mod queue;
@@ -81,6 +82,8 @@ enum Command {
     ///
     /// Sends nothing, and writes nothing unless --html names a file.
     Plan(Box<plan::Args>),
+    /// Show a document or a sheet under any light: a page to handle it in a browser, or a picture
+    Preview(Box<preview::Args>),
     /// Print a chart: to judge stacks by eye, to measure inks, or to calibrate the printer
     Chart(Box<chart::Args>),
     /// Save, list and use named sets of options
@@ -177,6 +180,7 @@ fn run(args: Args) -> Result<()> {
         Command::Print(args) => print::run(&args, observer),
         Command::Layers(args) => layers::run(&args, observer),
         Command::Plan(args) => plan::run(&args, observer),
+        Command::Preview(args) => preview::run(&args, observer),
         Command::Chart(args) => chart::run(&args, observer),
         Command::Preset(args) => preset::run(&args, &Args::command()),
         Command::Ledger(args) => ledger::run(&args),

@@ -89,9 +89,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Args::Layers(args) => return layers::plan(args, observer),
     };
     let page = args.shown.stage()?;
-    let path = Path::new(&args.work.document.document);
+    let path = Path::new(&args.work.dots.document.document);
     let drawn = if is_job(path) {
-        of_job(path, &args.work.inks.library()?, observer)?
+        of_job(path, &args.work.dots.inks.library()?, observer)?
     } else {
         args.work.draft(observer)?.into()
     };

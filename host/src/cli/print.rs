@@ -32,9 +32,9 @@ const BALL: usize = 160;
 /// Where the eye is when print and document are compared, in metres.
 const EYE: f64 = 0.5;
 
-/// A document and everything that decides how it is printed.
+/// A document and everything that decides its dots.
 #[derive(ClapArgs, Debug)]
-pub struct Work {
+pub struct DotsArgs {
     #[command(flatten)]
     pub document: DocumentArgs,
     /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
@@ -44,8 +44,6 @@ pub struct Work {
     #[command(flatten)]
     pub layout: LayoutArgs,
     #[command(flatten)]
-    pub media: MediaArgs,
-    #[command(flatten)]
     pub factor: FactorArgs,
     #[command(flatten)]
     pub gamut: GamutArgs,
@@ -53,27 +51,54 @@ pub struct Work {
     pub halftone: HalftoneArg,
     #[command(flatten)]
     pub inks: InkArgs,
+}
+
+/// A document and everything that decides how it is printed.
+#[derive(ClapArgs, Debug)]
+pub struct Work {
     #[command(flatten)]
-    pub preset: PresetArg,
+    pub dots: DotsArgs,
+    #[command(flatten)]
+    media: MediaArgs,
+    #[command(flatten)]
+    preset: PresetArg,
 }
 
 /// A document's dots and how they lie on the page.
-struct Laid {
-    document: Document,
-    library: Library,
-    settings: Settings,
+pub struct Laid {
+    pub document: Document,
+    pub library: Library,
+    pub settings: Settings,
     layout: Layout,
-    halftoned: Halftoned,
+    pub halftoned: Halftoned,
 }
 
 impl Work {
     /// The plan of the document. Nothing is written.
     pub fn draft(&self, observer: &dyn Observer) -> Result<Draft> {
-        let (inks, library) = self.inks.at_hand()?;
-        let laid = self.halftone(self.document.open(observer)?, inks, library, observer)?;
+        let laid = self.dots.laid(observer)?;
         let mut draft = pipeline::draft(&self.request(&laid), observer)?;
         draft.plan.notes.clone_from(&laid.document.notes);
         Ok(draft)
+    }
+
+    fn request<'a>(&self, laid: &'a Laid) -> Request<'a> {
+        Request {
+            name: &laid.document.name,
+            dots: &laid.halftoned.dots,
+            layout: &laid.layout,
+            handling: self.media.handling(),
+            allowed: laid.settings.inks,
+            library: &laid.library,
+        }
+    }
+}
+
+impl DotsArgs {
+    /// The document's dots. Nothing is written.
+    pub fn laid(&self, observer: &dyn Observer) -> Result<Laid> {
+        let (inks, library) = self.inks.at_hand()?;
+        self.halftone(self.document.open(observer)?, inks, library, observer)
     }
 
     fn halftone(
@@ -102,17 +127,6 @@ impl Work {
             observer.note(&words);
         }
         Ok(Laid { document, library, settings, layout, halftoned })
-    }
-
-    fn request<'a>(&self, laid: &'a Laid) -> Request<'a> {
-        Request {
-            name: &laid.document.name,
-            dots: &laid.halftoned.dots,
-            layout: &laid.layout,
-            handling: self.media.handling(),
-            allowed: laid.settings.inks,
-            library: &laid.library,
-        }
     }
 }
 
@@ -159,14 +173,14 @@ pub struct Args {
 
 /// Runs `print`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let (inks, library) = args.work.inks.at_hand()?;
+    let (inks, library) = args.work.dots.inks.at_hand()?;
     let probe = match &args.probe {
         Some(path) => Probe::read_hdr(path)?,
         None => Probe::studio(128),
     };
-    let document = args.work.document.open(observer)?;
+    let document = args.work.dots.document.open(observer)?;
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
-    let laid = args.work.halftone(document, inks, library, observer)?;
+    let laid = args.work.dots.halftone(document, inks, library, observer)?;
     let ground = args.result.background.unwrap_or_default();
     let made = job::make(&args.work.request(&laid), &laid.document.notes, &[], places, ground, observer)?;
     let pictures = pictures(&laid, made.job.draft.separation.passes.len(), &probe, observer)?;

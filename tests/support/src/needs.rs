@@ -27,6 +27,8 @@ pub enum Need {
     Usb,
     /// dpkg, man and root.
     Package,
+    /// Chromium and Node, which `cargo xtask preview` brings.
+    Browser,
     /// Tesseract, which reads printed text.
     Reading,
 }
@@ -43,6 +45,7 @@ impl Need {
             Need::Emulator => "emulator",
             Need::Usb => "usb",
             Need::Package => "package",
+            Need::Browser => "browser",
             Need::Reading => "reading",
         }
     }

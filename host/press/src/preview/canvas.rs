@@ -117,6 +117,16 @@ impl DrawTarget for Canvas {
     }
 }
 
+/// A picture by itself on the neutral background.
+///
+/// # Errors
+/// A side that is 0 or too long.
+pub fn picture(radiance: &Radiance, exposure: Exposure) -> Result<RgbImage, PreviewError> {
+    let mut canvas = Canvas::new(radiance.width, radiance.height)?;
+    canvas.paste(0, 0, radiance, exposure);
+    Ok(canvas.finish())
+}
+
 /// A text cut to `room` letters.
 pub(super) fn shortened(text: &str, room: usize) -> String {
     if text.chars().count() <= room {

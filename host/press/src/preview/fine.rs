@@ -9,13 +9,13 @@
 use inks::Curve;
 
 /// Entries of a table.
-pub(super) const ENTRIES: usize = 384;
+pub const ENTRIES: usize = 384;
 
 /// Steps of the table from the chord to a place among the entries.
 const STEPS: usize = 8192;
 
 /// The angles of the entries. See the module text.
-pub(super) struct Fine {
+pub struct Fine {
     angles: Vec<f64>,
     places: Vec<f32>,
 }
@@ -27,7 +27,14 @@ fn coordinate(theta: f64) -> f64 {
     (10.0 * u).asinh() - 0.15 * (cos * cos + 1e-3).ln()
 }
 
+impl Default for Fine {
+    fn default() -> Fine {
+        Fine::new()
+    }
+}
+
 impl Fine {
+    /// The angles, and the way from a chord to them.
     pub fn new() -> Fine {
         let most = std::f64::consts::FRAC_PI_2;
         let (from, to) = (coordinate(0.0), coordinate(most));
@@ -58,7 +65,7 @@ impl Fine {
         self.angles.iter().map(|&t| curve.at(t).map(|v| v as f32)).collect()
     }
 
-    /// The entry below a chord, and the fraction of the way to the next entry, which exists.
+    /// The entry below a chord, `2 sin(theta_h / 2)` from 0 to the root of 2, and the fraction of the way to the next entry, which exists.
     #[inline]
     pub fn at(&self, chord: f32) -> (usize, f32) {
         let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);

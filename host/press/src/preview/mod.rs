@@ -25,11 +25,14 @@ mod source;
 pub mod sphere;
 mod tone;
 
+pub use canvas::picture;
 pub use error::{LONGEST_SIDE, PreviewError};
 pub use fidelity::{Report, fidelity};
+pub use fine::{ENTRIES, Fine};
 pub use flat::{Light, flat};
 pub use materials_picture::{Swatch, materials_picture, mix_in_words};
 pub use probe::Probe;
 pub use radiance::Radiance;
 pub use sheet_picture::{STANDARD_LIGHTS, sheet_picture};
 pub use source::Source;
+pub use tone::Exposure;

@@ -9,6 +9,8 @@
 //! Cost: one increment a dot, then one multiply-add for each column and stack in the pixel.
 //! Limits: averaging is linear in reflectance, as section 4.2 of the 2009 paper assumes of halftones.
 
+use rayon::prelude::*;
+
 use crate::sheet::{Area, DotMap};
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
@@ -62,6 +64,29 @@ impl<'a> Source<'a> {
         let (w, h) = self.size();
         let side = |part: usize, whole: usize| (part * longest + whole / 2) / whole.max(1);
         (side(w, w.max(h)).max(1), side(h, w.max(h)).max(1))
+    }
+
+    /// The share of each basis or stack in every pixel of a `width` x `height` picture, row by row, as many values a pixel as
+    /// there are bases or stacks. `None` for a document that is not factored.
+    ///
+    /// # Errors
+    /// A size out of range, or tables that do not match each other.
+    pub fn shares(&self, width: usize, height: usize) -> Result<Option<Vec<f32>>, PreviewError> {
+        let lines = self.lines(width, height, 1)?;
+        let Some(channels) = lines.table().map(Table::len) else { return Ok(None) };
+        let mut all = vec![0.0; width * height * channels];
+        all.par_chunks_exact_mut(width * channels).enumerate().for_each_init(
+            Scratch::default,
+            |scratch, (y, out)| {
+                let mut pixels = out.chunks_exact_mut(channels);
+                lines.each(y, scratch, |mean| {
+                    if let (Some(out), Mean::Shares(shares)) = (pixels.next(), mean) {
+                        out.copy_from_slice(shares);
+                    }
+                });
+            },
+        );
+        Ok(Some(all))
     }
 
     /// Prepares reading it line by line as `width` x `height` pixels.

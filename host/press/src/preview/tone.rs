@@ -17,7 +17,7 @@ const MIDDLE: f32 = 0.6;
 
 /// The factor of radiance before the tone curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Exposure(pub f32);
+pub struct Exposure(pub f32);
 
 impl Exposure {
     /// For white paper facing a light of irradiance 1, which reflects about 0.85 / pi: it becomes slightly darker than white.

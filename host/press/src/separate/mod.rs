@@ -176,6 +176,17 @@ pub fn separate(sheet: &Sheet, rules: &[Rule], observer: &dyn Observer) -> Resul
     })
 }
 
+/// The passes that print these stacks: their inks, first printed first, and for each stack the bits of its passes.
+pub fn passes(stacks: &[Stack]) -> (Vec<Ink>, Vec<u16>) {
+    let inks = order::order(&stacks.iter().map(Stack::layers).collect::<Vec<_>>()).inks;
+    let bits = |stack: &Stack| {
+        let passes = order::embed(stack.layers(), &inks).unwrap_or_default();
+        passes.into_iter().filter(|&pass| pass < 16).fold(0, |bits, pass| bits | 1 << pass)
+    };
+    let bits = stacks.iter().map(bits).collect();
+    (inks, bits)
+}
+
 /// The sheet that passes print: each dot has the inks of the passes that have it, lowest first. `stacks` are the
 /// stacks to expect, numbered as the sheet will number them.
 ///

@@ -51,7 +51,7 @@ pub(crate) fn upon(stack: &Stack, ground: [u8; 3]) -> [u8; 3] {
 }
 
 /// The same for one ink to be seen by itself: clear ones are labelled with a colour that they do not have.
-pub(crate) fn label(ink: Ink, ground: [u8; 3]) -> [u8; 3] {
+pub fn label(ink: Ink, ground: [u8; 3]) -> [u8; 3] {
     bytes(look(&Stack::new([ink]), fractions(ground), tint))
 }
 
@@ -84,7 +84,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 /// One colour for each stack, all different, sRGB.
-pub(crate) fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
+pub fn colours(stacks: &[Stack]) -> Vec<[u8; 3]> {
     let grid: Vec<[f64; 3]> =
         (0..4096).map(|i| [i / 256, i / 16 % 16, i % 16].map(|v| f64::from(v) * 17.0)).collect();
     // How far each grid colour is from all colours given away.

@@ -1,0 +1,83 @@
+//! `foilpress preview` as users of the program meet it.
+
+use std::fs;
+
+use serde_json::Value;
+use testing::program::{Bench, small_document};
+
+const SMALL: &str = "--size 12x8mm -q";
+
+#[test]
+fn a_document_becomes_a_page_a_picture_or_radiance() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let said = bench.done(&format!("preview tile {SMALL} -o tile.html --json"));
+    let report: Value = serde_json::from_str(&said).expect("JSON");
+    let page = fs::read_to_string(bench.path("tile.html")).expect("a page");
+    assert_eq!(report["bytes"], page.len());
+    assert!(page.starts_with("<!doctype html>") && page.contains("show=document&with=printed"));
+
+    // Twice the light is twice the radiance, and a darker exposure a darker picture.
+    let red = |name: &str| {
+        let picture = image::open(bench.path(name)).expect("a picture").into_rgba32f();
+        picture.pixels().map(|p| f64::from(p.0[0])).sum::<f64>()
+    };
+    bench.done(&format!("preview tile {SMALL} -o one.exr --light 20,10 --pixels 120"));
+    bench.done(&format!("preview tile {SMALL} -o two.exr --light 20,10 --light 20,10 --pixels 120"));
+    assert!((red("two.exr") / red("one.exr") - 2.0).abs() < 1e-4);
+    bench.done(&format!("preview tile {SMALL} -o bright.png --exposure 1 --show document --pixels 120"));
+    bench.done(&format!(
+        "preview tile {SMALL} -o dark.png --exposure -2 --show mapped --pixels 120 --curl 0.02"
+    ));
+    assert!(red("dark.png") < 0.8 * red("bright.png"));
+}
+
+#[test]
+fn dots_and_jobs_show_the_print_alone() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("print tile --size 12x8mm --paper postcard -q --to file:job.rgl");
+    bench.done("preview job.rgl -q -o job.png --pixels 200");
+    bench.done("simulate job.rgl -q -o printed.sheet");
+    bench.done("preview printed.sheet -q -o sheet.png --pixels 200");
+    assert_eq!(fs::read(bench.path("job.png")).unwrap(), fs::read(bench.path("sheet.png")).unwrap());
+    let said = bench.refused(1, "preview job.rgl -q -o job.png --show document");
+    assert!(said.contains("has printed dots and no document"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_with_what_to_do_and_leaves_nothing() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let panorama = |exposure: &str| {
+        let mut bytes = format!("#?RADIANCE\n{exposure}FORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n").into_bytes();
+        bytes.extend([[128u8, 128, 128, 128]; 8].concat());
+        bytes
+    };
+    fs::write(bench.path("good.hdr"), panorama("")).unwrap();
+    fs::write(bench.path("nan.hdr"), panorama("EXPOSURE=NaN\n")).unwrap();
+    fs::write(bench.path("negative.hdr"), panorama("EXPOSURE=-1\n")).unwrap();
+    fs::write(bench.path("infinite.hdr"), panorama("EXPOSURE=inf\n")).unwrap();
+    fs::write(bench.path("tiny.hdr"), panorama("EXPOSURE=1e-38\nEXPOSURE=1e-38\n")).unwrap();
+    fs::write(bench.path("short.hdr"), &panorama("")[..60]).unwrap();
+    bench.done(&format!("preview tile {SMALL} -o out.png --light-probe good.hdr --pixels 64"));
+    fs::remove_file(bench.path("out.png")).unwrap();
+    for (args, expected) in [
+        ("-o out.png --view 120,0", "behind the sheet"),
+        ("-o out.png --view 60,0 --tilt -60,0", "behind the sheet"),
+        ("-o out.png --curl 0.001", "cannot be bent"),
+        ("-o out.jpg", "must end in .html, .png or .exr"),
+        ("-o out.png --light-probe nan.hdr", "nan.hdr"),
+        ("-o out.png --light-probe negative.hdr", "negative.hdr"),
+        ("-o out.png --light-probe infinite.hdr", "infinite.hdr"),
+        ("-o out.png --light-probe tiny.hdr", "tiny.hdr"),
+        ("-o out.png --light-probe short.hdr", "short.hdr"),
+        ("-o out.png --light-probe missing.hdr", "missing.hdr"),
+        ("-o out.png --light 0,0 --light 0,0 --light 0,0 --light 0,0 --light 0,0", "at most four lights"),
+        ("-o nowhere/out.png", "there is no folder nowhere"),
+    ] {
+        let said = bench.refused(1, &format!("preview tile {SMALL} {args}"));
+        assert!(said.contains(expected), "{args}: {said}");
+        assert!(!bench.path("out.png").exists(), "{args}");
+    }
+}

@@ -1,0 +1,28 @@
+//! Relightable pictures: a document, its mixture of inks or the printed dots, under any light and from any direction.
+//!
+//! [`Lit`] is what is lit: a few curves over the half angle and a weight for each of them at every place. A [`Scene`] says
+//! where the eye and the lights are and how the sheet is held. [`Renderer`] makes a picture of both, and [`page`] writes a
+//! page that makes the same pictures in a browser, where they follow the hand.
+//! Units: metres, radians; x points right, y up, z to the eye that looks straight at the sheet. The origin is the middle of
+//! the sheet. Radiance is that of a surface under irradiance 1 where it faces the light, linear Rec. 709.
+#![forbid(unsafe_code)]
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    reason = "pixel arithmetic: sides are below 8192 and checked at the input; rounding to f32 and to bytes is the purpose of \
+              most casts"
+)]
+
+mod error;
+mod lit;
+pub mod page;
+mod render;
+mod scene;
+mod surroundings;
+
+pub use error::ViewError;
+pub use lit::{Lit, fit, mapped};
+pub use render::Renderer;
+pub use scene::{Camera, Light, Pose, Scene, direction, proportions};

@@ -1,0 +1,267 @@
+// Every control of the page by mouse, touch and keyboard. `FOILPRESS_PAGE` names the page: a document with a hostile name.
+
+import assert from 'node:assert/strict';
+import { readFile } from 'node:fs/promises';
+import { createRequire } from 'node:module';
+import test from 'node:test';
+import { open, rested } from './browser.mjs';
+
+const file = process.env.FOILPRESS_PAGE;
+const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+const numbers = (text) => text.split(',').map(Number);
+
+/** Runs in a page, and fails if the page complained. */
+async function visit(how, run) {
+  const { browser, page, complaints } = await open(file, how);
+  try {
+    await run(page);
+    assert.deepEqual(complaints, []);
+  } finally {
+    await browser.close();
+  }
+}
+const desk = { width: 900, height: 640 };
+const phone = { width: 390, height: 780, touch: true };
+
+/** A place on the sheet, beside lamp and handle. */
+async function place(page) {
+  const box = await page.locator('#picture').boundingBox();
+  return [box.x + 0.66 * box.width, box.y + 0.6 * box.height];
+}
+
+async function drag(page, dx, dy, from) {
+  const [x, y] = from ?? (await place(page));
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + dx / 2, y + dy / 2);
+  await page.mouse.move(x + dx, y + dy);
+  await page.mouse.up();
+  return rested(page);
+}
+
+test('a hostile name is text and nothing else', () => visit(desk, async (page) => {
+  const name = await page.locator('#name').textContent();
+  assert.match(name, /<img src=x onerror=/);
+  assert.equal(await page.evaluate(() => window.hacked), undefined);
+  assert.equal(await page.locator('h1 *').count(), 0);
+}));
+
+test('the mouse drags light, sheet and picture, and the wheel zooms where it is', () => visit(desk, async (page) => {
+  const before = await rested(page);
+  let after = await drag(page, 60, -40);
+  const [a, e] = numbers(after.get('light'));
+  assert.ok(a > numbers((before.get('light') ?? '-25,30,0'))[0] + 5 && e > 32, after.get('light'));
+  await page.click('[data-tool=sheet]');
+  after = await drag(page, 80, 40);
+  const [turn, tip] = numbers(after.get('tilt'));
+  assert.ok(turn > 10 && tip < -5, after.get('tilt'));
+  await page.click('[data-tool=move]');
+  after = await drag(page, 50, 50);
+  const [x, y] = numbers(after.get('pan'));
+  assert.ok(x < 0 && y > 0, after.get('pan'));
+  const [mx, my] = await place(page);
+  await page.mouse.move(mx + 100, my);
+  await page.mouse.wheel(0, -600);
+  after = await rested(page);
+  assert.ok(Number(after.get('zoom')) > 2, after.get('zoom'));
+  assert.ok(numbers(after.get('pan'))[0] > x, 'the point under the mouse stays');
+  await page.click('#whole');
+  after = await rested(page);
+  assert.deepEqual([after.get('zoom'), after.get('pan')], ['1', '0,0']);
+  await page.click('#nearer');
+  await page.click('#nearer');
+  await page.click('#farther');
+  after = await rested(page);
+  assert.equal(after.get('zoom'), '1.5');
+  // The lamp itself, and the handle.
+  const lamp = await page.locator('.lamp').boundingBox();
+  after = await drag(page, 30, 0, [lamp.x + 22, lamp.y + 22]);
+  assert.ok(numbers(after.get('light'))[0] > a);
+  const handle = await page.locator('#handle').boundingBox();
+  after = await drag(page, 100, 0, [handle.x + 22, handle.y + 90]);
+  assert.ok(Number(after.get('split')) > 0.55, after.get('split'));
+}));
+
+test('every view, every pass and every slider changes picture and address', () => visit(desk, async (page) => {
+  const picture = () => page.evaluate(() => document.querySelector('canvas').toDataURL());
+  await page.selectOption('#with', '');
+  const seen = new Set();
+  for (const show of ['document', 'mapped', 'printed', 'difference', 'stacks', 'passes']) {
+    await page.click(`[data-show=${show}]`);
+    assert.equal((await rested(page)).get('show'), show);
+    seen.add(await picture());
+  }
+  assert.equal(seen.size, 6);
+  await page.selectOption('#pass', '1');
+  assert.equal((await rested(page)).get('pass'), '1');
+  await page.click('[data-show=printed]');
+  await page.selectOption('#with', 'stacks');
+  assert.equal((await rested(page)).get('with'), 'stacks');
+  await page.selectOption('#with', '');
+  for (const slider of await page.locator('input[type=range]').all()) {
+    const [address, before] = [(await rested(page)).toString(), await picture()];
+    await slider.focus();
+    const upper = await slider.evaluate((input) => Number(input.value) > (Number(input.min) + Number(input.max)) / 2);
+    for (let i = 0; i < 8; i++) await page.keyboard.press(upper ? 'ArrowLeft' : 'ArrowRight');
+    const name = await slider.evaluate((input) => input.closest('label').textContent);
+    assert.notEqual((await rested(page)).toString(), address, name);
+    assert.notEqual(await picture(), before, name);
+  }
+  const before = await picture();
+  await page.check('#probe');
+  assert.equal((await rested(page)).get('probe'), '1');
+  assert.notEqual(await picture(), before);
+  await page.click('#more');
+  assert.equal((await rested(page)).get('light').split(';').length, 2);
+  await page.click('#lights button:first-child');
+  await page.click('#fewer');
+  assert.equal((await rested(page)).get('light').split(';').length, 1);
+  await page.click('#reset');
+  assert.equal((await rested(page)).get('probe'), '0');
+}));
+
+test('the keyboard reaches and does everything', () => visit(desk, async (page) => {
+  await page.focus('#picture');
+  const before = numbers((await rested(page)).get('light') ?? '-25,30');
+  await page.keyboard.press('ArrowRight');
+  await page.keyboard.press('ArrowUp');
+  let now = await rested(page);
+  assert.deepEqual(numbers(now.get('light')).slice(0, 2), [before[0] + 3, before[1] + 3]);
+  await page.keyboard.press('Shift+ArrowRight');
+  await page.keyboard.press('Alt+ArrowDown');
+  await page.keyboard.press('+');
+  now = await rested(page);
+  assert.ok(numbers(now.get('tilt'))[0] > 0 && numbers(now.get('pan'))[1] !== 0 && Number(now.get('zoom')) > 1, now.toString());
+  await page.keyboard.press('-');
+  await page.keyboard.press('0');
+  assert.equal((await rested(page)).get('zoom'), '1');
+  await page.keyboard.press('Enter');
+  assert.match(await page.locator('#spot').textContent(), /d = \d\.\d{3}/);
+  for (const [key, tool] of [['t', 'sheet'], ['m', 'move'], ['l', 'light']]) {
+    await page.keyboard.press(key);
+    assert.equal(await page.locator(`[data-tool=${tool}]`).getAttribute('aria-pressed'), 'true');
+  }
+  await page.focus('#handle');
+  await page.keyboard.press('Home');
+  assert.equal((await rested(page)).get('split'), '0');
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await rested(page)).get('split'), '0.02');
+  await page.focus('.lamp');
+  await page.keyboard.press('ArrowLeft');
+  assert.equal(numbers((await rested(page)).get('light'))[0], before[0]);
+  await page.focus('[data-show=document]');
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await rested(page)).get('show'), 'mapped');
+  // Everything that can be operated is reached by Tab.
+  const reached = new Set();
+  await page.evaluate(() => /** @type {HTMLElement} */ (document.activeElement).blur());
+  for (let i = 0; i < 60; i++) {
+    await page.keyboard.press('Tab');
+    reached.add(await page.evaluate(() => document.activeElement?.id || document.activeElement?.className || document.activeElement?.tagName));
+  }
+  for (const id of ['picture', 'handle', 'lamp', 'with', 'probe', 'share', 'reset']) assert.ok(reached.has(id), id);
+}));
+
+test('a spot tells its curve, its mixture and the inks of its dot', () => visit(desk, async (page) => {
+  const [x, y] = await place(page);
+  await page.mouse.click(x - 60, y + 40);
+  assert.equal(await page.locator('#spot svg path').count(), 2);
+  const shares = (await page.locator('#mixture li b').allTextContents()).map((text) => Number.parseInt(text, 10));
+  const sum = shares.reduce((a, b) => a + b, 0);
+  assert.ok(sum >= 97 && sum <= 103, String(sum));
+  assert.match(await page.locator('#dot').textContent(), /This dot: .+\(.+\)/);
+  const box = await page.locator('#picture').boundingBox();
+  await page.mouse.click(box.x + 4, box.y + 0.6 * box.height);
+  assert.match(await page.locator('#spot').textContent(), /Beside the sheet/);
+}));
+
+test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
+  await page.evaluate(() => { location.hash = 'show=printed'; });
+  const session = await page.context().newCDPSession(page);
+  const [x, y] = await place(page);
+  const touch = (type, ...points) => session.send('Input.dispatchTouchEvent', {
+    type, touchPoints: points.map(([px, py], id) => ({ x: px, y: py, id })),
+  });
+  const before = numbers((await rested(page)).get('light') ?? '-25,30');
+  await touch('touchStart', [x, y]);
+  await touch('touchMove', [x + 20, y]);
+  await touch('touchMove', [x + 50, y]);
+  await touch('touchEnd');
+  assert.ok(numbers((await rested(page)).get('light'))[0] > before[0] + 5);
+  await touch('touchStart', [x - 40, y], [x + 40, y]);
+  await touch('touchMove', [x - 60, y], [x + 60, y]);
+  await touch('touchMove', [x - 90, y], [x + 90, y]);
+  await touch('touchEnd');
+  assert.ok(Number((await rested(page)).get('zoom')) > 1.8);
+  await page.touchscreen.tap(x, y);
+  assert.match(await page.locator('#spot').textContent(), /This dot/);
+  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, 'nothing is cut off');
+}));
+
+test('an address brings back its view, and nonsense in it does no harm', () => visit(desk, async (page) => {
+  const view = 'show=printed&light=10,20,0;-30,40,0.5&probe=0&view=5,-5&distance=0.4&tilt=10,-20&curl=0.08&zoom=3&pan=0.01,-0.01&exposure=1.5';
+  await page.evaluate((hash) => { location.hash = hash; }, view);
+  assert.equal(decodeURIComponent((await rested(page)).toString()), view);
+  await page.evaluate(() => { location.hash = 'show=<b>&light=NaN,1;2&zoom=1e99&pan=a&tilt=999,-999&curl=-1&distance=1e-9&exposure=Infinity&pass=77&split=-4'; });
+  const after = await rested(page);
+  assert.equal(after.get('show'), 'printed');
+  assert.equal(after.get('zoom'), '400');
+}));
+
+for (const colorScheme of ['light', 'dark']) {
+  test(`no serious finding of axe-core, ${colorScheme}`, () => visit({ ...desk, colorScheme }, async (page) => {
+    await page.focus('#picture');
+    await page.keyboard.press('Enter');
+    for (const show of ['difference', 'stacks', 'passes']) {
+      await page.click(`[data-show=${show}]`);
+      await rested(page);
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => window.axe.run());
+      const serious = violations.filter(({ impact }) => impact === 'serious' || impact === 'critical');
+      assert.deepEqual(serious.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), []);
+    }
+  }));
+}
+
+test('five hundred changes of light leave no memory behind', () => visit({ width: 620, height: 400 }, async (page) => {
+  const used = () => page.evaluate(() => {
+    globalThis.gc();
+    globalThis.gc();
+    return performance.memory.usedJSHeapSize;
+  });
+  const turn = async (/** @type {number} */ count) => {
+    for (let i = 0; i < count; i++) {
+      await page.evaluate((hash) => { location.hash = hash; }, `show=document&light=${(i * 7) % 60},${i % 50},0.5&tilt=${i % 90 < 9 ? i % 9 : 0},0&probe=${Number(i % 90 < 9)}`);
+      await page.evaluate(() => new Promise(requestAnimationFrame));
+    }
+    await rested(page);
+  };
+  await turn(20);
+  const before = await used();
+  await turn(500);
+  const after = await used();
+  assert.ok(after < before + 4e6, `${before} bytes became ${after}`);
+}));
+
+test('without WebGL2 there is a picture and a sentence', () => visit({ ...desk, webgl: false }, async (page) => {
+  await page.waitForSelector('#message:not([hidden])');
+  assert.match(await page.locator('#message').textContent(), /no WebGL2/);
+  assert.ok(await page.locator('#still').evaluate((image) => image.naturalWidth > 0 && image.offsetWidth > 0));
+}));
+
+test('dragging draws coarser, and rest draws finely', () => visit(desk, async (page) => {
+  const size = () => page.evaluate(() => document.querySelector('canvas').width);
+  const fine = await size();
+  const [x, y] = await place(page);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  let least = fine;
+  for (let i = 0; i < 40; i++) {
+    await page.mouse.move(x + i, y);
+    least = Math.min(least, await size());
+  }
+  await page.mouse.up();
+  await rested(page);
+  assert.equal(await size(), fine);
+  assert.ok(least <= fine);
+}));

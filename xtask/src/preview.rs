@@ -1,0 +1,72 @@
+//! `cargo xtask preview`: the preview's page in a real browser.
+//!
+//! Its sources are checked for types, its pictures are compared with those of the renderer, and every control is used by
+//! mouse, touch and keyboard. The browser is Debian's, drawing in software.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use anyhow::{Context as _, Result, bail};
+use testing::needs::Need;
+
+use crate::tools::{self, Node};
+use crate::{cargo, command, firmware, succeed};
+
+const CHROMIUM: &str = "chromium";
+
+/// Runs the tests, or leaves them out where browser or Node cannot be had.
+pub fn run(root: &Path) -> Result<()> {
+    let folder = firmware::target(root);
+    std::fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+    let scripts = root.join("tests/browser");
+    let node = match Node::find(&folder).and_then(|node| install().map(|()| node)) {
+        Ok(node) => node,
+        Err(missing) => return tools::skip(Need::Browser, &format!("{missing:#}")),
+    };
+    let install = ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"];
+    succeed(node.command("npm", &install).current_dir(&scripts))?;
+    succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
+    let args =
+        ["test", "--package", "foilpress-view", "--test", "browser", "--locked", "--", "--test-threads=1"];
+    let mut test = cargo(&args);
+    test.current_dir(root)
+        .env("FOILPRESS_CHROMIUM", found()?)
+        .env("FOILPRESS_NODE", &node.program)
+        .env("FOILPRESS_BROWSER", &scripts);
+    succeed(&mut test)
+}
+
+/// Where the browser is.
+fn found() -> Result<PathBuf> {
+    let path = env::var_os("PATH").unwrap_or_default();
+    let mut programs = env::split_paths(&path).map(|folder| folder.join(CHROMIUM));
+    programs.find(|program| program.is_file()).context("chromium is not on PATH")
+}
+
+/// Installs the browser where it is missing.
+fn install() -> Result<()> {
+    let has = || {
+        let mut version = command(CHROMIUM, &["--version"]);
+        version.stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok_and(|status| status.success())
+    };
+    if has() {
+        return Ok(());
+    }
+    println!("{CHROMIUM} is not installed; apt fetches it");
+    let apt = || {
+        let mut install =
+            command("apt-get", &["install", "--yes", "--quiet", "--no-install-recommends", CHROMIUM]);
+        install.env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
+        install.status().is_ok_and(|status| status.success())
+    };
+    // The lists of a fresh machine are empty.
+    if !apt() {
+        let _ = command("apt-get", &["update", "--quiet"]).stdout(Stdio::null()).status();
+        apt();
+    }
+    if !has() {
+        bail!("{CHROMIUM} is not installed and cannot be (apt needs root)");
+    }
+    Ok(())
+}
