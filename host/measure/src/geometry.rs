@@ -280,6 +280,11 @@ impl Scene {
         self.half[1]
     }
 
+    /// Cosine of incidence at the can's right (1) or left (-1) outline.
+    pub(crate) fn lit_from_side(&self, side: f64, light: usize) -> f64 {
+        side * dot(unit(along(self.lights[light], -1.0, self.centre)), self.frame[0])
+    }
+
     /// By how many pixels the ray at this place passes outside the can's outline.
     pub(crate) fn outside_outline(&self, x: f64, y: f64) -> f64 {
         let d = self.camera.ray(x, y);

@@ -150,7 +150,7 @@ pub fn measure(folder: &Path, setup: &Setup, observer: &dyn Observer) -> Result<
         let copy = Copy::new(&radiance, card.scale.map(|k| irradiance / std::f64::consts::PI / k));
         let pixels =
             patches.iter().map(|(_, at)| reduce::pixels(&radiance, scene, card.scale, light, *at)).collect();
-        let outline = solve::outline(scene, &radiance);
+        let outline = solve::outline(scene, &radiance, light);
         seen.push(Seen { series: Series { shots, card }, copy, outline, pixels });
     }
     observer.end();

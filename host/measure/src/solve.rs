@@ -15,11 +15,13 @@ use crate::merge::Radiance;
 /// Nodes of a stack's curve over the square root of the angle.
 const NODES: usize = 48;
 /// Standard error of a place on the outline in pixels.
-const OUTLINE: f64 = 0.5;
+const OUTLINE: f64 = 1.0;
 /// What a model of one variable leaves unexplained at least, in ln f.
 const LEAST_MISFIT: f64 = 0.004;
 /// Neighbouring pixels share errors: paper's waves, the model's. So many of them count as one.
-const ALIKE: f64 = 8.0;
+const ALIKE: f64 = 20.0;
+/// The cosine of incidence at the outline from which it is bright enough.
+const GRAZING: f64 = 0.2;
 /// Steps of the method.
 const STEPS: usize = 14;
 
@@ -194,14 +196,17 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
     Solved { scene: apply(scene, measures, &moved), moved, uncertain, misfit, before }
 }
 
-/// Places in the picture where the can ends against a darker background, with the numbers of the rows along its axis.
-pub(crate) fn outline(scene: &Scene, radiance: &Radiance) -> Vec<[f64; 2]> {
+/// Places in the picture where the can ends against a darker background.
+pub(crate) fn outline(scene: &Scene, radiance: &Radiance, light: usize) -> Vec<[f64; 2]> {
     let Some(radius) = scene.radius() else { return Vec::new() };
     let mut found = Vec::new();
     for row in -12i32..=12 {
         let height = f64::from(row) / 14.0 * scene.half_height();
         for side in [-1.0, 1.0] {
-            found.extend(edge(scene, radiance, side * radius, height));
+            // Where the lamp's light only grazes, the can's shadow ends before the can does.
+            if scene.lit_from_side(side, light) > GRAZING {
+                found.extend(edge(scene, radiance, side * radius, height));
+            }
         }
     }
     found
