@@ -54,13 +54,23 @@ pub(crate) struct Match {
 }
 
 impl Tones {
-    pub(crate) fn new(probe: &Probe, response: &Response, noise: Noise, white: [f32; 3], exposure: f64) -> Tones {
+    pub(crate) fn new(
+        probe: &Probe,
+        response: &Response,
+        noise: Noise,
+        white: [f32; 3],
+        exposure: f64,
+    ) -> Tones {
         let blocks = (probe.factor * probe.factor) as f32;
         let time = exposure as f32;
-        let least: Vec<f32> =
-            probe.mean.iter().map(|mean| (0..3).map(|c| response.linear(c, mean[c])).sum::<f32>().max(0.0) / time).collect();
+        let least: Vec<f32> = probe
+            .mean
+            .iter()
+            .map(|mean| (0..3).map(|c| response.linear(c, mean[c])).sum::<f32>().max(0.0) / time)
+            .collect();
         let full = |most: &[f32; 3]| (0..3).any(|c| most[c] >= CLIPPED * white[c]);
-        let light = least.iter().zip(&probe.most).map(|(l, most)| if full(most) { f32::NAN } else { *l }).collect();
+        let light =
+            least.iter().zip(&probe.most).map(|(l, most)| if full(most) { f32::NAN } else { *l }).collect();
         // Where the noise of three channels is a twelfth of the value, for values with shot and read noise.
         let (gain, read) = (noise.gain, 3.0 * noise.read);
         let certain = CERTAIN * CERTAIN / blocks;
@@ -76,7 +86,8 @@ impl Tones {
             (0..width * height)
                 .map(|i| {
                     let at = 2 * (i / width) * self.width + 2 * (i % width);
-                    (values[at] + values[at + 1] + values[at + self.width] + values[at + self.width + 1]) / 4.0
+                    (values[at] + values[at + 1] + values[at + self.width] + values[at + self.width + 1])
+                        / 4.0
                 })
                 .collect()
         };
@@ -86,7 +97,11 @@ impl Tones {
 
     /// The logarithm of light with a little added.
     fn logs(&self, little: f32) -> Logs {
-        Logs { width: self.width, height: self.height, ln: self.light.iter().map(|l| (l + little).ln()).collect() }
+        Logs {
+            width: self.width,
+            height: self.height,
+            ln: self.light.iter().map(|l| (l + little).ln()).collect(),
+        }
     }
 
     /// Compares this photograph with another one of the same size.
@@ -122,7 +137,9 @@ impl Tones {
                 let (here, there) = (a.at(x, y), b.between(u, v));
                 let near = [(1, 0), (-1, 0), (0, 1), (0, -1)];
                 let slope = |logs: &Logs, x: i64, y: i64| {
-                    near.iter().map(|(i, j)| (logs.at(x + i, y + j) - logs.at(x, y)).abs()).fold(0.0, f64::max)
+                    near.iter()
+                        .map(|(i, j)| (logs.at(x + i, y + j) - logs.at(x, y)).abs())
+                        .fold(0.0, f64::max)
                 };
                 if here.is_finite() && there.is_finite() {
                     all.push((here, there - here, slope(a, x, y)));
@@ -130,11 +147,14 @@ impl Tones {
                 }
                 // One of them is full, which gives the other a least value.
                 let (i, j) = (u.round(), v.round());
-                let inside = i >= 1.0 && j >= 1.0 && i < self.width as f64 - 1.0 && j < self.height as f64 - 1.0;
+                let inside =
+                    i >= 1.0 && j >= 1.0 && i < self.width as f64 - 1.0 && j < self.height as f64 - 1.0;
                 if !inside || (here.is_nan() && there.is_nan()) {
                     continue;
                 }
-                let bound = |tones: &Tones, x: usize, y: usize| f64::from((tones.least[y * tones.width + x] + little).ln());
+                let bound = |tones: &Tones, x: usize, y: usize| {
+                    f64::from((tones.least[y * tones.width + x] + little).ln())
+                };
                 let (value, least, slope) = if there.is_nan() {
                     (here, bound(other, i as usize, j as usize), slope(a, x, y))
                 } else {
@@ -162,7 +182,8 @@ impl Tones {
         let third = near.len() / 3;
         let bend = if third > 50 { mean(&near[near.len() - third..]) - mean(&near[..third]) } else { 0.0 };
         // What is dark in both says nothing.
-        let told: Vec<&(f64, f64, f64)> = all.iter().filter(|d| d.0.max(d.0 + d.1) > f64::from((2.0 * little).ln())).collect();
+        let told: Vec<&(f64, f64, f64)> =
+            all.iter().filter(|d| d.0.max(d.0 + d.1) > f64::from((2.0 * little).ln())).collect();
         let doubt = STRANGE + 4.0 * width.min(0.1);
         let strange = told.iter().filter(|d| (d.1 - ratio).abs() > doubt + d.2).count() + broken;
         Match {
@@ -206,8 +227,14 @@ impl Logs {
             for x in 1..self.width as i64 - 1 {
                 let found = other.between(x as f64 + shift[0], y as f64 + shift[1]);
                 let difference = found - self.at(x, y) - ratio;
-                let g = [(self.at(x + 1, y) - self.at(x - 1, y)) / 2.0, (self.at(x, y + 1) - self.at(x, y - 1)) / 2.0, -1.0];
-                if !(difference.is_finite() && g[0].is_finite() && g[1].is_finite()) || difference.abs() > limit {
+                let g = [
+                    (self.at(x + 1, y) - self.at(x - 1, y)) / 2.0,
+                    (self.at(x, y + 1) - self.at(x, y - 1)) / 2.0,
+                    -1.0,
+                ];
+                if !(difference.is_finite() && g[0].is_finite() && g[1].is_finite())
+                    || difference.abs() > limit
+                {
                     continue;
                 }
                 for i in 0..3 {
@@ -263,8 +290,12 @@ mod tests {
         let values = (0..width * height)
             .flat_map(|i| {
                 let (x, y) = ((i % width) as f64 - shift[0], (i / width) as f64 - shift[1]);
-                let disc = |cx: f64, cy: f64, r: f64| 1.0 / (1.0 + (((x - cx).hypot(y - cy) - r) / 1.5).exp());
-                let light = 0.05 + 0.3 * disc(90.0, 100.0, 40.0) + 0.2 * disc(220.0, 140.0, 30.0 * other) + 0.0004 * x;
+                let disc =
+                    |cx: f64, cy: f64, r: f64| 1.0 / (1.0 + (((x - cx).hypot(y - cy) - r) / 1.5).exp());
+                let light = 0.05
+                    + 0.3 * disc(90.0, 100.0, 40.0)
+                    + 0.2 * disc(220.0, 140.0, 30.0 * other)
+                    + 0.0004 * x;
                 [(light * exposure * 60_000.0).clamp(0.0, 65_535.0) as u16; 3]
             })
             .collect();
@@ -277,8 +308,14 @@ mod tests {
         let first = scene([0.0, 0.0], 1.0, 1.0);
         for shift in [[0.0, 0.0], [0.5, -0.3], [3.3, 2.6], [-12.4, 7.0]] {
             let found = first.compare(&scene(shift, 0.5 * 1.03, 1.0));
-            assert!((found.shift[0] - shift[0]).abs() < 0.05 && (found.shift[1] - shift[1]).abs() < 0.05, "{found:?}");
-            assert!(found.ratio.abs() < 0.002 && found.strange < 0.01 && found.compared > 10_000, "{found:?}");
+            assert!(
+                (found.shift[0] - shift[0]).abs() < 0.05 && (found.shift[1] - shift[1]).abs() < 0.05,
+                "{found:?}"
+            );
+            assert!(
+                found.ratio.abs() < 0.002 && found.strange < 0.01 && found.compared > 10_000,
+                "{found:?}"
+            );
         }
     }
 

@@ -92,8 +92,8 @@ pub fn find(radiance: &Radiance, reflectance: [f64; 3]) -> Result<[[f64; 4]; 3],
         for b in &regions {
             let Some(way) = follows(a, b, falls[0]) else { continue };
             for c in &regions {
-                let same_side =
-                    (c.middle()[way] - b.middle()[way]).signum() == (b.middle()[way] - a.middle()[way]).signum();
+                let same_side = (c.middle()[way] - b.middle()[way]).signum()
+                    == (b.middle()[way] - a.middle()[way]).signum();
                 if follows(b, c, falls[1]) == Some(way) && same_side {
                     let pixels = |at: usize| (at * factor) as f64;
                     found.push(
@@ -205,9 +205,14 @@ pub fn steps_of(rectangle: [f64; 4], radiance: &Radiance) -> [[f64; 4]; 3] {
 }
 
 /// Pixels well inside a step: x, y and number.
-fn inside(radiance: &Radiance, [left, top, right, bottom]: Rectangle) -> impl Iterator<Item = (usize, usize, usize)> {
+fn inside(
+    radiance: &Radiance,
+    [left, top, right, bottom]: Rectangle,
+) -> impl Iterator<Item = (usize, usize, usize)> {
     let (dx, dy) = (MARGIN * (right - left), MARGIN * (bottom - top));
-    let whole = |from: f64, to: f64, most: usize| (from.ceil().max(0.0) as usize)..(to.floor().max(0.0) as usize).min(most);
+    let whole = |from: f64, to: f64, most: usize| {
+        (from.ceil().max(0.0) as usize)..(to.floor().max(0.0) as usize).min(most)
+    };
     let (columns, width) = (whole(left + dx, right - dx, radiance.width), radiance.width);
     whole(top + dy, bottom - dy, radiance.height)
         .flat_map(move |y| columns.clone().map(move |x| (x, y, y * width + x)))
@@ -248,8 +253,10 @@ pub fn calibrate(
             )));
         }
         for c in 0..3 {
-            let values: Vec<f64> =
-                pixels.iter().map(|(i, irradiance)| f64::from(radiance.value[3 * i + c]) / irradiance).collect();
+            let values: Vec<f64> = pixels
+                .iter()
+                .map(|(i, irradiance)| f64::from(radiance.value[3 * i + c]) / irradiance)
+                .collect();
             let (middle, width) = spread(&values);
             let near: Vec<f64> = values.into_iter().filter(|v| (v - middle).abs() <= 3.0 * width).collect();
             levels[s][c] = near.iter().sum::<f64>() / near.len().max(1) as f64;
@@ -259,8 +266,12 @@ pub fn calibrate(
         }
     }
     let scale: [f64; 3] = std::array::from_fn(|c| reflectance[1] / PI / levels[1][c]);
-    let deviation = [0, 2].map(|s| std::array::from_fn(|c| levels[s][c] * scale[c] * PI / reflectance[s] - 1.0));
-    let worst = deviation.iter().flatten().fold(0.0f64, |most, d: &f64| if d.is_finite() { most.max(d.abs()) } else { f64::MAX });
+    let deviation =
+        [0, 2].map(|s| std::array::from_fn(|c| levels[s][c] * scale[c] * PI / reflectance[s] - 1.0));
+    let worst = deviation
+        .iter()
+        .flatten()
+        .fold(0.0f64, |most, d: &f64| if d.is_finite() { most.max(d.abs()) } else { f64::MAX });
     if scale.iter().any(|k| !k.is_finite() || *k <= 0.0) || worst > NO_CARD {
         return Err(MeasureError::Scene(format!(
             "the steps at {:.0}, {:.0} are not those of a card of {} %: they are off by {:.0} %; check card.rectangle_px and \

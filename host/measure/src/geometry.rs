@@ -118,12 +118,18 @@ impl Scene {
     ///
     /// # Errors
     /// Directions that are none, a light or camera inside the sample.
-    pub fn new(setup: &Setup, (width, height): (usize, usize), field_of_view: f64) -> Result<Scene, MeasureError> {
+    pub fn new(
+        setup: &Setup,
+        (width, height): (usize, usize),
+        field_of_view: f64,
+    ) -> Result<Scene, MeasureError> {
         let wrong = |problem: &str| MeasureError::Scene(format!("setup file: {problem}"));
         let forward = along(setup.camera.look_at_mm, -1.0, setup.camera.position_mm);
         let right = cross(forward, setup.camera.up);
         if dot(forward, forward) < 1e-6 || dot(right, right) < 1e-9 * dot(forward, forward) {
-            return Err(wrong("camera: it looks along `up` or at itself; check position_mm, look_at_mm and up"));
+            return Err(wrong(
+                "camera: it looks along `up` or at itself; check position_mm, look_at_mm and up",
+            ));
         }
         let (forward, right) = (unit(forward), unit(right));
         let camera = Camera {
@@ -138,7 +144,9 @@ impl Scene {
         let toward = along(setup.camera.position_mm, -1.0, sample.centre_mm);
         let side = cross(sample.axis, toward);
         if dot(sample.axis, sample.axis) < 1e-9 || dot(side, side) < 1e-6 * dot(toward, toward) {
-            return Err(wrong("sample.axis: the camera looks along it; give the direction of the can's axis"));
+            return Err(wrong(
+                "sample.axis: the camera looks along it; give the direction of the can's axis",
+            ));
         }
         let axis = unit(sample.axis);
         let across = unit(side);
@@ -150,7 +158,9 @@ impl Scene {
         {
             let d = along(p, -1.0, sample.centre_mm);
             if dot(d, normal) <= radius.unwrap_or(0.0) {
-                return Err(wrong(&format!("{name}: it does not stand in front of the sample; z points to the camera")));
+                return Err(wrong(&format!(
+                    "{name}: it does not stand in front of the sample; z points to the camera"
+                )));
             }
         }
         let facing = setup.card.normal.unwrap_or_else(|| along([0.0; 3], -1.0, forward));
@@ -221,10 +231,13 @@ impl Scene {
         }
         let p = along(o, t, d);
         let n = match self.radius {
-            Some(radius) => along(along([0.0; 3], dot(p, across) / radius, across), dot(p, normal) / radius, normal),
+            Some(radius) => {
+                along(along([0.0; 3], dot(p, across) / radius, across), dot(p, normal) / radius, normal)
+            }
             None => normal,
         };
-        let outside = dot(p, axis).abs() > self.half[1] || (self.radius.is_none() && dot(p, across).abs() > self.half[0]);
+        let outside = dot(p, axis).abs() > self.half[1]
+            || (self.radius.is_none() && dot(p, across).abs() > self.half[0]);
         (!outside).then(|| (along(self.centre, 1.0, p), n))
     }
 

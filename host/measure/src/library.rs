@@ -53,7 +53,11 @@ pub fn write(taken: &Taken, folder: &Path) -> Result<(), MeasureError> {
     };
     let measurement = &taken.measurement;
     let mut library = String::from("format = 1\nbased_on = \"built-in\"\n");
-    let _ = writeln!(library, "name = {}", quoted(&format!("measured by {}, {}", measurement.by, measurement.when)));
+    let _ = writeln!(
+        library,
+        "name = {}",
+        quoted(&format!("measured by {}, {}", measurement.by, measurement.when))
+    );
     for stack in &measurement.stacks {
         let name = curve_name(&stack.stack);
         let _ = write!(

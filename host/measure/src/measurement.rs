@@ -138,7 +138,10 @@ pub fn measure(folder: &Path, setup: &Setup, observer: &dyn Observer) -> Result<
         }
         let Some((expected, scene)) = &scene else { continue };
         if *expected != size {
-            let problem = format!("{} x {} pixels, but another lamp's have {} x {}", size.0, size.1, expected.0, expected.1);
+            let problem = format!(
+                "{} x {} pixels, but another lamp's have {} x {}",
+                size.0, size.1, expected.0, expected.1
+            );
             return Err(MeasureError::photo(&first, problem));
         }
         let steps = match setup.card.rectangle_px {
@@ -182,11 +185,14 @@ fn series(folder: &Path, setup: &Setup) -> Result<Vec<Vec<Exposure>>, MeasureErr
         };
         let exif = photo::exif(&path)?;
         named.retain(|other| **other != name);
-        let seconds = setup.exposures.get(&name).copied().or(exif.seconds).filter(|t| t.is_finite() && *t > 0.0);
+        let seconds =
+            setup.exposures.get(&name).copied().or(exif.seconds).filter(|t| t.is_finite() && *t > 0.0);
         let Some(seconds) = seconds else {
             return Err(MeasureError::photo(
                 &path,
-                format!("has no exposure time; keep the camera's EXIF, or add `\"{name}\" = 0.004` (seconds) to [exposures] in the setup file"),
+                format!(
+                    "has no exposure time; keep the camera's EXIF, or add `\"{name}\" = 0.004` (seconds) to [exposures] in the setup file"
+                ),
             ));
         };
         series[light].push(Exposure { path, seconds, exif });
@@ -223,7 +229,8 @@ fn covered(scene: &Scene, patches: &[Stacked], seen: &[Seen]) -> Result<(), Meas
                 pixels.len()
             )));
         }
-        let angles = pixels.iter().filter_map(|p| scene.view(p.x, p.y, p.light)).map(|v| v.theta.to_degrees());
+        let angles =
+            pixels.iter().filter_map(|p| scene.view(p.x, p.y, p.light)).map(|v| v.theta.to_degrees());
         let least = angles.fold(f64::INFINITY, f64::min);
         if least > HIGHLIGHT {
             return Err(MeasureError::Scene(format!(
@@ -258,7 +265,10 @@ fn measures(setup: &Setup) -> Vec<Measure> {
 /// Some pixels of every stack, spread over the half angles.
 fn samples(scene: &Scene, seen: &[Seen], patches: usize) -> Vec<Sample> {
     let mut bins: Vec<Vec<Sample>> = vec![Vec::new(); patches * reduce::BINS];
-    for (patch, pixel) in seen.iter().flat_map(|seen| seen.pixels.iter().enumerate().flat_map(|(i, p)| p.iter().map(move |p| (i, p)))) {
+    for (patch, pixel) in seen
+        .iter()
+        .flat_map(|seen| seen.pixels.iter().enumerate().flat_map(|(i, p)| p.iter().map(move |p| (i, p))))
+    {
         let mean = pixel.value.iter().sum::<f64>() / 3.0;
         let Some(view) = scene.view(pixel.x, pixel.y, pixel.light) else { continue };
         if pixel.bound != 0 || mean <= 0.0 {
@@ -289,8 +299,12 @@ fn samples(scene: &Scene, seen: &[Seen], patches: usize) -> Vec<Sample> {
 fn describe(measures: &[Measure], solved: &Solved) -> Vec<Corrected> {
     let name = |what: Unknown| match what {
         Unknown::Radius => ("radius of the can".to_owned(), 1.0, "mm"),
-        Unknown::Lean => ("lean of the axis in the picture".to_owned(), 180.0 / std::f64::consts::PI, "degrees"),
-        Unknown::Nod => ("tilt of the sample to the camera".to_owned(), 180.0 / std::f64::consts::PI, "degrees"),
+        Unknown::Lean => {
+            ("lean of the axis in the picture".to_owned(), 180.0 / std::f64::consts::PI, "degrees")
+        }
+        Unknown::Nod => {
+            ("tilt of the sample to the camera".to_owned(), 180.0 / std::f64::consts::PI, "degrees")
+        }
         Unknown::Turn => ("turn of the sample".to_owned(), 180.0 / std::f64::consts::PI, "degrees"),
         Unknown::Across => ("middle of the sample, to the right".to_owned(), 1.0, "mm"),
         Unknown::Depth => ("middle of the sample, to the camera".to_owned(), 1.0, "mm"),
@@ -347,7 +361,8 @@ fn finish(
     // The card's irradiance follows the lamp.
     let scales = |scene: &Scene| -> Vec<f64> {
         let factor = |(light, seen): (usize, &Seen)| {
-            middle_irradiance(scene, &seen.series.card, light) / middle_irradiance(tape, &seen.series.card, light)
+            middle_irradiance(scene, &seen.series.card, light)
+                / middle_irradiance(tape, &seen.series.card, light)
         };
         seen.iter().enumerate().map(factor).collect()
     };
@@ -356,11 +371,12 @@ fn finish(
         Vec::new()
     } else {
         let doubtful = solved.uncertain.iter().map(|column| solve::apply(tape, &measures, column));
-        doubtful.map(|other| {
-            let relative = scales(&other).iter().zip(&factors).map(|(a, b)| a / b).collect();
-            (other, relative)
-        })
-        .collect()
+        doubtful
+            .map(|other| {
+                let relative = scales(&other).iter().zip(&factors).map(|(a, b)| a / b).collect();
+                (other, relative)
+            })
+            .collect()
     };
     for (seen, factor) in seen.iter_mut().zip(&factors) {
         seen.series.card.scale = seen.series.card.scale.map(|k| k * factor);
@@ -412,7 +428,12 @@ fn finish(
 fn advice(measurement: &Measurement) -> Vec<String> {
     let mut again = Vec::new();
     for (i, series) in measurement.series.iter().enumerate() {
-        let worst = series.card.deviation.iter().flatten().fold(0.0f64, |a, d| if d.abs() > a.abs() { *d } else { a });
+        let worst = series
+            .card
+            .deviation
+            .iter()
+            .flatten()
+            .fold(0.0f64, |a, d| if d.abs() > a.abs() { *d } else { a });
         if worst.abs() > card::LINEAR {
             again.push(format!(
                 "lamp {}: a step of the grey card is off by {:.0} %: keep other light from the card, and bright things out of the \
@@ -436,12 +457,14 @@ fn advice(measurement: &Measurement) -> Vec<String> {
             ));
         }
         if series.shots.len() == 1 {
-            again.push(format!("lamp {}: one exposure only: take at least three, a factor of 4 apart", i + 1));
+            again
+                .push(format!("lamp {}: one exposure only: take at least three, a factor of 4 apart", i + 1));
         }
     }
     for stack in &measurement.stacks {
         let seen: Vec<&Row> = stack.rows.iter().filter(|row| row.kind != Kind::Extrapolated).collect();
-        let (first, last) = (seen.first().map_or(90.0, |r| r.theta_deg), seen.last().map_or(0.0, |r| r.theta_deg));
+        let (first, last) =
+            (seen.first().map_or(90.0, |r| r.theta_deg), seen.last().map_or(0.0, |r| r.theta_deg));
         if first > 1.5 || last < 60.0 {
             again.push(format!(
                 "stack {}: half angles from {first:.1} to {last:.0} degrees were seen, expected 1 to 60: a can covers more than a flat \
@@ -455,9 +478,13 @@ fn advice(measurement: &Measurement) -> Vec<String> {
                 stack.stack
             ));
         }
-        let noisy = seen.iter().filter(|row| (2.0..60.0).contains(&row.theta_deg) && row.sigma[1] > 0.1 * row.rgb[1]);
+        let noisy =
+            seen.iter().filter(|row| (2.0..60.0).contains(&row.theta_deg) && row.sigma[1] > 0.1 * row.rgb[1]);
         if noisy.count() * 5 > seen.len() {
-            again.push(format!("stack {}: samples are uncertain by more than 10 %: add longer exposures", stack.stack));
+            again.push(format!(
+                "stack {}: samples are uncertain by more than 10 %: add longer exposures",
+                stack.stack
+            ));
         }
     }
     if measurement.geometry.misfit > UNEVEN {

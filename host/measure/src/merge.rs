@@ -133,7 +133,9 @@ impl Frames {
             let sum: f64 = (c..count).step_by(3).map(|i| f64::from(field(i))).sum();
             (sum / (count / 3) as f64) as f32
         });
-        let values = (0..count).into_par_iter().map(|i| (photo.at(i) - dark(i)) * mean[i % 3] / field(i).max(0.02 * mean[i % 3]));
+        let values = (0..count)
+            .into_par_iter()
+            .map(|i| (photo.at(i) - dark(i)) * mean[i % 3] / field(i).max(0.02 * mean[i % 3]));
         Ok(Photo { values: Values::Float(values.collect()), ..photo })
     }
 }
@@ -190,12 +192,16 @@ pub fn merge(
         observer.note("photographs of 8 bits: the camera's response is recovered, and fine tones are lost; RAW or 16-bit TIFF is better");
     }
     let noise = Noise::of(&probes, white[1]);
-    let tones: Vec<Tones> =
-        probes.iter().zip(&relative).map(|(probe, &t)| Tones::new(probe, &response, noise, white, t)).collect();
+    let tones: Vec<Tones> = probes
+        .iter()
+        .zip(&relative)
+        .map(|(probe, &t)| Tones::new(probe, &response, noise, white, t))
+        .collect();
     let chain = compare(&exposures, &tones, size.0, &response, observer)?;
     let mut shots = Vec::new();
     let mut sums = Sums::new(size, noise, response, white);
-    let times: Vec<f64> = relative.iter().zip(&chain).map(|(t, link)| t / relative[0] * link.ratio.exp()).collect();
+    let times: Vec<f64> =
+        relative.iter().zip(&chain).map(|(t, link)| t / relative[0] * link.ratio.exp()).collect();
     let mut next = Some(read(&exposures[0]));
     for (i, exposure) in exposures.iter().enumerate() {
         let Some(photo) = next.take() else { break };
@@ -240,7 +246,6 @@ fn compare(
         (1..tones.len()).into_par_iter().map(|i| tones[i - 1].compare(&tones[i])).collect();
     let mut chain = vec![Link { shift: [0.0; 2], ratio: 0.0 }];
     for (i, found) in (1..).zip(&neighbours) {
-
         let (name, path) = (exposures[i - 1].name(), &exposures[i].path);
         let largest = MOST_SHIFT * width as f64;
         let moved = found.shift.iter().any(|d| d.abs() > largest);
@@ -256,7 +261,10 @@ fn compare(
         }
         if strange(found) {
             // The one that does not match others either is the stranger.
-            let others = [i.checked_sub(2).map(|j| tones[j].compare(&tones[i])), tones.get(i + 1).map(|t| tones[i].compare(t))];
+            let others = [
+                i.checked_sub(2).map(|j| tones[j].compare(&tones[i])),
+                tones.get(i + 1).map(|t| tones[i].compare(t)),
+            ];
             let fits = others.iter().flatten().any(|m| m.compared >= COMPARABLE && !strange(m));
             let culprit = if fits { &exposures[i - 1].path } else { path };
             let other = if fits { exposures[i].name() } else { name };
@@ -377,7 +385,10 @@ impl Sums {
             }
             Some(sum)
         };
-        let rows = value.par_chunks_mut(3 * width).zip(weight.par_chunks_mut(3 * width)).zip(bound.par_chunks_mut(width));
+        let rows = value
+            .par_chunks_mut(3 * width)
+            .zip(weight.par_chunks_mut(3 * width))
+            .zip(bound.par_chunks_mut(width));
         let full: usize = rows
             .enumerate()
             .map(|(y, ((value, weight), bound))| {

@@ -170,7 +170,10 @@ pub fn read(path: &Path) -> Result<Photo, MeasureError> {
 
 fn decode(bytes: &[u8], path: &Path, turn: bool) -> Result<Photo, MeasureError> {
     let wrong = |error: &dyn std::fmt::Display| {
-        MeasureError::photo(path, format!("not a readable photograph ({error}); expected TIFF, PNG, OpenEXR or JPEG"))
+        MeasureError::photo(
+            path,
+            format!("not a readable photograph ({error}); expected TIFF, PNG, OpenEXR or JPEG"),
+        )
     };
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(&e))?;
     let mut limits = image::Limits::default();
@@ -182,7 +185,11 @@ fn decode(bytes: &[u8], path: &Path, turn: bool) -> Result<Photo, MeasureError> 
         let problem = format!("{width} x {height} pixels; the limit is {} million", MOST_PIXELS / 1_000_000);
         return Err(MeasureError::photo(path, problem));
     }
-    let side = if turn { decoder.orientation().unwrap_or(Orientation::NoTransforms) } else { Orientation::NoTransforms };
+    let side = if turn {
+        decoder.orientation().unwrap_or(Orientation::NoTransforms)
+    } else {
+        Orientation::NoTransforms
+    };
     let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| wrong(&e))?;
     picture.apply_orientation(side);
     let (width, height) = (picture.width() as usize, picture.height() as usize);
@@ -219,7 +226,10 @@ fn develop(programs: &[(&str, &[&str])], path: &Path) -> Result<Vec<u8>, Measure
             Err(source) => return Err(MeasureError::Io { path: (*program).into(), source }),
         };
         let failed = |what: &str| {
-            MeasureError::photo(path, format!("`{program}` {what}; develop it to a linear 16-bit TIFF yourself"))
+            MeasureError::photo(
+                path,
+                format!("`{program}` {what}; develop it to a linear 16-bit TIFF yourself"),
+            )
         };
         let output = child.stdout.take();
         let reader = std::thread::spawn(move || {
@@ -330,7 +340,8 @@ mod tests {
         let path = folder.path().join("a.nef");
         sixteen().save_with_format(&path, image::ImageFormat::Tiff).unwrap();
         // `cat` hands the file on, as a developer would a TIFF.
-        let photo = decode(&develop(&[("/nonexistent/developer", &[]), ("cat", &[])], &path).unwrap(), &path, false);
+        let photo =
+            decode(&develop(&[("/nonexistent/developer", &[]), ("cat", &[])], &path).unwrap(), &path, false);
         assert_eq!(photo.unwrap().at(3 * 7), 2001.0);
         let error = develop(&[("/nonexistent/developer", &[])], &path).unwrap_err().to_string();
         assert!(error.contains("libraw-bin") && error.contains("a.nef"), "{error}");

@@ -24,7 +24,8 @@ impl Copy {
                 let mut sum = 0.0;
                 for j in 0..factor {
                     for i in 0..factor {
-                        let at = (y + j).min(radiance.height - 1) * radiance.width + (x + i).min(radiance.width - 1);
+                        let at = (y + j).min(radiance.height - 1) * radiance.width
+                            + (x + i).min(radiance.width - 1);
                         sum += f64::from(radiance.value[3 * at + c]);
                     }
                 }
@@ -48,7 +49,8 @@ impl Copy {
         }
         for step in steps {
             let [left, top, right, bottom] = *step;
-            let along = |from: f64, to: f64| (0..=400).map(move |i| from + (to - from) * f64::from(i) / 400.0);
+            let along =
+                |from: f64, to: f64| (0..=400).map(move |i| from + (to - from) * f64::from(i) / 400.0);
             let places: Vec<(f64, f64)> = along(left, right)
                 .flat_map(|x| [(x, top), (x, bottom)])
                 .chain(along(top, bottom).flat_map(|y| [(left, y), (right, y)]))
@@ -64,7 +66,8 @@ impl Copy {
 
     /// Deviations of ln f from the curve: blue below, red above, full colour at 10 %.
     pub(crate) fn residuals(&self, pixels: &[(f64, f64, Option<f64>)]) -> RgbImage {
-        let mut picture = RgbImage::from_pixel(self.picture.width(), self.picture.height(), Rgb([40, 40, 40]));
+        let mut picture =
+            RgbImage::from_pixel(self.picture.width(), self.picture.height(), Rgb([40, 40, 40]));
         for &(x, y, deviation) in pixels {
             let Some(deviation) = deviation else { continue };
             let part = (deviation / 0.1).clamp(-1.0, 1.0);

@@ -102,8 +102,12 @@ impl Noise {
     /// Fits the noise of photographs with the same sensor and sensitivity.
     pub(crate) fn of(probes: &[Probe], white: f32) -> Noise {
         let top = if white.is_finite() { white } else { f32::MAX };
-        let mut samples: Vec<(f32, f32)> =
-            probes.iter().flat_map(|probe| &probe.noise).copied().filter(|s| s.0 > 0.0 && s.0 < CLIPPED * top).collect();
+        let mut samples: Vec<(f32, f32)> = probes
+            .iter()
+            .flat_map(|probe| &probe.noise)
+            .copied()
+            .filter(|s| s.0 > 0.0 && s.0 < CLIPPED * top)
+            .collect();
         samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         let scale = samples.last().map_or(1.0, |s| s.0);
         // The rounding of 16-bit values, relative to the largest one found.
@@ -154,7 +158,8 @@ mod tests {
         let values = (0..width * height)
             .flat_map(|i| {
                 let v = 100.0 * (i % width) as f32;
-                [(); 3].map(|()| (v + normal(&mut state) * (gain * v + read).sqrt()).clamp(0.0, 50_000.0) as u16)
+                [(); 3]
+                    .map(|()| (v + normal(&mut state) * (gain * v + read).sqrt()).clamp(0.0, 50_000.0) as u16)
             })
             .collect();
         Photo { width, height, values: Values::Sixteen(values) }
@@ -166,14 +171,18 @@ mod tests {
         let white = white(&[probe]);
         assert_eq!(white, [50_000.0; 3]);
         let noise = Noise::of(&[Probe::new(&ramp(0.5, 9000.0))], white[1]);
-        assert!((noise.gain / 0.5 - 1.0).abs() < 0.1 && (noise.read / 9000.0 - 1.0).abs() < 0.15, "{noise:?}");
+        assert!(
+            (noise.gain / 0.5 - 1.0).abs() < 0.1 && (noise.read / 9000.0 - 1.0).abs() < 0.15,
+            "{noise:?}"
+        );
         let quiet = Noise::of(&[Probe::new(&ramp(0.0, 0.0))], 65_535.0);
         assert!(quiet.read > 0.0 && quiet.gain < 1.0, "{quiet:?}");
     }
 
     #[test]
     fn without_a_pile_the_limit_is_that_of_the_file() {
-        let photo = Photo { width: 4, height: 4, values: Values::Sixteen((0..48).map(|i| i * 900).collect()) };
+        let photo =
+            Photo { width: 4, height: 4, values: Values::Sixteen((0..48).map(|i| i * 900).collect()) };
         assert_eq!(white(&[Probe::new(&photo)]), [65_535.0; 3]);
     }
 }

@@ -130,7 +130,11 @@ fn value(curve: &Logs, theta: f64) -> [f64; 3] {
         let (before, after) = (if i > 0 { y[i - 1] } else { p }, if i + 2 < BINS { y[i + 2] } else { q });
         let (m0, m1) = (0.5 * (q - before), 0.5 * (after - p));
         let (t2, t3) = (t * t, t * t * t);
-        ((2.0 * t3 - 3.0 * t2 + 1.0) * p + (t3 - 2.0 * t2 + t) * m0 + (3.0 * t2 - 2.0 * t3) * q + (t3 - t2) * m1).exp()
+        ((2.0 * t3 - 3.0 * t2 + 1.0) * p
+            + (t3 - 2.0 * t2 + t) * m0
+            + (3.0 * t2 - 2.0 * t3) * q
+            + (t3 - t2) * m1)
+            .exp()
     })
 }
 
@@ -152,7 +156,10 @@ fn predicted(scene: &Scene, pixel: &Pixel, view: &View, curve: &Logs) -> [f64; 3
         for i in [-1.0, 0.0, 1.0] {
             for off in lamps {
                 let off = off.map(|d| d * lamp);
-                let Some(view) = scene.view_under(pixel.x + i / 3.0, pixel.y + j / 3.0, pixel.light, off) else { continue };
+                let Some(view) = scene.view_under(pixel.x + i / 3.0, pixel.y + j / 3.0, pixel.light, off)
+                else {
+                    continue;
+                };
                 let f = value(curve, view.theta);
                 for c in 0..3 {
                     sum[c] += f[c] * view.irradiance;
@@ -168,8 +175,10 @@ fn predicted(scene: &Scene, pixel: &Pixel, view: &View, curve: &Logs) -> [f64; 3
 fn robust(values: &[(f64, f64)]) -> (f64, f64, Vec<bool>) {
     let plain: Vec<f64> = values.iter().map(|v| v.0).collect();
     let (middle, width) = spread(&plain);
-    let belongs: Vec<bool> =
-        values.iter().map(|(v, variance)| (v - middle).abs() <= STRANGE * width.max(variance.sqrt()).max(1e-6)).collect();
+    let belongs: Vec<bool> = values
+        .iter()
+        .map(|(v, variance)| (v - middle).abs() <= STRANGE * width.max(variance.sqrt()).max(1e-6))
+        .collect();
     let (mut sum, mut weight) = (0.0, 0.0);
     for ((v, variance), _) in values.iter().zip(&belongs).filter(|(_, b)| **b) {
         let w = 1.0 / (variance + 1e-4);
@@ -266,7 +275,8 @@ fn correct(scene: &Scene, bin: &[(Pixel, View)], curve: &Logs) -> (Bin, [f64; 3]
         let kept = belongs.iter().filter(|b| **b).count().max(1);
         let mut variance = (width * width / kept as f64).max(1e-8);
         // Parts of the sample that disagree: six, by lamp, side and height.
-        let mut parts: std::collections::BTreeMap<(usize, bool, bool), (f64, usize)> = std::collections::BTreeMap::new();
+        let mut parts: std::collections::BTreeMap<(usize, bool, bool), (f64, usize)> =
+            std::collections::BTreeMap::new();
         for (((p, v), (value, _)), _) in bin.iter().zip(&values).zip(&belongs).filter(|(_, b)| **b) {
             let part = parts.entry((p.light, v.place[0] > 0.0, v.place[1] > 0.0)).or_default();
             part.0 += value;
@@ -285,7 +295,8 @@ fn correct(scene: &Scene, bin: &[(Pixel, View)], curve: &Logs) -> (Bin, [f64; 3]
             }
         }
     }
-    let blur = bin.iter().zip(&predictions).map(|((_, v), m)| m[1] / (value(curve, v.theta)[1] * v.irradiance));
+    let blur =
+        bin.iter().zip(&predictions).map(|((_, v), m)| m[1] / (value(curve, v.theta)[1] * v.irradiance));
     let mut blur: Vec<f64> = blur.collect();
     let blur = crate::linear::median(&mut blur);
     result.blurred = !(1.0 / BLURRED..=BLURRED).contains(&blur);
@@ -324,7 +335,10 @@ fn shifts(scene: &Scene, pixels: &[Pixel], curve: &Logs, doubts: &[(Scene, Vec<f
     let means = |scene: &Scene, factors: Option<&[f64]>| -> Vec<Option<[f64; 3]>> {
         let mut values: Vec<Vec<[f64; 3]>> = vec![Vec::new(); BINS];
         for p in pixels.iter().step_by(step) {
-            let Some(v) = scene.view(p.x, p.y, p.light).filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON) else { continue };
+            let Some(v) = scene.view(p.x, p.y, p.light).filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON)
+            else {
+                continue;
+            };
             let f = value(curve, v.theta);
             let factor = factors.and_then(|f| f.get(p.light)).copied().unwrap_or(1.0);
             values[(place(v.theta) as usize).min(BINS - 1)]
@@ -375,7 +389,13 @@ fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> 
                 (false, _) if inside && (b > 0 && measured(b - 1) || measured(b + 1)) => Kind::Measured,
                 _ => Kind::Extrapolated,
             };
-            Row { theta_deg: angle(b).to_degrees(), rgb: [0.0; 3], sigma: [0.0; 3], pixels: found[b].pixels, kind }
+            Row {
+                theta_deg: angle(b).to_degrees(),
+                rgb: [0.0; 3],
+                sigma: [0.0; 3],
+                pixels: found[b].pixels,
+                kind,
+            }
         })
         .collect();
     let (Some(_), Some(last)) = (first, last) else { return rows };
@@ -389,13 +409,20 @@ fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> 
         let start = (0..BINS).find(|&b| certain(b)).unwrap_or(last);
         let peak = lobe(&z, start, last);
         for (b, row) in rows.iter_mut().enumerate() {
-            let noise = if certain(b) { deviation[b].powi(2) + 0.5 * (z[b] - y[b]).powi(2) } else { deviation[b].powi(2) };
+            let noise = if certain(b) {
+                deviation[b].powi(2) + 0.5 * (z[b] - y[b]).powi(2)
+            } else {
+                deviation[b].powi(2)
+            };
             let mut variance = noise + geometry[b][c] + card * card;
             let mut ln = z[b];
             if b < start {
                 ln = peak(angle(b)).max(z[start]);
                 // Below what was seen a peak may be as much higher again as the lobe makes it.
-                variance = geometry[start][c] + card * card + deviation[start].powi(2) + (0.1 + 0.5 * (ln - z[start])).powi(2);
+                variance = geometry[start][c]
+                    + card * card
+                    + deviation[start].powi(2)
+                    + (0.1 + 0.5 * (ln - z[start])).powi(2);
             } else if b > last {
                 ln = z[last];
                 variance = 0.09 + deviation[last].powi(2);
@@ -456,8 +483,10 @@ pub fn pixels(
     light: usize,
     rectangle: Option<[f64; 4]>,
 ) -> Vec<Pixel> {
-    let [left, top, right, bottom] = rectangle.unwrap_or([0.0, 0.0, radiance.width as f64, radiance.height as f64]);
-    let whole = |from: f64, to: f64, most: usize| (from.ceil().max(0.0) as usize)..(to.floor() as usize).min(most);
+    let [left, top, right, bottom] =
+        rectangle.unwrap_or([0.0, 0.0, radiance.width as f64, radiance.height as f64]);
+    let whole =
+        |from: f64, to: f64, most: usize| (from.ceil().max(0.0) as usize)..(to.floor() as usize).min(most);
     let columns = whole(left, right, radiance.width);
     let lit = |x: f64, y: f64| scene.view(x, y, light).filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON);
     let row = |y: usize| -> Vec<(u32, u8)> {
@@ -492,7 +521,9 @@ pub fn pixels(
             y: (i / radiance.width) as f64 + 0.5,
             light,
             value: std::array::from_fn(|c| scale[c] * value(c)),
-            variance: std::array::from_fn(|c| f64::from(radiance.variance[3 * i + c]) / value(c).powi(2).max(1e-30)),
+            variance: std::array::from_fn(|c| {
+                f64::from(radiance.variance[3 * i + c]) / value(c).powi(2).max(1e-30)
+            }),
             bound: radiance.bound[i],
         }
     })

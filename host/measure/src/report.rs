@@ -81,7 +81,11 @@ fn write_page(m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Re
             let path = folder.join(&name);
             let small = std::fs::metadata(&path).is_ok_and(|found| found.len() <= MOST_PICTURE);
             if let (true, Ok(bytes)) = (small, std::fs::read(&path)) {
-                write!(page, "<p><img alt=\"{name}\" src=\"data:image/png;base64,{}\">", STANDARD.encode(bytes))?;
+                write!(
+                    page,
+                    "<p><img alt=\"{name}\" src=\"data:image/png;base64,{}\">",
+                    STANDARD.encode(bytes)
+                )?;
             }
         }
     }
@@ -112,7 +116,8 @@ fn exposures(m: &Measurement, page: &mut String) -> std::fmt::Result {
                 100.0 * shot.clipped
             )?;
         }
-        let [bright, dark] = series.card.deviation.map(|d| d.map(|v| format!("{:+.1} %", 100.0 * v)).join(", "));
+        let [bright, dark] =
+            series.card.deviation.map(|d| d.map(|v| format!("{:+.1} %", 100.0 * v)).join(", "));
         let balance = series.card.scale.map(|k| format!("{:.3}", k / series.card.scale[1])).join(", ");
         write!(
             page,
@@ -124,7 +129,11 @@ fn exposures(m: &Measurement, page: &mut String) -> std::fmt::Result {
 
 fn geometry(m: &Measurement, page: &mut String) -> std::fmt::Result {
     let g = &m.geometry;
-    let used = if g.solved { "The curves use the corrected measures." } else { "The setup is exact, so the curves use its measures." };
+    let used = if g.solved {
+        "The curves use the corrected measures."
+    } else {
+        "The setup is exact, so the curves use its measures."
+    };
     write!(
         page,
         "<h2>Geometry</h2><p>{used} Pixels of the same half angle differ by {:.1} % (by {:.1} % with the measures of the setup \
@@ -186,7 +195,8 @@ fn curves(stack: &Measured) -> Drawn {
                 (row.theta_deg.sqrt(), (row.rgb[c] + by * row.sigma[c]).clamp(low, high))
             };
             let band = stack.rows.iter().map(|row| point(row, 2.0));
-            let band: Vec<(f64, f64)> = band.chain(stack.rows.iter().rev().map(|row| point(row, -2.0))).collect();
+            let band: Vec<(f64, f64)> =
+                band.chain(stack.rows.iter().rev().map(|row| point(row, -2.0))).collect();
             chart.draw_series(std::iter::once(Polygon::new(band, colour.mix(0.18).filled())))?;
             for part in stack.rows.windows(2) {
                 let sure = part.iter().all(|row| row.kind == Kind::Measured);
@@ -226,7 +236,8 @@ fn coverage(stack: &Measured) -> Drawn {
         let half = 0.45 * 90f64.sqrt() / stack.rows.len() as f64;
         chart.draw_series(stack.rows.iter().filter(|row| row.pixels > 0).map(|row| {
             let (x, top) = (row.theta_deg.sqrt(), row.pixels as f64);
-            let colour = if row.kind == Kind::Measured { RGBColor(90, 90, 90) } else { RGBColor(230, 150, 40) };
+            let colour =
+                if row.kind == Kind::Measured { RGBColor(90, 90, 90) } else { RGBColor(230, 150, 40) };
             Rectangle::new([(x - half, 0.8), (x + half, top)], colour.filled())
         }))?;
         area.present()?;

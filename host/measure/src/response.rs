@@ -87,7 +87,8 @@ fn smooth_places(probes: &[Probe], white: f32) -> Vec<usize> {
             most - least < 0.03 * white
         })
     };
-    let mut places: Vec<usize> = (0..middle.mean.len()).filter(|&i| probes.iter().all(|probe| even(probe, i))).collect();
+    let mut places: Vec<usize> =
+        (0..middle.mean.len()).filter(|&i| probes.iter().all(|probe| even(probe, i))).collect();
     // In the order of all exposures together, so that dark and bright places count alike.
     let tone = |i: &usize| probes.iter().map(|probe| probe.mean[*i][1]).sum::<f32>();
     places.retain(|i| tone(i) > 0.02 * white);
@@ -96,7 +97,13 @@ fn smooth_places(probes: &[Probe], white: f32) -> Vec<usize> {
     places.into_iter().step_by(step).take(PIXELS).collect()
 }
 
-fn channel(probes: &[Probe], exposures: &[f64], white: f32, places: &[usize], c: usize) -> Option<[f32; LEVELS]> {
+fn channel(
+    probes: &[Probe],
+    exposures: &[f64],
+    white: f32,
+    places: &[usize],
+    c: usize,
+) -> Option<[f32; LEVELS]> {
     let n = LEVELS + places.len();
     let (mut a, mut b) = (vec![0.0; n * n], vec![0.0; n]);
     let hat = |z: f64| (z.min((LEVELS - 1) as f64 - z) / 127.5).max(0.0) + 1e-3;

@@ -238,7 +238,9 @@ impl Setup {
         }
         let date = self.when.split('-').map(str::parse::<u32>).collect::<Result<Vec<_>, _>>();
         let date = date.unwrap_or_default();
-        let in_range = |part: usize, range: std::ops::RangeInclusive<u32>| date.get(part).is_some_and(|n| range.contains(n));
+        let in_range = |part: usize, range: std::ops::RangeInclusive<u32>| {
+            date.get(part).is_some_and(|n| range.contains(n))
+        };
         let day = date.len() == 2 || date.len() == 3 && in_range(2, 1..=31);
         if !(day && in_range(0, 1990..=9999) && in_range(1, 1..=12)) {
             return Err(format!("when: `{}` is not a date; expected YYYY-MM-DD or YYYY-MM", self.when));
@@ -253,7 +255,8 @@ impl Setup {
                 ));
             }
         }
-        let rectangles = self.patch.iter().map(|patch| (format!("patch {}", patch.stack), patch.rectangle_px));
+        let rectangles =
+            self.patch.iter().map(|patch| (format!("patch {}", patch.stack), patch.rectangle_px));
         for (name, [left, top, right, bottom]) in
             rectangles.chain(self.card.rectangle_px.map(|at| ("card".to_owned(), at)))
         {
@@ -264,12 +267,11 @@ impl Setup {
             }
         }
         match (&self.sample.stack, self.patch.is_empty()) {
-            (None, true) => Err(
-                "sample.stack: missing; name the stack of the whole print, or add a [[patch]] for each".to_owned(),
-            ),
-            (Some(_), false) => {
-                Err("sample.stack: given beside [[patch]]; keep one of them".to_owned())
+            (None, true) => {
+                Err("sample.stack: missing; name the stack of the whole print, or add a [[patch]] for each"
+                    .to_owned())
             }
+            (Some(_), false) => Err("sample.stack: given beside [[patch]]; keep one of them".to_owned()),
             _ => Ok(()),
         }
     }
@@ -288,7 +290,9 @@ impl Setup {
             (Shape::Cylinder, ..) => {
                 return Err("sample: a cylinder needs radius_mm and has no width_mm".to_owned());
             }
-            (Shape::Flat, ..) => return Err("sample: a flat sheet needs width_mm and has no radius_mm".to_owned()),
+            (Shape::Flat, ..) => {
+                return Err("sample: a flat sheet needs width_mm and has no radius_mm".to_owned());
+            }
         }
         if let Some(angle) = self.camera.field_of_view_deg {
             positive("camera.field_of_view_deg", angle, 150.0)?;
@@ -321,11 +325,17 @@ impl Setup {
         }
         for (i, light) in self.light.iter().enumerate() {
             let bad = light.position_mm.iter().any(|v| !v.is_finite() || v.abs() > 1e5);
-            if bad || !(0.0..=1e3).contains(&light.diameter_mm) || !(1e-6..=1e3).contains(&light.tolerance_mm) {
-                return Err(format!("light {}: expected lengths in millimetres and a tolerance above 0", i + 1));
+            if bad || !(0.0..=1e3).contains(&light.diameter_mm) || !(1e-6..=1e3).contains(&light.tolerance_mm)
+            {
+                return Err(format!(
+                    "light {}: expected lengths in millimetres and a tolerance above 0",
+                    i + 1
+                ));
             }
             let others = self.light.iter().enumerate().filter(|(j, _)| *j != i);
-            if let Some((j, _)) = others.into_iter().find(|(_, other)| other.photos.starts_with(&light.photos)) {
+            if let Some((j, _)) =
+                others.into_iter().find(|(_, other)| other.photos.starts_with(&light.photos))
+            {
                 return Err(format!(
                     "light {}: photos `{}` also begins the names of light {}; give each lamp a beginning of its own",
                     i + 1,
@@ -343,7 +353,8 @@ impl Setup {
             (Shape::Cylinder, Some(radius)) => format!("bent round a cylinder of {radius} mm radius"),
             _ => "flat".to_owned(),
         };
-        let lamps = if self.light.len() == 1 { "one lamp".into() } else { format!("{} lamps", self.light.len()) };
+        let lamps =
+            if self.light.len() == 1 { "one lamp".into() } else { format!("{} lamps", self.light.len()) };
         let note = if self.note.is_empty() { String::new() } else { format!("; {}", self.note) };
         format!("photographs of the print {sample}, {lamps}, three-step grey card in the picture{note}")
     }
@@ -354,7 +365,8 @@ impl Setup {
         let angle = self.camera.field_of_view_deg.map(|degrees| degrees * PI / 180.0);
         angle.or(film_focal_mm.map(|focal| 2.0 * (18.0 / focal).atan())).ok_or_else(|| {
             MeasureError::Scene(
-                "the photographs do not say the focal length; add camera.field_of_view_deg to the setup file".into(),
+                "the photographs do not say the focal length; add camera.field_of_view_deg to the setup file"
+                    .into(),
             )
         })
     }

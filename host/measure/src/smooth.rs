@@ -11,7 +11,8 @@ use crate::linear::Cholesky;
 pub(crate) fn smooth(y: &[f64], weight: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let known = weight.iter().filter(|w| **w > 0.0).count();
     if known < 4 {
-        let mean = y.iter().zip(weight).map(|(y, w)| y * w).sum::<f64>() / weight.iter().sum::<f64>().max(1e-300);
+        let mean =
+            y.iter().zip(weight).map(|(y, w)| y * w).sum::<f64>() / weight.iter().sum::<f64>().max(1e-300);
         let z = y.iter().zip(weight).map(|(y, w)| if *w > 0.0 { *y } else { mean }).collect();
         return (z, weight.iter().map(|w| if *w > 0.0 { w.powf(-0.5) } else { 1.0 }).collect());
     }
@@ -125,7 +126,8 @@ mod tests {
     fn a_gap_is_bridged() {
         let mut weight = vec![1e4; 30];
         weight[12..16].fill(0.0);
-        let y: Vec<f64> = (0..30).map(|i| if (12..16).contains(&i) { 99.0 } else { -0.1 * i as f64 }).collect();
+        let y: Vec<f64> =
+            (0..30).map(|i| if (12..16).contains(&i) { 99.0 } else { -0.1 * i as f64 }).collect();
         let (z, _) = smooth(&y, &weight);
         assert!((z[14] + 1.4).abs() < 0.01, "{z:?}");
     }
@@ -135,7 +137,10 @@ mod tests {
         let y = [5.0, 5.2, 3.0, 1.0, 1.4, 0.9, 0.8, 1.5, 2.0];
         let z = falling_then_rising(&y, &[1.0; 9]);
         let turn = (0..9).min_by(|a, b| z[*a].total_cmp(&z[*b])).unwrap();
-        assert!(z[..=turn].windows(2).all(|p| p[1] <= p[0]) && z[turn..].windows(2).all(|p| p[1] >= p[0]), "{z:?}");
+        assert!(
+            z[..=turn].windows(2).all(|p| p[1] <= p[0]) && z[turn..].windows(2).all(|p| p[1] >= p[0]),
+            "{z:?}"
+        );
         assert!((z[0] - 5.1).abs() < 1e-12 && (z[8] - 2.0).abs() < 1e-12);
         let falls = [3.0, 2.0, 1.0, 0.5];
         assert_eq!(falling_then_rising(&falls, &[1.0; 4]), falls);

@@ -56,11 +56,15 @@ pub(crate) struct Solved {
 
 /// The scene with corrections in tolerances.
 pub(crate) fn apply(scene: &Scene, measures: &[Measure], moved: &[f64]) -> Scene {
-    measures.iter().zip(moved).fold(scene.clone(), |scene, ((what, tolerance), u)| scene.changed(*what, u * tolerance))
+    measures
+        .iter()
+        .zip(moved)
+        .fold(scene.clone(), |scene, ((what, tolerance), u)| scene.changed(*what, u * tolerance))
 }
 
 fn node(theta: f64) -> f64 {
-    ((theta / std::f64::consts::FRAC_PI_2).max(0.0).sqrt() * NODES as f64 - 0.5).clamp(0.0, NODES as f64 - 1.001)
+    ((theta / std::f64::consts::FRAC_PI_2).max(0.0).sqrt() * NODES as f64 - 0.5)
+        .clamp(0.0, NODES as f64 - 1.001)
 }
 
 /// Deviations of ln f from each stack's curve for this scene. Pixels without light get 0.
@@ -122,15 +126,20 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
     let mut moved = vec![0.0; n];
     let mut misfit = before.max(LEAST_MISFIT);
     let mut damping = 1e-3;
-    let outlines = |scene: &Scene| -> Vec<f64> { outline.iter().map(|p| scene.outside_outline(p[0], p[1]) / OUTLINE).collect() };
+    let outlines = |scene: &Scene| -> Vec<f64> {
+        outline.iter().map(|p| scene.outside_outline(p[0], p[1]) / OUTLINE).collect()
+    };
     let mut normal = Vec::new();
     for step in 0..STEPS {
         let now = apply(scene, measures, &moved);
         let plain = deviations(&now, samples, &flat, patches);
         misfit = spread(&plain).1.max(LEAST_MISFIT);
         let sigma = |s: &Sample| (s.sigma * s.sigma + misfit * misfit).sqrt();
-        let weights: Vec<f64> =
-            samples.iter().zip(&plain).map(|(s, r)| huber(r / sigma(s)) / (sigma(s) * sigma(s)) / ALIKE).collect();
+        let weights: Vec<f64> = samples
+            .iter()
+            .zip(&plain)
+            .map(|(s, r)| huber(r / sigma(s)) / (sigma(s) * sigma(s)) / ALIKE)
+            .collect();
         let residuals = |u: &[f64]| {
             let scene = apply(scene, measures, u);
             (deviations(&scene, samples, &weights, patches), outlines(&scene))
@@ -151,7 +160,9 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
                 (slope(r, &base), slope(e, &edge))
             })
             .collect();
-        let dot = |w: &[f64], a: &[f64], b: &[f64]| w.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum::<f64>();
+        let dot = |w: &[f64], a: &[f64], b: &[f64]| {
+            w.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum::<f64>()
+        };
         normal = vec![0.0; n * n];
         let mut gradient = vec![0.0; n];
         for i in 0..n {
@@ -160,7 +171,8 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
                     + dot(&edge_weights, &columns[i].1, &columns[j].1)
                     + f64::from(u8::from(i == j));
             }
-            gradient[i] = -dot(&weights, &columns[i].0, &base) - dot(&edge_weights, &columns[i].1, &edge) - moved[i];
+            gradient[i] =
+                -dot(&weights, &columns[i].0, &base) - dot(&edge_weights, &columns[i].1, &edge) - moved[i];
         }
         let old = cost(&(base, edge), &moved);
         let mut settled = true;
@@ -171,7 +183,8 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
             }
             let Some(factors) = Cholesky::new(&damped, n) else { break };
             let by = factors.solve(&gradient);
-            let next: Vec<f64> = moved.iter().zip(&by).map(|(u, d)| (u + d.clamp(-3.0, 3.0)).clamp(-30.0, 30.0)).collect();
+            let next: Vec<f64> =
+                moved.iter().zip(&by).map(|(u, d)| (u + d.clamp(-3.0, 3.0)).clamp(-30.0, 30.0)).collect();
             if cost(&residuals(&next), &next) < old {
                 damping = (damping / 5.0).max(1e-6);
                 settled = by.iter().all(|d| d.abs() < 2e-3);
@@ -217,7 +230,9 @@ fn edge(scene: &Scene, radiance: &Radiance, radius: f64, height: f64) -> Option<
     let (from, to) = (scene.beside(0.6 * radius, height), scene.beside(1.3 * radius, height));
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     let count = length.ceil() as usize;
-    let at = |i: f64| [from[0] + (to[0] - from[0]) * i / count as f64, from[1] + (to[1] - from[1]) * i / count as f64];
+    let at = |i: f64| {
+        [from[0] + (to[0] - from[0]) * i / count as f64, from[1] + (to[1] - from[1]) * i / count as f64]
+    };
     // Between pixel centres, which are at halves; the picture's rows are level enough for the nearest one.
     let light = |i: f64| -> Option<f64> {
         let [x, y] = at(i);
@@ -271,9 +286,18 @@ mod tests {
         for y in (60..300).step_by(4) {
             for x in (160..320).step_by(2) {
                 let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
-                let Some(view) = truth.view(x, y, 0).filter(|v| v.cos_i > 0.15 && v.cos_o > 0.15) else { continue };
+                let Some(view) = truth.view(x, y, 0).filter(|v| v.cos_i > 0.15 && v.cos_o > 0.15) else {
+                    continue;
+                };
                 let f = 0.05 + inks::ggx::lobe(view.theta, 0.1);
-                samples.push(Sample { x, y, light: 0, patch: 0, ln: (f * view.irradiance).ln(), sigma: 0.01 });
+                samples.push(Sample {
+                    x,
+                    y,
+                    light: 0,
+                    patch: 0,
+                    ln: (f * view.irradiance).ln(),
+                    sigma: 0.01,
+                });
             }
         }
         samples
@@ -295,7 +319,12 @@ mod tests {
                 [low, y]
             })
             .collect();
-        for (what, by) in [(Unknown::Radius, 0.5), (Unknown::Lean, 0.0087), (Unknown::Nod, 0.0087), (Unknown::Light(0, 0), 5.0)] {
+        for (what, by) in [
+            (Unknown::Radius, 0.5),
+            (Unknown::Lean, 0.0087),
+            (Unknown::Nod, 0.0087),
+            (Unknown::Light(0, 0), 5.0),
+        ] {
             let wrong = truth.clone().changed(what, by);
             let solved = solve(&wrong, &samples, &outline, &measures());
             let off = |scene: &Scene| -> f64 {
@@ -305,8 +334,19 @@ mod tests {
                 });
                 far.sum::<f64>() / samples.len() as f64
             };
-            println!("{what:?}: {:.5} to {:.5}, misfit {:.4} to {:.4}", off(&wrong), off(&solved.scene), solved.before, solved.misfit);
-            assert!(off(&solved.scene) < 0.35 * off(&wrong), "{what:?}: {} of {}", off(&solved.scene), off(&wrong));
+            println!(
+                "{what:?}: {:.5} to {:.5}, misfit {:.4} to {:.4}",
+                off(&wrong),
+                off(&solved.scene),
+                solved.before,
+                solved.misfit
+            );
+            assert!(
+                off(&solved.scene) < 0.35 * off(&wrong),
+                "{what:?}: {} of {}",
+                off(&solved.scene),
+                off(&wrong)
+            );
             assert!(solved.misfit <= solved.before.max(LEAST_MISFIT), "{what:?}");
         }
     }

@@ -32,13 +32,55 @@ struct Material {
 }
 
 const MATERIALS: [Material; 7] = [
-    Material { name: "paper", stack: "substrate", diffuse: [0.84, 0.85, 0.88], f0: [0.04; 3], alpha: 0.28, shorter: 1.0 },
-    Material { name: "magenta", stack: "M", diffuse: [0.69, 0.02, 0.2], f0: [0.04; 3], alpha: 0.12, shorter: 1.0 },
-    Material { name: "finish", stack: "C+F", diffuse: [0.02, 0.23, 0.6], f0: [0.04; 3], alpha: 0.05, shorter: 1.0 },
+    Material {
+        name: "paper",
+        stack: "substrate",
+        diffuse: [0.84, 0.85, 0.88],
+        f0: [0.04; 3],
+        alpha: 0.28,
+        shorter: 1.0,
+    },
+    Material {
+        name: "magenta",
+        stack: "M",
+        diffuse: [0.69, 0.02, 0.2],
+        f0: [0.04; 3],
+        alpha: 0.12,
+        shorter: 1.0,
+    },
+    Material {
+        name: "finish",
+        stack: "C+F",
+        diffuse: [0.02, 0.23, 0.6],
+        f0: [0.04; 3],
+        alpha: 0.05,
+        shorter: 1.0,
+    },
     Material { name: "silver", stack: "MS", diffuse: [0.1; 3], f0: [0.57; 3], alpha: 0.27, shorter: 1.0 },
-    Material { name: "gold", stack: "MG", diffuse: [0.09, 0.07, 0.03], f0: [0.54, 0.41, 0.2], alpha: 0.29, shorter: 1.0 },
-    Material { name: "gold foil", stack: "GF", diffuse: [0.015; 3], f0: [0.84, 0.66, 0.31], alpha: 0.06, shorter: 8.0 },
-    Material { name: "silver foil", stack: "SF", diffuse: [0.015; 3], f0: [0.85; 3], alpha: 0.06, shorter: 8.0 },
+    Material {
+        name: "gold",
+        stack: "MG",
+        diffuse: [0.09, 0.07, 0.03],
+        f0: [0.54, 0.41, 0.2],
+        alpha: 0.29,
+        shorter: 1.0,
+    },
+    Material {
+        name: "gold foil",
+        stack: "GF",
+        diffuse: [0.015; 3],
+        f0: [0.84, 0.66, 0.31],
+        alpha: 0.06,
+        shorter: 8.0,
+    },
+    Material {
+        name: "silver foil",
+        stack: "SF",
+        diffuse: [0.015; 3],
+        f0: [0.85; 3],
+        alpha: 0.06,
+        shorter: 8.0,
+    },
 ];
 
 impl Material {
@@ -57,7 +99,9 @@ impl Material {
     }
 
     fn times(&self) -> Vec<f64> {
-        [0.25, 1.0 / 15.0, 1.0 / 60.0, 1.0 / 250.0, 1.0 / 1000.0, 1.0 / 4000.0].map(|t| t / self.shorter).to_vec()
+        [0.25, 1.0 / 15.0, 1.0 / 60.0, 1.0 / 250.0, 1.0 / 1000.0, 1.0 / 4000.0]
+            .map(|t| t / self.shorter)
+            .to_vec()
     }
 }
 
@@ -96,8 +140,11 @@ impl Raw {
     }
 
     fn save(self, path: &Path) {
-        let buffer =
-            image::ImageBuffer::<image::Rgb<u16>, _>::from_raw(self.width as u32, self.height as u32, self.values);
+        let buffer = image::ImageBuffer::<image::Rgb<u16>, _>::from_raw(
+            self.width as u32,
+            self.height as u32,
+            self.values,
+        );
         buffer.unwrap().save(path).unwrap();
     }
 }
@@ -110,7 +157,13 @@ fn render(script: &Path, material: &Material, times: &[f64], extra: &str, folder
         "import importlib.util as u, sys\ns = u.spec_from_file_location('r', sys.argv[1]); m = u.module_from_spec(s); s.loader.exec_module(m)\n\
          m.photo(m.load_curve(sys.argv[2]), sys.argv[3], times={times:?}{extra})"
     );
-    let done = Command::new("python3").args(["-c", &code]).arg(script).arg(&curve).arg(folder.join("npy")).output().unwrap();
+    let done = Command::new("python3")
+        .args(["-c", &code])
+        .arg(script)
+        .arg(&curve)
+        .arg(folder.join("npy"))
+        .output()
+        .unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 }
 
@@ -155,8 +208,13 @@ struct Tape {
     field_of_view: f64,
 }
 
-const EXACT: Tape =
-    Tape { known: true, radius: 50.0, light: [350.0, 100.0, 900.0], axis: [0.0, 1.0, 0.0], field_of_view: 14.0 };
+const EXACT: Tape = Tape {
+    known: true,
+    radius: 50.0,
+    light: [350.0, 100.0, 900.0],
+    axis: [0.0, 1.0, 0.0],
+    field_of_view: 14.0,
+};
 
 fn setup(tape: &Tape, stack: &str, times: &BTreeMap<String, f64>) -> Setup {
     let mut text = format!(
@@ -200,7 +258,16 @@ fn score(taken: &Taken, material: &Material) -> Score {
             covered += f64::from(u8::from((row.rgb[c] - truth[c]).abs() <= 2.0 * row.sigma[c]));
             all += 1.0;
             if std::env::var_os("FOILPRESS_ROWS").is_some() {
-                println!("{:6.2} {c} {:.5} {:.5} {:+.4} {:.4} {:?} {}", row.theta_deg, row.rgb[c], truth[c], error, row.sigma[c] / row.rgb[c], row.kind, row.pixels);
+                println!(
+                    "{:6.2} {c} {:.5} {:.5} {:+.4} {:.4} {:?} {}",
+                    row.theta_deg,
+                    row.rgb[c],
+                    truth[c],
+                    error,
+                    row.sigma[c] / row.rgb[c],
+                    row.kind,
+                    row.pixels
+                );
             }
             if row.theta_deg >= 2.0 {
                 worst = worst.max(error.abs());
@@ -229,7 +296,8 @@ fn seven_materials_with_known_geometry() {
     let Some(script) = renderer() else { return };
     for material in &MATERIALS {
         let rendered = Rendered::new(&script, material, "");
-        let taken = measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), &Silent).unwrap();
+        let taken =
+            measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), &Silent).unwrap();
         let score = score(&taken, material);
         report(material.name, &taken, &score);
         assert!(score.count > 90 && score.worst < 0.03, "{}: {score:?}", material.name);
@@ -254,7 +322,8 @@ fn a_wrong_tape_is_corrected() {
     for material in &MATERIALS {
         let rendered = Rendered::new(&script, material, "");
         for (name, tape) in &cases {
-            let taken = measure(&rendered.photos(), &setup(tape, material.stack, &rendered.times), &Silent).unwrap();
+            let taken =
+                measure(&rendered.photos(), &setup(tape, material.stack, &rendered.times), &Silent).unwrap();
             let score = score(&taken, material);
             report(&format!("{}, {name}", material.name), &taken, &score);
             assert!(score.worst < 0.08 && score.scale.abs() < 0.02, "{}, {name}: {score:?}", material.name);
@@ -270,7 +339,8 @@ fn a_hand_held_camera_is_aligned() {
     // The photograph in the middle of the series is where the setup holds.
     let places = [(8, 9), (9, 8), (5, 11), (8, 8), (12, 8), (8, 3)];
     for material in [&MATERIALS[3], &MATERIALS[6]] {
-        let rendered = Rendered::with(&script, material, ", size=(960, 720), ss=2", |i, raw| raw.halved(places[i]));
+        let rendered =
+            Rendered::with(&script, material, ", size=(960, 720), ss=2", |i, raw| raw.halved(places[i]));
         // The cut margin makes the angle of view smaller.
         let field_of_view = 2.0 * ((480.0 - 8.0) / 480.0 * 7f64.to_radians().tan()).atan().to_degrees();
         for known in [true, false] {
@@ -278,7 +348,8 @@ fn a_hand_held_camera_is_aligned() {
             let setup = setup(&tape, material.stack, &rendered.times);
             let taken = measure(&rendered.photos(), &setup, &Silent).unwrap();
             let score = score(&taken, material);
-            let shifts: Vec<[f64; 2]> = taken.measurement.series[0].shots.iter().map(|shot| shot.shift).collect();
+            let shifts: Vec<[f64; 2]> =
+                taken.measurement.series[0].shots.iter().map(|shot| shot.shift).collect();
             report(&format!("{}, hand-held, known {known}", material.name), &taken, &score);
             println!("{shifts:?}");
             let limit = if known { 0.03 } else { 0.08 };
@@ -294,7 +365,8 @@ fn a_clipped_peak_is_never_silent() {
     for shorter in [1.0, 0.25] {
         let material = Material { shorter, ..MATERIALS[6] };
         let rendered = Rendered::new(&script, &material, "");
-        let taken = measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), &Silent).unwrap();
+        let taken =
+            measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), &Silent).unwrap();
         let rows = &taken.measurement.stacks[0].rows;
         let clipped: Vec<_> = rows.iter().filter(|row| row.kind == Kind::Clipped).collect();
         assert!(clipped.len() > 3, "{} clipped rows", clipped.len());
@@ -302,12 +374,21 @@ fn a_clipped_peak_is_never_silent() {
             let truth = material.at(row.theta_deg.to_radians());
             for c in 0..3 {
                 let low = row.rgb[c] < 0.95 * truth[c];
-                assert!(row.kind != Kind::Measured || row.theta_deg > 60.0 || !low, "{row:?}, truth {truth:?}");
-                assert!(row.kind == Kind::Measured || row.rgb[c] + 2.0 * row.sigma[c] > 0.7 * truth[c], "{row:?}, truth {truth:?}");
+                assert!(
+                    row.kind != Kind::Measured || row.theta_deg > 60.0 || !low,
+                    "{row:?}, truth {truth:?}"
+                );
+                assert!(
+                    row.kind == Kind::Measured || row.rgb[c] + 2.0 * row.sigma[c] > 0.7 * truth[c],
+                    "{row:?}, truth {truth:?}"
+                );
             }
         }
         let again = taken.measurement.again.join("; ");
-        assert!(again.contains("SF: the highlight is clipped") && again.contains("4 and 16 times as short"), "{again}");
+        assert!(
+            again.contains("SF: the highlight is clipped") && again.contains("4 and 16 times as short"),
+            "{again}"
+        );
     }
 }
 
@@ -324,7 +405,15 @@ fn a_flat_sheet_under_several_lamps() {
          [sample]\nshape = \"flat\"\nwidth_mm = 120\nheight_mm = 120\nstack = \"MS\"\n",
     );
     let mut times = String::from("[exposures]\n");
-    let lamps = [(90.0, 900.0), (250.0, 900.0), (450.0, 850.0), (700.0, 700.0), (900.0, 500.0), (1000.0, 320.0), (1050.0, 190.0)];
+    let lamps = [
+        (90.0, 900.0),
+        (250.0, 900.0),
+        (450.0, 850.0),
+        (700.0, 700.0),
+        (900.0, 500.0),
+        (1000.0, 320.0),
+        (1050.0, 190.0),
+    ];
     for (i, (x, z)) in lamps.into_iter().enumerate() {
         let lamp = tempfile::tempdir().unwrap();
         // The renderer's card is at the right; a lamp at the right lights it as well.
@@ -349,7 +438,11 @@ fn a_flat_sheet_under_several_lamps() {
     }
     println!("flat: {first:.1} to {last:.1} degrees, worst {:.2} %", 100.0 * worst);
     assert!(first < 2.0 && last > 38.0 && worst < 0.03, "{first} {last} {worst}");
-    assert!(taken.measurement.again.iter().any(|line| line.contains("half angles from")), "{:?}", taken.measurement.again);
+    assert!(
+        taken.measurement.again.iter().any(|line| line.contains("half angles from")),
+        "{:?}",
+        taken.measurement.again
+    );
 }
 
 /// What people do wrong, each named with what to do.
@@ -365,14 +458,21 @@ fn mistakes_are_named() {
         println!("{error}");
         assert!(words.iter().all(|word| error.contains(word)), "{error}");
     };
-    fails(&rendered.photos(), &Setup { exposures: BTreeMap::new(), ..exact.clone() }, ["exp_0.png: has no exposure time", "[exposures]"]);
+    fails(
+        &rendered.photos(),
+        &Setup { exposures: BTreeMap::new(), ..exact.clone() },
+        ["exp_0.png: has no exposure time", "[exposures]"],
+    );
     for (known, radius) in [(true, 44.0), (false, 56.0)] {
         let wrong = setup(&Tape { known, radius, ..EXACT }, material.stack, &rendered.times);
         fails(&rendered.photos(), &wrong, ["sample.radius_mm: the setup file says", "measure the can"]);
     }
     let mut aside = exact.clone();
     aside.sample.stack = None;
-    aside.patch = vec![measure::setup::Patch { stack: "K".parse().unwrap(), rectangle_px: [180.0, 100.0, 210.0, 260.0] }];
+    aside.patch = vec![measure::setup::Patch {
+        stack: "K".parse().unwrap(),
+        rectangle_px: [180.0, 100.0, 210.0, 260.0],
+    }];
     fails(&rendered.photos(), &aside, ["stack K: no highlight in view", "move the lamp"]);
 
     // Photographs changed one by one.
@@ -443,9 +543,12 @@ fn alum_bronze_of_the_data_set() {
         let taken = measure(&data.join("photos/alum_bronze_cylinder"), &setup, &Silent).unwrap();
         let mut best = f64::INFINITY;
         for kind in ["avg", "colocated"] {
-            let truth = inks::Curve::read_csv(&data.join(format!("brdf/curves_{kind}/merl_alum-bronze.csv"))).unwrap();
+            let truth = inks::Curve::read_csv(&data.join(format!("brdf/curves_{kind}/merl_alum-bronze.csv")))
+                .unwrap();
             let mut worst = 0.0f64;
-            for row in taken.measurement.stacks[0].rows.iter().filter(|row| (2.0..60.0).contains(&row.theta_deg)) {
+            for row in
+                taken.measurement.stacks[0].rows.iter().filter(|row| (2.0..60.0).contains(&row.theta_deg))
+            {
                 for (found, truth) in row.rgb.iter().zip(truth.at(row.theta_deg.to_radians())) {
                     worst = worst.max((found / truth - 1.0).abs());
                 }
@@ -455,4 +558,45 @@ fn alum_bronze_of_the_data_set() {
         }
         assert!(best < if known { 0.03 } else { 0.08 }, "{best}");
     }
+}
+
+/// 24 photographs of 12 megapixels: time and memory. `cargo test -p foilpress-measure --test rendered -- --ignored --nocapture`
+#[test]
+#[ignore = "writes a gigabyte and takes minutes"]
+fn time_and_memory_of_24_large_photographs() {
+    let Some(script) = renderer() else { return };
+    let material = &MATERIALS[3];
+    let rendered = Rendered::new(&script, material, ", size=(1000, 750), ss=2");
+    let large = tempfile::tempdir().unwrap();
+    let mut times = BTreeMap::new();
+    for k in 0..24 {
+        let small = image::open(rendered.photos().join(format!("exp_{}.png", k % 6))).unwrap().into_rgb16();
+        let mut state = k as u32 + 1;
+        let picture = image::ImageBuffer::from_fn(4000, 3000, |x, y| {
+            let image::Rgb(values) = *small.get_pixel(x / 4, y / 4);
+            // Noise of one step of 12 bits keeps the files from being small.
+            image::Rgb(values.map(|v| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                if v >= 65_520 { v } else { v.saturating_add(16 * (state >> 31) as u16) }
+            }))
+        });
+        let name = format!("large_{k:02}.png");
+        picture.save(large.path().join(&name)).unwrap();
+        times.insert(name, material.times()[k % 6]);
+    }
+    let memory = || {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let line = status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or_default().to_owned();
+        line.split_whitespace().nth(1).and_then(|kb| kb.parse::<f64>().ok()).unwrap_or(0.0) / 1e6
+    };
+    let before = memory();
+    let start = std::time::Instant::now();
+    let taken =
+        measure(large.path(), &setup(&Tape { known: false, ..EXACT }, material.stack, &times), &Silent)
+            .unwrap();
+    let (took, peak) = (start.elapsed().as_secs_f64(), memory());
+    let score = score(&taken, material);
+    report("24 large photographs", &taken, &score);
+    println!("{took:.1} s, at most {peak:.2} GB ({before:.2} GB before)");
+    assert!(score.worst < 0.08 && took < 60.0 && peak < 2.0, "{score:?} {took} {peak}");
 }

@@ -21,9 +21,9 @@ use observe::Observer;
     subcommand_negates_reqs = true,
     after_help = "Examples:\n  \
     foilpress measure photos/ --setup can.toml -o mine/\n  \
-    foilpress measure report mine/                       (masks, residuals and every curve on one page)\n  \
-    foilpress inks check mine/                           (then print with --library mine/)\n\n\
-    docs/measuring-inks.md explains what to photograph and what the setup file says."
+    foilpress measure report mine/                       (masks, residuals and every curve on one page)\n\n\
+    The folder is an ink library: check it with `inks check`, then print with --library. The page \"Measuring inks\" of the\n\
+    documentation explains what to photograph and what the setup file says."
 )]
 pub struct Args {
     #[command(subcommand)]
@@ -83,18 +83,26 @@ fn report(dir: &Path, output: Option<&Path>) -> Result<()> {
 
 /// What was measured, in a line for each stack.
 fn summary(measurement: &Measurement, output: &Path) -> String {
-    let mut text = format!("{:<12} {:>9} {:>9} {:>15}  uncertain by\n", "stack", "f(2)", "f(30)", "half angles");
+    let mut text =
+        format!("{:<12} {:>9} {:>9} {:>15}  uncertain by\n", "stack", "f(2)", "f(30)", "half angles");
     for stack in &measurement.stacks {
         let near = |degrees: f64| {
             let off = |row: &&measure::reduce::Row| (row.theta_deg - degrees).abs();
             stack.rows.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
         };
         let at = |degrees: f64| near(degrees).map_or(0.0, |row| row.rgb[1]);
-        let seen = || stack.rows.iter().filter(|row| row.kind != Origin::Extrapolated).map(|row| row.theta_deg);
+        let seen =
+            || stack.rows.iter().filter(|row| row.kind != Origin::Extrapolated).map(|row| row.theta_deg);
         let (first, last) = (seen().fold(90.0, f64::min), seen().fold(0.0, f64::max));
         let doubt = near(30.0).map_or(0.0, |row| 200.0 * row.sigma[1] / row.rgb[1].max(1e-12));
         let angles = format!("{first:.1} to {last:.0}");
-        let _ = writeln!(text, "{:<12} {:>9.4} {:>9.4} {angles:>15}  {doubt:.1} %", stack.stack, at(2.0), at(30.0));
+        let _ = writeln!(
+            text,
+            "{:<12} {:>9.4} {:>9.4} {angles:>15}  {doubt:.1} %",
+            stack.stack,
+            at(2.0),
+            at(30.0)
+        );
     }
     let dir = output.display();
     let _ = writeln!(

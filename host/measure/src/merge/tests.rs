@@ -22,7 +22,11 @@ fn photograph(folder: &Path, name: &str, time: f64, scene: f64, shift: (i64, i64
         image::Rgb([1.7, 1.0, 1.4].map(|gain| {
             let value = 20_000.0 * gain * light * time;
             let value = (value + noise() * (4.0 * value + 1000.0).sqrt()).clamp(0.0, 65_520.0);
-            if gamma { (65_535.0 * (value / 65_535.0).powf(0.45)) as u16 } else { (value / 16.0).round() as u16 * 16 }
+            if gamma {
+                (65_535.0 * (value / 65_535.0).powf(0.45)) as u16
+            } else {
+                (value / 16.0).round() as u16 * 16
+            }
         }))
     });
     let path = folder.join(name);
@@ -32,8 +36,12 @@ fn photograph(folder: &Path, name: &str, time: f64, scene: f64, shift: (i64, i64
 
 /// Five decades of light; `scene` is the size of one disc.
 fn light(x: i64, y: i64, scene: f64) -> f64 {
-    let disc = |cx: f64, cy: f64, r: f64| 1.0 / (1.0 + (((x as f64 - cx).hypot(y as f64 - cy) - r) / 1.5).exp());
-    0.02 + 0.0005 * x as f64 + 0.3 * disc(90.0, 100.0, 40.0) + 5.0 * disc(220.0, 140.0, scene) + 40.0 * disc(220.0, 60.0, 12.0)
+    let disc =
+        |cx: f64, cy: f64, r: f64| 1.0 / (1.0 + (((x as f64 - cx).hypot(y as f64 - cy) - r) / 1.5).exp());
+    0.02 + 0.0005 * x as f64
+        + 0.3 * disc(90.0, 100.0, 40.0)
+        + 5.0 * disc(220.0, 140.0, scene)
+        + 40.0 * disc(220.0, 60.0, 12.0)
 }
 
 const TIMES: [f64; 5] = [16.0, 4.0, 1.0, 0.25, 0.03];
@@ -68,7 +76,20 @@ fn five_decades_come_back_with_their_variance() {
         }
     }
     println!("{shots:?}");
-    for (x,y) in [(20,20),(100,20),(90,100),(220,140),(220,60)] { let (mut s, mut v, mut n)=(0.0,0.0,0.0); for dy in 0..7 { for dx in 0..7 { let (x,y)=(x+dx,y+dy); let i=3*(y*320+x)+1; let e=f64::from(radiance.value[i])/(unit*light(x as i64,y as i64,30.0))-1.0; s+=e; v+=e*e; n+=f64::from(radiance.variance[i]).sqrt()/f64::from(radiance.value[i]); }} println!("{x},{y}: mean {:.5} rms {:.5} expected {:.5}", s/49.0,(v/49f64).sqrt(),n/49.0); }
+    for (x, y) in [(20, 20), (100, 20), (90, 100), (220, 140), (220, 60)] {
+        let (mut s, mut v, mut n) = (0.0, 0.0, 0.0);
+        for dy in 0..7 {
+            for dx in 0..7 {
+                let (x, y) = (x + dx, y + dy);
+                let i = 3 * (y * 320 + x) + 1;
+                let e = f64::from(radiance.value[i]) / (unit * light(x as i64, y as i64, 30.0)) - 1.0;
+                s += e;
+                v += e * e;
+                n += f64::from(radiance.variance[i]).sqrt() / f64::from(radiance.value[i]);
+            }
+        }
+        println!("{x},{y}: mean {:.5} rms {:.5} expected {:.5}", s / 49.0, (v / 49f64).sqrt(), n / 49.0);
+    }
     assert!((off / count).abs() < 2e-3, "bias {}", off / count);
     assert!((0.6..1.7).contains(&(sum / count)), "chi squared {}", sum / count);
     assert!(shots.iter().all(|shot| (shot.ratio - 1.0).abs() < 0.01), "{shots:?}");
