@@ -95,13 +95,16 @@ impl Tones {
         Tones { width, height, factor: 2 * self.factor, light, least, floor: self.floor }
     }
 
-    /// The logarithm of light with a little added.
+    /// The logarithm of light with a little added, softened so that edges are wider than a step of the method.
     fn logs(&self, little: f32) -> Logs {
-        Logs {
-            width: self.width,
-            height: self.height,
-            ln: self.light.iter().map(|l| (l + little).ln()).collect(),
-        }
+        let logs = |ln: Vec<f32>| Logs { width: self.width, height: self.height, ln };
+        let sharp = logs(self.light.iter().map(|l| (l + little).ln()).collect());
+        let soft = |i: usize| {
+            let (x, y) = ((i % self.width) as i64, (i / self.width) as i64);
+            let row = |y: i64| (sharp.at(x - 1, y) + 2.0 * sharp.at(x, y) + sharp.at(x + 1, y)) / 4.0;
+            ((row(y - 1) + 2.0 * row(y) + row(y + 1)) / 4.0) as f32
+        };
+        logs((0..self.light.len()).map(soft).collect())
     }
 
     /// Compares this photograph with another one of the same size.
@@ -233,7 +236,7 @@ impl Logs {
                     -1.0,
                 ];
                 if !(difference.is_finite() && g[0].is_finite() && g[1].is_finite())
-                    || difference.abs() > limit
+                    || difference.abs() > limit + 2.0 * g[0].abs().max(g[1].abs())
                 {
                     continue;
                 }

@@ -298,13 +298,19 @@ impl Scene {
         side * dot(unit(along(self.lights[light], -1.0, self.centre)), self.frame[0])
     }
 
+    /// Millimetres a pixel at the sample's middle.
+    pub(crate) fn pixel_mm(&self) -> f64 {
+        let o = along(self.camera.position, -1.0, self.centre);
+        dot(o, o).sqrt() / self.camera.focal
+    }
+
     /// By how many pixels the ray at this place passes outside the can's outline.
     pub(crate) fn outside_outline(&self, x: f64, y: f64) -> f64 {
         let d = self.camera.ray(x, y);
         let o = along(self.camera.position, -1.0, self.centre);
         let between = cross(d, self.frame[1]);
         let distance = dot(o, between).abs() / dot(between, between).sqrt();
-        (distance - self.radius.unwrap_or(0.0)) * self.camera.focal / dot(o, o).sqrt()
+        (distance - self.radius.unwrap_or(0.0)) / self.pixel_mm()
     }
 }
 

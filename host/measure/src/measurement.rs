@@ -28,6 +28,8 @@ const HIGHLIGHT: f64 = 5.0;
 const FEWEST: usize = 200;
 /// A correction beyond this many tolerances is a mistake.
 const MISTAKE: f64 = 3.0;
+/// Places on the outline that are enough to judge the radius by.
+const OUTLINED: usize = 8;
 /// Deviation of pixels of one half angle that is worth a word.
 const UNEVEN: f64 = 0.12;
 
@@ -325,14 +327,29 @@ fn describe(measures: &[Measure], solved: &Solved) -> Vec<Corrected> {
 }
 
 /// A correction beyond its tolerance: a slip of the tape or the pen.
-fn mistakes(setup: &Setup, measures: &[Measure], solved: &Solved) -> Result<(), MeasureError> {
+fn mistakes(
+    setup: &Setup,
+    tape: &Scene,
+    outline: &[[f64; 2]],
+    measures: &[Measure],
+    solved: &Solved,
+) -> Result<(), MeasureError> {
     let far = |k: usize| solved.moved[k].abs() > MISTAKE;
-    let radius = measures.iter().position(|(what, _)| *what == Unknown::Radius).filter(|&k| far(k));
-    if let (Some(_), Some(given), Some(found)) = (radius, setup.sample.radius_mm, solved.scene.radius()) {
-        return Err(MeasureError::Scene(format!(
-            "sample.radius_mm: the setup file says {given}, but outline and highlight fit {found:.1} mm; measure the can with the \
-             print on it"
-        )));
+    let radius = measures.iter().position(|(what, _)| *what == Unknown::Radius);
+    if let (Some(k), Some(given), Some(found)) = (radius, setup.sample.radius_mm, solved.scene.radius()) {
+        // The outline alone says whether the can is as wide as the tape: lamp and tilt have no part in it.
+        let mut outside: Vec<f64> =
+            outline.iter().map(|p| tape.outside_outline(p[0], p[1]) * tape.pixel_mm()).collect();
+        let seen = outline.len() >= OUTLINED;
+        let outside = crate::linear::median(&mut outside);
+        let allowed = 2.0 * measures[k].1.hypot(setup.sample.centre_tolerance_mm);
+        if far(k) || (seen && outside.abs() > allowed) {
+            let fits = if seen { given + outside } else { found };
+            return Err(MeasureError::Scene(format!(
+                "sample.radius_mm: the setup file says {given}, but the can's outline and highlight fit {fits:.1} mm; measure the can \
+                 with the print on it"
+            )));
+        }
     }
     match describe(measures, solved).into_iter().enumerate().find(|(k, _)| far(*k)) {
         Some((_, wrong)) => Err(MeasureError::Scene(format!(
@@ -354,7 +371,7 @@ fn finish(
     let measures = measures(setup);
     let outline: Vec<[f64; 2]> = seen.iter().flat_map(|seen| seen.outline.iter().copied()).collect();
     let solved = solve::solve(tape, &samples(tape, &seen, patches.len()), &outline, &measures);
-    mistakes(setup, &measures, &solved)?;
+    mistakes(setup, tape, &outline, &measures, &solved)?;
     observer.end();
     let trusted = setup.geometry == Trust::Known;
     let scene = if trusted { tape.clone() } else { solved.scene.clone() };

@@ -354,6 +354,14 @@ fn a_hand_held_camera_is_aligned() {
             println!("{shifts:?}");
             let limit = if known { 0.03 } else { 0.08 };
             assert!(score.worst < limit && score.scale.abs() < 0.02, "{}: {score:?}", material.name);
+            assert!(score.covered >= 0.9, "{}: {score:?}", material.name);
+            for (shift, place) in shifts.iter().zip(places) {
+                let moved = [place.0, place.1].map(|d| (8.0 - d as f64) / 2.0);
+                assert!(
+                    (0..2).all(|axis| (shift[axis] - moved[axis]).abs() < 0.25),
+                    "{shift:?} for {moved:?}"
+                );
+            }
         }
     }
 }
@@ -370,14 +378,11 @@ fn a_clipped_peak_is_never_silent() {
         let rows = &taken.measurement.stacks[0].rows;
         let clipped: Vec<_> = rows.iter().filter(|row| row.kind == Kind::Clipped).collect();
         assert!(clipped.len() > 3, "{} clipped rows", clipped.len());
-        for row in rows {
+        for row in rows.iter().filter(|row| row.theta_deg < 60.0) {
             let truth = material.at(row.theta_deg.to_radians());
             for c in 0..3 {
                 let low = row.rgb[c] < 0.95 * truth[c];
-                assert!(
-                    row.kind != Kind::Measured || row.theta_deg > 60.0 || !low,
-                    "{row:?}, truth {truth:?}"
-                );
+                assert!(row.kind != Kind::Measured || !low, "{row:?}, truth {truth:?}");
                 assert!(
                     row.kind == Kind::Measured || row.rgb[c] + 2.0 * row.sigma[c] > 0.7 * truth[c],
                     "{row:?}, truth {truth:?}"
@@ -392,7 +397,7 @@ fn a_clipped_peak_is_never_silent() {
     }
 }
 
-/// A flat sheet under nine lamps, rendered one by one.
+/// A flat sheet under seven lamps, rendered one by one.
 #[test]
 fn a_flat_sheet_under_several_lamps() {
     let Some(script) = renderer() else { return };
