@@ -12,6 +12,10 @@
     clippy::cast_sign_loss,
     reason = "pixels and bins are counted in numbers far below 2^31, and positions are checked against the picture"
 )]
+#![allow(
+    clippy::needless_range_loop,
+    reason = "channels, bins and pixels are numbered across several arrays at once"
+)]
 
 mod align;
 pub mod card;

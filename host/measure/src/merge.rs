@@ -93,6 +93,9 @@ fn name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
+/// Width and height of a photograph, and its small copy.
+type Small = ((usize, usize), Probe);
+
 /// What is taken from each photograph before it is merged.
 pub struct Frames {
     /// An evenly lit white surface.
@@ -155,7 +158,7 @@ pub fn merge(
     let mut probes: Vec<Probe> = Vec::new();
     let mut size = (0, 0);
     for pair in exposures.chunks(2) {
-        let read: Vec<Result<((usize, usize), Probe), MeasureError>> = pair
+        let read: Vec<Result<Small, MeasureError>> = pair
             .par_iter()
             .map(|exposure| read(exposure).map(|photo| ((photo.width, photo.height), Probe::new(&photo))))
             .collect();
