@@ -274,7 +274,7 @@ fn correct(scene: &Scene, bin: &[(Pixel, View)], curve: &Logs) -> (Bin, [f64; 3]
         ratio[c] = mean;
         let kept = belongs.iter().filter(|b| **b).count().max(1);
         let mut variance = (width * width / kept as f64).max(1e-8);
-        // Parts of the sample that disagree: six, by lamp, side and height.
+        // Parts of the sample that disagree: four for each lamp, by side and height.
         let mut parts: std::collections::BTreeMap<(usize, bool, bool), (f64, usize)> =
             std::collections::BTreeMap::new();
         for (((p, v), (value, _)), _) in bin.iter().zip(&values).zip(&belongs).filter(|(_, b)| **b) {
