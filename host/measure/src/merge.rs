@@ -254,8 +254,7 @@ fn compare(
         let moved = found.shift.iter().any(|d| d.abs() > largest);
         if found.compared < COMPARABLE {
             observer.note(&format!(
-                "{} and {name} share too few tones to be compared; their exposure times are taken as they stand: take exposures a \
-                 factor of 2 to 4 apart",
+                "{} and {name} share too few tones to be compared, so their exposure times are taken as they stand",
                 exposures[i].name()
             ));
             let last = chain[i - 1];

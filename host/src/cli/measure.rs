@@ -21,9 +21,9 @@ use observe::Observer;
     subcommand_negates_reqs = true,
     after_help = "Examples:\n  \
     foilpress measure photos/ --setup can.toml -o mine/\n  \
-    foilpress measure report mine/                       (masks, residuals and every curve on one page)\n\n\
-    The folder is an ink library: check it with `inks check`, then print with --library. The page \"Measuring inks\" of the\n\
-    documentation explains what to photograph and what the setup file says."
+    foilpress measure report mine/                       (one page with every curve)\n\n\
+    The folder is an ink library: check it with `inks check`, then print with --library.\n\
+    docs/measuring-inks.md explains what to photograph and what the setup file says."
 )]
 pub struct Args {
     #[command(subcommand)]
