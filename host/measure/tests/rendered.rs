@@ -1,6 +1,8 @@
 //! Photographs from an independent renderer, with noise, 12-bit clipping and an unknown white balance, measured with exact and with
 //! wrong setups, against the curves that were rendered.
 
+#![allow(clippy::needless_range_loop, reason = "channels are numbered across several arrays at once")]
+
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -104,6 +106,9 @@ impl Material {
             .to_vec()
     }
 }
+
+/// A photograph of 16 bits.
+type Picture = image::ImageBuffer<image::Rgb<u16>, Vec<u16>>;
 
 /// A picture as the renderer stores it: NumPy's format, 16 bits.
 struct Raw {
@@ -481,7 +486,7 @@ fn mistakes_are_named() {
     fails(&rendered.photos(), &aside, ["stack K: no highlight in view", "move the lamp"]);
 
     // Photographs changed one by one.
-    let changed = |change: &dyn Fn(usize, &mut image::ImageBuffer<image::Rgb<u16>, Vec<u16>>)| {
+    let changed = |change: &dyn Fn(usize, &mut Picture)| {
         let folder = tempfile::tempdir().unwrap();
         for i in 0..6 {
             let name = format!("exp_{i}.png");
