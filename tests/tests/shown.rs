@@ -15,7 +15,7 @@ use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
 /// Commands that are not run here, by their first words, and why.
-const ELSEWHERE: [(&str, &str); 16] = [
+const ELSEWHERE: [(&str, &str); 17] = [
     ("foilpress bridge flash", "needs a board in its boot loader: tests/emulator/flash.rs"),
     ("foilpress queue", "changes the computer's print system: tests/queue/system.rs"),
     ("lp ", "needs a print server: tests/queue/main.rs"),
@@ -30,6 +30,7 @@ const ELSEWHERE: [(&str, &str); 16] = [
     ("foilpress bridge status --watch", "runs until Ctrl-C: tests/emulator/care.rs"),
     ("foilpress bridge log", "needs the firmware's debug data: tests/emulator/care.rs"),
     ("foilpress bridge test", "needs a loop-back plug, or no printer: tests/emulator/care.rs"),
+    ("foilpress measure", "needs photographs: host/tests/measure.rs"),
     ("foilpress doctor", "judges the whole computer: tests/emulator/main.rs"),
     ("foilpress generate", "is for packages: `cargo xtask package` runs it"),
 ];

@@ -19,6 +19,7 @@ mod job;
 mod layers;
 mod layout;
 mod ledger;
+mod measure;
 mod output;
 mod permission;
 mod plan;
@@ -122,6 +123,11 @@ enum Command {
     Doctor(doctor::Args),
     /// List, show and check the inks and stacks of a library
     Inks(inks::Args),
+    /// Measure printed stacks from photographs
+    ///
+    /// Turns series of exposures of a print round a can, with a grey card in the picture, into an ink library with curves,
+    /// their uncertainty and their provenance.
+    Measure(measure::Args),
     /// Install, remove and list print queues of the system
     Queue(queue::Args),
     /// Deliver a job to the printer (called by the print system)
@@ -200,6 +206,7 @@ fn run(args: Args) -> Result<()> {
         Command::Bridge(args) => bridge::run(&args, observer),
         Command::Doctor(args) => doctor::run(&args),
         Command::Inks(args) => inks::run(args),
+        Command::Measure(args) => measure::run(&args, observer),
         Command::Generate(args) => generate::run(&args, &Args::command()),
         Command::Queue(args) => queue::run(&args, observer),
         Command::Sample(args) => sample::run(args),

@@ -38,6 +38,8 @@ pub enum Kind {
     Passes,
     /// Pictures of passes without their description.
     Pictures,
+    /// Curves from photographs.
+    Measured,
     /// A sample's maps, which the user may have painted in since: never replaced.
     Maps,
 }
@@ -52,6 +54,7 @@ impl Kind {
             Kind::Dots => Some("dots.toml"),
             Kind::Sheet => Some("sheet.toml"),
             Kind::Passes => Some("passes.toml"),
+            Kind::Measured => Some(measure::library::FIGURES),
             Kind::Pictures | Kind::Maps => None,
         }
     }
@@ -72,6 +75,11 @@ impl Kind {
                 Kind::Sheet => ["separation.png", "layout.toml"].contains(&name),
                 Kind::Passes | Kind::Pictures => {
                     name.starts_with(|c: char| c.is_ascii_digit()) && name.contains('-') && picture(name)
+                }
+                Kind::Measured => {
+                    [inks::FILE_NAME, "report.html"].contains(&name)
+                        || name.ends_with(".csv")
+                        || (["mask-", "residuals-"].iter().any(|start| name.starts_with(start)) && picture(name))
                 }
                 Kind::Maps => false,
             }
