@@ -2,7 +2,7 @@
 //!
 //! The modules follow the data, and each uses only the ones before it: [`brdf`] holds curves and the metric that compares
 //! them, [`weights`] fixed-point weight maps, [`solve`] the constrained least squares, [`materials`] what the pixels of a
-//! document reflect, [`sample`] drawn materials to try things on. [`document`] reads and writes files of materials,
+//! document reflect, [`sample`] drawn materials to try things on, and [`wide`] loops over lanes. [`document`] reads and writes files of materials,
 //! [`factor`] turns materials into bases and weights, and [`gamut`] maps the bases to stacks of ink. Nothing here knows
 //! about dots, pages or printers.
 #![deny(unsafe_code)]
@@ -23,3 +23,4 @@ pub mod sample;
 pub mod solve;
 pub mod srgb;
 pub mod weights;
+pub mod wide;

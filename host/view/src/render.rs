@@ -12,6 +12,7 @@
 //! is not. The back of a sheet is never seen: all of a bent one lies behind its middle, where [`Scene::check`] wants the eye
 //! in front.
 
+use appearance::wide::wide;
 use observe::Observer;
 use press::preview::{ENTRIES, Fine, LONGEST_SIDE, PreviewError, Radiance};
 use rayon::prelude::*;
@@ -102,17 +103,22 @@ impl<'a> Renderer<'a> {
             || vec![0.0f32; 2 * self.lit.stride],
             |scratch, (y, row)| {
                 let (weights, level) = scratch.split_at_mut(self.lit.stride);
-                for (x, out) in row.iter_mut().enumerate() {
-                    let Some(hit) = seen.hit(x as f32 + 0.5, y as f32 + 0.5) else { continue };
-                    self.weights(&hit, weights, level);
-                    let mut rgb = self.shade(&seen, &hit, weights);
-                    if let Some(field) = &field {
-                        let from = field.at(hit.place, self.lit.size, weights);
-                        (0..3).for_each(|c| rgb[c] += from[c]);
-                    }
-                    let [r, g, b] = rgb.map(|v| v * hit.covered);
-                    *out = [r, g, b, hit.covered];
-                }
+                wide(
+                    #[inline(always)]
+                    || {
+                        for (x, out) in row.iter_mut().enumerate() {
+                            let Some(hit) = seen.hit(x as f32 + 0.5, y as f32 + 0.5) else { continue };
+                            self.weights(&hit, weights, level);
+                            let mut rgb = self.shade(&seen, &hit, weights);
+                            if let Some(field) = &field {
+                                let from = field.at(hit.place, self.lit.size, weights);
+                                (0..3).for_each(|c| rgb[c] += from[c]);
+                            }
+                            let [r, g, b] = rgb.map(|v| v * hit.covered);
+                            *out = [r, g, b, hit.covered];
+                        }
+                    },
+                );
                 observer.advance(1);
             },
         );
@@ -121,6 +127,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// The light of the lights that a place with these weights sends to the eye.
+    #[inline(always)]
     fn shade(&self, seen: &Seen, hit: &Hit, weights: &[f32]) -> V {
         let stride = self.lit.stride;
         let mut sum = [0.0; 3];
@@ -153,6 +160,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// The mean weights over the footprint of a hit.
+    #[inline(always)]
     fn weights(&self, hit: &Hit, out: &mut [f32], scratch: &mut [f32]) {
         let [width, height] = self.lit.size.map(|side| side as f32);
         let first = &self.lit.levels[0];
@@ -173,6 +181,7 @@ impl<'a> Renderer<'a> {
     }
 
     /// The weights at a point of a level, between its places.
+    #[inline(always)]
     fn between(&self, level: usize, u: f32, v: f32, out: &mut [f32]) {
         let level = &self.lit.levels[level];
         let stride = self.lit.stride;
@@ -199,6 +208,7 @@ impl<'a> Renderer<'a> {
 }
 
 /// The weighted sum of values between two entries.
+#[inline(always)]
 fn mixed(weights: &[f32], near: &[f32], far: &[f32], s: f32) -> f32 {
     let mut sums = [0.0; LANES];
     let (near, far) = (near.as_chunks::<LANES>().0, far.as_chunks::<LANES>().0);
@@ -211,6 +221,7 @@ fn mixed(weights: &[f32], near: &[f32], far: &[f32], s: f32) -> f32 {
 }
 
 /// `E cos_i` of a light on a place that faces it, and the chord between the normal and the half vector.
+#[inline(always)]
 fn irradiance(light: Light, hit: &Hit) -> Option<(f32, f32)> {
     let (l, falloff) = match light {
         Light::Far(v) => (v.map(|c| c as f32), 1.0),
@@ -257,6 +268,7 @@ impl Seen {
     }
 
     /// Where the ray through a point of the picture (pixels from its top left corner) meets the sheet.
+    #[inline(always)]
     fn hit(&self, x: f32, y: f32) -> Option<Hit> {
         let window: V = std::array::from_fn(|c| self.corner[c] + x * self.right[c] - y * self.up[c]);
         let (o, d) = match self.eye {
@@ -282,6 +294,7 @@ impl Seen {
         }
     }
 
+    #[inline(always)]
     fn hit_at(&self, o: V, d: V, t: f32, normal: V, along: Option<f32>) -> Option<Hit> {
         if !t.is_finite() || (self.eye.is_some() && t <= 0.0) {
             return None;

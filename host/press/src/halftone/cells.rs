@@ -22,8 +22,8 @@ use rayon::prelude::*;
 
 use super::search::{self, Point};
 use super::solids::Solids;
-use super::wide::wide;
 use appearance::gamut::InkMix;
+use appearance::wide::wide;
 use observe::Observer;
 
 use choose::Metric;

@@ -24,7 +24,6 @@ mod regions;
 mod rule;
 mod search;
 mod solids;
-mod wide;
 
 use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};

@@ -35,6 +35,7 @@
 //! sum to [`UNIT`], so the result is the same on every machine. Limits: debts are 32-bit in that unit, which is 8192 dots;
 //! the tests see debts of a few minimum clusters.
 
+use appearance::wide::wide;
 use std::collections::VecDeque;
 
 /// One dot of full weight.
@@ -143,23 +144,7 @@ pub(super) struct Rule {
 
 /// Walks to the end with the widest vectors of this processor. The result does not depend on them.
 pub(super) fn walk<S: Source, K: Sink>(rule: &mut Rule, source: &mut S, sink: &mut K) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        /// The same code, compiled for AVX2: integer operations only, so equal bit for bit.
-        #[target_feature(enable = "avx2")]
-        fn wide<S: Source, K: Sink>(rule: &mut Rule, source: &mut S, sink: &mut K) {
-            rule.walk(source, sink);
-        }
-        if is_x86_feature_detected!("avx2") {
-            #[expect(unsafe_code, reason = "a call to code compiled for a processor feature")]
-            // SAFETY: the only requirement of `wide` is that the processor has AVX2, just detected.
-            unsafe {
-                wide(rule, source, sink)
-            };
-            return;
-        }
-    }
-    rule.walk(source, sink);
+    wide(|| rule.walk(source, sink));
 }
 
 /// The best candidate.

@@ -20,10 +20,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use appearance::wide::wide;
+
 use super::cells::cell::{Cell, fits_half};
 use super::cells::field::{Field, Row};
 use super::cells::plan::{BLOCK, Plan};
-use super::wide::wide;
 
 use kernel::Kernel;
 

@@ -66,7 +66,7 @@ impl Fine {
     }
 
     /// The entry below a chord, `2 sin(theta_h / 2)` from 0 to the root of 2, and the fraction of the way to the next entry, which exists.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, chord: f32) -> (usize, f32) {
         let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
         let (k, s) = (step as usize, step.fract());
