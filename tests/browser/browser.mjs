@@ -28,7 +28,7 @@ export async function open(file, { width, height, touch = false, webgl = true, c
 
 /** Waits until the hand has rested and the picture is drawn finely, and returns the address. */
 export async function rested(page) {
-  await page.waitForTimeout(200);
+  await page.waitForFunction(() => !document.querySelector('#stage.changing'));
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   return new URLSearchParams(new URL(page.url()).hash.slice(1));
 }

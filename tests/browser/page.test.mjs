@@ -76,7 +76,7 @@ test('the mouse drags light, sheet and picture, and the wheel zooms where it is'
   // The lamp itself, and the handle.
   const lamp = await page.locator('.lamp').boundingBox();
   after = await drag(page, 30, 0, [lamp.x + 22, lamp.y + 22]);
-  assert.ok(numbers(after.get('light'))[0] > a);
+  assert.ok(numbers(after.get('light'))[0] > a, `${after.get('light')} from ${a}, lamp at ${JSON.stringify(lamp)}`);
   const handle = await page.locator('#handle').boundingBox();
   after = await drag(page, 100, 0, [handle.x + 22, handle.y + 90]);
   assert.ok(Number(after.get('split')) > 0.55, after.get('split'));
@@ -249,19 +249,26 @@ test('without WebGL2 there is a picture and a sentence', () => visit({ ...desk, 
   assert.ok(await page.locator('#still').evaluate((image) => image.naturalWidth > 0 && image.offsetWidth > 0));
 }));
 
-test('dragging draws coarser, and rest draws finely', () => visit(desk, async (page) => {
+test('dragging stays fluid, coarser if it must, and rest draws finely', () => visit(desk, async (page) => {
   const size = () => page.evaluate(() => document.querySelector('canvas').width);
   const fine = await size();
   const [x, y] = await place(page);
   await page.mouse.move(x, y);
   await page.mouse.down();
+  const took = [];
   let least = fine;
-  for (let i = 0; i < 40; i++) {
+  for (let i = 0; i < 60; i++) {
     await page.mouse.move(x + i, y);
+    took.push(await page.evaluate(() => new Promise((done) => {
+      requestAnimationFrame((first) => requestAnimationFrame((second) => done(second - first)));
+    })));
     least = Math.min(least, await size());
   }
   await page.mouse.up();
   await rested(page);
   assert.equal(await size(), fine);
-  assert.ok(least <= fine);
+  const usual = took.slice(30).sort((a, b) => a - b)[15];
+  // On a machine too slow for that the picture is as coarse as it gets.
+  assert.ok(usual <= 34 || least < fine / 4, `${usual} ms a frame, ${least} of ${fine} pixels`);
+  console.log(`${usual} ms a frame while dragging, ${least} of ${fine} pixels wide`);
 }));

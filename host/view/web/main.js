@@ -7,7 +7,7 @@ import { chart, distance, element, inWords, reflectance, shares, weightsAt } fro
 import { initial, MOST_LIGHTS, MOST_ZOOM, read, SHOWS, written } from './state.js';
 
 /** A frame that takes longer while something moves is drawn coarser, in milliseconds. */
-const SLOW = 40;
+const SLOW = 30;
 /** How long the hand rests before the picture is drawn finely, in milliseconds. */
 const REST = 140;
 const MOST_COARSE = 6;
@@ -55,10 +55,12 @@ let rest;
 /** @param {boolean} inMotion */
 function redraw(inMotion) {
   moving = inMotion;
+  stage.classList.add('changing');
   clearTimeout(rest);
   rest = setTimeout(() => {
-    if (moving) redraw(false);
     shareAddress();
+    if (moving) redraw(false);
+    else stage.classList.remove('changing');
   }, REST);
   if (!asked) {
     asked = true;
