@@ -393,6 +393,14 @@ stack = "MS+C"
 "#;
 
     #[test]
+    fn the_example_of_the_guide_is_a_setup() {
+        let guide = include_str!("../../../docs/measuring-inks.md");
+        let example = guide.split("```toml setup\n").nth(1).unwrap().split("```").next().unwrap();
+        let setup = Setup::parse(example).unwrap();
+        assert_eq!(setup.patch.len(), 2);
+    }
+
+    #[test]
     fn a_short_file_is_enough_and_says_how_it_was_measured() {
         let setup = Setup::parse(CAN).unwrap();
         assert_eq!((setup.geometry, setup.card.reflectance), (Trust::Solved, [0.9, 0.18, 0.036]));

@@ -6,6 +6,7 @@ use std::process::{ChildStdout, Command, Stdio};
 
 use press::layers::{Page, kinds};
 use press::process::{self, Process, ProcessError};
+use press::scratch::Scratch;
 use tempfile::NamedTempFile;
 
 use super::{FilterError, io_error};
@@ -19,6 +20,8 @@ pub(super) struct Drawing {
     pages: BufReader<ChildStdout>,
     /// Read by the process.
     _conversions: NamedTempFile,
+    /// Where the process keeps files of its own, which it leaves behind when it is stopped.
+    _scratch: Scratch,
 }
 
 /// Why there is no drawing.
@@ -33,8 +36,10 @@ impl Drawing {
     /// Begins to draw a document, or one page of it.
     pub(super) fn begin(path: &Path, page: Option<usize>, dpi: u16) -> Result<Drawing, FilterError> {
         let conversions = kinds::conversions().map_err(io_error("keep the conversion of colours"))?;
+        let scratch = Scratch::new().map_err(io_error("make a temporary folder"))?;
         let mut command = Command::new("gs");
         command
+            .env("TMPDIR", scratch.path())
             .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dNOINTERPOLATE"])
             .arg(format!("-sDEVICE={}", kinds::DEVICE))
             .arg(format!("-sSourceObjectICC={}", conversions.path().display()))
@@ -52,7 +57,7 @@ impl Drawing {
         #[cfg(target_os = "linux")]
         let _ = rustix::pipe::fcntl_setpipe_size(&pages, 1 << 20);
         let pages = BufReader::with_capacity(1 << 18, pages);
-        Ok(Drawing { process, pages, _conversions: conversions })
+        Ok(Drawing { process, pages, _conversions: conversions, _scratch: scratch })
     }
 
     /// Width and height of the next page in pixels.

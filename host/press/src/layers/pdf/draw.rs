@@ -277,6 +277,10 @@ fn ghostscript(
 ) -> Result<String, LayersError> {
     let file = std::path::absolute(path).map_err(io(path, "find it"))?;
     let mut command = Command::new("gs");
+    // Its own files lie beside its result: it leaves them behind when it is stopped.
+    if let Some(folder) = to.parent() {
+        command.env("TMPDIR", folder);
+    }
     command
         .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
         .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
