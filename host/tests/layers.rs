@@ -286,19 +286,21 @@ mod programs {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        let begun = bench.path("scratch/begun");
+        // Ghostscript's own files go into the folder of the plates, so that they are removed with it.
+        let begun = || {
+            let folders = entries(&bench.path("scratch"));
+            folders.iter().any(|name| bench.path("scratch").join(name).join("begun").exists())
+        };
         let started = Instant::now();
-        while !begun.exists() {
+        while !begun() {
             assert!(started.elapsed() < Duration::from_secs(60), "the page is never begun");
             std::thread::sleep(Duration::from_millis(10));
         }
-        assert_eq!(entries(&bench.path("scratch")).len(), 2, "the plates' folder and the sign");
         Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(130));
-        assert_eq!(entries(&bench.path("scratch")), ["begun"]);
+        assert!(entries(&bench.path("scratch")).is_empty());
         assert!(!bench.entries().iter().any(|name| name.ends_with(".print")), "{:?}", bench.entries());
 
-        fs::remove_file(begun).unwrap();
         fs::write(bench.path("bin/gs"), "#!/bin/sh\necho broken >&2\nexit 1\n").unwrap();
         let output = bench
             .command("layers page.pdf")

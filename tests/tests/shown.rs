@@ -36,7 +36,7 @@ const ELSEWHERE: [(&str, &str); 17] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 9] = [
+const DOCUMENTS: [(&str, &str); 10] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
@@ -45,6 +45,7 @@ const DOCUMENTS: [(&str, &str); 9] = [
     ("docs/guide/preview.md", "."),
     ("docs/guide/queue.md", "."),
     ("docs/emulator.md", "."),
+    ("docs/measuring-inks.md", "."),
     ("docs/wiring.md", "."),
 ];
 
@@ -244,6 +245,16 @@ fn decals() {
 #[test]
 fn pages() {
     document("docs/guide/page.md");
+}
+
+#[test]
+fn previews() {
+    document("docs/guide/preview.md");
+}
+
+#[test]
+fn measuring_inks() {
+    document("docs/measuring-inks.md");
 }
 
 #[test]
