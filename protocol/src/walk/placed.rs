@@ -38,7 +38,7 @@ impl Frame {
     }
 }
 
-/// The order of all dots of a plane with a frame. See the [module](self).
+/// The order of all dots of a plane with a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Placed {
     above: Walk,
