@@ -28,7 +28,7 @@ pub fn run(root: &Path) -> Result<()> {
     succeed(node.command("npm", &install).current_dir(&scripts))?;
     succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
     let args =
-        ["test", "--package", "foilpress-view", "--test", "browser", "--locked", "--", "--test-threads=1"];
+        ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_CHROMIUM", found()?)

@@ -47,7 +47,7 @@ pub fn install() -> Result<()> {
 /// The tests of print queues alone.
 pub fn run() -> Result<()> {
     install()?;
-    let mut tests = cargo(&["test", "--package", "foilpress-tests", "--test", "queue", "--locked"]);
+    let mut tests = cargo(&["test", "--workspace", "--test", "queue", "--locked"]);
     if !tests.status()?.success() {
         bail!("the tests of print queues failed");
     }

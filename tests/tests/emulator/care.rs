@@ -24,12 +24,12 @@ fn the_log_tells_of_the_start_and_of_every_job_in_words() {
             .find(|line| line.contains(needle))
             .unwrap_or_else(|| panic!("no `{needle}` in: {words}"))
     };
-    assert!(entry("up, after power or reset").contains("info"), "{words}");
+    assert!(entry("up on a Pico, after power or reset").contains("info"), "{words}");
     entry(": Printing");
     // To the byte, and later than the start.
     assert!(entry(": Done").contains(&format!("{} bytes printed", job.len())), "{words}");
     let seconds = |line: &str| line.trim().split(' ').next().unwrap().parse::<f64>().unwrap();
-    assert!(seconds(entry(": Done")) > seconds(entry("up, after")), "{words}");
+    assert!(seconds(entry(": Done")) > seconds(entry("up on a Pico")), "{words}");
     // As JSON the same.
     let output = bench.run(&[&args[..], &["--json"]].concat());
     let lines: Vec<Value> = String::from_utf8(output.stdout)
