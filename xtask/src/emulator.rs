@@ -8,6 +8,7 @@
 use crate::tools::{self, Node};
 use crate::{PROGRAM, cargo, firmware};
 use anyhow::{Context, Result, bail};
+use needs::Need;
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
@@ -17,7 +18,6 @@ use protocol::walk::{EDGE, Frame, Placed, Walk};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use testing::needs::Need;
 
 /// What every use of the emulator needs.
 struct Bench {

@@ -1,7 +1,7 @@
 //! `cargo xtask test`: everything that has to pass before anything lands.
 //!
 //! Every step runs, whatever failed before, and has its time said. At the end stand the tests that were left out because
-//! something is missing on this computer ([`testing::needs`]), and the steps that failed.
+//! something is missing on this computer ([`needs`]), and the steps that failed.
 
 use std::fs;
 use std::io::ErrorKind;

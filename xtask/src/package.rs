@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use testing::needs::Need;
+use needs::Need;
 
 use crate::{cargo, command, firmware, queue, succeed, tools};
 

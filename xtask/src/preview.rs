@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
 use anyhow::{Context as _, Result, bail};
-use testing::needs::Need;
+use needs::Need;
 
 use crate::tools::{self, Node};
 use crate::{cargo, command, firmware, succeed};
@@ -27,8 +27,7 @@ pub fn run(root: &Path) -> Result<()> {
     let install = ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"];
     succeed(node.command("npm", &install).current_dir(&scripts))?;
     succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
-    let args =
-        ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
+    let args = ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_CHROMIUM", found()?)

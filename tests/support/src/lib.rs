@@ -5,5 +5,6 @@
 #![forbid(unsafe_code)]
 
 pub mod damage;
-pub mod needs;
 pub mod program;
+
+pub use needs;
