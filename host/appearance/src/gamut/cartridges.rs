@@ -193,13 +193,14 @@ mod tests {
             // Ties within 0.1 %, and weights below 0.5 % of a fourth ink, do not count.
             prop_assert!(chosen.chosen <= best.sqrt() * 1.003 + 1e-6, "{} {}", chosen.chosen, best.sqrt());
             prop_assert!(chosen.all <= chosen.chosen + 1e-9);
-            // Neither counts where it has to be exact.
+            // Neither counts where it has to be exact: the solver's gap alone is left.
             let exact = choose(&candidates, &targets, 3, Precision::EXACT, &Silent).unwrap();
-            prop_assert!((exact.chosen - best.sqrt()).abs() <= 1e-6 * best.sqrt() + 1e-7, "{} {}", exact.chosen, best.sqrt());
-            for worth in worth(&candidates, &targets, &exact).unwrap() {
-                let fewer = stacks_of(&candidates, exact.inks.without(worth.ink));
-                let again = targets.fit(&candidates, &fewer, None).unwrap().loss.sqrt();
-                prop_assert!((worth.without - again).abs() < 1e-5 && worth.without >= exact.chosen - 1e-7, "{worth:?} {again}");
+            prop_assert!((exact.chosen.powi(2) - best).abs() <= 3e-8, "{} {}", exact.chosen, best.sqrt());
+            for left in worth(&candidates, &targets, &exact).unwrap() {
+                let fewer = stacks_of(&candidates, exact.inks.without(left.ink));
+                let again = targets.fit(&candidates, &fewer, None).unwrap().loss;
+                prop_assert!((left.without.powi(2) - again).abs() < 1e-6, "{left:?} {again}");
+                prop_assert!(left.without.powi(2) >= exact.chosen.powi(2) - 3e-8, "{left:?}");
             }
         }
     }

@@ -154,7 +154,8 @@ mod tests {
             DefaultSolver::new(&matrix(&upper), &linear, &matrix(&constraints), &right, &cones, settings)
                 .unwrap();
         solver.solve();
-        solver.solution.obj_val + product(rows.row(row), rows.row(row))
+        // Relative to the row, whose peak may be large.
+        1.0 + solver.solution.obj_val / product(rows.row(row), rows.row(row))
     }
 
     /// Some stacks of the library, and two that are mixtures of them.
@@ -175,7 +176,7 @@ mod tests {
         let found = redundancy(&space, &printable, 0.0, 1e-4).unwrap();
         for (k, stack) in found.iter().enumerate() {
             let miss = outside(&printable.curves, k);
-            assert_eq!(stack.alone < 1e-4, miss < 1e-7, "{}: {} {miss}", stack.stack, stack.alone);
+            assert_eq!(stack.alone < 1e-4, miss < 1e-6, "{}: {} {miss}", stack.stack, stack.alone);
             assert_eq!(stack.together.is_some(), k >= real, "{}: {stack:?}", stack.stack);
         }
         let mixture = &found[real].mixture;
