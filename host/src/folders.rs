@@ -1,4 +1,4 @@
-//! Where the user's own files are: calibration profiles and presets.
+//! Where the user's own files are: calibration profiles, presets and ink libraries.
 
 use std::path::{Path, PathBuf};
 
@@ -28,13 +28,22 @@ pub fn config() -> Result<PathBuf, NoFolder> {
 
 /// The path of `NAME.toml` in a folder. A name cannot lead to another folder.
 pub fn file(folder: &Path, name: &str) -> Result<PathBuf, NoName> {
+    Ok(folder.join(format!("{}.toml", checked(name)?)))
+}
+
+/// The path of the folder `NAME` in a folder. A name cannot lead to another folder.
+pub fn folder(folder: &Path, name: &str) -> Result<PathBuf, NoName> {
+    Ok(folder.join(checked(name)?))
+}
+
+fn checked(name: &str) -> Result<&str, NoName> {
     const LONGEST: usize = 64;
     let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
     if name.is_empty() || name.chars().count() > LONGEST || name.starts_with('-') || !name.chars().all(plain)
     {
         return Err(NoName(name.into()));
     }
-    Ok(folder.join(format!("{name}.toml")))
+    Ok(name)
 }
 
 /// The names of the `.toml` files in a folder, sorted; none when there is no such folder.
@@ -66,7 +75,7 @@ mod tests {
         let folder = Path::new("/somewhere");
         assert_eq!(file(folder, "decal-2"), Ok(folder.join("decal-2.toml")));
         for wrong in ["", "..", "a/b", "a\\b", ".hidden", "-x", "a b", "\u{0}"] {
-            assert!(file(folder, wrong).is_err(), "{wrong}");
+            assert!(file(folder, wrong).is_err() && super::folder(folder, wrong).is_err(), "{wrong}");
         }
         assert!(file(folder, &"x".repeat(65)).is_err());
     }

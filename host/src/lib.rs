@@ -11,4 +11,5 @@
 
 pub mod cli;
 mod folders;
+mod libraries;
 pub mod queue;

@@ -26,6 +26,7 @@ pub(crate) struct File {
     pub based_on: Option<Spanned<String>>,
     pub name: Option<String>,
     pub about: Option<String>,
+    pub licence: Option<Spanned<String>>,
     pub stacks: Option<Vec<Spanned<String>>>,
     pub paper: Option<Paper>,
     pub model: Option<Model>,

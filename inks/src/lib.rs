@@ -7,11 +7,13 @@
 )]
 
 pub mod albedo;
+pub mod archive;
 mod combine;
 mod curve;
 mod format;
 pub mod ggx;
 pub mod gloss;
+mod judge;
 mod knots;
 mod lab;
 mod library;
@@ -24,6 +26,7 @@ mod read;
 mod rule;
 pub mod set;
 mod stack;
+mod uncertainty;
 
 pub use curve::{Curve, CurveError};
 pub use format::{Caution, FILE_NAME};
@@ -36,3 +39,4 @@ pub use provenance::{Provenance, Source};
 pub use rule::{Certainty, Rule, Severity};
 pub use set::{InkSet, InkSetError};
 pub use stack::{Stack, StackError};
+pub use uncertainty::{SampleKind, Uncertainty};

@@ -10,6 +10,7 @@ use crate::provenance::{Figure, Provenance};
 use crate::rule::{Rule, Severity};
 use crate::set::InkSet;
 use crate::stack::Stack;
+use crate::uncertainty::Uncertainty;
 
 /// A cartridge as it is sold.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +37,8 @@ pub struct Entry {
     /// Reflectance in 1/sr over the half angle. A modelled curve is sampled at 512 angles of the square-root grid;
     /// [`Entry::curve_at`] evaluates it at other angles without interpolation.
     pub curve: Curve,
+    /// The standard deviation of the curve, if it was measured and its file has one.
+    pub uncertainty: Option<Uncertainty>,
     /// The modelled lobes; none if the curve was measured.
     pub lobes: Option<Lobes>,
     /// The source of the curve.
@@ -57,6 +60,7 @@ impl Entry {
 pub struct Library {
     pub(crate) name: String,
     pub(crate) about: String,
+    pub(crate) licence: Option<String>,
     pub(crate) optics: Optics,
     pub(crate) cartridges: Vec<Cartridge>,
     pub(crate) rules: Vec<Rule>,
@@ -72,6 +76,11 @@ impl Library {
     /// A description in one sentence.
     pub fn about(&self) -> &str {
         &self.about
+    }
+
+    /// The licence that its owner gives it under, if there is one.
+    pub fn licence(&self) -> Option<&str> {
+        self.licence.as_deref()
     }
 
     /// The stacks; number 0 is the bare substrate.

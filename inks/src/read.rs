@@ -13,19 +13,21 @@ use toml::Spanned;
 use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::curve::{Curve, CurveError};
 use crate::format::{FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
+use crate::judge;
 use crate::library::{Cartridge, Entry, Library};
 use crate::model::{Layer, Listed, Model, Optics, Paper};
 use crate::problem::{Findings, Problem};
 use crate::provenance::{Figure, Provenance};
 use crate::rule::{Rule, Severity};
 use crate::stack::Stack;
+use crate::uncertainty::Uncertainty;
 
 /// The most stacks: a sheet numbers them with a byte.
-const MOST_STACKS: usize = 256;
+pub(crate) const MOST_STACKS: usize = 256;
 /// The most layers: far more than can be printed, as a limit for hostile files.
 const MOST_LAYERS: usize = 16;
 /// The largest curve file, in bytes.
-const MOST_CURVE_BYTES: u64 = 16 << 20;
+pub(crate) const MOST_CURVE_BYTES: u64 = 16 << 20;
 /// A measured albedo up to this value is a calibration error; a larger one is not a reflectance.
 const CALIBRATION: f64 = 1.05;
 
@@ -47,7 +49,7 @@ pub(crate) fn folder(folder: &Path, built_in: fn() -> Library) -> Found {
 }
 
 /// Reads a text file of at most `most` bytes.
-fn text(path: &Path, most: u64) -> Result<String, String> {
+pub(crate) fn text(path: &Path, most: u64) -> Result<String, String> {
     let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
     let mut text = String::new();
     file.take(most + 1).read_to_string(&mut text).map_err(|error| error.to_string())?;
@@ -61,7 +63,15 @@ fn text(path: &Path, most: u64) -> Result<String, String> {
 struct Listing {
     stack: Stack,
     offset: Option<usize>,
-    measured: Option<(Curve, Provenance)>,
+    measured: Option<Measured>,
+}
+
+/// A measured curve as it was read.
+struct Measured {
+    curve: Curve,
+    uncertainty: Option<Uncertainty>,
+    provenance: Provenance,
+    file: PathBuf,
 }
 
 /// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
@@ -99,6 +109,7 @@ pub(crate) fn parse(text: &str, file: &Path, folder: Option<Folder<'_>>) -> Foun
 struct Parts {
     name: Option<String>,
     about: Option<String>,
+    licence: Option<String>,
     paper: Option<Paper>,
     model: Option<Model>,
     layers: [Option<Layer>; Ink::ALL.len()],
@@ -112,6 +123,8 @@ impl Parts {
         Parts {
             name: Some(format!("{}, changed", base.name)),
             about: Some("Modelled where it was not measured.".into()),
+            // What is based on a library has a licence of its own.
+            licence: None,
             paper: Some(base.optics.paper),
             model: Some(base.optics.model),
             layers: base.optics.layers,
@@ -145,6 +158,7 @@ fn build(
     }
     parts.name = file.name.or(parts.name);
     parts.about = file.about.or(parts.about);
+    parts.licence = file.licence.and_then(|licence| checked_licence(licence, findings));
     let mut seen = Vec::new();
     for table in file.ink {
         let offset = table.span().start;
@@ -165,6 +179,23 @@ fn build(
     measurements(&file.measured, folder, &mut wanted, findings);
     check_stacks(&wanted, &parts.cartridges, findings);
     finish(parts, wanted, findings)
+}
+
+/// The name of a licence: one line of text.
+fn checked_licence(licence: Spanned<String>, findings: &mut Findings) -> Option<String> {
+    let offset = licence.span().start;
+    let licence = licence.into_inner();
+    if is_licence(&licence) {
+        return Some(licence);
+    }
+    let problem = "expected the name of a licence in one line, such as `CC0-1.0` or `CC-BY-4.0`";
+    findings.error(Some(offset), "licence", problem);
+    None
+}
+
+/// Whether a text can be the name of a licence.
+pub(crate) fn is_licence(text: &str) -> bool {
+    (1..=200).contains(&text.trim().len()) && !text.chars().any(char::is_control)
 }
 
 /// Reads all measured curves, and warns about curves in the folder that are not used.
@@ -205,7 +236,7 @@ fn check_stacks(wanted: &[Listing], cartridges: &[Cartridge], findings: &mut Fin
 
 /// Makes the library, if there are no errors so far.
 fn finish(parts: Parts, wanted: Vec<Listing>, findings: &mut Findings) -> Option<Library> {
-    let Parts { name, about, paper, model, layers, cartridges, rules, .. } = parts;
+    let Parts { name, about, licence, paper, model, layers, cartridges, rules, .. } = parts;
     let Some(paper) = paper else {
         missing(findings, "paper");
         return None;
@@ -224,9 +255,11 @@ fn finish(parts: Parts, wanted: Vec<Listing>, findings: &mut Findings) -> Option
         let number = entries.len();
         entries.extend(entry(number, want, &optics, &quadratures, &rules, findings));
     }
+    judge::filters(&entries, findings);
     Some(Library {
         name: name.unwrap_or_default(),
         about: about.unwrap_or_default(),
+        licence,
         optics,
         cartridges,
         rules,
@@ -364,13 +397,13 @@ fn measured(
     }
     let field = format!("{owner}.curve");
     let curve = match curve_path(folder, table.curve.get_ref()) {
-        Ok(path) => curve(&path, findings, table.curve.span().start, &field),
+        Ok(path) => curve(&path, findings, table.curve.span().start, &field).map(|(c, u)| (c, u, path)),
         Err(problem) => {
             findings.error(Some(table.curve.span().start), field, problem);
             None
         }
     };
-    let (Some(stack), Some(curve)) = (stack, curve) else { return };
+    let (Some(stack), Some((curve, uncertainty, file))) = (stack, curve) else { return };
     let provenance = Provenance::Measured {
         by: table.by.get_ref().clone(),
         when: table.when.get_ref().clone(),
@@ -384,7 +417,7 @@ fn measured(
         findings.error(Some(offset), owner, "is measured twice");
     }
     wanted[place].offset.get_or_insert(offset);
-    wanted[place].measured = Some((curve, provenance));
+    wanted[place].measured = Some(Measured { curve, uncertainty, provenance, file });
 }
 
 /// The path of a file inside the folder; names that lead out of it are errors.
@@ -397,7 +430,13 @@ fn curve_path(folder: Option<&Path>, name: &str) -> Result<PathBuf, String> {
     Ok(folder.join(name))
 }
 
-fn curve(path: &Path, findings: &mut Findings, offset: usize, field: &str) -> Option<Curve> {
+/// Reads a curve and its standard deviations, if it has them.
+fn curve(
+    path: &Path,
+    findings: &mut Findings,
+    offset: usize,
+    field: &str,
+) -> Option<(Curve, Option<Uncertainty>)> {
     let text = match text(path, MOST_CURVE_BYTES) {
         Ok(text) => text,
         Err(problem) => {
@@ -405,8 +444,9 @@ fn curve(path: &Path, findings: &mut Findings, offset: usize, field: &str) -> Op
             return None;
         }
     };
-    match Curve::from_csv(text.as_bytes(), path) {
-        Ok(curve) => Some(curve),
+    let curve = Curve::from_csv(text.as_bytes(), path);
+    match curve.and_then(|curve| Ok((curve, Uncertainty::from_csv(&text, path)?))) {
+        Ok(read) => Some(read),
         Err(CurveError::Csv { path, line, problem }) => {
             findings.found.push(Problem {
                 file: path,
@@ -478,12 +518,15 @@ fn entry(
 ) -> Option<Entry> {
     let Listing { stack, offset, measured } = want;
     let field = format!("stack {stack}");
-    let (curve, lobes, provenance) = match measured {
-        Some((curve, provenance)) => (curve, None, provenance),
+    let (curve, uncertainty, lobes, provenance) = match measured {
+        Some(Measured { curve, uncertainty, provenance, file }) => {
+            judge::curve(&stack, &file, &curve, uncertainty.as_ref(), findings);
+            (curve, uncertainty, None, provenance)
+        }
         None => match optics.lobes(&stack) {
             Ok(lobes) => {
                 let (model, parameters) = (optics.model.name.clone(), optics.parameters(&stack));
-                (lobes.curve(&grid()), Some(lobes), Provenance::Modelled { model, parameters })
+                (lobes.curve(&grid()), None, Some(lobes), Provenance::Modelled { model, parameters })
             }
             Err(error) => {
                 findings.error(offset, field, error.to_string());
@@ -514,5 +557,5 @@ fn entry(
         let problem = format!("{} ({}; {})", rule.says, rule.name, rule.certainty);
         findings.add(rule.severity, offset, field.clone(), problem);
     }
-    Some(Entry { number, stack, curve, lobes, provenance })
+    Some(Entry { number, stack, curve, uncertainty, lobes, provenance })
 }

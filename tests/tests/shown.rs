@@ -36,11 +36,12 @@ const ELSEWHERE: [(&str, &str); 17] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 10] = [
+const DOCUMENTS: [(&str, &str); 11] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
     ("docs/guide/decals.md", "docs/guide/decal"),
+    ("docs/guide/libraries.md", "docs/guide"),
     ("docs/guide/page.md", "."),
     ("docs/guide/preview.md", "."),
     ("docs/guide/queue.md", "."),
@@ -245,6 +246,11 @@ fn decals() {
 #[test]
 fn pages() {
     document("docs/guide/page.md");
+}
+
+#[test]
+fn the_guide_of_libraries() {
+    document("docs/guide/libraries.md");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
 use super::choice::{Metric, choice};
+use crate::libraries;
 use observe::Observer;
 
 /// What to read.
@@ -98,8 +99,9 @@ pub struct InkArgs {
     /// leading - removes one from the default [default: all but the foils]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     pub inks: Option<String>,
-    /// Folder of your own ink library, such as one you measured [default: the built-in library]
-    #[arg(long, value_name = "DIR")]
+    /// Your own ink library, such as one you measured: its folder, or the name it was added under [default: the built-in
+    /// library]
+    #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
 }
 
@@ -129,7 +131,7 @@ impl InkArgs {
     /// The library.
     pub fn library(&self) -> Result<Library> {
         Ok(match &self.library {
-            Some(folder) => Library::from_dir(folder)?,
+            Some(spec) => libraries::open(spec)?,
             None => Library::builtin(),
         })
     }

@@ -137,8 +137,9 @@ pub struct Halftone {
     size: Option<Size>,
     #[command(flatten)]
     halftone: HalftoneArg,
-    /// Folder of your own ink library; its minimum clusters apply [default: the built-in library]
-    #[arg(long, value_name = "DIR")]
+    /// Your own ink library: its folder, or the name it was added under; its minimum clusters apply [default: the built-in
+    /// library]
+    #[arg(long, value_name = "LIBRARY")]
     library: Option<PathBuf>,
     /// Folder to write: a picture with one stack for every dot, dots.toml [default: DOC.dots in the current folder]
     #[arg(short, long, value_name = "DOC.dots")]
@@ -203,8 +204,9 @@ pub struct Separate {
     /// Folder written by `layout` or `simulate`
     #[arg(value_name = "DOC.sheet")]
     sheet: PathBuf,
-    /// Folder of your own ink library; its order rules apply [default: the built-in library]
-    #[arg(long, value_name = "DIR")]
+    /// Your own ink library: its folder, or the name it was added under; its order rules apply [default: the built-in
+    /// library]
+    #[arg(long, value_name = "LIBRARY")]
     library: Option<PathBuf>,
     /// Folder to write: a one-bit picture for each pass, passes.toml [default: DOC.passes in the current folder]
     #[arg(short, long, value_name = "DOC.passes")]

@@ -63,8 +63,8 @@ struct Ramp {
 /// What charts between two stacks share.
 #[derive(ClapArgs, Debug)]
 struct StepArgs {
-    /// Folder of your own ink library [default: the built-in library]
-    #[arg(long, value_name = "DIR")]
+    /// Your own ink library: its folder, or the name it was added under [default: the built-in library]
+    #[arg(long, value_name = "LIBRARY")]
     library: Option<std::path::PathBuf>,
     #[command(flatten)]
     job: JobArgs,

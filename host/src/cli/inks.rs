@@ -1,4 +1,11 @@
-//! `foilpress inks`: list, show and check the inks and stacks of a library.
+//! `foilpress inks`: list, show and check the inks and stacks of a library; what else is done with libraries is in the
+//! modules below.
+
+mod choose;
+mod diff;
+mod gamut;
+mod page;
+mod share;
 
 use std::fmt::Write as _;
 use std::io::IsTerminal;
@@ -11,14 +18,18 @@ use serde::Serialize;
 
 use super::output::Staged;
 use super::stdio::{closed_pipe, show};
+use crate::libraries;
 use appearance::brdf::plot;
+use observe::Observer;
 
 /// The library of inks and stacks.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress inks list --inks process,metallic-silver\n  \
     foilpress inks show MS+C --figures                   (with the figures behind its curve)\n  \
-    foilpress inks check my-library/                     (before it is used with --library)")]
+    foilpress inks check my-library/                     (before it is used with --library)\n  \
+    foilpress inks diff builtin my-library/ -o diff.html\n  \
+    foilpress inks choose my-material/ --cartridges 4")]
 pub struct Args {
     #[command(subcommand)]
     what: What,
@@ -28,8 +39,9 @@ pub struct Args {
 enum What {
     /// List the stacks with their layers, their peak reflectance and the origin of their curves
     List {
-        /// Folder of an ink library, with its `library.toml` [default: the built-in library, which is modelled, not measured]
-        #[arg(long, value_name = "DIR")]
+        /// Ink library: its folder, or the name it was added under [default: the built-in library, which is modelled, not
+        /// measured]
+        #[arg(long, value_name = "LIBRARY")]
         library: Option<PathBuf>,
         /// List only stacks made of these inks, such as `process,metallic-silver,finish`, `all` or `-metallic`; foils are
         /// left out unless they or `all` are named [default: list every stack]
@@ -43,8 +55,8 @@ enum What {
     Show {
         /// Stack: inks from the bottom up, such as `MS+C+F`, `metallic-silver+cyan` or `substrate`
         stack: String,
-        /// Folder of an ink library, with its `library.toml` [default: the built-in library]
-        #[arg(long, value_name = "DIR")]
+        /// Ink library: its folder, or the name it was added under [default: the built-in library]
+        #[arg(long, value_name = "LIBRARY")]
         library: Option<PathBuf>,
         /// List every figure that the curve is based on
         #[arg(long)]
@@ -53,15 +65,70 @@ enum What {
         #[arg(long, value_name = "FILE.svg")]
         plot: Option<PathBuf>,
     },
-    /// Check the folder of a library and list every problem with its file, line and field
+    /// Check a library and list every problem with its file, line and field
+    ///
+    /// Errors make a library unusable: files that cannot be read, stacks that reflect more light than arrives. Warnings doubt a
+    /// curve: it rises where prints only fall, its samples scatter, its highlight is clipped, a process ink adds light. Notes
+    /// say what was not measured, and how uncertain the rest is.
+    #[command(after_help = "Examples:\n  \
+        foilpress inks check my-library/\n  \
+        foilpress inks check my-library/ --json")]
     Check {
-        /// Folder with `library.toml`
+        /// Library: its folder with `library.toml`, or the name it was added under
+        #[arg(value_name = "LIBRARY")]
         dir: PathBuf,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Compare two libraries stack by stack, and say which differences are within the measurement
+    Diff(diff::Args),
+    /// Choose the best cartridges for a document, and show what each is worth
+    ///
+    /// The choice is exact for a sample of the document's pixels: no other set of cartridges comes nearer to them.
+    Choose(choose::Args),
+    /// Show how near a library comes to the bases of a document
+    Gamut(gamut::Args),
+    /// List the stacks that mixtures of the other stacks can replace
+    Redundant(gamut::Redundant),
+    /// Add a library to your own, so that --library finds it by its name
+    #[command(after_help = "Examples:\n  \
+        foilpress inks add my-library/\n  \
+        foilpress inks add my-library/ --name matt-paper")]
+    Add {
+        /// Folder with `library.toml`, such as `foilpress measure` writes
+        dir: PathBuf,
+        /// Name of the library [default: the name of the folder]
+        #[arg(long)]
+        name: Option<String>,
+    },
+    /// Write a library as one archive, with its licence and the origin of its curves
+    #[command(after_help = "Examples:\n  \
+        foilpress inks export my-library/ -o mine.zip --licence CC0-1.0")]
+    Export {
+        /// Library: its folder, or the name it was added under
+        library: PathBuf,
+        /// Archive to write [default: LIBRARY.zip in the current folder]
+        #[arg(short, long, value_name = "FILE.zip")]
+        output: Option<PathBuf>,
+        /// Licence to give it under, such as CC0-1.0 or CC-BY-4.0 [default: the one that library.toml names]
+        #[arg(long, value_name = "NAME")]
+        licence: Option<String>,
+    },
+    /// Add the library in an archive to your own
+    #[command(after_help = "Examples:\n  \
+        foilpress inks import mine.zip --name theirs")]
+    Import {
+        /// Archive that `foilpress inks export` wrote
+        archive: PathBuf,
+        /// Name of the library [default: the name of the archive]
+        #[arg(long)]
+        name: Option<String>,
     },
 }
 
 /// Runs the subcommand; what it has to say goes to the standard output.
-pub fn run(args: Args) -> anyhow::Result<()> {
+pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
     let (text, verdict) = match args.what {
         What::List { library, inks, json } => (list(&open(library.as_deref())?, inks, json)?, Ok(())),
         What::Show { stack, library, figures, plot } => {
@@ -81,7 +148,16 @@ pub fn run(args: Args) -> anyhow::Result<()> {
             }
             (text, Ok(()))
         }
-        What::Check { dir } => check(&dir),
+        What::Check { dir, json } => check(&libraries::folder(&dir)?, json)?,
+        What::Diff(args) => (diff::run(&args)?, Ok(())),
+        What::Choose(args) => (choose::run(&args, observer)?, Ok(())),
+        What::Gamut(args) => (gamut::run(&args, observer)?, Ok(())),
+        What::Redundant(args) => (gamut::redundant(&args)?, Ok(())),
+        What::Add { dir, name } => (share::add(&dir, name)?, Ok(())),
+        What::Export { library, output, licence } => {
+            (share::export(&library, output.as_deref(), licence.as_deref())?, Ok(()))
+        }
+        What::Import { archive, name } => (share::import(&archive, name)?, Ok(())),
     };
     match show(&text) {
         // A reader that closes the pipe early, such as `head`, is not a failure.
@@ -90,12 +166,8 @@ pub fn run(args: Args) -> anyhow::Result<()> {
     }
 }
 
-fn open(folder: Option<&Path>) -> anyhow::Result<Library> {
-    match folder {
-        Some(folder) => Library::from_dir(folder)
-            .with_context(|| format!("{} is not a usable ink library", folder.display())),
-        None => Ok(Library::builtin()),
-    }
+fn open(spec: Option<&Path>) -> anyhow::Result<Library> {
+    spec.map_or_else(|| Ok(Library::builtin()), libraries::open)
 }
 
 /// The entry of a stack given as text. Suggests another when the library lacks it.
@@ -279,7 +351,7 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
     lines
 }
 
-fn check(dir: &Path) -> (String, anyhow::Result<()>) {
+fn check(dir: &Path, json: bool) -> anyhow::Result<(String, anyhow::Result<()>)> {
     let problems = Library::check(dir);
     let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
     let count = |severity| problems.iter().filter(|problem| problem.severity == severity).count();
@@ -296,7 +368,10 @@ fn check(dir: &Path) -> (String, anyhow::Result<()>) {
         0 => Ok(()),
         _ => Err(anyhow::anyhow!("{} cannot be used as an ink library", dir.display())),
     };
-    (text, verdict)
+    if json {
+        text = serde_json::to_string_pretty(&problems)? + "\n";
+    }
+    Ok((text, verdict))
 }
 
 #[cfg(test)]
@@ -375,10 +450,10 @@ mod tests {
     #[test]
     fn check_fails_on_errors_and_counts_what_it_found() {
         let folder = tempfile::tempdir().unwrap();
-        let (text, verdict) = check(folder.path());
+        let (text, verdict) = check(folder.path(), false).unwrap();
         assert!(verdict.is_err() && text.contains("1 error,"), "{text}");
         std::fs::write(folder.path().join("library.toml"), "format = 1\nbased_on = \"built-in\"\n").unwrap();
-        let (text, verdict) = check(folder.path());
+        let (text, verdict) = check(folder.path(), false).unwrap();
         assert!(verdict.is_ok() && text.contains("0 errors"), "{text}");
     }
 }

@@ -90,8 +90,9 @@ pub struct LayersArgs {
     /// Suggestions of the plan to accept, separated by commas
     #[arg(long, value_name = "WHAT", value_delimiter = ',', value_parser = choice::<Accept>())]
     pub accept: Vec<Accept>,
-    /// Folder of your own ink library; its order rules and minimum clusters apply [default: the built-in library]
-    #[arg(long, value_name = "DIR")]
+    /// Your own ink library: its folder, or the name it was added under; its order rules and minimum clusters apply
+    /// [default: the built-in library]
+    #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
 }
 
@@ -163,7 +164,7 @@ impl LayersArgs {
     /// The library.
     pub fn library(&self) -> Result<Library> {
         Ok(match &self.library {
-            Some(folder) => Library::from_dir(folder)?,
+            Some(spec) => crate::libraries::open(spec)?,
             None => Library::builtin(),
         })
     }

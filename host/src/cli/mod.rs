@@ -121,7 +121,7 @@ enum Command {
     Bridge(bridge::Args),
     /// Find out what prevents printing and how to fix it
     Doctor(doctor::Args),
-    /// List, show and check the inks and stacks of a library
+    /// Manage ink libraries: list, show, check, compare, share; choose cartridges
     Inks(inks::Args),
     /// Measure printed stacks from photographs
     ///
@@ -205,7 +205,7 @@ fn run(args: Args) -> Result<()> {
         Command::Cancel(args) => resume::cancel(&args, observer),
         Command::Bridge(args) => bridge::run(&args, observer),
         Command::Doctor(args) => doctor::run(&args),
-        Command::Inks(args) => inks::run(args),
+        Command::Inks(args) => inks::run(args, observer),
         Command::Measure(args) => measure::run(&args, observer),
         Command::Generate(args) => generate::run(&args, &Args::command()),
         Command::Queue(args) => queue::run(&args, observer),

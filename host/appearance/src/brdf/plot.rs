@@ -3,7 +3,7 @@
 //! Both show the angle from 0 to 90 degrees on a linear axis and reflectance on a logarithmic one, because foil and paper
 //! differ by a factor of a hundred. Values below a millionth of the largest are drawn at that floor.
 
-use inks::Curve;
+use inks::{Curve, Uncertainty};
 use plotters::prelude::*;
 use textplots::{Chart, ColorPlot, LabelBuilder, LabelFormat, Plot, Shape, TickDisplay, TickDisplayBuilder};
 
@@ -21,9 +21,10 @@ pub struct PlotError {
 const TERMINAL: (u32, u32) = (72, 4);
 const INKS: [(u8, u8, u8); 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 
-/// The decades that hold the curve: at least three and at most six.
-fn decades(curve: &Curve) -> (i32, i32) {
-    let values = || curve.rgb().iter().flatten().copied().filter(|v| *v > 0.0);
+/// The decades that hold some curves: at least three and at most six.
+fn decades<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> (i32, i32) {
+    let values =
+        || curves.clone().flat_map(|curve| curve.rgb().iter().flatten().copied()).filter(|v| *v > 0.0);
     let most = values().fold(1e-12, f64::max).log10().ceil() as i32;
     let least = values().fold(f64::MAX, f64::min).log10().floor() as i32;
     (least.clamp(most - 6, most - 3), most)
@@ -46,7 +47,7 @@ fn is_grey(curve: &Curve) -> bool {
 
 /// The curve in braille dots with its scales: one line per channel, or a single line if the channels agree.
 pub fn terminal(curve: &Curve, colour: bool) -> String {
-    let range = decades(curve);
+    let range = decades([curve].into_iter());
     let channels = if is_grey(curve) { 1..2 } else { 0..3 };
     let colour = colour && channels.len() > 1;
     let shapes: Vec<Vec<(f32, f32)>> = channels
@@ -83,16 +84,31 @@ fn number(value: f64) -> String {
     }
 }
 
+/// A curve in a plot of several, with its standard deviation if it has one.
+#[derive(Clone, Copy, Debug)]
+pub struct Line<'a> {
+    /// The curve.
+    pub curve: &'a Curve,
+    /// Drawn as a band of two standard deviations.
+    pub uncertainty: Option<&'a Uncertainty>,
+}
+
 /// The curve as an SVG image.
 pub fn svg(title: &str, curve: &Curve) -> Result<String, PlotError> {
+    compared(title, &[Line { curve, uncertainty: None }])
+}
+
+/// Curves in one SVG image: the first as lines, the others dashed.
+pub fn compared(title: &str, lines: &[Line<'_>]) -> Result<String, PlotError> {
     let mut text = String::new();
-    draw(&mut text, title, curve)
+    draw(&mut text, title, lines)
         .map_err(|error| PlotError { title: title.into(), problem: error.to_string() })?;
     Ok(text)
 }
 
-fn draw(text: &mut String, title: &str, curve: &Curve) -> Result<(), Box<dyn std::error::Error>> {
-    let (least, most) = decades(curve);
+fn draw(text: &mut String, title: &str, lines: &[Line<'_>]) -> Result<(), Box<dyn std::error::Error>> {
+    let (least, most) = decades(lines.iter().map(|line| line.curve));
+    let (low, high) = (10f64.powi(least), 10f64.powi(most));
     let area = SVGBackend::with_string(text, (720, 480)).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
@@ -100,7 +116,7 @@ fn draw(text: &mut String, title: &str, curve: &Curve) -> Result<(), Box<dyn std
         .margin(12)
         .x_label_area_size(44)
         .y_label_area_size(72)
-        .build_cartesian_2d(0.0..90.0, (10f64.powi(least)..10f64.powi(most)).log_scale())?;
+        .build_cartesian_2d(0.0..90.0, (low..high).log_scale())?;
     chart
         .configure_mesh()
         .x_desc("half angle, degrees")
@@ -110,9 +126,29 @@ fn draw(text: &mut String, title: &str, curve: &Curve) -> Result<(), Box<dyn std
         .x_labels(10)
         .light_line_style(BLACK.mix(0.06))
         .draw()?;
-    for (channel, (r, g, b)) in INKS.into_iter().enumerate() {
-        let line = points(curve, channel, (least, most)).into_iter().map(|(x, y)| (x, 10f64.powf(y)));
-        chart.draw_series(LineSeries::new(line, RGBColor(r, g, b).stroke_width(2)))?;
+    for (place, line) in lines.iter().enumerate() {
+        for (channel, (r, g, b)) in INKS.into_iter().enumerate() {
+            let colour = RGBColor(r, g, b);
+            if let Some(uncertainty) = line.uncertainty {
+                let edge = |by: f64| {
+                    let at = move |&theta: &f64| {
+                        let value = line.curve.at(theta)[channel] + by * uncertainty.at(theta)[channel];
+                        (theta.to_degrees(), value.clamp(low, high))
+                    };
+                    uncertainty.theta().iter().map(at).collect::<Vec<(f64, f64)>>()
+                };
+                let mut band = edge(2.0);
+                band.extend(edge(-2.0).into_iter().rev());
+                chart.draw_series(std::iter::once(Polygon::new(band, colour.mix(0.18).filled())))?;
+            }
+            let points = points(line.curve, channel, (least, most)).into_iter();
+            let points = points.map(|(x, y)| (x, 10f64.powf(y)));
+            if place == 0 {
+                chart.draw_series(LineSeries::new(points, colour.stroke_width(2)))?;
+            } else {
+                chart.draw_series(DashedLineSeries::new(points, 6, 4, colour.stroke_width(2)))?;
+            }
+        }
     }
     area.present()?;
     Ok(())
@@ -125,6 +161,7 @@ mod tests {
     #[test]
     fn the_scale_holds_the_curve_and_no_more_than_six_decades() {
         let level = |v: f64| Curve::new(vec![0.0], vec![[v; 3]]).unwrap();
+        let decades = |curve: &Curve| decades([curve].into_iter());
         assert_eq!(decades(&level(0.25)), (-3, 0));
         assert_eq!(decades(&level(0.0)), (-15, -12));
         let steep = Curve::new(vec![0.0, 1.0], vec![[30.0; 3], [1e-9; 3]]).unwrap();
@@ -142,11 +179,17 @@ mod tests {
         for values in [[0.0; 3], [1e300; 3], [1e-300, 1.0, 30.0], [5.0, 0.0, 1e-5]] {
             let curve = Curve::new(vec![0.0, 0.4], vec![values, [0.1; 3]]).unwrap();
             let text = terminal(&curve, false);
-            let rows = TERMINAL.1 * decades(&curve).0.abs_diff(decades(&curve).1);
+            let range = decades([&curve].into_iter());
+            let rows = TERMINAL.1 * range.0.abs_diff(range.1);
             assert!(text.lines().count() > rows as usize, "{text}");
             assert!(text.contains("90 deg"));
             let picture = svg("a curve", &curve).unwrap();
             assert!(picture.starts_with("<svg") && picture.contains("a curve") && !picture.contains("NaN"));
+            let other = Curve::new(vec![0.0, 1.5], vec![[2.0; 3], [0.01; 3]]).unwrap();
+            let line = |curve| Line { curve, uncertainty: None };
+            let both = compared("two curves", &[line(&curve), line(&other)]).unwrap();
+            // Dashes are drawn as many short lines.
+            assert!(both.matches("<polyline").count() > picture.matches("<polyline").count() + 20, "{both}");
         }
     }
 }

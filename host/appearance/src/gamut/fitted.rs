@@ -4,7 +4,6 @@ use inks::InkSet;
 use rayon::prelude::*;
 
 use super::candidates::Candidates;
-use super::prune::PRUNED;
 use crate::solve::{Hull, Mixer, MixtureError, Target};
 
 /// Gap in squared distance that decides nothing.
@@ -89,11 +88,11 @@ impl Targets {
 }
 
 impl Fitted {
-    /// The inks that a mixture has more of than is left out.
-    pub fn inks(&self, candidates: &Candidates) -> InkSet {
+    /// The inks that a mixture has at least this weight of, and more than none.
+    pub fn inks(&self, candidates: &Candidates, least: f64) -> InkSet {
         let mut used = vec![false; candidates.len()];
         for mixture in &self.mixtures {
-            used.iter_mut().zip(&mixture.weights).for_each(|(used, &w)| *used |= w >= PRUNED);
+            used.iter_mut().zip(&mixture.weights).for_each(|(used, &w)| *used |= w > 0.0 && w >= least);
         }
         let stacks = (0..candidates.len()).filter(|&k| used[k]);
         InkSet::of(stacks.flat_map(|k| candidates.inks[k].iter()))

@@ -26,6 +26,7 @@ mod map;
 mod mix;
 mod prune;
 mod recent;
+mod redundancy;
 mod report;
 mod sample;
 mod settings;
@@ -35,7 +36,8 @@ mod typical;
 
 pub use candidates::Printable;
 pub use error::GamutError;
-pub use map::{Gain, clamped, gain, map};
+pub use map::{Choice, Gain, choose, clamped, gain, map};
 pub use mix::{InkMix, MixError};
+pub use redundancy::{LeftOut, redundancy};
 pub use report::{GivenUp, Mapped, MaterialReport, PixelReport, Report};
 pub use settings::{Gloss, Intent, LIGHT, Settings};

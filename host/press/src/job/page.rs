@@ -37,7 +37,7 @@ pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageErro
 }
 
 /// Text as it stands in HTML: names come from untrusted files.
-fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -1,0 +1,74 @@
+//! `foilpress inks add`, `export` and `import`: libraries become the user's own, and go to others.
+
+use std::fs::File;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use inks::{Library, archive};
+
+use super::super::output::{Staged, file_name};
+use crate::libraries;
+
+/// The name that a folder or a file suggests.
+fn suggested(path: &Path, name: Option<String>) -> String {
+    let own = |path: &Path| {
+        let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let part = if whole.is_dir() { whole.file_name() } else { whole.file_stem() };
+        part.map_or_else(String::new, |part| part.to_string_lossy().into_owned())
+    };
+    name.unwrap_or_else(|| own(path))
+}
+
+fn counted(library: &Library) -> String {
+    let measured = library.entries().iter().filter(|entry| entry.provenance.is_measured()).count();
+    format!("{} stacks, {measured} of them measured", library.entries().len())
+}
+
+fn installed(name: &str, members: &[archive::Member], from: &Path) -> Result<String> {
+    let (folder, library) =
+        libraries::install(name, members).with_context(|| format!("{}", from.display()))?;
+    let licence = library.licence().map_or_else(String::new, |licence| format!(", licence {licence}"));
+    Ok(format!(
+        "{name}: {}{licence}\nin {}\nUse it with --library {name}\n",
+        counted(&library),
+        folder.display()
+    ))
+}
+
+/// Makes the library in a folder one of the user's own.
+pub fn add(dir: &Path, name: Option<String>) -> Result<String> {
+    Library::from_dir(dir).with_context(|| format!("{} is not a usable ink library", dir.display()))?;
+    let members = archive::gather(dir).with_context(|| format!("{}", dir.display()))?;
+    installed(&suggested(dir, name), &members, dir)
+}
+
+/// Writes a library as one archive.
+pub fn export(spec: &Path, output: Option<&Path>, licence: Option<&str>) -> Result<String> {
+    if libraries::is_built_in(spec) {
+        bail!("the built-in library comes with every copy of the program, so there is nothing to export");
+    }
+    let folder = libraries::folder(spec)?;
+    let library = libraries::open(spec)?;
+    let output = output.map_or_else(
+        || PathBuf::from(format!("{}.zip", file_name(&suggested(&folder, None)))),
+        Path::to_path_buf,
+    );
+    let staged = Staged::file(&output)?;
+    let members = archive::gather(&folder).with_context(|| format!("{}", folder.display()))?;
+    let bytes =
+        archive::pack(&members, &library, licence).with_context(|| format!("{}", folder.display()))?;
+    std::fs::write(staged.path(), &bytes).with_context(|| format!("cannot write {}", output.display()))?;
+    staged.commit()?;
+    Ok(format!("{}: {}, {} bytes\n", output.display(), counted(&library), bytes.len()))
+}
+
+/// Makes the library in an archive one of the user's own.
+pub fn import(path: &Path, name: Option<String>) -> Result<String> {
+    let cannot = || format!("cannot read {}", path.display());
+    let mut bytes = Vec::new();
+    let file = File::open(path).with_context(cannot)?;
+    file.take(archive::MOST_ARCHIVE + 1).read_to_end(&mut bytes).with_context(cannot)?;
+    let members = archive::unpack(&bytes).with_context(|| format!("{}", path.display()))?;
+    installed(&suggested(path, name), &members, path)
+}
