@@ -36,11 +36,12 @@ const ELSEWHERE: [(&str, &str); 17] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 10] = [
+const DOCUMENTS: [(&str, &str); 11] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
     ("docs/guide/decals.md", "docs/guide/decal"),
+    ("docs/guide/edit.md", "."),
     ("docs/guide/page.md", "."),
     ("docs/guide/preview.md", "."),
     ("docs/guide/queue.md", "."),
@@ -240,6 +241,11 @@ fn charts() {
 #[test]
 fn decals() {
     document("docs/guide/decals.md");
+}
+
+#[test]
+fn edits() {
+    document("docs/guide/edit.md");
 }
 
 #[test]
