@@ -12,7 +12,8 @@ fn bytes(folder: &Path) -> Vec<(String, Vec<u8>)> {
 /// A texture folder with three materials side by side: varnish of this colour, silver, and brass.
 fn textures(bench: &Bench, name: &str, varnish: [u8; 3]) {
     fs::create_dir(bench.path(name)).unwrap();
-    let bands = |bands: [[u8; 3]; 3]| image::RgbImage::from_fn(24, 16, |x, _| image::Rgb(bands[x as usize / 8]));
+    let bands =
+        |bands: [[u8; 3]; 3]| image::RgbImage::from_fn(24, 16, |x, _| image::Rgb(bands[x as usize / 8]));
     for (file, picture) in [
         ("base_color.png", bands([varnish, [230, 230, 235], [220, 180, 90]])),
         ("roughness.png", bands([[90; 3], [110; 3], [140; 3]])),
@@ -52,7 +53,8 @@ fn steps_of_several_commands_replay_to_the_same_files() {
     let curves = fs::read_to_string(bench.path("one.foil/bases.csv")).unwrap();
     let (curves, last) = curves.trim_end().rsplit_once('\n').unwrap();
     let angle: Vec<&str> = last.split(',').take(2).collect();
-    fs::write(bench.path("one.foil/bases.csv"), format!("{curves}\n{},0.5,0.5,0.5\n", angle.join(","))).unwrap();
+    fs::write(bench.path("one.foil/bases.csv"), format!("{curves}\n{},0.5,0.5,0.5\n", angle.join(",")))
+        .unwrap();
     let output = bench.run("edit one.foil -q --swap 0,1 -o fresh.foil");
     let said = text(&output.stderr);
     assert!(output.status.success() && said.contains("so they are not kept"), "{said}");
@@ -69,13 +71,15 @@ fn showing_writes_nothing_and_says_what_leaves_the_gamut() {
     tile(&bench);
     let before = bench.entries();
     let said = bench.done("edit tile.foil -q --show");
-    assert!(said.contains("d of print") && said.lines().filter(|line| line.contains(" %  #")).count() == 3, "{said}");
+    assert!(
+        said.contains("d of print") && said.lines().filter(|line| line.contains(" %  #")).count() == 3,
+        "{said}"
+    );
     let output = bench.run("edit tile.foil -q --show --replace 0=mirror.csv");
     assert!(!output.status.success());
     // A mirror of pure green, which no ink is.
-    let mirror: String = (0..90)
-        .map(|n| format!("{n},0,{},0\n", 500.0 * (-f64::from(n) / 2.0).exp()))
-        .collect();
+    let mirror: String =
+        (0..90).map(|n| format!("{n},0,{},0\n", 500.0 * (-f64::from(n) / 2.0).exp())).collect();
     fs::write(bench.path("mirror.csv"), format!("theta_h_deg,r,g,b\n{mirror}")).unwrap();
     let output = bench.run("edit tile.foil -q --show --replace 0=mirror.csv");
     let (out, err) = (text(&output.stdout), text(&output.stderr));
@@ -95,7 +99,11 @@ fn what_cannot_be_edited_is_refused_and_leaves_nothing() {
     let before = bench.entries();
     for (code, args, says) in [
         (1, "tile.foil -o out.foil", "name an edit"),
-        (1, "tile.foil --basis 9 --rougher 2 -o out.foil", "there is no basis 9: the document has bases 0 to 2"),
+        (
+            1,
+            "tile.foil --basis 9 --rougher 2 -o out.foil",
+            "there is no basis 9: the document has bases 0 to 2",
+        ),
         (1, "tile.foil --rougher NaN -o out.foil", "rougher = NaN: expected 0.05 to 20"),
         (1, "tile.foil --albedo inf -o out.foil", "albedo = inf"),
         (1, "tile.foil --glossier 0 -o out.foil", "glossier = 0"),

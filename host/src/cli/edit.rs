@@ -49,7 +49,10 @@ impl FromStr for Mixing {
     fn from_str(text: &str) -> Result<Mixing, String> {
         text.rsplit_once(',')
             .and_then(|(two, share)| Some(Mixing(two.parse().ok()?, share.trim().parse().ok()?)))
-            .ok_or_else(|| "expected two bases and the share of the first that becomes the second, such as 1,4,0.3".into())
+            .ok_or_else(|| {
+                "expected two bases and the share of the first that becomes the second, such as 1,4,0.3"
+                    .into()
+            })
     }
 }
 
@@ -64,7 +67,9 @@ impl FromStr for Replacing {
         text.split_once('=')
             .and_then(|(basis, document)| Some(Replacing(basis.trim().parse().ok()?, document.to_owned())))
             .filter(|Replacing(_, document)| !document.is_empty())
-            .ok_or_else(|| "expected a basis and a document, such as 3=chrome.binary or 3=other.foil:2".into())
+            .ok_or_else(|| {
+                "expected a basis and a document, such as 3=chrome.binary or 3=other.foil:2".into()
+            })
     }
 }
 
@@ -198,9 +203,12 @@ impl Args {
             let stem = stem.strip_prefix("sample:").unwrap_or(&stem);
             format!("{}-edited.foil", output::file_name(stem)).into()
         });
-        let same = |a: &Path, b: &Path| Some(a.canonicalize().ok()?) == b.canonicalize().ok();
-        if same(document, &target) {
-            bail!("{} is the document itself, which stays as it is; name another folder with -o", target.display());
+        let place = |path: &Path| path.canonicalize().ok();
+        if place(document).is_some_and(|document| place(&target) == Some(document)) {
+            bail!(
+                "{} is the document itself, which stays as it is; name another folder with -o",
+                target.display()
+            );
         }
         Ok((Staged::folder(&target, Kind::Foil)?, target))
     }
@@ -221,8 +229,9 @@ impl Args {
         };
         let path = Path::new(&self.document.document).join(FILE_NAME);
         let Some(factored) = edited.filter(|_| path.is_file()) else { return Ok(fresh) };
-        let earlier = Steps::read(&path, &factored.space, observer)
-            .context("the earlier steps of the document cannot be kept; delete them to edit it as a new document")?;
+        let earlier = Steps::read(&path, &factored.space, observer).context(
+            "the earlier steps of the document cannot be kept; delete them to edit it as a new document",
+        )?;
         if earlier.result.as_deref() == Some(fingerprint) {
             return Ok(earlier);
         }
@@ -324,7 +333,9 @@ impl<'a> Told<'a> {
     /// Says what lies outside the gamut because of the edits.
     fn warn(&self, observer: &dyn Observer) {
         for (i, basis) in self.bases.iter().enumerate() {
-            let Some((_, before)) = basis.before.filter(|(_, before)| basis.reach > before.max(VISIBLE) + 5e-4) else {
+            let Some((_, before)) =
+                basis.before.filter(|(_, before)| basis.reach > before.max(VISIBLE) + 5e-4)
+            else {
                 continue;
             };
             let verb = if before > VISIBLE { "is further outside" } else { "leaves" };
@@ -353,10 +364,10 @@ impl<'a> Told<'a> {
                 basis.reach
             );
             if let Some((origin, before)) = basis.before {
-                let d = self.before.space.distance(
-                    self.before.bases.row(origin),
-                    self.edited.document.bases.row(i),
-                );
+                let d = self
+                    .before
+                    .space
+                    .distance(self.before.bases.row(origin), self.edited.document.bases.row(i));
                 let from = if origin == i { String::new() } else { format!("from basis {origin}, ") };
                 let _ = write!(text, " (before: {before:.3}; {from}changed by d = {d:.3})");
             }
@@ -381,7 +392,11 @@ impl<'a> Told<'a> {
             Change::Surface { .. } | Change::Replace { .. } if into != basis => format!(", now basis {into}"),
             _ => String::new(),
         };
-        format!("step {}: basis {basis} {what} ({:.1} % of the document){new}\n", effect.step + 1, 100.0 * share)
+        format!(
+            "step {}: basis {basis} {what} ({:.1} % of the document){new}\n",
+            effect.step + 1,
+            100.0 * share
+        )
     }
 
     /// The curves of the edited bases before and after.
@@ -408,7 +423,9 @@ fn surface_in_words(surface: &Surface, effect: &Effect) -> String {
             if asked < 1.0 { ("glossier", asked.recip(), came.recip()) } else { ("rougher", asked, came) };
         if asked != 1.0 {
             parts.push(match differs(asked, came) {
-                true => format!("{word} by {came:.2} (not {asked:.2}: a highlight has a width from 0.02 to 1)"),
+                true => {
+                    format!("{word} by {came:.2} (not {asked:.2}: a highlight has a width from 0.02 to 1)")
+                }
                 false => format!("{word} by {asked:.2}"),
             });
         }

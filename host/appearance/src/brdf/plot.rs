@@ -17,9 +17,11 @@ pub struct PlotError {
     pub problem: String,
 }
 
+type Rgb = (u8, u8, u8);
+
 /// Characters across a terminal plot, and rows per decade. The scale has a label every four rows.
 const TERMINAL: (u32, u32) = (72, 4);
-const INKS: [(u8, u8, u8); 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
+const INKS: [Rgb; 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 
 /// The decades that hold the curve: at least three and at most six.
 fn decades(curve: &Curve) -> (i32, i32) {
@@ -60,7 +62,7 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
 }
 
 /// Shapes over these decades, with their scales.
-fn framed(range: (i32, i32), shapes: &[(&Shape<'_>, Option<(u8, u8, u8)>)]) -> String {
+fn framed(range: (i32, i32), shapes: &[(&Shape<'_>, Option<Rgb>)]) -> String {
     // A character is two dots wide and four dots high.
     let (width, height) = (TERMINAL.0 * 2, TERMINAL.1 * 4 * range.0.abs_diff(range.1));
     let mut chart = Chart::new_with_y_range(width, height, 0.0, 90.0, range.0 as f32, range.1 as f32);

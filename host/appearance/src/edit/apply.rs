@@ -106,7 +106,8 @@ struct Work<'a> {
 impl<'a> Work<'a> {
     fn of(source: &'a Factored) -> Work<'a> {
         let channels = source.maps.channels();
-        let map = |channel: usize| source.maps.data().iter().skip(channel).step_by(channels).copied().collect();
+        let map =
+            |channel: usize| source.maps.data().iter().skip(channel).step_by(channels).copied().collect();
         Work {
             source,
             bases: source.bases.rows().map(<[f64]>::to_vec).collect(),

@@ -59,7 +59,9 @@ pub enum EditError {
         size: (usize, usize),
     },
     /// Masked edits split bases, and there are too many now.
-    #[error("the masked edit needs a further basis, and {bases} is the limit for {pixels} pixels; edit without a mask, or factor into fewer bases")]
+    #[error(
+        "the masked edit needs a further basis, and {bases} is the limit for {pixels} pixels; edit without a mask, or factor into fewer bases"
+    )]
     Many {
         /// The limit.
         bases: usize,

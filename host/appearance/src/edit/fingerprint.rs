@@ -11,7 +11,13 @@ use crate::materials::Factored;
 pub fn fingerprint(document: &Factored) -> String {
     let mut hash = Sha256::new();
     let maps = &document.maps;
-    for number in [document.space.angles().len(), document.space.columns(), maps.width(), maps.height(), maps.channels()] {
+    for number in [
+        document.space.angles().len(),
+        document.space.columns(),
+        maps.width(),
+        maps.height(),
+        maps.channels(),
+    ] {
         hash.update((number as u64).to_le_bytes());
     }
     for value in document.bases.rows().flatten() {

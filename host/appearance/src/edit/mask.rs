@@ -150,8 +150,9 @@ impl Painted {
     pub(super) fn read(path: &Path, source: &mut Source<'_>) -> Result<Painted, EditError> {
         let bytes = source.read(path, MOST_BYTES)?;
         let picture = Picture::decode(&bytes, path, source)?;
-        let wrong =
-            |problem: String| EditError::Document(DocumentError::Picture { path: PathBuf::from(path), problem });
+        let wrong = |problem: String| {
+            EditError::Document(DocumentError::Picture { path: PathBuf::from(path), problem })
+        };
         let (width, height) = (picture.width, picture.height);
         let grey = picture.channel(0);
         for channel in 1..picture.colours() {

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 use observe::Silent;
 
 use crate::brdf::{Space, Table};
-use crate::gamut::{self, Gloss, GamutError, Intent, Printable, Settings};
+use crate::gamut::{self, GamutError, Gloss, Intent, Printable, Settings};
 use crate::materials::Factored;
 use crate::weights::{ONE, WeightMaps};
 
@@ -31,6 +31,12 @@ pub fn reach(space: &Space, rows: &Table, printable: &Printable) -> Result<Vec<f
         most_cartridges: usize::MAX,
         ..Settings::default()
     };
-    let mapped = gamut::map(&materials, || Ok::<_, GamutError>(Cow::Borrowed(&materials)), printable, &settings, &Silent)?;
+    let mapped = gamut::map(
+        &materials,
+        || Ok::<_, GamutError>(Cow::Borrowed(&materials)),
+        printable,
+        &settings,
+        &Silent,
+    )?;
     Ok(mapped.report.materials.iter().map(|material| material.unscaled_distance).collect())
 }

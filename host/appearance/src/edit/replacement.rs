@@ -31,7 +31,8 @@ impl Replacement {
         let name = text.chars().filter(|c| !c.is_control()).collect::<String>();
         let refused = |problem: String| EditError::Replacement { name: name.clone(), problem };
         // A name with a colon and a number may also be that of a file.
-        let numbered = text.rsplit_once(':').and_then(|(path, basis)| Some((path, basis.parse::<usize>().ok()?)));
+        let numbered =
+            text.rsplit_once(':').and_then(|(path, basis)| Some((path, basis.parse::<usize>().ok()?)));
         let (path, basis) = match numbered {
             Some((path, basis)) if !Path::new(text).exists() => (path, Some(basis)),
             _ => (text, None),
@@ -66,7 +67,9 @@ impl Replacement {
                     }
                 };
                 if basis >= bases {
-                    return Err(refused(format!("there is no basis {basis} among its {bases}, counted from 0")));
+                    return Err(refused(format!(
+                        "there is no basis {basis} among its {bases}, counted from 0"
+                    )));
                 }
                 foil::row(space, &other.space.curve(other.bases.row(basis)))
             }

@@ -130,7 +130,9 @@ impl Steps {
             let change = change(&entry, folder, space, observer, &wrong).map_err(refused)?;
             let mask = entry.mask.map(|text| match Mask::of_maps(&text)? {
                 Some(mask) => Ok(mask),
-                None => Ok(Mask::Painted(Painted::read(&beside(folder, &text).map_err(wrong)?, &mut source)?)),
+                None => {
+                    Ok(Mask::Painted(Painted::read(&beside(folder, &text).map_err(wrong)?, &mut source)?))
+                }
             });
             steps.push(Step { change, mask: mask.transpose().map_err(refused)? });
         }
@@ -228,7 +230,8 @@ fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
 
 /// A file in the folder or below it.
 fn beside(folder: &Path, name: &str) -> Result<PathBuf, String> {
-    let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    let inside =
+        Path::new(name).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     if name.is_empty() || !inside || name.contains(|c: char| c == '\\' || c.is_control()) {
         let name: String = name.chars().filter(|c| !c.is_control()).collect();
         return Err(format!("`{name}` must be a file in the folder of the step file, or below it"));
@@ -244,7 +247,8 @@ fn change(
     observer: &dyn Observer,
     wrong: &dyn Fn(String) -> EditError,
 ) -> Result<Change, EditError> {
-    let surface = entry.rougher.is_some() || entry.glossier.is_some() || entry.tint.is_some() || entry.albedo.is_some();
+    let surface =
+        entry.rougher.is_some() || entry.glossier.is_some() || entry.tint.is_some() || entry.albedo.is_some();
     let kinds = [surface, entry.replace.is_some(), entry.swap.is_some(), entry.mix.is_some()];
     if kinds.iter().filter(|kind| **kind).count() != 1 {
         return Err(wrong(
@@ -255,7 +259,9 @@ fn change(
         return Err(wrong("a step is rougher or glossier, not both".into()));
     }
     if entry.share.is_some() != entry.mix.is_some() {
-        return Err(wrong("mix needs share, the part of the basis that becomes the other one, and share mix".into()));
+        return Err(wrong(
+            "mix needs share, the part of the basis that becomes the other one, and share mix".into(),
+        ));
     }
     let basis = || {
         let name = if entry.mix.is_some() { "mix" } else { "replace" };

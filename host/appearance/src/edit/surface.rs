@@ -40,7 +40,10 @@ impl FromStr for Tint {
             text: text.chars().filter(|c| !c.is_control()).collect(),
             expected: "a colour such as #c08040",
         };
-        let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii()).ok_or_else(wrong)?;
+        let digits = text
+            .strip_prefix('#')
+            .filter(|digits| digits.len() == 6 && digits.is_ascii())
+            .ok_or_else(wrong)?;
         let mut rgb = [0; 3];
         for (value, pair) in rgb.iter_mut().zip([0, 2, 4]) {
             let pair = &digits[pair..pair + 2];
@@ -91,7 +94,11 @@ impl Surface {
     pub fn glossier(factor: f64) -> Result<f64, EditError> {
         let (low, high) = (ROUGHER.end().recip(), ROUGHER.start().recip());
         if !(low..=high).contains(&factor) {
-            return Err(EditError::Value { what: "glossier", found: factor, expected: format!("{low} to {high}") });
+            return Err(EditError::Value {
+                what: "glossier",
+                found: factor,
+                expected: format!("{low} to {high}"),
+            });
         }
         Ok(factor.recip())
     }
@@ -113,13 +120,13 @@ impl Surface {
             self.albedo
         };
         let mut out = row.to_vec();
-        for c in 0..3 {
+        for (c, &tint) in tint.iter().enumerate() {
             let channel: Vec<f64> = row.iter().skip(c).step_by(3).copied().collect();
             let least = channel.iter().copied().fold(f64::INFINITY, f64::min);
             let body = (found.diffuse[c] / std::f64::consts::PI).min(least);
             let gloss: Vec<f64> = channel.iter().map(|f| f - body).collect();
             let gloss = stretched(space.angles(), &gloss, found.alpha, alpha);
-            let colour = tint[c] * albedo;
+            let colour = tint * albedo;
             let own = DIELECTRIC * (1.0 - metallic.metallic);
             let white = if found.f0[c] > own { own / found.f0[c] } else { 1.0 };
             for (out, g) in out.iter_mut().skip(c).step_by(3).zip(gloss) {
@@ -246,7 +253,8 @@ mod tests {
         let (_, applied) = Surface { albedo: 3.0, ..Surface::default() }.edited(&space, &row(&space, &paper));
         assert!((applied.albedo - 1.0 / 0.9).abs() < 1e-3, "{applied:?}");
         let mirror = Pbr { diffuse: [0.0; 3], f0: [0.9; 3], alpha: 0.03 };
-        let (_, applied) = Surface { rougher: 0.1, ..Surface::default() }.edited(&space, &row(&space, &mirror));
+        let (_, applied) =
+            Surface { rougher: 0.1, ..Surface::default() }.edited(&space, &row(&space, &mirror));
         assert!((applied.rougher - 2.0 / 3.0).abs() < 1e-3, "{applied:?}");
     }
 }

@@ -58,7 +58,8 @@ impl Nearest {
         // The slope of cbrt(f c) is c^(1/3) f^(-2/3) / 3. Below a millionth of the peak it is that of the millionth.
         let floor = row.iter().copied().fold(0.0, f64::max) * 1e-6 + 1e-12;
         let columns = row.iter().zip(space.weight().iter().zip(space.radiance()));
-        let weight = columns.map(|(&f, (w, c))| (w * c.cbrt()).powi(2) * f.max(floor).powf(-4.0 / 3.0)).collect();
+        let weight =
+            columns.map(|(&f, (w, c))| (w * c.cbrt()).powi(2) * f.max(floor).powf(-4.0 / 3.0)).collect();
         let target = Target { space, row, weight };
         let width = |step: f64| ALPHA.start() * (ALPHA.end() / ALPHA.start()).powf(step / (STEPS - 1) as f64);
         let tried = (0..STEPS).map(|step| target.fitted(width(step as f64)));
@@ -130,8 +131,10 @@ impl Target<'_> {
                 _ => (PI * (f_one / one).max(0.0), 0.0),
             };
         }
-        let model: Vec<f64> =
-            lobes.iter().flat_map(|l| std::array::from_fn::<_, 3, _>(|c| diffuse[c] / PI + f0[c] * l)).collect();
+        let model: Vec<f64> = lobes
+            .iter()
+            .flat_map(|l| std::array::from_fn::<_, 3, _>(|c| diffuse[c] / PI + f0[c] * l))
+            .collect();
         Nearest { diffuse, f0, alpha, distance: self.space.distance(self.row, &model) }
     }
 }
