@@ -76,11 +76,11 @@ impl FromStr for Replacing {
 /// Arguments of `edit`.
 #[derive(ClapArgs, Debug)]
 #[command(after_help = "Examples:\n  \
-    foilpress factor sample:leaf --bases 6 -o leaf.foil\n  \
-    foilpress edit leaf.foil --show\n  \
-    foilpress edit leaf.foil --basis 2 --rougher 1.5 --tint '#c08040' -o edited.foil\n  \
+    foilpress factor sample:ladder --bases 6 -o ladder.foil\n  \
+    foilpress edit ladder.foil --show\n  \
+    foilpress edit ladder.foil --basis 2 --rougher 1.5 --tint '#c08040' -o edited.foil\n  \
     foilpress edit edited.foil --swap 1,4 --mask basis:1,0.5 -o again.foil\n  \
-    foilpress edit leaf.foil --steps again.foil/steps.toml -o replayed.foil\n\n\
+    foilpress edit ladder.foil --steps again.foil/steps.toml -o replayed.foil\n\n\
     DOC never changes. The edited document keeps its steps as steps.toml, beside their masks and curves: change them by hand\n\
     and replay them on the document that was edited first. Under a mask a basis is split: the edited one is new and gets the\n\
     last number.")]

@@ -52,6 +52,9 @@ const FORMAT: u32 = 1;
 /// The most steps in a file.
 const MOST_STEPS: usize = 1000;
 
+/// The most pixels of all painted masks, for memory's sake: sixteen masks of the largest document.
+const MOST_PAINTED: usize = 1 << 30;
+
 /// The steps of a document.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steps {
@@ -124,7 +127,7 @@ impl Steps {
             return Err(wrong(format!("{} steps: expected 1 to {MOST_STEPS}", file.step.len())));
         }
         let folder = path.parent().unwrap_or(Path::new(""));
-        let mut steps = Vec::new();
+        let (mut steps, mut painted) = (Vec::new(), 0);
         for (number, entry) in file.step.into_iter().enumerate() {
             let refused = |source| EditError::Step { number: number + 1, source: Box::new(source) };
             let change = change(&entry, folder, space, observer, &wrong).map_err(refused)?;
@@ -134,7 +137,16 @@ impl Steps {
                     Ok(Mask::Painted(Painted::read(&beside(folder, &text).map_err(wrong)?, &mut source)?))
                 }
             });
-            steps.push(Step { change, mask: mask.transpose().map_err(refused)? });
+            let mask = mask.transpose().map_err(refused)?;
+            if let Some(Mask::Painted(mask)) = &mask {
+                painted += mask.values.len();
+            }
+            if painted > MOST_PAINTED {
+                return Err(wrong(format!(
+                    "the masks have more than {MOST_PAINTED} pixels in all; replay the steps in several files"
+                )));
+            }
+            steps.push(Step { change, mask });
         }
         // The name is shown on terminals.
         let document = file.document.chars().filter(|c| !c.is_control()).take(200).collect();
