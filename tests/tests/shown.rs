@@ -36,11 +36,12 @@ const ELSEWHERE: [(&str, &str); 17] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 11] = [
+const DOCUMENTS: [(&str, &str); 12] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
     ("docs/guide/decals.md", "docs/guide/decal"),
+    ("docs/guide/edit.md", "."),
     ("docs/guide/libraries.md", "docs/guide"),
     ("docs/guide/page.md", "."),
     ("docs/guide/preview.md", "."),
@@ -241,6 +242,11 @@ fn charts() {
 #[test]
 fn decals() {
     document("docs/guide/decals.md");
+}
+
+#[test]
+fn edits() {
+    document("docs/guide/edit.md");
 }
 
 #[test]

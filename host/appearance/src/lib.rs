@@ -3,8 +3,8 @@
 //! The modules follow the data, and each uses only the ones before it: [`brdf`] holds curves and the metric that compares
 //! them, [`weights`] fixed-point weight maps, [`solve`] the constrained least squares, [`materials`] what the pixels of a
 //! document reflect, [`sample`] drawn materials to try things on, and [`wide`] loops over lanes. [`document`] reads and writes files of materials,
-//! [`factor`] turns materials into bases and weights, and [`gamut`] maps the bases to stacks of ink. Nothing here knows
-//! about dots, pages or printers.
+//! [`factor`] turns materials into bases and weights, [`gamut`] maps the bases to stacks of ink, and [`edit`] changes them. Nothing
+//! here knows about dots, pages or printers.
 #![deny(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,
@@ -16,6 +16,7 @@
 
 pub mod brdf;
 pub mod document;
+pub mod edit;
 pub mod factor;
 pub mod gamut;
 pub mod materials;

@@ -12,6 +12,7 @@ mod chart;
 mod choice;
 mod deliver;
 mod doctor;
+mod edit;
 mod generate;
 mod inks;
 mod inspect;
@@ -97,6 +98,10 @@ enum Command {
     Profile(layout::ProfileArgs),
     /// Factor a document into a few basis materials and their weight maps
     Factor(chain::Factor),
+    /// Edit the basis materials of a document: rougher, tinted, replaced, swapped, everywhere or under a mask
+    ///
+    /// The document itself stays as it is. The edited document keeps its steps, which can be changed and replayed.
+    Edit(edit::Args),
     /// Map basis materials (or every pixel) to mixtures of printable stacks
     Map(chain::Map),
     /// Choose one stack for every dot of a document
@@ -193,6 +198,7 @@ fn run(args: Args) -> Result<()> {
         Command::Papers(args) => layout::papers(&args),
         Command::Profile(args) => layout::profile_command(&args),
         Command::Factor(args) => args.run(observer),
+        Command::Edit(args) => edit::run(&args, observer),
         Command::Map(args) => args.run(observer),
         Command::Halftone(args) => args.run(observer),
         Command::Layout(args) => args.run(observer),

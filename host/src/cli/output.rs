@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, bail};
+use appearance::edit;
 use press::process;
 use press::scratch::{self, Scratch};
 
@@ -69,7 +70,11 @@ impl Kind {
                         || name == "preview.png"
                         || (name.starts_with("preview-") && picture(name))
                 }
-                Kind::Foil => name == "bases.csv" || (name.starts_with("weights-") && picture(name)),
+                Kind::Foil => {
+                    ["bases.csv", edit::FILE_NAME].contains(&name)
+                        || (["weights-", "mask-"].iter().any(|start| name.starts_with(start)) && picture(name))
+                        || (name.starts_with("curve-") && name.ends_with(".csv"))
+                }
                 Kind::Mix => name.starts_with("weights-") && picture(name),
                 Kind::Dots => name == "separation.png",
                 Kind::Sheet => ["separation.png", "layout.toml"].contains(&name),

@@ -17,9 +17,11 @@ pub struct PlotError {
     pub problem: String,
 }
 
+type Rgb = (u8, u8, u8);
+
 /// Characters across a terminal plot, and rows per decade. The scale has a label every four rows.
 const TERMINAL: (u32, u32) = (72, 4);
-const INKS: [(u8, u8, u8); 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
+const INKS: [Rgb; 3] = [(224, 64, 64), (48, 168, 80), (72, 112, 240)];
 
 /// The decades that hold some curves: at least three and at most six.
 fn decades<'a>(curves: impl Iterator<Item = &'a Curve> + Clone) -> (i32, i32) {
@@ -55,6 +57,13 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
         .map(|c| points(curve, c, range).into_iter().map(|(x, y)| (x as f32, y as f32)).collect())
         .collect();
     let lines: Vec<Shape<'_>> = shapes.iter().map(|points| Shape::Lines(points)).collect();
+    let inked: Vec<_> =
+        lines.iter().zip(channels).map(|(line, channel)| (line, colour.then_some(INKS[channel]))).collect();
+    framed(range, &inked)
+}
+
+/// Shapes over these decades, with their scales.
+fn framed(range: (i32, i32), shapes: &[(&Shape<'_>, Option<Rgb>)]) -> String {
     // A character is two dots wide and four dots high.
     let (width, height) = (TERMINAL.0 * 2, TERMINAL.1 * 4 * range.0.abs_diff(range.1));
     let mut chart = Chart::new_with_y_range(width, height, 0.0, 90.0, range.0 as f32, range.1 as f32);
@@ -62,13 +71,33 @@ pub fn terminal(curve: &Curve, colour: bool) -> String {
         .x_label_format(LabelFormat::Custom(Box::new(|degrees| format!("{degrees:.0} deg"))))
         .y_label_format(LabelFormat::Custom(Box::new(|decade| number(10f64.powf(f64::from(decade))))))
         .y_tick_display(TickDisplay::Sparse);
-    for (line, channel) in lines.iter().zip(channels) {
-        let (r, g, b) = INKS[channel];
-        chart = if colour { chart.linecolorplot(line, (r, g, b).into()) } else { chart.lineplot(line) };
+    for (shape, colour) in shapes {
+        chart = match *colour {
+            Some((r, g, b)) => chart.linecolorplot(shape, (r, g, b).into()),
+            None => chart.lineplot(shape),
+        };
     }
     chart.axis();
     chart.figures();
     chart.to_string()
+}
+
+/// The mean of the channels before a change (single dots) and after it (a line) in braille dots, with their scales.
+pub fn terminal_change(before: &Curve, after: &Curve) -> String {
+    let grey = |curve: &Curve| {
+        let mut values = curve.rgb().iter().map(|v| [v.iter().sum::<f64>() / 3.0; 3]);
+        Curve::sampled(curve.theta(), |_| values.next().unwrap_or_default())
+    };
+    let curves = [grey(before), grey(after)];
+    let ranges = [decades(&curves[0]), decades(&curves[1])];
+    let most = ranges[0].1.max(ranges[1].1);
+    let range = (ranges[0].0.min(ranges[1].0).max(most - 6), most);
+    let [old, new] = [0, 1].map(|i| -> Vec<(f32, f32)> {
+        points(&curves[i], 1, range).into_iter().map(|(x, y)| (x as f32, y as f32)).collect()
+    });
+    // One in eight, so that they stay apart on the terminal.
+    let dots: Vec<(f32, f32)> = old.into_iter().step_by(8).collect();
+    framed(range, &[(&Shape::Points(&dots), None), (&Shape::Lines(&new), None)])
 }
 
 /// A reflectance with at most two significant digits.
@@ -183,6 +212,8 @@ mod tests {
             let rows = TERMINAL.1 * range.0.abs_diff(range.1);
             assert!(text.lines().count() > rows as usize, "{text}");
             assert!(text.contains("90 deg"));
+            let level = Curve::new(vec![0.0], vec![[0.1; 3]]).unwrap();
+            assert!(terminal_change(&curve, &level).contains("90 deg"));
             let picture = svg("a curve", &curve).unwrap();
             assert!(picture.starts_with("<svg") && picture.contains("a curve") && !picture.contains("NaN"));
             let other = Curve::new(vec![0.0, 1.5], vec![[2.0; 3], [0.01; 3]]).unwrap();

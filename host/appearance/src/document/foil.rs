@@ -32,7 +32,10 @@ const BASES: &str = "bases.csv";
 const FORMAT: u32 = 1;
 
 /// The most bases. Each has its own map, and no document needs more than a few dozen.
-const MOST_BASES: usize = 256;
+pub(crate) const MOST_BASES: usize = 256;
+
+/// The most weights in all, for memory's sake.
+pub(crate) const MOST_WEIGHTS: usize = 1 << 30;
 
 /// `document.toml`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -61,7 +64,7 @@ struct BasisRow {
 }
 
 /// The stored form of a weight, 0..=65535, from units of 1/[`ONE`].
-fn stored(weight: u16) -> u16 {
+pub(crate) fn stored(weight: u16) -> u16 {
     ((u32::from(weight) * 65_535 + u32::from(ONE) / 2) / u32::from(ONE)) as u16
 }
 
@@ -237,7 +240,7 @@ fn check(index: &Index) -> Result<(), String> {
     if index.maps.is_empty() || index.maps.len() > MOST_BASES {
         return Err(format!("maps: {} files; expected 1 to {MOST_BASES}", index.maps.len()));
     }
-    if pixels * index.maps.len() as u64 > 1 << 30 {
+    if pixels * index.maps.len() as u64 > MOST_WEIGHTS as u64 {
         return Err(format!("{pixels} pixels of {} weights: too many for memory", index.maps.len()));
     }
     if index.samples == 0 || index.samples > 4096 {
@@ -253,6 +256,14 @@ fn check(index: &Index) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// A curve as a row of the space. Samples on exactly its grid are used unchanged, so that writing and reading changes
+/// nothing.
+pub(crate) fn row(space: &Space, curve: &Curve) -> Vec<f64> {
+    let (theta, grid) = (curve.theta(), space.angles());
+    let on_grid = theta.len() == grid.len() && theta.iter().zip(grid).all(|(a, b)| (a - b).abs() < 1e-9);
+    if on_grid { curve.rgb().iter().flatten().copied().collect() } else { space.row(curve) }
 }
 
 fn read_bases(
@@ -284,13 +295,9 @@ fn read_bases(
         let Some((theta, rgb)) = samples.remove(&basis) else {
             return Err(wrong(format!("basis {basis}"), "it has a map but no samples".into()));
         };
-        let on_grid = theta.len() == space.angles().len()
-            && theta.iter().zip(space.angles()).all(|(a, b)| (a - b).abs() < 1e-9);
-        let row: Vec<f64> = rgb.iter().flatten().copied().collect();
         let curve =
             Curve::new(theta, rgb).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
-        // Samples on exactly this grid are used unchanged, so that writing and reading changes nothing.
-        let row = if on_grid { row } else { space.row(&curve) };
+        let row = row(space, &curve);
         check_reflectance(&row).map_err(|error| wrong(format!("basis {basis}"), error.to_string()))?;
         bases.push(&row);
     }

@@ -17,11 +17,11 @@ mod hostile;
 mod merl;
 mod names;
 mod open;
-mod picture;
+pub(crate) mod picture;
 mod relief;
 mod rgl;
 mod sample;
-mod source;
+pub(crate) mod source;
 mod tensor;
 mod texture;
 

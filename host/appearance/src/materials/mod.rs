@@ -3,11 +3,12 @@
 //! [`Materials`] is all that factoring and gamut mapping know of a document. It is implemented by a surface for every
 //! pixel ([`Surfaces`]), by bases and weight maps ([`Factored`]) and by one material everywhere ([`Uniform`]). [`Reduced`]
 //! averages any of them over the cells of a print ([`Cover`]). `Distinct` finds the pixels that are equal, so that each
-//! material is computed once.
+//! material is computed once. [`Nearest`] is the way back from a curve to a surface.
 
 mod cover;
 mod distinct;
 mod factored;
+mod nearest;
 mod pixels;
 mod reduced;
 mod surface;
@@ -17,6 +18,7 @@ mod uniform;
 pub use cover::Cover;
 pub(crate) use distinct::Distinct;
 pub use factored::Factored;
+pub use nearest::{ALPHA, DIELECTRIC, Metallic, Nearest};
 pub use pixels::Materials;
 pub use reduced::{Reduced, resolution};
 pub use surface::Surface;
