@@ -49,7 +49,7 @@ fn is_grey(curve: &Curve) -> bool {
 
 /// The curve in braille dots with its scales: one line per channel, or a single line if the channels agree.
 pub fn terminal(curve: &Curve, colour: bool) -> String {
-    let range = decades([curve].into_iter());
+    let range = decades(std::iter::once(curve));
     let channels = if is_grey(curve) { 1..2 } else { 0..3 };
     let colour = colour && channels.len() > 1;
     let shapes: Vec<Vec<(f32, f32)>> = channels
@@ -89,9 +89,7 @@ pub fn terminal_change(before: &Curve, after: &Curve) -> String {
         Curve::sampled(curve.theta(), |_| values.next().unwrap_or_default())
     };
     let curves = [grey(before), grey(after)];
-    let ranges = [decades(&curves[0]), decades(&curves[1])];
-    let most = ranges[0].1.max(ranges[1].1);
-    let range = (ranges[0].0.min(ranges[1].0).max(most - 6), most);
+    let range = decades(curves.iter());
     let [old, new] = [0, 1].map(|i| -> Vec<(f32, f32)> {
         points(&curves[i], 1, range).into_iter().map(|(x, y)| (x as f32, y as f32)).collect()
     });
@@ -190,7 +188,7 @@ mod tests {
     #[test]
     fn the_scale_holds_the_curve_and_no_more_than_six_decades() {
         let level = |v: f64| Curve::new(vec![0.0], vec![[v; 3]]).unwrap();
-        let decades = |curve: &Curve| decades([curve].into_iter());
+        let decades = |curve: &Curve| decades(std::iter::once(curve));
         assert_eq!(decades(&level(0.25)), (-3, 0));
         assert_eq!(decades(&level(0.0)), (-15, -12));
         let steep = Curve::new(vec![0.0, 1.0], vec![[30.0; 3], [1e-9; 3]]).unwrap();
@@ -208,7 +206,7 @@ mod tests {
         for values in [[0.0; 3], [1e300; 3], [1e-300, 1.0, 30.0], [5.0, 0.0, 1e-5]] {
             let curve = Curve::new(vec![0.0, 0.4], vec![values, [0.1; 3]]).unwrap();
             let text = terminal(&curve, false);
-            let range = decades([&curve].into_iter());
+            let range = decades(std::iter::once(&curve));
             let rows = TERMINAL.1 * range.0.abs_diff(range.1);
             assert!(text.lines().count() > rows as usize, "{text}");
             assert!(text.contains("90 deg"));
