@@ -74,7 +74,7 @@ pub fn compare(space: &Space, a: &Entry, b: &Entry) -> Difference {
         distance: space.distance(&first, &second),
         light: space.light_distance(&first, &second),
         band: (!known.is_empty()).then(|| space.distance(&middle, &above)),
-        within: can_tell.then(|| inside as f64 >= AGREE * compared as f64),
+        within: can_tell.then_some(inside as f64 >= AGREE * compared as f64),
         largest,
     }
 }
