@@ -20,7 +20,6 @@ use appearance::edit::{
 };
 use appearance::gamut::Printable;
 use appearance::materials::{Factored, Nearest};
-use appearance::srgb;
 use observe::Observer;
 use press::pipeline::document as stages;
 
@@ -359,8 +358,8 @@ impl<'a> Told<'a> {
                 text,
                 "{i:5} {:5.1} %  {}  {}    {alpha:>5}  {metal:3.0} %  {:.3}",
                 100.0 * basis.share,
-                hex(diffuse),
-                hex(f0),
+                Tint::of_linear(diffuse),
+                Tint::of_linear(f0),
                 basis.reach
             );
             if let Some((origin, before)) = basis.before {
@@ -443,10 +442,4 @@ fn surface_in_words(surface: &Surface, effect: &Effect) -> String {
         }
     }
     parts.join(", ")
-}
-
-/// A linear colour as sRGB digits.
-fn hex(linear: [f64; 3]) -> String {
-    let [r, g, b] = linear.map(|v| (srgb::encode(v as f32) * 255.0).round() as u8);
-    Tint([r, g, b]).to_string()
 }

@@ -27,6 +27,11 @@ impl Tint {
     /// The tint that changes nothing.
     pub const WHITE: Tint = Tint([255; 3]);
 
+    /// The nearest to a linear colour; channels outside 0 to 1 are clamped.
+    pub fn of_linear(colour: [f64; 3]) -> Tint {
+        Tint(colour.map(|v| (srgb::encode(v as f32) * 255.0).round() as u8))
+    }
+
     fn linear(self) -> [f64; 3] {
         self.0.map(|v| f64::from(srgb::decode(f32::from(v) / 255.0)))
     }
