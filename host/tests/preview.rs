@@ -45,6 +45,18 @@ fn dots_and_jobs_show_the_print_alone() {
     assert!(said.contains("has printed dots and no document"), "{said}");
 }
 
+/// A print written as glTF is a document like any other.
+#[test]
+fn a_print_as_gltf_is_read_as_a_document() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let said = bench.done(&format!("preview tile {SMALL} -o tile.glb --pixels 64 --json"));
+    let report: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(report["bytes"], fs::metadata(bench.path("tile.glb")).unwrap().len());
+    assert!(report["distance"].as_f64().unwrap() <= report["worst"].as_f64().unwrap());
+    bench.done("factor tile.glb -q --bases 2 -o again.foil");
+}
+
 #[test]
 fn what_cannot_be_shown_is_refused_with_what_to_do_and_leaves_nothing() {
     let bench = Bench::new();
@@ -66,7 +78,8 @@ fn what_cannot_be_shown_is_refused_with_what_to_do_and_leaves_nothing() {
         ("-o out.png --view 120,0", "behind the sheet"),
         ("-o out.png --view 60,0 --tilt -60,0", "behind the sheet"),
         ("-o out.png --curl 0.001", "cannot be bent"),
-        ("-o out.jpg", "must end in .html, .png or .exr"),
+        ("-o out.jpg", "must end in .html, .png, .exr or .glb"),
+        ("-o out.glb --light 10,20", "a .glb has no lights"),
         ("-o out.png --light-probe nan.hdr", "nan.hdr"),
         ("-o out.png --light-probe negative.hdr", "negative.hdr"),
         ("-o out.png --light-probe infinite.hdr", "infinite.hdr"),

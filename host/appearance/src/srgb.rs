@@ -8,6 +8,6 @@ pub fn decode(v: f32) -> f32 {
 }
 
 /// The encoded value of a linear one; both are 0 to 1, and values outside are clamped.
-pub(crate) fn encode(v: f32) -> f32 {
+pub fn encode(v: f32) -> f32 {
     <Srgb as FromLinear<f32, f32>>::from_linear(v.clamp(0.0, 1.0))
 }

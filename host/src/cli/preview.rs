@@ -25,7 +25,7 @@ use press::preview::{Exposure, Probe, Radiance, Source, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
 use view::page::{Subject, Target, page};
-use view::{Camera, Light, Lit, Pose, Renderer, Scene, direction, mapped, proportions};
+use view::{Camera, Glb, Light, Lit, Pose, Renderer, Scene, direction, glb, mapped, proportions};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
 const BASES: usize = 12;
@@ -50,6 +50,7 @@ enum Format {
     Page,
     Png,
     Exr,
+    Glb,
 }
 
 /// A direction in degrees: azimuth to the right, elevation upwards.
@@ -124,7 +125,8 @@ fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], Strin
     after_help = "Examples:\n  \
     foilpress preview sample:leaf -o leaf.html\n  \
     foilpress preview sample:card -o card.png --light -40,30 --view 20,10 --curl 0.1\n  \
-    foilpress preview sample:dove -o dove.exr --show document --light 0,60,0.5 --distance far\n\n\
+    foilpress preview sample:dove -o dove.exr --show document --light 0,60,0.5 --distance far\n  \
+    foilpress preview sample:leaf -o leaf.glb                              (for other renderers)\n\n\
     DOC may also be a job (.rgl), or a folder written by `halftone`, `layout` or `simulate`; these show printed dots alone.\n\
     Angles are in degrees: the first to the right, the second upwards; 0,0 is straight above the sheet. All lights have the\n\
     same strength at the middle of the sheet. A page has controls for everything and shows the document, its mixture of\n\
@@ -135,7 +137,7 @@ pub struct Args {
     dots: DotsArgs,
     #[command(flatten)]
     preset: PresetArg,
-    /// File to write: a page (.html), a picture (.png), or linear radiance (.exr)
+    /// File to write: a page (.html), a picture (.png), linear radiance (.exr), or a glTF material (.glb)
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// What to show first or in a picture [default: printed]
@@ -163,7 +165,7 @@ pub struct Args {
     /// [default: so that most of the picture is neither dark nor burnt out]
     #[arg(long, value_name = "STOPS", allow_hyphen_values = true, value_parser = stops)]
     exposure: Option<f32>,
-    /// Pixels of the longer side of a picture
+    /// Pixels of the longer side of a picture or texture
     #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = clap::value_parser!(u16).range(16..=8192))]
     pixels: u16,
     /// Print what was written as JSON
@@ -200,6 +202,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     if args.light.len() > 4 {
         bail!("--light: at most four lights, not {}", args.light.len());
     }
+    if format == Format::Glb && args.has_lights() {
+        bail!(
+            "{}: a .glb has no lights; leave --light, --light-probe and --exposure out",
+            args.output.display()
+        );
+    }
     let probe = args.light_probe.as_deref().map(Probe::read_hdr).transpose()?;
     let staged = Staged::file(&args.output)?;
     let shown = Shown::open(&args.dots, observer)?;
@@ -213,8 +221,6 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     let longest = if format == Format::Page { STILL } else { args.pixels.into() };
     let size = shown.size();
-    let (width, height) = proportions(size, longest);
-    let scene = args.scene(size, width as f64 / height as f64, probe.clone());
     let stacks = reflectances(shown.dots.stacks(), &shown.library, &shown.space);
     let print = Source::Print {
         dots: &shown.dots,
@@ -229,12 +235,19 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     };
     // Fine enough for the picture and never much finer.
     let lit = Lit::new(&source, size, longest.clamp(64, 2048))?;
+    if format == Format::Glb {
+        return write_glb(args, &glb(&lit, &shown.space, &shown.name, observer)?, &shown, staged);
+    }
+    let (width, height) = proportions(size, longest);
+    let scene = args.scene(size, width as f64 / height as f64, probe.clone());
     let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
     let exposure = match args.exposure {
         Some(stops) => Exposure(Exposure::PAPER.0 * stops.exp2()),
         None => Exposure::of(std::slice::from_ref(&radiance)),
     };
     match format {
+        // Written above: it needs no light.
+        Format::Glb => {}
         Format::Png => write_png(&radiance, exposure, staged.path())?,
         Format::Exr => write_exr(&radiance, staged.path())?,
         Format::Page => {
@@ -299,6 +312,10 @@ impl Args {
             return vec![Lamp(Degrees(-25.0, 30.0), Some(0.6))];
         }
         self.light.clone()
+    }
+
+    fn has_lights(&self) -> bool {
+        !self.light.is_empty() || self.light_probe.is_some() || self.exposure.is_some()
     }
 
     /// The same scene as the page's address holds it.
@@ -397,7 +414,8 @@ fn format(output: &Path) -> Result<Format> {
         Some("html" | "htm") => Ok(Format::Page),
         Some("png") => Ok(Format::Png),
         Some("exr") => Ok(Format::Exr),
-        _ => bail!("{}: the name of the file must end in .html, .png or .exr", output.display()),
+        Some("glb") => Ok(Format::Glb),
+        _ => bail!("{}: the name of the file must end in .html, .png, .exr or .glb", output.display()),
     }
 }
 
@@ -409,6 +427,29 @@ fn png(radiance: &Radiance, exposure: Exposure) -> Result<Vec<u8>> {
 
 fn write_png(radiance: &Radiance, exposure: Exposure, path: &Path) -> Result<()> {
     Ok(fs::write(path, png(radiance, exposure)?)?)
+}
+
+fn write_glb(args: &Args, glb: &Glb, shown: &Shown, staged: Staged) -> Result<()> {
+    fs::write(staged.path(), &glb.bytes)
+        .with_context(|| format!("cannot write {}", args.output.display()))?;
+    staged.commit()?;
+    let mut out = std::io::stdout().lock();
+    let Glb { bytes, texels, distance, worst } = glb;
+    if args.json {
+        let size_mm = shown.size().map(|side| side * 1000.0);
+        let report = json!({
+            "written": args.output.display().to_string(), "bytes": bytes.len(), "name": shown.name, "size_mm": size_mm,
+            "pixels": texels, "distance": distance, "worst": worst,
+        });
+        writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
+    } else {
+        writeln!(out, "{} ({:.1} MB)", args.output.display(), bytes.len() as f64 / 1e6)?;
+        writeln!(
+            out,
+            "one lobe a texel: difference d {distance:.3} (root mean square), {worst:.3} at worst; 0.01 is barely visible"
+        )?;
+    }
+    Ok(())
 }
 
 /// Linear radiance with coverage as premultiplied alpha.
@@ -440,7 +481,7 @@ mod tests {
     #[test]
     fn the_ending_decides_what_is_written() {
         assert_eq!(format(Path::new("a/leaf.HTML")).unwrap(), Format::Page);
-        assert!(format(Path::new("leaf.jpg")).unwrap_err().to_string().contains(".html, .png or .exr"));
+        assert!(format(Path::new("leaf.jpg")).unwrap_err().to_string().contains(".html, .png, .exr or .glb"));
         assert!(format(Path::new("leaf")).is_err());
     }
 }

@@ -41,10 +41,10 @@ pub enum ViewError {
     /// A sheet that cannot be held like this.
     #[error("sheet: {0}")]
     Pose(String),
-    /// Packing the page. Never seen; if it is, it is a bug worth a report.
-    #[error("the page cannot be packed")]
+    /// Packing a page or a texture. Never seen; if it is, it is a bug worth a report.
+    #[error("the file cannot be packed")]
     Pack(#[from] std::io::Error),
-    /// Writing the page's description. Never seen; if it is, it is a bug worth a report.
-    #[error("the page cannot be described")]
+    /// Writing a description. Never seen; if it is, it is a bug worth a report.
+    #[error("the file cannot be described")]
     Describe(#[from] serde_json::Error),
 }

@@ -2,7 +2,7 @@
 //!
 //! [`Lit`] is what is lit: a few curves over the half angle and a weight for each of them at every place. A [`Scene`] says
 //! where the eye and the lights are and how the sheet is held. [`Renderer`] makes a picture of both, and [`page`] writes a
-//! page that makes the same pictures in a browser, where they follow the hand.
+//! page that makes the same pictures in a browser, where they follow the hand. [`glb`] writes what is lit for other programs.
 //! Units: metres, radians; x points right, y up, z to the eye that looks straight at the sheet. The origin is the middle of
 //! the sheet. Radiance is that of a surface under irradiance 1 where it faces the light, linear Rec. 709.
 #![forbid(unsafe_code)]
@@ -16,6 +16,7 @@
 )]
 
 mod error;
+mod glb;
 mod lit;
 pub mod page;
 mod render;
@@ -23,6 +24,7 @@ mod scene;
 mod surroundings;
 
 pub use error::ViewError;
+pub use glb::{Glb, glb};
 pub use lit::{Lit, fit, mapped};
 pub use render::Renderer;
 pub use scene::{Camera, Light, Pose, Scene, direction, proportions};

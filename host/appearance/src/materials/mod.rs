@@ -18,7 +18,7 @@ mod uniform;
 pub use cover::Cover;
 pub(crate) use distinct::Distinct;
 pub use factored::Factored;
-pub use nearest::{ALPHA, DIELECTRIC, Metallic, Nearest};
+pub use nearest::{ALPHA, DIELECTRIC, Metallic, Near, Nearest, Widths};
 pub use pixels::Materials;
 pub use reduced::{Reduced, resolution};
 pub use surface::Surface;
