@@ -9,6 +9,8 @@ await page.addStyleTag({
   content: `#stage { position: fixed !important; top: 0; left: 0; width: ${width}px !important; height: ${height}px !important; border-radius: 0 !important }`,
 });
 await page.waitForTimeout(1000);
+// An address that is set while something moves may be overwritten by that of where it moved to.
+await rested(page);
 for (const [i, state] of JSON.parse(await readFile(states, 'utf8')).entries()) {
   await page.evaluate((hash) => { location.hash = hash; }, state);
   // The page writes its own address when it rests: the same view, in other words.

@@ -618,8 +618,9 @@ async function start() {
     redraw(false);
   });
   new ResizeObserver(() => redraw(false)).observe(canvas);
-  addEventListener('hashchange', () => {
-    read(location.hash, state, limits);
+  addEventListener('hashchange', (event) => {
+    // The page may have written its own address since.
+    read(new URL(event.newURL).hash, state, limits);
     faceTheEye();
     controls();
     redraw(false);
