@@ -32,7 +32,12 @@ pub fn build(root: &Path, profile: Profile) -> Result<()> {
     };
     // The program holds the bridge's images, so that it can flash a board wherever it is installed.
     let image = firmware::build(root)?;
-    let mut program = cargo(&["build", "--package", "foilpress", "--locked", "--profile", name]);
+    // The tests' build has the libraries already, with the features of the whole workspace.
+    let which: &[&str] = match profile {
+        Profile::Release => &["--package", "foilpress"],
+        Profile::Dev => &["--workspace", "--bin", "foilpress"],
+    };
+    let mut program = cargo(&[&["build", "--locked", "--profile", name], which].concat());
     succeed(program.current_dir(root).env("FOILPRESS_FIRMWARE", &image))?;
     let bytes = fs::read(&built)?;
     for image in [image.clone(), image.with_file_name("foilpress-bridge-pico2.uf2")] {
