@@ -324,7 +324,7 @@ fn wait_until_read() {
     while Instant::now() < end && rustix::io::ioctl_fionread(io::stderr()).is_ok_and(|unread| unread > 0) {
         std::thread::sleep(Duration::from_millis(20));
     }
-    std::thread::sleep(Duration::from_secs(2).min(end.saturating_duration_since(Instant::now())));
+    std::thread::sleep(Duration::from_secs(1).min(end.saturating_duration_since(Instant::now())));
 }
 
 fn filtered(arguments: &[OsString], observer: &dyn Observer) -> Result<usize> {

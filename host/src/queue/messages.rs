@@ -125,8 +125,10 @@ impl<W: Write> Messages<W> {
     fn line(&self, keyword: &str, text: &str) {
         // A message is one line. If nobody reads it, the job goes on.
         let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        // Filter and backend share a pipe: what is written at once, up to a page, is not torn apart by the other's lines.
+        let line = format!("{keyword}: {text}\n");
         self.with(|state| {
-            let _ = writeln!(state.out, "{keyword}: {text}");
+            let _ = state.out.write_all(line.as_bytes());
         });
     }
 
@@ -285,6 +287,29 @@ mod tests {
         let messages = Messages::of_filter(Vec::new());
         messages.info("two\nlines\u{1b}[31m\rSTATE: +paused");
         assert_eq!(said(messages), ["INFO: two lines [31m STATE: +paused"]);
+    }
+
+    /// Two processes write to one pipe, so a line in parts would be torn apart.
+    #[test]
+    fn every_message_is_written_at_once() {
+        #[derive(Default)]
+        struct Writes(Vec<Vec<u8>>);
+        impl Write for Writes {
+            fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+                self.0.push(bytes.to_vec());
+                Ok(bytes.len())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let messages = Messages::new(Writes::default());
+        messages.info("of cartridges");
+        messages.error("and of paper");
+        messages.reasons(&[Reason::OffLine]);
+        let writes = messages.state.into_inner().unwrap().out.0;
+        assert_eq!(writes.len(), 4);
+        assert!(writes.iter().all(|line| line.ends_with(b"\n")));
     }
 
     #[test]
