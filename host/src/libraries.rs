@@ -63,6 +63,11 @@ pub fn open(spec: &Path) -> Result<Library> {
     Library::from_dir(&folder).with_context(|| format!("{} is not a usable ink library", folder.display()))
 }
 
+/// The library asked for; without one, that of the program.
+pub fn given(spec: Option<&Path>) -> Result<Library> {
+    spec.map_or_else(|| Ok(Library::builtin()), open)
+}
+
 /// Makes files a library of the user under this name, whole or not at all.
 pub fn install(name: &str, members: &[Member]) -> Result<(PathBuf, Library)> {
     let home = home()?;

@@ -130,10 +130,7 @@ impl InkArgs {
 
     /// The library.
     pub fn library(&self) -> Result<Library> {
-        Ok(match &self.library {
-            Some(spec) => libraries::open(spec)?,
-            None => Library::builtin(),
-        })
+        libraries::given(self.library.as_deref())
     }
 }
 

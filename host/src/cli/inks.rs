@@ -130,10 +130,12 @@ enum What {
 /// Runs the subcommand; what it has to say goes to the standard output.
 pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
     let (text, verdict) = match args.what {
-        What::List { library, inks, json } => (list(&open(library.as_deref())?, inks, json)?, Ok(())),
+        What::List { library, inks, json } => {
+            (list(&libraries::given(library.as_deref())?, inks, json)?, Ok(()))
+        }
         What::Show { stack, library, figures, plot } => {
             let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
-            let library = open(library.as_deref())?;
+            let library = libraries::given(library.as_deref())?;
             let entry = find(&library, &stack)?;
             let mut text = describe(&library, entry, figures);
             text.push_str(&plot::terminal(&entry.curve, colour));
@@ -164,10 +166,6 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
         Err(error) if !closed_pipe(&error) => Err(error),
         _ => verdict,
     }
-}
-
-fn open(spec: Option<&Path>) -> anyhow::Result<Library> {
-    spec.map_or_else(|| Ok(Library::builtin()), libraries::open)
 }
 
 /// The entry of a stack given as text. Suggests another when the library lacks it.

@@ -163,10 +163,7 @@ fn set(option: &str, text: &str) -> Result<InkSet> {
 impl LayersArgs {
     /// The library.
     pub fn library(&self) -> Result<Library> {
-        Ok(match &self.library {
-            Some(spec) => crate::libraries::open(spec)?,
-            None => Library::builtin(),
-        })
+        crate::libraries::given(self.library.as_deref())
     }
 
     /// The inks that may be used: white is among the usual ones here.

@@ -5,7 +5,7 @@
 //! measurement if it is at most two standard deviations, those of both curves together; the curves agree if 95 % of the
 //! samples that were seen are. The band is the distance d that two standard deviations everywhere would make.
 //! Cost: one evaluation of both curves at the angles of the space. Limits: a curve without standard deviations counts as
-//! exact, and so does a model; where neither has any, nothing is said.
+//! exact, and so does a model; where neither has any, there is no verdict.
 
 use inks::Entry;
 use serde::Serialize;

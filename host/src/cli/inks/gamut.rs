@@ -132,12 +132,14 @@ fn nearest(space: &Space, printable: &Printable, target: &[f64]) -> (Stack, f64)
 
 fn report(basis: &Basis) -> Value {
     let m = &basis.mapped;
-    let weights: Vec<Value> =
-        m.weights.iter().map(|(stack, weight)| json!({"stack": stack, "weight": weight})).collect();
     json!({
         "share": m.share, "nearest": basis.nearest, "distance_nearest": basis.alone,
-        "distance_mixed": m.unscaled_distance, "light": m.light, "mixture": weights,
+        "distance_mixed": m.unscaled_distance, "light": m.light, "mixture": weights(&m.weights),
     })
+}
+
+fn weights(mixture: &[(Stack, f64)]) -> Vec<Value> {
+    mixture.iter().map(|(stack, weight)| json!({"stack": stack, "weight": weight})).collect()
 }
 
 fn mixture(weights: &[(Stack, f64)]) -> String {
@@ -202,20 +204,13 @@ pub struct Redundant {
 
 /// Runs `inks redundant`.
 pub fn redundant(args: &Redundant) -> Result<String> {
-    let library = match &args.library {
-        Some(spec) => libraries::open(spec)?,
-        None => inks::Library::builtin(),
-    };
+    let library = libraries::given(args.library.as_deref())?;
     let space = Space::half_angle(SAMPLES);
     let printable = Printable::from_library(&library, &args.inks.unwrap_or(InkSet::ALL), &space);
     let found = gamut::redundancy(&space, &printable, LIGHT, args.within)?;
     if args.json {
         let one = |left: &LeftOut| {
-            let mixture: Vec<Value> = left
-                .mixture
-                .iter()
-                .map(|(stack, weight)| json!({"stack": stack, "weight": weight}))
-                .collect();
+            let mixture = weights(&left.mixture);
             json!({"stack": left.stack, "alone": left.alone, "together": left.together, "mixture": mixture})
         };
         return Ok(serde_json::to_string_pretty(&found.iter().map(one).collect::<Vec<_>>())? + "\n");
