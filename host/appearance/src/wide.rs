@@ -2,7 +2,8 @@
 //!
 //! Problem: the program is built for any processor of its kind, which leaves half of the lanes of most of them idle.
 //! Method: the same code is compiled a second time for AVX2. Every operation is still rounded once and in the same order, as
-//! multiplications and additions are not fused: equal bit for bit. Only what is inlined gains.
+//! multiplications and additions are not fused: equal bit for bit. Only what is inlined gains: the
+//! closure itself has to be `#[inline(always)]`, since it is called in two places, and so has what it calls.
 
 /// Does some work, with AVX2 where there is.
 #[inline(always)]

@@ -11,6 +11,7 @@
 //! a fragment. Limits: detail finer than a cell is averaged, unless it is solid; a stack's cells have sides of 1, 2, 3, 4,
 //! 6 or 8 dots.
 
+mod arrange;
 mod border;
 pub(super) mod cell;
 mod choose;
@@ -64,17 +65,20 @@ pub(super) fn cells(
     let plan = Plan::new(&field, &least, &mut index);
     index.par_chunks_mut(STRIP * BLOCK * width).enumerate().for_each(|(i, rows)| {
         let (first, count) = (i * STRIP, rows.len().div_ceil(BLOCK * width));
-        wide(|| {
-            let mut strip = Strip::new(&field, &plan, &metric, &least);
-            for row in first.saturating_sub(LEAD)..first {
-                strip.block_row(row, &mut Target { rows: None, top: 0 });
-            }
-            let mut target = Target { rows: Some(rows), top: first * BLOCK };
-            for row in first..first + count {
-                strip.block_row(row, &mut target);
-                observer.advance((width * BLOCK.min(height - row * BLOCK)) as u64);
-            }
-        });
+        wide(
+            #[inline(always)]
+            || {
+                let mut strip = Strip::new(&field, &plan, &metric, &least);
+                for row in first.saturating_sub(LEAD)..first {
+                    strip.block_row(row, &mut Target { rows: None, top: 0 });
+                }
+                let mut target = Target { rows: Some(rows), top: first * BLOCK };
+                for row in first..first + count {
+                    strip.block_row(row, &mut target);
+                    observer.advance((width * BLOCK.min(height - row * BLOCK)) as u64);
+                }
+            },
+        );
     });
     if let Some(points) = points.filter(|_| searched) {
         search::search(&field, &plan, &points, &least, &mut index);

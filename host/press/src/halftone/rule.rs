@@ -144,7 +144,10 @@ pub(super) struct Rule {
 
 /// Walks to the end with the widest vectors of this processor. The result does not depend on them.
 pub(super) fn walk<S: Source, K: Sink>(rule: &mut Rule, source: &mut S, sink: &mut K) {
-    wide(|| rule.walk(source, sink));
+    wide(
+        #[inline(always)]
+        || rule.walk(source, sink),
+    );
 }
 
 /// The best candidate.

@@ -129,13 +129,18 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], minimum: &[u1
         tasks.into_par_iter().for_each(|(rows, dots)| {
             let first = if rows.start > 0 { MARGIN } else { 0 };
             let end = rows.len() - if rows.end < down { MARGIN } else { 0 };
-            wide(|| {
-                let mut part = Part::new(field, plan, (points, small), &kernel, rows, dots);
-                for _ in 0..ROUNDS {
-                    (first..end).for_each(|row| part.block_row(row));
-                }
-                part.print(field, dots);
-            });
+            wide(
+                #[inline(always)]
+                || {
+                    let mut part = Part::new(field, plan, (points, small), &kernel, rows, dots);
+                    for _ in 0..ROUNDS {
+                        for row in first..end {
+                            part.block_row(row);
+                        }
+                    }
+                    part.print(field, dots);
+                },
+            );
         });
     }
 }
@@ -176,29 +181,45 @@ impl<'a> Part<'a> {
         (part.cells, part.allowed) = (vec![FIXED; start], vec![0; start]);
         let errors = part.errors(field, plan, rows.start, dots);
         part.seen = vec![[0.0; 4]; start];
-        part.each_place(0..rows.len(), |part, place| {
-            let (cell, errors) = errors[place.number()];
-            if errors == [[0.0; 4]; 2] {
-                return;
-            }
-            if !cell.is_split() {
-                let error: Point = std::array::from_fn(|c| errors[0][c] + errors[1][c]);
-                return part.around(place, REACH, [(0, 0); 2], |seen, own, _| {
-                    for (seen, own) in seen.iter_mut().zip(own) {
-                        for c in 0..4 {
-                            seen[c] += own[c] * error[c];
-                        }
-                    }
-                });
-            }
-            part.around(place, REACH, place.halves(cell.stacked), |seen, first, second| {
-                for (seen, (first, second)) in seen.iter_mut().zip(first.iter().zip(second)) {
-                    for c in 0..4 {
-                        seen[c] += first[c] * errors[0][c] + second[c] * errors[1][c];
-                    }
+        part.each_place(
+            0..rows.len(),
+            #[inline(always)]
+            |part, place| {
+                let (cell, errors) = errors[place.number()];
+                if errors == [[0.0; 4]; 2] {
+                    return;
                 }
-            });
-        });
+                if !cell.is_split() {
+                    let error: Point = std::array::from_fn(|c| errors[0][c] + errors[1][c]);
+                    return part.around(
+                        place,
+                        REACH,
+                        [(0, 0); 2],
+                        #[inline(always)]
+                        |seen, own, _| {
+                            for (seen, own) in seen.iter_mut().zip(own) {
+                                for c in 0..4 {
+                                    seen[c] += own[c] * error[c];
+                                }
+                            }
+                        },
+                    );
+                }
+                part.around(
+                    place,
+                    REACH,
+                    place.halves(cell.stacked),
+                    #[inline(always)]
+                    |seen, first, second| {
+                        for (seen, (first, second)) in seen.iter_mut().zip(first.iter().zip(second)) {
+                            for c in 0..4 {
+                                seen[c] += first[c] * errors[0][c] + second[c] * errors[1][c];
+                            }
+                        }
+                    },
+                );
+            },
+        );
         part
     }
 
@@ -227,35 +248,39 @@ impl<'a> Part<'a> {
         let mut errors = vec![(FIXED, [[0.0; 4]; 2]); self.cells.len()];
         let mut lines: Vec<Row> = (0..=BLOCK).map(|_| Row::default()).collect();
         let mut want = vec![0.0; field.lanes];
-        self.each_place(0..self.zones.len(), |part, place| {
-            let Zone { size, left, .. } = place.zone;
-            let (x, y) = (left + place.i * size, (top + place.row) * BLOCK + place.j * size);
-            if x >= field.width || y >= field.height || !plan.is_whole(x, y) {
-                return;
-            }
-            field.row(size, y / size, &mut lines[size]);
-            field.cell(size, x / size, &mut lines[size], &mut want);
-            let corner = (y - top * BLOCK) * field.width + x;
-            let cell = Cell::read(&dots[corner..], field.width, size, &number);
-            let mut halves = cell.halves.map(|q| {
-                part.points[usize::from(q)].map(|coordinate| 0.5 * (size * size) as f32 * coordinate)
-            });
-            for (point, &want) in part.points.iter().zip(&want) {
-                for c in 0..4 {
-                    halves[0][c] -= 0.5 * want * point[c];
-                    halves[1][c] -= 0.5 * want * point[c];
+        self.each_place(
+            0..self.zones.len(),
+            #[inline(always)]
+            |part, place| {
+                let Zone { size, left, .. } = place.zone;
+                let (x, y) = (left + place.i * size, (top + place.row) * BLOCK + place.j * size);
+                if x >= field.width || y >= field.height || !plan.is_whole(x, y) {
+                    return;
                 }
-            }
-            let at = place.number();
-            errors[at] = (cell, halves);
-            if cell.halves.iter().all(|&q| q < 64)
-                && plan.owned((y * field.width + x) as u32).next().is_none()
-            {
-                part.cells[at] = cell;
-                let here = want.iter().take(64).enumerate().filter(|&(_, &want)| want > 0.0);
-                part.allowed[at] = here.fold(0, |all, (q, _)| all | 1 << q);
-            }
-        });
+                field.row(size, y / size, &mut lines[size]);
+                field.cell(size, x / size, &mut lines[size], &mut want);
+                let corner = (y - top * BLOCK) * field.width + x;
+                let cell = Cell::read(&dots[corner..], field.width, size, &number);
+                let mut halves = cell.halves.map(|q| {
+                    part.points[usize::from(q)].map(|coordinate| 0.5 * (size * size) as f32 * coordinate)
+                });
+                for (point, &want) in part.points.iter().zip(&want) {
+                    for c in 0..4 {
+                        halves[0][c] -= 0.5 * want * point[c];
+                        halves[1][c] -= 0.5 * want * point[c];
+                    }
+                }
+                let at = place.number();
+                errors[at] = (cell, halves);
+                if cell.halves.iter().all(|&q| q < 64)
+                    && plan.owned((y * field.width + x) as u32).next().is_none()
+                {
+                    part.cells[at] = cell;
+                    let here = want.iter().take(64).enumerate().filter(|&(_, &want)| want > 0.0);
+                    part.allowed[at] = here.fold(0, |all, (q, _)| all | 1 << q);
+                }
+            },
+        );
         errors
     }
 
@@ -317,11 +342,15 @@ impl<'a> Part<'a> {
 
     #[inline(always)]
     fn block_row(&mut self, row: usize) {
-        self.each_place(row..row + 1, |part, place| {
-            if part.cells[place.number()] != FIXED {
-                part.improve(place);
-            }
-        });
+        self.each_place(
+            row..row + 1,
+            #[inline(always)]
+            |part, place| {
+                if part.cells[place.number()] != FIXED {
+                    part.improve(place);
+                }
+            },
+        );
     }
 
     /// Prints the cells on the rows of the page that they are.

@@ -17,7 +17,7 @@ use appearance::weights::ONE;
 
 /// What a stack's own debt weighs, against the mean square of the distance of stacks from the mean of the page: with less, tones
 /// are no longer kept; with more, the dots look less even.
-const OWN: f32 = 1.0;
+const OWN: f32 = 1.3;
 
 /// By how much the decision of a cell is disturbed, in cells, for the second largest share in it, linear in between: where
 /// there are two stacks, and where others share the cell, which break most patterns themselves.
@@ -53,12 +53,11 @@ pub(super) static NOISE: [f32; 512] = {
 
 /// How far stacks are apart: scalar products of the stacks of a field.
 pub(in crate::halftone) struct Metric {
-    lanes: usize,
-    /// Of [`LANES`] stacks after another, by coordinate, from the mean of the page; 0 where all stacks are equally far apart.
-    coordinates: Vec<[[f32; LANES]; 4]>,
+    /// Each coordinate of the stacks and padding, from the mean of the page; 0 where all stacks are equally far apart.
+    coordinates: [Vec<f32>; 4],
     /// What a stack's own debt weighs.
     own: f32,
-    /// The products of each stack with all others, `lanes` a row.
+    /// The products of each stack with all others, a row each.
     products: Vec<f32>,
     /// The product of each stack with itself.
     squares: Vec<f32>,
@@ -68,7 +67,7 @@ impl Metric {
     /// For so many stacks and padding, of which the mean page has these shares. Without points all stacks are equally far
     /// apart.
     pub(in crate::halftone) fn new(lanes: usize, shares: &[f32], points: Option<&[Point]>) -> Metric {
-        let mut coordinates = vec![[[0.0; LANES]; 4]; lanes / LANES];
+        let mut coordinates: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; lanes]);
         let mut own = 0.0;
         if let Some(points) = points {
             let mean: Point = std::array::from_fn(|c| {
@@ -77,41 +76,59 @@ impl Metric {
             for (q, (share, point)) in shares.iter().zip(points).enumerate() {
                 for c in 0..4 {
                     let from_mean = point[c] - mean[c];
-                    coordinates[q / LANES][c][q % LANES] = from_mean;
+                    coordinates[c][q] = from_mean;
                     own += OWN * share * from_mean * from_mean;
                 }
             }
         }
         if own < f32::MIN_POSITIVE {
             own = 1.0;
-            coordinates.fill([[0.0; LANES]; 4]);
+            coordinates.iter_mut().for_each(|coordinate| coordinate.fill(0.0));
         }
         let product = |a: usize, b: usize| {
-            let at = |q: usize, c: usize| coordinates[q / LANES][c][q % LANES];
-            let sum: f32 = (0..4).map(|c| at(a, c) * at(b, c)).sum();
+            let sum: f32 = coordinates.iter().map(|coordinate| coordinate[a] * coordinate[b]).sum();
             if a == b { sum + own } else { sum }
         };
         let products = (0..lanes * lanes).map(|at| product(at / lanes, at % lanes)).collect();
         let squares = (0..lanes).map(|q| product(q, q)).collect();
-        Metric { lanes, coordinates, own, products, squares }
+        Metric { coordinates, own, products, squares }
     }
 
     /// The product of a vector of debts with each coordinate.
     #[inline(always)]
-    fn seen(&self, debts: &[f32]) -> Point {
-        let mut sums = [[0.0f32; LANES]; 4];
-        for (lines, debts) in self.coordinates.iter().zip(debts.as_chunks::<LANES>().0) {
-            for (sums, line) in sums.iter_mut().zip(lines) {
+    pub(super) fn seen(&self, debts: &[f32]) -> Point {
+        let along = |coordinate: &[f32]| {
+            let mut sums = [0.0f32; LANES];
+            for (line, debts) in coordinate.as_chunks::<LANES>().0.iter().zip(debts.as_chunks::<LANES>().0) {
                 for l in 0..LANES {
                     sums[l] += line[l] * debts[l];
                 }
             }
+            sums.iter().sum()
+        };
+        let [a, b, c, d] = &self.coordinates;
+        [along(a), along(b), along(c), along(d)]
+    }
+
+    /// Where a stack lies from the mean of the page.
+    #[inline(always)]
+    pub(super) fn point(&self, stack: u8) -> Point {
+        std::array::from_fn(|c| self.coordinates[c][usize::from(stack)])
+    }
+
+    /// The product of a vector of debts, of which this is seen, with each stack: into `out`.
+    #[inline(always)]
+    fn products(&self, debts: &[f32], seen: Point, out: &mut [f32]) {
+        let [a, b, c, d] = &self.coordinates;
+        let coordinates = a.iter().zip(b).zip(c.iter().zip(d));
+        for ((out, debt), ((a, b), (c, d))) in out.iter_mut().zip(debts).zip(coordinates) {
+            *out = self.own * debt + seen[0] * a + seen[1] * b + seen[2] * c + seen[3] * d;
         }
-        sums.map(|sums| sums.iter().sum())
     }
 
     fn row(&self, stack: u8) -> &[f32] {
-        &self.products[usize::from(stack) * self.lanes..][..self.lanes]
+        let lanes = self.squares.len();
+        &self.products[usize::from(stack) * lanes..][..lanes]
     }
 }
 
@@ -122,18 +139,25 @@ pub(super) struct Chooser<'a> {
     small: Vec<Vec<f32>>,
     /// The product of a vector of debts with each stack.
     products: Vec<f32>,
+    /// What each stack gains.
+    gains: Vec<f32>,
 }
 
 impl<'a> Chooser<'a> {
     /// For stacks with these minimum clusters, and cells up to this side.
     pub(super) fn new(metric: &'a Metric, minimum: &[u16], largest: usize) -> Chooser<'a> {
+        let lanes = metric.squares.len();
         let small = |size: usize| {
             let bar = |q: usize| minimum.get(q).is_some_and(|&minimum| fits_half(minimum, size));
-            let bars: Vec<f32> =
-                (0..metric.lanes).map(|q| if bar(q) { 0.0 } else { f32::NEG_INFINITY }).collect();
+            let bars: Vec<f32> = (0..lanes).map(|q| if bar(q) { 0.0 } else { f32::NEG_INFINITY }).collect();
             if bars.contains(&0.0) { bars } else { Vec::new() }
         };
-        Chooser { metric, small: (0..=largest).map(small).collect(), products: vec![0.0; metric.lanes] }
+        Chooser {
+            metric,
+            small: (0..=largest).map(small).collect(),
+            products: vec![0.0; lanes],
+            gains: vec![0.0; lanes],
+        }
     }
 
     /// Whether cells of this side may be cut into halves.
@@ -152,48 +176,31 @@ impl<'a> Chooser<'a> {
         side: Option<usize>,
         turn: u32,
     ) -> Cell {
-        let metric = self.metric;
-        let seen = metric.seen(debts);
-        let mut most = Largest::new();
-        let stacks = self.products.as_chunks_mut::<LANES>().0.iter_mut().zip(&metric.coordinates);
-        let stacks = stacks.zip(debts.as_chunks::<LANES>().0).zip(metric.squares.as_chunks::<LANES>().0);
-        for ((((product, lines), debts), squares), want) in stacks.zip(want.as_chunks::<LANES>().0) {
-            let mut gains = [0.0; LANES];
-            for l in 0..LANES {
-                product[l] = metric.own * debts[l];
-                for c in 0..4 {
-                    product[l] += seen[c] * lines[c][l];
-                }
-                gains[l] = product[l] - 0.5 * area * squares[l];
-            }
-            most.see(&gains, want);
+        let Chooser { metric, small, products, gains } = self;
+        metric.products(debts, metric.seen(debts), products);
+        let stacks = products.iter().zip(&metric.squares).zip(want);
+        for (gain, ((product, square), &want)) in gains.iter_mut().zip(stacks) {
+            let gained = product - 0.5 * area * square;
+            *gain = if want > 0.0 { gained } else { f32::NEG_INFINITY };
         }
-        let (whole, gained) = most.found();
+        let (whole, gained) = largest(gains);
         let small = match side {
-            Some(side) if self.cuts(side) => &self.small[side],
+            Some(side) if !small[side].is_empty() => &small[side],
             _ => return Cell::whole(whole),
         };
-        let mut most = Largest::new();
-        let halves = self.products.as_chunks_mut::<LANES>().0.iter_mut().zip(small.as_chunks::<LANES>().0);
-        let halves = halves.zip(metric.squares.as_chunks::<LANES>().0).zip(want.as_chunks::<LANES>().0);
-        for (((product, bar), squares), want) in halves {
-            for l in 0..LANES {
-                product[l] = product[l] - 0.25 * area * squares[l] + bar[l];
-            }
-            most.see(product, want);
+        let stacks = products.iter_mut().zip(&metric.squares).zip(small).zip(want);
+        for (gain, (((product, square), bar), &want)) in gains.iter_mut().zip(stacks) {
+            let gained = *product - 0.25 * area * square + bar;
+            *product = gained;
+            *gain = if want > 0.0 { gained } else { f32::NEG_INFINITY };
         }
-        let (first, one) = most.found();
-        let mut most = Largest::new();
-        let halves =
-            self.products.as_chunks::<LANES>().0.iter().zip(metric.row(first).as_chunks::<LANES>().0);
-        for ((product, with), want) in halves.zip(want.as_chunks::<LANES>().0) {
-            let mut gains = [0.0; LANES];
-            for l in 0..LANES {
-                gains[l] = product[l] - 0.5 * area * with[l];
-            }
-            most.see(&gains, want);
+        let (first, one) = largest(gains);
+        let stacks = products.iter().zip(metric.row(first)).zip(want);
+        for (gain, ((product, with), &want)) in gains.iter_mut().zip(stacks) {
+            let gained = product - 0.5 * area * with;
+            *gain = if want > 0.0 { gained } else { f32::NEG_INFINITY };
         }
-        let (second, other) = most.found();
+        let (second, other) = largest(gains);
         if 0.5 * (one + other) <= gained {
             return Cell::whole(whole);
         }
@@ -202,42 +209,22 @@ impl<'a> Chooser<'a> {
     }
 }
 
-/// The stack with the largest gain among those that a cell asks for, the lowest among equals.
-struct Largest {
-    gain: [f32; LANES],
-    /// The first of [`LANES`] stacks among which each gain was.
-    first: [u32; LANES],
-    next: u32,
+/// The stack with the largest gain, the lowest among equals, and that gain.
+#[inline(always)]
+fn largest(gains: &[f32]) -> (u8, f32) {
+    let mut most = [f32::NEG_INFINITY; LANES];
+    for gains in gains.as_chunks::<LANES>().0 {
+        for l in 0..LANES {
+            most[l] = if gains[l] > most[l] { gains[l] } else { most[l] };
+        }
+    }
+    let most = most.into_iter().fold(f32::NEG_INFINITY, f32::max);
+    (gains.iter().position(|&gain| gain == most).unwrap_or_default() as u8, most)
 }
 
-impl Largest {
-    #[inline(always)]
-    fn new() -> Largest {
-        Largest { gain: [f32::NEG_INFINITY; LANES], first: [0; LANES], next: 0 }
-    }
-
-    /// The gains of the next stacks, and what the cell wants of them.
-    #[inline(always)]
-    fn see(&mut self, gains: &[f32; LANES], want: &[f32; LANES]) {
-        for l in 0..LANES {
-            let better = want[l] > 0.0 && gains[l] > self.gain[l];
-            self.gain[l] = if better { gains[l] } else { self.gain[l] };
-            self.first[l] = if better { self.next } else { self.first[l] };
-        }
-        self.next += LANES as u32;
-    }
-
-    #[inline(always)]
-    fn found(&self) -> (u8, f32) {
-        let (mut stack, mut most) = (0, f32::NEG_INFINITY);
-        for l in 0..LANES {
-            let at = self.first[l] + l as u32;
-            if self.gain[l] > most || self.gain[l] == most && at < stack {
-                (stack, most) = (at, self.gain[l]);
-            }
-        }
-        (stack as u8, most)
-    }
+/// Whether a document varies by itself where a weight differs by so much over a block.
+pub(super) fn textured(varies: u16) -> bool {
+    f32::from(varies) >= TEXTURED
 }
 
 /// By how much to disturb the decision of a cell that asks for `want`, in cells: [`DISTURBED`]. Where it may be `cut` and the

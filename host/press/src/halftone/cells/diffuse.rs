@@ -8,9 +8,10 @@
 //! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away.
 //! Cost: about two dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
+use super::arrange::Errors;
 use super::border::{begin, usual};
 use super::cell::Cell;
-use super::choose::{Chooser, Metric, NOISE, disturbing};
+use super::choose::{Chooser, Metric, NOISE, disturbing, textured};
 use super::field::{Field, LANES, Row};
 use super::plan::{BLOCK, Plan};
 
@@ -45,6 +46,10 @@ pub(super) struct Strip<'a> {
     fresh: bool,
     /// By how much decisions are disturbed here, in cells. In the midst of a tone it is found once for a row of a block.
     disturbance: f32,
+    metric: &'a Metric,
+    /// By which halves are arranged in a block that varies: whether it does.
+    errors: Errors,
+    textured: bool,
 }
 
 /// A place for dots: rows of the page from `top`, or nowhere.
@@ -78,6 +83,9 @@ impl<'a> Strip<'a> {
             back: false,
             fresh: true,
             disturbance: 0.0,
+            metric,
+            errors: Errors::new(plan.across * BLOCK),
+            textured: false,
         }
     }
 
@@ -102,6 +110,7 @@ impl<'a> Strip<'a> {
                 if !before {
                     self.carry.fill(0.0);
                     self.late.fill(0.0);
+                    self.errors.interrupt();
                 } else if !here {
                     self.leave(if self.back { column * BLOCK + BLOCK - 1 } else { column * BLOCK });
                 }
@@ -123,6 +132,7 @@ impl<'a> Strip<'a> {
         let count = BLOCK / size;
         let y = row * BLOCK + y;
         self.field.row(size, y / size, &mut self.rows[size]);
+        self.textured = self.chooser.cuts(size) && textured(block.varies);
         for step in 0..count {
             let cell = if self.back { count - 1 - step } else { step };
             let x = column * BLOCK + cell * size;
@@ -278,6 +288,13 @@ impl<'a> Strip<'a> {
         if !whole {
             cell = Cell::whole(self.holding(cell.halves[0].into(), area) as u8);
         }
+        let place = slot / lanes;
+        if self.textured && side.is_some() {
+            let own = (&self.want[..], area as f32);
+            cell = self.errors.arrange(self.metric, (place, self.back), own, cell);
+        } else {
+            self.errors.forget(place);
+        }
         for half in cell.halves {
             self.debt[usize::from(half)] -= 0.5 * area as f32;
         }
@@ -317,6 +334,9 @@ impl<'a> Strip<'a> {
             return;
         }
         self.format[column] = size;
+        for slot in column * BLOCK..(column + 1) * BLOCK {
+            self.errors.forget(slot);
+        }
         let slots = &mut self.slots[column * BLOCK * lanes..][..BLOCK * lanes];
         let before = slots.to_vec();
         slots.fill(0.0);

@@ -112,13 +112,19 @@ impl Part<'_> {
             self.exchange_halves(own, &there, &mut best);
         }
         for shift in best.shifts.into_iter().flatten() {
-            self.around(place, NEAR, [shift.from.at, shift.to.at], |seen, from, to| {
-                for (seen, (from, to)) in seen.iter_mut().zip(from.iter().zip(to)) {
-                    for c in 0..4 {
-                        seen[c] += (to[c] - from[c]) * shift.error[c];
+            self.around(
+                place,
+                NEAR,
+                [shift.from.at, shift.to.at],
+                #[inline(always)]
+                |seen, from, to| {
+                    for (seen, (from, to)) in seen.iter_mut().zip(from.iter().zip(to)) {
+                        for c in 0..4 {
+                            seen[c] += (to[c] - from[c]) * shift.error[c];
+                        }
                     }
-                }
-            });
+                },
+            );
         }
         for (place, cell) in best.cells.into_iter().flatten() {
             self.cells[place.number()] = cell;
