@@ -148,3 +148,53 @@ fn the_table_of_the_document_is_that_of_the_plug() {
         assert!(text.contains(&row), "docs/wiring.md does not have: {row}");
     }
 }
+
+/// A constant of the firmware's module of pins.
+fn firmware(name: &str) -> u8 {
+    let source = include_str!("../../../../../bridge/firmware/src/pins.rs");
+    let (_, rest) = source.split_once(&format!("const {name}: u8 = ")).unwrap_or_else(|| panic!("no {name}"));
+    rest.split(';').next().unwrap().parse().unwrap()
+}
+
+/// The pin of a Pico's edge. Two are ground behind every eight, one on either side.
+fn edge(gpio: u8) -> u8 {
+    gpio + 1 + (gpio + 2) / 4
+}
+
+/// Pins of a chip's input and of the output opposite to it, counted from the first.
+fn through(chip: u8, channel: u8) -> String {
+    let (first, last) = if chip == 3 { (2, 18) } else { (3, 21) };
+    format!("U{chip} {}, {}", first + channel, last - channel)
+}
+
+#[test]
+fn the_table_of_pins_is_that_of_the_firmware_the_program_and_the_chips() {
+    let text = include_str!("../../../../../docs/wiring.md");
+    let table = text.split_once("## Pins").unwrap().1.split_once("| supply |").unwrap().0;
+    let rows: Vec<Vec<&str>> =
+        table.lines().map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect();
+    let mut gpios = BTreeSet::new();
+    let mut check = |name: &str, gpio: u8, chip: String, plug: String, db25: String| {
+        let row = rows.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no row for {name}"));
+        let found = [row[1], row[2], row[4], row[5]];
+        assert_eq!(found, [&format!("GP{gpio} ({})", edge(gpio)), &chip, &plug, &db25], "{name}");
+        assert!(gpios.insert(gpio), "GP{gpio} twice");
+    };
+    let controls = ["STROBE", "AUTO_FEED", "INIT", "SELECT_IN"].map(firmware);
+    for (line, output) in OUTPUTS.iter().zip(0..) {
+        let (gpio, chip) = match output {
+            0..8 => (firmware("DATA") + output, through(1, output)),
+            _ => (controls[usize::from(output) - 8], through(2, output - 8)),
+        };
+        assert_eq!(line.gpio, gpio, "{}", line.name);
+        check(line.name, gpio, chip, line.centronics.to_string(), line.db25.to_string());
+    }
+    for (line, input) in INPUTS.iter().zip(0..) {
+        assert_eq!(line.gpio, firmware("ACK") + input, "{}", line.name);
+        check(line.name, line.gpio, through(3, input), line.centronics.to_string(), line.db25.to_string());
+    }
+    check("+5 V", firmware("POWER"), through(3, 5), "18".into(), "-".into());
+    check("nOE", firmware("ENABLE"), "U1 22 and U2 22".into(), "-".into(), "-".into());
+    assert!(text.contains(&format!("GP{} stays unconnected", firmware("UNUSED"))));
+    assert!(text.contains(&format!("The lamp is the Pico's own (GP{})", firmware("LAMP"))));
+}
