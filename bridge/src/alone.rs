@@ -19,8 +19,6 @@ use protocol::link::message::{ALONE, JobState, Refusal, StoredJob};
 pub struct Alone<F> {
     store: Store<F>,
     run: Option<Run>,
-    /// An answer that waits for the one before it to be sent.
-    answer: Option<(u16, Option<u8>)>,
 }
 
 /// A stored job that is being printed.
@@ -35,7 +33,7 @@ impl<F: Flash> Alone<F> {
     /// from a checkpoint, which then knows better. To be called before anything is sent.
     pub fn open(flash: F, engine: &mut Engine<'_>, remembers: bool) -> Self {
         let store = Store::open(flash);
-        let mut alone = Alone { store, run: None, answer: None };
+        let mut alone = Alone { store, run: None };
         let note = alone.store.note();
         engine.set_stored(alone.store.jobs().len());
         for stored in alone.store.jobs() {
@@ -64,9 +62,7 @@ impl<F: Flash> Alone<F> {
     /// Does what is due, one thing at most; returns whether there may be more at once.
     pub fn poll(&mut self, engine: &mut Engine<'_>) -> bool {
         self.note(engine);
-        if let Some(answer) = self.answer {
-            self.tell(answer, engine);
-        } else if let Some(request) = engine.request() {
+        if let Some(request) = engine.request() {
             self.serve(request, engine);
             return true;
         }
@@ -95,7 +91,7 @@ impl<F: Flash> Alone<F> {
                     engine.refuse_stored(Refusal::Empty, job);
                 }
             }
-            Request::List { request, index } => self.tell((request, Some(index)), engine),
+            Request::List { request, index } => self.tell(request, Some(index), engine),
             Request::Print { job, stored } => match self.find(|found| found.job == stored) {
                 Some(found) => self.print(job, found, engine),
                 None => engine.refuse_stored(Refusal::NoSuchJob, stored),
@@ -111,7 +107,7 @@ impl<F: Flash> Alone<F> {
             Request::Delete { request, stored } => {
                 if self.store.delete(stored) {
                     engine.set_stored(self.store.jobs().len());
-                    self.tell((request, None), engine);
+                    self.tell(request, None, engine);
                 } else {
                     engine.refuse_stored(Refusal::NoSuchJob, stored);
                 }
@@ -140,14 +136,12 @@ impl<F: Flash> Alone<F> {
         self.store.jobs().iter().copied().find(which)
     }
 
-    /// Answers a question, or does so later.
-    fn tell(&mut self, answer: (u16, Option<u8>), engine: &mut Engine<'_>) {
-        let (request, index) = answer;
+    /// Answers a question.
+    fn tell(&self, request: u16, index: Option<u8>, engine: &mut Engine<'_>) {
         let stored = index.and_then(|index| self.store.jobs().get(usize::from(index)));
         let name = stored.map(|stored| self.store.name(stored)).unwrap_or_default();
         let job = stored.map(|&Stored { job, kind, length, .. }| StoredJob { job, kind, length, name: &name });
-        let told = engine.tell_stored(request, self.store.room(), self.store.total(), job);
-        self.answer = (!told).then_some(answer);
+        engine.tell_stored(request, self.store.room(), self.store.total(), job);
     }
 
     /// Gives the engine the next page of the job that is printed.

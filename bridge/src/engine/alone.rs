@@ -247,14 +247,13 @@ impl Engine<'_> {
         self.stored
     }
 
-    /// What the store says of itself and of one of its jobs, for the host that asked. False while another answer waits.
-    pub fn tell_stored(&mut self, request: u16, room: u32, total: u32, job: Option<StoredJob<'_>>) -> bool {
-        let free = self.frame.is_empty();
-        if free {
+    /// What the store says of itself and of one of its jobs, for the host that asked. While another answer waits to be sent this one
+    /// is dropped, and the host repeats its question.
+    pub fn tell_stored(&mut self, request: u16, room: u32, total: u32, job: Option<StoredJob<'_>>) {
+        if self.frame.is_empty() {
             let count = u8::try_from(self.stored).unwrap_or(u8::MAX);
             self.prepare(&ToHost::Stored { request, count, room, total, job });
         }
-        free
     }
 
     /// Notes how a job of the link has ended.
