@@ -139,7 +139,7 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
             if random.random_bool(0.5) {
                 flash.cut_after(random.random_range(0..40));
             }
-            let mut moments = random.random_range(1..2500);
+            let mut moments = random.random_range(1..300);
             let mut deed;
             'deeds: loop {
                 number += 1;
@@ -284,7 +284,7 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
         }
     }
     println!("{printed} printed, {sheets_lost} lost, {cancelled} cancelled, {warm} restarts, {cut_while:?}");
-    assert!(printed > 500 && sheets_lost > 100 && cancelled > 50 && warm > 100);
+    assert!(printed > 300 && sheets_lost > 100 && cancelled > 50 && warm > 100);
     assert!(cut_while.iter().take(4).all(|&count| count > 50), "{cut_while:?}");
 }
 
