@@ -207,7 +207,7 @@ fn finish(
             observer.note(&text);
             Ok(())
         }
-        Outcome::Cancelled | Outcome::Broken | Outcome::Lost | Outcome::Forgotten => bail!("{text}"),
+        Outcome::Cancelled | Outcome::Broken | Outcome::Lost | Outcome::Stored | Outcome::Forgotten => bail!("{text}"),
     }
 }
 
