@@ -101,7 +101,9 @@ impl<F: Flash> Alone<F> {
                     self.print(ALONE, last, engine);
                 }
             }
-            Request::Delete { stored, .. } if self.run.as_ref().is_some_and(|run| run.stored.job == stored) => {
+            Request::Delete { stored, .. }
+                if self.run.as_ref().is_some_and(|run| run.stored.job == stored) =>
+            {
                 engine.refuse_stored(Refusal::JobOpen, stored);
             }
             Request::Delete { request, stored } => {
@@ -140,7 +142,8 @@ impl<F: Flash> Alone<F> {
     fn tell(&self, request: u16, index: Option<u8>, engine: &mut Engine<'_>) {
         let stored = index.and_then(|index| self.store.jobs().get(usize::from(index)));
         let name = stored.map(|stored| self.store.name(stored)).unwrap_or_default();
-        let job = stored.map(|&Stored { job, kind, length, .. }| StoredJob { job, kind, length, name: &name });
+        let job =
+            stored.map(|&Stored { job, kind, length, .. }| StoredJob { job, kind, length, name: &name });
         engine.tell_stored(request, self.store.room(), self.store.total(), job);
     }
 

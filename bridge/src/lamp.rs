@@ -52,7 +52,8 @@ impl Lamp {
         let progress = engine.progress();
         self.still = if progress.printed == self.printed { self.still.saturating_add(1) } else { 0 };
         self.printed = progress.printed;
-        let sign = sign(progress.state, engine.waits_for_printer() && self.still >= PATIENCE, engine.stored_jobs());
+        let sign =
+            sign(progress.state, engine.waits_for_printer() && self.still >= PATIENCE, engine.stored_jobs());
         self.step = (self.step + 1) % STEPS;
         is_lit(sign, self.step)
     }
@@ -67,7 +68,9 @@ fn sign(state: JobState, stuck: bool, stored: usize) -> Sign {
         JobState::Printing | JobState::Cancelling => Sign::Printing,
         JobState::Storing => Sign::Storing,
         JobState::Broken(_) | JobState::Lost => Sign::Lost,
-        JobState::None | JobState::Done | JobState::Cancelled | JobState::Stored if stored > 0 => Sign::Waiting,
+        JobState::None | JobState::Done | JobState::Cancelled | JobState::Stored if stored > 0 => {
+            Sign::Waiting
+        }
         JobState::None | JobState::Done | JobState::Cancelled | JobState::Stored => Sign::Idle,
     }
 }

@@ -9,8 +9,8 @@ use model::flash::ModelFlash;
 use model::{Board, IDENTITY, Job, framed, is_a_whole_job, seeded};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    ALONE, DATA_MAX, DefectKind, Fault, JobKind, JobState, Lines, PastJob, Progress, Refusal, StoredJob, ToBridge,
-    ToHost,
+    ALONE, DATA_MAX, DefectKind, Fault, JobKind, JobState, Lines, PastJob, Progress, Refusal, StoredJob,
+    ToBridge, ToHost,
 };
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -133,7 +133,9 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
         for _ in 0..25 {
             let mut bridge = Bridge::start(&mut board, &flash);
             let found = bridge.stored();
-            let same = |kept: &[Job]| found.iter().map(|(id, data)| (*id, data)).eq(kept.iter().map(|job| (job.id, &job.data)));
+            let same = |kept: &[Job]| {
+                found.iter().map(|(id, data)| (*id, data)).eq(kept.iter().map(|job| (job.id, &job.data)))
+            };
             assert!(same(&kept), "what is stored outlives the supply");
             // In the middle of an operation of the flash, or between two.
             if random.random_bool(0.5) {
@@ -200,7 +202,10 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
                     for _ in 0..random.random_range(0..40) {
                         bridge.engine.work();
                     }
-                    if cancel_at.is_some_and(|at| printer.since.len() >= at) && !is_cancelled && bridge.progress().job == id {
+                    if cancel_at.is_some_and(|at| printer.since.len() >= at)
+                        && !is_cancelled
+                        && bridge.progress().job == id
+                    {
                         is_cancelled = true;
                         bridge.engine.press(Press::Long);
                     } else if random.random_ratio(1, 200) && bridge.engine.open_job() == Some(id) {
@@ -232,7 +237,9 @@ fn a_thousand_cuts_cost_nothing_but_the_sheet_in_the_rollers() {
                             printed += 1;
                         }
                         (_, JobState::Cancelled) => {
-                            assert!(is_cancelled && (printer.since.is_empty() || is_a_whole_job(&printer.since)));
+                            assert!(
+                                is_cancelled && (printer.since.is_empty() || is_a_whole_job(&printer.since))
+                            );
                             cancelled += 1;
                         }
                         (deed, state) => panic!("{deed:?} has ended as {state:?}"),
@@ -339,7 +346,10 @@ fn the_host_stores_lists_prints_and_deletes() {
     fn told(count: u8, room: u32, total: u32, job: Option<StoredJob<'_>>) -> String {
         format!("{:?}", ToHost::Stored { request: 9, count, room, total, job })
     }
-    assert_eq!(ask(&mut bridge, ToBridge::ListStored { request: 9, index: 0 }), [told(0, total, total, None)]);
+    assert_eq!(
+        ask(&mut bridge, ToBridge::ListStored { request: 9, index: 0 }),
+        [told(0, total, total, None)]
+    );
     store(&mut bridge, &mut printer, &first);
     store(&mut bridge, &mut printer, &second);
     let room = bridge.alone.store().room();
@@ -502,7 +512,10 @@ fn a_page_that_flash_has_forgotten_ends_the_sheet_properly() {
     };
     store(&mut bridge, &mut printer, &job);
     // In its second sector.
-    let place = flash.bytes().windows(64).position(|bytes| job.data.windows(64).nth(17 * PAGE_DATA + 10).unwrap() == bytes);
+    let place = flash
+        .bytes()
+        .windows(64)
+        .position(|bytes| job.data.windows(64).nth(17 * PAGE_DATA + 10).unwrap() == bytes);
     flash.flip(place.expect("the job's data are in the flash as they are"), 3);
     bridge.engine.press(Press::Short);
     settle(&mut bridge, &mut printer);

@@ -11,7 +11,13 @@ use rand_chacha::ChaCha8Rng;
 type Kept = Vec<(u32, JobKind, String, Vec<u8>)>;
 
 /// Stores a job as far as the supply lasts; whether it counts then.
-fn put(store: &mut Store<ModelFlash>, job: u32, kind: JobKind, name: &str, data: &[u8]) -> Result<bool, Worn> {
+fn put(
+    store: &mut Store<ModelFlash>,
+    job: u32,
+    kind: JobKind,
+    name: &str,
+    data: &[u8],
+) -> Result<bool, Worn> {
     if !store.begin(job, kind, data.len() as u32, name) {
         return Ok(false);
     }
@@ -78,7 +84,8 @@ fn a_thousand_cuts_of_the_supply_leave_the_old_or_the_new_state() {
                     if flash.is_off() {
                         flash.power_up();
                         let found = all(&Store::open(flash.clone()));
-                        (gone, left) = (gone + usize::from(found == expected), left + usize::from(found == before));
+                        (gone, left) =
+                            (gone + usize::from(found == expected), left + usize::from(found == before));
                         assert!(found == expected || found == before, "the job is there, or it is not");
                         (expected, cuts) = (found, cuts + 1);
                         break;
@@ -94,8 +101,12 @@ fn a_thousand_cuts_of_the_supply_leave_the_old_or_the_new_state() {
                     if flash.is_off() {
                         flash.power_up();
                         let found = all(&Store::open(flash.clone()));
-                        (whole, half) = (whole + usize::from(found == expected), half + usize::from(found == before));
-                        assert!(found == expected || found == before, "the job is there as a whole, or not at all");
+                        (whole, half) =
+                            (whole + usize::from(found == expected), half + usize::from(found == before));
+                        assert!(
+                            found == expected || found == before,
+                            "the job is there as a whole, or not at all"
+                        );
                         (expected, cuts) = (found, cuts + 1);
                         break;
                     }
@@ -122,7 +133,8 @@ fn the_notes_on_the_printer_survive_cuts_too() {
             assert_eq!(store.note(), last);
             flash.cut_after(random.random_range(0..300));
             while !flash.is_off() {
-                let standing = [Standing::Clear, Standing::ResetOwed, Standing::Printing][random.random_range(0..3)];
+                let standing =
+                    [Standing::Clear, Standing::ResetOwed, Standing::Printing][random.random_range(0..3)];
                 let note = Note { standing, job: random.random_range(1..9), stored: random.random() };
                 store.write_note(note);
                 if flash.is_off() {
@@ -158,7 +170,8 @@ fn every_sector_is_erased_as_often_as_the_others() {
         assert!(store.delete(job));
     }
     assert_eq!(all(&store), [fixed]);
-    let erased: Vec<u32> = flash.erased().iter().zip(before).map(|(now, before)| now - before).skip(2).collect();
+    let erased: Vec<u32> =
+        flash.erased().iter().zip(before).map(|(now, before)| now - before).skip(2).collect();
     let used: Vec<u32> = erased.iter().copied().filter(|&count| count > 0).collect();
     let (least, most) = (used.iter().min().unwrap(), used.iter().max().unwrap());
     assert!(*least > 50 && most - least <= 2, "{erased:?}");

@@ -149,7 +149,12 @@ async fn main(spawner: Spawner) {
     let area = Area::new(flash);
     let alone = ALONE.init_with(|| shared.engine(|engine| Alone::open(area, engine, checkpoint.is_some())));
     let store = alone.store();
-    defmt::info!("{=usize} jobs stored, room for {=u32} of {=u32} bytes", store.jobs().len(), store.room(), store.total());
+    defmt::info!(
+        "{=usize} jobs stored, room for {=u32} of {=u32} bytes",
+        store.jobs().len(),
+        store.room(),
+        store.total()
+    );
 
     let Pio { mut common, sm0, .. } = Pio::new(peripherals.PIO0, Interrupts);
     let data = [

@@ -1,7 +1,7 @@
 //! From accepted data to printer bytes, and how a job ends.
 
-use super::job::{Cancel, Phase, Way, positions};
 use super::Engine;
+use super::job::{Cancel, Phase, Way, positions};
 use crate::streams::WRITE_ROOM;
 use protocol::link::message::{Defect, DefectKind, JobKind, JobState, PastJob, Progress};
 

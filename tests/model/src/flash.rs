@@ -36,7 +36,15 @@ impl ModelFlash {
             bytes.fill_with(|| random.random());
         }
         let erased = vec![0; sectors];
-        ModelFlash(Rc::new(RefCell::new(Chip { bytes, erased, left: None, off: false, operations: 0, worn: None, random })))
+        ModelFlash(Rc::new(RefCell::new(Chip {
+            bytes,
+            erased,
+            left: None,
+            off: false,
+            operations: 0,
+            worn: None,
+            random,
+        })))
     }
 
     /// The supply goes in the middle of the operation after so many others.
@@ -123,7 +131,11 @@ impl Flash for ModelFlash {
     }
 
     fn program(&mut self, at: u32, bytes: &[u8]) {
-        assert!(at / PAGE == (at + bytes.len() as u32 - 1) / PAGE, "bytes {at} and {} on lie in two pages", bytes.len());
+        assert!(
+            at / PAGE == (at + bytes.len() as u32 - 1) / PAGE,
+            "bytes {at} and {} on lie in two pages",
+            bytes.len()
+        );
         let mut chip = self.0.borrow_mut();
         let Some(part) = chip.operate() else { return };
         for (i, &byte) in bytes.iter().enumerate() {

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, Fault, JobKind, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, StoredJob, ToBridge, ToHost,
-    Usage, VERSION,
+    Answer, Ask, Fault, JobKind, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, StoredJob,
+    ToBridge, ToHost, Usage, VERSION,
 };
 
 use super::session::{Bridge, other_version, printable, stranger};
@@ -223,7 +223,12 @@ impl<'t> Query<'t> {
     /// Has the job `stored` printed from the bridge's flash, as job `job`, a number that was never used; says where it stands.
     ///
     /// Errors: [`QueryError::NotStored`], and [`QueryError::JobOpen`] while another job is open, beside those of every question.
-    pub fn print_stored(&mut self, job: u32, stored: u32, patience: Duration) -> Result<Progress, QueryError> {
+    pub fn print_stored(
+        &mut self,
+        job: u32,
+        stored: u32,
+        patience: Duration,
+    ) -> Result<Progress, QueryError> {
         let messages = [ToBridge::PrintStored { job, stored }];
         let mut open = self.progress.job;
         exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
@@ -235,7 +240,9 @@ impl<'t> Query<'t> {
             Heard::Refused(Refusal::NoSuchJob, refused) if refused == stored => {
                 Some(Err(QueryError::NotStored(stored)))
             }
-            Heard::Refused(Refusal::JobOpen, refused) if refused == job => Some(Err(QueryError::JobOpen(open))),
+            Heard::Refused(Refusal::JobOpen, refused) if refused == job => {
+                Some(Err(QueryError::JobOpen(open)))
+            }
             _ => None,
         })?
     }
@@ -251,7 +258,9 @@ impl<'t> Query<'t> {
             Heard::Refused(Refusal::NoSuchJob, refused) if refused == stored => {
                 Some(Err(QueryError::NotStored(stored)))
             }
-            Heard::Refused(Refusal::JobOpen, refused) if refused == stored => Some(Err(QueryError::JobOpen(open))),
+            Heard::Refused(Refusal::JobOpen, refused) if refused == stored => {
+                Some(Err(QueryError::JobOpen(open)))
+            }
             _ => None,
         })?
     }

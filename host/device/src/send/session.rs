@@ -16,11 +16,11 @@
 use std::time::Duration;
 
 use protocol::link::frame::{self, MAX, Read, Reader};
+#[cfg(doc)]
+use protocol::link::message::NAME_MAX;
 use protocol::link::message::{
     DATA_MAX, Fault, JobState, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION, hello_version,
 };
-#[cfg(doc)]
-use protocol::link::message::NAME_MAX;
 use serde::Serialize;
 
 use super::query::is_open;
@@ -86,7 +86,9 @@ pub enum SessionError {
     #[error("the bridge has had another job with the number {0:08x}; send this one again")]
     NumberTaken(u32),
     /// The bridge's flash has no room for the job.
-    #[error("the bridge has no room for the job; `foilpress bridge jobs` lists what is stored there, and deletes it")]
+    #[error(
+        "the bridge has no room for the job; `foilpress bridge jobs` lists what is stored there, and deletes it"
+    )]
     NoRoom,
     /// The bridge takes no job at all.
     #[error("the bridge has no memory for a job; flash the firmware that came with this program")]

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use anyhow::{Result, anyhow};
-use protocol::link::message::{Fault, JobState, Lines, PastJob, Progress, Usage};
 use indicatif::HumanBytes;
+use protocol::link::message::{Fault, JobState, Lines, PastJob, Progress, Usage};
 use serde_json::json;
 
 use device::deliver::ask::{self, Negotiate};
