@@ -82,7 +82,7 @@ impl Port {
             forget: false.into(),
             restart: false.into(),
             press: false.into(),
-            flash: Mutex::new(vec![0xff; 100 * SECTOR as usize]),
+            flash: Mutex::new(vec![0xff; 480 * SECTOR as usize]),
             cartridges: cartridges.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
             stop: false.into(),

@@ -28,7 +28,7 @@ fn store(bench: &Bench) -> String {
 fn a_job_is_stored_listed_printed_by_button_and_by_command_and_deleted() {
     let bench = Bench::new(8, 2000);
     let (_, said) = bench.answered("bridge jobs --to BRIDGE", "");
-    assert!(said.starts_with("no jobs, room for 360"), "{said}");
+    assert!(said.starts_with("no jobs, room for 1.72 MiB of 1.72 MiB"), "{said}");
     let number = store(&bench);
     assert!(bench.printed().is_empty());
     let (_, said) = bench.answered("bridge jobs --to BRIDGE", "");
