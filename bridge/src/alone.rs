@@ -61,6 +61,9 @@ impl<F: Flash> Alone<F> {
 
     /// Does what is due, one thing at most; returns whether there may be more at once.
     pub fn poll(&mut self, engine: &mut Engine<'_>) -> bool {
+        if self.run.as_ref().is_some_and(|run| !engine.prints_from_store(run.job)) {
+            self.run = None;
+        }
         self.note(engine);
         if let Some(request) = engine.request() {
             self.serve(request, engine);
@@ -150,11 +153,6 @@ impl<F: Flash> Alone<F> {
     /// Gives the engine the next page of the job that is printed.
     fn feed(&mut self, engine: &mut Engine<'_>) -> bool {
         let Some(run) = &mut self.run else { return false };
-        if !engine.prints_from_store(run.job) {
-            self.run = None;
-            self.note(engine);
-            return true;
-        }
         if engine.room_from_store() == 0 {
             return false;
         }

@@ -33,59 +33,46 @@ test('a stored job is printed with no cable to a host, by the button, again and 
   legal(bench.printer);
   // Nobody knew where the printer stood.
   assert.equal(bench.printer.resets, resets + 1);
-  bench.printer.taken = [];
-
-  // Held in the middle, and cancelled there.
-  await bench.pass(20);
-  bench.printer.taken = [];
-  const slow = bench.restarted(false);
-  await slow.pass(50);
-  await slow.board.press(100);
-  await taken(slow, expected.length, 2000);
-  same(slow.printer.taken, expected);
 
   // With a host again: the first one by its number, then it goes.
-  await slow.connect('bulk');
-  slow.printer.taken = [];
-  await slow.say(printStored(77, 5));
-  await slow.hear((heard) => heard.kind === 'progress' && heard.job === 77 && heard.state === 'done');
-  same(slow.printer.taken, expected);
-  await slow.say(deleteStored(900, 5));
-  await slow.hear((heard) => heard.kind === 'stored' && heard.request === 900);
-  assert.deepEqual((await slow.stored()).jobs.map(({ job }) => job), [6]);
+  await bench.connect('bulk');
+  bench.printer.taken = [];
+  await bench.say(printStored(77, 5));
+  await bench.hear((heard) => heard.kind === 'progress' && heard.job === 77 && heard.state === 'done');
+  same(bench.printer.taken, expected);
+  await bench.say(deleteStored(900, 5));
+  await bench.hear((heard) => heard.kind === 'stored' && heard.request === 900);
+  assert.deepEqual((await bench.stored()).jobs.map(({ job }) => job), [6]);
 });
 
-test('the button holds a job, lets it go on, and cancels it', { skip }, async () => {
+test('the button holds a job and cancels it', { skip }, async () => {
   const expected = job('page.rgl');
   // A slow printer: there is time to press.
-  const bench = new Bench({ work: 60_000 });
+  const bench = new Bench({ work: 10_000 });
   await bench.connect('bulk');
   assert.equal((await bench.store(5, STREAMS, job('page.streams'), 'page')).state, 'stored');
-  await bench.board.press(100);
-  await taken(bench, 3000, 2000);
-  await bench.board.press(100);
-  await bench.pass(250);
+  await bench.board.press(60);
+  assert.ok(await taken(bench, 1000, 2000));
+  await bench.board.press(60);
   const held = bench.printer.taken.length;
-  await bench.pass(200);
+  await bench.pass(100);
   assert.equal(bench.printer.taken.length, held);
-  assert.ok(held < expected.length);
-  await bench.board.press(100);
-  assert.ok(await taken(bench, held + 2000, 2000));
-  await bench.board.press(3300);
-  await bench.hear((heard) => heard.kind === 'progress' && heard.state === 'cancelled', 20_000);
+  assert.ok(held < expected.length / 2);
+  await bench.board.press(3100);
+  await bench.hear((heard) => heard.kind === 'progress' && heard.state === 'cancelled', 3000);
   assert.ok(bench.printer.taken.length < expected.length);
 });
 
-test('twenty cuts of the supply while the image stores and prints cost nothing but the sheet in the rollers', { skip }, async () => {
+test('ten cuts of the supply while the image stores and prints cost nothing but the sheet in the rollers', { skip }, async () => {
   const next = random(5);
   const expected = job('small.rgl'), streams = job('small.streams');
   let bench = new Bench();
   await bench.connect('bulk');
   assert.equal((await bench.store(1, STREAMS, streams, 'first')).state, 'stored');
   let [stored, lost] = [[1], 0];
-  for (let cut = 0; cut < 20; cut++) {
+  for (let cut = 0; cut < 10; cut++) {
     if (cut % 2 === 0) {
-      bench.board.cutAfter = next(12);
+      bench.board.cutAfter = next(24);
       await bench.store(10 + cut, STREAMS, streams, 'more').catch(() => {});
       assert.ok(bench.board.off || bench.progress.state === 'stored');
     } else {
@@ -113,5 +100,5 @@ test('twenty cuts of the supply while the image stores and prints cost nothing b
     assert.equal(bench.printer.resets, resets + 1);
     bench.printer.taken = [];
   }
-  assert.ok(lost === 10 && stored.length > 1 && stored.length < 11, `${lost} ${stored}`);
+  assert.ok(lost === 5 && stored.length > 1 && stored.length < 6, `${lost} ${stored}`);
 });
