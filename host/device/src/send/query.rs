@@ -348,7 +348,7 @@ impl<'t> Query<'t> {
             &mut |heard| match heard {
                 Heard::Progress(progress) if progress.job == job => match progress.state {
                     // From before it was told.
-                    JobState::Printing | JobState::Stopped(_) => None,
+                    JobState::Printing | JobState::Stopped(_) | JobState::Storing => None,
                     _ => Some(Ok(progress)),
                 },
                 Heard::Refused(Refusal::NoSuchJob, refused) if refused == job => {
