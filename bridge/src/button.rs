@@ -35,7 +35,7 @@ impl Button {
         Button { contact: false, since_ms: 0, down: None }
     }
 
-    /// Looks at the contact, by a clock in ms that may wrap. To be called every 50 ms or more often.
+    /// Looks at the contact, by a clock in ms that may wrap. To be called every 10 ms or so.
     pub fn look(&mut self, closed: bool, now_ms: u32) -> Option<Press> {
         if closed != self.contact {
             (self.contact, self.since_ms) = (closed, now_ms);

@@ -14,7 +14,7 @@
 //! | `work` | data, room | lets the engine make printer bytes, a turn at a time |
 //! | `port::serve` | 1 ms, a sent buffer | polls the port's driver |
 //! | `alone::serve` | 10 ms, packets, the button | writes to and reads from the store |
-//! | `watch::run` | 50 ms | sets the lamp, looks at the button, feeds the watchdog |
+//! | `watch::run` | 10 ms | sets the lamp, looks at the button, feeds the watchdog |
 //!
 //! Memory: 64 KiB of stack, lowest, most of it for the start; 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the
 //! printer has work while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.

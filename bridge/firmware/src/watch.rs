@@ -28,6 +28,9 @@ pub enum Life {
 /// They have, since the watchdog was last fed.
 static ALIVE: [AtomicBool; 2] = [const { AtomicBool::new(false) }; 2];
 
+/// Between two looks at the button: a tap takes some 60 ms.
+const LOOK_MS: u32 = 10;
+
 const PATIENCE: Duration = Duration::from_secs(8);
 
 /// A task has gone round its loop.
@@ -48,16 +51,18 @@ pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
     let (mut lamp, mut button) = (Lamp::new(), Button::new());
     loop {
         pins::lamp(shared.engine(|engine| lamp.next(engine)));
-        // The clock of the button may wrap.
-        if let Some(press) = button.look(pins::button(), Instant::now().as_millis() as u32) {
-            shared.engine(|engine| engine.press(press));
-            shared.wake(Side::Store);
-            shared.wake(Side::Port);
-        }
         if ALIVE.iter().all(|alive| alive.load(Ordering::Relaxed)) {
             ALIVE.iter().for_each(|alive| alive.store(false, Ordering::Relaxed));
             watchdog.feed(PATIENCE);
         }
-        Timer::after(Duration::from_millis(lamp::STEP_MS.into())).await;
+        for _ in 0..lamp::STEP_MS / LOOK_MS {
+            // The clock of the button may wrap.
+            if let Some(press) = button.look(pins::button(), Instant::now().as_millis() as u32) {
+                shared.engine(|engine| engine.press(press));
+                shared.wake(Side::Store);
+                shared.wake(Side::Port);
+            }
+            Timer::after(Duration::from_millis(LOOK_MS.into())).await;
+        }
     }
 }
