@@ -15,7 +15,7 @@ use observe::Observer;
 #[command(after_help = "Examples:\n  \
     foilpress send job.rgl --to usb:                     (the only bridge on USB)\n  \
     foilpress send job.rgl --to serial:/dev/ttyACM0      (a bridge; `foilpress bridge list` finds it)\n  \
-    foilpress send job.rgl --to usb: --store             (into the bridge, to be printed without this computer)\n  \
+    foilpress send job.rgl --to usb: --store             (into the bridge, for its button)\n  \
     foilpress send job.rgl --to raw:/dev/usb/lp0         (a printer on a USB-to-parallel cable)\n\n\
     A job sent to a bridge is kept on disk until it is printed. After a pulled cable it continues by itself; after any \
     other interruption `foilpress resume` continues it. A raw device cannot report what it has printed, so a job sent to \
@@ -33,10 +33,7 @@ pub struct Args {
     /// Number of sheets to print; the program waits for Enter between them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
     copies: u16,
-    /// Store the job in the bridge instead of printing it
-    ///
-    /// The bridge prints it without a computer when its button is pressed. `foilpress bridge jobs` lists stored jobs, prints and
-    /// deletes them.
+    /// Store the job in the bridge, whose button prints it without a computer
     #[arg(long, conflicts_with_all = ["copies", "force"])]
     store: bool,
 }
