@@ -2,8 +2,6 @@
 //! undisturbed run.
 
 #[cfg(unix)]
-mod alone;
-#[cfg(unix)]
 mod faults;
 mod paper;
 #[cfg(unix)]

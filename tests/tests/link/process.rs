@@ -64,15 +64,15 @@ pub fn random_job(seed: u64) -> Vec<u8> {
 }
 
 /// A bridge, and a folder with a journal.
-pub struct Bench {
+struct Bench {
     folder: tempfile::TempDir,
-    pub bridge: Bridge,
-    pub job: Vec<u8>,
+    bridge: Bridge,
+    job: Vec<u8>,
 }
 
 impl Bench {
     /// A random job, and a printer that takes so many bytes a millisecond.
-    pub fn new(seed: u64, rate: usize) -> Bench {
+    fn new(seed: u64, rate: usize) -> Bench {
         Bench::with(random_job(seed), Port::new(&[Ink::White], rate))
     }
 
@@ -104,15 +104,15 @@ impl Bench {
         self.folder.path().join("jobs")
     }
 
-    pub fn address(&self) -> Address {
+    fn address(&self) -> Address {
         Address::Unix(self.folder.path().join("bridge"))
     }
 
-    pub fn printed(&self) -> Vec<u8> {
+    fn printed(&self) -> Vec<u8> {
         self.bridge.printed()
     }
 
-    pub fn until_it_prints(&self) {
+    fn until_it_prints(&self) {
         while self.printed().is_empty() {
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -127,7 +127,7 @@ impl Bench {
         child.wait().unwrap();
     }
 
-    pub fn keep_busy(&self, busy: bool) {
+    fn keep_busy(&self, busy: bool) {
         self.bridge.port.busy.store(busy, Ordering::Relaxed);
     }
 
@@ -148,7 +148,7 @@ impl Bench {
     }
 
     /// Runs with this typed; exit code and everything that was said.
-    pub fn answered(&self, args: &str, typed: &str) -> (Option<i32>, String) {
+    fn answered(&self, args: &str, typed: &str) -> (Option<i32>, String) {
         let mut command = self.program(args);
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         child.stdin.take().unwrap().write_all(typed.as_bytes()).unwrap();
@@ -158,13 +158,13 @@ impl Bench {
     }
 
     /// How many whole sheets the printer has taken; nothing else may have come.
-    pub fn sheets(&self) -> usize {
+    fn sheets(&self) -> usize {
         let printed = self.printed();
         assert!(printed.chunks(self.job.len()).all(|sheet| sheet == self.job), "other bytes at the port");
         printed.len() / self.job.len()
     }
 
-    pub fn says(&self, code: i32, args: &str) -> String {
+    fn says(&self, code: i32, args: &str) -> String {
         let output = self.program(args).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(code), "{args}: {said}");
