@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Board } from './board.mjs';
-import { Frames, ask, begin, data, hello, parse } from './frames.mjs';
+import { Frames, ask, begin, data, hello, listStored, parse, store } from './frames.mjs';
 import { Printer, waveform } from './printer.mjs';
 import { Host } from './usb.mjs';
 
@@ -72,6 +72,7 @@ export class Bench {
     const next = new this.constructor(this.settings);
     if (memory) next.board.chip.sram.set(this.board.chip.sram);
     next.printer.taken = this.printer.taken;
+    next.board.chip.flash.set(this.board.chip.flash);
     return next;
   }
 
@@ -170,6 +171,37 @@ export class Bench {
       throw new Error(`the job does not end: sent ${next} of ${bytes.length}, ${JSON.stringify(this.progress)}, taken ${this.printer.taken.length}`);
     }
     return this.progress;
+  }
+
+  /// Stores a job in the board's flash, and waits for its end.
+  async store(number, kind, bytes, name, limitMs = 60_000) {
+    await this.say(store(number, kind, bytes.length, name));
+    await this.hear((heard) => heard.kind === 'progress' && heard.job === number);
+    let [next, sending] = [0, false];
+    const step = () => {
+      if (['stored', 'cancelled', 'broken'].includes(this.progress.state) && this.progress.job === number) return true;
+      if (!sending && next < Math.min(this.progress.limit, bytes.length)) {
+        const end = Math.min(next + 900, this.progress.limit, bytes.length);
+        sending = true;
+        this.host.write(this.end.out, data(number, next, bytes.subarray(next, end))).then(() => { sending = false; });
+        next = end;
+      }
+      return this.board.off;
+    };
+    if (!(await this.board.run(step, limitMs * MS))) throw new Error(`the job is not stored: ${JSON.stringify(this.progress)}`);
+    return this.progress;
+  }
+
+  /// What is stored, one after the other.
+  async stored() {
+    const jobs = [];
+    for (let index = 0; ; index++) {
+      const request = ++this.requests;
+      await this.say(listStored(request, index));
+      const { job, room, total } = await this.hear((heard) => heard.kind === 'stored' && heard.request === request);
+      if (!job) return { jobs, room, total };
+      jobs.push(job);
+    }
   }
 
   /// Asks, and gives the answer.

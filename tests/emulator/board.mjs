@@ -15,8 +15,25 @@ const HARD_FAULT = 3;
 // While the processor sleeps, time goes on in steps of at most this, so that what the test does is not late.
 const MOST_NS = 20_000;
 
-/// A boot ROM of a few instructions: the two functions the image calls, and a table look-up that finds them. The
-/// real one cannot be kept here, and nothing else of it is needed.
+// The pin of the button, which a resistor in the pad holds high.
+const BUTTON = 22;
+
+// Where the boot ROM's functions are that write the flash, and what they take: some 45 ms for a sector and 0.7 for a page, as the data
+// sheets of such chips have it. The processor stands still meanwhile, and everything else goes on.
+const ERASE = 0x60;
+const PROGRAM = 0x64;
+// The others.
+const LOOK_UP = 0x30;
+const NOTHING = 0x48;
+const MEMCPY44 = 0x50;
+const NAMES = { C4: MEMCPY44, RE: ERASE, RP: PROGRAM };
+const SECTOR = 4096;
+const SECTOR_NS = 45_000_000;
+const PAGE = 256;
+const PAGE_NS = 700_000;
+
+/// A boot ROM of a few instructions: the functions the image calls, and a table look-up that finds them. The
+/// real one cannot be kept here, and nothing else of it is needed. Those that write the flash are done by [`Board.step`].
 function bootRom(rom) {
   const half = (address, ...values) => {
     for (const [i, value] of values.entries()) {
@@ -26,14 +43,13 @@ function bootRom(rom) {
     }
   };
   half(0x14, 0x0001); // the table: never looked into
-  half(0x18, 0x0031); // the look-up
-  // r1 is the function's name. "C4" (memcpy44) is at 0x50, everything else does nothing, at 0x48.
-  half(0x30, 0x4a03, 0x4291, 0xd001); //     ldr r2, [pc, #12]; cmp r1, r2; beq 0x3a
-  half(0x36, 0x2049, 0x4770); //             movs r0, #0x49; bx lr
-  half(0x3a, 0x2051, 0x4770); //             movs r0, #0x51; bx lr
-  half(0x40, 0x3443, 0x0000); //             "C4"
-  half(0x48, 0x4770); //                     bx lr
-  half(0x50, 0x3a04, 0x588b, 0x5083, 0xd1fb, 0x4770); // subs r2, #4; ldr r3, [r1, r2]; str r3, [r0, r2]; bne; bx lr
+  half(0x18, LOOK_UP | 1); // the look-up
+  // r1 is the function's name; `Board.step` puts the function of this name into r0.
+  half(LOOK_UP, 0x4770); //                  bx lr
+  half(NOTHING, 0x4770); //                  bx lr
+  half(ERASE, 0x4770); //                    bx lr
+  half(PROGRAM, 0x4770); //                  bx lr
+  half(MEMCPY44, 0x3a04, 0x588b, 0x5083, 0xd1fb, 0x4770); // subs r2, #4; ldr r3, [r1, r2]; str r3, [r0, r2]; bne; bx lr
 }
 
 /// A peripheral whose registers are all zero.
@@ -76,6 +92,8 @@ export class Board {
     // While awake.
     this.instructions = 0;
     this.cycles = 0;
+    this.erased = 0;
+    this.pin(BUTTON).setInputValue(true);
     // A pin that was never told reads low; the lines of a printer are told by the printer.
     this.machines = [];
     for (const pio of this.chip.pio) {
@@ -142,6 +160,7 @@ export class Board {
     } else {
       this.instructions += 1;
       const before = chip.core.PC;
+      if (before < 0x80) this.rom(before);
       const cycles = chip.core.executeInstruction();
       if (this.busError) {
         this.busError = false;
@@ -152,6 +171,53 @@ export class Board {
       this.cycles += cycles;
       this.pass(cycles * NS_PER_CYCLE);
     }
+  }
+
+  /// What the boot ROM's functions do beside returning.
+  rom(at) {
+    const { registers } = this.chip.core;
+    const offset = registers[0];
+    if (at === LOOK_UP) {
+      const name = String.fromCharCode(registers[1] & 255, (registers[1] >> 8) & 255);
+      registers[0] = (NAMES[name] ?? NOTHING) | 1;
+    } else if (at === ERASE) {
+      for (let sector = offset; sector < offset + registers[1]; sector += SECTOR) {
+        this.flashOperation(SECTOR_NS, (part) => this.chip.flash.fill(0xff, sector, sector + SECTOR * part));
+        this.erased += 1;
+      }
+    } else if (at === PROGRAM) {
+      const [from, count] = [registers[1], registers[2]];
+      for (let page = 0; page < count; page += PAGE) {
+        this.flashOperation(PAGE_NS, (part) => {
+          for (let i = page; i < page + PAGE * part; i++) this.chip.flash[offset + i] &= this.chip.readUint8(from + i);
+        });
+      }
+    }
+  }
+
+  /// How many operations of the flash are left before the supply goes, in the middle of the next one.
+  cutAfter = Infinity;
+  off = false;
+
+  flashOperation(ns, act) {
+    if (this.off) return;
+    if (this.cutAfter-- <= 0) {
+      this.off = true;
+      act(0.5);
+      // Nothing of the board goes on.
+      this.step = () => this.pass(MOST_NS);
+      return;
+    }
+    act(1);
+    this.pass(ns);
+  }
+
+  /// Presses the button for so long, and lets go.
+  async press(ms) {
+    this.pin(BUTTON).setInputValue(false);
+    await this.run(() => false, ms * 1_000_000);
+    this.pin(BUTTON).setInputValue(true);
+    await this.run(() => false, 150_000_000);
   }
 
   /// The processor takes the exception of a fault, as after an instruction that does not exist. One in its own handler locks it up.

@@ -85,8 +85,14 @@ export const probe = (request, level, lines) => frame([9, ...varint(request), le
 export const abandon = (job) => frame([11, ...varint(job)]);
 export const readLog = (request, from) => frame([10, ...varint(request), ...varint(from)]);
 
-const STATES = ['none', 'printing', 'stopped', 'cancelling', 'done', 'cancelled', 'broken', 'lost'];
-const FAULTS = ['paper out', 'off line', 'error', 'power off', 'busy too long', 'no ack'];
+export const store = (job, kind, length, name) =>
+  frame([12, ...varint(job), kind, ...varint(length), name.length, ...new TextEncoder().encode(name)]);
+export const listStored = (request, index) => frame([13, ...varint(request), index]);
+export const printStored = (job, stored) => frame([14, ...varint(job), ...varint(stored)]);
+export const deleteStored = (request, stored) => frame([15, ...varint(request), ...varint(stored)]);
+
+const STATES = ['none', 'printing', 'stopped', 'cancelling', 'done', 'cancelled', 'broken', 'lost', 'storing', 'stored'];
+const FAULTS = ['paper out', 'off line', 'error', 'power off', 'busy too long', 'no ack', 'held'];
 
 /// A message of the bridge.
 export function parse(message) {
@@ -134,6 +140,13 @@ export function parse(message) {
     }
     case 8:
       return { kind: 'board', request: number(), fixed: number(), stack: number(), used: number(), longest: number() };
+    case 9: {
+      const [request, count, room, total] = [number(), byte(), number(), number()];
+      const job = byte()
+        ? { job: number(), kind: byte(), length: number(), name: new TextDecoder().decode(bytes()) }
+        : null;
+      return { kind: 'stored', request, count, room, total, job };
+    }
     default:
       return { kind: 'other' };
   }

@@ -1,4 +1,4 @@
-//! A bridge on a socket: the engine that runs on the board, and a printer whose pace and troubles a test decides.
+//! A bridge on a socket: the engine and the store that run on the board, and a printer whose pace and troubles a test decides.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -8,7 +8,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use bridge::alone::Alone;
+use bridge::button::Press;
 use bridge::engine::{Checkpoint, Engine, Identity, Memory, Outcome, Task};
+use bridge::store::{Flash, SECTOR};
 use device::send::transport::{Socket, Transport};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, STATUS_LENGTH, Trouble};
 use protocol::ink::Ink;
@@ -48,6 +51,10 @@ pub struct Port {
     pub forget: AtomicBool,
     /// The bridge restarts, and keeps its memory.
     pub restart: AtomicBool,
+    /// The bridge's button was pressed for a moment.
+    pub press: AtomicBool,
+    /// The bridge's flash, which outlives everything.
+    flash: Mutex<Vec<u8>>,
     /// The cartridges that are in.
     cartridges: Vec<Cartridge>,
     /// Bytes of memory for bands.
@@ -74,6 +81,8 @@ impl Port {
             garbage: false.into(),
             forget: false.into(),
             restart: false.into(),
+            press: false.into(),
+            flash: Mutex::new(vec![0xff; 480 * SECTOR as usize]),
             cartridges: cartridges.iter().copied().map(Cartridge::from).collect(),
             band: 40_000,
             stop: false.into(),
@@ -92,6 +101,33 @@ impl Port {
             printer.strike(Trouble::CoverOpen);
         }
         printer.status()
+    }
+}
+
+/// The area of the flash, in memory.
+struct Area<'p>(&'p Mutex<Vec<u8>>);
+
+impl Area<'_> {
+    fn bytes<R>(&self, from: u32, count: usize, act: impl FnOnce(&mut [u8]) -> R) -> R {
+        act(&mut self.0.lock().expect("no test panicked with it")[from as usize..][..count])
+    }
+}
+
+impl Flash for Area<'_> {
+    fn size(&self) -> u32 {
+        self.0.lock().expect("no test panicked with it").len() as u32
+    }
+
+    fn read(&self, at: u32, out: &mut [u8]) {
+        self.bytes(at, out.len(), |bytes| out.copy_from_slice(bytes));
+    }
+
+    fn program(&mut self, at: u32, bytes: &[u8]) {
+        self.bytes(at, bytes.len(), |old| old.iter_mut().zip(bytes).for_each(|(old, new)| *old &= new));
+    }
+
+    fn erase(&mut self, sector: u32) {
+        self.bytes(sector * SECTOR, SECTOR as usize, |bytes| bytes.fill(0xff));
     }
 }
 
@@ -144,11 +180,12 @@ impl Bridge {
                         decoder: &mut decoder,
                     };
                     let identity = Identity { boot, serial: 7, firmware: "test" };
+                    let remembers = kept.is_some();
                     let engine = match kept {
                         Some(checkpoint) => Engine::resume(memory, identity, checkpoint),
                         None => Engine::new(memory, identity),
                     };
-                    kept = serve(engine, &mut accept, &port);
+                    kept = serve(engine, remembers, &mut accept, &port);
                     if is(&port.stop) {
                         break;
                     }
@@ -179,11 +216,13 @@ fn is(flag: &AtomicBool) -> bool {
 /// One life of the bridge; what it leaves to the next one.
 fn serve(
     mut engine: Engine<'_>,
+    remembers: bool,
     accept: &mut dyn FnMut() -> Option<Box<dyn Transport>>,
     port: &Port,
 ) -> Option<Checkpoint> {
     let (mut reader, mut buffer) = (Reader::new(), [0; 4096]);
     let mut link: Option<Box<dyn Transport>> = None;
+    let mut alone = Alone::open(Area(&port.flash), &mut engine, remembers);
     while !is(&port.stop) && !port.forget.swap(false, Ordering::Relaxed) {
         if port.restart.swap(false, Ordering::Relaxed) {
             return Some(engine.checkpoint());
@@ -230,7 +269,11 @@ fn serve(
                 _ => Outcome::Done,
             });
         }
+        if port.press.swap(false, Ordering::Relaxed) {
+            engine.press(Press::Short);
+        }
         for _ in 0..50 {
+            alone.poll(&mut engine);
             engine.work();
         }
         let (lines, fault) = match (is(&port.off), is(&port.paper)) {

@@ -15,7 +15,7 @@ use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
 /// Commands that are not run here, by their first words, and why.
-const ELSEWHERE: [(&str, &str); 17] = [
+const ELSEWHERE: [(&str, &str); 19] = [
     ("foilpress bridge flash", "needs a board in its boot loader: tests/emulator/flash.rs"),
     ("foilpress queue", "changes the computer's print system: tests/queue/system.rs"),
     ("lp ", "needs a print server: tests/queue/main.rs"),
@@ -28,6 +28,8 @@ const ELSEWHERE: [(&str, &str); 17] = [
     ("foilpress resume", "needs an interrupted job: tests/link/process.rs, tests/emulator/main.rs"),
     ("foilpress cancel", "needs an interrupted job: tests/link/process.rs, tests/emulator/main.rs"),
     ("foilpress bridge status --watch", "runs until Ctrl-C: tests/emulator/care.rs"),
+    ("foilpress bridge jobs --print", "needs a stored job: bridge/tests/alone.rs"),
+    ("foilpress bridge jobs --delete", "needs a stored job: bridge/tests/alone.rs"),
     ("foilpress bridge log", "needs the firmware's debug data: tests/emulator/care.rs"),
     ("foilpress bridge test", "needs a loop-back plug, or no printer: tests/emulator/care.rs"),
     ("foilpress measure", "needs photographs: host/tests/measure.rs"),
@@ -142,7 +144,7 @@ impl Desk {
         fs::write(&device, "").unwrap();
         command = command.replace("/dev/usb/lp0", &device.display().to_string());
         // Without an address the program looks for the only bridge on USB.
-        let is_of_a_bridge = ["foilpress bridge reset", "foilpress bridge status"]
+        let is_of_a_bridge = ["foilpress bridge reset", "foilpress bridge status", "foilpress bridge jobs"]
             .iter()
             .any(|words| command.starts_with(words));
         if is_of_a_bridge && !command.contains("--to") && !command.contains("--by-hand") {

@@ -3,7 +3,7 @@
 //! Every decision is in the library `bridge`, where it is tested without a board. Here is what the board adds: pins, a
 //! strobe engine of PIO and DMA, a USB device, flash, memory that survives a reset, a watchdog, and the calls between
 //! these and the library. What only this board can show (the PIO program, DMA, descriptors) is tested with the image
-//! on an emulated one. Eight tasks on one core:
+//! on an emulated one. Nine tasks on one core:
 //!
 //! | task | waits for | does |
 //! |---|---|---|
@@ -13,15 +13,18 @@
 //! | `usb::printer::run` | packets | gives them to the intake of the printer class |
 //! | `work` | data, room | lets the engine make printer bytes, a turn at a time |
 //! | `port::serve` | 1 ms, a sent buffer | polls the port's driver |
-//! | `watch::run` | 50 ms | sets the lamp, feeds the watchdog |
+//! | `alone::serve` | 10 ms, packets, the button | writes to and reads from the store |
+//! | `watch::run` | 10 ms | sets the lamp, looks at the button, feeds the watchdog |
 //!
 //! Memory: 64 KiB of stack, lowest, most of it for the start; 79,040 bytes for a band of the widest page at 1200 dpi, 36 KiB of printer bytes so that the
 //! printer has work while a band is decoded, 12 KiB of window for the link, 8 KiB that outlive a reset.
 #![no_std]
 #![no_main]
 
+mod alone;
 mod board;
 mod fault;
+mod flash;
 mod keep;
 mod log;
 mod pins;
@@ -33,6 +36,7 @@ mod trace;
 mod usb;
 mod watch;
 
+use bridge::alone::Alone;
 use bridge::engine::{Engine, Identity, Memory};
 use bridge::turn::{self, Turn};
 use core::ffi::CStr;
@@ -46,6 +50,7 @@ use embassy_rp::peripherals::{PIO0, USB};
 use embassy_rp::pio::Pio;
 use embassy_rp::{bind_interrupts, pio, usb as usb_driver};
 use embassy_time::Instant;
+use flash::Area;
 use protocol::runs::Decoder;
 use shared::{Shared, Side};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -93,7 +98,8 @@ async fn main(spawner: Spawner) {
     // Times are counted in cycles of this clock.
     assert!(clocks::clk_sys_freq() == board::CLOCK_HZ);
 
-    let number = board::serial_number(peripherals.FLASH);
+    let mut flash = flash::take(peripherals.FLASH);
+    let number = board::serial_number(&mut flash);
     let identity = Identity {
         boot: RoscRng.next_u32(),
         serial: u64::from_be_bytes(number),
@@ -138,6 +144,17 @@ async fn main(spawner: Spawner) {
             None => Engine::new(memory, identity),
         })
     });
+    // Before a byte goes anywhere: the flash may say that the printer has to be reset first.
+    static ALONE: StaticCell<Alone<Area>> = StaticCell::new();
+    let area = Area::new(flash);
+    let alone = ALONE.init_with(|| shared.engine(|engine| Alone::open(area, engine, checkpoint.is_some())));
+    let store = alone.store();
+    defmt::info!(
+        "{=usize} jobs stored, room for {=u32} of {=u32} bytes",
+        store.jobs().len(),
+        store.room(),
+        store.total()
+    );
 
     let Pio { mut common, sm0, .. } = Pio::new(peripherals.PIO0, Interrupts);
     let data = [
@@ -180,6 +197,7 @@ async fn main(spawner: Spawner) {
     let (from_host, to_host) = usb.printer;
     spawner.spawn(printer::run(shared, from_host, to_host).unwrap());
     spawner.spawn(port::serve(shared, driver).unwrap());
+    spawner.spawn(alone::serve(shared, alone).unwrap());
     spawner.spawn(watch::run(shared, watchdog).unwrap());
     trace::restart();
     work(shared).await

@@ -33,6 +33,8 @@ const UNUSED: u8 = 19;
 pub const ENABLE: u8 = 20;
 /// The printer's +5 V, through a divider.
 pub const POWER: u8 = 21;
+/// The button, to ground.
+pub const BUTTON: u8 = 22;
 /// The board's lamp.
 pub const LAMP: u8 = 25;
 
@@ -100,6 +102,7 @@ pub fn bring_up() {
         (BUSY + 2, Rest::Down),
         (BUSY + 3, Rest::Up),
         (POWER, Rest::Down),
+        (BUTTON, Rest::Up),
     ] {
         input(pin, rest);
     }
@@ -114,6 +117,11 @@ pub fn enable(on: bool) {
 /// Switches the board's lamp.
 pub fn lamp(on: bool) {
     if on { out_set() } else { out_clear() }.write_value(1 << LAMP);
+}
+
+/// Whether the button is pressed.
+pub fn button() -> bool {
+    levels() >> BUTTON & 1 == 0
 }
 
 /// Gives nStrobe and the data lines to the PIO block, whose own level for nStrobe has to be high by now.

@@ -19,6 +19,8 @@ pub enum Side {
     Port,
     /// The one that answers the host.
     Link,
+    /// The one at the store.
+    Store,
 }
 
 /// What is shared.
@@ -26,7 +28,7 @@ pub struct Shared {
     engine: RefCell<Engine<'static>>,
     links: RefCell<Links>,
     device_id: RefCell<DeviceId>,
-    bells: [Signal<NoopRawMutex, ()>; 3],
+    bells: [Signal<NoopRawMutex, ()>; 4],
     /// Another way to the host is to be answered, or none any more.
     pub speaker_changed: Signal<NoopRawMutex, ()>,
     /// No more of a job comes through the printer interface.
@@ -40,7 +42,7 @@ impl Shared {
             engine: RefCell::new(engine),
             links: RefCell::new(Links::new()),
             device_id: RefCell::new(DeviceId::new()),
-            bells: [const { Signal::new() }; 3],
+            bells: [const { Signal::new() }; 4],
             speaker_changed: Signal::new(),
             printer_end: Signal::new(),
         }
@@ -73,6 +75,7 @@ impl Shared {
         self.wake(Side::Work);
         self.wake(Side::Port);
         self.wake(Side::Link);
+        self.wake(Side::Store);
     }
 
     /// Wakes a side that waits, or keeps it from waiting the next time.

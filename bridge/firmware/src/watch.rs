@@ -1,17 +1,19 @@
-//! The lamp and the watchdog.
+//! The lamp, the button and the watchdog.
 //!
 //! The watchdog runs from before USB starts, and only here it is fed: when both tasks that print have gone round their loops since
 //! the last time, the one that makes printer bytes and the one at the port, which wakes the other every millisecond. If
 //! either hangs, or another one keeps the processor, the board restarts after eight seconds. During the reset a resistor
-//! holds nOE high, so the printer sees nothing of it. The library decides what the lamp shows ([`bridge::lamp`]).
+//! holds nOE high, so the printer sees nothing of it. The library decides what the lamp shows
+//! ([`bridge::lamp`]) and what a press of the button means ([`bridge::button`]).
 
 use crate::pins;
-use crate::shared::Shared;
-use bridge::lamp;
+use crate::shared::{Shared, Side};
+use bridge::button::Button;
+use bridge::lamp::{self, Lamp};
 use embassy_rp::Peri;
 use embassy_rp::peripherals::WATCHDOG;
 use embassy_rp::watchdog::Watchdog;
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, Instant, Timer};
 use portable_atomic::{AtomicBool, Ordering};
 
 /// Who has to show life.
@@ -25,6 +27,9 @@ pub enum Life {
 
 /// They have, since the watchdog was last fed.
 static ALIVE: [AtomicBool; 2] = [const { AtomicBool::new(false) }; 2];
+
+/// Between two looks at the button: a tap takes some 60 ms.
+const LOOK_MS: u32 = 10;
 
 const PATIENCE: Duration = Duration::from_secs(8);
 
@@ -40,17 +45,24 @@ pub fn start(watchdog: Peri<'static, WATCHDOG>) -> Watchdog {
     watchdog
 }
 
-/// Runs both.
+/// Runs all three.
 #[embassy_executor::task]
 pub async fn run(shared: &'static Shared, mut watchdog: Watchdog) -> ! {
+    let (mut lamp, mut button) = (Lamp::new(), Button::new());
     loop {
-        for step in 0..lamp::STEPS {
-            pins::lamp(lamp::is_lit(shared.engine(|engine| engine.progress().state), step));
-            if ALIVE.iter().all(|alive| alive.load(Ordering::Relaxed)) {
-                ALIVE.iter().for_each(|alive| alive.store(false, Ordering::Relaxed));
-                watchdog.feed(PATIENCE);
+        pins::lamp(shared.engine(|engine| lamp.next(engine)));
+        if ALIVE.iter().all(|alive| alive.load(Ordering::Relaxed)) {
+            ALIVE.iter().for_each(|alive| alive.store(false, Ordering::Relaxed));
+            watchdog.feed(PATIENCE);
+        }
+        for _ in 0..lamp::STEP_MS / LOOK_MS {
+            // The clock of the button may wrap.
+            if let Some(press) = button.look(pins::button(), Instant::now().as_millis() as u32) {
+                shared.engine(|engine| engine.press(press));
+                shared.wake(Side::Store);
+                shared.wake(Side::Port);
             }
-            Timer::after(Duration::from_millis(lamp::STEP_MS.into())).await;
+            Timer::after(Duration::from_millis(LOOK_MS.into())).await;
         }
     }
 }

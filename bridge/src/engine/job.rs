@@ -19,6 +19,17 @@ pub(super) enum Phase {
     },
 }
 
+/// Where a job's data come from and go to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// From a host to the port.
+    ToPort,
+    /// From a host to the board's flash.
+    ToStore,
+    /// From the board's flash to the port.
+    FromStore,
+}
+
 /// Whether the host has cancelled the job, and where it ends then.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Cancel {
@@ -33,6 +44,7 @@ pub(super) enum Cancel {
 pub(super) struct Job {
     pub(super) id: u32,
     pub(super) kind: JobKind,
+    pub(super) way: Way,
     pub(super) length: u32,
     pub(super) accepted: u32,
     /// Data taken out of the queue again.
@@ -53,10 +65,11 @@ pub(super) struct Job {
 
 impl Job {
     /// A job of which nothing has come yet.
-    pub(super) fn new(id: u32, kind: JobKind, length: u32) -> Self {
+    pub(super) fn new(id: u32, kind: JobKind, length: u32, way: Way) -> Self {
         Job {
             id,
             kind,
+            way,
             length,
             accepted: 0,
             used: 0,

@@ -1,7 +1,7 @@
 //! The conversation with the host, and with a plain printer interface.
 
-use super::job::{Cancel, Job, Marks, Phase, positions};
-use super::{Due, Engine, Identity, LEAST_MEMORY, LOCAL, Task};
+use super::job::{Cancel, Job, Marks, Phase, Way, positions};
+use super::{ALONE, Due, Engine, Identity, LEAST_MEMORY, LOCAL, Request, Task};
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
     Answer, Ask, DATA_MAX, JobKind, JobState, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage, VERSION,
@@ -45,7 +45,11 @@ impl Engine<'_> {
     fn follow(&mut self, message: ToBridge<'_>) {
         match message {
             ToBridge::Hello { .. } => self.greet(),
-            ToBridge::Begin { job, kind, length } => self.begin(job, kind, length),
+            ToBridge::Begin { job, kind, length } => {
+                if self.may_begin(job, kind, length) && !self.open(job, kind, length, Way::ToPort) {
+                    self.refuse(Refusal::Empty, job);
+                }
+            }
             ToBridge::Data { job, offset, bytes } => self.take(job, offset, bytes),
             ToBridge::Cancel { job } => self.cancel(job),
             ToBridge::Ask { request, what: Ask::Lines } => self.due.lines = Some(request),
@@ -76,6 +80,18 @@ impl Engine<'_> {
             ToBridge::Probe { request, data, control } => self.ask(request, Task::Probe { data, control }),
             ToBridge::ReadLog { request, from } => self.due.log = Some((request, from)),
             ToBridge::Abandon { job } => self.abandon(job),
+            ToBridge::Store { job, kind, length, name } => {
+                if self.may_begin(job, kind, length) {
+                    self.have_stored(job, kind, length, name);
+                }
+            }
+            ToBridge::ListStored { request, index } => self.ask_store(Request::List { request, index }),
+            ToBridge::PrintStored { job, stored } => {
+                if self.may_print(job) {
+                    self.ask_store(Request::Print { job, stored });
+                }
+            }
+            ToBridge::DeleteStored { request, stored } => self.ask_store(Request::Delete { request, stored }),
         }
     }
 
@@ -83,9 +99,11 @@ impl Engine<'_> {
         (self.due.hello, self.due.past, self.due.progress) = (true, true, true);
     }
 
-    fn begin(&mut self, id: u32, kind: JobKind, length: u32) {
-        if id == 0 || id == LOCAL || length == 0 {
-            return self.refuse(Refusal::Empty, id);
+    /// Whether a host may open this job now. If not, or if it is open already, the host is told where it stands.
+    fn may_begin(&mut self, id: u32, kind: JobKind, length: u32) -> bool {
+        if id == 0 || id >= ALONE || length == 0 {
+            self.refuse(Refusal::Empty, id);
+            return false;
         }
         self.due.progress = true;
         if let Some(job) = &mut self.job {
@@ -96,29 +114,28 @@ impl Engine<'_> {
             } else if (job.kind, job.length) != (kind, length) {
                 self.refuse(Refusal::OtherJob, id);
             }
-            return;
+            return false;
         }
         if self.last.job == id {
             if self.last_shape.is_some_and(|shape| shape != (kind, length)) {
                 self.refuse(Refusal::OtherJob, id);
             }
-            return;
+            return false;
         }
         if self.remembered(id).is_some() {
             self.due.past = true;
-            return self.refuse(Refusal::OtherJob, id);
+            self.refuse(Refusal::OtherJob, id);
+            return false;
         }
-        if !self.open(id, kind, length) {
-            self.refuse(Refusal::Empty, id);
-        }
+        true
     }
 
     /// Opens a job; false if there is too little memory for any.
-    fn open(&mut self, id: u32, kind: JobKind, length: u32) -> bool {
+    pub(super) fn open(&mut self, id: u32, kind: JobKind, length: u32, way: Way) -> bool {
         if self.data.capacity() < LEAST_MEMORY || self.output.capacity() < LEAST_MEMORY {
             return false;
         }
-        self.job = Some(Job::new(id, kind, length));
+        self.job = Some(Job::new(id, kind, length, way));
         self.clear();
         true
     }
@@ -129,7 +146,7 @@ impl Engine<'_> {
     ///
     /// A job ends with the reset after its rows, or else with [`Engine::local_end`].
     pub fn local(&mut self, bytes: &[u8]) -> usize {
-        if bytes.is_empty() || self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX) {
+        if bytes.is_empty() || self.job.is_none() && !self.open(LOCAL, JobKind::Raw, u32::MAX, Way::ToPort) {
             return 0;
         }
         let Some(job) = &mut self.job else { return 0 };
@@ -199,7 +216,8 @@ impl Engine<'_> {
             return;
         };
         let end = u64::from(offset) + bytes.len() as u64;
-        if job.phase != Phase::Running || offset > job.accepted || end <= u64::from(job.accepted) {
+        let of_host = job.phase == Phase::Running && job.way != Way::FromStore;
+        if !of_host || offset > job.accepted || end <= u64::from(job.accepted) {
             self.due.progress = true;
             return;
         }
@@ -209,23 +227,30 @@ impl Engine<'_> {
             self.due.progress = true;
             return self.refuse(Refusal::BeyondLimit, id);
         }
+        self.due.progress |= end == u64::from(job.length);
+        self.accept(fresh);
+    }
+
+    /// Takes the next bytes of the open job, for which there is room.
+    pub(super) fn accept(&mut self, fresh: &[u8]) {
+        let Some(job) = &mut self.job else { return };
         self.data.push(fresh);
         job.accepted += positions(fresh.len());
         if job.kind == JobKind::Raw
+            && job.way != Way::ToStore
             && let Some(count) = self.ahead.follow(fresh)
         {
             job.settled = job.accepted - positions(fresh.len() - count);
         }
-        if job.accepted == job.length || end > u64::from(job.accepted) {
-            self.due.progress = true;
-        }
     }
 
-    fn cancel(&mut self, id: u32) {
+    pub(super) fn cancel(&mut self, id: u32) {
         self.due.progress = true;
         let remembered = self.remembered(id).is_some();
         match &mut self.job {
             Some(job) if job.id == id => {
+                // The end has to go out.
+                self.held = false;
                 // After a reset the data are needed even for this: only they tell what the printer waits for.
                 if job.cancel == Cancel::None && !matches!(job.phase, Phase::Ending { .. }) {
                     job.cancel = Cancel::Requested;
@@ -242,6 +267,8 @@ impl Engine<'_> {
     fn abandon(&mut self, id: u32) {
         self.due.progress = true;
         match &self.job {
+            // Nothing of it is at the printer.
+            Some(job) if job.id == id && job.way == Way::ToStore => self.cancel(id),
             // The host repeats itself if the board has something else to do.
             Some(job) if job.id == id => {
                 if self.assign(Task::Initialise, None) {

@@ -11,6 +11,7 @@
 //! * [`Engine::task`] for what only the board can do, [`Engine::done`] for its outcome;
 //! * a piece of the log to [`Engine::log`] when [`Engine::log_wanted`], its own use to [`Engine::usage`] when
 //!   [`Engine::usage_wanted`]; [`Engine::transmit`] to the link until it returns nothing;
+//! * what is to be stored, or printed from the store, between this and a store ([`crate::alone`]);
 //! * [`Engine::checkpoint`] to memory that outlives a reset, whenever bytes were consumed.
 //!
 //! **One byte, once.** Data carry their offset, and only the byte that comes next is taken. The bytes made from them
@@ -26,17 +27,20 @@
 //! **Two queues.** Accepted data wait in one, printer bytes in the other, so the port has work while a band is being
 //! decoded, and the link has credit while the printer is busy.
 
+mod alone;
 mod job;
 mod link;
 mod work;
 
-use self::job::{Cancel, Job, Marks, Phase, positions};
+pub use self::alone::Request;
+
+use self::job::{Cancel, Job, Marks, Phase, Way, positions};
 use crate::ring::Ring;
 use crate::streams::{Streams, WRITE_ROOM};
 use heapless::Vec;
 use protocol::link::frame::MAX;
 use protocol::link::message::{
-    Answer, Fault, JobKind, JobState, Lines, PAST, PastJob, PortSettings, Progress, Refusal, ToHost,
+    ALONE, Answer, Fault, JobKind, JobState, Lines, PAST, PastJob, PortSettings, Progress, Refusal, ToHost,
 };
 use protocol::rgl::Track;
 use protocol::runs::Decoder;
@@ -201,6 +205,12 @@ pub struct Engine<'m> {
     at_rest: bool,
     /// The printer has shown that it does not negotiate, and was not switched off or reset since.
     one_way: bool,
+    /// Somebody holds the job with the button: the printer gets nothing.
+    held: bool,
+    /// What the store has to do.
+    request: Option<Request>,
+    /// Jobs in the store.
+    stored: usize,
 }
 
 const NOTHING: Progress =
@@ -234,6 +244,9 @@ impl<'m> Engine<'m> {
             abandoned: None,
             at_rest: false,
             one_way: false,
+            held: false,
+            request: None,
+            stored: 0,
         }
     }
 
@@ -259,6 +272,12 @@ impl<'m> Engine<'m> {
             engine.last = Progress { state, printed, limit: progress.accepted, ..progress };
             return engine;
         }
+        if progress.state == JobState::Storing {
+            // What is stored of it does not count.
+            engine.last = Progress { state: JobState::Cancelled, limit: progress.accepted, ..progress };
+            engine.remember(PastJob { job: progress.job, state: JobState::Cancelled, printed: 0 });
+            return engine;
+        }
         engine.job = Some(Job {
             printed: progress.printed,
             phase: Phase::Unknown,
@@ -266,15 +285,19 @@ impl<'m> Engine<'m> {
             cancel: ends_at.map_or(Cancel::None, Cancel::Decided),
             pass: progress.pass,
             row: progress.row,
-            ..Job::new(progress.job, JobKind::Raw, 0)
+            ..Job::new(progress.job, JobKind::Raw, 0, Way::ToPort)
         });
         engine
     }
 
     /// What must be kept so that [`Engine::resume`] can continue.
     pub fn checkpoint(&self) -> Checkpoint {
+        let mut progress = self.progress();
+        if self.job.as_ref().is_some_and(|job| job.way == Way::ToStore) {
+            progress.state = JobState::Storing;
+        }
         Checkpoint {
-            progress: self.progress(),
+            progress,
             ends_at: self.job.as_ref().and_then(Job::ends_at),
             // What an open job needs behind it turns out again when the job is worked through again.
             needs_reset: self.owes_reset,
@@ -294,6 +317,8 @@ impl<'m> Engine<'m> {
         let Some(job) = &self.job else { return self.last };
         let state = match self.fault {
             _ if job.cancel != Cancel::None => JobState::Cancelling,
+            _ if job.way == Way::ToStore => JobState::Storing,
+            _ if self.held => JobState::Stopped(Fault::Held),
             Some(fault) => JobState::Stopped(fault),
             None => JobState::Printing,
         };
@@ -322,7 +347,7 @@ impl<'m> Engine<'m> {
         // Nothing else uses the port during a task, a printer that must be reset gets nothing before that, and one without its
         // supply nothing at all.
         match self.board {
-            Board::Free if !self.owes_reset && !self.is_off() => self.output.behind(skip),
+            Board::Free if !self.owes_reset && !self.is_off() && !self.held => self.output.behind(skip),
             _ => &[],
         }
     }
@@ -446,7 +471,12 @@ impl<'m> Engine<'m> {
 
 fn is_final(state: JobState) -> bool {
     match state {
-        JobState::None | JobState::Done | JobState::Cancelled | JobState::Broken(_) | JobState::Lost => true,
-        JobState::Printing | JobState::Stopped(_) | JobState::Cancelling => false,
+        JobState::None
+        | JobState::Done
+        | JobState::Cancelled
+        | JobState::Broken(_)
+        | JobState::Lost
+        | JobState::Stored => true,
+        JobState::Printing | JobState::Stopped(_) | JobState::Cancelling | JobState::Storing => false,
     }
 }

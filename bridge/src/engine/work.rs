@@ -1,7 +1,7 @@
 //! From accepted data to printer bytes, and how a job ends.
 
-use super::job::{Cancel, Phase, positions};
-use super::{Engine, LOCAL};
+use super::Engine;
+use super::job::{Cancel, Phase, Way, positions};
 use crate::streams::WRITE_ROOM;
 use protocol::link::message::{Defect, DefectKind, JobKind, JobState, PastJob, Progress};
 
@@ -9,7 +9,7 @@ impl Engine<'_> {
     /// Does a slice of work, if there is any, and returns whether there may be more.
     pub fn work(&mut self) -> bool {
         let Some(job) = &self.job else { return false };
-        if job.phase != Phase::Running || self.output.free() < WRITE_ROOM {
+        if job.phase != Phase::Running || job.way == Way::ToStore || self.output.free() < WRITE_ROOM {
             return false;
         }
         let worked = match job.kind {
@@ -191,12 +191,10 @@ impl Engine<'_> {
         if let Some(job) = self.job.take() {
             self.last = Progress { state, limit: progress.accepted, ..progress };
             self.last_shape = (job.length > 0).then_some((job.kind, job.length));
-            if job.id != LOCAL {
-                self.past.rotate_right(1);
-                self.past[0] = PastJob { job: job.id, state, printed: progress.printed };
-            }
+            self.remember(PastJob { job: job.id, state, printed: progress.printed });
         }
         self.clear();
+        self.held = false;
         self.due.progress = true;
     }
 }

@@ -2,6 +2,7 @@
 
 mod flash;
 mod found;
+mod jobs;
 mod list;
 mod log;
 mod reset;
@@ -9,7 +10,7 @@ mod status;
 mod test;
 mod watch;
 
-pub use found::{Found, PATIENCE, ask, doing, only};
+pub use found::{Found, PATIENCE, ask, doing, only, shelf_text};
 
 use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
@@ -23,6 +24,7 @@ use observe::Observer;
     foilpress bridge status                              (the only bridge)\n  \
     foilpress bridge status --to serial:/dev/ttyACM0 --json\n  \
     foilpress bridge status --watch                      (refreshed until Ctrl-C)\n  \
+    foilpress bridge jobs                                (the jobs stored in it)\n  \
     foilpress bridge test                                (the wiring, with a loop-back plug)\n  \
     foilpress bridge log                                 (the log of the firmware)\n  \
     foilpress bridge flash                               (new firmware, or the first one on a new board)\n  \
@@ -42,6 +44,8 @@ enum Command {
     ///
     /// The printer is asked only while no job is open.
     Status(status::Args),
+    /// List the jobs stored in a bridge, print one, or delete one
+    Jobs(jobs::Args),
     /// Test the wiring with a loop-back plug, or step through the lines for a meter
     Test(test::Args),
     /// Show the log of the firmware, including entries from before its last restart
@@ -56,6 +60,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Command::List(args) => list::run(args),
         Command::Flash(args) => flash::run(args, observer),
         Command::Status(args) => status::run(args),
+        Command::Jobs(args) => jobs::run(args),
         Command::Test(args) => test::run(args),
         Command::Log(args) => log::run(args),
         Command::Reset(args) => reset::run(args),

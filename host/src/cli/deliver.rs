@@ -6,8 +6,9 @@ use std::path::Path;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 
+use super::bridge::shelf_text;
 use super::output::{self, Staged};
-use super::terminal::{Terminal, cartridges_needed, cartridges_text};
+use super::terminal::{Terminal, cartridges_needed, cartridges_text, size_text};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
 use device::printers::Printers;
 use device::send::finish::Sheet;
@@ -109,6 +110,33 @@ pub fn deliver(job: Job<'_>, to: &Destination, order: Order, observer: &dyn Obse
     }
 }
 
+/// Stores a job in a bridge. Nothing is printed.
+pub fn store(job: Job<'_>, to: &Destination, observer: &dyn Observer) -> Result<()> {
+    let Destination::Bridge(address) = to else {
+        bail!("--store needs a bridge as the destination: usb:, serial:PORT or tcp:HOST:PORT");
+    };
+    // Before the job is coded: a mistyped address is told at once.
+    let shelf = device::deliver::store::shelf(address).map_err(|failure| not_stored(job.name, failure))?;
+    let packed = Packed::new(job, observer);
+    let size = size_text(packed.kind(), packed.data().len() as u64, job.bytes.len() as u64);
+    let stored = shelf_text(&shelf).unwrap_or_else(|| "no room for jobs".into());
+    observer.note(&format!("{}: {size}; the bridge has {stored}", job.name));
+    let terminal = Terminal::new(false, true, observer);
+    output::say_on_interrupt("what is stored of the job does not count; store it again");
+    let number = device::deliver::store::store(&packed, address, &terminal)
+        .map_err(|failure| not_stored(job.name, failure))?;
+    observer.note(&cartridges_needed(&job.checked.inks));
+    observer.note(&format!(
+        "{} is stored in the bridge as job {number:08x}. Its button prints it, and so does `foilpress bridge jobs --print {number:08x}`",
+        job.name
+    ));
+    Ok(())
+}
+
+fn not_stored(name: &str, failure: Failure) -> anyhow::Error {
+    anyhow::Error::from(failure).context(format!("{name} is not stored"))
+}
+
 fn to_device(job: Job<'_>, path: &Path, order: Order, observer: &dyn Observer) -> Result<()> {
     let printers = Printers::of_system()?;
     let terminal = Terminal::new(order.force, order.cartridges_shown, observer);
@@ -207,7 +235,9 @@ fn finish(
             observer.note(&text);
             Ok(())
         }
-        Outcome::Cancelled | Outcome::Broken | Outcome::Lost | Outcome::Forgotten => bail!("{text}"),
+        Outcome::Cancelled | Outcome::Broken | Outcome::Lost | Outcome::Stored | Outcome::Forgotten => {
+            bail!("{text}")
+        }
     }
 }
 

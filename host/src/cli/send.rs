@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args as ClapArgs;
 
-use super::deliver::{Order, deliver};
+use super::deliver::{Order, deliver, store};
 use device::deliver::Job;
 use device::send::{self, Destination};
 use observe::Observer;
@@ -15,6 +15,7 @@ use observe::Observer;
 #[command(after_help = "Examples:\n  \
     foilpress send job.rgl --to usb:                     (the only bridge on USB)\n  \
     foilpress send job.rgl --to serial:/dev/ttyACM0      (a bridge; `foilpress bridge list` finds it)\n  \
+    foilpress send job.rgl --to usb: --store             (into the bridge, for its button)\n  \
     foilpress send job.rgl --to raw:/dev/usb/lp0         (a printer on a USB-to-parallel cable)\n\n\
     A job sent to a bridge is kept on disk until it is printed. After a pulled cable it continues by itself; after any \
     other interruption `foilpress resume` continues it. A raw device cannot report what it has printed, so a job sent to \
@@ -32,6 +33,9 @@ pub struct Args {
     /// Number of sheets to print; the program waits for Enter between them
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
     copies: u16,
+    /// Store the job in the bridge, whose button prints it without a computer
+    #[arg(long, conflicts_with_all = ["copies", "force"])]
+    store: bool,
 }
 
 /// Runs `send`.
@@ -40,6 +44,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let name = args.job.file_name().map_or_else(|| "job".into(), |name| name.to_string_lossy().into_owned());
     let checked = send::check(&bytes, observer)?;
     let job = Job { name: &name, bytes: &bytes, checked: &checked };
+    if args.store {
+        return store(job, &args.to, observer);
+    }
     let order = Order { copies: args.copies, force: args.force, cartridges_shown: false };
     deliver(job, &args.to, order, observer)
 }

@@ -175,7 +175,7 @@ pub fn agreed(question: &str) -> bool {
 }
 
 /// The size of a job on the cable and at the printer.
-fn size_text(kind: JobKind, data: u64, printed: u64) -> String {
+pub fn size_text(kind: JobKind, data: u64, printed: u64) -> String {
     match kind {
         JobKind::Streams => format!(
             "{} as pass streams, 1/{:.1} of the {} the bridge makes of them",

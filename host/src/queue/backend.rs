@@ -276,7 +276,7 @@ impl<W: Write + Send> Backend<'_, W> {
                 Ok(false)
             }
             // By somebody at the bridge, or by another process.
-            Outcome::Cancelled | Outcome::Broken => Err(self.fail(Exit::Cancel, &text)),
+            Outcome::Cancelled | Outcome::Broken | Outcome::Stored => Err(self.fail(Exit::Cancel, &text)),
             Outcome::Lost => Err(self.hold(folder, &text, "release it to print this sheet again")),
             Outcome::Forgotten => Err(self.hold(folder, &text, RESET)),
         }

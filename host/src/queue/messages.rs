@@ -71,7 +71,7 @@ impl Reason {
         match fault {
             Fault::PaperOut => Reason::MediaEmpty,
             Fault::OffLine | Fault::PowerOff => Reason::OffLine,
-            Fault::Error | Fault::BusyTooLong | Fault::NoAck => Reason::Other,
+            Fault::Error | Fault::BusyTooLong | Fault::NoAck | Fault::Held => Reason::Other,
         }
     }
 

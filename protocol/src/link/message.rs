@@ -12,14 +12,20 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the link. It changes only if an old message, or the data of a job, changes its meaning, not when messages are
 /// appended.
-pub const VERSION: u8 = 4;
+pub const VERSION: u8 = 5;
 
 /// Fingerprint of the message set: the CRC-32 over one example of every variant. With equal fingerprints, host and bridge
 /// know the same messages. With different fingerprints but the same version, both understand everything the older knows.
-pub const SCHEMA: u32 = 0xf2dc_8310;
+pub const SCHEMA: u32 = 0x415e_b2c7;
 
 /// How many ended jobs a bridge remembers.
 pub const PAST: usize = 16;
+
+/// The number of a job that was started with the bridge's button.
+pub const ALONE: u32 = u32::MAX - 1;
+
+/// Bytes of the name of a stored job, at most.
+pub const NAME_MAX: usize = 36;
 
 /// The most data bytes in one [`ToBridge::Data`]. They fit a frame whatever the other fields are.
 pub const DATA_MAX: usize = 960;
@@ -112,6 +118,40 @@ pub enum ToBridge<'a> {
     Abandon {
         /// The job.
         job: u32,
+    },
+    /// Opens a job that is kept in the bridge's flash instead of being printed; its data follow as those of any other. Repeating
+    /// it for the same job changes nothing. Answered by [`ToHost::Progress`]; the job ends as [`JobState::Stored`].
+    Store {
+        /// The host's number for the job: not 0, and never used for another job.
+        job: u32,
+        /// The kind of its data.
+        kind: JobKind,
+        /// Its number of data bytes.
+        length: u32,
+        /// What people call it, at most [`NAME_MAX`] bytes.
+        name: &'a str,
+    },
+    /// Asks for a stored job. Answered by [`ToHost::Stored`] with the same number.
+    ListStored {
+        /// Number of the question, returned with the answer.
+        request: u16,
+        /// Which one, the oldest being 0.
+        index: u8,
+    },
+    /// Prints a stored job, which stays in the store. Repeating it for the same job changes nothing. Answered by
+    /// [`ToHost::Progress`].
+    PrintStored {
+        /// The number of the job at the printer, as in [`ToBridge::Begin`].
+        job: u32,
+        /// The number it was stored under.
+        stored: u32,
+    },
+    /// Deletes a stored job. Answered by [`ToHost::Stored`] with the same number and without a job.
+    DeleteStored {
+        /// Number of the question, returned with the answer.
+        request: u16,
+        /// The number it was stored under.
+        stored: u32,
     },
 }
 
@@ -240,6 +280,33 @@ pub enum ToHost<'a> {
         /// The use.
         usage: Usage,
     },
+    /// What the bridge has in its flash.
+    Stored {
+        /// The number of the question.
+        request: u16,
+        /// How many jobs there are.
+        count: u8,
+        /// Bytes of data that one more job may have.
+        room: u32,
+        /// Bytes of data that the only job might have; 0 if the bridge cannot store any.
+        total: u32,
+        /// The job that was asked for, if there is one.
+        #[serde(borrow)]
+        job: Option<StoredJob<'a>>,
+    },
+}
+
+/// A job in the bridge's flash.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct StoredJob<'a> {
+    /// The number it was stored under.
+    pub job: u32,
+    /// The kind of its data.
+    pub kind: JobKind,
+    /// Its number of data bytes.
+    pub length: u32,
+    /// What people call it.
+    pub name: &'a str,
 }
 
 /// How a job has ended.
@@ -312,6 +379,10 @@ pub enum JobState {
     /// The job was given up in the middle: the printer was switched off, or the bridge was reset and the data were gone.
     /// Nothing more was sent, and the sheet is lost.
     Lost,
+    /// The bridge waits for data or writes them to its flash.
+    Storing,
+    /// All of the job is in the bridge's flash.
+    Stored,
 }
 
 /// Why the printer does not take bytes.
@@ -330,6 +401,8 @@ pub enum Fault {
     BusyTooLong,
     /// Busy is low but nAck never came, although the handshake asks for it.
     NoAck,
+    /// Somebody holds the job with the bridge's button.
+    Held,
 }
 
 /// What is wrong with a job's data.
@@ -358,6 +431,8 @@ pub enum DefectKind {
     Excess,
     /// The data end before the job does.
     Truncated,
+    /// The bridge's flash does not keep what is written.
+    Flash,
 }
 
 /// The answer to a question to the printer.
@@ -394,6 +469,8 @@ pub enum Refusal {
     BeyondLimit,
     /// Settings that the port cannot use.
     Settings,
+    /// The bridge's flash has no room for the job.
+    NoRoom,
 }
 
 /// Levels of the port's status lines.
@@ -515,6 +592,13 @@ mod tests {
             (ToBridge::Abandon { job: 7 }, &[11, 7]),
             (ask(Ask::PrinterAtRest), &[4, 0xac, 0x02, 3]),
             (ask(Ask::Board), &[4, 0xac, 0x02, 4]),
+            (
+                ToBridge::Store { job: 7, kind: JobKind::Streams, length: 1061, name: "leaf" },
+                &[12, 7, 1, 0xa5, 0x08, 4, b'l', b'e', b'a', b'f'],
+            ),
+            (ToBridge::ListStored { request: 300, index: 2 }, &[13, 0xac, 0x02, 2]),
+            (ToBridge::PrintStored { job: 8, stored: 7 }, &[14, 8, 7]),
+            (ToBridge::DeleteStored { request: 300, stored: 7 }, &[15, 0xac, 0x02, 7]),
         ]
     }
 
@@ -522,6 +606,7 @@ mod tests {
         let lines = |fault| ToHost::Lines { request: 3, lines: Lines(0x39), fault };
         let answer = |answer| ToHost::Answer { request: 3, answer };
         let refused = |reason| ToHost::Refused { reason, job: 7 };
+        let stored = |job| ToHost::Stored { request: 3, count: 1, room: 1000, total: 2000, job };
         let mut past = [PastJob::NONE; PAST];
         past[0] = PastJob { job: 7, state: JobState::Done, printed: 300 };
         past[1] = PastJob { job: 6, state: JobState::Lost, printed: 4 };
@@ -571,6 +656,16 @@ mod tests {
             (answer(Answer::Unsure), &[3, 3, 5]),
             (ToHost::Past(past), PAST_BYTES),
             (ToHost::Board { request: 3, usage }, &[8, 3, 0x80, 8, 0x80, 0x10, 100, 9]),
+            (with_state(JobState::Storing), &[1, 1, 8, 2, 3, 4, 5, 6]),
+            (with_state(JobState::Stored), &[1, 1, 9, 2, 3, 4, 5, 6]),
+            (lines(Some(Fault::Held)), &[2, 3, 0x39, 1, 6]),
+            (broken(DefectKind::Flash), &[1, 1, 6, 9, 6, 2, 3, 4, 5, 6]),
+            (refused(Refusal::NoRoom), &[4, 7, 7]),
+            (stored(None), &[9, 3, 1, 0xe8, 7, 0xd0, 0x0f, 0]),
+            (
+                stored(Some(StoredJob { job: 7, kind: JobKind::Streams, length: 1061, name: "leaf" })),
+                &[9, 3, 1, 0xe8, 7, 0xd0, 0x0f, 1, 7, 1, 0xa5, 0x08, 4, b'l', b'e', b'a', b'f'],
+            ),
         ]
     }
 

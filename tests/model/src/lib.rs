@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "a model for tests, read beside them")]
 
 pub mod bench;
+pub mod flash;
 
 use bridge::engine::{Checkpoint, Engine, Identity, Memory, Outcome, Task};
 use protocol::ink::Ink;

@@ -19,6 +19,7 @@
 //! | `PULL_DOWN` | whether a pad's own resistor can hold an input low |
 //! | `now_us` | the lower half of the clock, which is enough for a difference |
 //! | `serial_number` | the number of this very board, 0 if it does not tell |
+//! | `flash_bytes` | the size of its flash |
 
 #[cfg(feature = "pico")]
 mod rp2040;

@@ -2,17 +2,14 @@
 //!
 //! RP2040-E1, the watchdog that counts twice a tick, is met by `embassy_rp`, which loads twice the time on this chip alone.
 
+use crate::flash::Whole;
 use core::ops::Range;
-use embassy_rp::Peri;
-use embassy_rp::flash::{Blocking, Flash};
 use embassy_rp::pac;
 use embassy_rp::pac::dma::Channel;
-use embassy_rp::peripherals::FLASH;
 
 pub const NAME: &str = "Pico";
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");
 pub const CLOCK_HZ: u32 = 125_000_000;
-const FLASH_BYTES: usize = 2 * 1024 * 1024;
 /// Behind the second-stage boot loader, as far as any image of ours goes.
 pub const CODE: Range<u32> = 0x1000_0100..0x1002_0000;
 pub const COUNT_MAX: u32 = u32::MAX;
@@ -40,10 +37,18 @@ pub fn now_us() -> u32 {
 }
 
 /// That of the flash chip: the RP2040 has none.
-pub fn serial_number(flash: Peri<'static, FLASH>) -> [u8; 8] {
-    let mut flash = Flash::<_, Blocking, FLASH_BYTES>::new_blocking(flash);
+pub fn serial_number(flash: &mut Whole) -> [u8; 8] {
     let mut number = [0; 8];
     // A board whose flash does not tell has number 0, which is as good as any if it is the only one.
     let _ = flash.blocking_unique_id(&mut number);
     number
+}
+
+/// What the chip says of itself: the last byte of its JEDEC ID is the logarithm of its size. 2 MiB, the least on such boards, if it
+/// says anything else than 2 to 16.
+pub fn flash_bytes(flash: &mut Whole) -> u32 {
+    match flash.blocking_jedec_id().map(|id| id & 0xff) {
+        Ok(size @ 21..=24) => 1 << size,
+        _ => 2 << 20,
+    }
 }

@@ -7,12 +7,11 @@
 //!   count at all (data sheet, 12.6.2.2).
 //! * The watchdog counts once a tick: RP2040-E1 is not here. `embassy_rp` knows.
 
+use crate::flash::Whole;
 use core::ops::Range;
-use embassy_rp::Peri;
 use embassy_rp::otp;
 use embassy_rp::pac;
 use embassy_rp::pac::dma::Channel;
-use embassy_rp::peripherals::FLASH;
 
 pub const NAME: &str = "Pico 2";
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (Pico 2)\0");
@@ -48,6 +47,11 @@ pub fn now_us() -> u32 {
 }
 
 /// That of the chip.
-pub fn serial_number(_flash: Peri<'static, FLASH>) -> [u8; 8] {
+pub fn serial_number(_flash: &mut Whole) -> [u8; 8] {
     otp::get_chipid().unwrap_or_default().to_be_bytes()
+}
+
+/// That of a Pico 2. `embassy_rp` cannot ask the chip on this processor.
+pub fn flash_bytes(_flash: &mut Whole) -> u32 {
+    4 << 20
 }

@@ -396,7 +396,7 @@ impl<'d, 'a> Watcher<'d, 'a> {
     fn ended(&self, outcome: Outcome, followed: bool) {
         let Some(printer) = self.printer() else { return };
         match outcome {
-            Outcome::Printed | Outcome::Cancelled | Outcome::Broken => {
+            Outcome::Printed | Outcome::Cancelled | Outcome::Broken | Outcome::Stored => {
                 self.delivery.close(&printer, &self.job);
             }
             Outcome::Lost => {}

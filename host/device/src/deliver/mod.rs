@@ -22,6 +22,7 @@
 pub mod ask;
 mod bridge;
 mod raw;
+pub mod store;
 
 use std::borrow::Cow;
 
@@ -168,6 +169,29 @@ pub enum Failure {
     /// A device without a bridge failed.
     #[error(transparent)]
     Raw(#[from] RawError),
+    /// The bridge has no flash for jobs.
+    #[error("this bridge cannot store jobs; send the job without --store")]
+    NoStore,
+    /// The job is too large for what is free.
+    #[error(
+        "the job needs {needs} bytes in the bridge, which has room for {room} of {total}; {}",
+        if *needs > *total as usize { "send it without --store" } else { "`foilpress bridge jobs` lists the jobs there, and deletes them" }
+    )]
+    NoRoom {
+        /// Bytes of its data.
+        needs: usize,
+        /// Bytes that are free.
+        room: u32,
+        /// Bytes there are.
+        total: u32,
+    },
+    /// The job did not arrive as a whole.
+    #[error("the job is not stored: {}; store it again", match .0 {
+        Outcome::Cancelled => "somebody has cancelled it, or the bridge has restarted",
+        Outcome::Broken => "the bridge's flash does not keep what is written; such a board is worn out",
+        _ => "the bridge has restarted or lost its supply",
+    })]
+    NotStored(Outcome),
     /// The caller stopped waiting.
     #[error("stopped before the job ended")]
     Left,
@@ -265,6 +289,21 @@ impl<'a> Packed<'a> {
             Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
             None => Packed { job, kind: JobKind::Raw, data: job.bytes.into() },
         }
+    }
+
+    /// What people call it.
+    pub fn name(&self) -> &str {
+        self.job.name
+    }
+
+    /// The kind of its data.
+    pub fn kind(&self) -> JobKind {
+        self.kind
+    }
+
+    /// The data that cross the cable.
+    pub fn data(&self) -> &[u8] {
+        &self.data
     }
 
     /// The same under another name, such as that of a copy.

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use protocol::link::frame::checksum;
-use protocol::link::message::JobKind;
+use protocol::link::message::{ALONE, JobKind};
 use serde::{Deserialize, Serialize};
 
 use super::record::{Phase, Record};
@@ -127,6 +127,16 @@ pub struct NewJob<'a> {
     pub passes: Vec<PassPlace>,
 }
 
+/// A number for a job that no other job of this or another computer has: time, process, content and place say so well enough, and a
+/// bridge that knows the number as another job's refuses it.
+pub fn fresh_number(content: u32, place: &[u8]) -> u32 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let seed =
+        [&now.as_nanos().to_le_bytes()[..], &std::process::id().to_le_bytes(), &content.to_le_bytes(), place]
+            .concat();
+    (protocol::link::frame::checksum(&seed) % ALONE).max(1)
+}
+
 impl Journal {
     /// The user's journal: `FOILPRESS_JOBS`, or `foilpress/jobs` where the system keeps programs' state.
     pub fn of_user() -> Result<Journal, JournalError> {
@@ -163,18 +173,9 @@ impl Journal {
             .map_err(io_error("write in", &self.folder))?;
         let checksum = checksum(job.data);
         write_durably(&staged.path().join("data"), job.data)?;
-        // A number that no other job of this or another computer has: time, process and content say so well enough,
-        // and a bridge that knows the number as another job's refuses it.
-        let seed = [
-            &now.as_nanos().to_le_bytes()[..],
-            &std::process::id().to_le_bytes(),
-            &checksum.to_le_bytes(),
-            self.folder.as_os_str().as_encoded_bytes(),
-        ]
-        .concat();
-        let mut number = protocol::link::frame::checksum(&seed).max(1);
+        let mut number = fresh_number(checksum, self.folder.as_os_str().as_encoded_bytes());
         while self.folder_of(number).exists() {
-            number = number.wrapping_add(1).max(1);
+            number = (number + 1) % ALONE;
         }
         let entry = Entry {
             name: job.name.into(),

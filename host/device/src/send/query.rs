@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use protocol::link::frame::{self, MAX, Read, Reader};
 use protocol::link::message::{
-    Answer, Ask, Fault, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, Usage,
-    VERSION,
+    Answer, Ask, Fault, JobKind, JobState, Lines, PAST, PastJob, Progress, Refusal, SCHEMA, StoredJob,
+    ToBridge, ToHost, Usage, VERSION,
 };
 
 use super::session::{Bridge, other_version, printable, stranger};
@@ -73,6 +73,9 @@ pub enum QueryError {
          bridge's address for the job of another user or computer"
     )]
     JobOpen(u32),
+    /// The bridge has no such job in its flash.
+    #[error("the bridge has no stored job {0:08x}; `foilpress bridge jobs` lists those it has")]
+    NotStored(u32),
     /// The bridge has no such job.
     #[error("the bridge has no job {0:08x}, and nothing of it to end")]
     NoSuchJob(u32),
@@ -92,6 +95,30 @@ pub struct LogPiece {
     pub end: u32,
     /// The bytes.
     pub bytes: Vec<u8>,
+}
+
+/// What a bridge has in its flash.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Shelf {
+    /// Bytes of data that one more job may have.
+    pub room: u32,
+    /// Bytes of data that the only job might have; 0 if the bridge cannot store any.
+    pub total: u32,
+    /// The jobs, the oldest first.
+    pub jobs: Vec<Stored>,
+}
+
+/// A job in a bridge's flash.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Stored {
+    /// The number it was stored under.
+    pub job: u32,
+    /// The kind of its data.
+    pub kind: JobKind,
+    /// Its number of data bytes.
+    pub length: u32,
+    /// What it was called.
+    pub name: String,
 }
 
 /// A conversation of questions.
@@ -114,6 +141,7 @@ enum Heard {
     Log(u16, LogPiece),
     Past(Box<[PastJob; PAST]>),
     Usage(u16, Usage),
+    Stored(u16, u8, Shelf),
 }
 
 impl<'t> Query<'t> {
@@ -169,6 +197,72 @@ impl<'t> Query<'t> {
             Heard::Usage(request, usage) if request == number => Some(usage),
             _ => None,
         })
+    }
+
+    /// What the bridge has in its flash.
+    pub fn shelf(&mut self, patience: Duration) -> Result<Shelf, QueryError> {
+        let mut shelf = Shelf::default();
+        for index in 0..=u8::MAX {
+            let number = self.next();
+            let question = ToBridge::ListStored { request: number, index };
+            let (count, one) =
+                exchange(self.link, &mut self.reader, &[question], patience, &mut |heard| match heard {
+                    Heard::Stored(request, count, one) if request == number => Some((count, one)),
+                    _ => None,
+                })?;
+            (shelf.room, shelf.total) = (one.room, one.total);
+            let missing = one.jobs.is_empty();
+            shelf.jobs.extend(one.jobs);
+            if missing || index.saturating_add(1) >= count {
+                break;
+            }
+        }
+        Ok(shelf)
+    }
+
+    /// Has the job `stored` printed from the bridge's flash, as job `job`, a number that was never used; says where it stands.
+    ///
+    /// Errors: [`QueryError::NotStored`], and [`QueryError::JobOpen`] while another job is open, beside those of every question.
+    pub fn print_stored(
+        &mut self,
+        job: u32,
+        stored: u32,
+        patience: Duration,
+    ) -> Result<Progress, QueryError> {
+        let messages = [ToBridge::PrintStored { job, stored }];
+        let mut open = self.progress.job;
+        exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
+            Heard::Progress(progress) if progress.job == job => Some(Ok(progress)),
+            Heard::Progress(progress) => {
+                open = progress.job;
+                None
+            }
+            Heard::Refused(Refusal::NoSuchJob, refused) if refused == stored => {
+                Some(Err(QueryError::NotStored(stored)))
+            }
+            Heard::Refused(Refusal::JobOpen, refused) if refused == job => {
+                Some(Err(QueryError::JobOpen(open)))
+            }
+            _ => None,
+        })?
+    }
+
+    /// Deletes a job from the bridge's flash.
+    ///
+    /// Errors: [`QueryError::NotStored`], and [`QueryError::JobOpen`] while it is printed, beside those of every question.
+    pub fn delete_stored(&mut self, stored: u32, patience: Duration) -> Result<(), QueryError> {
+        let (number, open) = (self.next(), self.progress.job);
+        let messages = [ToBridge::DeleteStored { request: number, stored }];
+        exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
+            Heard::Stored(request, ..) if request == number => Some(Ok(())),
+            Heard::Refused(Refusal::NoSuchJob, refused) if refused == stored => {
+                Some(Err(QueryError::NotStored(stored)))
+            }
+            Heard::Refused(Refusal::JobOpen, refused) if refused == stored => {
+                Some(Err(QueryError::JobOpen(open)))
+            }
+            _ => None,
+        })?
     }
 
     /// The port's lines, and the fault they mean.
@@ -254,7 +348,7 @@ impl<'t> Query<'t> {
             &mut |heard| match heard {
                 Heard::Progress(progress) if progress.job == job => match progress.state {
                     // From before it was told.
-                    JobState::Printing | JobState::Stopped(_) => None,
+                    JobState::Printing | JobState::Stopped(_) | JobState::Storing => None,
                     _ => Some(Ok(progress)),
                 },
                 Heard::Refused(Refusal::NoSuchJob, refused) if refused == job => {
@@ -328,7 +422,10 @@ const NOTHING: Progress =
 
 /// Whether a job is open.
 pub fn is_open(progress: &Progress) -> bool {
-    matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling)
+    matches!(
+        progress.state,
+        JobState::Printing | JobState::Stopped(_) | JobState::Cancelling | JobState::Storing
+    )
 }
 
 /// Says `messages`, again and again, until `judge` is content with what is heard.
@@ -401,6 +498,15 @@ fn heard(message: &[u8]) -> Option<Heard> {
         }
         ToHost::Past(past) => Heard::Past(Box::new(past)),
         ToHost::Board { request, usage } => Heard::Usage(request, usage),
+        ToHost::Stored { request, count, room, total, job } => {
+            let stored = |job: StoredJob<'_>| Stored {
+                job: job.job,
+                kind: job.kind,
+                length: job.length,
+                name: printable(job.name),
+            };
+            Heard::Stored(request, count, Shelf { room, total, jobs: job.map(stored).into_iter().collect() })
+        }
         _ => return None,
     })
 }

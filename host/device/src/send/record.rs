@@ -32,6 +32,8 @@ pub enum Outcome {
     /// Printer or bridge lost their place in the middle: the sheet is lost. The bridge resets the printer before anything
     /// else goes to it.
     Lost,
+    /// All of it is in the bridge's flash, and nothing printed.
+    Stored,
     /// The bridge does not know of the job any more, though data had left for it. The sheet may be complete; if it is
     /// not, it is lost.
     Forgotten,

@@ -16,11 +16,14 @@
 use std::time::Duration;
 
 use protocol::link::frame::{self, MAX, Read, Reader};
+#[cfg(doc)]
+use protocol::link::message::NAME_MAX;
 use protocol::link::message::{
     DATA_MAX, Fault, JobState, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION, hello_version,
 };
 use serde::Serialize;
 
+use super::query::is_open;
 pub use super::record::{Outcome, Phase, Record};
 
 /// A question that is not answered is repeated after this long.
@@ -82,6 +85,11 @@ pub enum SessionError {
     /// The number was used for another job.
     #[error("the bridge has had another job with the number {0:08x}; send this one again")]
     NumberTaken(u32),
+    /// The bridge's flash has no room for the job.
+    #[error(
+        "the bridge has no room for the job; `foilpress bridge jobs` lists what is stored there, and deletes it"
+    )]
+    NoRoom,
     /// The bridge takes no job at all.
     #[error("the bridge has no memory for a job; flash the firmware that came with this program")]
     NoMemory,
@@ -105,6 +113,8 @@ pub(super) fn stranger(message: &[u8]) -> Option<Bridge> {
 /// One job's conversation.
 pub struct Session<'d> {
     record: Record,
+    /// What the job is called, if it is to be stored and not printed.
+    store: Option<&'d str>,
     saved: Option<Record>,
     data: &'d [u8],
     reader: Reader,
@@ -137,6 +147,7 @@ impl<'d> Session<'d> {
         let cancel = record.cancel;
         let mut session = Session {
             record,
+            store: None,
             saved: None,
             data,
             reader: Reader::new(),
@@ -158,6 +169,11 @@ impl<'d> Session<'d> {
             session.cancel();
         }
         session
+    }
+
+    /// A conversation about a new job that is to be stored under this name, of at most [`NAME_MAX`] bytes, and not printed.
+    pub fn storing(record: Record, data: &'d [u8], name: &'d str) -> Session<'d> {
+        Session { store: Some(name), ..Session::new(record, data) }
     }
 
     /// The record as it is now.
@@ -364,7 +380,7 @@ impl<'d> Session<'d> {
     /// The bridge tells of another job.
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
         self.followed |= progress.job != 0 && progress.printed > 0;
-        let open = matches!(progress.state, JobState::Printing | JobState::Stopped(_) | JobState::Cancelling);
+        let open = is_open(&progress);
         match self.record.phase {
             // Nothing of it has ever left, and the bridge does not have it.
             Phase::Begun if self.record.cancel => {
@@ -391,6 +407,7 @@ impl<'d> Session<'d> {
     fn refused(&mut self, now: Duration, reason: Refusal) -> Result<(), SessionError> {
         match reason {
             Refusal::Empty => return Err(SessionError::NoMemory),
+            Refusal::NoRoom => return Err(SessionError::NoRoom),
             Refusal::OtherJob => {
                 if self.convinced(now) {
                     return Err(SessionError::NumberTaken(self.record.job));
@@ -484,7 +501,13 @@ impl<'d> Session<'d> {
                 self.record.phase = Phase::Begun;
             }
             self.keep(save)?;
-            push(&ToBridge::Begin { job, kind, length }, out);
+            push(
+                &match self.store {
+                    Some(name) => ToBridge::Store { job, kind, length, name },
+                    None => ToBridge::Begin { job, kind, length },
+                },
+                out,
+            );
         }
         if self.record.cancel {
             self.keep(save)?;
@@ -511,7 +534,12 @@ fn outcome(state: JobState) -> Option<Outcome> {
         JobState::Cancelled => Some(Outcome::Cancelled),
         JobState::Broken(_) => Some(Outcome::Broken),
         JobState::Lost => Some(Outcome::Lost),
-        JobState::None | JobState::Printing | JobState::Stopped(_) | JobState::Cancelling => None,
+        JobState::Stored => Some(Outcome::Stored),
+        JobState::None
+        | JobState::Printing
+        | JobState::Stopped(_)
+        | JobState::Cancelling
+        | JobState::Storing => None,
     }
 }
 

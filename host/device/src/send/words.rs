@@ -42,6 +42,9 @@ pub fn fault(fault: Fault, ink: Option<Ink>) -> String {
         (Fault::NoAck, _) => {
             "the printer does not acknowledge bytes (nAck never came): the nAck wire may be loose".into()
         }
+        (Fault::Held, _) => {
+            "the job is held with the bridge's button: press it once more, and the job continues".into()
+        }
     }
 }
 
@@ -90,6 +93,7 @@ pub fn outcome(outcome: Outcome, entry: &Entry, progress: Option<&Progress>) -> 
                 entry.name
             )
         }
+        Outcome::Stored => format!("{}: stored in the bridge; nothing is printed yet", entry.name),
         Outcome::Broken => {
             let why = match progress.map(|progress| progress.state) {
                 Some(JobState::Broken(what)) => format!(" ({})", defect(what)),
@@ -126,6 +130,7 @@ fn defect(defect: Defect) -> String {
         DefectKind::Stream => "a damaged pass stream",
         DefectKind::Excess => "bytes after the end",
         DefectKind::Truncated => "the end is missing",
+        DefectKind::Flash => "the bridge's flash does not keep what is written",
     };
     format!("byte {}: {what}", defect.at)
 }
@@ -146,6 +151,7 @@ pub fn phase(entry: &Entry) -> String {
             Outcome::Cancelled => "cancelled",
             Outcome::Broken => "refused by the bridge",
             Outcome::Lost => "sheet lost",
+            Outcome::Stored => "stored in the bridge",
             Outcome::Forgotten => "no longer known to the bridge",
         }
         .into(),

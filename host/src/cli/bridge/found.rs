@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use anyhow::{Result, anyhow};
+use indicatif::HumanBytes;
 use protocol::link::message::{Fault, JobState, Lines, PastJob, Progress, Usage};
 use serde_json::json;
 
@@ -10,7 +11,7 @@ use device::deliver::ask::{self, Negotiate};
 use device::flash::image::Firmware;
 use device::printers::Printers;
 use device::send::find::{self, Candidate};
-use device::send::query::{Query, Reply, is_alps, is_open};
+use device::send::query::{Query, Reply, Shelf, is_alps, is_open};
 use device::send::session::Bridge;
 use device::send::status::Status;
 use device::send::transport::Transport;
@@ -38,6 +39,8 @@ pub fn doing(progress: &Progress) -> String {
         JobState::Printing => format!("printing job {job:08x}, {} bytes printed", progress.printed),
         JobState::Stopped(fault) => format!("job {job:08x} waits: {}", words::fault(fault, None)),
         JobState::Cancelling => format!("ending job {job:08x} early"),
+        JobState::Storing => format!("storing job {job:08x}, {} bytes received", progress.accepted),
+        JobState::Stored => format!("idle; job {job:08x} was stored"),
         JobState::Done => format!("idle; job {job:08x} was printed"),
         JobState::Cancelled => format!("idle; job {job:08x} was cancelled"),
         JobState::Broken(_) => format!("idle; job {job:08x} could not be read"),
@@ -92,6 +95,8 @@ pub struct Found {
     pub past: Vec<PastJob>,
     /// The firmware's use of memory and time.
     pub usage: Usage,
+    /// What is stored in it.
+    pub shelf: Shelf,
 }
 
 impl Found {
@@ -134,6 +139,7 @@ impl Found {
             status: Reply::NotNow,
             past: query.past().copied().collect(),
             usage: query.usage(PATIENCE)?,
+            shelf: query.shelf(PATIENCE)?,
         })
     }
 
@@ -149,6 +155,7 @@ impl Found {
             })).collect::<Vec<_>>(),
             "firmware": { "memory": self.usage.fixed, "stack": self.usage.stack, "stack_used": self.usage.stack_used,
                           "longest_us": self.usage.longest_us },
+            "stored": { "jobs": self.shelf.jobs.len(), "room": self.shelf.room, "total": self.shelf.total },
             "lines_high": levels(self.lines),
             "fault": self.fault.map(|fault| words::fault(fault, None)),
             "device_id": self.device_id.device_id(),
@@ -180,6 +187,9 @@ impl Found {
             self.earlier().take(4).map(|past| format!("{:08x} {}", past.job, ended(past.state))).collect();
         if !earlier.is_empty() {
             writeln!(out, "before: {}", earlier.join(", "))?;
+        }
+        if let Some(stored) = shelf_text(&self.shelf) {
+            writeln!(out, "stored: {stored}")?;
         }
         writeln!(out, "lines high: {}", levels(self.lines).join(" "))?;
         if let Some(fault) = self.fault {
@@ -220,6 +230,17 @@ impl Found {
     }
 }
 
+/// What a bridge has stored and has room for; nothing if it cannot store any job.
+pub fn shelf_text(shelf: &Shelf) -> Option<String> {
+    let jobs = match shelf.jobs.len() {
+        0 => "no jobs".into(),
+        1 => "1 job".into(),
+        many => format!("{many} jobs"),
+    };
+    let (room, total) = (HumanBytes(shelf.room.into()), HumanBytes(shelf.total.into()));
+    (shelf.total > 0).then(|| format!("{jobs}, room for {room} of {total}"))
+}
+
 /// How an earlier job has ended, in a word or two.
 fn ended(state: JobState) -> &'static str {
     match state {
@@ -227,7 +248,12 @@ fn ended(state: JobState) -> &'static str {
         JobState::Cancelled => "cancelled",
         JobState::Broken(_) => "not readable",
         JobState::Lost => "lost",
-        JobState::None | JobState::Printing | JobState::Stopped(_) | JobState::Cancelling => "open",
+        JobState::Stored => "stored",
+        JobState::None
+        | JobState::Printing
+        | JobState::Stopped(_)
+        | JobState::Cancelling
+        | JobState::Storing => "open",
     }
 }
 

@@ -1,0 +1,207 @@
+//! Storing jobs, and printing them with no host: what stands between the engine and the [`Store`].
+//!
+//! Problem: a job goes from the link into the flash, and from there to the printer, and the supply may go at any instant of either.
+//! Nothing may be lost but the sheet in the rollers, and a printer that waits for the rest of a row has to be reset before anything
+//! else goes to it, whoever comes next and however long the supply was away.
+//! Method: a poll does one thing at most: it answers a question, writes a page, or reads one. Storing goes on only while
+//! nothing is printed, because the flash cannot be read while it is written, and the processor stands still for that long.
+//! Printing writes to the flash twice: before the first byte, and when the job has ended. So the printer's state after a loss of the
+//! supply is known from the flash, and after any other reset from memory, to the byte ([`crate::keeper`]); then the
+//! engine gets the data once more and leaves out what has crossed.
+//! Cost: a poll that writes takes as long as the flash does; all others stay well below a millisecond.
+//! Limits: if the supply goes between the last byte of a job and the note that it has ended, some milliseconds, the sheet counts as lost.
+
+use crate::engine::{Engine, Request};
+use crate::store::{Flash, Next, Note, PAGE_DATA, Reading, Standing, Store, Stored, Worn};
+use protocol::link::message::{ALONE, JobState, Refusal, StoredJob};
+
+/// The store, and the job that is printed from it.
+pub struct Alone<F> {
+    store: Store<F>,
+    run: Option<Run>,
+}
+
+/// A stored job that is being printed.
+struct Run {
+    job: u32,
+    stored: Stored,
+    reading: Reading,
+}
+
+impl<F: Flash> Alone<F> {
+    /// Finds what is in the flash, and tells the engine what it has to know of it. `remembers` says whether the engine continues
+    /// from a checkpoint, which then knows better. To be called before anything is sent.
+    pub fn open(flash: F, engine: &mut Engine<'_>, remembers: bool) -> Self {
+        let store = Store::open(flash);
+        let mut alone = Alone { store, run: None };
+        let note = alone.store.note();
+        engine.set_stored(alone.store.jobs().len());
+        for stored in alone.store.jobs() {
+            engine.was_stored(stored.job);
+        }
+        if note.job != 0 && engine.open_job() == Some(note.job) {
+            if let Some(stored) = alone.find(|stored| stored.id() == note.stored) {
+                engine.resume_from_store(stored.kind, stored.length);
+                alone.run = Some(alone.begin(note.job, stored));
+            }
+        } else if !remembers {
+            match note.standing {
+                Standing::Printing => engine.lost_from_store(note.job),
+                Standing::ResetOwed => engine.owe_reset(),
+                Standing::Clear => {}
+            }
+        }
+        alone
+    }
+
+    /// The store.
+    pub fn store(&self) -> &Store<F> {
+        &self.store
+    }
+
+    /// Does what is due, one thing at most; returns whether there may be more at once.
+    pub fn poll(&mut self, engine: &mut Engine<'_>) -> bool {
+        if self.run.as_ref().is_some_and(|run| !engine.prints_from_store(run.job)) {
+            self.run = None;
+        }
+        self.note(engine);
+        if let Some(request) = engine.request() {
+            self.serve(request, engine);
+            return true;
+        }
+        if self.run.is_some() { self.feed(engine) } else { self.keep(engine) }
+    }
+
+    /// Writes where the printer stands, if that has changed.
+    fn note(&mut self, engine: &Engine<'_>) {
+        let Note { job, stored, .. } = self.store.note();
+        let note = match &self.run {
+            Some(run) => Note { standing: Standing::Printing, job: run.job, stored: run.stored.id() },
+            None if engine.owes_reset() => Note { standing: Standing::ResetOwed, job, stored },
+            None => Note { standing: Standing::Clear, job, stored },
+        };
+        self.store.write_note(note);
+    }
+
+    fn serve(&mut self, request: Request, engine: &mut Engine<'_>) {
+        match request {
+            Request::Store { job, kind, length, name } => {
+                if engine.open_job().is_some() {
+                    engine.refuse_stored(Refusal::JobOpen, job);
+                } else if !self.store.begin(job, kind, length, &name) {
+                    engine.refuse_stored(Refusal::NoRoom, job);
+                } else if !engine.open_for_store(job, kind, length) {
+                    engine.refuse_stored(Refusal::Empty, job);
+                }
+            }
+            Request::List { request, index } => self.tell(request, Some(index), engine),
+            Request::Print { job, stored } => match self.find(|found| found.job == stored) {
+                Some(found) => self.print(job, found, engine),
+                None => engine.refuse_stored(Refusal::NoSuchJob, stored),
+            },
+            Request::PrintLast => {
+                if let Some(&last) = self.store.jobs().last() {
+                    self.print(ALONE, last, engine);
+                }
+            }
+            Request::Delete { stored, .. }
+                if self.run.as_ref().is_some_and(|run| run.stored.job == stored) =>
+            {
+                engine.refuse_stored(Refusal::JobOpen, stored);
+            }
+            Request::Delete { request, stored } => {
+                if self.store.delete(stored) {
+                    engine.set_stored(self.store.jobs().len());
+                    self.tell(request, None, engine);
+                } else {
+                    engine.refuse_stored(Refusal::NoSuchJob, stored);
+                }
+            }
+        }
+    }
+
+    /// Begins to print a job. That it is printed is written down before the engine has a byte of it.
+    fn print(&mut self, job: u32, stored: Stored, engine: &mut Engine<'_>) {
+        if engine.open_job().is_some() {
+            return engine.refuse_stored(Refusal::JobOpen, job);
+        }
+        self.run = Some(self.begin(job, stored));
+        self.note(engine);
+        if !engine.open_from_store(job, stored.kind, stored.length) {
+            self.run = None;
+            engine.refuse_stored(Refusal::Empty, job);
+        }
+    }
+
+    fn begin(&self, job: u32, stored: Stored) -> Run {
+        Run { job, stored, reading: self.store.read(&stored) }
+    }
+
+    fn find(&self, which: impl Fn(&Stored) -> bool) -> Option<Stored> {
+        self.store.jobs().iter().copied().find(which)
+    }
+
+    /// Answers a question.
+    fn tell(&self, request: u16, index: Option<u8>, engine: &mut Engine<'_>) {
+        let stored = index.and_then(|index| self.store.jobs().get(usize::from(index)));
+        let name = stored.map(|stored| self.store.name(stored)).unwrap_or_default();
+        let job =
+            stored.map(|&Stored { job, kind, length, .. }| StoredJob { job, kind, length, name: &name });
+        engine.tell_stored(request, self.store.room(), self.store.total(), job);
+    }
+
+    /// Gives the engine the next page of the job that is printed.
+    fn feed(&mut self, engine: &mut Engine<'_>) -> bool {
+        let Some(run) = &mut self.run else { return false };
+        if engine.room_from_store() == 0 {
+            return false;
+        }
+        let mut page = [0; PAGE_DATA];
+        let mut ahead = run.reading;
+        match self.store.next(&mut ahead, &mut page) {
+            // All of the page or nothing: what is left of it would have to be kept.
+            Next::Bytes(count) if engine.room_from_store() < count => return false,
+            Next::Bytes(count) => engine.feed_from_store(&page[..count]),
+            Next::Later => {}
+            Next::Damaged => engine.end_from_store(),
+            Next::End => return false,
+        }
+        run.reading = ahead;
+        true
+    }
+
+    /// Writes the next page of the job that is stored.
+    fn keep(&mut self, engine: &mut Engine<'_>) -> bool {
+        match engine.storing() {
+            None => {
+                self.store.forget();
+                return false;
+            }
+            Some((_, true)) => {
+                self.store.forget();
+                engine.stored(JobState::Cancelled);
+                return true;
+            }
+            Some((_, false)) => {}
+        }
+        let mut page = [0; PAGE_DATA];
+        let page = &mut page[..self.store.wants()];
+        if page.is_empty() {
+            // Nobody has begun it here.
+            engine.not_stored();
+            return true;
+        }
+        if !engine.take_for_store(page) {
+            return false;
+        }
+        match self.store.put(page) {
+            Ok(false) => {}
+            Ok(true) => {
+                engine.set_stored(self.store.jobs().len());
+                engine.stored(JobState::Stored);
+            }
+            Err(Worn) => engine.not_stored(),
+        }
+        true
+    }
+}
