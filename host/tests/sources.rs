@@ -93,7 +93,7 @@ fn a_library_without_measurements_predicts_nothing() {
 #[test]
 fn curves_of_other_instruments_join_a_library() {
     let bench = Bench::new();
-    let mut table = "# reflectance 0.2 everywhere\n3 450 550 650\n".to_owned();
+    let mut table = "# reflectance 0.2 everywhere\n3 430 550 650\n".to_owned();
     for light in 1..14 {
         for eye in 0..14 {
             table += &format!("{} 0 {} 3.0 0.2 0.2 0.2\n", 0.1 * f64::from(light), 0.1 * f64::from(eye));

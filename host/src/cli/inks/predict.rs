@@ -63,7 +63,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     let folder = libraries::folder(&args.library)?;
     let library = libraries::open(&folder)?;
     let staged = Staged::folder(&args.output, Kind::Predicted)?;
-    observer.begin("leave stacks out", library.origins().measured as u64);
+    observer.begin("leaving stacks out", library.origins().measured as u64);
     let found = library.predict(|| observer.advance(1));
     observer.end();
     let found = found?;
@@ -125,7 +125,7 @@ fn members(
         let name = free(&members, &predicted.stack);
         let from = listed(predicted.from.iter());
         let setup = format!("layer model ({}) fitted to measured curves, here {from}; {error}", found.model);
-        write!(tables, "\n[[predicted]]\n")?;
+        writeln!(tables, "\n[[predicted]]")?;
         for (key, value) in [
             ("stack", predicted.stack.to_string()),
             ("curve", name.clone()),
