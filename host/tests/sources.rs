@@ -131,7 +131,7 @@ fn curves_of_other_instruments_join_a_library() {
             && at("P+SF").iter().all(|v| (v - 0.1).abs() < 1e-9)
     );
     let shown = bench.done("inks show K --library mine");
-    for word in ["predicted from measurements by Owner", "10.8 GU at 60 degrees", "alpha 0.12"] {
+    for word in ["predicted from measurements by Owner", "10.8 GU at 60 degrees", "alpha 0.118"] {
         assert!(shown.contains(word), "`{word}` is not in:\n{shown}");
     }
     assert!(bench.done("inks show substrate --library mine").contains("gonio; goniometer table grey.brdf"));

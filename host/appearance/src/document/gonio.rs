@@ -174,7 +174,7 @@ pub(super) mod tests {
 
     /// A table over a goniometer's angles: light at 0 to 75 degrees, the eye all around.
     pub fn table(f: impl Fn(f64, f64) -> f64) -> String {
-        let mut text = "# made by a test\n3 450 550 650 # nm\n".to_owned();
+        let mut text = "# made by a test\n3 430 550 650 # nm\n".to_owned();
         for i in 0..16 {
             let theta_i = f64::from(i) * 5f64.to_radians();
             for o in 0..60 {
@@ -221,7 +221,7 @@ pub(super) mod tests {
     /// Red light is red: the wavelengths keep their order.
     #[test]
     fn wavelengths_become_colours() {
-        let text = "3 450 550 650\n0.3 0 0.3 3.1415 0 0 1\n0.5 0 0.2 3.1415 0 0 1\n";
+        let text = "3 430 550 650\n0.3 0 0.3 3.1415 0 0 1\n0.5 0 0.2 3.1415 0 0 1\n";
         let v = parse(text.as_bytes(), Path::new("x.brdf")).unwrap().rgb()[0];
         assert!(v[0] > 0.5 && v[1] < 0.3 && v[2] < 0.1, "{v:?}");
     }
@@ -236,12 +236,12 @@ pub(super) mod tests {
             ("3 450 550", "a wavelength is missing"),
             ("3 650 550 450", "ascending wavelengths"),
             ("3 500 550 600", "cover 430 to 650"),
-            ("3 450 550 650\n0.1 0 0.2 0 1 1", "line 2"),
-            ("3 450 550 650\n0.1 0 0.2 x 1 1 1", "line 2"),
-            ("3 450 550 650\n0.1 0 0.2 0 1 inf 1", "line 2"),
-            ("3 450 550 650\n0.1 0 2.2 0 1 1 1", "measurement 1: theta 0.1 and 2.2"),
-            ("3 450 550 650\n# nothing\n", "none of 0"),
-            ("3 450 550 650\n0 0 0 0 1 1 1", "none of 1"),
+            ("3 430 550 650\n0.1 0 0.2 0 1 1", "line 2"),
+            ("3 430 550 650\n0.1 0 0.2 x 1 1 1", "line 2"),
+            ("3 430 550 650\n0.1 0 0.2 0 1 inf 1", "line 2"),
+            ("3 430 550 650\n0.1 0 2.2 0 1 1 1", "measurement 1: theta 0.1 and 2.2"),
+            ("3 430 550 650\n# nothing\n", "none of 0"),
+            ("3 430 550 650\n0 0 0 0 1 1 1", "none of 1"),
         ] {
             let said = parse(text.as_bytes(), Path::new("x.brdf")).unwrap_err().to_string();
             let known = said.contains(word) || (word == "line 2" && said.contains("is missing"));

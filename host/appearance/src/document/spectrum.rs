@@ -62,7 +62,7 @@ mod tests {
     fn wavelengths_that_nobody_sees_have_no_colour() {
         assert!(rgb_weights(&[1.0, 1000.0]).is_none());
         assert!(rgb_weights(&[450.0, 550.0]).is_none() && rgb_weights(&[550.0, 450.0, 650.0]).is_none());
-        let three = rgb_weights(&[450.0, 550.0, 650.0]).unwrap();
+        let three = rgb_weights(&[430.0, 550.0, 650.0]).unwrap();
         for c in 0..3 {
             assert!((three.iter().map(|w| w[c]).sum::<f64>() - 1.0).abs() < 1e-12);
         }
