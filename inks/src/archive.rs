@@ -26,12 +26,15 @@ use crate::read::{MOST_CURVE_BYTES, MOST_STACKS, is_licence};
 
 /// The file with the origin of the curves and the hashes of the files.
 pub const PROVENANCE: &str = "provenance.json";
+/// The file with the figures behind predicted curves.
+pub const PREDICTION: &str = "prediction.json";
 /// The largest archive, in bytes.
 pub const MOST_ARCHIVE: u64 = 64 << 20;
 /// The most that its files can hold together, in bytes.
 const MOST_TOTAL: u64 = 128 << 20;
 /// Files beside library and curves that belong to a library if they are there.
-const BESIDE: [&str; 5] = ["measurement.json", "LICENSE", "LICENSE.txt", "LICENCE.txt", "README.md"];
+pub const BESIDE: [&str; 6] =
+    ["measurement.json", PREDICTION, "LICENSE", "LICENSE.txt", "LICENCE.txt", "README.md"];
 /// The most files: a curve for each stack, and the others.
 const MOST_FILES: usize = MOST_STACKS + BESIDE.len() + 2;
 const FORMAT: u32 = 1;
@@ -93,6 +96,9 @@ struct Origins {
 #[derive(Serialize, Deserialize)]
 struct Origin {
     stack: String,
+    /// `measured` or `predicted`.
+    #[serde(default)]
+    curve: String,
     by: String,
     when: String,
     setup: String,
@@ -114,7 +120,7 @@ pub fn gather(folder: &Path) -> Result<Vec<Member>, ArchiveError> {
     let text = std::str::from_utf8(&library).map_err(|error| member(FILE_NAME, error.to_string()))?;
     let parsed: File = toml::from_str(text).map_err(|error| member(FILE_NAME, error.message()))?;
     let mut names: BTreeSet<String> = BTreeSet::new();
-    for table in &parsed.measured {
+    for table in parsed.measured.iter().chain(&parsed.predicted) {
         names.insert(plain(table.get_ref().curve.get_ref())?);
     }
     names.extend(BESIDE.iter().filter(|name| folder.join(name).is_file()).map(|&name| name.to_owned()));
@@ -208,12 +214,15 @@ pub fn pack(members: &[Member], library: &Library, licence: Option<&str>) -> Res
         (None, Some(_)) => return Err(whole("the name of a licence is one line of text, such as CC0-1.0")),
     };
     let curves = library.entries().iter().filter_map(|entry| match &entry.provenance {
-        Provenance::Measured { by, when, setup } => Some(Origin {
-            stack: entry.stack.to_string(),
-            by: by.clone(),
-            when: when.clone(),
-            setup: setup.clone(),
-        }),
+        Provenance::Measured { by, when, setup } | Provenance::Predicted { by, when, setup } => {
+            Some(Origin {
+                stack: entry.stack.to_string(),
+                curve: entry.provenance.word().into(),
+                by: by.clone(),
+                when: when.clone(),
+                setup: setup.clone(),
+            })
+        }
         Provenance::Modelled { .. } => None,
     });
     let listed = |member: &Member| Listed {

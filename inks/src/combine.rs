@@ -14,6 +14,7 @@ use protocol::ink::Ink;
 use crate::curve::Curve;
 use crate::library::{Entry, Library};
 use crate::lobes::Lobes;
+use crate::provenance::Trust;
 use crate::set::InkSet;
 use crate::stack::Stack;
 
@@ -53,9 +54,10 @@ impl Library {
         }
     }
 
-    /// Stacks of these inks that are not on the list and look like none that is: empty if a stack was measured.
+    /// Stacks of these inks that are not on the list and look like none that is: empty if a stack was measured, or if only
+    /// measured ones may be used.
     pub fn combinations(&self, inks: &InkSet) -> Vec<Stack> {
-        if !self.is_modelled() {
+        if !self.is_modelled() || self.trust() != Trust::All {
             return Vec::new();
         }
         let mut seen: HashSet<Vec<u64>> =

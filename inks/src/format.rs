@@ -36,6 +36,8 @@ pub(crate) struct File {
     pub rule: Vec<Spanned<Rule>>,
     #[serde(default)]
     pub measured: Vec<Spanned<MeasuredTable>>,
+    #[serde(default)]
+    pub predicted: Vec<Spanned<MeasuredTable>>,
 }
 
 #[derive(Deserialize)]
@@ -63,6 +65,7 @@ pub struct Caution {
     pub certainty: Certainty,
 }
 
+/// A curve that was measured, or predicted from measurements.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct MeasuredTable {

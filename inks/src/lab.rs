@@ -2,7 +2,7 @@
 //!
 //! Printed solids are specified in CIELAB under D50 (as in ISO 12647-2); the pipeline computes in linear
 //! Rec. 709 under D65. Method: CIE 15 inverse, Bradford adaptation, the Rec. 709 matrix. Limits: the result is
-//! not clipped, and inks such as cyan lie outside the gamut, so a channel may be negative.
+//! not clipped, and inks such as cyan lie outside the gamut, so a channel may be negative. The inverse undoes it to the last digits.
 
 /// White points as XYZ with Y = 1.
 const D50: [f64; 3] = [0.96422, 1.0, 0.82521];
@@ -42,9 +42,33 @@ pub fn to_linear_rgb([l, a, b]: [f64; 3]) -> [f64; 3] {
     times(&REC709, adapted)
 }
 
+/// The inverse of a matrix that has one.
+fn inverse(m: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let minor = |i: usize, j: usize| {
+        let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
+        m[a][c] * m[b][d] - m[a][d] * m[b][c]
+    };
+    let determinant: f64 = (0..3).map(|j| m[0][j] * minor(0, j)).sum();
+    std::array::from_fn(|j| std::array::from_fn(|i| minor(i, j) / determinant))
+}
+
+/// CIELAB under D50 of a linear Rec. 709 colour: the inverse of [`to_linear_rgb`].
+pub fn from_linear_rgb(rgb: [f64; 3]) -> [f64; 3] {
+    let (from, to) = (times(&BRADFORD, D50), times(&BRADFORD, D65));
+    let cone = times(&inverse(&BRADFORD_BACK), times(&inverse(&REC709), rgb));
+    let xyz = times(&inverse(&BRADFORD), std::array::from_fn(|i| cone[i] * from[i] / to[i]));
+    let delta: f64 = 6.0 / 29.0;
+    let f: [f64; 3] = std::array::from_fn(|i| {
+        let v = xyz[i] / D50[i];
+        if v > delta.powi(3) { v.cbrt() } else { v / (3.0 * delta * delta) + 4.0 / 29.0 }
+    });
+    [116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn the_paper_white_is_white_and_greys_stay_grey() {
@@ -66,6 +90,16 @@ mod tests {
             for (j, v) in back.into_iter().enumerate() {
                 assert!((v - f64::from(u8::from(i == j))).abs() < 1e-6, "{back:?}");
             }
+        }
+    }
+
+    proptest! {
+        /// Dark channels keep all their digits: the fit of filters depends on it.
+        #[test]
+        fn colours_come_back(rgb in prop::array::uniform3(-12.0f64..0.0)) {
+            let rgb = rgb.map(f64::exp);
+            let back = to_linear_rgb(from_linear_rgb(rgb));
+            prop_assert!(rgb.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-12), "{rgb:?} {back:?}");
         }
     }
 

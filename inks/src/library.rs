@@ -6,7 +6,7 @@ use crate::curve::Curve;
 use crate::format::Caution;
 use crate::lobes::Lobes;
 use crate::model::Optics;
-use crate::provenance::{Figure, Provenance};
+use crate::provenance::{Figure, Provenance, Trust};
 use crate::rule::{Rule, Severity};
 use crate::set::InkSet;
 use crate::stack::Stack;
@@ -37,9 +37,9 @@ pub struct Entry {
     /// Reflectance in 1/sr over the half angle. A modelled curve is sampled at 512 angles of the square-root grid;
     /// [`Entry::curve_at`] evaluates it at other angles without interpolation.
     pub curve: Curve,
-    /// The standard deviation of the curve, if it was measured and its file has one.
+    /// The standard deviation of the curve, if it was measured or predicted and its file has one.
     pub uncertainty: Option<Uncertainty>,
-    /// The modelled lobes; none if the curve was measured.
+    /// The modelled lobes; none if the curve was measured or predicted.
     pub lobes: Option<Lobes>,
     /// The source of the curve.
     pub provenance: Provenance,
@@ -65,6 +65,45 @@ pub struct Library {
     pub(crate) cartridges: Vec<Cartridge>,
     pub(crate) rules: Vec<Rule>,
     pub(crate) entries: Vec<Entry>,
+    pub(crate) trust: Trust,
+}
+
+/// How many curves of a library are of each origin, in words: `57 stacks: 3 measured, 54 modelled`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Origins {
+    /// Measured.
+    pub measured: usize,
+    /// Predicted from measurements.
+    pub predicted: usize,
+    /// Modelled from the figures of the library.
+    pub modelled: usize,
+}
+
+impl Origins {
+    /// Counts these curves.
+    pub fn of<'a>(entries: impl IntoIterator<Item = &'a Entry>) -> Origins {
+        let mut counted = Origins::default();
+        for entry in entries {
+            match &entry.provenance {
+                Provenance::Measured { .. } => counted.measured += 1,
+                Provenance::Predicted { .. } => counted.predicted += 1,
+                Provenance::Modelled { .. } => counted.modelled += 1,
+            }
+        }
+        counted
+    }
+}
+
+impl std::fmt::Display for Origins {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Origins { measured, predicted, modelled } = self;
+        let all = measured + predicted + modelled;
+        write!(f, "{all} stack{}: {measured} measured, ", if all == 1 { "" } else { "s" })?;
+        if *predicted > 0 {
+            write!(f, "{predicted} predicted from measurements, ")?;
+        }
+        write!(f, "{modelled} modelled")
+    }
 }
 
 impl Library {
@@ -83,6 +122,11 @@ impl Library {
         self.licence.as_deref()
     }
 
+    /// How many of its curves are measured, predicted and modelled.
+    pub fn origins(&self) -> Origins {
+        Origins::of(&self.entries)
+    }
+
     /// The stacks; number 0 is the bare substrate.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
@@ -93,12 +137,29 @@ impl Library {
         self.entries.iter().find(|entry| entry.stack == *stack)
     }
 
-    /// The stacks that need only these inks and break no rule of severity [`Severity::Error`], in the order of the library.
-    /// The substrate is always among them.
+    /// The same library, of which only curves of such an origin may be used. The bare paper may be used whatever its origin: no
+    /// print is without it.
+    #[must_use]
+    pub fn trusting(mut self, trust: Trust) -> Library {
+        self.trust = trust;
+        self
+    }
+
+    /// Which of its curves may be used.
+    pub fn trust(&self) -> Trust {
+        self.trust
+    }
+
+    /// The stacks that need only these inks, whose curves may be used, and that break no rule of severity [`Severity::Error`],
+    /// in the order of the library. The substrate is always among them.
     pub fn at_hand(&self, inks: &InkSet) -> Vec<&Entry> {
         let forbidden =
             |stack: &Stack| self.broken_rules(stack).iter().any(|rule| rule.severity == Severity::Error);
-        let usable = |entry: &&Entry| inks.contains_all(entry.stack.layers()) && !forbidden(&entry.stack);
+        let usable = |entry: &&Entry| {
+            inks.contains_all(entry.stack.layers())
+                && !forbidden(&entry.stack)
+                && (self.trust.includes(&entry.provenance) || entry.stack == Stack::SUBSTRATE)
+        };
         self.entries.iter().filter(usable).collect()
     }
 

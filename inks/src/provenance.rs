@@ -45,6 +45,16 @@ impl<T: Copy> Figure<T> {
         *self.value.get_ref()
     }
 
+    /// Replaces the value, whatever its source.
+    pub(crate) fn set(&mut self, value: T) {
+        self.value = Spanned::new(self.value.span(), value);
+    }
+
+    /// A figure of the same source for three channels.
+    pub(crate) fn triple(&self, value: [f64; 3]) -> Figure<[f64; 3]> {
+        Figure { value: Spanned::new(self.value.span(), value), source: self.source, note: None }
+    }
+
     /// Its source.
     pub fn source(&self) -> Source {
         self.source
@@ -118,6 +128,15 @@ pub enum Provenance {
         /// The figures used, substrate first, then layer by layer.
         parameters: Vec<Parameter>,
     },
+    /// Computed from measurements of something else: of other stacks, or of gloss and colour.
+    Predicted {
+        /// Who measured what it was predicted from.
+        by: String,
+        /// When, as `YYYY-MM-DD` or `YYYY-MM`.
+        when: String,
+        /// From what, by which model, and how far off it may be.
+        setup: String,
+    },
     /// Measured on a print.
     Measured {
         /// Who measured.
@@ -135,8 +154,35 @@ impl Provenance {
         matches!(self, Provenance::Measured { .. })
     }
 
-    /// `modelled` or `measured`.
+    /// `modelled`, `predicted` or `measured`.
     pub fn word(&self) -> &'static str {
-        if self.is_measured() { "measured" } else { "modelled" }
+        match self {
+            Provenance::Modelled { .. } => "modelled",
+            Provenance::Predicted { .. } => "predicted",
+            Provenance::Measured { .. } => "measured",
+        }
+    }
+}
+
+/// Which curves of a library may be used.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Trust {
+    /// All of them.
+    #[default]
+    All,
+    /// Those that were measured, and those predicted from measurements.
+    Predicted,
+    /// Those that were measured.
+    Measured,
+}
+
+impl Trust {
+    /// Whether a curve of this origin may be used.
+    pub fn includes(self, provenance: &Provenance) -> bool {
+        match provenance {
+            Provenance::Modelled { .. } => self == Trust::All,
+            Provenance::Predicted { .. } => self != Trust::Measured,
+            Provenance::Measured { .. } => true,
+        }
     }
 }

@@ -17,7 +17,7 @@ use crate::judge;
 use crate::library::{Cartridge, Entry, Library};
 use crate::model::{Layer, Listed, Model, Optics, Paper};
 use crate::problem::{Findings, Problem};
-use crate::provenance::{Figure, Provenance};
+use crate::provenance::{Figure, Provenance, Trust};
 use crate::rule::{Rule, Severity};
 use crate::stack::Stack;
 use crate::uncertainty::Uncertainty;
@@ -66,7 +66,7 @@ struct Listing {
     measured: Option<Measured>,
 }
 
-/// A measured curve as it was read.
+/// A measured or predicted curve as it was read.
 struct Measured {
     curve: Curve,
     uncertainty: Option<Uncertainty>,
@@ -176,7 +176,7 @@ fn build(
             Vec::new()
         }
     };
-    measurements(&file.measured, folder, &mut wanted, findings);
+    measurements(&file.measured, &file.predicted, folder, &mut wanted, findings);
     check_stacks(&wanted, &parts.cartridges, findings);
     finish(parts, wanted, findings)
 }
@@ -198,21 +198,25 @@ pub(crate) fn is_licence(text: &str) -> bool {
     (1..=200).contains(&text.trim().len()) && !text.chars().any(char::is_control)
 }
 
-/// Reads all measured curves, and warns about curves in the folder that are not used.
+/// Reads all measured and predicted curves, and warns about curves in the folder that are not used.
 fn measurements(
-    tables: &[Spanned<MeasuredTable>],
+    measured: &[Spanned<MeasuredTable>],
+    predicted: &[Spanned<MeasuredTable>],
     folder: Option<&Path>,
     wanted: &mut Vec<Listing>,
     findings: &mut Findings,
 ) {
-    if let Some(beyond) = tables.get(MOST_STACKS) {
-        findings.error(Some(beyond.span().start), "measured", format!("more than {MOST_STACKS}"));
-    }
-    for table in tables.iter().take(MOST_STACKS) {
-        measured(table.get_ref(), folder, wanted, findings);
+    let mut named: Vec<String> = Vec::new();
+    for (tables, word) in [(measured, "measured"), (predicted, "predicted")] {
+        if let Some(beyond) = tables.get(MOST_STACKS) {
+            findings.error(Some(beyond.span().start), word, format!("more than {MOST_STACKS}"));
+        }
+        for table in tables.iter().take(MOST_STACKS) {
+            given(table.get_ref(), word, folder, wanted, findings);
+        }
+        named.extend(tables.iter().map(|table| table.get_ref().curve.get_ref().clone()));
     }
     if let Some(folder) = folder {
-        let named: Vec<String> = tables.iter().map(|table| table.get_ref().curve.get_ref().clone()).collect();
         unused_curves(folder, &named, findings);
     }
 }
@@ -264,6 +268,7 @@ fn finish(parts: Parts, wanted: Vec<Listing>, findings: &mut Findings) -> Option
         cartridges,
         rules,
         entries,
+        trust: Trust::All,
     })
 }
 
@@ -375,19 +380,20 @@ fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut 
     }
 }
 
-/// Reads a measured curve and assigns it to its stack, which is appended to the list if it is new.
-fn measured(
+/// Reads a `measured` or `predicted` curve and assigns it to its stack, which is appended to the list if it is new.
+fn given(
     table: &MeasuredTable,
+    word: &str,
     folder: Option<&Path>,
     wanted: &mut Vec<Listing>,
     findings: &mut Findings,
 ) {
-    let owner = format!("measured {}", table.stack.get_ref());
+    let owner = format!("{word} {}", table.stack.get_ref());
     let offset = table.stack.span().start;
     let stack = parse_stack(table.stack.get_ref(), &owner, offset, findings);
     for (name, value) in [("by", &table.by), ("when", &table.when), ("setup", &table.setup)] {
         if value.get_ref().trim().is_empty() {
-            let problem = "is empty; a measurement needs who, when and how";
+            let problem = format!("is empty; a {word} curve needs who, when and how");
             findings.error(Some(value.span().start), format!("{owner}.{name}"), problem);
         }
     }
@@ -404,17 +410,22 @@ fn measured(
         }
     };
     let (Some(stack), Some((curve, uncertainty, file))) = (stack, curve) else { return };
-    let provenance = Provenance::Measured {
-        by: table.by.get_ref().clone(),
-        when: table.when.get_ref().clone(),
-        setup: table.setup.get_ref().clone(),
+    let (by, when, setup) =
+        (table.by.get_ref().clone(), table.when.get_ref().clone(), table.setup.get_ref().clone());
+    let provenance = match word {
+        "measured" => Provenance::Measured { by, when, setup },
+        _ => Provenance::Predicted { by, when, setup },
     };
     let place = wanted.iter().position(|want| want.stack == stack).unwrap_or_else(|| {
         wanted.push(Listing { stack, offset: Some(offset), measured: None });
         wanted.len() - 1
     });
-    if wanted[place].measured.is_some() {
-        findings.error(Some(offset), owner, "is measured twice");
+    if let Some(other) = &wanted[place].measured {
+        let problem = match other.provenance.word() {
+            other if other == word => format!("is {word} twice"),
+            other => format!("is {other} as well; a stack has one curve"),
+        };
+        findings.error(Some(offset), owner, problem);
     }
     wanted[place].offset.get_or_insert(offset);
     wanted[place].measured = Some(Measured { curve, uncertainty, provenance, file });
@@ -495,7 +506,7 @@ fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
             line: None,
             field: String::new(),
             severity: Severity::Warning,
-            text: "this curve is not used by any `[[measured]]`".into(),
+            text: "this curve is not used by any `[[measured]]` or `[[predicted]]`".into(),
         });
     }
 }
@@ -520,7 +531,9 @@ fn entry(
     let field = format!("stack {stack}");
     let (curve, uncertainty, lobes, provenance) = match measured {
         Some(Measured { curve, uncertainty, provenance, file }) => {
-            judge::curve(&stack, &file, &curve, uncertainty.as_ref(), findings);
+            if provenance.is_measured() {
+                judge::curve(&stack, &file, &curve, uncertainty.as_ref(), findings);
+            }
             (curve, uncertainty, None, provenance)
         }
         None => match optics.lobes(&stack) {

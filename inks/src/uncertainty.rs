@@ -24,6 +24,8 @@ pub enum SampleKind {
     Clipped,
     /// From the samples beside it.
     Extrapolated,
+    /// From other stacks, or from readings of gloss and colour.
+    Predicted,
 }
 
 /// Standard deviations of a curve's samples, in 1/sr, at their half angles.
@@ -103,11 +105,11 @@ impl Uncertainty {
         std::array::from_fn(|c| self.sigma[above - 1][c] * (1.0 - part) + self.sigma[above][c] * part)
     }
 
-    /// Whether the samples on both sides of an angle in radians were seen.
+    /// Whether the samples on both sides of an angle in radians were seen, or predicted.
     pub fn is_measured(&self, theta: f64) -> bool {
         let above = self.theta.partition_point(|&t| t < theta);
         let inside = above < self.theta.len() && (above > 0 || self.theta[0] == theta);
-        let seen = |i: usize| self.kinds[i] == SampleKind::Measured;
+        let seen = |i: usize| matches!(self.kinds[i], SampleKind::Measured | SampleKind::Predicted);
         inside && seen(above) && (above == 0 || self.theta[above] == theta || seen(above - 1))
     }
 }

@@ -441,6 +441,10 @@ fn files_of_the_examples(desk: &Desk) {
     }
     copy(&folder.join("docs/guide/decal"), &folder.join("decal"));
     copy(&root().join("inks/library"), &folder.join("my-library"));
+    copy(&folder.join("docs/guide/few-stacks"), &folder.join("mine"));
+    fs::copy(folder.join("docs/guide/readings/k.toml"), folder.join("k.toml")).unwrap();
+    fs::write(folder.join("p-sf.brdf"), "3 430 550 650\n0.2 0 0.3 3 0.2 0.2 0.2\n0.8 0 0.6 1 0.1 0.1 0.1\n")
+        .unwrap();
     fs::copy(folder.join("docs/guide/reserved/art.png"), folder.join("art.png")).unwrap();
     image::open(folder.join("docs/pictures/leaf-sheet.jpg")).unwrap().save(folder.join("photo.png")).unwrap();
     fs::write(folder.join("art.svg"), DRAWING).unwrap();

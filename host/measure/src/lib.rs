@@ -4,6 +4,7 @@
 //! out how the exposures compare; [`merge`] makes one picture of radiance from them; [`card`] finds the grey card and gives
 //! radiance its scale; [`geometry`] gives every pixel its half angle and irradiance, and `solve` corrects what was measured with a
 //! tape; [`reduce`] makes curves; [`library`] writes them; [`report`] shows them. [`measure()`] is all of it.
+//! [`readings`] makes a curve from a gloss meter and a spectrophotometer instead.
 #![forbid(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,
@@ -28,6 +29,7 @@ pub mod merge;
 pub mod photo;
 mod pictures;
 mod probe;
+pub mod readings;
 pub mod reduce;
 pub mod report;
 mod response;

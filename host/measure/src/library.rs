@@ -16,12 +16,12 @@ pub const FIGURES: &str = "measurement.json";
 const MOST_BYTES: u64 = 64 << 20;
 
 /// The name of a stack's curve file.
-fn curve_name(stack: &str) -> String {
+pub fn curve_name(stack: &str) -> String {
     format!("{}.csv", stack.to_lowercase().replace('+', "-"))
 }
 
 /// A string of TOML.
-fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 

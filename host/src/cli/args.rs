@@ -4,22 +4,22 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use inks::{InkSet, Library};
+use inks::{InkSet, Library, Trust};
 
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
-use super::choice::{Metric, choice};
+use super::choice::{Metric, choice, name};
 use crate::libraries;
 use observe::Observer;
 
 /// What to read.
 #[derive(Args, Debug)]
 pub struct DocumentArgs {
-    /// Document: a folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .csv), a .foil
-    /// folder, or sample:NAME
+    /// Document: a folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
+    /// .foil folder, or sample:NAME
     #[arg(value_name = "DOC")]
     pub document: String,
     /// Material of a glTF file, by number (from 0) or name [default: the only one]
@@ -93,7 +93,7 @@ impl FactorArgs {
 }
 
 /// What to print with.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct InkArgs {
     /// Inks to print with: names and the groups process, metallic, clear, foil, default, all, separated by commas; a
     /// leading - removes one from the default [default: all but the foils]
@@ -103,13 +103,30 @@ pub struct InkArgs {
     /// library]
     #[arg(long, value_name = "LIBRARY")]
     pub library: Option<PathBuf>,
+    /// Curves of the library to rely on; stacks with other curves are not printed. Bare paper is always there
+    #[arg(long, value_name = "CURVES", default_value = "all", value_parser = choice::<Trust>())]
+    pub trust: Trust,
 }
 
 impl InkArgs {
+    /// These inks of this library, whatever the origin of its curves.
+    pub fn of(inks: Option<String>, library: Option<PathBuf>) -> InkArgs {
+        InkArgs { inks, library, trust: Trust::All }
+    }
+
     /// The inks to print with and the library, which has at least one stack of them.
     pub fn at_hand(&self) -> Result<(InkSet, Library)> {
         let (set, library) = (self.set()?, self.library()?);
-        if library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty()) {
+        let none =
+            |library: &Library| library.at_hand(&set).iter().all(|entry| entry.stack.layers().is_empty());
+        if self.trust != Trust::All && none(&library) && !none(&library.clone().trusting(Trust::All)) {
+            bail!(
+                "--trust {}: the library has no such curve of a stack made only of {set}; `foilpress inks list` says where each \
+                 curve comes from",
+                name(self.trust)
+            );
+        }
+        if none(&library) {
             bail!(
                 "--inks: the library has no stack made only of {set}; `foilpress inks list` shows the stacks it has"
             );
@@ -128,9 +145,9 @@ impl InkArgs {
         Ok(set)
     }
 
-    /// The library.
+    /// The library, trusted as far as was asked.
     pub fn library(&self) -> Result<Library> {
-        libraries::given(self.library.as_deref())
+        Ok(libraries::given(self.library.as_deref())?.trusting(self.trust))
     }
 }
 

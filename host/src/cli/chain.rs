@@ -149,7 +149,7 @@ pub struct Halftone {
 impl Halftone {
     /// Mixtures → one stack for every dot.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
+        let library = InkArgs::of(None, self.library.clone()).library()?;
         let (mix, provenance) = gamut::files::load(&self.mix)?;
         let pixels = (mix.maps.width(), mix.maps.height());
         // Whether it fits its paper is the layout's business; only the largest sheet is a limit here.
@@ -216,7 +216,7 @@ pub struct Separate {
 impl Separate {
     /// A page → one-bit passes.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
+        let library = InkArgs::of(None, self.library.clone()).library()?;
         let layout::Arranged { sheet, laid } = layout::Arranged::load(&self.sheet)?;
         let staged = Staged::folder(&named(&self.output, &self.sheet, "passes"), Kind::Passes)?;
         let separation = pipeline::separate_page(&sheet, &laid, &library, observer)?;

@@ -155,7 +155,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             step.run("halftone", make, [first, second], observer)
         }
         Chart::Stacks(stacks) => {
-            let usual = InkArgs { inks: Some(USUAL.into()), library: stacks.inks.library.clone() };
+            let usual = InkArgs { inks: Some(USUAL.into()), ..stacks.inks.clone() };
             let (set, library) = if stacks.inks.inks.is_some() { &stacks.inks } else { &usual }.at_hand()?;
             if set.len() > MOST_CARTRIDGES {
                 bail!(
@@ -214,7 +214,7 @@ impl StepArgs {
         [first, second]: [&Stack; 2],
         observer: &dyn Observer,
     ) -> Result<()> {
-        let library = InkArgs { inks: None, library: self.library.clone() }.library()?;
+        let library = InkArgs::of(None, self.library.clone()).library()?;
         let dots = make(&library)?;
         let name = format!("{name} {first} {second}");
         // Who names a foil wants it.

@@ -4,6 +4,7 @@ use appearance::document::ColourSpace;
 use appearance::factor::Method;
 use appearance::gamut::{self, Intent};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use inks::Trust;
 use press::layers::{Accept, Finish, White};
 
 /// An enum whose values have names on the command line.
@@ -78,6 +79,14 @@ impl Choice for Metric {
     const ALL: &'static [(Metric, &'static str, &'static str)] = &[
         (Metric::Light, "light", "Distance d and how much light is returned: metals shine"),
         (Metric::Paper, "paper", "Distance d alone, as in the 2009 paper"),
+    ];
+}
+
+impl Choice for Trust {
+    const ALL: &'static [(Trust, &'static str, &'static str)] = &[
+        (Trust::All, "all", "Every curve of the library, modelled ones too"),
+        (Trust::Predicted, "predicted", "Curves that were measured, and those predicted from measurements"),
+        (Trust::Measured, "measured", "Curves that were measured, and no others"),
     ];
 }
 

@@ -101,7 +101,7 @@ pub struct Args {
     /// Multiply the base colour by this factor (0 to 20), as far as no channel returns more light than it receives
     #[arg(long, value_name = "FACTOR")]
     albedo: Option<f64>,
-    /// Replace basis N by a measured material (.binary, .bsdf, .csv), or by a basis of another document (other.foil:2)
+    /// Replace basis N by a measured material (.binary, .bsdf, .brdf, .csv), or by a basis of another document (other.foil:2)
     #[arg(long, value_name = "N=DOC", conflicts_with_all = ["basis", "rougher", "glossier", "tint", "albedo", "swap", "mix"])]
     replace: Option<Replacing>,
     /// Let two bases change places

@@ -3,8 +3,10 @@
 
 mod choose;
 mod diff;
+mod from;
 mod gamut;
 mod page;
+mod predict;
 mod share;
 
 use std::fmt::Write as _;
@@ -12,7 +14,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use inks::{Entry, InkSet, Library, Provenance, Severity, Source, Stack};
+use inks::{Entry, InkSet, Library, Origins, Provenance, Severity, Source, Stack};
 use protocol::ink::Ink;
 use serde::Serialize;
 
@@ -28,6 +30,7 @@ use observe::Observer;
     foilpress inks list --inks process,metallic-silver\n  \
     foilpress inks show MS+C --figures                   (with the figures behind its curve)\n  \
     foilpress inks check my-library/                     (before it is used with --library)\n  \
+    foilpress inks predict mine/ -o full/                (the other stacks, from those measured)\n  \
     foilpress inks diff builtin my-library/ -o diff.html\n  \
     foilpress inks choose my-material/ --cartridges 4")]
 pub struct Args {
@@ -65,6 +68,13 @@ enum What {
         #[arg(long, value_name = "FILE.svg")]
         plot: Option<PathBuf>,
     },
+    /// Add a curve from another instrument to a library: a goniometer, a gloss meter with a spectrophotometer
+    From(from::Args),
+    /// Predict the stacks that were not measured from those that were
+    ///
+    /// The figures of the layer model are fitted to all measured curves. A stack is predicted if each of its inks is in a measured
+    /// stack. Each measured stack is also predicted from the others alone, which shows how far predictions are off.
+    Predict(predict::Args),
     /// Check a library and list every problem with its file, line and field
     ///
     /// Errors make a library unusable: files that cannot be read, stacks that reflect more light than arrives. Warnings doubt a
@@ -151,6 +161,8 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
             (text, Ok(()))
         }
         What::Check { dir, json } => check(&libraries::folder(&dir)?, json)?,
+        What::From(args) => (from::run(&args, observer)?, Ok(())),
+        What::Predict(args) => (predict::run(&args, observer)?, Ok(())),
         What::Diff(args) => (diff::run(&args)?, Ok(())),
         What::Choose(args) => (choose::run(&args, observer)?, Ok(())),
         What::Gamut(args) => (gamut::run(&args, observer)?, Ok(())),
@@ -255,13 +267,8 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
             library.words(&entry.stack)
         )?;
     }
-    let measured = entries.iter().filter(|entry| entry.provenance.is_measured()).count();
-    writeln!(
-        text,
-        "\n{} stacks, {measured} measured, {} modelled. f is the luminance of the reflectance, in 1/sr.",
-        entries.len(),
-        entries.len() - measured
-    )?;
+    let origins = Origins::of(entries.iter().copied());
+    writeln!(text, "\n{origins}. f is the luminance of the reflectance, in 1/sr.")?;
     Ok(text)
 }
 
@@ -313,6 +320,9 @@ fn curve_lines(entry: &Entry) -> Vec<String> {
         Provenance::Measured { by, when, setup } => {
             lines.push(format!("curve     measured by {by}, {when}: {setup}"));
         }
+        Provenance::Predicted { by, when, setup } => {
+            lines.push(format!("curve     predicted from measurements by {by}, {when}: {setup}"));
+        }
     }
     if let Some(lobes) = &entry.lobes {
         let rgb = |v: [f64; 3]| format!("{:.3} {:.3} {:.3}", v[0], v[1], v[2]);
@@ -354,6 +364,9 @@ fn check(dir: &Path, json: bool) -> anyhow::Result<(String, anyhow::Result<()>)>
     let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
     let count = |severity| problems.iter().filter(|problem| problem.severity == severity).count();
     let (errors, warnings, notes) = (count(Severity::Error), count(Severity::Warning), count(Severity::Note));
+    if let Ok(library) = Library::from_dir(dir) {
+        text.push_str(&format!("{}: {}\n", dir.display(), library.origins()));
+    }
     let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
     text.push_str(&format!(
         "{}: {}, {}, {}\n",
@@ -403,9 +416,9 @@ mod tests {
         for entry in library.entries() {
             assert!(text.lines().any(|line| line.contains(&format!(" {} ", entry.stack))), "{}", entry.stack);
         }
-        assert!(text.contains("57 stacks, 0 measured, 57 modelled"));
+        assert!(text.contains("57 stacks: 0 measured, 57 modelled"));
         let few = list(&library, Some("process".parse().unwrap()), false).unwrap();
-        assert!(few.contains("\n9 stacks"), "{few}");
+        assert!(few.contains("\n9 stacks: "), "{few}");
     }
 
     #[test]

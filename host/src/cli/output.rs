@@ -41,6 +41,8 @@ pub enum Kind {
     Pictures,
     /// Curves from photographs.
     Measured,
+    /// A library with predicted curves.
+    Predicted,
     /// A sample's maps, which the user may have painted in since: never replaced.
     Maps,
 }
@@ -56,6 +58,7 @@ impl Kind {
             Kind::Sheet => Some("sheet.toml"),
             Kind::Passes => Some("passes.toml"),
             Kind::Measured => Some(measure::library::FIGURES),
+            Kind::Predicted => Some(inks::archive::PREDICTION),
             Kind::Pictures | Kind::Maps => None,
         }
     }
@@ -85,6 +88,9 @@ impl Kind {
                     [inks::FILE_NAME, "report.html"].contains(&name)
                         || name.ends_with(".csv")
                         || (["mask-", "residuals-"].iter().any(|start| name.starts_with(start)) && picture(name))
+                }
+                Kind::Predicted => {
+                    name == inks::FILE_NAME || inks::archive::BESIDE.contains(&name) || name.ends_with(".csv")
                 }
                 Kind::Maps => false,
             }

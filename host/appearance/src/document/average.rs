@@ -12,7 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use inks::Curve;
 
 /// The range of theta_d that is averaged, in degrees.
-const THETA_D: (f64, f64) = (2.5, 57.5);
+pub const THETA_D: (f64, f64) = (2.5, 57.5);
 
 /// A direction, with z along the normal.
 pub type Direction = [f64; 3];

@@ -11,7 +11,7 @@ use crate::brdf::Space;
 use crate::materials::Uniform;
 
 /// The longest curve file, in bytes.
-const MOST_BYTES: u64 = 16 << 20;
+pub(super) const MOST_BYTES: u64 = 16 << 20;
 
 /// Opens a curve file.
 pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {

@@ -23,10 +23,20 @@ pub enum DocumentError {
     /// The path is not a kind of document.
     #[error(
         "{}: unknown kind of document; expected a folder of texture maps, a factored document, a .gltf, .glb, \
-         MERL .binary, RGL .bsdf or curve .csv file, or `sample:NAME`",
+         MERL .binary, RGL .bsdf, goniometer .brdf or curve .csv file, or `sample:NAME`",
         path.display()
     )]
     Kind {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is not a measured BRDF.
+    #[error(
+        "{}: unknown kind of measurement; expected a MERL .binary, RGL .bsdf, goniometer .brdf or curve .csv file, or \
+         readings of gloss and colour in a .toml file",
+        path.display()
+    )]
+    NotMeasured {
         /// The file.
         path: PathBuf,
     },

@@ -114,6 +114,8 @@ fn victims() -> Vec<Victim> {
     };
     let mut merl: Vec<u8> = [3i32, 30, 4].iter().flat_map(|d| d.to_le_bytes()).collect();
     merl.extend((0..3 * 360).flat_map(|i| f64::from(i).to_le_bytes()));
+    let gonio_lines: String =
+        gonio::tests::table(|h, _| 0.1 + h).lines().take(120).map(|line| format!("{line}\n")).collect();
     let bsdf = rgl::tests::tensor_file(&[
         ("theta_i", vec![2], vec![0.0, 1.5]),
         ("phi_i", vec![1], vec![0.0]),
@@ -137,6 +139,7 @@ fn victims() -> Vec<Victim> {
         single("a.csv", b"theta_h_deg,r,g,b\n0,1,1,1\n45,0.5,0.5,0.5\n90,0,0,0\n".to_vec()),
         single("a.binary", merl),
         single("a.bsdf", bsdf),
+        single("a.brdf", gonio_lines.into_bytes()),
         single("inline.gltf", inline.into_bytes()),
         beside("a.gltf"),
         beside("map one.png"),

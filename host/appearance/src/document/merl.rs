@@ -22,8 +22,11 @@ const MOST_CELLS: u64 = 1 << 24;
 
 const HEADER: usize = 12;
 
+/// The largest file, in bytes.
+pub(super) const MOST_BYTES: u64 = HEADER as u64 + 24 * MOST_CELLS;
+
 pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
-    let bytes = source.read(path, HEADER as u64 + 24 * MOST_CELLS)?;
+    let bytes = source.read(path, MOST_BYTES)?;
     let averaged = parse(&bytes, path)?;
     source.note(
         "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),

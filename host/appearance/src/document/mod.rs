@@ -12,6 +12,7 @@ mod error;
 pub mod foil;
 mod folder;
 mod gltf;
+mod gonio;
 #[cfg(test)]
 mod hostile;
 mod merl;
@@ -22,12 +23,13 @@ mod relief;
 mod rgl;
 mod sample;
 pub(crate) mod source;
+mod spectrum;
 mod tensor;
 mod texture;
 
 pub use content::{ColourSpace, Content, Document, Options, SAMPLES};
 pub use error::DocumentError;
-pub use open::open;
+pub use open::{measured, open};
 pub use sample::write_sample;
 
 pub use crate::materials::{Materials, Surface};

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
+use inks::Curve;
 use observe::Observer;
 
 use super::content::{Document, Options};
 use super::error::DocumentError;
-use super::source::Source;
-use super::{curve, foil, folder, gltf, merl, rgl, sample};
+use super::source::{MOST_BYTES, Source};
+use super::{curve, foil, folder, gltf, gonio, merl, rgl, sample};
 use crate::brdf::Space;
 
 /// Opens a document: a path, or `sample:NAME`.
@@ -42,10 +43,33 @@ pub fn open(spec: &str, options: &Options, observer: &dyn Observer) -> Result<Do
     note_unused_choice(options, &mut source);
     match extension.as_str() {
         "binary" => merl::open(path, space, source),
+        "brdf" => gonio::open(path, space, source),
         "csv" => curve::open(path, space, source),
         _ => Err(DocumentError::Kind { path: path.to_path_buf() }),
     }
 }
+
+/// The curve of a measured BRDF, as its file has it: MERL `.binary`, RGL `.bsdf`, a goniometer's `.brdf`, or a curve's `.csv`.
+///
+/// # Errors
+/// Files of another kind, and damage, with its place.
+pub fn measured(path: &Path, observer: &dyn Observer) -> Result<Curve, DocumentError> {
+    let mut source = Source::new(observer);
+    let head = source.head(path)?;
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let kind = if head.starts_with(b"tensor_file\0") { "bsdf" } else { &extension };
+    let (most, parse): (u64, Parser) = match kind {
+        "bsdf" => (MOST_BYTES, rgl::parse),
+        "binary" => (merl::MOST_BYTES, merl::parse),
+        "brdf" => (gonio::MOST_BYTES, gonio::parse),
+        "csv" => (curve::MOST_BYTES, |bytes, path| Ok(Curve::from_csv(bytes, path)?)),
+        _ => return Err(DocumentError::NotMeasured { path: path.to_path_buf() }),
+    };
+    parse(&source.read(path, most)?, path)
+}
+
+/// Reads a curve from a file's bytes.
+type Parser = fn(&[u8], &Path) -> Result<Curve, DocumentError>;
 
 /// Notes that the choice of a material has no effect.
 fn note_unused_choice(options: &Options, source: &mut Source<'_>) {

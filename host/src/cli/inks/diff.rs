@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use appearance::brdf::{Difference, Space, compare, plot};
-use inks::{Entry, Library, Stack};
+use inks::{Entry, Library, Origins, Stack};
 use press::job::page::escape;
 use serde::Serialize;
 
@@ -78,6 +78,9 @@ impl Row<'_> {
 struct Report<'a> {
     first: &'a str,
     second: &'a str,
+    /// How many curves of each are measured, predicted and modelled.
+    #[serde(skip)]
+    origins: [Origins; 2],
     stacks: &'a [Row<'a>],
     only_first: Vec<&'a Stack>,
     only_second: Vec<&'a Stack>,
@@ -104,6 +107,7 @@ pub fn run(args: &Args) -> Result<String> {
     let report = Report {
         first: first.name(),
         second: second.name(),
+        origins: [first.origins(), second.origins()],
         stacks: &rows,
         only_first: only(&first, &second),
         only_second: only(&second, &first),
@@ -126,7 +130,10 @@ fn listed(stacks: &[&Stack]) -> String {
 }
 
 fn words(report: &Report<'_>) -> Result<String> {
-    let mut text = format!("first:  {}\nsecond: {}\n\n", report.first, report.second);
+    let mut text = format!(
+        "first:  {}\n        {}\nsecond: {}\n        {}\n\n",
+        report.first, report.origins[0], report.second, report.origins[1]
+    );
     let differ: Vec<_> = report.stacks.iter().filter(|row| !row.is_equal()).collect();
     if !differ.is_empty() {
         writeln!(text, "{:<10} {:>7} {:>7}  {:<28} verdict", "stack", "d", "band", "largest difference")?;
@@ -162,10 +169,12 @@ fn words(report: &Report<'_>) -> Result<String> {
 
 fn write_page(target: &Path, report: &Report<'_>) -> Result<()> {
     let mut body = format!(
-        "<p>Lines: {}. Dashed: {}. Bands are two standard deviations.</p><table><tr><th>stack<th class=n>d\
+        "<p>Lines: {} ({}). Dashed: {} ({}). Bands are two standard deviations.</p><table><tr><th>stack<th class=n>d\
          <th class=n>light<th class=n>band<th>largest difference<th>verdict",
         escape(report.first),
-        escape(report.second)
+        report.origins[0],
+        escape(report.second),
+        report.origins[1]
     );
     let differ = || report.stacks.iter().filter(|row| !row.is_equal());
     for row in differ() {

@@ -57,7 +57,7 @@ struct Basis {
 
 /// Runs `inks gamut`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
-    let inks = InkArgs { inks: args.inks.clone(), library: Some(args.library.clone()) };
+    let inks = InkArgs::of(args.inks.clone(), Some(args.library.clone()));
     let (set, library) = inks.at_hand()?;
     let opening = DocumentArgs {
         document: args.document.clone(),

@@ -11,6 +11,12 @@ const STYLE: &str = "body{font:15px/1.45 sans-serif;color:#111;max-width:1000px;
     h2{font-size:1.15em;margin:1.6em 0 .3em}table{border-collapse:collapse}th,td{text-align:left;padding:.15em .8em;\
     border-bottom:1px solid #ccc}td.n,th.n{text-align:right}svg{max-width:100%;height:auto}";
 
+/// The name of a file without what a terminal could take for a command.
+pub fn file_name_of(path: &Path) -> String {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    name.chars().filter(|c| !c.is_control()).collect()
+}
+
 /// Writes a page with this title and body; the body is HTML already.
 pub fn write(target: &Path, title: &str, body: &str) -> Result<()> {
     let title = escape(title);

@@ -20,18 +20,13 @@ fn suggested(path: &Path, name: Option<String>) -> String {
     name.unwrap_or_else(|| own(path))
 }
 
-fn counted(library: &Library) -> String {
-    let measured = library.entries().iter().filter(|entry| entry.provenance.is_measured()).count();
-    format!("{} stacks, {measured} of them measured", library.entries().len())
-}
-
 fn installed(name: &str, members: &[archive::Member], from: &Path) -> Result<String> {
     let (folder, library) =
         libraries::install(name, members).with_context(|| format!("{}", from.display()))?;
     let licence = library.licence().map_or_else(String::new, |licence| format!(", licence {licence}"));
     Ok(format!(
         "{name}: {}{licence}\nin {}\nUse it with --library {name}\n",
-        counted(&library),
+        library.origins(),
         folder.display()
     ))
 }
@@ -60,7 +55,7 @@ pub fn export(spec: &Path, output: Option<&Path>, licence: Option<&str>) -> Resu
         archive::pack(&members, &library, licence).with_context(|| format!("{}", folder.display()))?;
     std::fs::write(staged.path(), &bytes).with_context(|| format!("cannot write {}", output.display()))?;
     staged.commit()?;
-    Ok(format!("{}: {}, {} bytes\n", output.display(), counted(&library), bytes.len()))
+    Ok(format!("{}: {}, {} bytes\n", output.display(), library.origins(), bytes.len()))
 }
 
 /// Makes the library in an archive one of the user's own.

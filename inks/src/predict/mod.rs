@@ -1,0 +1,417 @@
+//! Stacks that nobody measured, from those that were.
+//!
+//! Problem: twelve ribbons make some dozens of stacks, and an owner measures a handful. What they reflect says what their inks do, and
+//! the inks what the other stacks reflect.
+//! Method: the figures of the layer model ([`crate::model`]) are fitted to all measured curves at once. Residuals are differences of logarithms, so
+//! that a foil's peak and its body count alike; each is weighed by the measurement's standard deviation and by what the model itself
+//! may be off. The library's own figures are priors. A stack is predicted if each of its inks was measured, alone or in
+//! another stack. Each measured stack is also predicted from the others alone: the difference is the leave-one-out error. The band of a
+//! prediction is the spread that the fit leaves to its figures, together with what those errors exceed such spreads by.
+//! Cost: about a second for twenty stacks, most of it leaving out. Limits: what the model cannot express (trapping, grazing angles,
+//! lobes that are not GGX) shows in the leave-one-out error, not in the figures.
+
+mod figures;
+mod least_squares;
+
+use std::f64::consts::FRAC_PI_2;
+
+use serde::Serialize;
+
+use self::figures::Slot;
+use self::least_squares::{Factor, Matrix, Normal};
+use crate::curve::Curve;
+use crate::library::Library;
+use crate::model::{ModelError, Optics};
+use crate::stack::Stack;
+use crate::uncertainty::SampleKind;
+
+/// Half angle in radians beyond which curves are not compared: 80 degrees. Lobes grow as 1 / cos there, and few cameras see it.
+const WIDEST: f64 = 1.396;
+/// The most samples of a curve that are compared.
+const MOST_SAMPLES: usize = 48;
+/// Reflectance, in 1/sr, below which differences do not matter.
+const FLOOR: f64 = 1e-4;
+/// What the model may be off, as a share.
+const MISFIT: f64 = 0.03;
+/// What it may be off where nothing could be left out to test it.
+const UNTESTED: f64 = 0.25;
+/// The step of a logarithm for derivatives by central differences.
+const STEP: f64 = 1e-4;
+/// Samples of a predicted curve.
+const SAMPLES: u32 = 64;
+
+/// Why nothing can be predicted.
+#[derive(Debug, thiserror::Error)]
+pub enum PredictError {
+    /// No curve of the library is a measurement.
+    #[error(
+        "the library has no measured curve, so there is nothing to predict from; `foilpress measure` makes some"
+    )]
+    NothingMeasured,
+    /// The measured stacks hold inks without a model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The equations of the fit have no solution.
+    #[error(
+        "the measured curves do not determine the figures of the model; check them with `foilpress inks check`"
+    )]
+    Singular,
+}
+
+/// A measured curve at the angles at which it is compared.
+#[derive(Clone, Debug)]
+struct Data {
+    stack: Stack,
+    theta: Vec<f64>,
+    /// Logarithms of the reflectance.
+    log: Vec<[f64; 3]>,
+    /// Their standard deviations.
+    sigma: Vec<[f64; 3]>,
+}
+
+fn log(rgb: [f64; 3]) -> [f64; 3] {
+    rgb.map(|v| (v.max(0.0) + FLOOR).ln())
+}
+
+/// The measured curves of a library.
+fn measured(library: &Library) -> Vec<Data> {
+    let entries = library.entries().iter().filter(|entry| entry.provenance.is_measured());
+    entries
+        .map(|entry| {
+            let curve = &entry.curve;
+            let seen = |&i: &usize| {
+                curve.theta()[i] <= WIDEST
+                    && entry.uncertainty.as_ref().is_none_or(|u| u.kinds()[i] == SampleKind::Measured)
+            };
+            let seen: Vec<usize> = (0..curve.theta().len()).filter(seen).collect();
+            let every = seen.len().div_ceil(MOST_SAMPLES).max(1);
+            let mut data =
+                Data { stack: entry.stack.clone(), theta: Vec::new(), log: Vec::new(), sigma: Vec::new() };
+            for i in seen.into_iter().step_by(every) {
+                let rgb = curve.rgb()[i];
+                let stated = entry.uncertainty.as_ref().map_or([0.0; 3], |u| u.sigma()[i]);
+                data.theta.push(curve.theta()[i]);
+                data.log.push(log(rgb));
+                data.sigma.push(std::array::from_fn(|c| MISFIT.hypot(stated[c] / (rgb[c] + FLOOR))));
+            }
+            data
+        })
+        .collect()
+}
+
+/// The logarithms of what a stack reflects.
+fn modelled(optics: &Optics, stack: &Stack, theta: &[f64]) -> Result<Vec<[f64; 3]>, ModelError> {
+    let lobes = optics.lobes(stack)?;
+    Ok(theta.iter().map(|&t| log(lobes.at(t))).collect())
+}
+
+/// The figures of a model, fitted to curves.
+struct Fitted {
+    optics: Optics,
+    slots: Vec<Slot>,
+    x: Vec<f64>,
+    factor: Factor,
+    /// The factor on all standard deviations that the residuals ask for, at least 1.
+    scale: f64,
+}
+
+/// Fits the figures that these curves depend on. `from` are the library's own, which are the priors as well; `start` is
+/// where the search begins.
+fn fit(from: &Optics, data: &[&Data], start: Option<&Fitted>) -> Result<Fitted, PredictError> {
+    let mut optics = figures::prepared(from);
+    let mut inks: Vec<_> = data.iter().flat_map(|d| figures::inks_of(from, &d.stack)).collect();
+    inks.sort_unstable();
+    inks.dedup();
+    let slots = figures::slots(&mut optics, &inks);
+    for d in data {
+        optics.lobes(&d.stack)?;
+    }
+    let values: Vec<f64> = slots.iter().map(|slot| slot.get(&mut optics).unwrap_or(1.0)).collect();
+    let bounds: Vec<[f64; 2]> = slots.iter().map(|slot| slot.range().map(f64::ln)).collect();
+    let prior: Vec<f64> = values.iter().map(|v| v.max(1e-12).ln()).collect();
+    let spread: Vec<f64> = slots.iter().zip(&values).map(|(slot, &v)| slot.spread(v)).collect();
+    let known = |slot: &Slot| start.and_then(|s| s.slots.iter().position(|k| k == slot).map(|i| s.x[i]));
+    let x: Vec<f64> = slots.iter().zip(&prior).map(|(slot, &p)| known(slot).unwrap_or(p)).collect();
+    // The numbers that each curve depends on.
+    let active: Vec<Vec<usize>> = data.iter().map(|d| depends(from, &slots, &d.stack)).collect();
+    let priors = |x: &[f64]| -> f64 { (0..x.len()).map(|i| ((x[i] - prior[i]) / spread[i]).powi(2)).sum() };
+    let cost = |x: &[f64]| {
+        let mut optics = optics.clone();
+        put(&mut optics, &slots, x);
+        let of = |d: &&Data| residuals(&optics, d).map_or(f64::INFINITY, |r| r.iter().map(|r| r * r).sum());
+        0.5 * (priors(x) + data.iter().map(of).sum::<f64>())
+    };
+    let normal = |x: &[f64]| {
+        let mut optics = optics.clone();
+        put(&mut optics, &slots, x);
+        let n = x.len();
+        let mut found = Normal { cost: 0.5 * priors(x), gradient: vec![0.0; n], curvature: Matrix::zero(n) };
+        for i in 0..n {
+            found.gradient[i] = (x[i] - prior[i]) / spread[i].powi(2);
+            *found.curvature.at_mut(i, i) = spread[i].powi(-2);
+        }
+        for (d, active) in data.iter().zip(&active) {
+            let Ok(r) = residuals(&optics, d) else { continue };
+            found.cost += 0.5 * r.iter().map(|r| r * r).sum::<f64>();
+            let weights: Vec<f64> = d.sigma.iter().flatten().map(|s| 1.0 / s).collect();
+            let columns: Vec<Vec<f64>> = active
+                .iter()
+                .map(|&i| {
+                    let slope = slopes(&mut optics, slots[i], x[i], &d.stack, &d.theta);
+                    slope.iter().flatten().zip(&weights).map(|(s, w)| s * w).collect()
+                })
+                .collect();
+            for (a, &i) in active.iter().enumerate() {
+                found.gradient[i] += dot(&columns[a], &r);
+                for (b, &j) in active.iter().enumerate().take(a + 1) {
+                    let product = dot(&columns[a], &columns[b]);
+                    *found.curvature.at_mut(i, j) += product;
+                    if i != j {
+                        *found.curvature.at_mut(j, i) += product;
+                    }
+                }
+            }
+        }
+        found
+    };
+    let (x, last) = least_squares::minimise(x, &bounds, normal, cost);
+    let factor = last.curvature.factor().ok_or(PredictError::Singular)?;
+    let count: usize = data.iter().map(|d| 3 * d.theta.len()).sum();
+    let freedom = count.saturating_sub(slots.len()).max(1);
+    let scale = (2.0 * last.cost / freedom as f64).sqrt().max(1.0);
+    put(&mut optics, &slots, &x);
+    Ok(Fitted { optics, slots, x, factor, scale })
+}
+
+/// The numbers that the curve of a stack depends on, by their place in the list.
+fn depends(optics: &Optics, slots: &[Slot], stack: &Stack) -> Vec<usize> {
+    let inks = figures::inks_of(optics, stack);
+    (0..slots.len()).filter(|&i| slots[i].ink().is_none_or(|ink| inks.contains(&ink))).collect()
+}
+
+fn put(optics: &mut Optics, slots: &[Slot], x: &[f64]) {
+    for (slot, x) in slots.iter().zip(x) {
+        slot.set(optics, x.exp());
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Differences of logarithms between model and measurement, in standard deviations.
+fn residuals(optics: &Optics, data: &Data) -> Result<Vec<f64>, ModelError> {
+    let model = modelled(optics, &data.stack, &data.theta)?;
+    let all = model.iter().zip(&data.log).zip(&data.sigma);
+    Ok(all.flat_map(|((m, f), s)| (0..3).map(move |c| (m[c] - f[c]) / s[c])).collect())
+}
+
+/// The derivative of the logarithm of a stack's curve by the logarithm of a number whose logarithm is `x`.
+fn slopes(optics: &mut Optics, slot: Slot, x: f64, stack: &Stack, theta: &[f64]) -> Vec<[f64; 3]> {
+    let mut at = |x: f64| {
+        slot.set(optics, x.exp());
+        modelled(optics, stack, theta)
+    };
+    let both = (at(x + STEP), at(x - STEP));
+    slot.set(optics, x.exp());
+    let (Ok(above), Ok(below)) = both else { return vec![[0.0; 3]; theta.len()] };
+    let slope = |(a, b): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| (a[c] - b[c]) / (2.0 * STEP));
+    above.iter().zip(&below).map(slope).collect()
+}
+
+/// A number of the model before and after the fit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FittedFigure {
+    /// Its path, such as `metallic-silver.alpha` or `cyan.solid.red`. Colours are linear RGB; a metal's reflectance is a share of
+    /// aluminium's.
+    pub name: String,
+    /// The library's own value.
+    pub before: f64,
+    /// The value that fits the curves.
+    pub value: f64,
+    /// Its standard deviation, as a share of the value.
+    pub uncertainty: f64,
+    /// That of the library's own value.
+    pub uncertainty_before: f64,
+}
+
+/// A measured stack, and how well the model knows it. Errors are root mean squares of relative differences over all samples.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LeftOut {
+    /// The stack.
+    pub stack: Stack,
+    /// Error of the figures of the library that the measured one is based on.
+    pub modelled: f64,
+    /// Error of the figures fitted to all measured stacks.
+    pub fitted: f64,
+    /// Error of the figures fitted to all other measured stacks; none if one of its inks is in no other of them.
+    pub left_out: Option<f64>,
+    /// Its curve as predicted from the others.
+    #[serde(skip)]
+    pub curve: Option<Curve>,
+}
+
+/// A stack as the others predict it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Predicted {
+    /// The stack.
+    pub stack: Stack,
+    /// Its curve.
+    pub curve: Curve,
+    /// The standard deviation of each sample, in 1/sr.
+    pub sigma: Vec<[f64; 3]>,
+    /// The measured stacks that share an ink with it.
+    pub from: Vec<Stack>,
+}
+
+/// What measured curves say about the others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// The name of the model.
+    pub model: String,
+    /// Its figures.
+    pub figures: Vec<FittedFigure>,
+    /// The measured stacks.
+    pub measured: Vec<LeftOut>,
+    /// The root mean square of their leave-one-out errors; none if no stack could be left out.
+    pub error: Option<f64>,
+    /// The stacks that could be predicted.
+    pub stacks: Vec<Predicted>,
+    /// Those that could not: an ink in them was not measured.
+    pub unknown: Vec<Stack>,
+}
+
+/// Whether each ink of a stack is in one of the others. The bare paper is what it is.
+fn is_known(optics: &Optics, stack: &Stack, others: &[&Data]) -> bool {
+    let own = |ink| others.iter().any(|d| d.stack.layers().contains(ink));
+    optics.lobes(stack).is_ok() && !stack.layers().is_empty() && stack.layers().iter().all(own)
+}
+
+/// The root mean square of the relative differences between a model and a measurement.
+fn error(optics: &Optics, data: &Data) -> Result<f64, ModelError> {
+    let model = modelled(optics, &data.stack, &data.theta)?;
+    let squares = model.iter().zip(&data.log).flat_map(|(m, f)| (0..3).map(move |c| (m[c] - f[c]).powi(2)));
+    Ok((squares.sum::<f64>() / (3 * data.theta.len()).max(1) as f64).sqrt())
+}
+
+impl Library {
+    /// Predicts the stacks that are modelled from those that were measured. `done` is called after each stack that was left out.
+    ///
+    /// # Errors
+    /// A library without measured curves, and measured stacks of inks that have no model and share none with others.
+    pub fn predict(&self, mut done: impl FnMut()) -> Result<Prediction, PredictError> {
+        let from = self.optics();
+        let mut data = measured(self);
+        // White has no model: its stacks stay as they were measured.
+        data.retain(|d| from.lobes(&d.stack).is_ok() && !d.theta.is_empty());
+        if data.is_empty() {
+            return Err(PredictError::NothingMeasured);
+        }
+        let all: Vec<&Data> = data.iter().collect();
+        let fitted = fit(from, &all, None)?;
+        // What each error exceeds what the fit and the measurement say of themselves.
+        let (mut left, mut excess) = (Vec::with_capacity(all.len()), Vec::new());
+        for d in &all {
+            let others: Vec<&Data> = all.iter().copied().filter(|other| other.stack != d.stack).collect();
+            let known = is_known(from, &d.stack, &others);
+            let without = known.then(|| fit(from, &others, Some(&fitted))).transpose()?;
+            let (left_out, curve) = match &without {
+                None => (None, None),
+                Some(f) => (Some(error(&f.optics, d)?), Some(f.optics.lobes(&d.stack)?.curve(&grid()))),
+            };
+            if let Some((f, off)) = without.as_ref().zip(left_out) {
+                let spread = f.spread(from, &d.stack, &d.theta);
+                let known =
+                    spread.iter().zip(&d.sigma).flat_map(|(a, b)| (0..3).map(|c| a[c] * a[c] + b[c] * b[c]));
+                excess.push((off * off - known.sum::<f64>() / (3 * d.theta.len()) as f64).max(0.0).sqrt());
+            }
+            let (modelled, fitted) = (error(from, d)?, error(&fitted.optics, d)?);
+            left.push(LeftOut { stack: d.stack.clone(), modelled, fitted, left_out, curve });
+            done();
+        }
+        let errors: Vec<f64> = left.iter().filter_map(|l| l.left_out).collect();
+        let mean = |of: &[f64]| (of.iter().map(|e| e * e).sum::<f64>() / of.len() as f64).sqrt();
+        let error = (!errors.is_empty()).then(|| mean(&errors));
+        let misfit = if excess.is_empty() { UNTESTED } else { mean(&excess).max(MISFIT) };
+        let modelled = self.entries().iter().filter(|entry| entry.lobes.is_some());
+        let (known, unknown): (Vec<_>, Vec<_>) = modelled.partition(|e| is_known(from, &e.stack, &all));
+        let stacks = known
+            .into_iter()
+            .map(|entry| fitted.predict(from, &entry.stack, &all, misfit))
+            .collect::<Result<_, _>>()?;
+        Ok(Prediction {
+            model: from.model.name.clone(),
+            figures: fitted.figures(from),
+            measured: left,
+            error,
+            stacks,
+            unknown: unknown.into_iter().map(|entry| entry.stack.clone()).collect(),
+        })
+    }
+}
+
+/// Angles of a predicted curve: the square-root grid from 0 to 87 degrees.
+fn grid() -> Vec<f64> {
+    (0..SAMPLES).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(SAMPLES)).powi(2)).collect()
+}
+
+impl Fitted {
+    /// The standard deviation that the fit leaves to the logarithm of a stack's curve, at these angles.
+    fn spread(&self, from: &Optics, stack: &Stack, theta: &[f64]) -> Vec<[f64; 3]> {
+        let mut optics = self.optics.clone();
+        let active = depends(from, &self.slots, stack);
+        let columns: Vec<Vec<[f64; 3]>> =
+            active.iter().map(|&i| slopes(&mut optics, self.slots[i], self.x[i], stack, theta)).collect();
+        let at = |k: usize, c: usize| {
+            let mut row = vec![0.0; self.x.len()];
+            for (&i, column) in active.iter().zip(&columns) {
+                row[i] = column[k][c];
+            }
+            let y = self.factor.forward(&row);
+            self.scale * dot(&y, &y).sqrt()
+        };
+        (0..theta.len()).map(|k| std::array::from_fn(|c| at(k, c))).collect()
+    }
+
+    /// The curve of a stack and its standard deviations; `misfit` is what the model itself is off, as a share.
+    fn predict(
+        &self,
+        from: &Optics,
+        stack: &Stack,
+        data: &[&Data],
+        misfit: f64,
+    ) -> Result<Predicted, ModelError> {
+        let theta = grid();
+        let curve = self.optics.lobes(stack)?.curve(&theta);
+        let spread = self.spread(from, stack, &theta);
+        let sigma =
+            |(s, v): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| s[c].hypot(misfit) * (v[c] + FLOOR));
+        let sigma = spread.iter().zip(curve.rgb()).map(sigma).collect();
+        let shares = |d: &&&Data| d.stack.layers().iter().any(|ink| stack.layers().contains(ink));
+        let from = data.iter().filter(shares).map(|d| d.stack.clone()).collect();
+        Ok(Predicted { stack: stack.clone(), curve, sigma, from })
+    }
+
+    fn figures(&self, from: &Optics) -> Vec<FittedFigure> {
+        let mut before = figures::prepared(from);
+        let n = self.x.len();
+        (0..n)
+            .map(|i| {
+                let mut unit = vec![0.0; n];
+                unit[i] = 1.0;
+                let y = self.factor.forward(&unit);
+                let was = self.slots[i].get(&mut before).unwrap_or(0.0);
+                FittedFigure {
+                    name: self.slots[i].name(),
+                    before: was,
+                    value: self.x[i].exp(),
+                    uncertainty: self.scale * dot(&y, &y).sqrt(),
+                    uncertainty_before: self.slots[i].spread(was),
+                }
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;
