@@ -261,7 +261,7 @@ fn refined(picture: &Grey, mut corners: [[f64; 2]; 4]) -> Option<[[f64; 2]; 4]> 
             *next = lines[(i + 3) % 4].meet(&lines[i])?;
         }
         let moved = (0..4).map(|i| distance(corners[i], next[i])).fold(0.0, f64::max);
-        if !(moved < 0.1 * distance(corners[0], corners[2])) {
+        if moved.is_nan() || moved >= 0.1 * distance(corners[0], corners[2]) {
             return None;
         }
         corners = next;

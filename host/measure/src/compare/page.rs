@@ -109,7 +109,7 @@ fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut 
         stacks(photo, page)?;
     }
     camera(c, page)?;
-    write!(page, "</main><script>{}</script></html>\n", include_str!("page.js"))
+    writeln!(page, "</main><script>{}</script></html>", include_str!("page.js"))
 }
 
 fn pair(
