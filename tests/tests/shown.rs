@@ -15,7 +15,7 @@ use protocol::ink::Ink;
 use testing::program::{self, small_document};
 
 /// Commands that are not run here, by their first words, and why.
-const ELSEWHERE: [(&str, &str); 19] = [
+const ELSEWHERE: [(&str, &str); 20] = [
     ("foilpress bridge flash", "needs a board in its boot loader: tests/emulator/flash.rs"),
     ("foilpress queue", "changes the computer's print system: tests/queue/system.rs"),
     ("lp ", "needs a print server: tests/queue/main.rs"),
@@ -32,16 +32,18 @@ const ELSEWHERE: [(&str, &str); 19] = [
     ("foilpress bridge jobs --delete", "needs a stored job: bridge/tests/alone.rs"),
     ("foilpress bridge log", "needs the firmware's debug data: tests/emulator/care.rs"),
     ("foilpress bridge test", "needs a loop-back plug, or no printer: tests/emulator/care.rs"),
+    ("foilpress compare", "needs photographs: host/tests/compare.rs"),
     ("foilpress measure", "needs photographs: host/tests/measure.rs"),
     ("foilpress doctor", "judges the whole computer: tests/emulator/main.rs"),
     ("foilpress generate", "is for packages: `cargo xtask package` runs it"),
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 12] = [
+const DOCUMENTS: [(&str, &str); 13] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
+    ("docs/guide/compare.md", "."),
     ("docs/guide/decals.md", "docs/guide/decal"),
     ("docs/guide/edit.md", "."),
     ("docs/guide/libraries.md", "docs/guide"),
@@ -239,6 +241,11 @@ fn the_guide() {
 #[test]
 fn charts() {
     document("docs/guide/charts.md");
+}
+
+#[test]
+fn comparisons() {
+    document("docs/guide/compare.md");
 }
 
 #[test]

@@ -205,7 +205,7 @@ pub fn steps_of(rectangle: [f64; 4], radiance: &Radiance) -> [[f64; 4]; 3] {
 }
 
 /// Pixels well inside a step: x, y and number.
-fn inside(
+pub(crate) fn inside(
     radiance: &Radiance,
     [left, top, right, bottom]: Rectangle,
 ) -> impl Iterator<Item = (usize, usize, usize)> {

@@ -19,16 +19,16 @@ pub(crate) fn along(a: Vector, t: f64, b: Vector) -> Vector {
     [a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]]
 }
 
-fn cross(a: Vector, b: Vector) -> Vector {
+pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-fn unit(a: Vector) -> Vector {
+pub(crate) fn unit(a: Vector) -> Vector {
     a.map(|v| v / dot(a, a).sqrt())
 }
 
 /// Turns a vector about a unit axis by a small or large angle.
-fn turned(v: Vector, axis: Vector, angle: f64) -> Vector {
+pub(crate) fn turned(v: Vector, axis: Vector, angle: f64) -> Vector {
     let (sin, cos) = angle.sin_cos();
     let side = cross(axis, v);
     std::array::from_fn(|i| v[i] * cos + side[i] * sin + axis[i] * dot(axis, v) * (1.0 - cos))

@@ -5,6 +5,9 @@
 //! radiance its scale; [`geometry`] gives every pixel its half angle and irradiance, and `solve` corrects what was measured with a
 //! tape; [`reduce`] makes curves; [`library`] writes them; [`report`] shows them. [`measure()`] is all of it.
 //! [`readings`] makes a curve from a gloss meter and a spectrophotometer instead.
+//!
+//! [`compare`](mod@compare) lays photographs of a printed sheet over its prediction: [`marks`] finds the sheet's camera marks, and
+//! [`camera`] where the camera was.
 #![forbid(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,
@@ -19,15 +22,19 @@
 )]
 
 mod align;
+pub mod camera;
 pub mod card;
+pub mod compare;
 mod error;
 pub mod geometry;
 pub mod library;
 mod linear;
+pub mod marks;
 mod measurement;
 pub mod merge;
 pub mod photo;
 mod pictures;
+mod plane;
 mod probe;
 pub mod readings;
 pub mod reduce;

@@ -22,7 +22,7 @@ const STYLE: &str = "body{font:15px/1.45 sans-serif;color:#111;max-width:960px;m
     .again{background:#fff4d0;padding:.5em 1em}.clean{background:#e4f5e4;padding:.5em 1em}";
 
 /// Text as it stands in HTML: names come from files.
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

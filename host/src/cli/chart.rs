@@ -202,7 +202,8 @@ fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Li
 }
 
 fn print(artwork: &Artwork<'_>, args: &JobArgs, observer: &dyn Observer) -> Result<()> {
-    let layout = args.layout.layout(observer)?;
+    // Charts are there to be photographed.
+    let layout = Layout { camera_marks: true, ..args.layout.layout(observer)? };
     artwork.print(&layout, &args.media, &args.result, &args.deliver, observer)
 }
 

@@ -44,8 +44,11 @@ pub struct LayoutArgs {
     /// Print a cross in every pass at each side, to see whether the passes line up
     #[arg(long)]
     pub registration_marks: bool,
-    /// Inks of the marks, separated by commas [default: of the inks in use, the one that shows best for ticks and all of
-    /// them for crosses]
+    /// Print a pattern at each corner that tells a camera which sheet it sees, for `foilpress compare`
+    #[arg(long)]
+    pub camera_marks: bool,
+    /// Inks of the marks, separated by commas [default: of the inks in use, the one that shows best for ticks, all of them
+    /// for crosses, a dark one for camera marks]
     #[arg(long, value_name = "INKS")]
     pub mark_ink: Option<InkSet>,
     /// Cut off what lies beyond the printable area [default: an error]
@@ -108,6 +111,7 @@ impl LayoutArgs {
             mirror: self.mirror,
             crop_marks: self.crop_marks,
             registration_marks: self.registration_marks,
+            camera_marks: self.camera_marks,
             mark_inks: self.mark_ink.map_or_else(Vec::new, |set| set.iter().collect()),
             cut: self.crop,
             profile: profile(self.profile.as_deref(), observer)?,

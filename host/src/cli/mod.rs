@@ -10,6 +10,7 @@ mod bridge;
 mod chain;
 mod chart;
 mod choice;
+mod compare;
 mod deliver;
 mod doctor;
 mod edit;
@@ -86,6 +87,8 @@ enum Command {
     Plan(Box<plan::Args>),
     /// Show a document or a sheet under any light: a page to handle it in a browser, or a picture
     Preview(Box<preview::Args>),
+    /// Compare photographs of a printed sheet with its prediction: figures, and a page with sliders
+    Compare(Box<compare::Args>),
     /// Print a chart: to judge stacks by eye, to measure inks, or to calibrate the printer
     Chart(Box<chart::Args>),
     /// Save, list and use named sets of options
@@ -192,6 +195,7 @@ fn run(args: Args) -> Result<()> {
         Command::Layers(args) => layers::run(&args, observer),
         Command::Plan(args) => plan::run(&args, observer),
         Command::Preview(args) => preview::run(&args, observer),
+        Command::Compare(args) => compare::run(&args, observer),
         Command::Chart(args) => chart::run(&args, observer),
         Command::Preset(args) => preset::run(&args, &Args::command()),
         Command::Ledger(args) => ledger::run(&args),

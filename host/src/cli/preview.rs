@@ -28,7 +28,7 @@ use view::page::{Subject, Target, page};
 use view::{Camera, Glb, Light, Lit, Pose, Renderer, Scene, direction, glb, mapped, proportions};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
-const BASES: usize = 12;
+pub const BASES: usize = 12;
 
 /// Pixels of the longer side of the picture in the page.
 const STILL: usize = 800;
@@ -392,7 +392,7 @@ impl Shown {
 }
 
 /// The dots of a job or of a folder with a sheet; nothing for a document.
-fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
+pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
     if path.join("dots.toml").is_file() {
         return Ok(Some(DotMap::load(path)?));
     }

@@ -69,7 +69,7 @@ pub struct Laid {
     pub document: Document,
     pub library: Library,
     pub settings: Settings,
-    layout: Layout,
+    pub layout: Layout,
     pub halftoned: Halftoned,
 }
 

@@ -89,11 +89,25 @@ impl<'a> Renderer<'a> {
         height: usize,
         observer: &dyn Observer,
     ) -> Result<Radiance, ViewError> {
+        self.draw(scene, width, height, observer, |_, _| ())
+    }
+
+    /// Renders a scene whose window `place` may move.
+    fn draw(
+        &self,
+        scene: &Scene,
+        width: usize,
+        height: usize,
+        observer: &dyn Observer,
+        place: impl FnOnce(&mut Seen, [f64; 2]),
+    ) -> Result<Radiance, ViewError> {
         scene.check(self.lit.size)?;
         if !(1..=LONGEST_SIDE).contains(&width) || !(1..=LONGEST_SIDE).contains(&height) {
             return Err(PreviewError::Size { width, height }.into());
         }
-        let seen = Seen::new(scene, self.lit.size, width, height);
+        let mut seen = Seen::new(scene, self.lit.size, width, height);
+        place(&mut seen, self.lit.size);
+        let seen = seen;
         let field = scene.probe.as_ref().map(|probe| {
             Field::new(probe, scene, self.lit, &self.fine, |light| self.product(light), observer)
         });
@@ -124,6 +138,30 @@ impl<'a> Renderer<'a> {
         );
         observer.end();
         Ok(Radiance { width, height, pixels })
+    }
+
+    /// Renders the sheet laid flat, `width` x `height` pixels from edge to edge: what the eye of the scene sees of each place,
+    /// where the place is on the sheet. For photographs that were laid flat the same way.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::render`]; a sheet that is bent.
+    pub fn laid_flat(
+        &self,
+        scene: &Scene,
+        width: usize,
+        height: usize,
+        observer: &dyn Observer,
+    ) -> Result<Radiance, ViewError> {
+        if scene.pose.curl.is_some() {
+            return Err(ViewError::Pose("only a flat sheet can be laid flat".into()));
+        }
+        self.draw(scene, width, height, observer, |seen, size| {
+            // The window lies in the sheet instead of facing the eye.
+            let [w, h] = size.map(|side| side as f32);
+            seen.right = [w / width as f32, 0.0, 0.0];
+            seen.up = [0.0, h / height as f32, 0.0];
+            seen.corner = [-0.5 * w, 0.5 * h, 0.0];
+        })
     }
 
     /// The light of the lights that a place with these weights sends to the eye.

@@ -7,6 +7,7 @@ use protocol::paper::Paper;
 use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::halftone::Method;
+use crate::layout::camera::{QUIET, SIDE};
 use crate::separate::MOST_CARTRIDGES;
 use crate::sheet::DotMap;
 use observe::Observer;
@@ -113,11 +114,13 @@ pub fn ladder(
     Ok(sketch.finish()?)
 }
 
-/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera.
+/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera. Camera marks have room
+/// above and below.
 ///
 /// Errors: more than the paper has room for.
 pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<DotMap, ChartError> {
-    let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
+    let (width, length) =
+        (usize::from(paper.width()), usize::from(paper.length()).saturating_sub(2 * (SIDE + QUIET)));
     let (patch, gap) = (mm(20.0), mm(4.0));
     let cell = (patch + gap, patch + mm(1.0) + LINE * 3 + mm(3.0));
     let columns = ((width + gap) / cell.0).max(1);

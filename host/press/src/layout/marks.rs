@@ -1,16 +1,19 @@
-//! Crop marks and registration marks around a block of copies.
+//! Crop marks, registration marks and camera marks around a block of copies.
 //!
 //! Crop marks are ticks outside the block in line with every edge that is cut. Registration marks are a cross in a ring in
 //! the middle of each side, printed by every pass on the same place, so that a pass that is off shows beside the others.
+//! Camera marks stand above and below the block, flush with its sides, clear of all other marks, with bare paper around them.
 //! Where the printable area leaves no room a tick becomes shorter; what cannot be drawn is counted.
 
 use inks::Stack;
 use protocol::ink::Ink;
 
 use super::block::Block;
+use super::camera::{self, Name, QUIET, SIDE};
 use super::length::Mm;
 use super::rect::Rect;
 use super::settings::{Layout, LayoutError};
+use crate::sheet::DotMap;
 use crate::sheet::order::passes_of;
 
 /// From the block to a mark, in millimetres.
@@ -30,6 +33,8 @@ pub(super) enum Shape {
     Tick,
     /// A cross in a ring that fills the rectangle.
     Target,
+    /// A pattern that fills the rectangle.
+    Camera(Name),
 }
 
 /// A mark and its place on the ideal page.
@@ -47,6 +52,10 @@ impl Mark {
         }
         match self.shape {
             Shape::Tick => true,
+            Shape::Camera(name) => {
+                let cell = |at: i64, from: i64| (at - from) as usize / camera::CELL;
+                name.is_dark(cell(x, self.place.left), cell(y, self.place.top))
+            }
             Shape::Target => {
                 // In half dots from the middle, so that even sides have one.
                 let side = self.place.width();
@@ -130,6 +139,43 @@ pub(super) fn registration(block: Rect, room: Rect, ticks: bool) -> (Vec<Mark>, 
     (marks, missing)
 }
 
+/// A camera mark at each corner of the block, and how many had no room.
+fn cameras(block: Rect, room: Rect, layout: &Layout, names: [Name; camera::CORNERS]) -> (Vec<Mark>, usize) {
+    let (side, quiet) = (SIDE as i64, QUIET as i64);
+    let away = quiet + if layout.crop_marks { Mm(AWAY + TICK).dots() } else { 0 };
+    // Between the two above the block: bare paper, and a cross if there is one.
+    let between = quiet + if layout.registration_marks { quiet + Mm(TARGET).dots() } else { 0 };
+    let left = block.left.min((block.left + block.right - between) / 2 - side);
+    let right = block.right.max(left + 2 * side + between);
+    let (above, below) = (block.top - away - side, block.bottom + away);
+    let corners = [(left, above), (right - side, above), (left, below), (right - side, below)];
+    let marks: Vec<Mark> = corners
+        .into_iter()
+        .zip(names)
+        .map(|((left, top), name)| Mark {
+            place: Rect { left, top, right: left + side, bottom: top + side },
+            shape: Shape::Camera(name),
+        })
+        .filter(|mark| mark.place.meet(room) == mark.place)
+        .collect();
+    let missing = camera::CORNERS - marks.len();
+    (marks, missing)
+}
+
+/// The darkest ink of these on white paper, if one is dark.
+fn dark(inks: &[Ink]) -> Option<Ink> {
+    const ORDER: [Ink; 7] = [
+        Ink::Black,
+        Ink::Magenta,
+        Ink::Cyan,
+        Ink::MetallicMagenta,
+        Ink::MetallicCyan,
+        Ink::MetallicGold,
+        Ink::MetallicSilver,
+    ];
+    ORDER.into_iter().find(|ink| inks.contains(ink))
+}
+
 /// The ink in use that shows best on most grounds.
 fn best(inks: &[Ink]) -> Option<Ink> {
     const ORDER: [Ink; 13] = [
@@ -167,6 +213,7 @@ fn in_order(chosen: &[Ink], in_use: &[Ink]) -> Vec<Ink> {
 /// inks of the dots in the order of passes.
 pub(super) fn marks_of(
     layout: &Layout,
+    dots: &DotMap,
     in_use: &[Ink],
     block: &Block,
     stacks: &mut Vec<Stack>,
@@ -196,6 +243,17 @@ pub(super) fn marks_of(
     }
     if layout.registration_marks {
         add(registration(block.place, block.room, layout.crop_marks), number(crosses)?);
+    }
+    if layout.camera_marks {
+        let chosen = if layout.mark_inks.is_empty() { in_use } else { &layout.mark_inks[..] };
+        let Some(ink) = dark(chosen) else {
+            return Err(LayoutError::Setting(
+                "camera marks need a dark ink, and none of the inks of this sheet is dark on paper; choose one with --mark-ink, such \
+                 as black"
+                    .into(),
+            ));
+        };
+        add(cameras(block.place, block.room, layout, camera::names(dots)), number(vec![ink])?);
     }
     Ok((all, left_out))
 }

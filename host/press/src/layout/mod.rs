@@ -6,6 +6,7 @@
 //! or doubling single rows, evenly.
 
 mod block;
+pub mod camera;
 mod files;
 mod length;
 mod marks;
@@ -92,9 +93,9 @@ pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Resul
     let across = layout.across();
     let block = Block::of((dots.width() / across.max(1), dots.length()), layout)?;
     let mut stacks = dots.stacks().to_vec();
-    let marked = layout.crop_marks || layout.registration_marks;
+    let marked = layout.crop_marks || layout.registration_marks || layout.camera_marks;
     let in_use = if marked { order::passes_of(&used(dots)) } else { Vec::new() };
-    let (marks, marks_left_out) = marks::marks_of(layout, &in_use, &block, &mut stacks)?;
+    let (marks, marks_left_out) = marks::marks_of(layout, dots, &in_use, &block, &mut stacks)?;
     let page = Page { dots, layout, block: &block, marks: &marks };
     let sheet = Sheet::new(in_dots(layout.paper, layout.resolution), stacks, page.render(observer))?;
 

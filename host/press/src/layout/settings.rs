@@ -32,7 +32,10 @@ pub struct Layout {
     pub crop_marks: bool,
     /// Crosses that every pass prints.
     pub registration_marks: bool,
-    /// Inks of the marks; empty for those in use: the one that shows best for ticks, all for crosses.
+    /// Patterns at the corners that tell a camera which sheet it sees and from where ([`camera`](super::camera)).
+    pub camera_marks: bool,
+    /// Inks of the marks; empty for those in use: the one that shows best for ticks, all for crosses, a dark one for camera
+    /// marks.
     pub mark_inks: Vec<Ink>,
     /// Whether what lies beyond the printable area is cut off instead of refused.
     pub cut: bool,
@@ -72,6 +75,7 @@ impl Layout {
             mirror: false,
             crop_marks: false,
             registration_marks: false,
+            camera_marks: false,
             mark_inks: Vec::new(),
             cut: false,
             profile: Profile::default(),

@@ -235,3 +235,52 @@ fn what_is_too_large_is_told_what_fits_and_what_is_beside_the_page_is_told_to_mo
     let beside = Layout { position: Position::FromPrintable(dots(-1, 0)), ..layout };
     assert!(check(100, 100, &beside).unwrap_err().to_string().contains("mm; move it"));
 }
+
+/// The cells of camera marks, read back from the sheet with nothing shared but the names.
+#[test]
+fn camera_marks_stand_clear_at_the_corners_of_the_print() {
+    let dots = random(900, 700, 5, 3);
+    let names = camera::names(&dots);
+    let corner = |layout: &Layout, i: usize| -> (usize, usize) {
+        let copy =
+            arrange(&dots, &Layout { camera_marks: false, ..layout.clone() }, &Silent).unwrap().laid.copies
+                [0];
+        let ticks = if layout.crop_marks { Mm(5.5).dots() as usize } else { 0 };
+        let x = if i % 2 == 0 { copy.left } else { copy.left + copy.width - camera::SIDE };
+        let y =
+            if i < 2 { copy.top - ticks - 45 - camera::SIDE } else { copy.top + copy.length + ticks + 45 };
+        (x, y)
+    };
+    let paper = Paper::Custom { width: 1500, length: 1700 };
+    for layout in [
+        Layout { camera_marks: true, ..Layout::centred(paper) },
+        Layout { camera_marks: true, crop_marks: true, registration_marks: true, ..Layout::centred(paper) },
+    ] {
+        let Arranged { sheet, laid } = arrange(&dots, &layout, &Silent).unwrap();
+        assert_eq!(laid.marks_left_out, 0);
+        let black = sheet.stacks().iter().position(|stack| stack.to_string() == "K").unwrap();
+        for (i, name) in names.into_iter().enumerate() {
+            let (left, top) = corner(&layout, i);
+            for y in 0..camera::SIDE + 60 {
+                for x in 0..camera::SIDE + 60 {
+                    let dot = sheet.index()[(top + y - 30) * sheet.width() + left + x - 30];
+                    let inside = (30..30 + camera::SIDE).contains(&x) && (30..30 + camera::SIDE).contains(&y);
+                    let dark = inside && name.is_dark((x - 30) / camera::CELL, (y - 30) / camera::CELL);
+                    assert_eq!(usize::from(dot), if dark { black } else { 0 }, "mark {i}, {x}, {y}");
+                }
+            }
+        }
+    }
+    // A narrow print has its marks apart from each other, and one as long as the paper has none.
+    let narrow = random(80, 700, 5, 3);
+    let layout = Layout { camera_marks: true, ..Layout::centred(paper) };
+    let Arranged { laid, .. } = arrange(&narrow, &layout, &Silent).unwrap();
+    assert_eq!((laid.marks_left_out, laid.area.width), (0, 2 * camera::SIDE + camera::QUIET));
+    let long = random(900, 1500, 5, 3);
+    assert_eq!(arrange(&long, &layout, &Silent).unwrap().laid.marks_left_out, 4);
+    let pale = DotMap::new(10, 10, vec![Stack::SUBSTRATE, Stack::new([Ink::White])], vec![1; 100]).unwrap();
+    let said = arrange(&pale, &layout, &Silent).unwrap_err().to_string();
+    assert!(said.contains("--mark-ink"), "{said}");
+    let black = Layout { mark_inks: vec![Ink::White, Ink::Black], ..layout };
+    assert!(arrange(&pale, &black, &Silent).is_ok());
+}

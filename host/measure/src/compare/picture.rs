@@ -1,0 +1,144 @@
+//! A photograph of a flat sheet as linear light, and laid flat.
+//!
+//! Method: values of 8 bits are undone of their sRGB curve; the sheet's places are projected through lens and pose, and the
+//! photograph is read between its pixels, at about as many places as it has pixels there. Limits: cameras bend 8-bit tones in ways of
+//! their own, so figures from JPEG are rough.
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::flat::{Flat, Window};
+use crate::MeasureError;
+use crate::camera::{Lens, Pose};
+use crate::marks::Grey;
+use crate::merge::Radiance;
+use crate::photo::{self, Values};
+use crate::probe::CLIPPED;
+
+/// A photograph, linear in light.
+pub(crate) struct Picture {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// RGB interleaved, 1 where a channel is full.
+    values: Vec<f32>,
+    /// The value from which a channel is full.
+    full: f32,
+}
+
+impl Picture {
+    pub(crate) fn read(path: &Path, linear: Option<bool>) -> Result<Picture, MeasureError> {
+        let photo = photo::read(path)?;
+        let eight = matches!(photo.values, Values::Eight(_));
+        let (limit, full) = match photo.values {
+            Values::Eight(_) => (255.0, 253.5 / 255.0),
+            Values::Sixteen(_) => (65_535.0, CLIPPED),
+            Values::Float(_) => (1.0, f32::INFINITY),
+        };
+        let bent = !linear.unwrap_or(!eight);
+        let values: Vec<f32> = (0..3 * photo.width * photo.height)
+            .into_par_iter()
+            .map(|i| {
+                let v = photo.at(i) / limit;
+                if bent { undone(v) } else { v }
+            })
+            .collect();
+        let full = if bent { undone(full) } else { full };
+        if photo.width.min(photo.height) < 100 {
+            let problem = format!("{} x {} pixels; too small to find marks in", photo.width, photo.height);
+            return Err(MeasureError::photo(path, problem));
+        }
+        Ok(Picture { width: photo.width, height: photo.height, values, full })
+    }
+
+    /// The darkest channel of each pixel, each channel divided by its own bright tones: dark for any coloured ink, bright for
+    /// paper.
+    pub(crate) fn grey(&self) -> Grey {
+        let bright: [f32; 3] = std::array::from_fn(|c| {
+            let stride = (self.width * self.height / 20_000).max(1) | 1;
+            let mut some: Vec<f32> =
+                (0..self.width * self.height).step_by(stride).map(|i| self.values[3 * i + c]).collect();
+            let at = some.len() * 9 / 10;
+            some.select_nth_unstable_by(at, f32::total_cmp).1.max(1e-9)
+        });
+        let values = self
+            .values
+            .par_chunks_exact(3)
+            .map(|rgb| (0..3).map(|c| rgb[c] / bright[c]).fold(f32::MAX, f32::min))
+            .collect();
+        Grey { width: self.width, height: self.height, values }
+    }
+
+    /// The same for the search of the grey card. Noise is not known here, and not needed.
+    pub(crate) fn radiance(&self) -> Radiance {
+        let bound =
+            self.values.chunks_exact(3).map(|rgb| u8::from(rgb.iter().any(|v| *v >= self.full))).collect();
+        Radiance {
+            width: self.width,
+            height: self.height,
+            value: self.values.clone(),
+            variance: vec![1e-12; self.values.len()],
+            bound,
+        }
+    }
+
+    /// The light between pixel centres, which are at halves, and whether a channel near it is full. `None` outside.
+    pub(crate) fn at(&self, [x, y]: [f64; 2]) -> Option<([f64; 3], bool)> {
+        let (x, y) = (x - 0.5, y - 0.5);
+        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
+            return None;
+        }
+        let (i, j, s, t) = (x as usize, y as usize, x.fract(), y.fract());
+        let (mut sum, mut full) = ([0.0; 3], false);
+        for (i, j, part) in [
+            (i, j, (1.0 - s) * (1.0 - t)),
+            (i + 1, j, s * (1.0 - t)),
+            (i, j + 1, (1.0 - s) * t),
+            (i + 1, j + 1, s * t),
+        ] {
+            for (c, sum) in sum.iter_mut().enumerate() {
+                let value = self.values[3 * (j * self.width + i) + c];
+                full |= value >= self.full;
+                *sum += part * f64::from(value);
+            }
+        }
+        Some((sum, full))
+    }
+
+    /// The window laid flat, with each channel multiplied by `scale`.
+    pub(crate) fn flat(&self, window: &Window, lens: &Lens, pose: &Pose, scale: [f64; 3]) -> Flat {
+        let near =
+            |dx: f64| lens.project(pose, [window.middle[0] + dx, window.middle[1], 0.0]).unwrap_or_default();
+        let pixels = window.size[0] / window.width as f64
+            * (near(0.5)[0] - near(-0.5)[0]).hypot(near(0.5)[1] - near(-0.5)[1]);
+        let parts = (pixels.ceil() as usize + 1).clamp(2, 8);
+        let share = 1.0 / (parts * parts) as f64;
+        let mut flat = Flat::new(window.width, window.height);
+        let (rgb, known) = (&mut flat.rgb, &mut flat.known);
+        rgb.par_chunks_exact_mut(window.width)
+            .zip(known.par_chunks_exact_mut(window.width))
+            .enumerate()
+            .for_each(|(y, (rgb, known))| {
+                for (x, (rgb, known)) in rgb.iter_mut().zip(known).enumerate() {
+                    let mut sum = [0.0; 3];
+                    let seen = (0..parts * parts).all(|i| {
+                        let part = |k: usize| (k as f64 + 0.5) / parts as f64;
+                        let [px, py] = window.place(x as f64 + part(i % parts), y as f64 + part(i / parts));
+                        let read = lens.project(pose, [px, py, 0.0]).and_then(|at| self.at(at));
+                        read.is_some_and(|(light, full)| {
+                            (0..3).for_each(|c| sum[c] += share * light[c]);
+                            !full
+                        })
+                    });
+                    *rgb = std::array::from_fn(|c| (sum[c] * scale[c]) as f32);
+                    *known = seen;
+                }
+            });
+        flat
+    }
+}
+
+/// IEC 61966-2-1.
+fn undone(v: f32) -> f32 {
+    if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+}

@@ -1,0 +1,550 @@
+//! Camera marks in a picture: where their corners are, and what they say.
+//!
+//! Problem: marks must be found under uneven light, blurred, noisy and seen askew, and their corners to some hundredths of a
+//! pixel. Method: dark regions against the mean of their surroundings, in windows of three sizes; the convex hull of a region is
+//! reduced to four corners; each side is then measured by the area under profiles across it, which neither blur nor noise
+//! shifts, and fitted by a line; lines meet in corners. The cells between them are read by their homography. Patterns and what they mean
+//! are those of [`press::layout::camera`]. Cost: three passes over the picture, about 0.1 s a megapixel. Limits: marks whose
+//! cells are at least four pixels wide; dark on light; the paper around them unshaded.
+
+use press::layout::camera::{CELLS, Name};
+use rayon::prelude::*;
+
+use crate::plane::Plane;
+
+/// Windows of the mean, in parts of the picture's longer side.
+const WINDOWS: [f64; 3] = [1.0 / 12.0, 1.0 / 28.0, 1.0 / 70.0];
+/// Darker than this part of the mean is dark.
+const DARK: f32 = 0.75;
+/// The smallest side of a mark in pixels.
+const SMALLEST: f64 = 28.0;
+/// Profiles across each side of a mark: about one a pixel, within these bounds.
+const PROFILES: (usize, usize) = (40, 240);
+/// Half the length of a profile in cells at most: it ends in the frame and in the bare paper.
+const REACH: f64 = 0.65;
+/// Half the length of a profile in pixels and in cells from which it is long enough: the shorter, the less noise and
+/// shading it sees.
+const ENOUGH: (f64, f64) = (5.0, 0.25);
+/// Steps of a profile from its middle to its end.
+const STEPS: i32 = 16;
+
+/// A picture of one channel, linear in light.
+#[derive(Clone, Debug)]
+pub struct Grey {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Values, rows from the top.
+    pub values: Vec<f32>,
+}
+
+impl Grey {
+    /// The value between pixel centres, which are at halves. `None` outside of the picture.
+    pub(crate) fn at(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        let (x, y) = (x - 0.5, y - 0.5);
+        if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
+            return None;
+        }
+        let (i, j, s, t) = (x as usize, y as usize, x.fract(), y.fract());
+        let value = |i: usize, j: usize| f64::from(self.values[j * self.width + i]);
+        let row = |j: usize| value(i, j) * (1.0 - s) + value(i + 1, j) * s;
+        Some(row(j) * (1.0 - t) + row(j + 1) * t)
+    }
+}
+
+/// A mark in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark {
+    /// What it says.
+    pub name: Name,
+    /// Its corners in pixels: top left, top right, bottom right, bottom left of the mark as it is printed.
+    pub corners: [[f64; 2]; 4],
+}
+
+impl Mark {
+    /// From the mark's own plane, in which its corners are those of the square from 0 to 8, to the picture.
+    pub(crate) fn plane(&self) -> Option<Plane> {
+        let side = CELLS as f64;
+        Plane::through([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]], self.corners)
+    }
+}
+
+/// The marks in a picture, each once.
+pub fn find(picture: &Grey) -> Vec<Mark> {
+    if picture.width < 8 || picture.height < 8 {
+        return Vec::new();
+    }
+    let sums = Sums::new(picture);
+    let longest = picture.width.max(picture.height) as f64;
+    let mut found: Vec<Mark> = Vec::new();
+    for window in WINDOWS {
+        let dark = sums.dark(picture, ((0.5 * window * longest) as usize).max(4));
+        let marks: Vec<Mark> = regions(&dark, picture.width, picture.height)
+            .par_iter()
+            .filter_map(|hull| read(picture, refined(picture, quad(hull)?)?))
+            .collect();
+        for mark in marks {
+            let near =
+                |known: &Mark| distance(known.corners[0], mark.corners[0]) < 4.0 && known.name == mark.name;
+            if !found.iter().any(near) {
+                found.push(mark);
+            }
+        }
+    }
+    found.sort_by_key(|mark| mark.name.corner);
+    found
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// Sums over rectangles in four additions (Crow 1984).
+struct Sums {
+    stride: usize,
+    sums: Vec<f64>,
+}
+
+impl Sums {
+    fn new(picture: &Grey) -> Sums {
+        let stride = picture.width + 1;
+        let mut sums = vec![0.0; stride * (picture.height + 1)];
+        for (y, row) in picture.values.chunks_exact(picture.width).enumerate() {
+            let mut line = 0.0;
+            for (x, &value) in row.iter().enumerate() {
+                line += f64::from(value);
+                sums[(y + 1) * stride + x + 1] = sums[y * stride + x + 1] + line;
+            }
+        }
+        Sums { stride, sums }
+    }
+
+    /// Which pixels are darker than their surroundings within `reach` pixels.
+    fn dark(&self, picture: &Grey, reach: usize) -> Vec<bool> {
+        let (width, height) = (picture.width, picture.height);
+        let mut dark = vec![false; width * height];
+        dark.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+            let (top, bottom) = (y.saturating_sub(reach), (y + reach + 1).min(height));
+            for (x, dark) in row.iter_mut().enumerate() {
+                let (left, right) = (x.saturating_sub(reach), (x + reach + 1).min(width));
+                let sum = self.sums[bottom * self.stride + right] + self.sums[top * self.stride + left]
+                    - self.sums[bottom * self.stride + left]
+                    - self.sums[top * self.stride + right];
+                let mean = sum / ((right - left) * (bottom - top)) as f64;
+                *dark = picture.values[y * width + x] < DARK * mean as f32;
+            }
+        });
+        dark
+    }
+}
+
+/// The convex hull of each dark region that may be a mark, in order round it.
+fn regions(dark: &[bool], width: usize, height: usize) -> Vec<Vec<[f64; 2]>> {
+    let mut seen = vec![false; dark.len()];
+    let mut open = Vec::new();
+    let mut hulls = Vec::new();
+    let mut spans: Vec<(usize, usize)> = Vec::new();
+    for start in 0..dark.len() {
+        if !dark[start] || seen[start] {
+            continue;
+        }
+        let first = start / width;
+        spans.clear();
+        seen[start] = true;
+        open.push(start);
+        let mut count = 0;
+        while let Some(i) = open.pop() {
+            let (x, y) = (i % width, i / width);
+            count += 1;
+            // The first pixel met is of the topmost row.
+            let row = y - first;
+            if row >= spans.len() {
+                spans.resize(row + 1, (usize::MAX, 0));
+            }
+            spans[row] = (spans[row].0.min(x), spans[row].1.max(x));
+            let near = [
+                (x > 0).then(|| i - 1),
+                (x + 1 < width).then_some(i + 1),
+                i.checked_sub(width),
+                Some(i + width).filter(|_| y + 1 < height),
+            ];
+            for next in near.into_iter().flatten() {
+                if dark[next] && !seen[next] {
+                    seen[next] = true;
+                    open.push(next);
+                }
+            }
+        }
+        let (left, right) = spans.iter().fold((usize::MAX, 0), |(l, r), s| (l.min(s.0), r.max(s.1)));
+        let touches = left == 0 || first == 0 || right + 1 >= width || first + spans.len() >= height;
+        let (across, down) = ((right - left + 1) as f64, spans.len() as f64);
+        // A frame alone is 7/16 of its square; a square that stands on its corner fills half of its rectangle.
+        let sparse = f64::from(count) < 0.15 * across * down;
+        if touches
+            || sparse
+            || across.min(down) < 0.6 * SMALLEST
+            || across.max(down) > 0.5 * width.max(height) as f64
+        {
+            continue;
+        }
+        let points = spans.iter().enumerate().flat_map(|(row, &(l, r))| {
+            let (top, bottom) = ((first + row) as f64, (first + row + 1) as f64);
+            [[l as f64, top], [l as f64, bottom], [r as f64 + 1.0, top], [r as f64 + 1.0, bottom]]
+        });
+        hulls.push(hull(points.collect()));
+    }
+    hulls
+}
+
+fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// Andrew's monotone chain.
+fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    let mut chain: Vec<[f64; 2]> = Vec::new();
+    for pass in 0..2 {
+        let base = chain.len();
+        let mut add = |p: &[f64; 2]| {
+            while chain.len() >= base + 2 && turn(chain[chain.len() - 2], chain[chain.len() - 1], *p) <= 0.0 {
+                chain.pop();
+            }
+            chain.push(*p);
+        };
+        if pass == 0 {
+            points.iter().for_each(&mut add)
+        } else {
+            points.iter().rev().for_each(&mut add)
+        }
+        chain.pop();
+    }
+    chain
+}
+
+fn area(points: &[[f64; 2]]) -> f64 {
+    let next = points.iter().cycle().skip(1);
+    0.5 * points.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
+}
+
+/// The four corners of a hull that is nearly a quadrilateral: two far from each other, and on either side of their line the
+/// one farthest from it.
+fn quad(hull: &[[f64; 2]]) -> Option<[[f64; 2]; 4]> {
+    let far = |from: [f64; 2]| {
+        hull.iter().copied().max_by(|a, b| distance(*a, from).total_cmp(&distance(*b, from)))
+    };
+    let middle =
+        hull.iter().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]).map(|v| v / hull.len() as f64);
+    let a = far(middle)?;
+    let c = far(a)?;
+    let b = hull.iter().copied().max_by(|p, q| turn(a, *p, c).total_cmp(&turn(a, *q, c)))?;
+    let d = hull.iter().copied().min_by(|p, q| turn(a, *p, c).total_cmp(&turn(a, *q, c)))?;
+    let corners = [a, b, c, d];
+    let found = area(&corners).abs();
+    let sides: Vec<f64> = (0..4).map(|i| distance(corners[i], corners[(i + 1) % 4])).collect();
+    let (least, most) = sides.iter().fold((f64::MAX, 0.0f64), |(l, m), &s| (l.min(s), m.max(s)));
+    let square =
+        found > 0.85 * area(hull).abs() && least > 0.4 * most && most >= SMALLEST && least >= 0.5 * SMALLEST;
+    // In the order of the clock, as rows grow downward.
+    square.then(|| if area(&corners) > 0.0 { corners } else { [a, d, c, b] })
+}
+
+/// Corners to a part of a pixel.
+fn refined(picture: &Grey, mut corners: [[f64; 2]; 4]) -> Option<[[f64; 2]; 4]> {
+    for round in 0..3 {
+        let lines: Option<Vec<Line>> = (0..4).map(|i| side(picture, &corners, i, round == 0)).collect();
+        let lines = lines?;
+        let mut next = [[0.0; 2]; 4];
+        for (i, next) in next.iter_mut().enumerate() {
+            *next = lines[(i + 3) % 4].meet(&lines[i])?;
+        }
+        let moved = (0..4).map(|i| distance(corners[i], next[i])).fold(0.0, f64::max);
+        if moved.is_nan() || moved >= 0.1 * distance(corners[0], corners[2]) {
+            return None;
+        }
+        corners = next;
+    }
+    Some(corners)
+}
+
+/// A line through `at` along the unit vector `along`.
+struct Line {
+    at: [f64; 2],
+    along: [f64; 2],
+}
+
+impl Line {
+    /// Total least squares without the worst points, twice.
+    fn fit(mut points: Vec<[f64; 2]>) -> Option<Line> {
+        for round in 0..3 {
+            if points.len() < PROFILES.0 / 3 {
+                return None;
+            }
+            let n = points.len() as f64;
+            let at = points.iter().fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]).map(|v| v / n);
+            let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+            for p in &points {
+                let (x, y) = (p[0] - at[0], p[1] - at[1]);
+                xx += x * x;
+                xy += x * y;
+                yy += y * y;
+            }
+            let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
+            let line = Line { at, along: [angle.cos(), angle.sin()] };
+            if round == 2 {
+                return Some(line);
+            }
+            let off = |p: &[f64; 2]| ((p[0] - at[0]) * line.along[1] - (p[1] - at[1]) * line.along[0]).abs();
+            let mut all: Vec<f64> = points.iter().map(off).collect();
+            let limit = (3.0 * 1.4826 * crate::linear::median(&mut all)).max(0.02);
+            points.retain(|p| off(p) <= limit);
+        }
+        None
+    }
+
+    fn meet(&self, other: &Line) -> Option<[f64; 2]> {
+        let cross = self.along[0] * other.along[1] - self.along[1] * other.along[0];
+        if cross.abs() < 0.2 {
+            return None;
+        }
+        let (dx, dy) = (other.at[0] - self.at[0], other.at[1] - self.at[1]);
+        let t = (dx * other.along[1] - dy * other.along[0]) / cross;
+        Some([self.at[0] + t * self.along[0], self.at[1] + t * self.along[1]])
+    }
+}
+
+/// The side from corner `i` to the next.
+fn side(picture: &Grey, corners: &[[f64; 2]; 4], i: usize, rough: bool) -> Option<Line> {
+    let (a, b) = (corners[i], corners[(i + 1) % 4]);
+    let length = distance(a, b);
+    let along = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
+    // Corners follow the clock, so out of the mark is to the left of the way.
+    let out = [along[1], -along[0]];
+    // A cell across this side: the neighbouring sides are as long as the mark is high.
+    let high = 0.5 * (distance(b, corners[(i + 2) % 4]) + distance(a, corners[(i + 3) % 4]));
+    let lean = {
+        let (p, q) = (corners[(i + 2) % 4], corners[(i + 3) % 4]);
+        let middle = [0.5 * (a[0] + b[0] - p[0] - q[0]), 0.5 * (a[1] + b[1] - p[1] - q[1])];
+        ((middle[0] * out[0] + middle[1] * out[1]) / high).clamp(0.3, 1.0)
+    };
+    let cell = high * lean / CELLS as f64;
+    let reach = if rough { REACH * cell } else { (REACH * cell).min((ENOUGH.1 * cell).max(ENOUGH.0)) };
+    let profiles = (length as usize).clamp(PROFILES.0, PROFILES.1);
+    let points = (0..profiles)
+        .filter_map(|k| {
+            let along = 0.08 + 0.84 * (k as f64 + 0.5) / profiles as f64;
+            let at = [a[0] + along * (b[0] - a[0]), a[1] + along * (b[1] - a[1])];
+            let shift = profile(picture, at, out, reach)?;
+            Some([at[0] + shift * out[0], at[1] + shift * out[1]])
+        })
+        .collect();
+    Line::fit(points)
+}
+
+/// By how far the step from dark to bright lies further out than `at`.
+fn profile(picture: &Grey, at: [f64; 2], out: [f64; 2], reach: f64) -> Option<f64> {
+    let mut values = [0.0; 2 * STEPS as usize + 1];
+    for (value, step) in values.iter_mut().zip(-STEPS..=STEPS) {
+        let s = reach * f64::from(step) / f64::from(STEPS);
+        *value = picture.at([at[0] + s * out[0], at[1] + s * out[1]])?;
+    }
+    let ends = STEPS as usize / 3;
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let (inner, outer) = (mean(&values[..ends]), mean(&values[values.len() - ends..]));
+    if outer - inner < 0.15 * outer.abs() {
+        return None;
+    }
+    // The area above the dark level grows by as much as the dark part shrinks; trapezoids.
+    let last = values.len() - 1;
+    let bright: f64 = values
+        .iter()
+        .enumerate()
+        .map(|(i, v)| {
+            let weight = if i == 0 || i == last { 0.5 } else { 1.0 };
+            weight * (v - inner) / (outer - inner)
+        })
+        .sum::<f64>()
+        * reach
+        / f64::from(STEPS);
+    let shift = reach - bright;
+    (shift.abs() < 0.7 * reach).then_some(shift)
+}
+
+/// Reads the cells of a square.
+fn read(picture: &Grey, corners: [[f64; 2]; 4]) -> Option<Mark> {
+    let side = CELLS as f64;
+    let plane = Plane::through([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]], corners)?;
+    let cell = |x: f64, y: f64| -> Option<f64> {
+        let mut sum = 0.0;
+        for dy in [-0.2, 0.0, 0.2] {
+            for dx in [-0.2, 0.0, 0.2] {
+                sum += picture.at(plane.at([x + 0.5 + dx, y + 0.5 + dy]))?;
+            }
+        }
+        Some(sum / 9.0)
+    };
+    let ring = |first: i32, last: i32| -> Option<Vec<f64>> {
+        let edge = |v: i32| v == first || v == last;
+        let places = (first..=last).flat_map(|y| (first..=last).map(move |x| (x, y)));
+        places.filter(|&(x, y)| edge(x) || edge(y)).map(|(x, y)| cell(f64::from(x), f64::from(y))).collect()
+    };
+    let (mut frame, mut paper) = (ring(0, CELLS as i32 - 1)?, ring(-1, CELLS as i32)?);
+    let (dark, bright) =
+        (crate::linear::median(&mut frame.clone()), crate::linear::median(&mut paper.clone()));
+    let middle = 0.5 * (dark + bright);
+    frame.retain(|&v| v >= middle);
+    paper.retain(|&v| v <= middle);
+    if bright - dark < 0.2 * bright || frame.len() > 2 || paper.len() > 3 {
+        return None;
+    }
+    let mut bits = 0;
+    let inner = CELLS - 2;
+    for at in 0..inner * inner {
+        let value = cell((at % inner + 1) as f64, (at / inner + 1) as f64)?;
+        bits |= u64::from(value < middle) << at;
+    }
+    let (name, turn) = Name::read(bits)?;
+    // Turned to the right by one, its top left corner is seen at the top right.
+    let corners = std::array::from_fn(|i| corners[(i + turn) % 4]);
+    Some(Mark { name, corners })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pseudo-random numbers from 0 to 1.
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// What a picture is made with: from cells of the sheet to the pixel, blur in pixels, noise, fall-off of light across it.
+    struct Taken {
+        /// The pixel of a place in cells; its inverse is not needed here, since the picture is made by searching the sheet.
+        plane: Plane,
+        back: Plane,
+        blur: f64,
+        noise: f64,
+        fall: f64,
+    }
+
+    const NAMES: [Name; 4] = [
+        Name { corner: 0, byte: 17 },
+        Name { corner: 1, byte: 200 },
+        Name { corner: 2, byte: 0 },
+        Name { corner: 3, byte: 255 },
+    ];
+    /// Top left corners of the marks in cells.
+    const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [40.0, 0.0], [0.0, 30.0], [40.0, 30.0]];
+
+    fn dark(x: f64, y: f64) -> bool {
+        NAMES.iter().zip(PLACES).any(|(name, [left, top])| {
+            let (u, v) = (x - left, y - top);
+            (0.0..8.0).contains(&u) && (0.0..8.0).contains(&v) && name.is_dark(u as usize, v as usize)
+        }) || ((10.0..38.0).contains(&x)
+            && (10.0..28.0).contains(&y)
+            && ((x * 1.7).sin() + (y * 2.3).cos()) > 0.4)
+    }
+
+    impl Taken {
+        /// A picture of 900 x 700 pixels whose corners show these places.
+        fn new(corners: [[f64; 2]; 4], blur: f64, noise: f64, fall: f64) -> Taken {
+            let frame = [[0.0, 0.0], [900.0, 0.0], [900.0, 700.0], [0.0, 700.0]];
+            let back = Plane::through(frame, corners).unwrap();
+            let plane = Plane::through(corners, frame).unwrap();
+            Taken { plane, back, blur, noise, fall }
+        }
+
+        fn picture(&self) -> Grey {
+            let (width, height) = (900, 700);
+            let mut state = 11;
+            let fine: Vec<f32> = (0..width * height)
+                .map(|i| {
+                    let (x, y) = ((i % width) as f64, (i / width) as f64);
+                    let mut sum = 0.0;
+                    for k in 0..25 {
+                        let (dx, dy) = (f64::from(k % 5) / 5.0 + 0.1, f64::from(k / 5) / 5.0 + 0.1);
+                        let [u, v] = self.back.at([x + dx, y + dy]);
+                        sum += if dark(u, v) { 0.06 } else { 0.8 };
+                    }
+                    (sum / 25.0 * (1.0 - self.fall * x / width as f64)) as f32
+                })
+                .collect();
+            let reach = (3.0 * self.blur).ceil() as i64;
+            let kernel: Vec<f64> = (-reach..=reach)
+                .map(|k| (-(k * k) as f64 / (2.0 * self.blur * self.blur).max(1e-9)).exp())
+                .collect();
+            let total: f64 = kernel.iter().sum();
+            let blurred = |from: &[f32], stride: i64, at: i64, side: i64, start: i64| -> f32 {
+                let value = |k: i64| f64::from(from[(start + (at + k).clamp(0, side - 1) * stride) as usize]);
+                (kernel.iter().zip(-reach..=reach).map(|(w, k)| w * value(k)).sum::<f64>() / total) as f32
+            };
+            let (w, h) = (width as i64, height as i64);
+            let rows: Vec<f32> = (0..w * h).map(|i| blurred(&fine, 1, i % w, w, i / w * w)).collect();
+            let mut values: Vec<f32> = (0..w * h).map(|i| blurred(&rows, w, i / w, h, i % w)).collect();
+            for value in &mut values {
+                let normal: f64 = (0..4).map(|_| random(&mut state)).sum::<f64>() - 2.0;
+                *value += (normal * 3f64.sqrt() * self.noise) as f32;
+            }
+            Grey { width, height, values }
+        }
+    }
+
+    /// How far corners are from where they were drawn, in pixels: root mean square and worst.
+    fn off(taken: &Taken) -> (f64, f64) {
+        let found = find(&taken.picture());
+        assert_eq!(found.iter().map(|mark| mark.name).collect::<Vec<_>>(), NAMES);
+        let (mut sum, mut worst) = (0.0, 0.0f64);
+        for (mark, [x, y]) in found.iter().zip(PLACES) {
+            for (corner, [dx, dy]) in
+                mark.corners.iter().zip([[0.0, 0.0], [8.0, 0.0], [8.0, 8.0], [0.0, 8.0]])
+            {
+                let error = distance(*corner, taken.plane.at([x + dx, y + dy]));
+                sum += error * error;
+                worst = worst.max(error);
+            }
+        }
+        ((sum / 16.0).sqrt(), worst)
+    }
+
+    #[test]
+    fn corners_are_found_to_hundredths_of_a_pixel_blurred_noisy_and_askew() {
+        let straight = [[-6.0, -6.0], [54.0, -6.0], [54.0, 44.0], [-6.0, 44.0]];
+        let turned = [[60.0, -10.0], [56.0, 46.0], [-10.0, 48.0], [-8.0, -6.0]];
+        let tilted = [[-14.0, -8.0], [62.0, -16.0], [51.0, 44.0], [-5.0, 41.0]];
+        for (corners, blur, noise, fall, most) in [
+            (straight, 0.0, 0.0, 0.0, 0.03),
+            (straight, 1.5, 0.0, 0.0, 0.03),
+            (turned, 0.7, 0.01, 0.5, 0.05),
+            (tilted, 0.7, 0.01, 0.6, 0.05),
+            (tilted, 1.2, 0.03, 0.6, 0.1),
+        ] {
+            let (rms, worst) = off(&Taken::new(corners, blur, noise, fall));
+            println!("blur {blur}, noise {noise}, fall-off {fall}: {rms:.4} pixels, at worst {worst:.4}");
+            assert!(rms < most && worst < 4.0 * most, "{rms} {worst}");
+        }
+    }
+
+    #[test]
+    fn pictures_without_marks_have_none() {
+        let mut state = 5;
+        let noise = Grey {
+            width: 400,
+            height: 300,
+            values: (0..120_000).map(|_| random(&mut state) as f32).collect(),
+        };
+        assert!(find(&noise).is_empty());
+        for value in [0.0, 0.5, f32::NAN, f32::INFINITY] {
+            assert!(find(&Grey { width: 200, height: 200, values: vec![value; 40_000] }).is_empty());
+        }
+        // A chequerboard has many squares and no marks.
+        let board = |i: usize| if (i % 640 / 40 + i / 640 / 40).is_multiple_of(2) { 0.05 } else { 0.8 };
+        assert!(
+            find(&Grey { width: 640, height: 480, values: (0..640 * 480).map(board).collect() }).is_empty()
+        );
+        assert!(find(&Grey { width: 2, height: 1, values: vec![0.0; 2] }).is_empty());
+    }
+}
