@@ -540,7 +540,7 @@ mod tests {
     #[test]
     fn points_on_a_line_are_no_sheet() {
         let line: Vec<Seen> = (0..8)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|i| Seen { sheet: [i, 2.0 * i], pixel: [10.0 * i, 20.0 * i] })
             .collect();
         assert!(solve(&[line], (200, 100), &Known::default()).is_none());

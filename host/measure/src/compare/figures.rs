@@ -240,7 +240,7 @@ mod tests {
                 down += print[i][c].powi(2);
             }
         }
-        assert!((found.print / (up / down as f64).sqrt() - 1.0).abs() < 1e-9, "{found:?}");
+        assert!((found.print / (up / down).sqrt() - 1.0).abs() < 1e-9, "{found:?}");
         // Noise is no ink's.
         let noisy: Vec<Option<[f64; 3]>> = (0..400)
             .map(|i| {
