@@ -20,6 +20,8 @@ use serde_json::Value;
 use testing::program::Bench;
 
 type V = [f64; 3];
+/// A photograph of 16 bits.
+type Picture = image::ImageBuffer<image::Rgb<u16>, Vec<u16>>;
 
 const SIZE: (usize, usize) = (1200, 900);
 const FOCAL: f64 = 2300.0;
@@ -181,12 +183,7 @@ fn lit(place: [f64; 2], eye: V, lamp: V) -> (f64, f64) {
 }
 
 /// A photograph: RGB of 12 bits in 16.
-fn photograph(
-    sheet: &Sheet,
-    shot: &Shot,
-    exposure: f64,
-    noise: bool,
-) -> image::ImageBuffer<image::Rgb<u16>, Vec<u16>> {
+fn photograph(sheet: &Sheet, shot: &Shot, exposure: f64, noise: bool) -> Picture {
     let axes = shot.axes();
     let (width, height) = SIZE;
     let values: Vec<u16> = (0..height)
@@ -479,7 +476,7 @@ fn photographs_and_camera_files_that_do_not_serve_are_named() {
     let bench = bench(&[shot.name, SHOTS[1].name]);
     let photo = bench.path("photos").join(shot.name);
     let original = image::open(&photo).unwrap().into_rgb16();
-    let put = |change: &dyn Fn(&mut image::ImageBuffer<image::Rgb<u16>, Vec<u16>>)| {
+    let put = |change: &dyn Fn(&mut Picture)| {
         let mut picture = original.clone();
         change(&mut picture);
         picture.save(&photo).unwrap();
