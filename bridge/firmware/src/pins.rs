@@ -31,7 +31,7 @@ pub const BUSY: u8 = 15;
 const UNUSED: u8 = 19;
 /// nOE of the output buffers: high, by a resistor, until the firmware has put the lines to rest.
 pub const ENABLE: u8 = 20;
-/// The printer's +5 V, through a divider.
+/// The printer's +5 V, through a divider and a buffer.
 pub const POWER: u8 = 21;
 /// The button, to ground.
 pub const BUTTON: u8 = 22;
@@ -87,7 +87,7 @@ fn output(pin: u8) {
     function(pin, SIO);
 }
 
-/// Puts every line to rest and only then lets the buffers drive the cable. Until now the pads were inputs and nOE
+/// Puts every line to rest, with nOE high: the buffers do not drive the cable yet. Until now the pads were inputs and nOE
 /// was high by its resistor, so nothing strobed.
 pub fn bring_up() {
     out_set().write_value(AT_REST | 1 << ENABLE);
@@ -106,7 +106,6 @@ pub fn bring_up() {
     ] {
         input(pin, rest);
     }
-    enable(true);
 }
 
 /// Lets the output buffers drive the cable, or not.

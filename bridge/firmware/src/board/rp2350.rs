@@ -2,7 +2,8 @@
 //!
 //! * RP2350-E5: an aborted channel may start the one it is chained to, itself included. It is disabled before it is aborted.
 //! * RP2350-E9 (stepping A2): an input that has once been high is held there by a leak of some 120 µA, against which the pad's
-//!   pull-down, of some 50 kΩ, can do nothing; a resistor of 8.2 kΩ outside can. So no input of ours relies on a pull-down.
+//!   pull-down, of some 50 kΩ, can do nothing; a resistor of 8.2 kΩ outside can. So no input of ours relies on a pull-down:
+//!   a buffer drives those from the printer both ways, and the button has a pull-up.
 //! * The counter of a DMA channel has 28 bits; the four above them choose a mode, and all of them set mean that it does not
 //!   count at all (data sheet, 12.6.2.2).
 //! * The watchdog counts once a tick: RP2040-E1 is not here. `embassy_rp` knows.
