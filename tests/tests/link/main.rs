@@ -2,6 +2,8 @@
 //! undisturbed run.
 
 #[cfg(unix)]
+mod alone;
+#[cfg(unix)]
 mod faults;
 mod paper;
 #[cfg(unix)]

@@ -64,15 +64,15 @@ pub fn random_job(seed: u64) -> Vec<u8> {
 }
 
 /// A bridge, and a folder with a journal.
-struct Bench {
+pub struct Bench {
     folder: tempfile::TempDir,
-    bridge: Bridge,
-    job: Vec<u8>,
+    pub bridge: Bridge,
+    pub job: Vec<u8>,
 }
 
 impl Bench {
     /// A random job, and a printer that takes so many bytes a millisecond.
-    fn new(seed: u64, rate: usize) -> Bench {
+    pub fn new(seed: u64, rate: usize) -> Bench {
         Bench::with(random_job(seed), Port::new(&[Ink::White], rate))
     }
 
@@ -104,15 +104,15 @@ impl Bench {
         self.folder.path().join("jobs")
     }
 
-    fn address(&self) -> Address {
+    pub fn address(&self) -> Address {
         Address::Unix(self.folder.path().join("bridge"))
     }
 
-    fn printed(&self) -> Vec<u8> {
+    pub fn printed(&self) -> Vec<u8> {
         self.bridge.printed()
     }
 
-    fn until_it_prints(&self) {
+    pub fn until_it_prints(&self) {
         while self.printed().is_empty() {
             std::thread::sleep(Duration::from_millis(5));
         }
@@ -127,7 +127,7 @@ impl Bench {
         child.wait().unwrap();
     }
 
-    fn keep_busy(&self, busy: bool) {
+    pub fn keep_busy(&self, busy: bool) {
         self.bridge.port.busy.store(busy, Ordering::Relaxed);
     }
 
@@ -148,7 +148,7 @@ impl Bench {
     }
 
     /// Runs with this typed; exit code and everything that was said.
-    fn answered(&self, args: &str, typed: &str) -> (Option<i32>, String) {
+    pub fn answered(&self, args: &str, typed: &str) -> (Option<i32>, String) {
         let mut command = self.program(args);
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
         child.stdin.take().unwrap().write_all(typed.as_bytes()).unwrap();
@@ -158,13 +158,13 @@ impl Bench {
     }
 
     /// How many whole sheets the printer has taken; nothing else may have come.
-    fn sheets(&self) -> usize {
+    pub fn sheets(&self) -> usize {
         let printed = self.printed();
         assert!(printed.chunks(self.job.len()).all(|sheet| sheet == self.job), "other bytes at the port");
         printed.len() / self.job.len()
     }
 
-    fn says(&self, code: i32, args: &str) -> String {
+    pub fn says(&self, code: i32, args: &str) -> String {
         let output = self.program(args).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(code), "{args}: {said}");
