@@ -21,7 +21,7 @@ const MOST_BYTES: u64 = 16 << 20;
 #[derive(clap::Args, Debug)]
 #[command(after_help = "Examples:\n  \
     foilpress inks from p-sf.brdf --stack P+SF --by \"A. Owner\" --when 2026-11 -o mine/\n  \
-    foilpress inks from k.toml --stack K --by \"A. Owner\" --when 2026-11-02 --note \"Rhopoint IQ\" -o mine/\n\n\
+    foilpress inks from k.toml --stack K --by \"A. Owner\" --when 2026-11-02 --note Rhopoint -o mine/\n\n\
     Readings of gloss and colour are a file such as\n  \
     format = 1\n  \
     lab = [16, 0, 0]      # CIELAB under D50, 45 degrees to the normal\n  \
