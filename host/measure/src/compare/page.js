@@ -1,4 +1,4 @@
-// The slider between the photograph and what it is compared with. Without this script the page still shows both.
+// The slider between the photograph and what it is compared with. Without this script the pictures stand one above the other.
 "use strict";
 
 for (const figure of document.querySelectorAll("figure.pair")) {
@@ -22,6 +22,7 @@ for (const figure of document.querySelectorAll("figure.pair")) {
   stage.addEventListener("pointermove", drag);
   slider.addEventListener("input", split);
   choice.addEventListener("change", choose);
+  figure.classList.add("live");
   split();
   choose();
 }
