@@ -210,9 +210,9 @@ mod tests {
             }
             let factor = a.factor().unwrap();
             let x = factor.solve(&b);
-            for i in 0..5 {
+            for (i, b) in b.iter().enumerate() {
                 let found: f64 = (0..5).map(|j| a.at(i, j) * x[j]).sum();
-                prop_assert!((found - b[i]).abs() < 1e-9);
+                prop_assert!((found - b).abs() < 1e-9);
             }
             let y = factor.forward(&b);
             let inner: f64 = x.iter().zip(&b).map(|(x, b)| x * b).sum();

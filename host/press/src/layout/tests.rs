@@ -246,7 +246,7 @@ fn camera_marks_stand_clear_at_the_corners_of_the_print() {
             arrange(&dots, &Layout { camera_marks: false, ..layout.clone() }, &Silent).unwrap().laid.copies
                 [0];
         let ticks = if layout.crop_marks { Mm(5.5).dots() as usize } else { 0 };
-        let x = if i % 2 == 0 { copy.left } else { copy.left + copy.width - camera::SIDE };
+        let x = if i.is_multiple_of(2) { copy.left } else { copy.left + copy.width - camera::SIDE };
         let y =
             if i < 2 { copy.top - ticks - 45 - camera::SIDE } else { copy.top + copy.length + ticks + 45 };
         (x, y)
