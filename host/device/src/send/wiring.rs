@@ -7,9 +7,9 @@
 //! for every single fault there is, and those faults are named that show exactly what was seen. When none does there
 //! are several at once, and the lines are named that do not do what they should.
 //!
-//! Cost: some 260 faults times 78 readings, milliseconds. Limits: a plug cannot tell a broken wire from one that is held high,
-//! since inputs rest high; nor see the printer's +5 V, nor slow edges. Two lines that touch are taken to be low when either
-//! is, which is how the buffers' outputs fight it out.
+//! Cost: some 260 faults, twice, times 78 readings: milliseconds. Limits: a plug cannot tell a broken wire from one that is held high,
+//! since inputs rest high; nor see the printer's +5 V, nor slow edges. Two lines that touch and are driven apart meet half way,
+//! behind their resistors: whether that reads low or high is the chip's affair, so both are tried ([`Contest`]).
 
 use std::fmt;
 
@@ -155,6 +155,17 @@ impl fmt::Display for Fault {
     }
 }
 
+/// What two lines that touch read as when one is driven high and the other low.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Contest {
+    Low,
+    High,
+}
+
+impl Contest {
+    const BOTH: [Contest; 2] = [Contest::Low, Contest::High];
+}
+
 /// Every single fault.
 fn faults() -> Vec<Fault> {
     let pairs = |count: usize| (0..count).flat_map(move |b| (0..b).map(move |a| (a, b)));
@@ -173,7 +184,7 @@ fn faults() -> Vec<Fault> {
 }
 
 /// What the inputs read through a plug, nAck in bit 0. Without one they rest high.
-fn reading(fault: Option<Fault>, plug: Option<Plug>, Levels(mut levels): Levels) -> u8 {
+fn reading(fault: Option<Fault>, contest: Contest, plug: Option<Plug>, Levels(mut levels): Levels) -> u8 {
     // A thirteenth line, always high, for the inputs that nothing leads to.
     const NONE: usize = OUTPUTS.len();
     levels |= 1 << NONE;
@@ -181,8 +192,9 @@ fn reading(fault: Option<Fault>, plug: Option<Plug>, Levels(mut levels): Levels)
     let high = |levels: u16, line: usize| levels >> line & 1 == 1;
     let set = |levels: u16, line: usize, high: bool| levels & !(1 << line) | u16::from(high) << line;
     let both = |levels: u16, a: usize, b: usize| {
-        let low = high(levels, a) && high(levels, b);
-        set(set(levels, a, low), b, low)
+        let (a_high, b_high) = (high(levels, a), high(levels, b));
+        let met = if contest == Contest::Low { a_high && b_high } else { a_high || b_high };
+        set(set(levels, a, met), b, met)
     };
     match fault {
         Some(Fault::Output(line, level)) => levels = set(levels, line, level),
@@ -227,11 +239,12 @@ pub struct Seen {
 impl Seen {
     /// Whether all is as it should be.
     pub fn is_good(&self) -> bool {
-        self.explained_by(None)
+        self.explained_by(None, Contest::Low)
     }
 
-    fn explained_by(&self, fault: Option<Fault>) -> bool {
-        patterns().zip(&self.readings).all(|(levels, &read)| reading(fault, Some(self.plug), levels) == read)
+    fn explained_by(&self, fault: Option<Fault>, contest: Contest) -> bool {
+        let mut readings = patterns().zip(&self.readings);
+        readings.all(|(levels, &read)| reading(fault, contest, Some(self.plug), levels) == read)
     }
 }
 
@@ -243,8 +256,13 @@ pub fn find<E>(probe: &mut dyn FnMut(Levels) -> Result<Lines, E>) -> Result<Opti
         seen.push((levels, probe(levels)?.0 & 0x1f));
     }
     // How far from what was seen the likest fault is, in readings.
-    let distance = |plug: Option<Plug>, fault: Option<Fault>| -> u32 {
-        seen.iter().map(|&(levels, read)| (reading(fault, plug, levels) ^ read).count_ones()).sum()
+    let distance = |plug: Option<Plug>, fault: Option<Fault>| -> Option<u32> {
+        let distance = |contest: Contest| {
+            let apart =
+                |&(levels, read): &(_, u8)| (reading(fault, contest, plug, levels) ^ read).count_ones();
+            seen.iter().map(apart).sum()
+        };
+        Contest::BOTH.into_iter().map(distance).min()
     };
     let explanations: Vec<Option<Fault>> =
         std::iter::once(None).chain(faults().into_iter().map(Some)).collect();
@@ -319,7 +337,10 @@ pub fn judge(seen: &[Seen]) -> Verdict {
     }
     let one: Vec<Fault> = faults()
         .into_iter()
-        .filter(|&fault| seen.iter().all(|seen| seen.explained_by(Some(fault))))
+        .filter(|&fault| {
+            let explains = |contest| seen.iter().all(|seen| seen.explained_by(Some(fault), contest));
+            Contest::BOTH.into_iter().any(explains)
+        })
         .collect();
     if !one.is_empty() {
         return Verdict::One(one);

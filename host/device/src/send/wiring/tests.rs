@@ -6,7 +6,8 @@ use std::convert::Infallible;
 
 /// A board, a cable and a plug as what they are: points, and wires between them. Output drivers are points 0 to 11, the
 /// plug's ends of their lines 12 to 23, the plug's ends of the inputs 24 to 28, the inputs 29 to 33, ground 34, supply 35.
-struct Wires(Vec<(usize, usize)>);
+/// Where levels meet, this one wins.
+struct Wires(Vec<(usize, usize)>, bool);
 
 const OUT: usize = 12;
 const BACK: usize = 24;
@@ -18,11 +19,12 @@ impl Wires {
     fn new() -> Wires {
         let outputs = (0..12).map(|output| (output, OUT + output));
         let inputs = (0..5).map(|input| (BACK + input, IN + input));
-        Wires(outputs.chain(inputs).collect())
+        Wires(outputs.chain(inputs).collect(), false)
     }
 
-    fn with(fault: Fault) -> Wires {
-        let mut wires = Wires::new();
+    /// With a fault, where lines that touch read as `wins` when they are driven apart.
+    fn with(fault: Fault, wins: bool) -> Wires {
+        let mut wires = Wires(Wires::new().0, wins);
         let swap = |wires: &mut Wires, a: usize, b: usize| {
             let (at, to) = (wires.0[a].1, wires.0[b].1);
             (wires.0[a].1, wires.0[b].1) = (to, at);
@@ -44,25 +46,34 @@ impl Wires {
         wires
     }
 
-    /// What the board reads: an input is low if anything low reaches it.
+    /// What the board reads: an input has the level that wins if that reaches it from anywhere, else the other if that
+    /// does. One that nothing reaches rests high.
     fn read(&self, plug: Option<Plug>, levels: Levels) -> Lines {
         let plugged = plug.map(Plug::wires).into_iter().flat_map(|wires| wires.into_iter().zip(0..));
         let mut wires = self.0.clone();
         wires.extend(plugged.map(|(output, input): (usize, usize)| (OUT + output, BACK + input)));
-        let mut low: BTreeSet<usize> = (0..12).filter(|output| levels.0 >> output & 1 == 0).collect();
-        low.insert(GROUND);
-        loop {
-            let before = low.len();
-            for &(a, b) in &wires {
-                if a != SUPPLY && (low.contains(&a) || low.contains(&b)) {
-                    low.extend([a, b]);
+        let reach = |level: bool| {
+            let (from, other) = if level { (SUPPLY, GROUND) } else { (GROUND, SUPPLY) };
+            let mut reached: BTreeSet<usize> =
+                (0..12).filter(|output| (levels.0 >> output & 1 == 1) == level).chain([from]).collect();
+            loop {
+                let before = reached.len();
+                for &(a, b) in &wires {
+                    if a != other && (reached.contains(&a) || reached.contains(&b)) {
+                        reached.extend([a, b]);
+                    }
+                }
+                if reached.len() == before {
+                    return reached;
                 }
             }
-            if low.len() == before {
-                break;
-            }
-        }
-        let high = (0..5).filter(|input| !low.contains(&(IN + input)));
+        };
+        let (winner, loser) = (reach(self.1), reach(!self.1));
+        let is_high = |input: &i32| {
+            let point = IN + *input as usize;
+            if winner.contains(&point) { self.1 } else { !loser.contains(&point) || !self.1 }
+        };
+        let high = (0..5).filter(is_high);
         Lines(high.fold(Lines::POWER, |lines, input| lines | 1 << input))
     }
 
@@ -92,19 +103,19 @@ fn good_wiring_is_called_good_in_every_position_and_no_plug_is_no_plug() {
 
 #[test]
 fn every_single_fault_is_named_and_no_other() {
-    for fault in faults() {
-        let wires = Wires::with(fault);
-        assert_eq!(wires.judged(), Verdict::One(vec![fault]), "{fault}");
+    for (fault, wins) in faults().into_iter().flat_map(|fault| [(fault, false), (fault, true)]) {
+        let wires = Wires::with(fault, wins);
+        assert_eq!(wires.judged(), Verdict::One(vec![fault]), "{fault}; {wins} wins");
     }
 }
 
 #[test]
 fn the_position_of_the_plug_is_found_whatever_single_fault_there_is() {
-    for fault in faults() {
-        let wires = Wires::with(fault);
-        assert_eq!(wires.found(None), None, "{fault}");
+    for (fault, wins) in faults().into_iter().flat_map(|fault| [(fault, false), (fault, true)]) {
+        let wires = Wires::with(fault, wins);
+        assert_eq!(wires.found(None), None, "{fault}; {wins} wins");
         for plug in Plug::ALL {
-            assert_eq!(wires.found(Some(plug)), Some(plug), "{fault}");
+            assert_eq!(wires.found(Some(plug)), Some(plug), "{fault}; {wins} wins");
         }
     }
 }
@@ -126,7 +137,7 @@ fn the_plug_is_found_without_a_strobe_or_a_reset() {
 
 #[test]
 fn two_faults_at_once_name_the_lines_that_go_astray() {
-    let mut wires = Wires::with(Fault::OutputsCrossed(0, 1));
+    let mut wires = Wires::with(Fault::OutputsCrossed(0, 1), false);
     wires.0[12 + 4] = (GROUND, IN + 4);
     let Verdict::Several(astray) = wires.judged() else { panic!("{:?}", wires.judged()) };
     let first: Vec<_> = astray.iter().filter(|astray| astray.plug == Plug::First).collect();
