@@ -9,7 +9,7 @@
 //!
 //! Cost: some 260 faults, twice, times 78 readings: milliseconds. Limits: a plug cannot tell a broken wire from one that is held high,
 //! since inputs rest high; nor see the printer's +5 V, nor slow edges. Two lines that touch and are driven apart meet half way,
-//! behind their resistors: whether that reads low or high is the chip's affair, so both are tried ([`Contest`]).
+//! behind their resistors: whether that reads low or high is the chip's affair, so both are tried.
 
 use std::fmt;
 
