@@ -196,20 +196,27 @@ fn centre_tolerance() -> f64 {
     2.0
 }
 
+/// Reads a file of at most [`MOST_BYTES`] bytes and parses its text; `kind` is what was expected.
+pub(crate) fn parsed<T>(
+    path: &Path,
+    kind: &str,
+    parse: impl FnOnce(&str) -> Result<T, String>,
+) -> Result<T, MeasureError> {
+    let io = |source| MeasureError::Io { path: path.to_path_buf(), source };
+    let wrong = |problem| MeasureError::Setup { path: path.to_path_buf(), problem };
+    if std::fs::metadata(path).map_err(io)?.len() > MOST_BYTES {
+        return Err(wrong(format!("longer than {MOST_BYTES} bytes; expected {kind} in TOML")));
+    }
+    parse(&std::fs::read_to_string(path).map_err(io)?).map_err(wrong)
+}
+
 impl Setup {
     /// Reads and checks a setup file. Files that it names are beside it.
     ///
     /// # Errors
     /// The field, what was found and what to do.
     pub fn read(path: &Path) -> Result<Setup, MeasureError> {
-        let io = |source| MeasureError::Io { path: path.to_path_buf(), source };
-        if std::fs::metadata(path).map_err(io)?.len() > MOST_BYTES {
-            let problem = format!("longer than {MOST_BYTES} bytes; expected a setup file in TOML");
-            return Err(MeasureError::Setup { path: path.to_path_buf(), problem });
-        }
-        let text = std::fs::read_to_string(path).map_err(io)?;
-        let mut setup = Setup::parse(&text)
-            .map_err(|problem| MeasureError::Setup { path: path.to_path_buf(), problem })?;
+        let mut setup = parsed(path, "a setup file", Setup::parse)?;
         let beside = path.parent().unwrap_or(Path::new(""));
         for file in [&mut setup.photos.flat_field, &mut setup.photos.dark_frame].into_iter().flatten() {
             *file = beside.join(&*file);

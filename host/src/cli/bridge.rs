@@ -10,7 +10,7 @@ mod status;
 mod test;
 mod watch;
 
-pub use found::{Found, PATIENCE, ask, doing, only, shelf_text};
+pub use found::{Found, PATIENCE, ask, doing, named_or_only, shelf_text};
 
 use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};

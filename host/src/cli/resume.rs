@@ -171,10 +171,7 @@ const PLAIN: u32 = u32::MAX;
 
 /// Ends what the operating system prints; no journal knows of it.
 fn cancel_plain(to: Option<&Address>) -> Result<()> {
-    let address = match to {
-        Some(address) => address.clone(),
-        None => bridge::only()?,
-    };
+    let address = bridge::named_or_only(to)?;
     let mut link = address.open()?;
     let progress = Query::new(&mut *link, bridge::PATIENCE)?.cancel(PLAIN, bridge::PATIENCE)?;
     let mut out = std::io::stdout().lock();

@@ -2,7 +2,8 @@
 //!
 //! Problem: a hundred numbers, some of which hardly matter, from some thousand residuals.
 //! Method: the normal equations, damped by a multiple of their diagonal, solved by Cholesky's factorisation. Numbers at a bound that would
-//! leave it stay there for the step. The step is taken if it lowers the cost; damping follows (Nielsen 1999, simplified).
+//! leave it stay there for the step. The step is taken, and damping falls to a fifth, if it lowers the cost; else
+//! damping grows five times.
 //! Cost: n^3 / 6 operations a step beside the caller's. Limits: a local minimum near the start. Priors of the caller keep the equations
 //! regular.
 

@@ -8,11 +8,10 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::MeasureError;
+use crate::setup::parsed;
 
 /// The version of the format.
 const FORMAT: u32 = 1;
-/// The largest camera file in bytes.
-const MOST_BYTES: u64 = 1 << 20;
 /// Farthest that cameras and lamps may be, in mm.
 const FARTHEST: f64 = 100_000.0;
 
@@ -94,12 +93,7 @@ impl Setup {
     /// # Errors
     /// The field, what was found and what to do.
     pub fn read(path: &Path) -> Result<Setup, MeasureError> {
-        let io = |source| MeasureError::Io { path: path.to_path_buf(), source };
-        let wrong = |problem| MeasureError::Setup { path: path.to_path_buf(), problem };
-        if std::fs::metadata(path).map_err(io)?.len() > MOST_BYTES {
-            return Err(wrong(format!("longer than {MOST_BYTES} bytes; expected a camera file in TOML")));
-        }
-        Setup::parse(&std::fs::read_to_string(path).map_err(io)?).map_err(wrong)
+        parsed(path, "a camera file", Setup::parse)
     }
 
     /// Reads and checks the text of a camera file.

@@ -23,8 +23,11 @@ pub const PATIENCE: Duration = Duration::from_secs(3);
 /// How long to wait for the printer behind it.
 pub const PRINTER_PATIENCE: Duration = Duration::from_secs(12);
 
-/// The address of the only bridge.
-pub fn only() -> Result<Address> {
+/// The address that was named, or that of the only bridge.
+pub fn named_or_only(named: Option<&Address>) -> Result<Address> {
+    if let Some(address) = named {
+        return Ok(address.clone());
+    }
     let bridge =
         find::only().map_err(|error| anyhow!("{error}; name one with --to, or see `foilpress doctor`"))?;
     let (address, _) = bridge.open()?;

@@ -8,7 +8,7 @@ use indicatif::HumanBytes;
 use protocol::link::message::JobKind;
 use serde_json::json;
 
-use super::found::{PATIENCE, only, shelf_text};
+use super::found::{PATIENCE, named_or_only, shelf_text};
 use crate::cli::stdio::show;
 use device::send::Address;
 use device::send::journal::fresh_number;
@@ -47,10 +47,7 @@ fn number(text: &str) -> Result<u32> {
 
 /// Runs `bridge jobs`.
 pub fn run(args: &Args) -> Result<()> {
-    let address = match &args.to {
-        Some(address) => address.clone(),
-        None => only()?,
-    };
+    let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
     if let Some(stored) = args.print {

@@ -7,7 +7,7 @@ use anyhow::{Context as _, Result, bail};
 use clap::Args as ClapArgs;
 use serde_json::json;
 
-use super::found::{PATIENCE, only};
+use super::found::{PATIENCE, named_or_only};
 use device::flash::image::Firmware;
 use device::send::Address;
 use device::send::log;
@@ -36,10 +36,7 @@ pub struct Args {
 
 /// Runs `bridge log`.
 pub fn run(args: &Args) -> Result<()> {
-    let address = match &args.to {
-        Some(address) => address.clone(),
-        None => only()?,
-    };
+    let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
     let program = match &args.elf {

@@ -10,7 +10,7 @@ use anyhow::{Result, bail};
 use clap::Args as ClapArgs;
 use protocol::link::message::{Fault, JobState};
 
-use super::found::{PATIENCE, doing, only};
+use super::found::{PATIENCE, doing, named_or_only};
 use crate::cli::stdio::show;
 use crate::cli::terminal::agreed;
 use device::deliver;
@@ -46,10 +46,7 @@ pub fn run(args: &Args) -> Result<()> {
     if args.by_hand {
         return Ok(printers.reset(None)?);
     }
-    let address = match &args.to {
-        Some(address) => address.clone(),
-        None => only()?,
-    };
+    let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
     let open = *query.progress();

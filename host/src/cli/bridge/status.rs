@@ -5,7 +5,7 @@ use std::io::Write as _;
 use anyhow::Result;
 use clap::Args as ClapArgs;
 
-use super::found::{Found, only};
+use super::found::{Found, named_or_only};
 use super::watch;
 use device::deliver::ask::Negotiate;
 use device::send::Address;
@@ -34,10 +34,7 @@ pub struct Args {
 
 /// Runs `bridge status`.
 pub fn run(args: &Args) -> Result<()> {
-    let address = match &args.to {
-        Some(address) => address.clone(),
-        None => only()?,
-    };
+    let address = named_or_only(args.to.as_ref())?;
     let negotiate = if args.no_negotiate { Negotiate::Never } else { Negotiate::Again };
     if args.watch {
         return watch::run(&address, args.json, negotiate);

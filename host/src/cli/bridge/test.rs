@@ -9,7 +9,7 @@ use clap::Args as ClapArgs;
 use protocol::link::message::Lines;
 use serde_json::json;
 
-use super::found::{PATIENCE, only};
+use super::found::{PATIENCE, named_or_only};
 use crate::cli::output::say_on_interrupt;
 use device::send::Address;
 use device::send::query::{Query, QueryError, is_open};
@@ -42,10 +42,7 @@ pub struct Args {
 
 /// Runs `bridge test`. Fails if the wiring is not good.
 pub fn run(args: &Args) -> Result<()> {
-    let address = match &args.to {
-        Some(address) => address.clone(),
-        None => only()?,
-    };
+    let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
     let progress = *query.progress();

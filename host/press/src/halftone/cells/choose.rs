@@ -134,7 +134,7 @@ impl Metric {
 
 /// Decides for one cell after another.
 pub(super) struct Chooser<'a> {
-    metric: &'a Metric,
+    pub(super) metric: &'a Metric,
     /// By side of cells, 0 for stacks that half a cell holds and minus infinity for others; nothing where there are none.
     small: Vec<Vec<f32>>,
     /// The product of a vector of debts with each stack.

@@ -46,9 +46,8 @@ pub(super) struct Strip<'a> {
     fresh: bool,
     /// By how much decisions are disturbed here, in cells. In the midst of a tone it is found once for a row of a block.
     disturbance: f32,
-    metric: &'a Metric,
-    /// By which halves are arranged in a block that varies: whether it does.
     errors: Errors,
+    /// Whether halves are arranged by their neighbours' errors in this block.
     textured: bool,
 }
 
@@ -83,7 +82,6 @@ impl<'a> Strip<'a> {
             back: false,
             fresh: true,
             disturbance: 0.0,
-            metric,
             errors: Errors::new(plan.across * BLOCK),
             textured: false,
         }
@@ -291,7 +289,7 @@ impl<'a> Strip<'a> {
         let place = slot / lanes;
         if self.textured && side.is_some() {
             let own = (&self.want[..], area as f32);
-            cell = self.errors.arrange(self.metric, (place, self.back), own, cell);
+            cell = self.errors.arrange(self.chooser.metric, (place, self.back), own, cell);
         } else {
             self.errors.forget(place);
         }
