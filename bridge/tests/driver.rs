@@ -330,7 +330,16 @@ fn a_printer_that_does_not_negotiate_is_one_way() {
 }
 
 fn negotiations(bench: &Bench<'_>) -> usize {
-    bench.cable.edges().iter().filter(|edge| edge.line == Line::SelectIn && edge.level == 1).count()
+    let (mut selected, mut count) = (true, 0);
+    for edge in bench.cable.edges() {
+        match edge.line {
+            Line::SelectIn => selected = edge.level == 0,
+            // Event 1 of IEEE 1284.
+            Line::AutoFeed if edge.level == 0 && !selected => count += 1,
+            _ => {}
+        }
+    }
+    count
 }
 
 #[test]
@@ -812,6 +821,92 @@ fn a_printer_that_is_switched_off_loses_the_job_and_is_reset_before_the_next_one
     let reset = edges.iter().position(|edge| edge.line == Line::Init).unwrap();
     let strobes = edges[..reset].iter().filter(|edge| edge.line == Line::Strobe && edge.level == 0).count();
     assert_eq!(strobes, had);
+}
+
+/// Whether the bridge drives the cable: nSelectIn, low at rest, is high by a pull-up else.
+fn drives(bench: &Bench<'_>) -> bool {
+    let edges = bench.cable.edges();
+    edges.iter().rev().find(|edge| edge.line == Line::SelectIn).is_some_and(|edge| edge.level == 0)
+}
+
+#[test]
+fn the_cable_is_driven_only_while_the_printer_has_its_supply_or_is_worked_on() {
+    for handshake in [Handshake::Busy, Handshake::Ack, Handshake::BusyAck] {
+        let mut board = Board::new(4096, 4096);
+        let mut bench = Bench::new(&mut board, Peripheral::default());
+        bench.cable.plan(0, Line::Power, 0);
+        bench.cable.pass(1);
+        bench.tell(&ToBridge::Configure(settings(handshake, Timing::DEFAULT)));
+        bench.pass(100 * MS);
+        assert!(!drives(&bench), "{handshake:?}: a printer that was off when the bridge started");
+        send(&mut bench, 7, &foreign(700));
+        bench.pass(100 * MS);
+        assert!(!drives(&bench), "{handshake:?}: a job that waits");
+        bench.cable.plan(0, Line::Power, 1);
+        bench.pass(2 * MS);
+        assert!(drives(&bench), "{handshake:?}: switched on");
+        bench.pass(20 * MS);
+        assert_eq!((bench.state(), bench.cable.taken()), (JobState::Done, foreign(700)), "{handshake:?}");
+        for (dropout_ms, stays) in [(17, true), (24, false)] {
+            bench.cable.plan(0, Line::Power, 0);
+            bench.pass(dropout_ms * MS);
+            assert_eq!(drives(&bench), stays, "{handshake:?}: off for {dropout_ms} ms");
+            bench.cable.plan(0, Line::Power, 1);
+            bench.pass(2 * MS);
+            assert!(drives(&bench), "{handshake:?}: on again");
+        }
+    }
+}
+
+/// A loop-back plug has no +5 V.
+#[test]
+fn a_wiring_test_drives_the_cable_of_a_printer_that_is_off_until_its_end() {
+    let mut board = Board::new(4096, 4096);
+    let mut bench = Bench::new(&mut board, Peripheral::default());
+    bench.cable.switch(false);
+    bench.pass(100 * MS);
+    assert!(!drives(&bench));
+    bench.tell(&ToBridge::Drive { data: 0xaa, control: 0b0111 });
+    bench.pass(300 * MS);
+    assert!(drives(&bench));
+    bench.tell(&ToBridge::Drive { data: 0, control: 0b0111 });
+    bench.pass(2 * MS);
+    assert!(!drives(&bench));
+    send(&mut bench, 7, &foreign(700));
+    bench.cable.switch(true);
+    bench.pass(100 * MS);
+    assert_eq!((bench.state(), bench.cable.taken()), (JobState::Done, foreign(700)));
+}
+
+/// Whenever it is switched on and off, and whatever it is asked meanwhile: no byte is strobed at a cable that is not driven, so
+/// none is counted that has not arrived.
+#[test]
+fn no_byte_counts_that_was_strobed_while_the_cable_was_free() {
+    for seed in 400..440 {
+        let mut random = seeded(seed);
+        let mut board = Board::new(4096, 4096);
+        let id = Some(b"\x00\x0cMFG:ALPS;;".to_vec());
+        let mut bench = Bench::new(&mut board, Peripheral { device_id: id, ..Peripheral::default() });
+        bench.random = Some(seeded(seed + 1000));
+        for job in 1..6 {
+            bench.cable.switch(false);
+            bench.pass(random.random_range(15..40) * MS);
+            let request = job as u16;
+            let what = if random.random() { Ask::DeviceId } else { Ask::PrinterAtRest };
+            bench.cable.plan(random.random_range(0..3_000_000), Line::Power, 1);
+            bench.pass(random.random_range(0..2) * MS);
+            bench.tell(&ToBridge::Ask { request, what });
+            bench.cable.pass(random.random_range(0..1_000_000));
+            bench.cable.switch(true);
+            bench.hear(&format!("Answer {{ request: {request}, "));
+            let before = bench.cable.taken().len();
+            let bytes = foreign(random.random_range(1..900));
+            send(&mut bench, job, &bytes);
+            bench.pass(4_000 * MS);
+            assert_eq!(bench.state(), JobState::Done, "seed {seed}, job {job}");
+            assert!(bench.cable.taken()[before..] == bytes, "seed {seed}, job {job}");
+        }
+    }
 }
 
 #[test]

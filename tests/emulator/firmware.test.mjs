@@ -249,8 +249,12 @@ test('a printer that is switched off in the middle loses the job, and nothing mo
   const { taken } = bench.printer;
   const had = taken.length;
   await bench.hear(({ kind, state }) => kind === 'progress' && state === 'lost');
+  await bench.pass(5);
+  assert.deepEqual([bench.printer.enabled, bench.printer.out.selectIn, bench.printer.out.strobe], [false, 1, 1], 'nOE is low');
   bench.printer.power(true);
-  await bench.pass(50);
+  await bench.pass(2);
+  assert.deepEqual([bench.printer.enabled, bench.printer.out.selectIn], [true, 0], 'nOE is high');
+  await bench.pass(48);
   assert.equal(taken.length, had);
 });
 

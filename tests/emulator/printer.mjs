@@ -204,7 +204,8 @@ export class Waveform {
     if (level.selectIn === 1) return;
     if (line === 'data') {
       if (this.#fallAt !== null) this.wrong.push({ at, what: 'data changed under the strobe' });
-      if (level.busy && !onItsWay) this.wrong.push({ at, what: 'data changed while busy' });
+      // Behind a printer that is off the buffers let go.
+      if (level.busy && level.power && !onItsWay) this.wrong.push({ at, what: 'data changed while busy' });
       if (this.#riseAt !== null) this.#least('hold', at - this.#riseAt);
       this.#dataAt = at;
     } else if (line === 'strobe' && now === 0) {

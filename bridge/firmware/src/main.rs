@@ -181,9 +181,8 @@ async fn main(spawner: Spawner) {
         (peripherals.DMA_CH0, peripherals.DMA_CH1),
     );
     strobe.set_place(keeper.place());
-    // The pins went to the PIO block and had no driver meanwhile. Only now does the cable see them.
+    // The pins went to the PIO block and had no driver meanwhile. The cable has not seen it: the driver enables the buffers.
     pins::bring_up();
-    pins::enable(true);
 
     static DRIVER: StaticCell<port::PicoDriver> = StaticCell::new();
     let driver = DRIVER.init_with(|| port::driver(strobe, keeper));

@@ -101,6 +101,10 @@ impl driver::Board for Pico {
         pins::status()
     }
 
+    fn enable(&mut self, on: bool) {
+        pins::enable(on);
+    }
+
     fn start_boot_loader(&mut self) {
         pins::enable(false);
         embassy_rp::rom_data::reset_to_usb_boot(1 << pins::LAMP, 0);

@@ -56,6 +56,9 @@ pub trait Board: Clock + Sender + Retained {
     /// The levels of the status lines, all read at one moment.
     fn lines(&mut self) -> Lines;
 
+    /// Lets the output buffers drive the cable, or not; then pull-ups hold its control lines high.
+    fn enable(&mut self, on: bool);
+
     /// Releases the printer's lines and restarts in the boot loader. A real board does not return from this.
     fn start_boot_loader(&mut self);
 

@@ -15,7 +15,8 @@
 //! jobs: device ID, status, reset, wiring test.
 //!
 //! While the printer's +5 V is absent nothing is strobed: the engine gives no bytes, the sender gets none and strobes none of
-//! those it has, and they are taken back when the supply counts as gone.
+//! those it has, and they are taken back when the supply counts as gone. From then on the output buffers let go of the cable,
+//! so that the inputs of a printer that is off are not fed, until the supply is back or the processor has work at the pins.
 //!
 //! Cost: a poll takes well below a millisecond, whatever the printer does.
 
@@ -52,6 +53,9 @@ const BUSY_US: u32 = 100;
 /// Bytes the processor sends in one poll, and for how long at most it begins another.
 const HANDFUL: usize = 32;
 const HANDFUL_US: u64 = 300;
+
+/// Data and control lines at rest, as [`Port::rest`] leaves the latter: these levels end a wiring test.
+const AT_REST: (u8, u8) = (0, 0b0111);
 
 /// Who works the pins.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -95,6 +99,8 @@ pub struct Driver<B, D, O, I, A, T> {
     /// When a byte was last sent, or nothing was waiting to be.
     moved_us: u64,
     supply: Supply,
+    /// The output buffers drive the cable.
+    driving: bool,
     /// Why the processor could not send.
     stop: Option<Fault>,
     introduction: Introduction,
@@ -129,6 +135,7 @@ where
             patience_us: u64::from(Timing::PATIENCE_MS) * 1000,
             moved_us: now_us,
             supply: Supply::new(now_us),
+            driving: false,
             stop: None,
             introduction: Introduction::Waiting,
             question: None,
@@ -263,6 +270,11 @@ where
                 let sent = self.board.stop();
                 self.consumed(sent, engine);
             }
+            if self.owner != Owner::WiringTest && self.talk.is_none() && self.question.is_none() {
+                self.drive(false);
+            }
+        } else if heeded.high(Lines::POWER) {
+            self.drive(true);
         }
         engine.port(self.lines, fault);
     }
@@ -282,7 +294,15 @@ where
         }
     }
 
-    /// Gives the pins to the processor, with nothing in flight.
+    /// Lets the output buffers drive the cable, or not.
+    fn drive(&mut self, on: bool) {
+        if self.driving != on {
+            self.driving = on;
+            self.board.enable(on);
+        }
+    }
+
+    /// Gives the pins to the processor, with nothing in flight and the cable driven.
     fn take_pins(&mut self, engine: &mut Engine<'_>) {
         let sent = self.board.stop();
         self.consumed(sent, engine);
@@ -292,6 +312,7 @@ where
             Owner::WiringTest => self.port.rest(),
         }
         self.owner = Owner::Processor;
+        self.drive(true);
     }
 
     /// Puts the lines to rest and gives the pins to whom the settings name.
@@ -339,10 +360,11 @@ where
             }
         };
         engine.done(outcome);
-        if matches!(task, Task::Drive { .. } | Task::Probe { .. }) {
-            self.owner = Owner::WiringTest;
-        } else {
-            self.release_pins();
+        match task {
+            Task::Drive { data, control } | Task::Probe { data, control } if (data, control) != AT_REST => {
+                self.owner = Owner::WiringTest;
+            }
+            _ => self.release_pins(),
         }
     }
 

@@ -123,8 +123,9 @@ pub struct SimulatedBoard {
 }
 
 impl SimulatedBoard {
-    /// A board at this end of the cable.
+    /// A board at this end of the cable, which it does not drive yet.
     pub fn new(port: &SimulatedPort) -> Self {
+        port.0.borrow_mut().enable(false);
         SimulatedBoard { world: port.0.clone(), buffers: Rc::default() }
     }
 
@@ -144,6 +145,7 @@ impl SimulatedBoard {
         let mut world = self.world.borrow_mut();
         world.finish_byte();
         world.strobing = Strobing::new();
+        world.enable(false);
         let marks = core::mem::take(&mut world.marks);
         let mut checkpoint = world.checkpoint?;
         checkpoint.progress.printed += marks;
@@ -249,6 +251,10 @@ impl Board for SimulatedBoard {
             (Line::Power, Lines::POWER),
         ];
         Lines(lines.into_iter().filter(|&(line, _)| world.level(line) == 1).map(|(_, bit)| bit).sum())
+    }
+
+    fn enable(&mut self, on: bool) {
+        self.world.borrow_mut().enable(on);
     }
 
     fn start_boot_loader(&mut self) {

@@ -72,6 +72,9 @@ pub(crate) struct World {
     plan: BTreeMap<(u64, u64), (Line, u8)>,
     planned: u64,
     levels: [u8; 11],
+    /// What the host's side puts out, whether or not its buffers drive the cable.
+    outputs: [u8; 11],
+    enabled: bool,
     ack_latch: bool,
     pub(crate) edges: Vec<Edge>,
     pub(crate) taken: Vec<u8>,
@@ -113,6 +116,8 @@ impl SimulatedPort {
             plan: BTreeMap::new(),
             planned: 0,
             levels,
+            outputs: levels,
+            enabled: true,
             ack_latch: false,
             edges: Vec::new(),
             taken: Vec::new(),
@@ -234,8 +239,25 @@ impl World {
 
     /// The host's side sets a line.
     fn drive(&mut self, line: Line, level: u8) {
+        self.outputs[line as usize] = level;
+        if self.enabled {
+            self.show(line, level);
+        }
+    }
+
+    /// The printer sees a line of the host's.
+    fn show(&mut self, line: Line, level: u8) {
         if self.change(line, level) && !self.off {
             self.react(line, level);
+        }
+    }
+
+    /// The host's buffers drive the cable, or pull-ups hold its control lines high.
+    fn enable(&mut self, on: bool) {
+        self.enabled = on;
+        for line in [Line::Data, Line::SelectIn, Line::AutoFeed, Line::Init, Line::Strobe] {
+            let free = if line == Line::Data { self.level(line) } else { 1 };
+            self.show(line, if on { self.outputs[line as usize] } else { free });
         }
     }
 

@@ -88,8 +88,8 @@ pub enum ToBridge<'a> {
     Initialise,
     /// Restarts the bridge in its boot loader, for flashing. Refused while a job is open.
     Bootloader,
-    /// Sets the port's outputs by hand, for the wiring test; [`Ask::Lines`] reads the inputs. The next job starts from the
-    /// idle levels again. Refused while a job is open.
+    /// Sets the port's outputs by hand, for the wiring test; [`Ask::Lines`] reads the inputs. The idle levels (data 0, control 7)
+    /// end the test, and the next job starts from them in any case. Refused while a job is open.
     Drive {
         /// Levels of Data1..Data8, Data1 in bit 0.
         data: u8,
