@@ -16,13 +16,13 @@
 // The board's clock never runs ahead of the world's, so that waiting costs nothing and its timers mean what they say;
 // it falls behind when the board has more to do than this machine can do in time.
 
-import { rmSync, readFileSync, writeFileSync } from 'node:fs';
-import { createServer } from 'node:net';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { createInterface } from 'node:readline';
 import { Board } from './board.mjs';
 import { Plug } from './plug.mjs';
 import { Printer } from './printer.mjs';
+import { SerialPort, keepTime, listen } from './serial.mjs';
 import { Urbs } from './urbs.mjs';
 import { Host } from './usb.mjs';
 
@@ -32,26 +32,12 @@ if (!folder) {
   process.exit(2);
 }
 
-const SLICE_NS = 2_000_000;
-
 const board = new Board(new Uint8Array(readFileSync(image)));
 const host = new Host(board);
 let woken = () => {};
 const wake = () => woken();
 
-/// One connection at a time at a socket.
-function serve(name, connected) {
-  const path = join(folder, name);
-  rmSync(path, { force: true });
-  const server = createServer((socket) => {
-    socket.on('error', () => {});
-    socket.on('data', wake);
-    socket.on('close', wake);
-    connected(socket);
-    wake();
-  });
-  return new Promise((resolve) => server.listen(path, resolve));
-}
+const serve = (name, connected) => listen(join(folder, name), wake, connected);
 
 // The printer.
 let paper = null;
@@ -93,48 +79,12 @@ let device = host.enumerate();
 async function replug() {
   host.replug();
   device = host.enumerate();
-  port?.destroy();
+  serial.destroy();
   urbs.unplugged();
   await device;
 }
 
-// The serial port: what the kernel's driver does when it is opened and closed.
-const dataInterface = async () => (await device).interfaces.find((one) => one.class === 0x0a);
-let opened = Promise.resolve();
-let port = null;
-function serialConnected(socket) {
-  port?.destroy();
-  port = socket;
-  // What fails here fails because the cable was pulled; the program finds out by its port's end.
-  const turn = (act) => { opened = opened.then(act).catch(() => socket.destroy()); };
-  turn(async () => {
-    if (port !== socket) return;
-    const data = await dataInterface();
-    await host.openSerial(data.number - 1, true);
-    const take = (packet) => {
-      if (socket.write(packet)) return;
-      // The next packet is asked for when this one has gone.
-      host.read(data.in, null);
-      socket.once('drain', () => { if (port === socket) host.read(data.in, take); });
-    };
-    host.read(data.in, take);
-  });
-  socket.on('data', (bytes) => {
-    socket.pause();
-    turn(async () => {
-      const data = await dataInterface();
-      await host.write(data.out, new Uint8Array(bytes));
-      socket.resume();
-    });
-  });
-  socket.on('close', () => turn(async () => {
-    if (port !== socket) return;
-    port = null;
-    const data = await dataInterface();
-    host.read(data.in, null);
-    await host.openSerial(data.number - 1, false);
-  }));
-}
+const serial = new SerialPort(host, () => device);
 
 /// What has been measured, in the board's time.
 const figures = () => ({
@@ -167,7 +117,7 @@ async function up() {
   const { device: own, configuration, names } = await device;
   writeFileSync(join(folder, 'descriptors'), Buffer.concat([own, configuration]));
   writeFileSync(join(folder, 'names'), `${names.join('\n')}\n`);
-  await serve('serial', serialConnected);
+  await serve('serial', (socket) => serial.connected(socket));
   await serve('usb', (socket) => urbs.connected(socket));
   await serve('printer', printerConnected);
   answer({ up: true, names });
@@ -177,18 +127,8 @@ up().catch((error) => {
   process.exit(1);
 });
 
-// The board's time against the world's.
-let ahead = performance.now() - board.now / 1e6;
-for (;;) {
-  await board.run(() => crossed.length > 512, SLICE_NS);
-  report();
-  const late = performance.now() - (ahead + board.now / 1e6);
-  if (late > 0) ahead += late;
-  else if (late < -1) {
-    await new Promise((resolve) => {
-      const timer = setTimeout(resolve, -late);
-      woken = () => { clearTimeout(timer); resolve(); };
-    });
-    woken = () => {};
-  }
-}
+await keepTime(board, {
+  until: () => crossed.length > 512,
+  turn: report,
+  sleep: (sleep) => { woken = sleep; },
+});

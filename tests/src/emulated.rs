@@ -34,6 +34,9 @@ const BUFFER: u64 = 4096;
 /// A program that has the port open but does not read is not waited for beyond this.
 const TERMINAL: usize = 4096;
 
+/// The serial port's name in its folder.
+const TTY: &str = "tty";
+
 /// How often a quiet end is looked at.
 const TICK: Duration = Duration::from_millis(5);
 
@@ -77,12 +80,7 @@ impl Emulated {
         printer: Printer,
         stock: Stock,
     ) -> io::Result<Emulated> {
-        let mut board = Command::new(std::env::var_os("FOILPRESS_NODE").unwrap_or_else(|| "node".into()))
-            .arg(scripts.join("bridge.mjs"))
-            .args([image, folder])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
+        let mut board = node(&scripts.join("bridge.mjs"), &[image, folder])?;
         let missing = || io::Error::other("a pipe to Node is missing");
         let orders = board.stdin.take().ok_or_else(missing)?;
         let answers = BufReader::new(board.stdout.take().ok_or_else(missing)?);
@@ -109,20 +107,13 @@ impl Emulated {
         let socket = UnixStream::connect(folder.join("printer"))?;
         let (desk, stop) = (emulated.desk.clone(), emulated.stop.clone());
         emulated.ends.push(std::thread::spawn(move || serve_printer(&socket, &desk, &stop)));
-        let mut terminal = Terminal::new(folder)?;
-        let stop = emulated.stop.clone();
-        emulated.ends.push(std::thread::spawn(move || {
-            while !stop.load(Ordering::Relaxed) {
-                terminal.serve()?;
-            }
-            Ok(())
-        }));
+        emulated.ends.push(serve_terminal(folder, &emulated.stop)?);
         Ok(emulated)
     }
 
     /// Where the serial port is.
     pub fn port(&self) -> PathBuf {
-        self.folder.join("tty")
+        self.folder.join(TTY)
     }
 
     /// The printer and what has come of it; it stands still while this is held.
@@ -177,6 +168,72 @@ impl Drop for Emulated {
             }
         }
     }
+}
+
+/// An emulated bridge with the rig at its cable. Dropping it switches both off.
+pub struct EmulatedRig {
+    boards: Child,
+    stop: Arc<AtomicBool>,
+    ends: Vec<JoinHandle<io::Result<()>>>,
+    /// The serial ports of bridge and rig.
+    pub ports: [PathBuf; 2],
+}
+
+impl EmulatedRig {
+    /// Boots the images of bridge and rig, with the ends of each in a folder of its own. `scripts` as for [`Emulated::start`].
+    ///
+    /// Errors: as there.
+    pub fn start(images: [&Path; 2], scripts: &Path, folders: [&Path; 2]) -> io::Result<EmulatedRig> {
+        let ([bridge, rig], [here, there]) = (images, folders);
+        let mut boards = node(&scripts.join("rig.mjs"), &[bridge, here, rig, there])?;
+        let ports = folders.map(|folder| folder.join(TTY));
+        let stop = Arc::<AtomicBool>::default();
+        let up = boards.stdout.take().map(|stdout| BufReader::new(stdout).read_line(&mut String::new()));
+        let mut emulated = EmulatedRig { boards, stop, ends: Vec::new(), ports };
+        if !matches!(up, Some(Ok(1..))) {
+            return Err(io::Error::other(
+                "the emulated boards do not come up; their last words are on standard error",
+            ));
+        }
+        for folder in folders {
+            emulated.ends.push(serve_terminal(folder, &emulated.stop)?);
+        }
+        Ok(emulated)
+    }
+}
+
+impl Drop for EmulatedRig {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        // The end of their standard input is the boards' end.
+        drop(self.boards.stdin.take());
+        let _ = self.boards.wait();
+        for end in self.ends.drain(..) {
+            let _ = end.join();
+        }
+    }
+}
+
+/// Node with a script, to be talked to.
+fn node(script: &Path, args: &[&Path]) -> io::Result<Child> {
+    Command::new(std::env::var_os("FOILPRESS_NODE").unwrap_or_else(|| "node".into()))
+        .arg(script)
+        .args(args)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+}
+
+/// Serves the serial port of the board whose ends are in this folder.
+fn serve_terminal(folder: &Path, stop: &Arc<AtomicBool>) -> io::Result<JoinHandle<io::Result<()>>> {
+    let mut terminal = Terminal::new(folder)?;
+    let stop = stop.clone();
+    Ok(std::thread::spawn(move || {
+        while !stop.load(Ordering::Relaxed) {
+            terminal.serve()?;
+        }
+        Ok(())
+    }))
 }
 
 /// The printer's end of the parallel cable.
@@ -384,7 +441,7 @@ fn open_terminal(folder: &Path) -> io::Result<File> {
     tcsetattr(&slave, OptionalActions::Now, &settings)?;
     drop(slave);
     rustix::io::ioctl_fionbio(&master, true)?;
-    let (fresh, name) = (folder.join("tty.new"), folder.join("tty"));
+    let (fresh, name) = (folder.join("tty.new"), folder.join(TTY));
     let _ = fs::remove_file(&fresh);
     symlink(path, &fresh)?;
     fs::rename(fresh, name)?;

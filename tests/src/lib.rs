@@ -3,4 +3,5 @@
 #[cfg(unix)]
 pub mod emulated;
 pub mod planes;
+pub mod rig;
 pub mod served;

@@ -22,6 +22,7 @@ use std::process::Command;
 /// What every use of the emulator needs.
 struct Bench {
     image: PathBuf,
+    rig: PathBuf,
     scripts: PathBuf,
     /// Where what is made for it goes.
     folder: PathBuf,
@@ -34,6 +35,7 @@ impl Bench {
         let folder = firmware::target(root);
         fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
         let image = firmware::build(root)?;
+        let rig = firmware::build_rig(root)?;
         let node = match Node::find(&folder) {
             Ok(node) => node,
             Err(missing) => return tools::skip(Need::Emulator, &format!("{missing:#}")).map(|()| None),
@@ -42,7 +44,7 @@ impl Bench {
         let mut install =
             node.command("npm", &["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"]);
         run_step("npm ci", install.current_dir(&scripts))?;
-        Ok(Some(Bench { image, scripts, folder, node }))
+        Ok(Some(Bench { image, rig, scripts, folder, node }))
     }
 }
 
@@ -88,6 +90,7 @@ pub fn run(root: &Path, program: &Path) -> Result<()> {
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_IMAGE", &bench.image)
+        .env("FOILPRESS_RIG", &bench.rig)
         .env("FOILPRESS_NODE", &bench.node.program)
         .env(PROGRAM, program);
     if has_usb {

@@ -1,16 +1,18 @@
-//! `cargo xtask firmware`: the bridge's images, one for each board, and whether they are as small as they are to be.
+//! `cargo xtask firmware`: the bridge's images, one for each board, and the rig's; and whether they are as small as they are to be.
 
 use crate::{cargo, elf, succeed};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// A board the firmware is built for.
+/// A firmware and the board it is built for.
 struct Board {
+    /// Where its source is.
+    folder: &'static str,
     /// What is to run it.
     chip: uf2::Chip,
-    /// The feature of the firmware that chooses it.
-    feature: &'static str,
+    /// The feature of the firmware that chooses the board, if there are several.
+    feature: Option<&'static str>,
     /// What the compiler makes code for.
     target: &'static str,
     /// What the image is called.
@@ -22,20 +24,32 @@ struct Board {
 /// The Pico: Cortex-M0+, no atomics with compare-and-swap. The Pico 2: Cortex-M33.
 const BOARDS: [Board; 2] = [
     Board {
+        folder: "bridge/firmware",
         chip: uf2::Chip::Rp2040,
-        feature: "pico",
+        feature: Some("pico"),
         target: "thumbv6m-none-eabi",
         name: "foilpress-bridge",
         memory: 264 << 10,
     },
     Board {
+        folder: "bridge/firmware",
         chip: uf2::Chip::Rp2350,
-        feature: "pico2",
+        feature: Some("pico2"),
         target: "thumbv8m.main-none-eabihf",
         name: "foilpress-bridge-pico2",
         memory: 520 << 10,
     },
 ];
+
+/// The board that plays the printer.
+const RIG: Board = Board {
+    folder: "tests/rig/firmware",
+    chip: uf2::Chip::Rp2040,
+    feature: None,
+    target: BOARDS[0].target,
+    name: "foilpress-rig",
+    memory: BOARDS[0].memory,
+};
 
 /// What the compiler makes code for; `rustup target add` brings them.
 pub const BARE_METAL: [&str; 2] = [BOARDS[0].target, BOARDS[1].target];
@@ -48,15 +62,20 @@ struct Budget {
 
 const MEMORY: u32 = 0x2000_0000;
 
-/// Builds the images and writes them as UF2; gives the path of the Pico's.
+/// Builds the bridge's images and writes them as UF2; gives the path of the Pico's.
 pub fn build(root: &Path) -> Result<PathBuf> {
     let [pico, pico2] = &BOARDS;
     build_for(pico2, root)?;
     build_for(pico, root)
 }
 
+/// Builds the rig's image and writes it as UF2; gives its path.
+pub fn build_rig(root: &Path) -> Result<PathBuf> {
+    build_for(&RIG, root)
+}
+
 fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
-    let folder = root.join("bridge/firmware");
+    let folder = root.join(board.folder);
     let target = target(root);
     let mut build = cargo(&["build", "--release", "--locked"]);
     // The folder's own settings name the linker's script and what is logged.
@@ -64,12 +83,16 @@ fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
     let status = build.status().context("cargo cannot be started")?;
     if !status.success() {
         bail!(
-            "the firmware for the {} does not build ({status}); `rustup target add {}`?",
+            "{} for the {} does not build ({status}); `rustup target add {}`?",
+            board.folder,
             board.chip,
             board.target
         );
     }
-    let program = target.join(board.target).join("release/foilpress-firmware");
+    let program = target.join(board.target).join("release").join(match board.feature {
+        Some(_) => "foilpress-firmware",
+        None => "foilpress-rig-firmware",
+    });
     let bytes = fs::read(&program).with_context(|| format!("{} cannot be read", program.display()))?;
     let segments = elf::segments(&bytes)?;
     let pieces: Vec<(u64, &[u8])> = segments
@@ -102,17 +125,17 @@ fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
     );
     println!("{} ({} pages)", path.display(), read.pages().len());
     if flash > budget.flash || memory > budget.memory {
-        bail!("the image is larger than bridge/firmware/budget.toml allows");
+        bail!("the image is larger than {}/budget.toml allows", board.folder);
     }
     Ok(path)
 }
 
-/// Checks the image's source as `cargo clippy` checks all other.
+/// Checks the images' sources as `cargo clippy` checks all other.
 pub fn lint(root: &Path) -> Result<()> {
-    for board in &BOARDS {
+    for board in BOARDS.iter().chain([&RIG]) {
         let mut lint = cargo(&["clippy", "--release", "--locked"]);
         lint.args(board.arguments()).args(["--", "-D", "warnings"]);
-        lint.current_dir(root.join("bridge/firmware")).env("CARGO_TARGET_DIR", target(root));
+        lint.current_dir(root.join(board.folder)).env("CARGO_TARGET_DIR", target(root));
         succeed(&mut lint)?;
     }
     Ok(())
@@ -120,8 +143,9 @@ pub fn lint(root: &Path) -> Result<()> {
 
 impl Board {
     /// What chooses it in a build.
-    fn arguments(&self) -> [&'static str; 5] {
-        ["--no-default-features", "--features", self.feature, "--target", self.target]
+    fn arguments(&self) -> impl Iterator<Item = &'static str> {
+        let feature = self.feature.map(|feature| ["--no-default-features", "--features", feature]);
+        feature.into_iter().flatten().chain(["--target", self.target])
     }
 }
 

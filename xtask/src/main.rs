@@ -59,7 +59,7 @@ fn main() -> ExitCode {
     match Args::parse().task {
         Task::Test => gate::run(root),
         Task::Bench => finish(succeed(&mut cargo(&["bench", "--workspace", "--locked"]))),
-        Task::Firmware => finish(firmware::build(root).map(drop)),
+        Task::Firmware => finish(firmware::build(root).and_then(|_| firmware::build_rig(root)).map(drop)),
         Task::Emulator { serve: true } => finish(emulator::serve(root)),
         Task::Emulator { serve: false } => finish(emulator::alone(root)),
         Task::Preview => finish(preview::run(root)),

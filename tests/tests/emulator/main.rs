@@ -7,6 +7,7 @@
 mod care;
 mod flash;
 mod found;
+mod rig;
 
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
