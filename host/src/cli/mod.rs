@@ -31,6 +31,7 @@ mod preview;
 mod print;
 mod progress;
 mod queue;
+mod report;
 mod resume;
 mod sample;
 mod send;
