@@ -26,9 +26,10 @@ const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1d1c1a;backg
     nav{display:flex;flex-wrap:wrap;gap:.3rem 1rem}.wide{overflow-x:auto}table{border-collapse:collapse}\
     th,td{text-align:left;padding:.2rem .9rem .2rem 0;border-bottom:1px solid #dcd8d0;vertical-align:top}\
     td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\
-    .many{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1rem}\
+    .many{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1rem;\
+    margin-top:1rem}\
     .passes{grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}figure{margin:0;background:#fff;padding:.6rem;\
-    border-radius:8px;min-width:0}figure>svg{max-width:720px;margin:0 auto}figcaption{font-size:.88rem;overflow-wrap:anywhere}.faint{color:#5f5b55}";
+    border-radius:8px;min-width:0}figure>svg{max-width:min(100%,720px);margin:0 auto}figcaption{font-size:.88rem;overflow-wrap:anywhere}.faint{color:#5f5b55}";
 
 /// What the page shows.
 pub struct Subject<'a> {
