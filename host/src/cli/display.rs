@@ -119,6 +119,14 @@ impl Image {
             Image::Document(document) => document.materials(),
         }
     }
+
+    /// What its reader had to assume.
+    fn notes(&self) -> &[String] {
+        match self {
+            Image::Matte(_) => &[],
+            Image::Document(document) => &document.notes,
+        }
+    }
 }
 
 /// Runs `display`.
@@ -156,7 +164,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     observer.end();
     frames.push(("alignment".to_owned(), Frame::alignment(&grid)));
-    let work = Work { name: &args.name(), grid: &grid, frames: &frames, placed, library: &library };
+    let notes: Vec<String> = images.iter().flat_map(Image::notes).cloned().collect();
+    let work =
+        Work { name: &args.name(), notes: &notes, grid: &grid, frames: &frames, placed, library: &library };
     work.print(&args.job, (&layout, if args.stacks.is_empty() { set } else { InkSet::ALL }), places, observer)
 }
 
@@ -232,6 +242,7 @@ impl Args {
 /// A display that is made.
 struct Work<'a> {
     name: &'a str,
+    notes: &'a [String],
     grid: &'a Grid,
     frames: &'a [(String, Frame)],
     placed: Placed,
@@ -256,7 +267,7 @@ impl Work<'_> {
             library: self.library,
         };
         let ground = job.result.background.unwrap_or_default();
-        let made = job::make(&request, &[], &[], places, ground, observer)?;
+        let made = job::make(&request, self.notes, &[], places, ground, observer)?;
         self.write(&made.folder, observer)?;
         made.finish(self.report(), (&self.advice(), "display.html"), &job.result, &job.deliver, observer)
     }

@@ -1,8 +1,8 @@
 //! The page that joins what a print of a document writes: `report.html`.
 //!
-//! It lies in the folder of the print and shows the pictures beside it by their names, so each exists once; curves and spectra are
-//! drawn in it. The plan stays a page of its own, `plan.html`, because it is printed and kept beside the printer.
-//! Names come from documents of unknown origin and appear as text.
+//! It lies in the folder of the print and shows the pictures beside it by their names, so each exists once; curves and spectra
+//! are drawn in it. The plan stays a page of its own, `plan.html`, because it is printed and kept beside the printer. Names
+//! come from documents of unknown origin and appear as text.
 
 use std::fmt::{self, Write as _};
 
@@ -29,7 +29,8 @@ const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1d1c1a;backg
     .many{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1rem;\
     margin-top:1rem}\
     .passes{grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}figure{margin:0;background:#fff;padding:.6rem;\
-    border-radius:8px;min-width:0}figure>svg{max-width:min(100%,720px);margin:0 auto}figcaption{font-size:.88rem;overflow-wrap:anywhere}.faint{color:#5f5b55}";
+    border-radius:8px;min-width:0}figure>svg{max-width:min(100%,720px);margin:0 auto}\
+    figcaption{font-size:.88rem;overflow-wrap:anywhere}.faint{color:#5f5b55}";
 
 /// What the page shows.
 pub struct Subject<'a> {
@@ -291,7 +292,8 @@ mod tests {
         };
         let materials: Vec<MaterialReport> = (0..DRAWN + 3).map(|i| material(i % 2)).collect();
         let (rmse, p95, max, light_rmse) = (0.02, 0.03, 0.4, 0.05);
-        let fidelity = Fidelity { mean: 0.0171, rmse, p95, max, light_rmse, width: 1, height: 1, map: vec![0.0] };
+        let fidelity =
+            Fidelity { mean: 0.0171, rmse, p95, max, light_rmse, width: 1, height: 1, map: vec![0.0] };
         let spectrum = press::preview::spectrum(&dots, &[0.9, 0.2]);
         assert!(spectrum.is_some());
         let subject = Subject {

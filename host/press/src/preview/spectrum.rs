@@ -1,11 +1,11 @@
 //! The radially averaged power spectrum of printed dots.
 //!
 //! Problem: see whether a halftone keeps its power at frequencies that the eye does not resolve.
-//! Method: each dot counts as a value of its stack, such as the cube root of its luminance. Of at most nine windows of 512 dots (21.7
-//! mm) that lie evenly, the three whose content changes least over their area are transformed (Hann's window, mean removed), and
-//! the power is averaged over rings. White noise of the same variance is 1 everywhere.
-//! Cost: 15 ms a window. Limits: content of the document finer than a window counts as halftone, so even windows are chosen; rings
-//! say nothing of directions.
+//! Method: each dot counts as a value of its stack, such as the cube root of its luminance. Of at most nine windows of 512
+//! dots (21.7 mm) that lie evenly, the three whose content changes least over their area are transformed (Hann's window, mean
+//! removed), and the power is averaged over rings. White noise of the same variance is 1 everywhere.
+//! Cost: 15 ms a window. Limits: content of the document finer than a window counts as halftone, so even windows are chosen;
+//! rings say nothing of directions.
 //! Source: Ulichney, Digital Halftoning (1987), chapter 3.
 
 use std::f64::consts::TAU;

@@ -1,9 +1,9 @@
 //! The stacks of a grid, where none are named.
 //!
 //! Problem: of some fifty stacks, the few whose combinations come nearest to the images.
-//! Method: greedy, then exchanges. Each round adds the stack that lowers the sum of squared distances over a sample of the images'
-//! pixels the most, with all cells of equal area; then each is exchanged for a better one while that helps. What would need more
-//! cartridges than the printer holds, or does not hold in cells of this size, is left out.
+//! Method: greedy, then exchanges. Each round adds the stack that lowers the sum of squared distances over a sample of the
+//! images' pixels the most, with all cells of equal area; then each is exchanged for a better one while that helps. What would
+//! need more cartridges than the printer holds, or does not hold in cells of this size, is left out.
 //! Cost: candidates x (1 to 3 rounds) x stacks x sample solutions of [`Solver`]. Limits: not always the best set.
 
 use std::collections::BTreeSet;

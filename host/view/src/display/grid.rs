@@ -1,10 +1,10 @@
 //! The printed grid: which stack lies in which cell, and where the cells' edges are in dots.
 //!
 //! Problem: the screen's pitch is not a whole number of dots.
-//! Method: cell i reaches from dot `round(i p)` to dot `round((i + 1) p)`, so edges never drift. Stacks repeat in tiles, row by row
-//! in the order they are given; where K stacks fill rows of K cells, each row starts one further, so two stacks make a
-//! checkerboard. Around the grid lies a margin of [`MARGIN`] cells of bare paper with a cross at each corner, one cell wide, in
-//! the stack that is farthest from paper.
+//! Method: cell i reaches from dot `round(i p)` to dot `round((i + 1) p)`, so edges never drift. Stacks repeat in tiles, row
+//! by row in the order they are given; where K stacks fill rows of K cells, each row starts one further, so two stacks make a
+//! checkerboard. Around the grid lies a margin of [`MARGIN`] cells of bare paper with a cross at each corner, one cell wide,
+//! in the stack that is farthest from paper.
 //! Cost: one pass over the dots. Limits: stacks that do not fill a tile evenly; the first ones have more cells.
 
 use appearance::brdf::{Space, reflectances};

@@ -1,8 +1,9 @@
 //! One HTML file that shows masks, what is seen of them, and the next one.
 //!
-//! Method: the page holds the frames cell by cell, the edges of the cells, and the stacks' curves as tables over the chord between
-//! normal and half vector. It evaluates the forward model itself (`web/display.js` is [`seen`](super::seen) again), so light, eye,
-//! misalignment and depth follow the hand. Names come from files of unknown origin: the page sets them as text.
+//! Method: the page holds the frames cell by cell, the edges of the cells, and the stacks' curves as tables over the chord
+//! between normal and half vector. It evaluates the forward model itself (`web/display.js` is [`seen()`](super::seen())
+//! again), so light, eye, misalignment and depth follow the hand. Names come from files of unknown origin: the page sets them
+//! as text.
 //! Cost: one byte a cell and frame, deflated.
 
 use appearance::brdf::{Space, reflectances};

@@ -1,7 +1,7 @@
 //! What an eye sees of a frame: the mean of the forward model over each pixel, exactly.
 //!
-//! Method: the print's cells and the screen's are both rectangles, so along each axis a cell of the print falls into pieces on which
-//! the light's way in and the eye's way out each cross one cell of the screen. A weight is a sum over pairs of pieces.
+//! Method: the print's cells and the screen's are both rectangles, so along each axis a cell of the print falls into pieces on
+//! which the light's way in and the eye's way out each cross one cell of the screen. A weight is a sum over pairs of pieces.
 //! Cost: one product for each pair of pieces; one pair a cell in line, at most about sixteen otherwise.
 
 use press::preview::Radiance;
@@ -55,8 +55,8 @@ impl Placed {
     }
 }
 
-/// A piece of a cell: its length in millimetres, and the cells of the screen above it on the way in and on the way out; `None` beyond
-/// the grid, where the screen is closed.
+/// A piece of a cell: its length in millimetres, and the cells of the screen above it on the way in and on the way out; `None`
+/// beyond the grid, where the screen is closed.
 type Piece = (f64, Option<usize>, Option<usize>);
 
 /// The pieces of each cell along an axis.

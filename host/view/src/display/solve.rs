@@ -1,14 +1,14 @@
 //! How far each cell of a pixel is open: bounded least squares in cube roots.
 //!
-//! Problem: minimise `sum_j W_j^2 (cbrt(sum_q u_q R_qj) - cbrt(t_j))^2` over `leak <= u_q <= 1`, where `R_q` is what all cells of stack q
-//! return when open, relative to the display's brightness, t is the target's radiance and W are the weights of the metric (eqs.
-//! 2-3 of the 2009 paper). The simplex of `appearance::solve` does not fit: cells open independently, so weights have bounds and
-//! no sum.
-//! Method: Gauss-Newton. The model at each step is a quadratic with bounds in at most nine unknowns, which descent along one unknown
-//! after the other solves ([`within`]); Armijo's rule halves the step. It starts from least squares in the tangent of the metric at
-//! the target.
-//! Cost: about six steps of `K^2 m` products. Limits: a local minimum, like any search in this metric; in 256 random problems of two
-//! stacks none was worse than the best of a fine grid.
+//! Problem: minimise `sum_j W_j^2 (cbrt(sum_q u_q R_qj) - cbrt(t_j))^2` over `leak <= u_q <= 1`, where `R_q` is what all cells
+//! of stack q return when open, relative to the display's brightness, t is the target's radiance and W are the weights of the
+//! metric (eqs. 2-3 of the 2009 paper). The simplex of `appearance::solve` does not fit: cells open independently, so weights
+//! have bounds and no sum.
+//! Method: Gauss-Newton. The model at each step is a quadratic with bounds in at most nine unknowns, which descent along one
+//! unknown after the other solves ([`within`]); Armijo's rule halves the step. It starts from least squares in the tangent of
+//! the metric at the target.
+//! Cost: about six steps of `K^2 m` products. Limits: a local minimum, like any search in this metric; in 256 random problems
+//! of two stacks none was worse than the best of a fine grid.
 
 use appearance::brdf::{Space, Table, reflectances};
 use inks::{Library, Stack};
@@ -57,8 +57,8 @@ impl Solver {
         }
     }
 
-    /// How far the cells of each stack are open, `leak` to 1, as shares of what open cells return, and the distance d that is left
-    /// between the display and the target (reflectance in 1/sr).
+    /// How far the cells of each stack are open, `leak` to 1, as shares of what open cells return, and the distance d that is
+    /// left between the display and the target (reflectance in 1/sr).
     pub fn solve(&self, target: &[f32]) -> (Vec<f64>, f64) {
         let target: Vec<f64> =
             target.iter().zip(&self.radiance).map(|(f, c)| (f64::from(*f) * c).max(0.0)).collect();
@@ -135,8 +135,8 @@ impl Solver {
     }
 }
 
-/// Minimises `(u - u0) H (u - u0) / 2 + g (u - u0)` within bounds, from `u0` in `at`, along one unknown after the other. H is symmetric and
-/// positive semidefinite, so the descent ends at the minimum.
+/// Minimises `(u - u0) H (u - u0) / 2 + g (u - u0)` within bounds, from `u0` in `at`, along one unknown after the other. H is
+/// symmetric and positive semidefinite, so the descent ends at the minimum.
 pub(super) fn within(hessian: &[f64], slope: &[f64], bounds: &[(f64, f64)], at: &mut [f64]) {
     let count = at.len();
     let mut gradient = slope.to_vec();
