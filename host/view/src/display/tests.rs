@@ -233,9 +233,8 @@ proptest! {
                 singular |= system[p][p].abs() < 1e-9;
                 for r in (0..n).filter(|&r| r != p) {
                     let factor = system[r][p] / system[p][p];
-                    for c in 0..=n {
-                        system[r][c] -= factor * system[p][c];
-                    }
+                    let pivot = system[p].clone();
+                    system[r].iter_mut().zip(pivot).for_each(|(at, by)| *at -= factor * by);
                 }
             }
             if singular {
