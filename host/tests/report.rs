@@ -9,7 +9,7 @@ fn the_report_shows_files_that_exist_and_names_as_text() {
     let bench = Bench::new();
     let name = "<b>tile&co";
     small_document(&bench.path(name));
-    let args = ["print", name, "--size", "24x16mm", "--paper", "postcard", "-q", "-o", "out"];
+    let args = ["print", name, "--size", "12x8mm", "--paper", "postcard", "-q", "-o", "out"];
     let output = bench.command_of(args).output().expect("it starts");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let said = text(&output.stdout);
