@@ -20,7 +20,16 @@ fn a_folder_becomes_a_print_with_everything_in_it() {
     let (previews, others): (Vec<_>, Vec<_>) = made.into_iter().partition(|name| name.starts_with("preview"));
     assert_eq!(
         others,
-        ["job.rgl", "materials.png", "passes", "plan.html", "report.json", "separation.png", "sheet.png"]
+        [
+            "job.rgl",
+            "materials.png",
+            "passes",
+            "plan.html",
+            "report.html",
+            "report.json",
+            "separation.png",
+            "sheet.png"
+        ]
     );
     let passes = entries(&bench.path("tile.print/passes")).len() - 1;
     assert_eq!(previews.len(), passes + 1, "all inks together and each pass by itself: {previews:?}");

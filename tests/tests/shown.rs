@@ -39,12 +39,13 @@ const ELSEWHERE: [(&str, &str); 20] = [
 ];
 
 /// Documents that show commands, and the folder these are typed in.
-const DOCUMENTS: [(&str, &str); 13] = [
+const DOCUMENTS: [(&str, &str); 14] = [
     ("README.md", "."),
     ("docs/guide.md", "."),
     ("docs/guide/charts.md", "."),
     ("docs/guide/compare.md", "."),
     ("docs/guide/decals.md", "docs/guide/decal"),
+    ("docs/guide/display.md", "."),
     ("docs/guide/edit.md", "."),
     ("docs/guide/libraries.md", "docs/guide"),
     ("docs/guide/page.md", "."),
@@ -251,6 +252,11 @@ fn comparisons() {
 #[test]
 fn decals() {
     document("docs/guide/decals.md");
+}
+
+#[test]
+fn displays() {
+    document("docs/guide/display.md");
 }
 
 #[test]

@@ -212,7 +212,7 @@ fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
 }
 
 /// Relative luminance of a linear Rec. 709 colour.
-fn luminance(rgb: [f64; 3]) -> f64 {
+pub fn luminance(rgb: [f64; 3]) -> f64 {
     0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 }
 

@@ -12,6 +12,7 @@ mod chart;
 mod choice;
 mod compare;
 mod deliver;
+mod display;
 mod doctor;
 mod edit;
 mod generate;
@@ -30,6 +31,7 @@ mod preview;
 mod print;
 mod progress;
 mod queue;
+mod report;
 mod resume;
 mod sample;
 mod send;
@@ -89,6 +91,11 @@ enum Command {
     Preview(Box<preview::Args>),
     /// Compare photographs of a printed sheet with its prediction: figures, and a page with sliders
     Compare(Box<compare::Args>),
+    /// Make a display of materials: print a grid of stacks, and write what a screen over it has to show
+    ///
+    /// Writes one folder with the job of the grid, a mask for each image and one to align by, pictures of what is seen, and a
+    /// page that shows it all. With --to the job is also sent to a printer.
+    Display(Box<display::Args>),
     /// Print a chart: to judge stacks by eye, to measure inks, or to calibrate the printer
     Chart(Box<chart::Args>),
     /// Save, list and use named sets of options
@@ -196,6 +203,7 @@ fn run(args: Args) -> Result<()> {
         Command::Plan(args) => plan::run(&args, observer),
         Command::Preview(args) => preview::run(&args, observer),
         Command::Compare(args) => compare::run(&args, observer),
+        Command::Display(args) => display::run(&args, observer),
         Command::Chart(args) => chart::run(&args, observer),
         Command::Preset(args) => preset::run(&args, &Args::command()),
         Command::Ledger(args) => ledger::run(&args),

@@ -71,7 +71,8 @@ impl Kind {
                 Kind::Print => {
                     ["job.rgl", "plan.html", "sheet.png", "materials.png", "separation.png", "passes"].contains(&name)
                         || name == "preview.png"
-                        || (name.starts_with("preview-") && picture(name))
+                        || ["report.html", "display.html"].contains(&name)
+                        || (["preview-", "mask-", "seen-"].iter().any(|start| name.starts_with(start)) && picture(name))
                 }
                 Kind::Foil => {
                     ["bases.csv", edit::FILE_NAME].contains(&name)

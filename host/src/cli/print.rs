@@ -11,24 +11,29 @@ use serde_json::{Value, json};
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
 use super::choice::name;
 use super::deliver::DeliverArgs;
+use super::inks::luminance;
 use super::job::{self, Places, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
+use super::report;
 use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::gamut::Gain;
 use observe::Observer;
-use press::halftone::{self, metrics};
+use press::halftone;
+use press::halftone::metrics::{self, Look, Tone};
 use press::layout::{Layout, Mm, Size};
 use press::pipeline::document::{self, Halftoned, Settings};
 use press::pipeline::{self, Draft, Request};
-use press::preview::{self, Probe, STANDARD_LIGHTS, Source, Swatch};
+use press::preview::{self, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
 use press::sheet::Area;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;
 /// Pixels across a ball in `materials.png`.
 const BALL: usize = 160;
+/// The half angle in radians at which dots are light or dark for their spectrum: beside the highlight.
+const ASIDE: f64 = 0.35;
 /// Where the eye is when print and document are compared, in metres.
 const EYE: f64 = 0.5;
 
@@ -192,8 +197,20 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
          obvious).",
         pictures.fidelity.mean
     );
-    let report = report(&laid, &pictures.fidelity, observer)?;
-    made.finish(report, (&advice, "sheet.png"), &args.result, &args.deliver, observer)
+    let halftone = Halftone::measured(&laid, observer)?;
+    let page = report::page(&report::Subject {
+        plan: &made.job.draft.plan,
+        space: laid.document.materials().space(),
+        materials: &laid.halftoned.mapped.report.materials,
+        kind: kind(&laid),
+        fidelity: (&pictures.fidelity, EYE),
+        look: halftone.look.as_ref(),
+        tones: &halftone.tones,
+        spectrum: halftone.spectrum.as_ref(),
+    })?;
+    job::write(&made.folder.join("report.html"), page.as_bytes())?;
+    let report = report(&laid, &pictures.fidelity, &halftone);
+    made.finish(report, (&advice, "report.html"), &args.result, &args.deliver, observer)
 }
 
 /// What there is to look at, and how far print and document are apart.
@@ -225,7 +242,7 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     let sheet =
         preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
     let mapped = &halftoned.mapped.report;
-    let kind = if mapped.intent.uses_bases() { "basis" } else { "material" };
+    let kind = kind(laid);
     let swatches: Vec<Swatch> = (1..)
         .zip(&mapped.materials)
         .map(|(number, material)| Swatch {
@@ -239,13 +256,38 @@ fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) 
     Ok(Pictures { sheet, materials, fidelity })
 }
 
+/// What the materials of a report are.
+fn kind(laid: &Laid) -> &'static str {
+    if laid.halftoned.mapped.report.intent.uses_bases() { "basis" } else { "material" }
+}
+
+/// What there is to say of the dots.
+struct Halftone {
+    look: Option<Look>,
+    tones: Vec<Tone>,
+    spectrum: Option<Spectrum>,
+}
+
+impl Halftone {
+    fn measured(laid: &Laid, observer: &dyn Observer) -> Result<Halftone> {
+        let Laid { document, library, halftoned, .. } = laid;
+        let (mix, dots) = (&halftoned.mapped.mix, &halftoned.dots);
+        let chosen = halftone::Settings::from_library(&mix.stacks, library);
+        let space = document.materials().space();
+        let looks = reflectances(dots.stacks(), library, space);
+        let lightness = |row: &[f64]| luminance(space.curve(row).at(ASIDE)).cbrt();
+        let values: Vec<f64> = looks.rows().map(lightness).collect();
+        Ok(Halftone {
+            look: metrics::look(mix, dots, &chosen)?,
+            tones: metrics::tones(mix, dots, observer)?,
+            spectrum: preview::spectrum(dots, &values),
+        })
+    }
+}
+
 /// What the report of a document says beside what every report says.
-fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> Result<Value> {
-    let Laid { document, library, settings, halftoned, .. } = laid;
-    let mix = &halftoned.mapped.mix;
-    let chosen = halftone::Settings::from_library(&mix.stacks, library);
-    let look = metrics::look(mix, &halftoned.dots, &chosen)?;
-    let tones = metrics::tones(mix, &halftoned.dots, observer)?;
+fn report(laid: &Laid, fidelity: &preview::Report, dots: &Halftone) -> Value {
+    let Laid { document, settings, halftoned, .. } = laid;
     let mapped = &halftoned.mapped.report;
     let materials: Vec<_> = mapped
         .materials
@@ -275,7 +317,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
             "merged_pairs": p.merged, "clamped_share": p.clamped,
         })
     });
-    Ok(json!({
+    json!({
         "document": { "name": document.name, "sha256": document.digest, "notes": document.notes },
         "seed": settings.factor.seed,
         "factoring": halftoned.factoring,
@@ -292,6 +334,9 @@ fn report(laid: &Laid, fidelity: &preview::Report, observer: &dyn Observer) -> R
             "eye_m": EYE, "mean": fidelity.mean, "rmse": fidelity.rmse, "p95": fidelity.p95, "max": fidelity.max,
             "light_rmse": fidelity.light_rmse,
         },
-        "halftone": { "method": name(settings.halftone), "look": look, "tones": tones },
-    }))
+        "halftone": {
+            "method": name(settings.halftone), "look": dots.look, "tones": dots.tones,
+            "spectrum": dots.spectrum.as_ref().map(|spectrum| &spectrum.rings),
+        },
+    })
 }

@@ -3,6 +3,7 @@
 //! [`Lit`] is what is lit: a few curves over the half angle and a weight for each of them at every place. A [`Scene`] says
 //! where the eye and the lights are and how the sheet is held. [`Renderer`] makes a picture of both, and [`page`] writes a
 //! page that makes the same pictures in a browser, where they follow the hand. [`glb`] writes what is lit for other programs.
+//! [`display`] lays a screen over a printed grid of stacks and shows what is seen.
 //! Units: metres, radians; x points right, y up, z to the eye that looks straight at the sheet. The origin is the middle of
 //! the sheet. Radiance is that of a surface under irradiance 1 where it faces the light, linear Rec. 709.
 #![forbid(unsafe_code)]
@@ -15,6 +16,7 @@
               most casts"
 )]
 
+pub mod display;
 mod error;
 mod glb;
 mod lit;

@@ -34,7 +34,7 @@ use crate::lit::fit;
 pub const LONGEST: usize = 1024;
 
 /// Entries of a curve's table.
-const STEPS: usize = 1024;
+pub(crate) const STEPS: usize = 1024;
 
 /// The longer side of the map of differences.
 const DIFFERENCE: usize = 256;
@@ -172,9 +172,13 @@ fn assembled(subject: &Subject, data: &str) -> String {
         ("{{data}}", data.replace('<', "\\u003c")),
         ("{{script}}", script),
     ];
-    // The template is split once, so that nothing in a document's name is taken for a place.
-    let mut rest = include_str!("../web/page.html");
-    let mut out = String::with_capacity(data.len() + subject.still.len() * 4 / 3 + (1 << 17));
+    filled(include_str!("../web/page.html"), &parts)
+}
+
+/// A template with everything in its place. It is split once, so that nothing in a document's name is taken for a place.
+pub(crate) fn filled(template: &str, parts: &[(&str, String)]) -> String {
+    let mut rest = template;
+    let mut out = String::with_capacity(rest.len() + parts.iter().map(|(_, text)| text.len()).sum::<usize>());
     while let Some((at, (mark, text))) =
         parts.iter().filter_map(|part| Some((rest.find(part.0)?, part))).min_by_key(|(at, _)| *at)
     {
@@ -186,7 +190,7 @@ fn assembled(subject: &Subject, data: &str) -> String {
 }
 
 /// A source as part of the one module: what it takes from the others is there already.
-fn joined(source: &str) -> String {
+pub(crate) fn joined(source: &str) -> String {
     let mut out = String::with_capacity(source.len());
     let mut inside_import = false;
     for line in source.lines() {
@@ -202,7 +206,7 @@ fn joined(source: &str) -> String {
 }
 
 /// Text as HTML.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.chars().fold(String::new(), |mut out, c| {
         match c {
             '&' => out.push_str("&amp;"),
@@ -217,14 +221,14 @@ fn escaped(text: &str) -> String {
 }
 
 /// Bytes deflated (RFC 1950), as base64.
-fn packed(bytes: &[u8]) -> Result<String, std::io::Error> {
+pub(crate) fn packed(bytes: &[u8]) -> Result<String, std::io::Error> {
     let mut encoder = ZlibEncoder::new(Vec::with_capacity(bytes.len() / 4), Compression::new(5));
     encoder.write_all(bytes)?;
     Ok(BASE64_STANDARD.encode(encoder.finish()?))
 }
 
 /// The tables of rows over the chord from 0 to the root of 2: for each row and entry R G B, as little-endian f32.
-fn tables(space: &Space, rows: &[&[f64]]) -> Vec<u8> {
+pub(crate) fn tables(space: &Space, rows: &[&[f64]]) -> Vec<u8> {
     let angle = |n: usize| 2.0 * (0.5 * SQRT_2 * n as f64 / (STEPS - 1) as f64).min(1.0).asin();
     let angles: Vec<f64> = (0..STEPS).map(angle).collect();
     let table = |row: &&[f64]| {

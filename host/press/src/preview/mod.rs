@@ -22,6 +22,7 @@ mod probe;
 mod radiance;
 mod sheet_picture;
 mod source;
+mod spectrum;
 pub mod sphere;
 mod tone;
 
@@ -35,4 +36,5 @@ pub use probe::Probe;
 pub use radiance::Radiance;
 pub use sheet_picture::{STANDARD_LIGHTS, sheet_picture};
 pub use source::Source;
+pub use spectrum::{Spectrum, spectrum};
 pub use tone::Exposure;
