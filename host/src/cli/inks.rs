@@ -6,6 +6,7 @@ mod diff;
 mod from;
 mod gamut;
 mod page;
+pub(super) mod place;
 mod predict;
 mod share;
 
@@ -353,6 +354,10 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
             cartridge.minimum_cluster.get()
         ),
     ];
+    if let Some(dots) = &cartridge.dots {
+        let gain = dots.dot_gain_um.map_or(String::new(), |gain| format!(", dot gain {gain:.1} um"));
+        lines.push(format!("  dots measured by {}, {}: {}{gain}", dots.by, dots.when, dots.setup));
+    }
     lines.extend(
         cartridge.cautions.iter().map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
     );

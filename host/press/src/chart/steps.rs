@@ -14,8 +14,6 @@ use observe::Observer;
 
 /// Scale of labels: letters 3.4 mm high.
 pub(super) const LABEL: usize = 4;
-/// Shares along a ramp: finer than an eye sees.
-const STEPS: usize = 1024;
 
 /// The four gloss levels of figure 5, relative to the highest.
 const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
@@ -38,42 +36,6 @@ pub(super) fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), Chart
         return Err(ChartError::Same { chart, stack: a.clone() });
     }
     Ok(())
-}
-
-/// Figure 2: all of `a` at the left, all of `b` at the right, 150 mm apart; below it a checkerboard to cut out and hold so
-/// that the ramp reflects it.
-pub fn ramp(
-    a: &Stack,
-    b: &Stack,
-    method: Method,
-    library: &Library,
-    observer: &dyn Observer,
-) -> Result<DotMap, ChartError> {
-    two("ramp", a, b)?;
-    let (width, strip) = (mm(150.0), mm(30.0));
-    let line = LINE * LABEL;
-    let head = line + mm(1.5);
-    let foot = head + strip + mm(1.0);
-    let board_top = foot + mm(2.0) + line + mm(10.0);
-    let square = mm(10.0);
-    let pen = pen(&[a, b]);
-    let mut sketch = Sketch::new(width, board_top + 6 * square);
-    sketch.text(0, 0, LABEL, &pen, &a.to_string());
-    sketch.text_to(width, 0, LABEL, &pen, &b.to_string());
-    let shares: Vec<f64> = (0..STEPS).map(|i| 1.0 - (i as f64 + 0.5) / STEPS as f64).collect();
-    sketch.halftone((0, head, width, strip), [a, b], &shares, method, library, observer)?;
-    for tenth in 0..=10 {
-        let x = (width - 6) * tenth / 10;
-        sketch.fill((x, foot, 6, if tenth % 5 == 0 { mm(3.0) } else { mm(1.5) }), &pen);
-    }
-    sketch.text(0, foot + mm(3.5), 3, &pen, "100 %");
-    sketch.text_to(width, foot + mm(3.5), 3, &pen, "0 %");
-    for row in 0..6 {
-        for column in (row % 2..width.div_ceil(square)).step_by(2) {
-            sketch.fill((column * square, board_top + row * square, square, square), &pen);
-        }
-    }
-    Ok(sketch.finish()?)
 }
 
 /// The share of the glossier ink that shows a gloss: clamped to the nearest ink, or with all levels brought between the inks
