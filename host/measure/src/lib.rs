@@ -34,6 +34,7 @@ mod linear;
 pub mod marks;
 mod measurement;
 pub mod merge;
+pub mod patches;
 pub mod photo;
 mod pictures;
 mod plane;

@@ -40,6 +40,26 @@ pub struct Grey {
 }
 
 impl Grey {
+    /// The darkest channel of each pixel (RGB interleaved), each channel divided by its own bright tones: dark for any coloured ink,
+    /// bright for paper.
+    pub(crate) fn of(rgb: &[f32], width: usize, height: usize) -> Grey {
+        let bright: [f32; 3] = std::array::from_fn(|c| {
+            let stride = (width * height / 20_000).max(1) | 1;
+            let mut some: Vec<f32> = (0..width * height)
+                .step_by(stride)
+                .map(|i| rgb[3 * i + c])
+                .filter(|v| v.is_finite())
+                .collect();
+            let at = some.len() * 9 / 10;
+            if some.is_empty() { 1.0 } else { some.select_nth_unstable_by(at, f32::total_cmp).1.max(1e-9) }
+        });
+        let values = rgb
+            .par_chunks_exact(3)
+            .map(|rgb| (0..3).map(|c| rgb[c] / bright[c]).fold(f32::MAX, f32::min))
+            .collect();
+        Grey { width, height, values }
+    }
+
     /// The picture with left and right exchanged.
     pub(crate) fn mirrored(&self) -> Grey {
         let rows = self.values.chunks_exact(self.width.max(1));

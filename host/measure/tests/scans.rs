@@ -360,7 +360,7 @@ fn what_no_ramp_can_be_read_from_is_named() {
     let path = saved(&folder, "good.png", &good, 1.0);
     refused(path.clone(), &chart_of("K", "C"), &["good.png", "another sheet"]);
     // A sheet that is no ramp.
-    let stacks = chart::stacks(&[stack("K"), stack("MS")], Paper::A4).unwrap();
+    let stacks = chart::stacks(&[stack("K"), stack("MS")], Paper::A4, false).unwrap();
     let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
     refused(
         path,

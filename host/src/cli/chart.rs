@@ -24,6 +24,7 @@ use press::sheet::DotMap;
     foilpress chart ladder C+M+Y+F C+M+Y\n  \
     foilpress chart halftone                             (black on paper by each halftone)\n  \
     foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
+    foilpress chart stacks --inks MS,C,F --strips        (strips to wrap round a can)\n  \
     foilpress chart registration --inks black,cyan,white\n  \
     foilpress chart calibration --to serial:/dev/ttyACM0")]
 pub struct Args {
@@ -102,6 +103,9 @@ struct Halftone {
 struct Stacks {
     #[command(flatten)]
     inks: InkArgs,
+    /// Print strips of 90 x 12 mm, one below the other, to wrap round a can
+    #[arg(long)]
+    strips: bool,
     #[command(flatten)]
     job: JobArgs,
 }
@@ -167,7 +171,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
                 );
             }
             let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
-            let dots = chart::stacks(&all, stacks.job.layout.paper)?;
+            let dots = chart::stacks(&all, stacks.job.layout.paper, stacks.strips)?;
             let artwork = artwork("stacks", &dots, set, &library);
             print(&artwork, &stacks.job, observer)
         }

@@ -78,8 +78,15 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 
 fn curves(photos: &Path, setup: &Path, output: &Path, observer: &dyn Observer) -> Result<()> {
     let setup = Setup::read(setup)?;
+    if let Some(added) = measure::library::added(output) {
+        bail!(
+            "{}: holds {added}, which this would delete; measure into another folder (-o), and copy those tables and curves over",
+            output.display()
+        );
+    }
     let staged = Staged::folder(output, Kind::Measured)?;
-    let taken = measure::measure(photos, &setup, observer)?;
+    let sheet = setup.sample.chart.as_deref().map(|path| chart(path, observer)).transpose()?;
+    let taken = measure::measure(photos, &setup, sheet.as_ref().map(Sheet::dots), observer)?;
     let folder = staged.create()?;
     measure::library::write(&taken, folder)?;
     Library::from_dir(folder).context("the measured curves cannot be used as an ink library")?;

@@ -53,22 +53,9 @@ impl Picture {
         Ok(Picture { width: photo.width, height: photo.height, values, full })
     }
 
-    /// The darkest channel of each pixel, each channel divided by its own bright tones: dark for any coloured ink, bright for
-    /// paper.
+    /// The picture as marks are found in it.
     pub(crate) fn grey(&self) -> Grey {
-        let bright: [f32; 3] = std::array::from_fn(|c| {
-            let stride = (self.width * self.height / 20_000).max(1) | 1;
-            let mut some: Vec<f32> =
-                (0..self.width * self.height).step_by(stride).map(|i| self.values[3 * i + c]).collect();
-            let at = some.len() * 9 / 10;
-            some.select_nth_unstable_by(at, f32::total_cmp).1.max(1e-9)
-        });
-        let values = self
-            .values
-            .par_chunks_exact(3)
-            .map(|rgb| (0..3).map(|c| rgb[c] / bright[c]).fold(f32::MAX, f32::min))
-            .collect();
-        Grey { width: self.width, height: self.height, values }
+        Grey::of(&self.values, self.width, self.height)
     }
 
     /// The same for the search of the grey card. Noise is not known here, and not needed.

@@ -76,16 +76,21 @@ pub fn ladder(
     Ok(sketch.finish()?)
 }
 
-/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera. Camera marks have room
-/// above and below.
+/// Sides of a patch in millimetres, and of a strip that goes round a can: across it sees all half angles.
+const SQUARE: (f64, f64) = (20.0, 20.0);
+const BAND: (f64, f64) = (90.0, 12.0);
+
+/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera; or a strip each, one below the
+/// other, to wrap round a can. Camera marks have room above and below.
 ///
 /// Errors: more than the paper has room for.
-pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<DotMap, ChartError> {
+pub fn stacks(stacks: &[Stack], paper: Paper, strips: bool) -> Result<DotMap, ChartError> {
     let (width, length) =
         (usize::from(paper.width()), usize::from(paper.length()).saturating_sub(2 * (SIDE + QUIET)));
-    let (patch, gap) = (mm(20.0), mm(4.0));
-    let cell = (patch + gap, patch + mm(1.0) + LINE * 3 + mm(3.0));
-    let columns = ((width + gap) / cell.0).max(1);
+    let (wide, long) = if strips { BAND } else { SQUARE };
+    let (patch, gap) = ((mm(wide), mm(long)), mm(4.0));
+    let cell = (patch.0 + gap, patch.1 + mm(1.0) + LINE * 3 + mm(3.0));
+    let columns = if strips { 1 } else { ((width + gap) / cell.0).max(1) };
     let most = columns * (length / cell.1);
     let shown: Vec<&Stack> = stacks.iter().filter(|stack| !stack.layers().is_empty()).collect();
     if shown.is_empty() || shown.len() > most {
@@ -96,11 +101,11 @@ pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<DotMap, ChartError> {
     let mut sketch = Sketch::new(columns * cell.0 - gap, shown.len().div_ceil(columns) * cell.1);
     for (i, stack) in shown.into_iter().enumerate() {
         let (x, y) = (i % columns * cell.0, i / columns * cell.1);
-        sketch.fill((x, y, patch, patch), stack);
+        sketch.fill((x, y, patch.0, patch.1), stack);
         let label = stack.to_string();
         // As large as the patch has room for.
-        let scale = (patch / (label.len() * LETTER)).clamp(1, 3);
-        sketch.text(x, y + patch + mm(1.0), scale, &pen, &label);
+        let scale = (patch.0 / (label.len() * LETTER)).clamp(1, 3);
+        sketch.text(x, y + patch.1 + mm(1.0), scale, &pen, &label);
     }
     Ok(sketch.finish()?)
 }

@@ -112,7 +112,7 @@ fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
 #[test]
 fn every_stack_has_a_patch_of_its_own_that_is_solid() {
     let all: Vec<Stack> = ["substrate", "C", "K", "MS", "MS+C", "MS+C+F"].map(stack).to_vec();
-    let chart = stacks(&all, Paper::A4).unwrap();
+    let chart = stacks(&all, Paper::A4, false).unwrap();
     for wanted in &all[1..] {
         let number = chart.stacks().iter().position(|s| s == wanted).unwrap() as u8;
         let dots = chart.index().iter().filter(|&&dot| dot == number).count();
@@ -123,7 +123,7 @@ fn every_stack_has_a_patch_of_its_own_that_is_solid() {
         );
     }
     let many: Vec<Stack> = (1..200).map(|n| Stack::new(vec![Ink::White; n])).collect();
-    assert!(stacks(&many, Paper::A4).unwrap_err().to_string().contains("choose fewer inks"));
+    assert!(stacks(&many, Paper::A4, false).unwrap_err().to_string().contains("choose fewer inks"));
 }
 
 #[test]

@@ -33,7 +33,7 @@ proptest! {
             mirror,
             cut: true,
             profile: Profile {
-                offset_mm: [Mm::of_dots(offset.0).0, Mm::of_dots(offset.1).0], feed,
+                offset_mm: [Mm::of_dots(offset.0).0, Mm::of_dots(offset.1).0], feed, ..Profile::default()
             },
             ..Layout::centred(Paper::Custom { width: page.0, length: page.1 })
         };
