@@ -134,11 +134,13 @@ fn light(dots: &DotMap, curves: &Curves, d: V) -> V {
         let (x, y) = (c * x + s * y, c * y - s * x);
         let (width, length) = (dots.width() as f64, dots.length() as f64);
         let (i, j) = (width / 2.0 + x * DOTS_PER_MM, length / 2.0 - y * DOTS_PER_MM);
-        if i < 0.0 || j < 0.0 || i >= width || j >= length {
+        if j < 0.0 || j >= length {
             return [0.0; 3];
         }
         let (theta, irradiance) = lit(p, n);
-        let own = usize::from(dots.index()[j as usize * dots.width() + i as usize]);
+        // Bare paper goes on round the can.
+        let beside = i < 0.0 || i >= width;
+        let own = if beside { 0 } else { usize::from(dots.index()[j as usize * dots.width() + i as usize]) };
         return curves.at(own, theta).map(|f| f * irradiance);
     }
     let t = -EYE[2] / d[2];
