@@ -41,9 +41,6 @@ fn a_ramp_tells_a_library_how_small_clusters_may_be() {
     fs::create_dir(bench.path("sheets")).unwrap();
     bench.done("simulate k.rgl -q -o sheets/k");
     scan(&bench.path("sheets/k"), (0, 0), &bench.path("k.png"));
-    let said = bench.done("measure ramp k.png --chart k.rgl");
-    assert!(said.contains("K in substrate") && said.contains("linear but for dot gain"), "{said}");
-    assert!(!bench.path("mine").exists());
     let measured = |more: &str| {
         let output = bench
             .command(&format!("measure ramp k.png --chart sheets/k --when 2026-11-02 -o mine {more}"))
@@ -54,6 +51,7 @@ fn a_ramp_tells_a_library_how_small_clusters_may_be() {
     };
     let (done, said, error) = measured("--note flatbed");
     assert!(done && said.contains("inks check mine"), "{said}{error}");
+    assert!(said.contains("K in substrate") && said.contains("linear but for dot gain"), "{said}");
     let library = fs::read_to_string(bench.path("mine/library.toml")).unwrap();
     for part in [
         "[[dots]]",
@@ -75,8 +73,11 @@ fn a_ramp_tells_a_library_how_small_clusters_may_be() {
     let (done, _, error) = measured("");
     assert!(!done && error.contains("has measured dots of black already"), "{error}");
     assert_eq!(fs::read_to_string(bench.path("mine/library.toml")).unwrap(), library);
-    // It is printed with: smaller clusters than the built-in library allows.
-    bench.done("chart ramp K substrate --library mine -q -o fine");
+    // Stacks print with it.
+    let listed: serde_json::Value =
+        serde_json::from_str(&bench.done("inks list --library mine --json")).unwrap();
+    let black = listed.as_array().unwrap().iter().find(|row| row["stack"] == "K").unwrap();
+    assert_eq!(black["minimum_cluster"], 1);
 }
 
 #[test]

@@ -17,9 +17,9 @@ use super::super::stdio::show;
 #[command(after_help = "Examples:\n  \
     foilpress measure ramp k.png --chart k.rgl --by \"A. Owner\" --when 2026-11-02 -o mine/\n  \
     foilpress measure ramp k-1.tif k-2.tif --chart k.rgl       (without -o: only shown)\n\n\
-    Print `foilpress chart ramp K substrate --to file:k.rgl`, scan it at 600 dpi with automatic tones turned off, and give the job\n\
-    that it was printed from. Photographs will do where the sheet is flat and evenly lit. The figures are of the ink that only one\n\
-    of the two stacks has; docs/measuring-inks.md explains them.")]
+    Make the job with `foilpress chart ramp K substrate --to file:k.rgl`, print it, and scan it at 600 dpi\n\
+    with automatic tones turned off. Photographs will do where the sheet is flat and evenly lit. The\n\
+    figures belong to the ink that only one of the two stacks has. docs/measuring-inks.md explains them.")]
 pub struct Args {
     /// Scans or photographs of one ramp chart; several are averaged
     #[arg(value_name = "SCAN", required = true)]

@@ -21,8 +21,9 @@ const APART: f64 = 0.3;
 #[command(after_help = "Examples:\n  \
     foilpress measure registration scan.png --chart registration.rgl --profile default\n  \
     foilpress measure registration a.tif b.tif --chart registration.rgl --dpi 600\n\n\
-    Print `foilpress chart registration --to file:registration.rgl`, lay something black behind the sheet, and scan all of it with\n\
-    its left and top edges inside the picture. The profile is then used as one of `profile set` is.")]
+    Make the job with `foilpress chart registration --to file:registration.rgl`, print it, lay something\n\
+    black behind the sheet, and scan all of it with its left and top edges inside the picture. The profile\n\
+    is used as one that `profile set` saves.")]
 pub struct Args {
     /// Scans of the registration chart; several sheets are averaged
     #[arg(value_name = "SCAN", required = true)]
