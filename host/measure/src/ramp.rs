@@ -187,7 +187,8 @@ impl<'a> Chart<'a> {
     fn find(sheet: &'a DotMap, marks: &Marks) -> Result<Chart<'a>, MeasureError> {
         let no_chart = || {
             MeasureError::Scene(
-                "the job is not a ramp chart with all its camera marks; print one with `foilpress chart ramp`, on a4 or letter, without crop marks and without a profile that corrects the feed"
+                "the job is not a ramp chart with all its camera marks; print one with `foilpress chart ramp`, on a4 or letter, \
+                 without crop marks and without a profile that corrects the feed"
                     .into(),
             )
         };

@@ -285,8 +285,8 @@ fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
         let rows = measured.rows.iter().filter(|row| row.kind != Kind::Extrapolated);
         for row in rows.filter(|row| (2.0..50.0).contains(&row.theta_deg)) {
             let real = truth(&measured.stack, row.theta_deg.to_radians());
-            for c in 0..3 {
-                let error = row.rgb[c] / real[c] - 1.0;
+            for (found, real) in row.rgb.iter().zip(real) {
+                let error = found / real - 1.0;
                 worst = worst.max(error.abs());
                 sum += error;
                 count += 1.0;
