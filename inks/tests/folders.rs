@@ -319,8 +319,11 @@ fn dots_as_measured_override_the_minimum_clusters_and_say_who_measured() {
     // Paper has the same between clusters of any ink.
     assert_eq!(library.minimum_cluster(&"C".parse().unwrap()), 11);
     assert_eq!(library.minimum_cluster(&"MS".parse().unwrap()), 16);
+    let guide = folder(&[("library.toml", &format!("{head}{}", blocks("toml dots")[0]))]);
+    let library = Library::from_dir(guide.path()).unwrap();
+    assert_eq!(library.cartridge(Ink::Black).unwrap().minimum_cluster.get(), 9);
     for (tables, words) in [
-        (dots("black", "").replace("11", "0"), ["dots black.minimum_cluster", "0 dots"]),
+        (dots("black", "").replace("= 11", "= 0"), ["dots black.minimum_cluster", "0 dots"]),
         (dots("black", "") + &dots("black", ""), ["dots black", "given twice"]),
         (dots("black", "dot_gain_um = 300.0\n"), ["dots black.dot_gain_um", "300"]),
         (dots("black", "dot_gain_um = nan\n"), ["dots black.dot_gain_um", "NaN"]),
