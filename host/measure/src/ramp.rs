@@ -116,7 +116,8 @@ pub struct Size {
 
 impl Size {
     fn agrees(&self, within: f64) -> bool {
-        (self.seen - self.expected).abs() <= within * self.expected.max(self.share)
+        self.share > 0.0
+            && (self.seen - self.expected).abs() <= within * self.expected.max(self.share)
             && self.expected >= OPEN * self.share
     }
 }

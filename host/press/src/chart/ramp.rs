@@ -8,6 +8,7 @@
 
 use inks::{Library, Stack};
 use observe::Observer;
+use protocol::ink::Kind;
 
 use super::error::ChartError;
 use super::sketch::{LINE, Sketch, mm};
@@ -30,6 +31,8 @@ const FIGURE: usize = 2;
 const FIGURES: usize = FIGURE * LINE + 10;
 /// From cluster to cluster, relative to the side of a square of as many dots: a ninth is covered.
 const APART: f64 = 3.0;
+/// The smallest clusters of foil: 3 x 3 dots.
+const FOIL: usize = 9;
 
 /// Where the parts of the chart are, in dots from its top left corner.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,6 +76,12 @@ pub fn parts() -> Parts {
     Parts { ramp, solids, clusters, size: (width, board + 6 * mm(10.0)) }
 }
 
+/// The smallest clusters of a stack that are tried: smaller ones of foil are not printed (the rule `foil-speckle`), and their patches
+/// stay empty.
+fn least(stack: &Stack) -> usize {
+    if stack.layers().iter().any(|ink| ink.kind() == Kind::Foil) { FOIL } else { 1 }
+}
+
 /// The dots of a cluster as (column, row): nearly a square.
 fn cluster(dots: usize) -> impl Iterator<Item = (usize, usize)> {
     let side = (1..).find(|side| side * side >= dots).unwrap_or(1);
@@ -114,6 +123,10 @@ pub fn ramp(
     for (row, (stack, ground)) in parts.clusters.iter().zip([(a, b), (b, a)]) {
         for (dots, patch) in (1..).zip(row) {
             sketch.fill(place(patch), ground);
+            sketch.text(patch.left, patch.top - FIGURES, FIGURE, &pen, &dots.to_string());
+            if dots < least(stack) {
+                continue;
+            }
             let pitch = (APART * (dots as f64).sqrt()).round().max(APART) as usize;
             let cluster: Vec<(usize, usize)> = cluster(dots).collect();
             let inside =
@@ -123,7 +136,6 @@ pub fn ramp(
                     cluster.iter().for_each(|(dx, dy)| sketch.fill((x + dx, y + dy, 1, 1), stack));
                 }
             }
-            sketch.text(patch.left, patch.top - FIGURES, FIGURE, &pen, &dots.to_string());
         }
     }
     let square = mm(10.0);

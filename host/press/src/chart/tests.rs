@@ -80,6 +80,12 @@ fn a_ramp_has_clusters_of_every_size_and_solids_of_both_stacks() {
             }
         }
     }
+    // Foil in clusters of fewer than 3 x 3 dots is not printed.
+    let foil = ramp(&stack("SF"), &stack("MS"), Method::Cells, &Library::builtin(), &Silent).unwrap();
+    for (dots, patch) in (1..).zip(&parts.clusters[0]) {
+        let place = (patch.left, patch.top, patch.width, patch.length);
+        assert_eq!(count(&foil, place, "SF") > 0, dots >= 9, "{dots}");
+    }
     for (strips, name) in parts.solids.iter().zip(["K", "MS"]) {
         for strip in strips {
             let place = (strip.left, strip.top, strip.width, strip.length);
