@@ -66,13 +66,10 @@ fn a_ramp_has_clusters_of_every_size_and_solids_of_both_stacks() {
             let share = inked as f64 / (inked + ground) as f64;
             assert!((0.07..0.14).contains(&share), "{own} of {dots} dots: {share}");
             let number = chart.stacks().iter().position(|s| *s == stack(own)).unwrap() as u8;
-            let inside = |i: &usize| {
-                let (x, y) = (i % chart.width(), i / chart.width());
-                (patch.left..patch.left + patch.width).contains(&x)
-                    && (patch.top..patch.top + patch.length).contains(&y)
-            };
-            let mut left: Vec<usize> =
-                (0..chart.index().len()).filter(|i| chart.index()[*i] == number).filter(inside).collect();
+            let wide = chart.width();
+            let row = |y: usize| (patch.left..patch.left + patch.width).map(move |x| y * wide + x);
+            let mut left: Vec<usize> = (patch.top..patch.top + patch.length).flat_map(row).collect();
+            left.retain(|&i| chart.index()[i] == number);
             while let Some(&first) = left.first() {
                 let cluster = joined(&chart, (first % chart.width(), first / chart.width()));
                 assert_eq!(cluster.len(), dots);
