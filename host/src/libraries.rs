@@ -20,7 +20,7 @@ fn home() -> Result<PathBuf> {
 }
 
 /// The names of the libraries that were added, sorted.
-fn names() -> Vec<String> {
+pub fn names() -> Vec<String> {
     let Ok(entries) = home().and_then(|home| Ok(fs::read_dir(home)?)) else { return Vec::new() };
     let folders = entries.filter_map(|entry| Some(entry.ok()?.path()));
     let with_library = folders.filter(|folder| folder.join(FILE_NAME).is_file());
@@ -41,17 +41,26 @@ pub fn folder(spec: &Path) -> Result<PathBuf> {
         return Ok(spec.to_path_buf());
     }
     let name = spec.to_string_lossy();
-    let added = home().ok().and_then(|home| folders::folder(&home, &name).ok());
-    if let Some(added) = added.filter(|added| added.is_dir()) {
+    if let Some(added) = added(&name) {
         return Ok(added);
     }
-    let known = match names() {
+    bail!(
+        "there is no ink library `{name}`: no folder has this name, and {}; `foilpress inks add` adds one",
+        known()
+    )
+}
+
+/// The folder of a library that was added under this name.
+pub fn added(name: &str) -> Option<PathBuf> {
+    home().ok().and_then(|home| folders::folder(&home, name).ok()).filter(|added| added.is_dir())
+}
+
+/// The libraries that were added, in words.
+fn known() -> String {
+    match names() {
         names if names.is_empty() => "none was added".to_owned(),
         names => format!("those added are {}", names.join(", ")),
-    };
-    bail!(
-        "there is no ink library `{name}`: no folder has this name, and {known}; `foilpress inks add` adds one"
-    )
+    }
 }
 
 /// A library, given as a folder, by its name, or as `builtin`.
@@ -98,4 +107,20 @@ pub fn install(name: &str, members: &[Member]) -> Result<(PathBuf, Library)> {
     fs::rename(&inside, &target).with_context(cannot)?;
     drop(folders);
     Ok((target, library))
+}
+
+/// Removes the library that was added under this name, at once or not at all. Returns where it was.
+pub fn remove(name: &str) -> Result<PathBuf> {
+    if BUILT_IN.contains(&name) {
+        bail!("`{name}` is the library that comes with the program; it cannot be removed");
+    }
+    let Some(target) = added(name) else {
+        bail!("no library was added under the name `{name}`; {}", known());
+    };
+    let cannot = || format!("cannot remove {}", target.display());
+    let staging = Scratch::beside(&home()?).with_context(cannot)?;
+    let folders = scratch::folders();
+    fs::rename(&target, staging.path().join(name)).with_context(cannot)?;
+    drop(folders);
+    Ok(target)
 }

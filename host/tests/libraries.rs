@@ -63,6 +63,30 @@ fn a_library_is_added_whole_under_a_name_and_only_once() {
 }
 
 #[test]
+fn added_libraries_are_listed_and_removed() {
+    let bench = Bench::new();
+    assert!(bench.done("inks list --added").contains("no library was added"));
+    std::fs::create_dir(bench.path("mine")).expect("a folder");
+    fs::write(bench.path("mine/library.toml"), "format = 1\nbased_on = \"built-in\"\nname = \"mine\"\n")
+        .expect("a library");
+    bench.done("inks add mine");
+    bench.done("inks add mine --name other");
+    let said = bench.done("inks list --added");
+    assert!(said.lines().count() == 2 && said.contains("mine") && said.contains("57 stacks"), "{said}");
+    let rows: Value = serde_json::from_str(&bench.done("inks list --added --json")).expect("JSON");
+    assert_eq!((rows[0]["name"].as_str(), rows[1]["name"].as_str()), (Some("mine"), Some("other")));
+    bench.done("inks remove other");
+    assert!(bench.refused(1, "inks remove other").contains("those added are mine"));
+    assert!(bench.refused(1, "inks remove builtin").contains("comes with the program"));
+    assert!(bench.refused(1, "inks remove ../mine").contains("no library was added"));
+    // The folder it came from stays.
+    bench.done("inks remove mine");
+    assert!(
+        bench.path("mine/library.toml").exists() && bench.done("inks list --added").contains("no library")
+    );
+}
+
+#[test]
 fn an_exported_library_can_be_imported_and_a_forged_one_cannot() {
     let bench = Bench::new();
     measured(&bench, "mine");

@@ -59,6 +59,12 @@ fn photographs_become_a_library_and_a_page() {
     // A second run replaces the folder, with the page in it.
     bench.done("measure photos --setup can.toml -o mine");
     assert!(!bench.path("mine/report.html").exists() && bench.path("mine/measurement.json").exists());
+    // Not one to which something was added since.
+    let library = fs::read_to_string(bench.path("mine/library.toml")).unwrap();
+    let dots = "\n[[dots]]\nink = \"black\"\nminimum_cluster = 9\nby = \"A. Owner\"\nwhen = \"2026-11\"\nsetup = \"a scanner\"\n";
+    fs::write(bench.path("mine/library.toml"), format!("{library}{dots}")).unwrap();
+    assert!(bench.refused(1, "measure photos --setup can.toml -o mine").contains("holds the dots of black"));
+    assert!(bench.path("mine/mg-c-f.csv").exists());
 }
 
 #[test]

@@ -38,6 +38,8 @@ pub(crate) struct File {
     pub measured: Vec<Spanned<MeasuredTable>>,
     #[serde(default)]
     pub predicted: Vec<Spanned<MeasuredTable>>,
+    #[serde(default)]
+    pub dots: Vec<Spanned<DotsTable>>,
 }
 
 #[derive(Deserialize)]
@@ -74,4 +76,44 @@ pub(crate) struct MeasuredTable {
     pub by: Spanned<String>,
     pub when: Spanned<String>,
     pub setup: Spanned<String>,
+}
+
+/// What a ramp chart said about the dots of an ink, or about gaps of bare paper between inks.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct DotsTable {
+    pub ink: Spanned<DotsOf>,
+    pub minimum_cluster: Spanned<u16>,
+    pub dot_gain_um: Option<Spanned<f64>>,
+    pub by: Spanned<String>,
+    pub when: Spanned<String>,
+    pub setup: Spanned<String>,
+}
+
+/// An ink by its name, or `paper`.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(try_from = "String")]
+pub(crate) enum DotsOf {
+    Ink(protocol::ink::Ink),
+    Paper,
+}
+
+impl DotsOf {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            DotsOf::Ink(ink) => ink.name(),
+            DotsOf::Paper => "paper",
+        }
+    }
+}
+
+impl TryFrom<String> for DotsOf {
+    type Error = crate::set::InkSetError;
+
+    fn try_from(word: String) -> Result<DotsOf, Self::Error> {
+        if word == "paper" {
+            return Ok(DotsOf::Paper);
+        }
+        InkName::try_from(word).map(|ink| DotsOf::Ink(ink.0))
+    }
 }

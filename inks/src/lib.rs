@@ -32,7 +32,7 @@ mod uncertainty;
 pub use curve::{Curve, CurveError};
 pub use format::{Caution, FILE_NAME};
 pub use knots::{Knots, Place};
-pub use library::{Cartridge, Entry, Library, Origins};
+pub use library::{Cartridge, Dots, Entry, Library, Origins};
 pub use lobes::{Lobe, Lobes};
 pub use open::LibraryError;
 pub use problem::Problem;

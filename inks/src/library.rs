@@ -23,8 +23,23 @@ pub struct Cartridge {
     pub alps: String,
     /// The smallest cluster that prints reliably, in dots of 1/600 inch.
     pub minimum_cluster: Figure<u16>,
+    /// What a ramp chart said about its dots, if one was read.
+    pub dots: Option<Dots>,
     /// Advice for owners.
     pub cautions: Vec<Caution>,
+}
+
+/// What a ramp chart said about the dots of an ink. The minimum cluster it gave is that of the cartridge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dots {
+    /// How far the ink reaches beyond its dots, in micrometres, if that was measured.
+    pub dot_gain_um: Option<f64>,
+    /// Who measured.
+    pub by: String,
+    /// When.
+    pub when: String,
+    /// With what.
+    pub setup: String,
 }
 
 /// A stack and its reflectance.

@@ -45,6 +45,13 @@ impl<T: Copy> Figure<T> {
         *self.value.get_ref()
     }
 
+    /// The same figure, measured.
+    pub(crate) fn measured(&mut self, value: T, note: String) {
+        self.set(value);
+        self.source = Source::Measured;
+        self.note = Some(note);
+    }
+
     /// Replaces the value, whatever its source.
     pub(crate) fn set(&mut self, value: T) {
         self.value = Spanned::new(self.value.span(), value);

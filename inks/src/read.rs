@@ -12,9 +12,9 @@ use toml::Spanned;
 
 use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::curve::{Curve, CurveError};
-use crate::format::{FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
+use crate::format::{DotsOf, DotsTable, FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
 use crate::judge;
-use crate::library::{Cartridge, Entry, Library};
+use crate::library::{Cartridge, Dots, Entry, Library};
 use crate::model::{Layer, Listed, Model, Optics, Paper};
 use crate::problem::{Findings, Problem};
 use crate::provenance::{Figure, Provenance, Trust};
@@ -30,6 +30,8 @@ const MOST_LAYERS: usize = 16;
 pub(crate) const MOST_CURVE_BYTES: u64 = 16 << 20;
 /// A measured albedo up to this value is a calibration error; a larger one is not a reflectance.
 const CALIBRATION: f64 = 1.05;
+/// The largest dot gain, in um: two dots.
+const MOST_GAIN: f64 = 85.0;
 
 type Found = (Option<Library>, Vec<Problem>);
 /// A library's folder, and what reads the built-in library it may be based on.
@@ -165,6 +167,7 @@ fn build(
         ink(table.into_inner(), offset, &mut seen, &mut parts, findings);
     }
     parts.cartridges.sort_by_key(|cartridge| cartridge.ink);
+    dots(file.dots, &mut parts, findings);
     merge_rules(file.rule, &mut parts.rules, findings);
     let mut wanted = match (file.stacks, parts.stacks.take()) {
         (Some(texts), _) => listed_stacks(&texts, findings),
@@ -360,8 +363,69 @@ fn ink(table: InkTable, offset: usize, seen: &mut Vec<Ink>, parts: &mut Parts, f
         okidata: table.okidata,
         alps: table.alps,
         minimum_cluster: table.minimum_cluster,
+        dots: None,
         cautions: table.cautions,
     });
+}
+
+/// Dots as measured override what the tables of inks and paper say.
+fn dots(tables: Vec<Spanned<DotsTable>>, parts: &mut Parts, findings: &mut Findings) {
+    let mut seen: Vec<&str> = Vec::new();
+    for table in tables {
+        let offset = table.span().start;
+        let DotsTable { ink, minimum_cluster, dot_gain_um, by, when, setup } = table.into_inner();
+        let of = *ink.get_ref();
+        let owner = format!("dots {}", of.name());
+        if seen.contains(&of.name()) {
+            findings.error(Some(offset), owner.clone(), "are given twice");
+        }
+        seen.push(of.name());
+        provenance(&owner, "measured figure", [&by, &when, &setup], findings);
+        let (least, at) = (*minimum_cluster.get_ref(), minimum_cluster.span().start);
+        if !(1..=1024).contains(&least) {
+            let problem = format!("{least} dots; expected 1 to 1024");
+            findings.error(Some(at), format!("{owner}.minimum_cluster"), problem);
+        }
+        if let Some(gain) = &dot_gain_um
+            && !(-MOST_GAIN..=MOST_GAIN).contains(gain.get_ref())
+        {
+            let problem = format!("{}; expected {} to {MOST_GAIN} um", gain.get_ref(), -MOST_GAIN);
+            findings.error(Some(gain.span().start), format!("{owner}.dot_gain_um"), problem);
+        }
+        let note = format!("measured by {}, {}: {}", by.get_ref(), when.get_ref(), setup.get_ref());
+        match of {
+            DotsOf::Paper => match &mut parts.paper {
+                Some(paper) => paper.minimum_cluster.measured(least, note),
+                None => missing(findings, "paper"),
+            },
+            DotsOf::Ink(ink) => match parts.cartridges.iter_mut().find(|cartridge| cartridge.ink == ink) {
+                Some(cartridge) => {
+                    cartridge.minimum_cluster.measured(least, note);
+                    cartridge.dots = Some(Dots {
+                        dot_gain_um: dot_gain_um.map(Spanned::into_inner),
+                        by: by.into_inner(),
+                        when: when.into_inner(),
+                        setup: setup.into_inner(),
+                    });
+                }
+                None => findings.error(Some(offset), owner, "the library has no `[[ink]]` of it"),
+            },
+        }
+    }
+}
+
+/// Checks who, when and how.
+fn provenance(owner: &str, what: &str, [by, when, setup]: [&Spanned<String>; 3], findings: &mut Findings) {
+    for (name, value) in [("by", by), ("when", when), ("setup", setup)] {
+        if value.get_ref().trim().is_empty() {
+            let problem = format!("is empty; a {what} needs who, when and how");
+            findings.error(Some(value.span().start), format!("{owner}.{name}"), problem);
+        }
+    }
+    if !is_date(when.get_ref()) {
+        let problem = format!("`{}` is not a date; expected YYYY-MM-DD or YYYY-MM", when.get_ref());
+        findings.error(Some(when.span().start), format!("{owner}.when"), problem);
+    }
 }
 
 /// Each rule replaces the one with its name, or is appended.
@@ -391,16 +455,7 @@ fn given(
     let owner = format!("{word} {}", table.stack.get_ref());
     let offset = table.stack.span().start;
     let stack = parse_stack(table.stack.get_ref(), &owner, offset, findings);
-    for (name, value) in [("by", &table.by), ("when", &table.when), ("setup", &table.setup)] {
-        if value.get_ref().trim().is_empty() {
-            let problem = format!("is empty; a {word} curve needs who, when and how");
-            findings.error(Some(value.span().start), format!("{owner}.{name}"), problem);
-        }
-    }
-    if !is_date(table.when.get_ref()) {
-        let problem = format!("`{}` is not a date; expected YYYY-MM-DD or YYYY-MM", table.when.get_ref());
-        findings.error(Some(table.when.span().start), format!("{owner}.when"), problem);
-    }
+    provenance(&owner, &format!("{word} curve"), [&table.by, &table.when, &table.setup], findings);
     let field = format!("{owner}.curve");
     let curve = match curve_path(folder, table.curve.get_ref()) {
         Ok(path) => curve(&path, findings, table.curve.span().start, &field).map(|(c, u)| (c, u, path)),

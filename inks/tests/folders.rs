@@ -300,3 +300,38 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn dots_as_measured_override_the_minimum_clusters_and_say_who_measured() {
+    let head = BASED;
+    let dots = |ink: &str, more: &str| {
+        format!(
+            "[[dots]]\nink = \"{ink}\"\nminimum_cluster = 11\nby = \"A. Owner\"\nwhen = \"2026-11\"\nsetup = \"a scanner\"\n{more}"
+        )
+    };
+    let text = format!("{head}{}{}", dots("black", "dot_gain_um = 17.5\n"), dots("paper", ""));
+    let here = folder(&[("library.toml", &text)]);
+    let library = Library::from_dir(here.path()).unwrap();
+    let black = library.cartridge(Ink::Black).unwrap();
+    assert_eq!((black.minimum_cluster.get(), black.minimum_cluster.source()), (11, inks::Source::Measured));
+    assert_eq!(black.dots.as_ref().unwrap().dot_gain_um, Some(17.5));
+    assert!(black.minimum_cluster.note().unwrap().contains("A. Owner, 2026-11: a scanner"));
+    // Paper has the same between clusters of any ink.
+    assert_eq!(library.minimum_cluster(&"C".parse().unwrap()), 11);
+    assert_eq!(library.minimum_cluster(&"MS".parse().unwrap()), 16);
+    let guide = folder(&[("library.toml", &format!("{head}{}", blocks("toml dots")[0]))]);
+    let library = Library::from_dir(guide.path()).unwrap();
+    assert_eq!(library.cartridge(Ink::Black).unwrap().minimum_cluster.get(), 9);
+    for (tables, words) in [
+        (dots("black", "").replace("= 11", "= 0"), ["dots black.minimum_cluster", "0 dots"]),
+        (dots("black", "") + &dots("black", ""), ["dots black", "given twice"]),
+        (dots("black", "dot_gain_um = 300.0\n"), ["dots black.dot_gain_um", "300"]),
+        (dots("black", "dot_gain_um = nan\n"), ["dots black.dot_gain_um", "NaN"]),
+        (dots("black", "").replace("2026-11", "soon"), ["dots black.when", "soon"]),
+        (dots("black", "").replace("A. Owner", " "), ["dots black.by", "empty"]),
+        (dots("blackk", ""), ["blackk", "library.toml"]),
+        (dots("black", "gain = 1\n"), ["gain", "library.toml"]),
+    ] {
+        one_error(&[("library.toml", &format!("{head}{tables}"))], &words);
+    }
+}

@@ -264,6 +264,30 @@ impl Scene {
         Some(self.view_of(p, n, self.lights[light]))
     }
 
+    /// The place of the sample's surface that a pixel sees, unrolled: across (along the arc of a can) and along its axis in mm, from the middle
+    /// of the side that faces the camera.
+    pub(crate) fn unrolled(&self, x: f64, y: f64) -> Option<[f64; 2]> {
+        let (p, _) = self.hit(self.camera.ray(x, y))?;
+        let q = along(p, -1.0, self.centre);
+        let [across, up, toward] = self.frame.map(|axis| dot(q, axis));
+        Some([self.radius.map_or(across, |radius| radius * across.atan2(toward)), up])
+    }
+
+    /// The pixel of such a place, if it faces the camera.
+    pub(crate) fn pixel_of(&self, [arc, up]: [f64; 2]) -> Option<[f64; 2]> {
+        let [across, axis, normal] = self.frame;
+        let (n, from) = match self.radius {
+            Some(radius) => {
+                let (s, c) = (arc / radius).sin_cos();
+                let n = along(along([0.0; 3], s, across), c, normal);
+                (n, along(self.centre, radius, n))
+            }
+            None => (normal, along(self.centre, arc, across)),
+        };
+        let p = along(from, up, axis);
+        (dot(n, along(self.camera.position, -1.0, p)) > 0.0).then(|| self.camera.project(p))
+    }
+
     /// The same under a part of the lamp that is off its middle by these millimetres, across the light's way.
     pub(crate) fn view_under(&self, x: f64, y: f64, light: usize, off: [f64; 2]) -> Option<View> {
         let (p, n) = self.hit(self.camera.ray(x, y))?;

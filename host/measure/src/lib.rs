@@ -7,7 +7,8 @@
 //! [`readings`] makes a curve from a gloss meter and a spectrophotometer instead.
 //!
 //! [`compare`](mod@compare) lays photographs of a printed sheet over its prediction: [`marks`] finds the sheet's camera marks, and
-//! [`camera`] where the camera was.
+//! [`camera`] where the camera was. [`ramp`] reads dot gain and the smallest cluster that holds from scans of the ramp chart,
+//! [`registration`] how a printer places and feeds.
 #![forbid(unsafe_code)]
 #![allow(
     clippy::cast_possible_truncation,
@@ -25,6 +26,7 @@ mod align;
 pub mod camera;
 pub mod card;
 pub mod compare;
+mod edges;
 mod error;
 pub mod geometry;
 pub mod library;
@@ -32,14 +34,19 @@ mod linear;
 pub mod marks;
 mod measurement;
 pub mod merge;
+pub mod patches;
 pub mod photo;
 mod pictures;
 mod plane;
 mod probe;
+pub mod ramp;
 pub mod readings;
 pub mod reduce;
+pub mod registration;
 pub mod report;
+pub mod resolution;
 mod response;
+mod scan;
 pub mod setup;
 mod smooth;
 mod solve;

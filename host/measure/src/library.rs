@@ -79,6 +79,34 @@ pub fn write(taken: &Taken, folder: &Path) -> Result<(), MeasureError> {
     Ok(())
 }
 
+/// What a measurement's folder holds that other commands added to it, in words; `None` for nothing, or for no such folder.
+pub fn added(folder: &Path) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Stack {
+        stack: String,
+    }
+    #[derive(serde::Deserialize)]
+    struct Tables {
+        #[serde(default)]
+        measured: Vec<Stack>,
+        #[serde(default)]
+        predicted: Vec<Stack>,
+        #[serde(default)]
+        dots: Vec<toml::Table>,
+    }
+    let own = read(folder).ok()?;
+    let text = fs::read_to_string(folder.join(inks::FILE_NAME)).ok()?;
+    let tables: Tables = toml::from_str(&text).ok()?;
+    let known = |stack: &&str| own.stacks.iter().any(|own| own.stack == **stack);
+    let stacks = tables.measured.iter().chain(&tables.predicted).map(|table| table.stack.as_str());
+    let mut words: Vec<String> =
+        stacks.filter(|stack| !known(stack)).map(|stack| format!("the curve of {stack}")).collect();
+    words.extend(
+        tables.dots.iter().filter_map(|table| Some(format!("the dots of {}", table.get("ink")?.as_str()?))),
+    );
+    (!words.is_empty()).then(|| words.join(", "))
+}
+
 /// Reads the figures of a measurement's folder.
 ///
 /// # Errors

@@ -40,6 +40,32 @@ pub struct Grey {
 }
 
 impl Grey {
+    /// The darkest channel of each pixel (RGB interleaved), each channel divided by its own bright tones: dark for any coloured ink,
+    /// bright for paper.
+    pub(crate) fn of(rgb: &[f32], width: usize, height: usize) -> Grey {
+        let bright: [f32; 3] = std::array::from_fn(|c| {
+            let stride = (width * height / 20_000).max(1) | 1;
+            let mut some: Vec<f32> = (0..width * height)
+                .step_by(stride)
+                .map(|i| rgb[3 * i + c])
+                .filter(|v| v.is_finite())
+                .collect();
+            let at = some.len() * 9 / 10;
+            if some.is_empty() { 1.0 } else { some.select_nth_unstable_by(at, f32::total_cmp).1.max(1e-9) }
+        });
+        let values = rgb
+            .par_chunks_exact(3)
+            .map(|rgb| (0..3).map(|c| rgb[c] / bright[c]).fold(f32::MAX, f32::min))
+            .collect();
+        Grey { width, height, values }
+    }
+
+    /// The picture with left and right exchanged.
+    pub(crate) fn mirrored(&self) -> Grey {
+        let rows = self.values.chunks_exact(self.width.max(1));
+        Grey { values: rows.flat_map(|row| row.iter().rev().copied()).collect(), ..*self }
+    }
+
     /// The value between pixel centres, which are at halves. `None` outside of the picture.
     pub(crate) fn at(&self, [x, y]: [f64; 2]) -> Option<f64> {
         let (x, y) = (x - 0.5, y - 0.5);
@@ -270,14 +296,14 @@ fn refined(picture: &Grey, mut corners: [[f64; 2]; 4]) -> Option<[[f64; 2]; 4]> 
 }
 
 /// A line through `at` along the unit vector `along`.
-struct Line {
-    at: [f64; 2],
-    along: [f64; 2],
+pub(crate) struct Line {
+    pub(crate) at: [f64; 2],
+    pub(crate) along: [f64; 2],
 }
 
 impl Line {
     /// Total least squares without the worst points, twice.
-    fn fit(mut points: Vec<[f64; 2]>) -> Option<Line> {
+    pub(crate) fn fit(mut points: Vec<[f64; 2]>) -> Option<Line> {
         for round in 0..3 {
             if points.len() < PROFILES.0 / 3 {
                 return None;
@@ -304,7 +330,7 @@ impl Line {
         None
     }
 
-    fn meet(&self, other: &Line) -> Option<[f64; 2]> {
+    pub(crate) fn meet(&self, other: &Line) -> Option<[f64; 2]> {
         let cross = self.along[0] * other.along[1] - self.along[1] * other.along[0];
         if cross.abs() < 0.2 {
             return None;
@@ -344,7 +370,7 @@ fn side(picture: &Grey, corners: &[[f64; 2]; 4], i: usize, rough: bool) -> Optio
 }
 
 /// By how far the step from dark to bright lies further out than `at`.
-fn profile(picture: &Grey, at: [f64; 2], out: [f64; 2], reach: f64) -> Option<f64> {
+pub(crate) fn profile(picture: &Grey, at: [f64; 2], out: [f64; 2], reach: f64) -> Option<f64> {
     let mut values = [0.0; 2 * STEPS as usize + 1];
     for (value, step) in values.iter_mut().zip(-STEPS..=STEPS) {
         let s = reach * f64::from(step) / f64::from(STEPS);

@@ -8,12 +8,14 @@ use std::path::Path;
 use image::RgbImage;
 use inks::Stack;
 use observe::Observer;
+use press::sheet::DotMap;
 use serde::{Deserialize, Serialize};
 
 use crate::MeasureError;
 use crate::card::{self, Calibration};
 use crate::geometry::{Scene, Unknown};
 use crate::merge::{self, Exposure, Frames, Shot};
+use crate::patches::{Chart, Region};
 use crate::photo;
 use crate::pictures::Copy;
 use crate::reduce::{self, Kind, Pixel, Reduced, Row};
@@ -119,13 +121,24 @@ struct Seen {
     pixels: Vec<Vec<Pixel>>,
 }
 
-/// Measures the photographs of a folder.
+/// Measures the photographs of a folder. `chart` is the sheet of the chart that lies on the sample, if the setup names one.
 ///
 /// # Errors
 /// Photographs, setup or scene that give no trustworthy curves; each says what is wrong and what to do.
-pub fn measure(folder: &Path, setup: &Setup, observer: &dyn Observer) -> Result<Taken, MeasureError> {
+pub fn measure(
+    folder: &Path,
+    setup: &Setup,
+    chart: Option<&DotMap>,
+    observer: &dyn Observer,
+) -> Result<Taken, MeasureError> {
     let series = series(folder, setup)?;
-    let patches = patches(setup);
+    let chart = chart.map(Chart::new).transpose()?;
+    let stacks = match &chart {
+        Some(chart) => chart.stacks(),
+        None => {
+            setup.sample.stack.iter().chain(setup.patch.iter().map(|patch| &patch.stack)).cloned().collect()
+        }
+    };
     let frames = Frames::read(setup.photos.flat_field.as_deref(), setup.photos.dark_frame.as_deref())?;
     observer.begin("reading photographs", 2 * series.iter().map(Vec::len).sum::<usize>() as u64);
     let mut scene: Option<((usize, usize), Scene)> = None;
@@ -153,22 +166,25 @@ pub fn measure(folder: &Path, setup: &Setup, observer: &dyn Observer) -> Result<
         let card = card::calibrate(&radiance, steps, &setup.card, scene, light)?;
         let irradiance = middle_irradiance(scene, &card, light);
         let copy = Copy::new(&radiance, card.scale.map(|k| irradiance / std::f64::consts::PI / k));
+        let regions = match &chart {
+            Some(chart) => chart.regions(&first, &radiance, scene)?,
+            None => regions(setup),
+        };
         let pixels =
-            patches.iter().map(|(_, at)| reduce::pixels(&radiance, scene, card.scale, light, *at)).collect();
+            regions.iter().map(|at| reduce::pixels(&radiance, scene, card.scale, light, at)).collect();
         let outline = solve::outline(scene, &radiance, light);
         seen.push(Seen { series: Series { shots, card }, copy, outline, pixels });
     }
     observer.end();
     let Some((_, scene)) = scene else { return Err(MeasureError::Scene("no photographs".into())) };
-    covered(&scene, &patches, &seen)?;
-    finish(setup, &scene, &patches, seen, observer)
+    covered(&scene, &stacks, &seen)?;
+    finish(setup, &scene, &stacks, seen, observer)
 }
 
-type Stacked = (Stack, Option<[f64; 4]>);
-
-fn patches(setup: &Setup) -> Vec<Stacked> {
-    let whole = setup.sample.stack.clone().map(|stack| (stack, None));
-    whole.into_iter().chain(setup.patch.iter().map(|p| (p.stack.clone(), Some(p.rectangle_px)))).collect()
+/// Where the stacks of a setup file are.
+fn regions(setup: &Setup) -> Vec<Region> {
+    let whole = setup.sample.stack.iter().map(|_| Region::All);
+    whole.chain(setup.patch.iter().map(|patch| Region::Pixels(patch.rectangle_px))).collect()
 }
 
 /// The photographs of each lamp with their exposures.
@@ -221,12 +237,12 @@ fn middle_irradiance(scene: &Scene, card: &Calibration, light: usize) -> f64 {
 }
 
 /// Every stack has pixels, and a highlight.
-fn covered(scene: &Scene, patches: &[Stacked], seen: &[Seen]) -> Result<(), MeasureError> {
-    for (i, (stack, _)) in patches.iter().enumerate() {
+fn covered(scene: &Scene, stacks: &[Stack], seen: &[Seen]) -> Result<(), MeasureError> {
+    for (i, stack) in stacks.iter().enumerate() {
         let pixels: Vec<&Pixel> = seen.iter().flat_map(|seen| &seen.pixels[i]).collect();
         if pixels.len() < FEWEST {
             return Err(MeasureError::Scene(format!(
-                "stack {stack}: {} usable pixels; it must lie on the sample, lit and seen: check rectangle_px, sample.height_mm and \
+                "stack {stack}: {} usable pixels; it must lie on the sample, lit and seen: check rectangle_px (or sample.chart), sample.height_mm and \
                  the camera's field of view",
                 pixels.len()
             )));
@@ -363,7 +379,7 @@ fn mistakes(
 fn finish(
     setup: &Setup,
     tape: &Scene,
-    patches: &[Stacked],
+    patches: &[Stack],
     mut seen: Vec<Seen>,
     observer: &dyn Observer,
 ) -> Result<Taken, MeasureError> {
@@ -402,7 +418,7 @@ fn finish(
     observer.begin("making curves", patches.len() as u64);
     let mut stacks = Vec::new();
     let mut used = Vec::new();
-    for (i, (stack, _)) in patches.iter().enumerate() {
+    for (i, stack) in patches.iter().enumerate() {
         let pixels: Vec<Pixel> = seen.iter().flat_map(|seen| seen.pixels[i].iter().copied()).collect();
         let error = seen.iter().map(|seen| seen.series.card.error).fold(0.0, f64::max);
         let Reduced { rows, used: of_stack } = reduce::reduce(&scene, &pixels, &doubts, error.hypot(0.005));

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::{Scene, View};
 use crate::linear::spread;
 use crate::merge::Radiance;
+use crate::patches::Region;
 use crate::smooth::{falling_then_rising, smooth};
 
 /// Samples of a curve.
@@ -474,17 +475,23 @@ fn lobe(z: &[f64], start: usize, last: usize) -> impl Fn(f64) -> f64 {
     move |theta| (x[0] * ggx::lobe(theta, alpha) + x[1]).max(1e-9).ln()
 }
 
-/// Pixels of a rectangle (left, top, right, bottom) or of the whole sample, without its border and what is near the horizon,
-/// thinned to what a curve needs.
+/// Pixels of a region, without the sample's border and what is near the horizon, thinned to what a curve needs.
 pub fn pixels(
     radiance: &Radiance,
     scene: &Scene,
     scale: [f64; 3],
     light: usize,
-    rectangle: Option<[f64; 4]>,
+    region: &Region,
 ) -> Vec<Pixel> {
-    let [left, top, right, bottom] =
-        rectangle.unwrap_or([0.0, 0.0, radiance.width as f64, radiance.height as f64]);
+    let [left, top, right, bottom] = match region {
+        Region::All => [0.0, 0.0, radiance.width as f64, radiance.height as f64],
+        Region::Pixels(rectangle) => *rectangle,
+        Region::Sheet(part) => part.around,
+    };
+    let inside = |x: f64, y: f64| match region {
+        Region::Sheet(part) => scene.unrolled(x, y).is_some_and(|place| part.holds(place)),
+        _ => true,
+    };
     let whole =
         |from: f64, to: f64, most: usize| (from.ceil().max(0.0) as usize)..(to.floor() as usize).min(most);
     let columns = whole(left, right, radiance.width);
@@ -496,7 +503,7 @@ pub fn pixels(
             let i = y * radiance.width + x;
             let Some(view) = lit(px, py).filter(|_| !radiance.value[3 * i].is_nan()) else { continue };
             let near = [(-BORDER, 0.0), (BORDER, 0.0), (0.0, -BORDER), (0.0, BORDER)];
-            if near.iter().all(|(i, j)| lit(px + i, py + j).is_some()) {
+            if near.iter().all(|(i, j)| lit(px + i, py + j).is_some()) && inside(px, py) {
                 found.push((i as u32, (place(view.theta) as usize).min(BINS - 1) as u8));
             }
         }

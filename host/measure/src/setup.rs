@@ -136,6 +136,8 @@ pub struct Sample {
     pub width_mm: Option<f64>,
     /// The stack, if the whole print is of one.
     pub stack: Option<Stack>,
+    /// The job or sheet of the chart of stacks that lies on it, beside the setup file: its marks tell where the stacks are.
+    pub chart: Option<PathBuf>,
 }
 
 /// The three-step grey card.
@@ -218,7 +220,8 @@ impl Setup {
     pub fn read(path: &Path) -> Result<Setup, MeasureError> {
         let mut setup = parsed(path, "a setup file", Setup::parse)?;
         let beside = path.parent().unwrap_or(Path::new(""));
-        for file in [&mut setup.photos.flat_field, &mut setup.photos.dark_frame].into_iter().flatten() {
+        let files = [&mut setup.photos.flat_field, &mut setup.photos.dark_frame, &mut setup.sample.chart];
+        for file in files.into_iter().flatten() {
             *file = beside.join(&*file);
         }
         Ok(setup)
@@ -273,12 +276,15 @@ impl Setup {
                 ));
             }
         }
-        match (&self.sample.stack, self.patch.is_empty()) {
-            (None, true) => {
-                Err("sample.stack: missing; name the stack of the whole print, or add a [[patch]] for each"
-                    .to_owned())
+        match (&self.sample.stack, self.patch.is_empty(), &self.sample.chart) {
+            (None, true, None) => Err(
+                "sample.stack: missing; name the stack of the whole print, its chart (sample.chart), or add a [[patch]] for each"
+                    .to_owned(),
+            ),
+            (Some(_), false, _) => Err("sample.stack: given beside [[patch]]; keep one of them".to_owned()),
+            (Some(_), _, Some(_)) | (_, false, Some(_)) => {
+                Err("sample.chart: given beside sample.stack or [[patch]]; keep one of them".to_owned())
             }
-            (Some(_), false) => Err("sample.stack: given beside [[patch]]; keep one of them".to_owned()),
             _ => Ok(()),
         }
     }
@@ -404,7 +410,11 @@ stack = "MS+C"
         let guide = include_str!("../../../docs/measuring-inks.md");
         let example = guide.split("```toml setup\n").nth(1).unwrap().split("```").next().unwrap();
         let setup = Setup::parse(example).unwrap();
-        assert_eq!(setup.patch.len(), 2);
+        assert_eq!(setup.sample.chart.as_deref(), Some(Path::new("stacks.rgl")));
+        // The other way: a table for each stack.
+        let patch = guide.split("[[patch]]\n").nth(1).unwrap().split("```").next().unwrap();
+        let other = example.replace("chart = \"stacks.rgl\"", "") + "[[patch]]\n" + patch;
+        assert_eq!(Setup::parse(&other).unwrap().patch.len(), 1);
     }
 
     #[test]
@@ -424,6 +434,11 @@ stack = "MS+C"
             ("radius_mm = 50", "width_mm = 50", "needs radius_mm"),
             ("radius_mm = 50", "radius = 50", "radius"),
             ("stack = \"MS+C\"", "", "sample.stack: missing"),
+            (
+                "stack = \"MS+C\"",
+                "stack = \"C\"\nchart = \"c.rgl\"",
+                "sample.chart: given beside sample.stack",
+            ),
             ("height_mm = 120", "height_mm = nan", "height_mm"),
             ("14.0", "1e9", "field_of_view_deg"),
             ("[[light]]\nposition_mm = [350, 100, 900]", "", "0 lamps"),

@@ -302,7 +302,8 @@ fn seven_materials_with_known_geometry() {
     for material in &MATERIALS {
         let rendered = Rendered::new(&script, material, "");
         let taken =
-            measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), &Silent).unwrap();
+            measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), None, &Silent)
+                .unwrap();
         let score = score(&taken, material);
         report(material.name, &taken, &score);
         assert!(score.count > 90 && score.worst < 0.03, "{}: {score:?}", material.name);
@@ -328,7 +329,8 @@ fn a_wrong_tape_is_corrected() {
         let rendered = Rendered::new(&script, material, "");
         for (name, tape) in &cases {
             let taken =
-                measure(&rendered.photos(), &setup(tape, material.stack, &rendered.times), &Silent).unwrap();
+                measure(&rendered.photos(), &setup(tape, material.stack, &rendered.times), None, &Silent)
+                    .unwrap();
             let score = score(&taken, material);
             report(&format!("{}, {name}", material.name), &taken, &score);
             assert!(score.worst < 0.08 && score.scale.abs() < 0.02, "{}, {name}: {score:?}", material.name);
@@ -351,7 +353,7 @@ fn a_hand_held_camera_is_aligned() {
         for known in [true, false] {
             let tape = Tape { known, field_of_view, ..EXACT };
             let setup = setup(&tape, material.stack, &rendered.times);
-            let taken = measure(&rendered.photos(), &setup, &Silent).unwrap();
+            let taken = measure(&rendered.photos(), &setup, None, &Silent).unwrap();
             let score = score(&taken, material);
             let shifts: Vec<[f64; 2]> =
                 taken.measurement.series[0].shots.iter().map(|shot| shot.shift).collect();
@@ -383,7 +385,8 @@ fn a_clipped_peak_is_never_silent() {
         let material = Material { shorter, ..MATERIALS[6] };
         let rendered = Rendered::new(&script, &material, "");
         let taken =
-            measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), &Silent).unwrap();
+            measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), None, &Silent)
+                .unwrap();
         let rows = &taken.measurement.stacks[0].rows;
         let clipped: Vec<_> = rows.iter().filter(|row| row.kind == Kind::Clipped).collect();
         assert!(clipped.len() > 3, "{} clipped rows", clipped.len());
@@ -441,7 +444,7 @@ fn a_flat_sheet_under_several_lamps() {
         let _ = writeln!(text, "[[light]]\nposition_mm = [{x}, 0, {z}]\nphotos = \"lamp{i}-\"");
     }
     // The sheet covers x from -60 to 60 mm and the card begins at 75 mm.
-    let taken = measure(&photos, &Setup::parse(&(text + &times)).unwrap(), &Silent).unwrap();
+    let taken = measure(&photos, &Setup::parse(&(text + &times)).unwrap(), None, &Silent).unwrap();
     let (mut worst, mut first, mut last) = (0.0f64, 90.0f64, 0.0f64);
     for row in taken.measurement.stacks[0].rows.iter().filter(|row| row.kind != Kind::Extrapolated) {
         let truth = material.at(row.theta_deg.to_radians());
@@ -468,7 +471,7 @@ fn mistakes_are_named() {
     let other = Rendered::new(&script, &MATERIALS[4], "");
     let exact = setup(&EXACT, material.stack, &rendered.times);
     let fails = |photos: &Path, setup: &Setup, words: [&str; 2]| {
-        let error = measure(photos, setup, &Silent).err().expect("an error").to_string();
+        let error = measure(photos, setup, None, &Silent).err().expect("an error").to_string();
         println!("{error}");
         assert!(words.iter().all(|word| error.contains(word)), "{error}");
     };
@@ -554,7 +557,7 @@ fn alum_bronze_of_the_data_set() {
         .collect();
     for known in [true, false] {
         let setup = setup(&Tape { known, ..EXACT }, "MG", &times);
-        let taken = measure(&data.join("photos/alum_bronze_cylinder"), &setup, &Silent).unwrap();
+        let taken = measure(&data.join("photos/alum_bronze_cylinder"), &setup, None, &Silent).unwrap();
         let mut best = f64::INFINITY;
         for kind in ["avg", "colocated"] {
             let truth = inks::Curve::read_csv(&data.join(format!("brdf/curves_{kind}/merl_alum-bronze.csv")))
@@ -606,7 +609,7 @@ fn time_and_memory_of_24_large_photographs() {
     let before = memory();
     let start = std::time::Instant::now();
     let taken =
-        measure(large.path(), &setup(&Tape { known: false, ..EXACT }, material.stack, &times), &Silent)
+        measure(large.path(), &setup(&Tape { known: false, ..EXACT }, material.stack, &times), None, &Silent)
             .unwrap();
     let (took, peak) = (start.elapsed().as_secs_f64(), memory());
     let score = score(&taken, material);

@@ -24,6 +24,7 @@ use press::sheet::DotMap;
     foilpress chart ladder C+M+Y+F C+M+Y\n  \
     foilpress chart halftone                             (black on paper by each halftone)\n  \
     foilpress chart stacks --inks process,MS,F           (a labelled patch of each stack, to measure)\n  \
+    foilpress chart stacks --inks MS,C,F --strips        (strips to wrap round a can)\n  \
     foilpress chart registration --inks black,cyan,white\n  \
     foilpress chart calibration --to serial:/dev/ttyACM0")]
 pub struct Args {
@@ -33,7 +34,8 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum Chart {
-    /// Print a halftoned ramp from one stack to another, with a checkerboard to hold so that the ramp reflects it
+    /// Print a halftoned ramp from one stack to another, clusters of 1 to 24 dots of both for `measure ramp`, and a checkerboard
+    /// to hold so that the ramp reflects it
     Ramp(Ramp),
     /// Print four levels of gloss between a glossy and a dull stack, both clamped and with their differences kept
     Ladder(Ladder),
@@ -41,7 +43,8 @@ enum Chart {
     Halftone(Halftone),
     /// Print a labelled patch of every stack that the chosen inks can make
     Stacks(Stacks),
-    /// Print verniers between the first ink and each other ink, to measure how far apart passes land
+    /// Print verniers between the first ink and each other ink, to see how far apart passes land, with marks for
+    /// `measure registration`
     Registration(Registration),
     /// Print two crosses to measure with a ruler, for `foilpress profile set`: where this printer prints and how far it
     /// feeds
@@ -100,6 +103,9 @@ struct Halftone {
 struct Stacks {
     #[command(flatten)]
     inks: InkArgs,
+    /// Print strips of 90 x 12 mm, one below the other, to wrap round a can
+    #[arg(long)]
+    strips: bool,
     #[command(flatten)]
     job: JobArgs,
 }
@@ -165,7 +171,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
                 );
             }
             let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
-            let dots = chart::stacks(&all, stacks.job.layout.paper)?;
+            let dots = chart::stacks(&all, stacks.job.layout.paper, stacks.strips)?;
             let artwork = artwork("stacks", &dots, set, &library);
             print(&artwork, &stacks.job, observer)
         }
@@ -175,12 +181,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
                 bail!("--inks: {} is given twice", twice.1.name());
             }
             let dots = chart::registration(inks, registration.whole.paper)?;
-            registration.whole.print("registration", &dots, inks, observer)
+            registration.whole.print("registration", &dots, inks, true, observer)
         }
         Chart::Calibration(calibration) => {
             let ink = calibration.ink;
             let dots = chart::calibration(ink, calibration.whole.paper, &NEXT)?;
-            calibration.whole.print("calibration", &dots, &[ink], observer)
+            calibration.whole.print("calibration", &dots, &[ink], false, observer)
         }
     }
 }
@@ -225,10 +231,17 @@ impl StepArgs {
 }
 
 impl WholePage {
-    fn print(&self, name: &str, dots: &DotMap, inks: &[Ink], observer: &dyn Observer) -> Result<()> {
+    fn print(
+        &self,
+        name: &str,
+        dots: &DotMap,
+        inks: &[Ink],
+        camera_marks: bool,
+        observer: &dyn Observer,
+    ) -> Result<()> {
         let library = Library::builtin();
         let artwork = artwork(name, dots, InkSet::of(inks.iter().copied()), &library);
-        let layout = Layout::centred(self.paper);
+        let layout = Layout { camera_marks, ..Layout::centred(self.paper) };
         artwork.print(&layout, &self.media, &self.result, &self.deliver, observer)
     }
 }

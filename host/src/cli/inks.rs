@@ -6,6 +6,7 @@ mod diff;
 mod from;
 mod gamut;
 mod page;
+pub(super) mod place;
 mod predict;
 mod share;
 
@@ -40,8 +41,11 @@ pub struct Args {
 
 #[derive(clap::Subcommand, Debug)]
 enum What {
-    /// List the stacks with their layers, their peak reflectance and the origin of their curves
+    /// List the stacks with their layers, their peak reflectance and the origin of their curves; or the libraries that were added
     List {
+        /// List the libraries that were added with `inks add` instead
+        #[arg(long, conflicts_with_all = ["library", "inks"])]
+        added: bool,
         /// Ink library: its folder, or the name it was added under [default: the built-in library, which is modelled, not
         /// measured]
         #[arg(long, value_name = "LIBRARY")]
@@ -112,6 +116,14 @@ enum What {
         #[arg(long)]
         name: Option<String>,
     },
+    /// Remove a library that was added; the folder or archive it was added from stays as it is
+    #[command(after_help = "Examples:\n  \
+        foilpress inks list --added\n  \
+        foilpress inks remove matt-paper")]
+    Remove {
+        /// Name of the library
+        name: String,
+    },
     /// Write a library as one archive, with its licence and the origin of its curves
     #[command(after_help = "Examples:\n  \
         foilpress inks export my-library/ -o mine.zip --licence CC0-1.0")]
@@ -140,7 +152,8 @@ enum What {
 /// Runs the subcommand; what it has to say goes to the standard output.
 pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
     let (text, verdict) = match args.what {
-        What::List { library, inks, json } => {
+        What::List { added: true, json, .. } => (share::list(json)?, Ok(())),
+        What::List { library, inks, json, .. } => {
             (list(&libraries::given(library.as_deref())?, inks, json)?, Ok(()))
         }
         What::Show { stack, library, figures, plot } => {
@@ -168,6 +181,7 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
         What::Gamut(args) => (gamut::run(&args, observer)?, Ok(())),
         What::Redundant(args) => (gamut::redundant(&args)?, Ok(())),
         What::Add { dir, name } => (share::add(&dir, name)?, Ok(())),
+        What::Remove { name } => (share::remove(&name)?, Ok(())),
         What::Export { library, output, licence } => {
             (share::export(&library, output.as_deref(), licence.as_deref())?, Ok(()))
         }
@@ -353,6 +367,10 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
             cartridge.minimum_cluster.get()
         ),
     ];
+    if let Some(dots) = &cartridge.dots {
+        let gain = dots.dot_gain_um.map_or(String::new(), |gain| format!(", dot gain {gain:.1} um"));
+        lines.push(format!("  dots measured by {}, {}: {}{gain}", dots.by, dots.when, dots.setup));
+    }
     lines.extend(
         cartridge.cautions.iter().map(|caution| format!("  {} ({})", caution.text, caution.certainty)),
     );

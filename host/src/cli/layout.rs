@@ -251,6 +251,7 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
 #[command(after_help = "Examples:\n  \
     foilpress chart calibration --to serial:/dev/ttyACM0     (print it, then measure with a ruler)\n  \
     foilpress profile set default --cross 20.4x29.7mm --distance 200.3mm\n  \
+    foilpress measure registration scan.png --chart registration.rgl --profile default\n  \
     foilpress profile list\n  \
     foilpress print sample:leaf --profile default")]
 pub struct ProfileArgs {
@@ -291,8 +292,9 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
             let names =
                 folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
             let profile = |name: String| {
-                let Profile { offset_mm, feed } = Profile::load(&folders::file(&folder, &name)?)?;
-                anyhow::Ok(serde_json::json!({ "name": name, "offset_mm": offset_mm, "feed": feed }))
+                let mut json = serde_json::to_value(Profile::load(&folders::file(&folder, &name)?)?)?;
+                json["name"] = name.into();
+                anyhow::Ok(json)
             };
             let profiles = names.into_iter().map(profile).collect::<Result<Vec<_>>>()?;
             super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&profiles)?))
@@ -302,8 +304,8 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
             for name in
                 folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?
             {
-                let Profile { offset_mm: [x, y], feed } = Profile::load(&folders::file(&folder, &name)?)?;
-                writeln!(text, "{name:<16} offset {x:.2}, {y:.2} mm, feed {feed:.4}")?;
+                let profile = Profile::load(&folders::file(&folder, &name)?)?;
+                writeln!(text, "{name:<16} {}", in_words(&profile))?;
             }
             if text.is_empty() {
                 text = format!(
@@ -315,14 +317,27 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
         }
         ProfileCommand::Set(set) => {
             let profile = press::chart::calibration::profile(set.cross, set.distance);
-            if let Some(problem) = profile.problem() {
-                bail!("{problem}; measure again");
-            }
-            let path = folders::file(&folder, &set.name)?;
-            std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-            profile.save(&path)?;
-            let Profile { offset_mm: [x, y], feed } = profile;
-            super::stdio::show(&format!("{}: offset {x:.2}, {y:.2} mm, feed {feed:.4}\n", path.display()))
+            let path = save_profile(&set.name, &profile)?;
+            super::stdio::show(&format!("{}: {}\n", path.display(), in_words(&profile)))
         }
     }
+}
+
+/// Saves a profile under a name; nothing is written if it is none of a printer.
+pub fn save_profile(name: &str, profile: &Profile) -> Result<PathBuf> {
+    if let Some(problem) = profile.problem() {
+        bail!("{problem}; measure again");
+    }
+    let folder = profiles()?;
+    let path = folders::file(&folder, name)?;
+    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    profile.save(&path)?;
+    Ok(path)
+}
+
+/// A profile in a line.
+pub fn in_words(profile: &Profile) -> String {
+    let Profile { offset_mm: [x, y], feed, skew_deg } = profile;
+    let skew = if *skew_deg == 0.0 { String::new() } else { format!(", skew {skew_deg:.2} degrees") };
+    format!("offset {x:.2}, {y:.2} mm, feed {feed:.4}{skew}")
 }

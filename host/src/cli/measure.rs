@@ -1,18 +1,24 @@
-//! `foilpress measure`: photographs of printed stacks to an ink library with measured curves.
+//! `foilpress measure`: photographs of printed stacks to an ink library with measured curves; scans of charts to the dots of inks and the
+//! printer's profile.
+
+mod ramp;
+mod registration;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
 use super::output::{Kind, Staged};
-use super::stdio::show;
+use super::stdio::{read_job, show};
 use measure::Measurement;
 use measure::reduce::Kind as Origin;
 use measure::setup::Setup;
 use observe::Observer;
+use press::sheet::Sheet;
+use press::simulate;
 
 /// Arguments of `measure`.
 #[derive(ClapArgs, Debug)]
@@ -21,7 +27,9 @@ use observe::Observer;
     subcommand_negates_reqs = true,
     after_help = "Examples:\n  \
     foilpress measure photos/ --setup can.toml -o mine/\n  \
-    foilpress measure report mine/                       (one page with every curve)\n\n\
+    foilpress measure report mine/                       (one page with every curve)\n  \
+    foilpress measure ramp k.png --chart k.rgl --by \"A. Owner\" --when 2026-11-02 -o mine/\n  \
+    foilpress measure registration scan.png --chart registration.rgl --profile default\n\n\
     The folder is an ink library: check it with `inks check`, then print with --library.\n\
     docs/measuring-inks.md explains what to photograph and what the setup file says."
 )]
@@ -41,6 +49,11 @@ pub struct Args {
 
 #[derive(Subcommand, Debug)]
 enum What {
+    /// Read dot gain and the smallest cluster that holds from scans of the ramp chart, and write them to a library
+    Ramp(ramp::Args),
+    /// Read where the printer starts, how far it feeds and how askew sheets go in from scans of the registration chart, and save
+    /// them as a profile
+    Registration(registration::Args),
     /// Write a measurement as one self-contained HTML page: masks, residuals, exposures, curves, what to photograph again
     Report {
         /// Folder that `foilpress measure` wrote
@@ -54,6 +67,8 @@ enum What {
 /// Runs `measure`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match (&args.what, &args.photos, &args.setup, &args.output) {
+        (Some(What::Ramp(args)), ..) => ramp::run(args, observer),
+        (Some(What::Registration(args)), ..) => registration::run(args, observer),
         (Some(What::Report { dir, output }), ..) => report(dir, output.as_deref()),
         (None, Some(photos), Some(setup), Some(output)) => curves(photos, setup, output, observer),
         // The parser asks for all three.
@@ -63,8 +78,15 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 
 fn curves(photos: &Path, setup: &Path, output: &Path, observer: &dyn Observer) -> Result<()> {
     let setup = Setup::read(setup)?;
+    if let Some(added) = measure::library::added(output) {
+        bail!(
+            "{}: holds {added}, which this would delete; measure into another folder (-o), and copy those tables and curves over",
+            output.display()
+        );
+    }
     let staged = Staged::folder(output, Kind::Measured)?;
-    let taken = measure::measure(photos, &setup, observer)?;
+    let sheet = setup.sample.chart.as_deref().map(|path| chart(path, observer)).transpose()?;
+    let taken = measure::measure(photos, &setup, sheet.as_ref().map(Sheet::dots), observer)?;
     let folder = staged.create()?;
     measure::library::write(&taken, folder)?;
     Library::from_dir(folder).context("the measured curves cannot be used as an ink library")?;
@@ -111,4 +133,20 @@ fn summary(measurement: &Measurement, output: &Path) -> String {
          Next: foilpress measure report {dir}; foilpress inks check {dir}"
     );
     text
+}
+
+/// The sheet that a chart was printed from: a job, or the folder of a sheet.
+fn chart(path: &Path, observer: &dyn Observer) -> Result<Sheet> {
+    if path.join("sheet.toml").is_file() {
+        return Ok(Sheet::load(path)?);
+    }
+    if path.is_dir() {
+        bail!(
+            "{}: has no sheet.toml; give the chart's job (.rgl), or a folder that `simulate` wrote",
+            path.display()
+        );
+    }
+    let printout = simulate::print(&read_job(path)?, &simulate::Setup::default(), observer)
+        .with_context(|| format!("{}", path.display()))?;
+    Ok(printout.sheet()?)
 }

@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn a_machine_is_in_the_description_of_its_queue() {
-        let machine = Profile { offset_mm: [0.25, -1.5], feed: 1.0015 };
+        let machine = Profile { offset_mm: [0.25, -1.5], feed: 1.0015, ..Profile::default() };
         assert_eq!(profile_in(&description(&machine)), machine);
         assert_eq!(profile_in("*FoilpressOffset: \"99 0\"\n"), Profile::default());
         assert_eq!(profile_in("*FoilpressOffset: \"\"\n*FoilpressFeed: x\n"), Profile::default());

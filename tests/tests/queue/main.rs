@@ -270,7 +270,7 @@ fn a_sheet_of_any_size_is_printed_where_the_user_wants_it_by_a_machine_that_is_n
     let server = server!();
     let bridge = Bridge::start(FAST);
     server.queue("Alps", &bridge.uri());
-    let machine = Profile { offset_mm: [0.508, -0.254], feed: 1.0 };
+    let machine = Profile { offset_mm: [0.508, -0.254], ..Profile::default() };
     server.queue_of("Off", &bridge.uri(), &machine);
     let file = server.path("files/mark.pdf");
     let mark = [60, 110, 100, 180];

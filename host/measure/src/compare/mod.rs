@@ -10,9 +10,9 @@
 mod figures;
 mod flat;
 pub mod page;
-mod picture;
+pub(crate) mod picture;
 mod setup;
-mod sheet;
+pub(crate) mod sheet;
 
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -34,12 +34,12 @@ pub use setup::{Card, Setup, White};
 use crate::MeasureError;
 use crate::camera::{self, Camera, Known, Lens, Pose, Seen};
 use crate::linear::median;
-use crate::marks::{self, Mark};
+use crate::marks::Mark;
 use crate::{card, photo};
 use figures::{Cover, Lighting, Squares, Steps};
 use flat::{Flat, Window};
 use picture::Picture;
-use sheet::{FEWEST, Marks};
+use sheet::Marks;
 
 /// Corners that lie farther than this from where a flat sheet has them, in pixels and in picture widths, are not on one.
 const MOST_RESIDUAL: (f64, f64) = (1.0, 6e-4);
@@ -162,7 +162,7 @@ struct Shot {
     name: String,
     light: usize,
     size: (usize, usize),
-    marks: Vec<Mark>,
+    marks: Vec<(Mark, sheet::Printed)>,
 }
 
 /// Compares the photographs in a folder with what was printed.
@@ -202,7 +202,7 @@ pub fn compare(
         observer.advance(1);
     }
     observer.end();
-    let camera = solved(&paths[0], setup, &sheet, &shots)?;
+    let camera = solved(&paths[0], setup, &shots)?;
     let area = printed.document.as_ref().map_or(sheet.between, |document| document.area);
     let (middle, size) = sheet.area(area);
     let mut warnings = Vec::new();
@@ -217,7 +217,7 @@ pub fn compare(
     observer.begin("comparing", shots.len() as u64);
     let (mut photos, mut pictures) = (Vec::new(), Vec::new());
     for (i, shot) in shots.iter().enumerate() {
-        let (figures, drawn) = scenery.compared(shot, i, &camera, setup, &sheet, observer)?;
+        let (figures, drawn) = scenery.compared(shot, i, &camera, setup, observer)?;
         if figures.paper_deviation > UNEVEN {
             warnings.push(format!(
                 "{}: the paper at the marks is off by up to {:.0} % from the fall-off of lamp {}; check its position_mm, and that no \
@@ -286,51 +286,21 @@ fn read(path: &Path, setup: &Setup, sheet: &Marks) -> Result<Shot, MeasureError>
         ));
     };
     let picture = Picture::read(path, setup.linear)?;
-    let found = marks::find(&picture.grey());
-    let own = |mark: &&Mark| sheet.marks.iter().any(|known| known.name == mark.name);
-    let marks: Vec<Mark> = found.iter().filter(own).copied().collect();
-    if found.is_empty() {
-        return wrong(
-            "no camera marks were found; show all four corners of the print, in focus, and so large that a mark has at least 40 \
-             pixels along its side"
-                .into(),
-        );
-    }
-    if marks.len() < FEWEST && found.len() > marks.len() {
-        return wrong(format!(
-            "its camera marks are those of another sheet ({} of {}); compare it with the job that it was printed from",
-            found.len() - marks.len(),
-            found.len()
-        ));
-    }
-    if marks.len() < FEWEST {
-        return wrong(format!(
-            "only {} of the sheet's {} camera marks are seen, and {FEWEST} are needed; show all corners, without shadows or fingers on \
-             them",
-            marks.len(),
-            sheet.marks.len()
-        ));
-    }
-    if marks.iter().enumerate().any(|(i, mark)| marks[..i].iter().any(|other| other.name == mark.name)) {
-        return wrong("two copies of the sheet are in the picture; show one of them".into());
-    }
+    let marks = sheet.seen(path, &picture.grey())?;
     Ok(Shot { path: path.to_path_buf(), name, light, size: (picture.width, picture.height), marks })
 }
 
 /// Solves for the camera.
-fn solved(first: &Path, setup: &Setup, sheet: &Marks, shots: &[Shot]) -> Result<Camera, MeasureError> {
+fn solved(first: &Path, setup: &Setup, shots: &[Shot]) -> Result<Camera, MeasureError> {
     let (width, height) = shots[0].size;
     let seen: Vec<Vec<Seen>> = shots
         .iter()
         .map(|shot| {
-            let marks = shot.marks.iter().filter_map(|mark| {
-                sheet.marks.iter().find(|known| known.name == mark.name).map(|known| (mark, known))
-            });
-            marks
-                .flat_map(|(mark, known)| {
-                    (0..4).map(|i| Seen { sheet: known.corners[i], pixel: mark.corners[i] })
-                })
-                .collect()
+            let corners = |(mark, known): &(Mark, sheet::Printed)| {
+                let (mark, known) = (*mark, *known);
+                (0..4).map(move |i| Seen { sheet: known.corners[i], pixel: mark.corners[i] })
+            };
+            shot.marks.iter().flat_map(corners).collect()
         })
         .collect();
     let focal_of = |degrees: f64| 0.5 * width as f64 / (0.5 * degrees).to_radians().tan();
@@ -431,7 +401,6 @@ impl Scenery {
         number: usize,
         camera: &Camera,
         setup: &Setup,
-        sheet: &Marks,
         observer: &dyn Observer,
     ) -> Result<(PhotoFigures, Pictures), MeasureError> {
         let (pose, lens) = (&camera.poses[number], &camera.lens);
@@ -439,7 +408,7 @@ impl Scenery {
         let lamp = setup.light[shot.light].position_mm;
         let lighting = Lighting { eye: pose.position(), lamp, middle: window.middle };
         let picture = Picture::read(&shot.path, setup.linear)?;
-        let (paper, paper_deviation) = self.paper_scale(shot, &picture, &lighting, sheet)?;
+        let (paper, paper_deviation) = self.paper_scale(shot, &picture, &lighting)?;
         let scale = match setup.white {
             White::Paper => paper,
             White::Card => card_scale(shot, &picture, &setup.card, &lighting, lens, pose)?,
@@ -528,13 +497,11 @@ impl Scenery {
         shot: &Shot,
         picture: &Picture,
         lighting: &Lighting,
-        sheet: &Marks,
     ) -> Result<([f64; 3], f64), MeasureError> {
         let mut ratios: [Vec<f64>; 3] = Default::default();
         let mut single: Vec<f64> = Vec::new();
-        for mark in &shot.marks {
+        for (mark, known) in &shot.marks {
             let Some(plane) = mark.plane() else { continue };
-            let Some(known) = sheet.marks.iter().find(|known| known.name == mark.name) else { continue };
             let [left, top] = known.corners[0];
             let cell = (known.corners[1][0] - left) / 8.0;
             let mut own: [Vec<f64>; 3] = Default::default();

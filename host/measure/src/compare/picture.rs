@@ -36,13 +36,15 @@ impl Picture {
             Values::Float(_) => (1.0, f32::INFINITY),
         };
         let bent = !linear.unwrap_or(!eight);
-        let values: Vec<f32> = (0..3 * photo.width * photo.height)
-            .into_par_iter()
-            .map(|i| {
-                let v = photo.at(i) / limit;
-                if bent { undone(v) } else { v }
-            })
-            .collect();
+        let plain = |v: f32| if bent { undone(v / limit) } else { v / limit };
+        let count = 3 * photo.width * photo.height;
+        let values: Vec<f32> = match &photo.values {
+            Values::Eight(bytes) => {
+                let table: Vec<f32> = (0..=255).map(|v| plain(v as f32)).collect();
+                bytes.par_iter().map(|v| table[usize::from(*v)]).collect()
+            }
+            _ => (0..count).into_par_iter().map(|i| plain(photo.at(i))).collect(),
+        };
         let full = if bent { undone(full) } else { full };
         if photo.width.min(photo.height) < 100 {
             let problem = format!("{} x {} pixels; too small to find marks in", photo.width, photo.height);
@@ -51,22 +53,9 @@ impl Picture {
         Ok(Picture { width: photo.width, height: photo.height, values, full })
     }
 
-    /// The darkest channel of each pixel, each channel divided by its own bright tones: dark for any coloured ink, bright for
-    /// paper.
+    /// The picture as marks are found in it.
     pub(crate) fn grey(&self) -> Grey {
-        let bright: [f32; 3] = std::array::from_fn(|c| {
-            let stride = (self.width * self.height / 20_000).max(1) | 1;
-            let mut some: Vec<f32> =
-                (0..self.width * self.height).step_by(stride).map(|i| self.values[3 * i + c]).collect();
-            let at = some.len() * 9 / 10;
-            some.select_nth_unstable_by(at, f32::total_cmp).1.max(1e-9)
-        });
-        let values = self
-            .values
-            .par_chunks_exact(3)
-            .map(|rgb| (0..3).map(|c| rgb[c] / bright[c]).fold(f32::MAX, f32::min))
-            .collect();
-        Grey { width: self.width, height: self.height, values }
+        Grey::of(&self.values, self.width, self.height)
     }
 
     /// The same for the search of the grey card. Noise is not known here, and not needed.
@@ -80,6 +69,12 @@ impl Picture {
             variance: vec![1e-12; self.values.len()],
             bound,
         }
+    }
+
+    /// A pixel's light, and whether one of its channels is empty, and full.
+    pub(crate) fn pixel(&self, x: usize, y: usize) -> ([f64; 3], [bool; 2]) {
+        let rgb: [f32; 3] = std::array::from_fn(|c| self.values[3 * (y * self.width + x) + c]);
+        (rgb.map(f64::from), [rgb.iter().any(|v| *v <= 0.0), rgb.iter().any(|v| *v >= self.full)])
     }
 
     /// The light between pixel centres, which are at halves, and whether a channel near it is full. `None` outside.

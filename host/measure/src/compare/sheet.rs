@@ -4,6 +4,8 @@
 //! found as those of a photograph are, and their corners moved to the dots they lie on. Cost: as for a photograph.
 //! Limits: marks of a dark ink on bare paper.
 
+use std::path::Path;
+
 use appearance::brdf::{Space, reflectances};
 use inks::Library;
 use press::layout::camera::{Name, SIDE};
@@ -18,6 +20,8 @@ const FACTOR: usize = 3;
 const BESIDE: f64 = 0.7;
 /// Angles at which curves are sampled for that.
 const SAMPLES: usize = 64;
+/// Bare paper around the printable area, in those pixels: a mark may stand at its very edge.
+const AROUND: usize = 24;
 /// The fewest marks that tell a sheet.
 pub(crate) const FEWEST: usize = 3;
 
@@ -46,8 +50,9 @@ impl Marks {
         let mut marks: Vec<(Name, [f64; 2])> = Vec::new();
         for Mark { name, corners } in &found {
             // The middle is more exact than a corner.
-            let middle: [f64; 2] =
-                std::array::from_fn(|c| corners.iter().map(|p| p[c]).sum::<f64>() / 4.0 * FACTOR as f64);
+            let middle: [f64; 2] = std::array::from_fn(|c| {
+                (corners.iter().map(|p| p[c]).sum::<f64>() / 4.0 - AROUND as f64) * FACTOR as f64
+            });
             let left_top = middle.map(|m| (m - SIDE as f64 / 2.0).round());
             if marks.iter().any(|(known, _)| known.corner == name.corner) {
                 return Err(MeasureError::Scene(
@@ -96,6 +101,58 @@ impl Marks {
         [(x - self.origin[0]) / DOTS_PER_MM, (self.origin[1] - y) / DOTS_PER_MM]
     }
 
+    /// A place in mm of the frame as dots from the sheet's top left corner.
+    pub(crate) fn dots(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [self.origin[0] + x * DOTS_PER_MM, self.origin[1] - y * DOTS_PER_MM]
+    }
+
+    /// The sheet's marks in a picture, each with itself as printed.
+    pub(crate) fn seen(&self, path: &Path, picture: &Grey) -> Result<Vec<(Mark, Printed)>, MeasureError> {
+        let wrong = |problem: String| Err(MeasureError::photo(path, problem));
+        let own = |found: &[Mark]| -> Vec<(Mark, Printed)> {
+            let known = |mark: &Mark| self.marks.iter().find(|known| known.name == mark.name);
+            found.iter().filter_map(|mark| Some((*mark, *known(mark)?))).collect()
+        };
+        let found = marks::find(picture);
+        let seen = own(&found);
+        if seen.len() < FEWEST
+            && found.len() < FEWEST
+            && own(&marks::find(&picture.mirrored())).len() >= FEWEST
+        {
+            return wrong("the picture is mirrored; turn mirroring off and take it again".into());
+        }
+        if found.is_empty() {
+            return wrong(
+                "no camera marks were found; show all four corners of the print, in focus, and so large that a mark has at least 40 \
+                 pixels along its side"
+                    .into(),
+            );
+        }
+        if seen.len() < FEWEST && found.len() > seen.len() {
+            return wrong(format!(
+                "its camera marks are those of another sheet ({} of {}); give the job that it was printed from",
+                found.len() - seen.len(),
+                found.len()
+            ));
+        }
+        if seen.len() < FEWEST {
+            return wrong(format!(
+                "only {} of the sheet's {} camera marks are seen, and {FEWEST} are needed; show all corners, without shadows or fingers on \
+                 them",
+                seen.len(),
+                self.marks.len()
+            ));
+        }
+        if seen
+            .iter()
+            .enumerate()
+            .any(|(i, (mark, _))| seen[..i].iter().any(|(other, _)| other.name == mark.name))
+        {
+            return wrong("two copies of the sheet are in the picture; show one of them".into());
+        }
+        Ok(seen)
+    }
+
     /// The middle of an area in mm of the frame, and its size in mm.
     pub(crate) fn area(&self, area: Area) -> ([f64; 2], [f64; 2]) {
         let half = |start: usize, side: usize| start as f64 + side as f64 / 2.0;
@@ -111,12 +168,17 @@ fn picture(dots: &DotMap, library: &Library) -> Grey {
         .rows()
         .map(|row| space.curve(row).at(BESIDE).into_iter().fold(f64::MAX, f64::min) as f32)
         .collect();
-    let (width, height) = (dots.width() / FACTOR, dots.length() / FACTOR);
-    let mut values = vec![0.0; width * height];
-    for (y, row) in values.chunks_exact_mut(width.max(1)).enumerate() {
+    let (columns, rows) = (dots.width() / FACTOR, dots.length() / FACTOR);
+    let (width, height) = (columns + 2 * AROUND, rows + 2 * AROUND);
+    let bare = dots.stacks().iter().position(|stack| stack.layers().is_empty());
+    let paper = bare.map_or_else(|| grey.iter().copied().fold(0.0, f32::max), |at| grey[at]);
+    let mut values = vec![paper * (FACTOR * FACTOR) as f32; width * height];
+    for (y, row) in values.chunks_exact_mut(width).skip(AROUND).take(rows).enumerate() {
+        let row = &mut row[AROUND..AROUND + columns];
+        row.fill(0.0);
         for line in 0..FACTOR {
             let start = (FACTOR * y + line) * dots.width();
-            let dots = &dots.index()[start..start + FACTOR * width];
+            let dots = &dots.index()[start..start + FACTOR * columns];
             for (value, dots) in row.iter_mut().zip(dots.chunks_exact(FACTOR)) {
                 *value += dots.iter().map(|&stack| grey[usize::from(stack)]).sum::<f32>();
             }

@@ -63,5 +63,5 @@ pub fn profile(cross: Point, distance: Option<Mm>) -> Profile {
     // Thousandths of a millimetre are more than any ruler tells.
     let round = |mm: f64| (mm * 1e3).round() / 1e3;
     let offset = [round(cross.0.0 - CROSS.0), round(cross.1.0 - TOP - feed * row)];
-    Profile { offset_mm: offset, feed }
+    Profile { offset_mm: offset, feed, ..Profile::default() }
 }

@@ -1,12 +1,13 @@
 //! Charts: dot maps made by the program itself, to look at inks, to measure them, and to measure the printer.
 //!
-//! [`ramp`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
+//! [`ramp()`] and [`ladder`] are figures 2 and 5 of the 2009 paper, [`stacks`] lays all stacks side by side for measuring,
 //! [`halftones`] the halftones, [`registration()`] shows how far passes are apart, [`calibration()`] where the printer starts and how far it feeds. Each gives
 //! a [`DotMap`](crate::sheet::DotMap) that is laid out and printed like any other.
 
 pub mod calibration;
 mod error;
 mod methods;
+pub mod ramp;
 mod registration;
 mod sketch;
 mod steps;
@@ -14,8 +15,9 @@ mod steps;
 pub use calibration::calibration;
 pub use error::ChartError;
 pub use methods::halftones;
+pub use ramp::ramp;
 pub use registration::registration;
-pub use steps::{ladder, ramp, stacks};
+pub use steps::{ladder, stacks};
 
 #[cfg(test)]
 mod tests;

@@ -12,6 +12,7 @@ use protocol::paper::Paper;
 use super::error::ChartError;
 use super::sketch::{LETTER, LINE, Sketch, mm};
 use crate::layout::Mm;
+use crate::layout::camera::{QUIET, SIDE};
 use crate::sheet::DotMap;
 
 /// From line to line in the first ink, in dots.
@@ -52,13 +53,14 @@ fn vernier(sketch: &mut Sketch, (x, y): (usize, usize), down: bool, first: &Stac
     }
 }
 
-/// The first ink against each of the others, on the whole printable area of the paper.
+/// The first ink against each of the others, on the printable area of the paper but for the camera marks above and below.
 pub fn registration(inks: &[Ink], paper: Paper) -> Result<DotMap, ChartError> {
     let [first, others @ ..] = inks else { return Err(ChartError::OneInk) };
     if others.is_empty() {
         return Err(ChartError::OneInk);
     }
-    let (width, length) = (usize::from(paper.width()), usize::from(paper.length()));
+    let marks = 2 * (SIDE + QUIET);
+    let (width, length) = (usize::from(paper.width()), usize::from(paper.length()).saturating_sub(marks));
     let column = CELL + mm(4.0);
     let block = LINE * LABEL + 2 * CELL + mm(4.0);
     let most = (width / column).min(6);
@@ -66,7 +68,7 @@ pub fn registration(inks: &[Ink], paper: Paper) -> Result<DotMap, ChartError> {
         if most < 1 || length < 3 * block {
             // Whole millimetres, rounded up.
             let needed = |dots: usize| Mm::of_dots(dots as i64).0.ceil() as u32;
-            let (width, length) = (needed(column), needed(3 * block));
+            let (width, length) = (needed(column), needed(3 * block + marks));
             return Err(ChartError::Paper { chart: "registration", width, length, paper: paper.name() });
         }
         return Err(ChartError::TooMany { what: "inks beside the first", found: others.len(), most });

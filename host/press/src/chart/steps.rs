@@ -14,8 +14,6 @@ use observe::Observer;
 
 /// Scale of labels: letters 3.4 mm high.
 pub(super) const LABEL: usize = 4;
-/// Shares along a ramp: finer than an eye sees.
-const STEPS: usize = 1024;
 
 /// The four gloss levels of figure 5, relative to the highest.
 const GLOSS: [f64; 4] = [1.0, 0.8, 0.5, 0.1];
@@ -38,42 +36,6 @@ pub(super) fn two(chart: &'static str, a: &Stack, b: &Stack) -> Result<(), Chart
         return Err(ChartError::Same { chart, stack: a.clone() });
     }
     Ok(())
-}
-
-/// Figure 2: all of `a` at the left, all of `b` at the right, 150 mm apart; below it a checkerboard to cut out and hold so
-/// that the ramp reflects it.
-pub fn ramp(
-    a: &Stack,
-    b: &Stack,
-    method: Method,
-    library: &Library,
-    observer: &dyn Observer,
-) -> Result<DotMap, ChartError> {
-    two("ramp", a, b)?;
-    let (width, strip) = (mm(150.0), mm(30.0));
-    let line = LINE * LABEL;
-    let head = line + mm(1.5);
-    let foot = head + strip + mm(1.0);
-    let board_top = foot + mm(2.0) + line + mm(10.0);
-    let square = mm(10.0);
-    let pen = pen(&[a, b]);
-    let mut sketch = Sketch::new(width, board_top + 6 * square);
-    sketch.text(0, 0, LABEL, &pen, &a.to_string());
-    sketch.text_to(width, 0, LABEL, &pen, &b.to_string());
-    let shares: Vec<f64> = (0..STEPS).map(|i| 1.0 - (i as f64 + 0.5) / STEPS as f64).collect();
-    sketch.halftone((0, head, width, strip), [a, b], &shares, method, library, observer)?;
-    for tenth in 0..=10 {
-        let x = (width - 6) * tenth / 10;
-        sketch.fill((x, foot, 6, if tenth % 5 == 0 { mm(3.0) } else { mm(1.5) }), &pen);
-    }
-    sketch.text(0, foot + mm(3.5), 3, &pen, "100 %");
-    sketch.text_to(width, foot + mm(3.5), 3, &pen, "0 %");
-    for row in 0..6 {
-        for column in (row % 2..width.div_ceil(square)).step_by(2) {
-            sketch.fill((column * square, board_top + row * square, square, square), &pen);
-        }
-    }
-    Ok(sketch.finish()?)
 }
 
 /// The share of the glossier ink that shows a gloss: clamped to the nearest ink, or with all levels brought between the inks
@@ -114,16 +76,21 @@ pub fn ladder(
     Ok(sketch.finish()?)
 }
 
-/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera. Camera marks have room
-/// above and below.
+/// Sides of a patch in millimetres, and of a strip that goes round a can: across it sees all half angles.
+const SQUARE: (f64, f64) = (20.0, 20.0);
+const BAND: (f64, f64) = (90.0, 12.0);
+
+/// Every stack that these inks can make, a solid patch each, labelled, for a gloss meter or a camera; or a strip each, one below the
+/// other, to wrap round a can. Camera marks have room above and below.
 ///
 /// Errors: more than the paper has room for.
-pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<DotMap, ChartError> {
+pub fn stacks(stacks: &[Stack], paper: Paper, strips: bool) -> Result<DotMap, ChartError> {
     let (width, length) =
         (usize::from(paper.width()), usize::from(paper.length()).saturating_sub(2 * (SIDE + QUIET)));
-    let (patch, gap) = (mm(20.0), mm(4.0));
-    let cell = (patch + gap, patch + mm(1.0) + LINE * 3 + mm(3.0));
-    let columns = ((width + gap) / cell.0).max(1);
+    let (wide, long) = if strips { BAND } else { SQUARE };
+    let (patch, gap) = ((mm(wide), mm(long)), mm(4.0));
+    let cell = (patch.0 + gap, patch.1 + mm(1.0) + LINE * 3 + mm(3.0));
+    let columns = if strips { 1 } else { ((width + gap) / cell.0).max(1) };
     let most = columns * (length / cell.1);
     let shown: Vec<&Stack> = stacks.iter().filter(|stack| !stack.layers().is_empty()).collect();
     if shown.is_empty() || shown.len() > most {
@@ -134,11 +101,11 @@ pub fn stacks(stacks: &[Stack], paper: Paper) -> Result<DotMap, ChartError> {
     let mut sketch = Sketch::new(columns * cell.0 - gap, shown.len().div_ceil(columns) * cell.1);
     for (i, stack) in shown.into_iter().enumerate() {
         let (x, y) = (i % columns * cell.0, i / columns * cell.1);
-        sketch.fill((x, y, patch, patch), stack);
+        sketch.fill((x, y, patch.0, patch.1), stack);
         let label = stack.to_string();
         // As large as the patch has room for.
-        let scale = (patch / (label.len() * LETTER)).clamp(1, 3);
-        sketch.text(x, y + patch + mm(1.0), scale, &pen, &label);
+        let scale = (patch.0 / (label.len() * LETTER)).clamp(1, 3);
+        sketch.text(x, y + patch.1 + mm(1.0), scale, &pen, &label);
     }
     Ok(sketch.finish()?)
 }

@@ -25,16 +25,70 @@ fn count(chart: &DotMap, (x, y, width, length): (usize, usize, usize, usize), wa
 #[test]
 fn a_ramp_has_the_tone_of_its_place() {
     let chart = ramp(&stack("MS"), &stack("MS+C"), Method::Cells, &Library::builtin(), &Silent).unwrap();
-    let top = chart.index().chunks(chart.width()).position(|row| row.iter().all(|&dot| dot != 0)).unwrap();
-    let length = 30 * 600 / 25;
+    let place = super::ramp::parts().ramp;
     for tenth in 0..10 {
         let width = chart.width() / 10;
-        let place = (tenth * width, top, width, length.min(700));
-        let share = count(&chart, place, "MS") as f64 / (width * length.min(700)) as f64;
+        let place = (tenth * width, place.top, width, place.length);
+        let share = count(&chart, place, "MS") as f64 / (width * place.3) as f64;
         let want = 0.95 - 0.1 * tenth as f64;
         assert!((share - want).abs() < 0.01, "{tenth}: {share} {want}");
     }
-    assert_eq!(count(&chart, (0, top, chart.width(), 700), "substrate"), 0);
+    assert_eq!(count(&chart, (0, place.top, chart.width(), place.length), "substrate"), 0);
+}
+
+/// Dots joined to this one by their sides, by spreading.
+fn joined(chart: &DotMap, start: (usize, usize)) -> Vec<(usize, usize)> {
+    let at = |(x, y): (usize, usize)| chart.index()[y * chart.width() + x];
+    let mut found = vec![start];
+    let mut next = 0;
+    while let Some(&(x, y)) = found.get(next) {
+        next += 1;
+        for near in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1)] {
+            if at(near) == at(start) && !found.contains(&near) {
+                found.push(near);
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn a_ramp_has_clusters_of_every_size_and_solids_of_both_stacks() {
+    let chart = ramp(&stack("K"), &stack("MS"), Method::Cells, &Library::builtin(), &Silent).unwrap();
+    let parts = super::ramp::parts();
+    assert_eq!((chart.width(), chart.length()), parts.size);
+    for (row, (own, other)) in parts.clusters.iter().zip([("K", "MS"), ("MS", "K")]) {
+        assert_eq!(row.len(), super::ramp::MOST);
+        for (dots, patch) in (1..).zip(row) {
+            let place = (patch.left, patch.top, patch.width, patch.length);
+            let (inked, ground) = (count(&chart, place, own), count(&chart, place, other));
+            assert_eq!(inked + ground, patch.width * patch.length);
+            let share = inked as f64 / (inked + ground) as f64;
+            assert!((0.07..0.14).contains(&share), "{own} of {dots} dots: {share}");
+            let number = chart.stacks().iter().position(|s| *s == stack(own)).unwrap() as u8;
+            let wide = chart.width();
+            let row = |y: usize| (patch.left..patch.left + patch.width).map(move |x| y * wide + x);
+            let mut left: Vec<usize> = (patch.top..patch.top + patch.length).flat_map(row).collect();
+            left.retain(|&i| chart.index()[i] == number);
+            while let Some(&first) = left.first() {
+                let cluster = joined(&chart, (first % chart.width(), first / chart.width()));
+                assert_eq!(cluster.len(), dots);
+                left.retain(|i| !cluster.contains(&(i % chart.width(), i / chart.width())));
+            }
+        }
+    }
+    // Foil in clusters of fewer than 3 x 3 dots is not printed.
+    let foil = ramp(&stack("SF"), &stack("MS"), Method::Cells, &Library::builtin(), &Silent).unwrap();
+    for (dots, patch) in (1..).zip(&parts.clusters[0]) {
+        let place = (patch.left, patch.top, patch.width, patch.length);
+        assert_eq!(count(&foil, place, "SF") > 0, dots >= 9, "{dots}");
+    }
+    for (strips, name) in parts.solids.iter().zip(["K", "MS"]) {
+        for strip in strips {
+            let place = (strip.left, strip.top, strip.width, strip.length);
+            assert_eq!(count(&chart, place, name), strip.width * strip.length, "{name} {strip:?}");
+        }
+    }
 }
 
 #[test]
@@ -61,7 +115,7 @@ fn a_ladder_keeps_four_levels_apart_where_clamping_keeps_two() {
 #[test]
 fn every_stack_has_a_patch_of_its_own_that_is_solid() {
     let all: Vec<Stack> = ["substrate", "C", "K", "MS", "MS+C", "MS+C+F"].map(stack).to_vec();
-    let chart = stacks(&all, Paper::A4).unwrap();
+    let chart = stacks(&all, Paper::A4, false).unwrap();
     for wanted in &all[1..] {
         let number = chart.stacks().iter().position(|s| s == wanted).unwrap() as u8;
         let dots = chart.index().iter().filter(|&&dot| dot == number).count();
@@ -72,7 +126,7 @@ fn every_stack_has_a_patch_of_its_own_that_is_solid() {
         );
     }
     let many: Vec<Stack> = (1..200).map(|n| Stack::new(vec![Ink::White; n])).collect();
-    assert!(stacks(&many, Paper::A4).unwrap_err().to_string().contains("choose fewer inks"));
+    assert!(stacks(&many, Paper::A4, false).unwrap_err().to_string().contains("choose fewer inks"));
 }
 
 #[test]
@@ -98,9 +152,8 @@ fn lines_of_a_vernier_meet_in_the_middle_and_a_dot_apart_for_each_line_from_it()
 #[test]
 fn a_machine_that_is_measured_and_corrected_prints_the_crosses_where_they_belong() {
     // The machine as it really is, and what a ruler finds on its calibration chart.
-    for real in
-        [Profile { offset_mm: [0.5, -0.8], feed: 1.004 }, Profile { offset_mm: [-1.0, 2.0], feed: 0.99 }]
-    {
+    for real in [([0.5, -0.8], 1.004), ([-1.0, 2.0], 0.99)] {
+        let real = Profile { offset_mm: real.0, feed: real.1, ..Profile::default() };
         let chart = calibration(Ink::Black, Paper::A4, &[]).unwrap();
         let lands = |chart: &DotMap, layout: &Layout| -> Vec<(f64, f64)> {
             let sheet = arrange(chart, layout, &Silent).unwrap().sheet;

@@ -14,6 +14,8 @@ use crate::files::{FileError, read_toml, write_toml};
 const MOST_OFFSET: f64 = 10.0;
 /// The largest error of the feed that is a printer's.
 const MOST_FEED: f64 = 0.02;
+/// The most that a sheet is askew in a printer, in degrees.
+const MOST_SKEW: f64 = 3.0;
 
 /// A printer as measured with the calibration chart.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
@@ -23,12 +25,15 @@ pub struct Profile {
     pub offset_mm: [f64; 2],
     /// How many millimetres a line of 1 mm along the feed measures on paper.
     pub feed: f64,
+    /// By how much prints are turned on the sheet, clockwise, in degrees. It is shown, and not corrected: rows of dots stay rows.
+    #[serde(default)]
+    pub skew_deg: f64,
 }
 
 impl Default for Profile {
     /// A printer that prints everything where it should.
     fn default() -> Profile {
-        Profile { offset_mm: [0.0, 0.0], feed: 1.0 }
+        Profile { offset_mm: [0.0, 0.0], feed: 1.0, skew_deg: 0.0 }
     }
 }
 
@@ -45,6 +50,12 @@ impl Profile {
                 self.feed,
                 1.0 - MOST_FEED,
                 1.0 + MOST_FEED
+            ));
+        }
+        if self.skew_deg.abs() > MOST_SKEW || self.skew_deg.is_nan() {
+            return Some(format!(
+                "skew_deg: {}; no sheet goes in askew by more than {MOST_SKEW} degrees",
+                self.skew_deg
             ));
         }
         None
@@ -86,7 +97,7 @@ mod tests {
     fn a_profile_comes_back_from_its_file_and_nonsense_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("default.toml");
-        let profile = Profile { offset_mm: [0.25, -0.5], feed: 1.002 };
+        let profile = Profile { offset_mm: [0.25, -0.5], feed: 1.002, skew_deg: -0.12 };
         profile.save(&path).unwrap();
         assert_eq!(Profile::load(&path).unwrap(), profile);
         for (text, word) in [
@@ -94,6 +105,7 @@ mod tests {
             ("offset_mm = [0.0, nan]\nfeed = 1.0", "offset_mm"),
             ("offset_mm = [0.0, 0.0]\nfeed = 2.0", "feed"),
             ("offset_mm = [0.0, 0.0]\nfeed = nan", "feed"),
+            ("offset_mm = [0.0, 0.0]\nfeed = 1.0\nskew_deg = nan", "skew_deg"),
             ("offset_mm = [0.0, 0.0]\nfeed = 1.0\nfed = 1", "fed"),
         ] {
             std::fs::write(&path, text).unwrap();

@@ -33,7 +33,7 @@ proptest! {
             mirror,
             cut: true,
             profile: Profile {
-                offset_mm: [Mm::of_dots(offset.0).0, Mm::of_dots(offset.1).0], feed,
+                offset_mm: [Mm::of_dots(offset.0).0, Mm::of_dots(offset.1).0], feed, ..Profile::default()
             },
             ..Layout::centred(Paper::Custom { width: page.0, length: page.1 })
         };
@@ -210,7 +210,7 @@ fn without_anything_asked_the_page_is_the_artwork_in_its_middle() {
     assert_eq!(arranged.laid.area, Area { left: 2249, top: 3086, width: 301, length: 200 });
     assert_eq!(arranged.sheet.stacks(), artwork.stacks());
     // A printer that is off moves its own room, not the middle, while there is room.
-    let profile = Profile { offset_mm: [2.54, 0.0], feed: 1.0 };
+    let profile = Profile { offset_mm: [2.54, 0.0], ..Profile::default() };
     let layout = Layout { profile, ..Layout::centred(Paper::A4) };
     assert_eq!(arrange(&artwork, &layout, &Silent).unwrap().laid.area.left, 2249 - 60);
     assert_eq!(layout.largest(), (4740, 6372));

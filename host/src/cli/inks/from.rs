@@ -2,17 +2,17 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use appearance::document;
-use inks::{Curve, FILE_NAME, Library, Stack, archive};
+use inks::{Curve, Stack, archive};
 use measure::library::{curve_name, quoted};
 use measure::readings;
 use observe::Observer;
 
-use super::super::output::{Kind, Staged};
 use super::page::file_name_of;
+use super::place;
 
 /// The largest curve file that is copied, in bytes.
 const MOST_BYTES: u64 = 16 << 20;
@@ -75,7 +75,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
         writeln!(table, "{key} = {}", quoted(&value))?;
     }
     let added = archive::Member { name: name.clone(), bytes: taken.csv };
-    let library = place(&args.output, table, added, &args.stack)?;
+    let library = place::curve(&args.output, &table, added, &args.stack)?;
     let word = library.entry(&args.stack).map_or("", |entry| entry.provenance.word());
     let dir = args.output.display();
     Ok(format!(
@@ -125,58 +125,4 @@ fn text_of(curve: &Curve) -> Result<Vec<u8>> {
     let mut csv = Vec::new();
     curve.to_csv(&mut csv)?;
     Ok(csv)
-}
-
-/// Adds a table and its curve to the library in a folder, which is created if it is not there. Nothing changes unless the whole
-/// is a library.
-fn place(folder: &Path, table: String, added: archive::Member, stack: &Stack) -> Result<Library> {
-    let new = !folder.exists();
-    let mut members = match new {
-        true => {
-            let text = "format = 1\nbased_on = \"built-in\"\nname = \"measured stacks\"\n";
-            vec![archive::Member { name: FILE_NAME.into(), bytes: text.into() }]
-        }
-        false => {
-            let here = Library::from_dir(folder)
-                .with_context(|| format!("{} is not a usable ink library", folder.display()))?;
-            let known = here.entry(stack).filter(|entry| entry.lobes.is_none());
-            if let Some(known) = known {
-                bail!(
-                    "{} has a {} curve of {stack} already; remove its table from {FILE_NAME} first",
-                    folder.display(),
-                    known.provenance.word()
-                );
-            }
-            archive::gather(folder).with_context(|| format!("{}", folder.display()))?
-        }
-    };
-    if !new && folder.join(&added.name).exists() {
-        bail!("{} exists; rename it, or remove it first", folder.join(&added.name).display());
-    }
-    let index =
-        members.iter().position(|member| member.name == FILE_NAME).context("a library has library.toml")?;
-    members[index].bytes.extend(table.bytes());
-    let toml = members[index].bytes.clone();
-    members.push(added.clone());
-    let checked = tempfile::tempdir().context("cannot make a temporary folder")?;
-    archive::place(&members, checked.path())?;
-    let library = Library::from_dir(checked.path()).map_err(|error| {
-        // The temporary folder means nothing to the user.
-        let inside = format!("{}{}", checked.path().display(), std::path::MAIN_SEPARATOR);
-        anyhow::anyhow!("the curve cannot be used: {}", error.to_string().replace(&inside, ""))
-    })?;
-    if new {
-        let staged = Staged::folder(folder, Kind::Measured)?;
-        archive::place(&members, staged.create()?)?;
-        staged.commit()?;
-    } else {
-        // The curve first: a curve that no table names is a warning, a table without its curve an error.
-        for (name, bytes) in [(added.name.as_str(), &added.bytes), (FILE_NAME, &toml)] {
-            let target = folder.join(name);
-            let staged = Staged::file(&target)?;
-            fs::write(staged.path(), bytes).with_context(|| format!("cannot write {}", target.display()))?;
-            staged.commit()?;
-        }
-    }
-    Ok(library)
 }

@@ -1,4 +1,4 @@
-//! `foilpress inks add`, `export` and `import`: libraries become the user's own, and go to others.
+//! `foilpress inks add`, `list --added`, `remove`, `export` and `import`: libraries become the user's own, and go to others.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -66,4 +66,38 @@ pub fn import(path: &Path, name: Option<String>) -> Result<String> {
     file.take(archive::MOST_ARCHIVE + 1).read_to_end(&mut bytes).with_context(cannot)?;
     let members = archive::unpack(&bytes).with_context(|| format!("{}", path.display()))?;
     installed(&suggested(path, name), &members, path)
+}
+
+/// The libraries that were added, a line each. One that cannot be used says so.
+pub fn list(json: bool) -> Result<String> {
+    let opened = |name: String| {
+        let library = libraries::added(&name)
+            .context("it was removed just now")
+            .and_then(|folder| libraries::open(&folder));
+        (name, library)
+    };
+    let all: Vec<(String, Result<Library>)> = libraries::names().into_iter().map(opened).collect();
+    if json {
+        let row = |(name, library): &(String, Result<Library>)| match library {
+            Ok(library) => {
+                serde_json::json!({ "name": name, "about": library.name(), "stacks": library.origins().to_string() })
+            }
+            Err(error) => serde_json::json!({ "name": name, "error": format!("{error:#}") }),
+        };
+        return Ok(serde_json::to_string_pretty(&all.iter().map(row).collect::<Vec<_>>())? + "\n");
+    }
+    if all.is_empty() {
+        return Ok("no library was added; `foilpress inks add DIR` adds one\n".into());
+    }
+    let line = |(name, library): &(String, Result<Library>)| match library {
+        Ok(library) => format!("{name:<16} {}\n", library.origins()),
+        Err(_) => format!("{name:<16} cannot be used; see `foilpress inks check {name}`\n"),
+    };
+    Ok(all.iter().map(line).collect())
+}
+
+/// Removes a library that was added.
+pub fn remove(name: &str) -> Result<String> {
+    let folder = libraries::remove(name)?;
+    Ok(format!("{name}: removed from {}\n", folder.display()))
 }
