@@ -38,3 +38,23 @@ fn the_engine_holds() {
 fn firmware_images_hold() {
     replay("uf2", properties::uf2::check);
 }
+
+#[test]
+fn the_workstations_session_holds() {
+    replay("host", properties::host::check);
+}
+
+#[test]
+fn what_is_kept_over_restarts_holds() {
+    replay("kept", properties::kept::check);
+}
+
+#[test]
+fn a_boot_loaders_replies_hold() {
+    replay("picoboot", properties::picoboot::check);
+}
+
+#[test]
+fn a_negotiations_answers_hold() {
+    replay("talk", properties::talk::check);
+}

@@ -21,7 +21,7 @@ const PROPERTY_SEED: &str = "PROPTEST_RNG_SEED";
 const SKIPS: &str = "FOILPRESS_SKIPS";
 
 /// What is built for itself, besides the workspace of all others.
-const WORKSPACES: [&str; 2] = ["bridge/firmware", "fuzz"];
+const WORKSPACES: [&str; 3] = ["bridge/firmware", "tests/rig/firmware", "fuzz"];
 
 /// The steps that failed.
 #[derive(Default)]

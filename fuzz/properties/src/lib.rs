@@ -4,6 +4,10 @@
 
 pub mod engine;
 pub mod frame;
+pub mod host;
+pub mod kept;
+pub mod picoboot;
 pub mod rgl;
 pub mod runs;
+pub mod talk;
 pub mod uf2;

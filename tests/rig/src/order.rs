@@ -22,6 +22,7 @@ pub const LINE_MAX: usize = 1100;
 pub const ID_MAX: usize = 255;
 
 /// An order.
+#[expect(clippy::large_enum_variant, reason = "there is one at a time")]
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Order {
     /// Begins anew.
