@@ -1,7 +1,7 @@
 //! Dot gain and the smallest cluster that holds, from scans of the ramp chart.
 //!
 //! Problem: ink spreads beyond its dots, and clusters that are too small come off or never stick; both differ from ribbon to ribbon.
-//! Method: the chart has patches of clusters of 1, 2, 3 dots and so on ([`press::chart::ramp`]). The tone of each patch is compared with the
+//! Method: the chart has patches of clusters of 1, 2, 3 dots and so on ([`mod@press::chart::ramp`]). The tone of each patch is compared with the
 //! one that its dots would have if their edges lay `g` further out (`edges`). The largest clusters give `g`; from them
 //! downward each size that agrees with all larger ones holds, and takes part in `g`. The ramp above is read in the same
 //! way, as the paper does: with the clusters it is made of it has to be linear but for `g`.
