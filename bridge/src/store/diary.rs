@@ -5,6 +5,7 @@
 //! stored job goes out, when it has ended, and whenever a reset is owed or was done. The last whole record counts. When a sector
 //! is full, the other one is erased, which holds older records only. Cost: 32 bytes a record, one erase in 128.
 
+use super::NUMBERS;
 use super::flash::{Flash, PAGE, SECTOR};
 use protocol::link::frame::checksum;
 
@@ -123,7 +124,7 @@ fn read(flash: &impl Flash, sector: u32, at: u32) -> Option<(u32, Note)> {
         2 => Standing::Printing,
         _ => return None,
     };
-    let whole = word(0) == checksum(&record[4..]);
+    let whole = word(0) == checksum(&record[4..]) && word(4) < NUMBERS;
     whole.then_some((word(4), Note { standing, job: word(12), stored: word(16) }))
 }
 

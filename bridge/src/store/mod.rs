@@ -42,6 +42,9 @@ const FIRST_PAGES: u32 = SECTOR / PAGE - 2;
 /// The same in its others.
 const PAGES: u32 = SECTOR / PAGE - 1;
 
+/// More sectors and records than any flash lasts to write: a greater number is none of ours.
+const NUMBERS: u32 = 1 << 31;
+
 const HEAD: usize = 28 + NAME_MAX;
 const _: () = assert!(HEAD == 64);
 const MAGIC: [u8; 2] = *b"F1";
@@ -361,6 +364,9 @@ impl<F: Flash> Store<F> {
         };
         let name = core::str::from_utf8(head.get(28..28 + usize::from(head[7]))?).ok()?;
         let stored = Stored { id: word(8), sector, job: word(20), kind, length: word(24) };
+        if stored.id >= NUMBERS || word(16) >= NUMBERS {
+            return None;
+        }
         Some(Head { place: word(12), sequence: word(16), stored, name: name.try_into().ok()? })
     }
 

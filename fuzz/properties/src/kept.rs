@@ -130,7 +130,7 @@ fn record(flash: &mut [u8], script: &mut Unstructured<'_>) -> Result<()> {
         if script.ratio(7u8, 8u8)? {
             script.int_in_range(0..=4)
         } else {
-            script.int_in_range(0..=0x7fff_ffff)
+            script.int_in_range(0..=0x3fff_ffff)
         }
     };
     let (id, length) = (small(script)?, small(script)?);
