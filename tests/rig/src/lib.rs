@@ -7,7 +7,6 @@
 //! do. Here is what needs no board; `firmware/` is the rest. `docs/bench.md` says how to build it, `tests/rig.toml` what is tried.
 //! Limits: it prints nothing, and takes jobs of [`ROOM`] bytes at most.
 #![no_std]
-#![warn(missing_docs)]
 
 #[cfg(test)]
 extern crate std;

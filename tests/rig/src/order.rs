@@ -12,6 +12,7 @@
 //!
 //! All others are answered by `ok`, and what is no order by `error` and the reason.
 
+use crate::nibble::Status;
 use core::fmt;
 use heapless::String;
 
@@ -45,8 +46,6 @@ pub enum Order {
     /// Asks for samples from this word on.
     Wave(u32),
 }
-
-use crate::nibble::Status;
 
 /// Why a line is no order.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
