@@ -63,14 +63,10 @@ export function pair(bridge, rig) {
     for (const { board } of ends) board.clock.tick(next - now);
     for (const end of ends) {
       for (const one of end.machines) {
-        if (one.due === null || one.due > next || !one.machine.enabled) continue;
-        const before = one.machine.cycles;
-        one.machine.step();
-        one.pio.checkChangedPins();
-        const ticks = Math.max(1, one.machine.cycles - before);
-        one.due += ticks * ((one.machine.clockDivInt || 65536) + one.machine.clockDivFrac / 256) * 8;
+        if (one.due !== null && one.due <= next && one.machine.enabled) end.board.stepMachine(one);
       }
       if (!end.core.waiting && end.due <= next) {
+        // `instruct` may put it off further.
         end.due = next;
         end.due += end.board.instruct();
       }

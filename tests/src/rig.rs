@@ -199,7 +199,7 @@ impl Bridge<'_> {
     }
 }
 
-/// A job of one ink in the middle of a postcard: some 12 kB.
+/// A job of one ink in the middle of a postcard: some 14 kB.
 fn job() -> io::Result<Vec<u8>> {
     let (width, length) = (usize::from(Paper::Postcard.width()), usize::from(Paper::Postcard.length()));
     let stride = width.div_ceil(8);

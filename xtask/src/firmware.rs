@@ -9,6 +9,8 @@ use std::{env, fs};
 struct Board {
     /// Where its source is.
     folder: &'static str,
+    /// What its package calls the program.
+    program: &'static str,
     /// What is to run it.
     chip: uf2::Chip,
     /// The feature of the firmware that chooses the board, if there are several.
@@ -25,6 +27,7 @@ struct Board {
 const BOARDS: [Board; 2] = [
     Board {
         folder: "bridge/firmware",
+        program: "foilpress-firmware",
         chip: uf2::Chip::Rp2040,
         feature: Some("pico"),
         target: "thumbv6m-none-eabi",
@@ -33,6 +36,7 @@ const BOARDS: [Board; 2] = [
     },
     Board {
         folder: "bridge/firmware",
+        program: "foilpress-firmware",
         chip: uf2::Chip::Rp2350,
         feature: Some("pico2"),
         target: "thumbv8m.main-none-eabihf",
@@ -44,6 +48,7 @@ const BOARDS: [Board; 2] = [
 /// The board that plays the printer.
 const RIG: Board = Board {
     folder: "tests/rig/firmware",
+    program: "foilpress-rig-firmware",
     chip: uf2::Chip::Rp2040,
     feature: None,
     target: BOARDS[0].target,
@@ -89,10 +94,7 @@ fn build_for(board: &Board, root: &Path) -> Result<PathBuf> {
             board.target
         );
     }
-    let program = target.join(board.target).join("release").join(match board.feature {
-        Some(_) => "foilpress-firmware",
-        None => "foilpress-rig-firmware",
-    });
+    let program = target.join(board.target).join("release").join(board.program);
     let bytes = fs::read(&program).with_context(|| format!("{} cannot be read", program.display()))?;
     let segments = elf::segments(&bytes)?;
     let pieces: Vec<(u64, &[u8])> = segments

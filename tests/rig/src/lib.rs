@@ -15,6 +15,9 @@ mod nibble;
 mod order;
 mod wave;
 
+/// The checksum of what was taken: CRC-32 as in zip files.
+pub use protocol::link::frame::checksum;
+
 pub use nibble::{Host, Nibble, Own, Status};
 pub use order::{BadOrder, ID_MAX, LINE_MAX, Order, Report};
 pub use wave::{SAMPLE_NS, Shortest, WORDS, samples, shortest};
@@ -24,8 +27,3 @@ pub const ROOM: usize = 96 << 10;
 
 /// A cycle of the rig's PIO programs, in ns: 125 MHz over 4.
 pub const TICK_NS: u32 = 32;
-
-/// The checksum of what was taken: CRC-32 as in zip files.
-pub fn checksum(bytes: &[u8]) -> u32 {
-    crc::Crc::<u32, crc::Table<1>>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
-}

@@ -123,7 +123,7 @@ impl fmt::Display for Order {
 pub struct Report {
     /// Bytes taken.
     pub taken: u32,
-    /// Their [`checksum`](crate::checksum()).
+    /// Their [`checksum`](crate::checksum).
     pub checksum: u32,
     /// Strobes. More than bytes: some came while the rig was busy or switched off.
     pub strobes: u32,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{env, fs};
 
+use ::rig::Shortest;
 use foilpress_tests::rig::{Bridge, Rig, dump, play, read, scenarios};
 
 const USAGE: &str = "usage: rig FOILPRESS BRIDGE RIG_PORT [FOLDER]
@@ -44,16 +45,7 @@ fn run() -> Result<bool, Box<dyn Error>> {
     for scenario in &read(&scenarios())?.scenario {
         match play(scenario, &mut rig, &bridge) {
             Ok(shown) => {
-                let time = |time: Option<u32>| time.map_or("-".to_owned(), |ns| ns.to_string());
-                let short = &shown.shortest;
-                println!(
-                    "good   {}: {} bytes; setup {}, strobe {}, hold {} ns at least",
-                    scenario.name,
-                    shown.report.taken,
-                    time(short.setup),
-                    time(short.strobe),
-                    time(short.hold)
-                );
+                println!("good   {}: {} bytes{}", scenario.name, shown.report.taken, times(&shown.shortest));
                 if let Some(waves) = waves.filter(|_| !shown.words.is_empty()) {
                     let name: PathBuf =
                         waves.join(scenario.name.replace([' ', ','], "-")).with_extension("vcd");
@@ -68,4 +60,14 @@ fn run() -> Result<bool, Box<dyn Error>> {
     }
     fs::remove_dir_all(&folder)?;
     Ok(good)
+}
+
+/// The times of the samples, if there were any.
+fn times(shortest: &Shortest) -> String {
+    match (shortest.setup, shortest.strobe, shortest.hold) {
+        (Some(setup), Some(strobe), Some(hold)) => {
+            format!("; setup {setup}, strobe {strobe}, hold {hold} ns at least")
+        }
+        _ => String::new(),
+    }
 }
