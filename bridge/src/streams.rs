@@ -12,9 +12,8 @@ use protocol::runs::{Decoder, Defect, Header, HeaderError, MAX_HEADER, Step, ban
 /// Room for whatever one slice of work writes: the longest row, 9880 dots.
 pub(crate) const WRITE_ROOM: usize = ROW_ROOM + 1235;
 
-/// Bytes of a stream read in one slice of work: 128 runs at most, each of 6 µs on a microcontroller. With the 0.2 ms of a
-/// [turn](crate::turn) before the last slice, a task keeps the processor for less than a millisecond.
-const SLICE: usize = 16;
+/// Bytes of a stream read in one slice of work. The decoder pauses by itself; packed rows alone take as long as they have bytes.
+const SLICE: usize = 64;
 
 /// What a slice of work did.
 pub(crate) struct Worked {
@@ -31,8 +30,8 @@ enum Stage {
     Header,
     /// Reading a band.
     Read,
-    /// Writing rows `next..end` of the band.
-    Rows { next: u16, end: u16 },
+    /// Writing rows `next..end` of the band, so many bytes of each.
+    Rows { next: u16, end: u16, reach: usize },
     /// Writing so many blank rows.
     Blank(u16),
     /// The job is complete.
@@ -131,8 +130,8 @@ impl<'m> Streams<'m> {
                     None => {}
                     Some(Step::More) => worked.progress = used > 0,
                     Some(Step::Blank { y, rows }) => (self.row, self.stage) = (y, Stage::Blank(rows)),
-                    Some(Step::Band { y, rows }) => {
-                        (self.row, self.stage) = (y, Stage::Rows { next: 0, end: rows })
+                    Some(Step::Band { y, rows, reach }) => {
+                        (self.row, self.stage) = (y, Stage::Rows { next: 0, end: rows, reach })
                     }
                     Some(Step::End) => {}
                 }
@@ -150,12 +149,13 @@ impl<'m> Streams<'m> {
                 self.row += rows;
                 self.stage = Stage::Read;
             }
-            Stage::Rows { next, end } => {
+            Stage::Rows { next, end, reach } => {
                 let at = usize::from(next) * self.stride;
-                let row = self.band.get(at..at + self.stride).ok_or(DefectKind::TooLarge)?;
+                let row = self.band.get(at..at + reach).ok_or(DefectKind::TooLarge)?;
                 worked.written = writer.row(row, out).map_err(|_| DefectKind::Stream)?;
                 self.row += 1;
-                self.stage = if next + 1 < end { Stage::Rows { next: next + 1, end } } else { Stage::Read };
+                self.stage =
+                    if next + 1 < end { Stage::Rows { next: next + 1, end, reach } } else { Stage::Read };
             }
         }
         Ok(worked)

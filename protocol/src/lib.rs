@@ -16,5 +16,6 @@ pub mod packbits;
 pub mod paper;
 pub mod rgl;
 pub mod runs;
+mod scan;
 pub mod status;
 pub mod walk;

@@ -8,6 +8,8 @@
 //! Limits: header `80` is never written, and refused when read, because drivers disagree about its meaning.
 //! Source: streams of the established driver, all of which this module reproduces byte for byte.
 
+use crate::scan;
+
 /// The longest run one header can stand for.
 const LONGEST: usize = 128;
 
@@ -47,23 +49,9 @@ pub fn pack_into(row: &[u8], out: &mut [u8]) -> Option<usize> {
 fn segment(row: &[u8]) -> (usize, bool) {
     let row = &row[..row.len().min(LONGEST)];
     if row.len() >= 2 && row[1] == row[0] {
-        return (row.len() - after_run(row), true);
+        return (scan::same(row, row[0]), true);
     }
     (literal(row), false)
-}
-
-/// Bytes left after the first run of equal bytes.
-fn after_run(row: &[u8]) -> usize {
-    let mut rest = row;
-    let same = u64::from_le_bytes([row[0]; 8]);
-    while WIDE && let Some(chunk) = rest.first_chunk::<8>() {
-        let differing = u64::from_le_bytes(*chunk) ^ same;
-        if differing != 0 {
-            return rest.len() - differing.trailing_zeros() as usize / 8;
-        }
-        rest = &rest[8..];
-    }
-    rest.len() - rest.iter().take_while(|&&byte| byte == row[0]).count()
 }
 
 /// Bytes before the first that equals the one before it.

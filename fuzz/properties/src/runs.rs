@@ -66,9 +66,14 @@ fn decode(walk: Placed, stream: &[u8], portion: usize) -> Result<(Vec<u8>, bool)
                     assert_eq!(plane.len(), usize::from(y) * stride(width));
                     plane.resize(plane.len() + usize::from(rows) * stride(width), 0);
                 }
-                Step::Band { y, rows } => {
+                Step::Band { y, rows, reach } => {
                     assert_eq!(plane.len(), usize::from(y) * stride(width));
-                    plane.extend_from_slice(&memory[..usize::from(rows) * stride(width)]);
+                    let rows = &memory[..usize::from(rows) * stride(width)];
+                    assert!(
+                        rows.chunks_exact(stride(width))
+                            .all(|row| row[reach..].iter().all(|&byte| byte == 0))
+                    );
+                    plane.extend_from_slice(rows);
                 }
                 Step::End => {
                     assert_eq!(plane.len(), usize::from(height) * stride(width));

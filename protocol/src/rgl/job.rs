@@ -12,7 +12,7 @@ use super::fault::Fault;
 use super::order::{Extent, Order};
 use super::parse::ROW_HEAD;
 use super::setup::JobSetup;
-use crate::packbits;
+use crate::{packbits, scan};
 
 /// The most room that [`JobWriter::begin`], [`JobWriter::next_pass`], [`JobWriter::end`] and [`JobWriter::cancel`] need.
 pub const COMMAND_ROOM: usize = 96;
@@ -114,7 +114,7 @@ impl JobWriter {
     ///
     /// Errors: [`Fault::BeyondWidth`] for a dot beyond the page, [`Fault::TooManyRows`], [`Fault::NoRoom`].
     pub fn row(&mut self, row: &[u8], out: &mut [u8]) -> Result<usize, Fault> {
-        let row = trim(row);
+        let row = scan::trim(row);
         if row.is_empty() {
             return self.blank_rows(1).map(|()| 0);
         }
@@ -232,22 +232,6 @@ fn finish(put: &mut dyn FnMut(Command<'_>) -> Result<(), Fault>) -> Result<(), F
     put(Command::FormFeed)?;
     put(Command::LeaveRgl)?;
     put(Command::Reset)
-}
-
-/// The row without the blank bytes at its right end.
-fn trim(row: &[u8]) -> &[u8] {
-    let mut end = row.len();
-    // Eight bytes at a time: most rows of most passes are mostly blank.
-    while let Some(chunk) = end.checked_sub(8).and_then(|start| row[start..end].first_chunk::<8>()) {
-        if u64::from_ne_bytes(*chunk) != 0 {
-            break;
-        }
-        end -= 8;
-    }
-    while end > 0 && row[end - 1] == 0 {
-        end -= 1;
-    }
-    &row[..end]
 }
 
 #[cfg(test)]
@@ -462,7 +446,7 @@ mod tests {
                 }
             }
             let trimmed: Vec<Image> =
-                images.iter().map(|image| image.iter().map(|row| trim(row).to_vec()).collect()).collect();
+                images.iter().map(|image| image.iter().map(|row| scan::trim(row).to_vec()).collect()).collect();
             prop_assert_eq!(seen, trimmed);
         }
     }

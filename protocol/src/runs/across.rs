@@ -9,6 +9,8 @@
 //! different sides in one row share one unit.
 
 use super::rice::Mean;
+use super::rows::Rows;
+use super::{AHEAD, MOST_RUNS};
 
 /// Ones that announce what is not a quotient. Edges beside the lattice are common, so they are few.
 pub(super) const ONES: u32 = 8;
@@ -59,8 +61,8 @@ pub(super) fn in_cells(kind: u32, index: u32) -> bool {
 pub(super) enum Stop {
     /// All input has been read.
     More,
-    /// A row is complete: others may run.
-    Row,
+    /// A row is complete, or many runs have been read: others may run.
+    Pause,
     /// The band is complete.
     Band,
 }
@@ -115,18 +117,25 @@ impl Across {
         }
     }
 
-    /// Reads until a row is complete. `rows` are those of the band, `width` dots each; they were blank at the beginning.
-    pub(super) fn read(&mut self, input: &[u8], rows: &mut [u8], stride: usize, width: u16) -> (usize, Stop) {
-        #[expect(clippy::cast_possible_truncation, reason = "a band has at most 64 rows")]
-        let height = (rows.len() / stride) as u16;
+    /// Reads until a row is complete or [`MOST_RUNS`] have been read.
+    pub(super) fn read(&mut self, input: &[u8], rows: &mut Rows<'_>) -> (usize, Stop) {
+        let height = rows.height;
         let mut read = 0;
+        let mut runs = MOST_RUNS;
         loop {
-            let at = usize::from(self.y) * stride;
             if self.alike > 0 {
-                rows.copy_within(at - stride..at, at);
+                rows.repeat(self.y);
                 self.alike -= 1;
                 self.y += 1;
-                return (read, if self.y < height { Stop::Row } else { Stop::Band });
+                return (read, if self.y < height { Stop::Pause } else { Stop::Band });
+            }
+            if matches!(self.part, Part::Ones(0)) && self.index > 0 && !self.counting && !self.escaped {
+                read += self.read_runs(&input[read..], rows, &mut runs);
+                self.counting = self.x == rows.width.into();
+                if runs == 0 {
+                    // On a microcontroller other tasks wait for their turn.
+                    return (read, Stop::Pause);
+                }
             }
             let needed = match self.part {
                 Part::Kind => KIND_BITS,
@@ -145,14 +154,14 @@ impl Across {
                 Part::Kind => {
                     self.kind = self.take(KIND_BITS);
                     if self.kind & DIFFERENCE != 0 && self.y > 0 {
-                        rows.copy_within(at - stride..at, at);
+                        rows.repeat(self.y);
                     }
                     (self.x, self.index, self.part) = (0, 0, Part::Ones(0));
                 }
-                Part::Ones(before) => self.count_ones(before, &mut rows[at..at + stride], width),
+                Part::Ones(before) => self.count_ones(before, rows),
                 Part::Plain(count, above) => {
                     let value = above << count | self.take(count);
-                    self.number(Some(value), &mut rows[at..at + stride], width);
+                    self.number(Some(value), rows);
                 }
             }
             if self.counting && matches!(self.part, Part::Kind) {
@@ -160,9 +169,65 @@ impl Across {
                 self.counting = false;
                 self.y += 1;
                 self.alike = self.alike.min(height - self.y);
-                return (read, if self.y < height { Stop::Row } else { Stop::Band });
+                return (read, if self.y < height { Stop::Pause } else { Stop::Band });
             }
         }
+    }
+
+    /// Reads codes of the row under way while they are short and complete, at most `runs` of them, and returns how much was
+    /// read. Most of the time is spent here: the bits are read a word ahead, and the surplus is given back at the end.
+    fn read_runs(&mut self, input: &[u8], rows: &mut Rows<'_>, runs: &mut u32) -> usize {
+        let width = u32::from(rows.width);
+        let row = rows.row(self.y);
+        let unit = if in_cells(self.kind, self.index) { self.side } else { 1 };
+        let means = &mut self.model.runs[self.kind as usize % 4];
+        let (mut x, mut index) = (self.x, self.index);
+        let (mut bits, mut held, mut read) = (self.bits, self.held, 0);
+        let (mut first, mut last) = (width, 0);
+        while *runs > 0
+            && x < width
+            && let Some(&[one, two, three, ..]) = input.get(read..).and_then(<[u8]>::first_chunk::<AHEAD>)
+        {
+            if held <= 8 {
+                bits |= u32::from_be_bytes([one, two, three, 0]) >> held;
+                (held, read) = (held + 24, read + 3);
+            } else if held <= 16 {
+                bits |= u32::from_be_bytes([one, two, 0, 0]) >> held;
+                (held, read) = (held + 16, read + 2);
+            }
+            let (mut rest, mut ones) = (bits, 0);
+            while rest >> 31 == 1 && ones < ONES {
+                rest <<= 1;
+                ones += 1;
+            }
+            let mean = &mut means[index as usize % 2];
+            let count = mean.parameter();
+            // Rare ones, and those of which bits are missing.
+            if ones == ONES || ones + 1 + count > held {
+                break;
+            }
+            rest <<= 1;
+            // Shifted twice, since `count` may be 0.
+            let value = ones << count | rest >> 1 >> (31 - count);
+            (bits, held) = (rest << count, held - ones - 1 - count);
+            mean.add(value);
+            let end = end_of(x, index, value, unit).min(width);
+            if index % 2 == 1 {
+                (first, last) = (first.min(x), end);
+                flip(row, x, end);
+            }
+            (x, index) = (end, index + 1);
+            *runs -= 1;
+        }
+        if first < last {
+            rows.inked.add((first / 8) as usize, last.div_ceil(8) as usize);
+        }
+        (self.x, self.index) = (x, index);
+        // Whole bytes can only be of this input: there were fewer than eight bits before it.
+        let back = held / 8;
+        held %= 8;
+        (self.bits, self.held) = (bits & !(u32::MAX >> held), held);
+        read - back as usize
     }
 
     /// Takes at most 31 bits that are held.
@@ -193,12 +258,12 @@ impl Across {
     }
 
     /// Counts the ones of a code; some bits are held.
-    fn count_ones(&mut self, before: u32, row: &mut [u8], width: u16) {
+    fn count_ones(&mut self, before: u32, rows: &mut Rows<'_>) {
         let ones = self.bits.leading_ones().min(self.held).min(ONES + 1 - before);
         self.drop(ones);
         let count = before + ones;
         if count > ONES {
-            return self.number(None, row, width);
+            return self.number(None, rows);
         }
         if self.held == 0 {
             self.part = Part::Ones(count);
@@ -216,7 +281,7 @@ impl Across {
     }
 
     /// A number is complete; `None` is all that is left.
-    fn number(&mut self, value: Option<u32>, row: &mut [u8], width: u16) {
+    fn number(&mut self, value: Option<u32>, rows: &mut Rows<'_>) {
         if let Some(value) = value {
             self.mean().add(value);
         }
@@ -227,31 +292,34 @@ impl Across {
             return;
         }
         let unit = if self.cells() { self.side } else { 1 };
-        let length = value.map_or(u32::MAX, |value| {
-            // Only the first run may be empty.
-            value.saturating_add(u32::from(self.index > 0)).saturating_mul(unit)
-        });
-        let end = self.x.saturating_add(length).min(width.into());
-        if self.index % 2 == 1 {
-            flip(row, self.x, end);
+        let end =
+            value.map_or(u32::MAX, |value| end_of(self.x, self.index, value, unit)).min(rows.width.into());
+        if self.index % 2 == 1 && self.x < end {
+            rows.inked.add((self.x / 8) as usize, end.div_ceil(8) as usize);
+            flip(rows.row(self.y), self.x, end);
         }
         (self.x, self.index, self.escaped) = (end, self.index + 1, false);
-        self.counting = end == u32::from(width);
+        self.counting = end == u32::from(rows.width);
     }
 }
 
-/// Flips dots `from..to` of a row, which has them.
+/// Where run `index` of a row ends that begins at `x` and has this number, below 2^24; it counts units of at most 255 dots, so
+/// nothing overflows.
+fn end_of(x: u32, index: u32, value: u32, unit: u32) -> u32 {
+    // Only the first run may be empty.
+    x + (value + u32::from(index > 0)) * unit
+}
+
+/// Flips dots `from..to` of a row, which has them; `from < to`.
 fn flip(row: &mut [u8], from: u32, to: u32) {
-    if from >= to {
-        return;
-    }
-    let (first, last) = ((from / 8) as usize, ((to - 1) / 8) as usize);
     let (head, tail) = (0xff >> (from % 8), 0xff << (7 - (to - 1) % 8));
-    if first == last {
-        row[first] ^= head & tail;
-        return;
+    match &mut row[(from / 8) as usize..to.div_ceil(8) as usize] {
+        [one] => *one ^= head & tail,
+        [first, middle @ .., last] => {
+            *first ^= head;
+            middle.iter_mut().for_each(|byte| *byte = !*byte);
+            *last ^= tail;
+        }
+        [] => {}
     }
-    row[first] ^= head;
-    row[first + 1..last].iter_mut().for_each(|byte| *byte = !*byte);
-    row[last] ^= tail;
 }

@@ -5,9 +5,9 @@
 //! tile is then laid out in the band. In a full tile, sixteen consecutive dots are a square of four by four, walked in one
 //! of four ways, so four look-ups turn sixteen bits of the line into four nibbles of four rows. The rows of the tile are then
 //! shifted to its place in the band, which may begin at any column. Tiles of other sizes, which occur only at the right
-//! and lower edges of a picture and around it, are laid out dot by dot from a table.
+//! and lower edges of a picture and around it, are laid out dot by dot from a table of their own.
 //!
-//! Cost: three operations a dot where there is ink, none for words without; 8 KB for the table, 1.5 KB for the
+//! Cost: three operations a dot where there is ink, none for words without; 16 KB for two tables, 1.5 KB for the
 //! order of the squares. Limits: those of the walk.
 
 use crate::walk::{EDGE, MOST, Orientation, Tile};
@@ -70,16 +70,22 @@ pub(super) struct Canvas {
     used: (usize, usize),
     /// Squares of full tiles by orientation, once there has been one.
     squares: [Option<[Square; SQUARES]>; 3],
-    /// The dots of the last tile of another size.
+    /// The dots of the last tiles of other sizes: a band has at most one that is left at the bottom, and another.
+    tables: [Table; 2],
+}
+
+/// The dots of a tile along the walk, `row * 64 + column` each.
+struct Table {
     shape: Option<Tile>,
-    table: [u16; MOST],
+    dots: [u16; MOST],
 }
 
 const UNUSED: (usize, usize) = (MOST / 32, 0);
 
 impl Canvas {
     pub(super) fn new() -> Canvas {
-        Canvas { line: [0; MOST / 32], used: UNUSED, squares: [None; 3], shape: None, table: [0; MOST] }
+        let table = || Table { shape: None, dots: [0; MOST] };
+        Canvas { line: [0; MOST / 32], used: UNUSED, squares: [None; 3], tables: [table(), table()] }
     }
 
     /// Drops what has not been laid out.
@@ -160,22 +166,29 @@ impl Canvas {
 
     /// Makes the table if it is another tile's, or lays out a portion of the line.
     fn lay_dots(&mut self, tile: &Tile, rows: &mut [u8], stride: usize) -> Laid {
-        let shape = Tile { x: 0, y: 0, ..*tile };
-        if self.shape != Some(shape) {
-            tile.fill(&mut self.table);
-            self.shape = Some(shape);
+        // The way back is the way along, turned by half a circle.
+        let (orientation, turned) = match tile.orientation {
+            Orientation::Back => (Orientation::Along, Some((tile.h - 1) * EDGE + tile.w - 1)),
+            orientation => (orientation, None),
+        };
+        let table = &mut self.tables[usize::from(orientation == Orientation::Down)];
+        let shape = Tile { x: 0, y: 0, orientation, ..*tile };
+        if table.shape != Some(shape) {
+            shape.fill(&mut table.dots);
+            table.shape = Some(shape);
             return Laid::Part;
         }
         let (first, end) = self.used;
         let until = end.min(first + PORTION);
-        let table = self.table.chunks_exact(32).zip(&mut self.line);
-        for (dots, word) in table.take(until).skip(first) {
+        let words = table.dots.chunks_exact(32).zip(&mut self.line);
+        for (dots, word) in words.take(until).skip(first) {
             let mut word = core::mem::take(word);
             let mut dots = dots.iter();
             while word != 0
                 && let Some(&dot) = dots.next()
             {
                 if word >> 31 == 1 {
+                    let dot = turned.map_or(dot, |last| last - dot);
                     let x = usize::from(tile.x + dot % EDGE);
                     rows[usize::from(dot / EDGE) * stride + x / 8] |= 0x80 >> (x % 8);
                 }

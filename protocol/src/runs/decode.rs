@@ -3,7 +3,8 @@
 use super::across::{Across, Stop};
 use super::canvas::{Canvas, Laid};
 use super::rice::{ESCAPE, Mean};
-use super::{PLAIN_BITS, band_bytes, form, stride};
+use super::rows::{Inked, Rows};
+use super::{AHEAD, MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
 use crate::walk::{Placed, PlacedBand, Tile};
 
 /// What is wrong with a stream.
@@ -37,6 +38,8 @@ pub enum Step {
         y: u16,
         /// Number of rows.
         rows: u16,
+        /// Bytes of each row after which all are blank.
+        reach: usize,
     },
     /// The page is complete; input behind it is not read.
     End,
@@ -76,8 +79,8 @@ struct Runs {
     to: u32,
     /// Tiles begun.
     tiles: usize,
-    /// A tile, or a part of one, has been laid out in this step.
-    laid: bool,
+    /// A tile, or a part of one, has been laid out in this step, or many runs have been read: others may run.
+    pause: bool,
 }
 
 /// Where in a rows band the decoder is.
@@ -114,6 +117,7 @@ pub struct Decoder {
     band: Option<PlacedBand>,
     state: State,
     canvas: Canvas,
+    inked: Inked,
 }
 
 impl Default for Decoder {
@@ -126,7 +130,14 @@ impl Default for Decoder {
 impl Decoder {
     /// A decoder for planes with this walk.
     pub fn new(walk: Placed) -> Decoder {
-        let mut decoder = Decoder { walk, next: 0, band: None, state: State::End, canvas: Canvas::new() };
+        let mut decoder = Decoder {
+            walk,
+            next: 0,
+            band: None,
+            state: State::End,
+            canvas: Canvas::new(),
+            inked: Inked::ALL,
+        };
         decoder.restart();
         decoder
     }
@@ -140,12 +151,21 @@ impl Decoder {
     /// Starts the stream of another page.
     pub fn begin(&mut self, walk: Placed) {
         self.walk = walk;
+        // The memory may be another now, and its rows of another length.
+        self.inked = Inked::ALL;
         self.restart();
     }
 
     /// Whether the page is complete.
     pub fn ended(&self) -> bool {
         matches!(self.state, State::End)
+    }
+
+    /// A band is complete in the memory.
+    fn complete(&mut self, band: PlacedBand, stride: usize) -> Step {
+        self.next += 1;
+        self.follow();
+        Step::Band { y: band.y, rows: band.height, reach: self.inked.range(stride).end }
     }
 
     /// The band to come, or the end.
@@ -155,7 +175,7 @@ impl Decoder {
     }
 
     /// Reads until a band is complete and returns how many bytes of `input` it has read. `memory` needs [`band_bytes`]
-    /// bytes and must stay the same, unchanged, until the band is complete.
+    /// bytes and must stay the same, unchanged, until the page has all its passes.
     ///
     /// After a defect only [`Decoder::restart`] and [`Decoder::begin`] help.
     pub fn step(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Step), Defect> {
@@ -170,7 +190,7 @@ impl Decoder {
     }
 
     /// Like [`Decoder::step`], but also stops, with `None`, after every tile it has laid out, several times within tiles
-    /// that take long, and after every row of runs across. The caller can do other things and then call it again with the rest of the input.
+    /// that take long, after every row of runs across and after many runs. The caller can do other things and then call it again with the rest of the input.
     pub fn slice(&mut self, input: &[u8], memory: &mut [u8]) -> Result<(usize, Option<Step>), Defect> {
         let width = self.walk.width();
         let memory = memory.get_mut(..band_bytes(width)).ok_or(Defect::Memory)?;
@@ -196,7 +216,9 @@ impl Decoder {
                         _ => return Err(Defect::Form),
                     };
                     if byte != form::BLANK {
-                        memory[..usize::from(band.height) * stride].fill(0);
+                        let inked = self.inked.range(stride);
+                        memory.chunks_exact_mut(stride).for_each(|row| row[inked.clone()].fill(0));
+                        self.inked = Inked::NONE;
                     }
                 }
                 State::Blank => {
@@ -215,15 +237,14 @@ impl Decoder {
                     self.state = State::Runs(Runs::new(minimum));
                 }
                 State::Runs(runs) => {
-                    let mut place = Place { band, stride, memory, canvas: &mut self.canvas };
+                    let mut place =
+                        Place { band, stride, memory, canvas: &mut self.canvas, inked: &mut self.inked };
                     let (used, complete) = runs.read(&input[read..], &mut place);
                     read += used;
                     if !complete {
-                        return Ok((read, (!runs.laid).then_some(Step::More)));
+                        return Ok((read, (!runs.pause).then_some(Step::More)));
                     }
-                    self.next += 1;
-                    self.follow();
-                    return Ok((read, Some(Step::Band { y: band.y, rows: band.height })));
+                    return Ok((read, Some(self.complete(band, stride))));
                 }
                 State::Side => {
                     let Some(&side) = input.get(read) else { return Ok((read, Some(Step::More))) };
@@ -234,28 +255,27 @@ impl Decoder {
                     self.state = State::Across(Across::new(side));
                 }
                 State::Across(across) => {
-                    let rows = &mut memory[..usize::from(band.height) * stride];
-                    let (used, stop) = across.read(&input[read..], rows, stride, width);
+                    let height = band.height;
+                    let mut rows = Rows { memory, stride, height, width, inked: &mut self.inked };
+                    let (used, stop) = across.read(&input[read..], &mut rows);
                     read += used;
                     match stop {
                         Stop::More => return Ok((read, Some(Step::More))),
                         // On a microcontroller other tasks wait for their turn.
-                        Stop::Row => return Ok((read, None)),
+                        Stop::Pause => return Ok((read, None)),
                         Stop::Band => {}
                     }
-                    self.next += 1;
-                    self.follow();
-                    return Ok((read, Some(Step::Band { y: band.y, rows: band.height })));
+                    return Ok((read, Some(self.complete(band, stride))));
                 }
                 State::Row(row) => {
-                    let (used, complete) = row.read(&input[read..], memory, stride, band.height, width)?;
+                    let height = band.height;
+                    let mut rows = Rows { memory, stride, height, width, inked: &mut self.inked };
+                    let (used, complete) = row.read(&input[read..], &mut rows)?;
                     read += used;
                     if !complete {
                         return Ok((read, Some(Step::More)));
                     }
-                    self.next += 1;
-                    self.follow();
-                    return Ok((read, Some(Step::Band { y: band.y, rows: band.height })));
+                    return Ok((read, Some(self.complete(band, stride))));
                 }
             }
         }
@@ -268,10 +288,8 @@ struct Place<'d> {
     stride: usize,
     memory: &'d mut [u8],
     canvas: &'d mut Canvas,
+    inked: &'d mut Inked,
 }
-
-/// Bytes of input with which any code is complete, whatever bits are held: 20 ones and 20 plain bits.
-const CODE_BYTES: usize = (ESCAPE + PLAIN_BITS).div_ceil(8) as usize;
 
 impl Runs {
     fn new(minimum: u8) -> Runs {
@@ -290,26 +308,29 @@ impl Runs {
             from: 0,
             to: 0,
             tiles: 0,
-            laid: false,
+            pause: false,
         }
     }
 
-    /// Reads runs until the band is full or something has been laid out. Returns how much was read and whether it is full.
+    /// Reads runs until the band is full or others may run. Returns how much was read and whether it is full.
     fn read(&mut self, input: &[u8], place: &mut Place<'_>) -> (usize, bool) {
         let mut read = 0;
-        self.laid = false;
+        self.pause = false;
         while self.done < place.band.len() {
             // On a microcontroller other tasks wait for their turn.
-            if self.laid {
+            if self.pause {
                 return (read, false);
             }
             if self.done < self.end {
                 self.ink(place);
                 continue;
             }
-            if self.ones == 0 && self.remainder.is_none() && input.len() - read >= CODE_BYTES {
+            if self.ones == 0 && self.remainder.is_none() {
+                let before = self.index;
                 read += self.read_codes(&input[read..], place);
-                continue;
+                if self.index > before {
+                    continue;
+                }
             }
             // Bits are needed: at least one for the ones, all of the remainder.
             let needed = self.remainder.unwrap_or(1);
@@ -333,45 +354,47 @@ impl Runs {
         (read, self.tile.is_none())
     }
 
-    /// Reads whole codes while there is enough input for any code, and returns how much was read. To be called between two
-    /// codes. Most of the time is spent here: the bits are read a word ahead, and the surplus is given back at the end.
+    /// Reads codes while they are short and complete, and returns how much was read. To be called between two codes. Most of
+    /// the time is spent here: the bits are read a word ahead, and the surplus is given back at the end.
     fn read_codes(&mut self, input: &[u8], place: &mut Place<'_>) -> usize {
-        let mut read = 0;
-        while self.done < place.band.len() && !self.laid && input.len() - read >= CODE_BYTES {
-            let (mut bits, mut held) = (self.bits, self.held);
-            while held <= 24 {
-                bits |= u32::from(input[read]) << (24 - held);
-                held += 8;
-                read += 1;
+        let len = place.band.len();
+        let (mut bits, mut held, mut read) = (self.bits, self.held, 0);
+        let mut runs = 0;
+        while self.done < len
+            && !self.pause
+            && let Some(&[one, two, three, ..]) = input.get(read..).and_then(<[u8]>::first_chunk::<AHEAD>)
+        {
+            if held <= 8 {
+                bits |= u32::from_be_bytes([one, two, three, 0]) >> held;
+                (held, read) = (held + 24, read + 3);
+            } else if held <= 16 {
+                bits |= u32::from_be_bytes([one, two, 0, 0]) >> held;
+                (held, read) = (held + 16, read + 2);
             }
-            let mut ones = 0;
-            while bits >> 31 == 1 && ones < ESCAPE {
-                bits <<= 1;
+            let (mut rest, mut ones) = (bits, 0);
+            while rest >> 31 == 1 && ones < ESCAPE {
+                rest <<= 1;
                 ones += 1;
             }
-            held -= ones;
-            let count = if ones == ESCAPE {
-                PLAIN_BITS
-            } else {
-                bits <<= 1;
-                held -= 1;
-                self.means[self.index as usize % 2].parameter()
-            };
-            // What a code needs beyond a word is still there: it is at most five bytes in all.
-            while held < count {
-                bits |= u32::from(input[read]) << (24 - held);
-                held += 8;
-                read += 1;
+            let mean = &mut self.means[self.index as usize % 2];
+            let count = mean.parameter();
+            // Rare ones, and those of which bits are missing.
+            if ones == ESCAPE || ones + 1 + count > held {
+                break;
             }
+            rest <<= 1;
             // Shifted twice, since `count` may be 0.
-            let value = bits >> 1 >> (31 - count);
-            (self.bits, self.held, self.ones) = (bits << count, held - count, ones);
-            self.take(value, count, place);
+            let value = ones << count | rest >> 1 >> (31 - count);
+            (bits, held) = (rest << count, held - ones - 1 - count);
+            mean.add(value);
+            self.run(value + self.minimum, len, place);
+            runs += 1;
+            self.pause |= runs == MOST_RUNS;
         }
         // Whole bytes can only be of this input: there were fewer than eight bits before it.
-        let back = self.held / 8;
-        self.held %= 8;
-        self.bits &= !(u32::MAX >> self.held);
+        let back = held / 8;
+        held %= 8;
+        (self.bits, self.held) = (bits & !(u32::MAX >> held), held);
         read - back as usize
     }
 
@@ -401,20 +424,28 @@ impl Runs {
             self.means[self.index as usize % 2].add(value);
             value + self.minimum
         };
-        self.end = self.done.saturating_add(length).min(place.band.len());
-        if self.index % 2 == 1 {
-            self.ink(place);
-        } else {
-            self.done = self.end;
-        }
-        self.index += 1;
+        self.run(length, place.band.len(), place);
         self.ones = 0;
         self.remainder = None;
     }
 
+    /// A run is known, in a band of `len` dots.
+    fn run(&mut self, length: u32, len: u32, place: &mut Place<'_>) {
+        self.end = self.done.saturating_add(length).min(len);
+        if self.index % 2 == 0 {
+            self.done = self.end;
+        } else if self.done < self.end && self.done >= self.from && self.end <= self.to {
+            place.canvas.ink(self.done - self.from, self.end - self.from);
+            self.done = self.end;
+        } else {
+            self.ink(place);
+        }
+        self.index += 1;
+    }
+
     /// Inks the run under way to its end, or until something has been laid out.
     fn ink(&mut self, place: &mut Place<'_>) {
-        while self.done < self.end && !self.laid {
+        while self.done < self.end && !self.pause {
             if self.done < self.to {
                 let to = self.end.min(self.to);
                 place.canvas.ink(self.done - self.from, to - self.from);
@@ -436,7 +467,10 @@ impl Runs {
     fn lay(&mut self, place: &mut Place<'_>) {
         let Some(tile) = &self.tile else { return };
         let laid = place.canvas.lay(tile, place.memory, place.stride);
-        self.laid |= laid != Laid::Blank;
+        self.pause |= laid != Laid::Blank;
+        if laid != Laid::Blank {
+            place.inked.add(usize::from(tile.x / 8), usize::from((tile.x + tile.w).div_ceil(8)));
+        }
         if laid != Laid::Part {
             self.tile = None;
         }
@@ -445,14 +479,8 @@ impl Runs {
 
 impl Row {
     /// Reads rows until the band is full. Returns how much was read and whether it is full.
-    fn read(
-        &mut self,
-        input: &[u8],
-        memory: &mut [u8],
-        stride: usize,
-        height: u16,
-        width: u16,
-    ) -> Result<(usize, bool), Defect> {
+    fn read(&mut self, input: &[u8], rows: &mut Rows<'_>) -> Result<(usize, bool), Defect> {
+        let Rows { stride, height, width, .. } = *rows;
         let mut read = 0;
         while self.y < height {
             let row = usize::from(self.y) * stride;
@@ -462,7 +490,7 @@ impl Row {
                     return Err(Defect::Row);
                 }
                 let spare = stride * 8 - usize::from(width);
-                if u32::from(memory[row + stride - 1]) & ((1 << spare) - 1) != 0 {
+                if u32::from(rows.memory[row + stride - 1]) & ((1 << spare) - 1) != 0 {
                     return Err(Defect::Row);
                 }
                 self.y += 1;
@@ -484,8 +512,8 @@ impl Row {
                         return Err(Defect::Count);
                     }
                     for _ in 0..byte {
-                        if let Some(above) = (usize::from(self.y) * stride).checked_sub(stride) {
-                            memory.copy_within(above..above + stride, above + stride);
+                        if self.y > 0 {
+                            rows.repeat(self.y);
                         }
                         self.y += 1;
                     }
@@ -499,7 +527,8 @@ impl Row {
                         if usize::from(*x) > stride {
                             return Err(Defect::Row);
                         }
-                        memory[from..from + usize::from(times)].fill(value);
+                        rows.memory[from..from + usize::from(times)].fill(value);
+                        rows.inked.add(0, usize::from(*x));
                         Ok(())
                     };
                     *run = match *run {

@@ -58,6 +58,7 @@ mod encode;
 mod encode_across;
 mod header;
 mod rice;
+mod rows;
 
 pub use decode::{Decoder, Defect, Step};
 pub use encode::{MAX_BAND, NoRoom, encode};
@@ -80,6 +81,12 @@ mod form {
     pub const ROWS: u8 = 2;
     pub const ACROSS: u8 = 3;
 }
+
+/// Bytes that are looked at ahead of a code.
+const AHEAD: usize = 3;
+
+/// Runs that are decoded before others may run: 6 µs each at most on a microcontroller.
+const MOST_RUNS: u32 = 64;
 
 /// Bits of the first run and of an escaped one: the largest band has 65535 x 64 dots at most in theory, and
 /// 9880 x 64 on this printer.

@@ -106,9 +106,9 @@ pub fn expand(streams: &[u8], put: &mut dyn FnMut(&[u8]) -> bool) -> Result<(), 
             match step {
                 runs::Step::More => return Err(NoStreams::Stream),
                 runs::Step::Blank { rows, .. } => writer.blank_rows(rows)?,
-                runs::Step::Band { rows, .. } => {
+                runs::Step::Band { rows, reach, .. } => {
                     for row in memory.chunks_exact(stride).take(rows.into()) {
-                        let count = writer.row(row, &mut out)?;
+                        let count = writer.row(&row[..reach], &mut out)?;
                         wanted = wanted && put(&out[..count]);
                     }
                 }
