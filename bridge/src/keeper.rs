@@ -10,6 +10,7 @@
 //! Cost: 64 bytes for each checkpoint, a byte for each mark, 288 bytes at the end of each job. Limits: fewer than [`MARKS`] bytes may cross between two
 //! checkpoints. The board says whether the memory is its own, and holds what it held ([`Memory`]).
 
+use core::ops::Range;
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use protocol::link::frame::checksum;
@@ -45,8 +46,10 @@ pub trait Memory {
     fn write_past(&mut self, which: usize, slot: [u8; PAST_SLOT]);
     /// Whether there is a mark at this place, below [`MARKS`].
     fn is_marked(&self, at: usize) -> bool;
-    /// Sets or clears the mark at this place, below [`MARKS`].
-    fn mark(&mut self, at: usize, set: bool);
+    /// Sets the mark at this place, below [`MARKS`].
+    fn mark(&mut self, at: usize);
+    /// Clears the marks at these places, all below [`MARKS`].
+    fn clear(&mut self, places: Range<usize>);
 }
 
 /// The checkpoints of this run.
@@ -69,7 +72,7 @@ impl<M: Memory> Keeper<M> {
         let Some((number, place, position)) = found else {
             (0..2).for_each(|which| memory.write(which, [0; SLOT]));
             (0..2).for_each(|which| memory.write_past(which, [0; PAST_SLOT]));
-            (0..MARKS).for_each(|at| memory.mark(at, false));
+            memory.clear(0..MARKS);
             let past = [PastJob::NONE; PAST];
             return (Keeper { memory, number: 0, place: 0, last: None, past, past_number: 0 }, None);
         };
@@ -83,7 +86,7 @@ impl<M: Memory> Keeper<M> {
         let mut keeper = Keeper { memory, number, place, last: None, past, past_number };
         keeper.store(checkpoint, place + crossed);
         // What a reset left between a slot and the clearing of its marks would be counted a turn of the ring later.
-        (0..MARKS).for_each(|at| keeper.memory.mark(at, false));
+        keeper.memory.clear(0..MARKS);
         (keeper, Some(checkpoint))
     }
 
@@ -115,15 +118,18 @@ impl<M: Memory> Keeper<M> {
         self.memory.write((number % 2) as usize, slot);
         compiler_fence(Ordering::SeqCst);
         // Only now the marks before it are no longer needed.
-        for at in 0..place.wrapping_sub(self.place) % MARKS {
-            self.memory.mark((self.place + at) % MARKS, false);
+        if place < self.place {
+            self.memory.clear(self.place..MARKS);
+            self.memory.clear(0..place);
+        } else {
+            self.memory.clear(self.place..place);
         }
         (self.place, self.last) = (place, Some(checkpoint));
     }
 
     /// Marks a byte that the processor has sent, after `sent` others since the last checkpoint.
     pub fn mark(&mut self, sent: usize) {
-        self.memory.mark((self.place + sent) % MARKS, true);
+        self.memory.mark((self.place + sent) % MARKS);
     }
 }
 
@@ -212,9 +218,17 @@ mod tests {
             self.held.marks[at]
         }
 
-        fn mark(&mut self, at: usize, set: bool) {
+        fn mark(&mut self, at: usize) {
             if self.writes() {
-                self.held.marks[at] = set;
+                self.held.marks[at] = true;
+            }
+        }
+
+        fn clear(&mut self, places: Range<usize>) {
+            for at in places {
+                if self.writes() {
+                    self.held.marks[at] = false;
+                }
             }
         }
     }

@@ -36,10 +36,10 @@ impl Links {
         self.speaker
     }
 
-    /// Bytes have come.
-    pub fn receive(&mut self, way: Way, bytes: &[u8], engine: &mut Engine<'_>) {
+    /// Bytes have come. Returns whether with them a message was complete.
+    pub fn receive(&mut self, way: Way, bytes: &[u8], engine: &mut Engine<'_>) -> bool {
         self.speaker = Some(way);
-        engine.receive(&mut self.readers[way as usize], bytes);
+        engine.receive(&mut self.readers[way as usize], bytes)
     }
 
     /// The host is gone from this way.

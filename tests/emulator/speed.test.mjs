@@ -42,7 +42,9 @@ for (const [what, settings] of [['the model printer', MODEL], ['a printer that i
   }
 }
 
-for (const [name, what, settings] of [['clusters', 'the model printer', MODEL], ['clusters', 'a printer that is quicker than the timing', QUICK], ['placed', 'a printer that is quicker than the timing', QUICK], ['cells', 'a printer that is quicker than the timing', QUICK]]) {
+const ROWS = { clusters: 256, placed: 260, cells: 256, 'small-clusters': 340, 'small-cells': 340 };
+
+for (const [name, what, settings] of [['clusters', 'the model printer', MODEL], ...Object.keys(ROWS).map((name) => [name, 'a printer that is quicker than the timing', QUICK])]) {
   test(`decoding ${name} keeps the port at work with ${what}`, { skip }, async (t) => {
     const expected = job(`${name}.rgl`), streams = job(`${name}.streams`);
     const bench = new Bench(settings);
@@ -53,7 +55,7 @@ for (const [name, what, settings] of [['clusters', 'the model printer', MODEL], 
     legal(bench.printer);
     const at = strobes(bench.printer);
     const busy = ((at.length - 1) * port(settings)) / (at.at(-1) - at[0]);
-    const perDot = (bench.board.cycles - before) / (2 * 4800 * (name === 'placed' ? 260 : 256));
+    const perDot = (bench.board.cycles - before) / (2 * 4800 * ROWS[name]);
     t.diagnostic(`${((at.at(-1) - at[0]) / (at.length - 1)).toFixed(0)} ns a byte, the port at work ${(100 * busy).toFixed(1)} % of the time; ${perDot.toFixed(1)} cycles a dot, all included`);
     assert.ok(busy >= 0.9);
   });

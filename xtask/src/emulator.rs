@@ -64,12 +64,20 @@ pub fn run(root: &Path, program: &Path) -> Result<()> {
     fs::create_dir_all(&jobs).with_context(|| format!("{} cannot be made", jobs.display()))?;
     // A picture that lies as the halftone does not expect it: no tile begins with a byte.
     let placed = Frame { x: 101, y: 3, width: 4600, height: 256 };
+    // 50 mm wide in the middle of the page: most of each row is blank, and one tile in ten is of another size.
+    let small = Frame { x: 1811, y: 40, width: 1181, height: 300 };
     let made = [
         ("small", Placed::whole(500, 150), discs(500, 150)),
         ("page", Placed::whole(4800, 130), discs(4800, 130)),
         ("clusters", Placed::whole(4800, 256), clusters(4800, 256, Frame::whole(4800, 256))),
         ("placed", Placed::new(4800, 260, placed).context("a picture within")?, clusters(4800, 260, placed)),
-        ("cells", Placed::whole(4800, 256), cells(4800, 256)),
+        ("cells", Placed::whole(4800, 256), cells(4800, 256, Frame { x: 7, y: 4, width: 4793, height: 252 })),
+        (
+            "small-clusters",
+            Placed::new(4800, 340, small).context("a picture within")?,
+            clusters(4800, 340, small),
+        ),
+        ("small-cells", Placed::new(4800, 340, small).context("a picture within")?, cells(4800, 340, small)),
     ];
     for (name, walk, planes) in made {
         let (printed, streams) = job(&walk, &planes).context("a test job cannot be made")?;
@@ -180,22 +188,23 @@ fn clusters(width: u16, rows: u16, frame: Frame) -> [Vec<u8>; 2] {
     planes
 }
 
-/// Two of eight planes of cells of 3 x 3 dots, each of one of eight inks or of bare paper, beside the corner of the page.
-fn cells(width: u16, rows: u16) -> [Vec<u8>; 2] {
+/// Two of eight planes of cells of 3 x 3 dots, each of one of eight inks or of bare paper, in a picture.
+fn cells(width: u16, rows: u16, frame: Frame) -> [Vec<u8>; 2] {
     let stride = runs::stride(width);
     let mut planes = [(); 2].map(|()| vec![0u8; stride * usize::from(rows)]);
     let mut random = 1u64;
-    let mut inks = vec![0; usize::from(width).div_ceil(3)];
-    for y in 4..usize::from(rows) {
-        if (y - 4).is_multiple_of(3) {
+    let mut inks = vec![0; usize::from(frame.width).div_ceil(3)];
+    for row in 0..usize::from(frame.height) {
+        if row.is_multiple_of(3) {
             inks.fill_with(|| {
                 random =
                     random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 (random >> 40) as usize % 9
             });
         }
-        for x in 7..usize::from(width) {
-            if let Some(plane) = planes.get_mut(inks[(x - 7) / 3]) {
+        for column in 0..usize::from(frame.width) {
+            if let Some(plane) = planes.get_mut(inks[column / 3]) {
+                let (x, y) = (usize::from(frame.x) + column, usize::from(frame.y) + row);
                 plane[y * stride + x / 8] |= 0x80 >> (x % 8);
             }
         }

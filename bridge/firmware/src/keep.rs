@@ -36,6 +36,8 @@ use bridge::keeper::{self, MARKS, Memory, PAST_SLOT, SLOT};
 use core::cell::UnsafeCell;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
+use core::ops::Range;
+use core::sync::atomic::compiler_fence;
 use portable_atomic::{AtomicBool, Ordering};
 use protocol::link::frame::checksum;
 
@@ -111,9 +113,17 @@ impl Memory for Ring {
         unsafe { mark(at).read_volatile() != 0 }
     }
 
-    fn mark(&mut self, at: usize, set: bool) {
+    fn mark(&mut self, at: usize) {
         // SAFETY: a byte of the ring; the DMA is about to write others.
-        unsafe { mark(at).write_volatile(set.into()) };
+        unsafe { mark(at).write_volatile(1) };
+    }
+
+    fn clear(&mut self, places: Range<usize>) {
+        let count = places.end.min(MARKS).saturating_sub(places.start);
+        // SAFETY: bytes of the ring, as many as are left of it from there; the DMA is about to write others.
+        unsafe { mark(places.start).write_bytes(0, count) };
+        // They are read only behind a reset: written all the same.
+        compiler_fence(Ordering::SeqCst);
     }
 }
 

@@ -71,11 +71,13 @@ impl Shared {
 
     /// A packet has come this way.
     pub fn hear(&self, way: Way, bytes: &[u8]) {
-        self.links(|links, engine| links.receive(way, bytes, engine));
-        self.wake(Side::Work);
-        self.wake(Side::Port);
-        self.wake(Side::Link);
-        self.wake(Side::Store);
+        // A message of data comes in some fifteen packets.
+        if self.links(|links, engine| links.receive(way, bytes, engine)) {
+            self.wake(Side::Work);
+            self.wake(Side::Port);
+            self.wake(Side::Link);
+            self.wake(Side::Store);
+        }
     }
 
     /// Wakes a side that waits, or keeps it from waiting the next time.

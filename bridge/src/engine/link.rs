@@ -18,14 +18,17 @@ impl Engine<'_> {
     }
 
     /// Bytes from a link, in any portions. Every link has its own reader. A board with two links (a serial port and bulk
-    /// endpoints, say) may serve both; the answers go to the one that spoke last.
-    pub fn receive(&mut self, reader: &mut Reader, mut bytes: &[u8]) {
+    /// endpoints, say) may serve both; the answers go to the one that spoke last. Returns whether a message was complete, so
+    /// that there may be something to do.
+    pub fn receive(&mut self, reader: &mut Reader, mut bytes: &[u8]) -> bool {
+        let mut heard = false;
         loop {
             match reader.read(bytes) {
-                Read::More => return,
+                Read::More => return heard,
                 // Damage needs no answer: the host sends again what was lost.
                 Read::Damaged(_, rest) => bytes = rest,
                 Read::Message(message, rest) => {
+                    heard = true;
                     bytes = rest;
                     match frame::decode(message) {
                         Ok(message) => self.follow(message),

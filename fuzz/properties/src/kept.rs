@@ -12,6 +12,7 @@ use protocol::link::frame::{Reader, checksum};
 use protocol::link::message::{JobKind, JobState, Lines, ToBridge};
 use protocol::runs::Decoder;
 use std::cell::RefCell;
+use std::ops::Range;
 
 const SECTORS: usize = 8;
 
@@ -242,7 +243,11 @@ impl keeper::Memory for Retained {
         self.marks[at]
     }
 
-    fn mark(&mut self, at: usize, set: bool) {
-        self.marks[at] = set;
+    fn mark(&mut self, at: usize) {
+        self.marks[at] = true;
+    }
+
+    fn clear(&mut self, places: Range<usize>) {
+        self.marks[places].fill(false);
     }
 }

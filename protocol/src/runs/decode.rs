@@ -95,8 +95,8 @@ enum RowPart {
     /// Second byte of the varint, the first having been this.
     Tail(u8),
     Same,
+    /// So many bytes of the row are left in the stream, and so many are in the memory.
     Data {
-        packed: bool,
         left: u16,
         x: u16,
         run: Run,
@@ -106,8 +106,10 @@ enum RowPart {
 #[derive(Clone, Copy)]
 enum Run {
     Head,
-    Literal(u8),
-    Repeat(u8),
+    /// So many bytes that stand as they are: all of a row that is not packed.
+    Literal(u16),
+    /// A byte, so many times.
+    Repeat(u16),
 }
 
 /// Decodes one pass of a page.
@@ -497,6 +499,22 @@ impl Row {
                 self.part = RowPart::Head;
                 continue;
             }
+            if let RowPart::Data { left, x, run: run @ Run::Literal(_) } = &mut self.part
+                && let Run::Literal(count) = *run
+            {
+                let data = &input[read..];
+                let data = &data[..data.len().min(count.min(*left).into())];
+                if data.is_empty() {
+                    return Ok((read, false));
+                }
+                rows.next(self.y, x, data.len())?.copy_from_slice(data);
+                read += data.len();
+                // At most what is left of the row.
+                let done = data.len() as u16;
+                *left -= done;
+                *run = if count == done { Run::Head } else { Run::Literal(count - done) };
+                continue;
+            }
             let Some(&byte) = input.get(read) else { return Ok((read, false)) };
             read += 1;
             match &mut self.part {
@@ -519,35 +537,16 @@ impl Row {
                     }
                     self.part = RowPart::Head;
                 }
-                RowPart::Data { packed, left, x, run } => {
+                RowPart::Data { left, x, run } => {
                     *left -= 1;
-                    let mut put = |value: u8, times: u8| -> Result<(), Defect> {
-                        let from = row + usize::from(*x);
-                        *x += u16::from(times);
-                        if usize::from(*x) > stride {
-                            return Err(Defect::Row);
-                        }
-                        rows.memory[from..from + usize::from(times)].fill(value);
-                        rows.inked.add(0, usize::from(*x));
-                        Ok(())
-                    };
                     *run = match *run {
-                        _ if !*packed => {
-                            put(byte, 1)?;
-                            Run::Head
-                        }
                         Run::Head => match byte {
                             0x80 => return Err(Defect::Row),
-                            0..0x80 => Run::Literal(byte + 1),
-                            // 257 - byte, which is 2..=128.
-                            _ => Run::Repeat((!byte) + 2),
+                            0..0x80 => Run::Literal(u16::from(byte) + 1),
+                            _ => Run::Repeat(257 - u16::from(byte)),
                         },
-                        Run::Literal(count) => {
-                            put(byte, 1)?;
-                            if count == 1 { Run::Head } else { Run::Literal(count - 1) }
-                        }
-                        Run::Repeat(count) => {
-                            put(byte, count)?;
+                        Run::Repeat(count) | Run::Literal(count) => {
+                            rows.next(self.y, x, count.into())?.fill(byte);
                             Run::Head
                         }
                     };
@@ -560,6 +559,8 @@ impl Row {
 
 impl RowPart {
     fn data(head: u16) -> RowPart {
-        RowPart::Data { packed: head % 2 == 1, left: head / 2, x: 0, run: Run::Head }
+        let left = head / 2;
+        let run = if head % 2 == 1 { Run::Head } else { Run::Literal(left) };
+        RowPart::Data { left, x: 0, run }
     }
 }

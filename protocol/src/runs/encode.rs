@@ -11,6 +11,9 @@ use heapless::Vec;
 /// buffer for [`encode`].
 pub const MAX_BAND: usize = 1 + EDGE as usize * (2 + MAX_STRIDE);
 
+/// How many times shorter than packed rows runs have to be.
+const WORTH: usize = 2;
+
 pub(super) const MAX_STRIDE: usize = 1235;
 
 /// A buffer is too small, a page wider than 9880 dots, or `bits` shorter than the plane.
@@ -49,7 +52,8 @@ pub fn encode(
             blank = 0;
         }
         // What was shorter last goes first, so that the other gives up early.
-        let limit = rows_length(rows, stride);
+        let packed = rows_length(rows, stride);
+        let limit = packed / WORTH + 1;
         let mut code = |across: bool, room: usize| {
             if across {
                 put_across(rows, width, &mut buffer[..room])
@@ -64,7 +68,7 @@ pub fn encode(
                 length
             }
             (None, Some(length)) => code(across, length).ok_or(NoRoom)?,
-            (None, None) => put_rows(rows, stride, &mut buffer[..limit]).ok_or(NoRoom)?,
+            (None, None) => put_rows(rows, stride, &mut buffer[..packed]).ok_or(NoRoom)?,
         };
         put(&buffer[..length]);
     }

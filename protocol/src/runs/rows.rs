@@ -4,6 +4,7 @@
 //! microcontroller longer than decoding what is in them. Method: the columns that have got ink since the memory was last cleared
 //! are known as one range of bytes for all rows of the band. Limits: two pictures side by side are one range.
 
+use super::Defect;
 use core::ops::Range;
 
 /// The rows of a band.
@@ -23,6 +24,15 @@ impl Rows<'_> {
     pub(super) fn row(&mut self, y: u16) -> &mut [u8] {
         let at = usize::from(y) * self.stride;
         &mut self.memory[at..at + self.stride]
+    }
+
+    /// The `count` bytes at `x` of row `y`, and moves `x` behind them.
+    pub(super) fn next(&mut self, y: u16, x: &mut u16, count: usize) -> Result<&mut [u8], Defect> {
+        let from = usize::from(*x);
+        let end = from + count;
+        *x = u16::try_from(end).map_err(|_| Defect::Row)?;
+        self.inked.add(0, end);
+        self.row(y).get_mut(from..end).ok_or(Defect::Row)
     }
 
     /// Copies the row above to row `y`, which is not the first.
