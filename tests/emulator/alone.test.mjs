@@ -72,7 +72,7 @@ test('ten cuts of the supply while the image stores and prints cost nothing but 
   let [stored, lost] = [[1], 0];
   for (let cut = 0; cut < 10; cut++) {
     if (cut % 2 === 0) {
-      bench.board.cutAfter = next(24);
+      bench.board.cutAfter = next(32);
       await bench.store(10 + cut, STREAMS, streams, 'more').catch(() => {});
       assert.ok(bench.board.off || bench.progress.state === 'stored');
     } else {

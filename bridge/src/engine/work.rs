@@ -20,6 +20,12 @@ impl Engine<'_> {
         worked
     }
 
+    /// Whether the job's data are used up sooner than a few messages come, and there are more.
+    pub(crate) fn runs_short(&self) -> bool {
+        let more = self.job.as_ref().is_some_and(|job| job.accepted < job.length);
+        more && self.data.len() < self.data.capacity() / 4
+    }
+
     fn work_raw(&mut self) -> bool {
         let Some(job) = &mut self.job else { return false };
         if job.must_stop() {

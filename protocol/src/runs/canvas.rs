@@ -84,8 +84,12 @@ const UNUSED: (usize, usize) = (MOST / 32, 0);
 
 impl Canvas {
     pub(super) fn new() -> Canvas {
-        let table = || Table { shape: None, dots: [0; MOST] };
-        Canvas { line: [0; MOST / 32], used: UNUSED, squares: [None; 3], tables: [table(), table()] }
+        Canvas {
+            line: [0; MOST / 32],
+            used: UNUSED,
+            squares: [None; 3],
+            tables: [Table { shape: None, dots: [0; MOST] }, Table { shape: None, dots: [0; MOST] }],
+        }
     }
 
     /// Drops what has not been laid out.

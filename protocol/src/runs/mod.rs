@@ -5,10 +5,11 @@
 //! a sequence of runs that are never shorter than the minimum cluster; across the rows, cells are runs of whole cells
 //! that are the same in several rows.
 //!
-//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in the shortest of four forms: nothing (blank
+//! Method: every band of [`Walk`](crate::walk::Walk) is coded on its own, in one of four forms: nothing (blank
 //! bands), runs along the walk or across the rows with adaptive Rice codes, or rows packed as the printer packs them. The
-//! last ensures that nothing ever costs more than in the printer's own language. The decoder holds one band (38 KB for
-//! 4800 dots), one tile's table (8 KB) and some counters, and takes its input in any portions.
+//! last ensures that nothing ever costs more than in the printer's own language; and a microcontroller decodes rows in a quarter
+//! of the time, so runs have to be half as long. The decoder holds one band (38 KB for
+//! 4800 dots), the tables of two tiles (16 KB) and some counters, and takes its input in any portions.
 //!
 //! Cost: encoding and decoding walk each inked dot once; blank dots are skipped by the run. On eight clustered
 //! planes of a full page the streams are a sixth to a seventh of the packed rows
