@@ -8,9 +8,9 @@
 //! Cost: some hundred cycles a run on a microcontroller and a copy for each row that is repeated. Limits: cells of
 //! different sides in one row share one unit.
 
-use super::rice::Mean;
+use super::MOST_RUNS;
+use super::rice::{Ahead, Mean};
 use super::rows::Rows;
-use super::{AHEAD, MOST_RUNS};
 
 /// Ones that announce what is not a quotient. Edges beside the lattice are common, so they are few.
 pub(super) const ONES: u32 = 8;
@@ -175,42 +175,19 @@ impl Across {
     }
 
     /// Reads codes of the row under way while they are short and complete, at most `runs` of them, and returns how much was
-    /// read. Most of the time is spent here: the bits are read a word ahead, and the surplus is given back at the end.
+    /// read.
     fn read_runs(&mut self, input: &[u8], rows: &mut Rows<'_>, runs: &mut u32) -> usize {
         let width = u32::from(rows.width);
         let row = rows.row(self.y);
         let unit = if in_cells(self.kind, self.index) { self.side } else { 1 };
         let means = &mut self.model.runs[self.kind as usize % 4];
+        let mut codes = Ahead::new(input, self.bits, self.held);
         let (mut x, mut index) = (self.x, self.index);
-        let (mut bits, mut held, mut read) = (self.bits, self.held, 0);
         let (mut first, mut last) = (width, 0);
         while *runs > 0
             && x < width
-            && let Some(&[one, two, three, ..]) = input.get(read..).and_then(<[u8]>::first_chunk::<AHEAD>)
+            && let Some(value) = codes.value(ONES, &mut means[index as usize % 2])
         {
-            if held <= 8 {
-                bits |= u32::from_be_bytes([one, two, three, 0]) >> held;
-                (held, read) = (held + 24, read + 3);
-            } else if held <= 16 {
-                bits |= u32::from_be_bytes([one, two, 0, 0]) >> held;
-                (held, read) = (held + 16, read + 2);
-            }
-            let (mut rest, mut ones) = (bits, 0);
-            while rest >> 31 == 1 && ones < ONES {
-                rest <<= 1;
-                ones += 1;
-            }
-            let mean = &mut means[index as usize % 2];
-            let count = mean.parameter();
-            // Rare ones, and those of which bits are missing.
-            if ones == ONES || ones + 1 + count > held {
-                break;
-            }
-            rest <<= 1;
-            // Shifted twice, since `count` may be 0.
-            let value = ones << count | rest >> 1 >> (31 - count);
-            (bits, held) = (rest << count, held - ones - 1 - count);
-            mean.add(value);
             let end = end_of(x, index, value, unit).min(width);
             if index % 2 == 1 {
                 (first, last) = (first.min(x), end);
@@ -223,11 +200,9 @@ impl Across {
             rows.inked.add((first / 8) as usize, last.div_ceil(8) as usize);
         }
         (self.x, self.index) = (x, index);
-        // Whole bytes can only be of this input: there were fewer than eight bits before it.
-        let back = held / 8;
-        held %= 8;
-        (self.bits, self.held) = (bits & !(u32::MAX >> held), held);
-        read - back as usize
+        let read;
+        (self.bits, self.held, read) = codes.end();
+        read
     }
 
     /// Takes at most 31 bits that are held.

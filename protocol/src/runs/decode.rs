@@ -2,9 +2,9 @@
 
 use super::across::{Across, Stop};
 use super::canvas::{Canvas, Laid};
-use super::rice::{ESCAPE, Mean};
+use super::rice::{Ahead, ESCAPE, Mean};
 use super::rows::{Inked, Rows};
-use super::{AHEAD, MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
+use super::{MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
 use crate::walk::{Placed, PlacedBand, Tile};
 
 /// What is wrong with a stream.
@@ -356,48 +356,22 @@ impl Runs {
         (read, self.tile.is_none())
     }
 
-    /// Reads codes while they are short and complete, and returns how much was read. To be called between two codes. Most of
-    /// the time is spent here: the bits are read a word ahead, and the surplus is given back at the end.
+    /// Reads codes while they are short and complete, and returns how much was read. To be called between two codes.
     fn read_codes(&mut self, input: &[u8], place: &mut Place<'_>) -> usize {
         let len = place.band.len();
-        let (mut bits, mut held, mut read) = (self.bits, self.held, 0);
+        let mut codes = Ahead::new(input, self.bits, self.held);
         let mut runs = 0;
         while self.done < len
             && !self.pause
-            && let Some(&[one, two, three, ..]) = input.get(read..).and_then(<[u8]>::first_chunk::<AHEAD>)
+            && let Some(value) = codes.value(ESCAPE, &mut self.means[self.index as usize % 2])
         {
-            if held <= 8 {
-                bits |= u32::from_be_bytes([one, two, three, 0]) >> held;
-                (held, read) = (held + 24, read + 3);
-            } else if held <= 16 {
-                bits |= u32::from_be_bytes([one, two, 0, 0]) >> held;
-                (held, read) = (held + 16, read + 2);
-            }
-            let (mut rest, mut ones) = (bits, 0);
-            while rest >> 31 == 1 && ones < ESCAPE {
-                rest <<= 1;
-                ones += 1;
-            }
-            let mean = &mut self.means[self.index as usize % 2];
-            let count = mean.parameter();
-            // Rare ones, and those of which bits are missing.
-            if ones == ESCAPE || ones + 1 + count > held {
-                break;
-            }
-            rest <<= 1;
-            // Shifted twice, since `count` may be 0.
-            let value = ones << count | rest >> 1 >> (31 - count);
-            (bits, held) = (rest << count, held - ones - 1 - count);
-            mean.add(value);
             self.run(value + self.minimum, len, place);
             runs += 1;
             self.pause |= runs == MOST_RUNS;
         }
-        // Whole bytes can only be of this input: there were fewer than eight bits before it.
-        let back = held / 8;
-        held %= 8;
-        (self.bits, self.held) = (bits & !(u32::MAX >> held), held);
-        read - back as usize
+        let read;
+        (self.bits, self.held, read) = codes.end();
+        read
     }
 
     fn drop(&mut self, count: u32) {

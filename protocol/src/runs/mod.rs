@@ -83,9 +83,6 @@ mod form {
     pub const ACROSS: u8 = 3;
 }
 
-/// Bytes that are looked at ahead of a code.
-const AHEAD: usize = 3;
-
 /// Runs that are decoded before others may run: 6 µs each at most on a microcontroller.
 const MOST_RUNS: u32 = 64;
 

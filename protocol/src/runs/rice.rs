@@ -1,4 +1,4 @@
-//! The adaptive parameter of the Rice codes, the same on both sides.
+//! Adaptive Rice codes: the parameter, the same on both sides, and a quick way to read short codes.
 
 /// Ones that announce a plain value.
 pub(super) const ESCAPE: u32 = 20;
@@ -38,5 +38,59 @@ impl Mean {
         while self.parameter > 0 && self.count << (self.parameter - 1) >= self.sum {
             self.parameter -= 1;
         }
+    }
+}
+
+/// Bytes that are looked at ahead of a code.
+const AHEAD: usize = 3;
+
+/// Reads short codes from a word of bits. Most of a decoder's time is spent here.
+pub(super) struct Ahead<'i> {
+    input: &'i [u8],
+    read: usize,
+    bits: u32,
+    held: u32,
+}
+
+impl<'i> Ahead<'i> {
+    /// Goes on behind `held` bits, fewer than eight, which stand at the top of `bits`.
+    pub(super) fn new(input: &'i [u8], bits: u32, held: u32) -> Ahead<'i> {
+        Ahead { input, read: 0, bits, held }
+    }
+
+    /// The next value, of a code with fewer than `escape` ones. None if there are as many, or if the input may not have all of the
+    /// code: nothing has been read of it then.
+    #[inline(always)]
+    pub(super) fn value(&mut self, escape: u32, mean: &mut Mean) -> Option<u32> {
+        let &[one, two, three] = self.input.get(self.read..)?.first_chunk::<AHEAD>()?;
+        if self.held <= 8 {
+            self.bits |= u32::from_be_bytes([one, two, three, 0]) >> self.held;
+            (self.held, self.read) = (self.held + 24, self.read + 3);
+        } else if self.held <= 16 {
+            self.bits |= u32::from_be_bytes([one, two, 0, 0]) >> self.held;
+            (self.held, self.read) = (self.held + 16, self.read + 2);
+        }
+        let (mut rest, mut ones) = (self.bits, 0);
+        while rest >> 31 == 1 && ones < escape {
+            rest <<= 1;
+            ones += 1;
+        }
+        let count = mean.parameter();
+        if ones == escape || ones + 1 + count > self.held {
+            return None;
+        }
+        rest <<= 1;
+        // Shifted twice, since `count` may be 0.
+        let value = ones << count | rest >> 1 >> (31 - count);
+        (self.bits, self.held) = (rest << count, self.held - ones - 1 - count);
+        mean.add(value);
+        Some(value)
+    }
+
+    /// Gives back whole bytes, which can only be of this input: the bits that are held, how many, fewer than eight, and the bytes
+    /// read.
+    pub(super) fn end(self) -> (u32, u32, usize) {
+        let held = self.held % 8;
+        (self.bits & !(u32::MAX >> held), held, self.read - self.held as usize / 8)
     }
 }
