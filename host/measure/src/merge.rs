@@ -30,6 +30,9 @@ const COMPARABLE: usize = 150;
 const MOST_RATIO: f64 = 0.4;
 /// A difference of ratios between dark and bright tones that linear values do not have.
 const BENT: f64 = 0.06;
+/// Below so many standard deviations of noise a photograph is not used where longer ones are: sensors cut noise off at zero, so that
+/// it reads too bright, and it has next to no weight.
+const DARK: f32 = 4.0;
 /// Shifts below this many pixels are left alone.
 const STILL: f64 = 0.05;
 
@@ -440,7 +443,11 @@ impl Sums {
                         let v = response.linear(c, code);
                         let expected = if weight[i] > 0.0 { value[i] / weight[i] * time } else { v };
                         let step = response.step(c, code);
-                        let w = time * time / (noise.variance(expected) + step * step / 6.0).max(1e-20);
+                        let variance = (noise.variance(expected) + step * step / 6.0).max(1e-20);
+                        if weight[i] > 0.0 && expected * expected < DARK * DARK * variance {
+                            continue;
+                        }
+                        let w = time * time / variance;
                         value[i] += w * v / time;
                         weight[i] += w;
                     }
