@@ -32,6 +32,19 @@ fn stacks_are_predicted_and_say_so_everywhere() {
         assert!(shown.contains(word), "`{word}` is not in:\n{shown}");
     }
     assert!(bench.done("inks check full").contains("0 errors"));
+    small_document(&bench.path("tile"));
+    let said = bench.done("print tile --size 12x8mm --library few --trust measured -o printed");
+    assert!(said.contains("of the difference lies within your measurement"), "{said}");
+    let report = fs::read_to_string(bench.path("printed/report.json")).expect("a report");
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let measurement = &report["gamut"]["measurement"];
+    let share = |name: &str| measurement[name].as_f64().expect("a number");
+    // All nine curves say that they are uncertain by 1.5 %.
+    assert!(share("known") > 0.99 && share("deviation") < 0.01 && share("within") < 0.5, "{measurement}");
+    let page = fs::read_to_string(bench.path("printed/report.html")).expect("a page");
+    assert!(page.contains("lies within your measurement"));
+    let said = bench.done("print tile --size 12x8mm -o modelled");
+    assert!(!said.contains("your measurement"), "{said}");
     let json: Value = serde_json::from_str(&bench.done("inks predict few -o full --json")).expect("JSON");
     let error = json["leave_one_out"].as_f64().expect("a number");
     // The curves have noise of 1.5 % and were made with figures the fit has to find.

@@ -17,6 +17,7 @@ mod judge;
 mod knots;
 pub mod lab;
 mod library;
+pub mod linear;
 mod lobes;
 pub mod model;
 mod open;

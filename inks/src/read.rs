@@ -3,15 +3,17 @@
 //! Findings are collected, so that an owner sees all of them at once; only a file that is not TOML with the expected keys
 //! stops the reading early. A library with errors is not returned.
 
+mod curves;
+
 use std::f64::consts::FRAC_PI_2;
 use std::io::Read;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 use protocol::ink::Ink;
 use toml::Spanned;
 
+use self::curves::Measured;
 use crate::albedo::{self, Albedo, INCIDENCES};
-use crate::curve::{Curve, CurveError};
 use crate::format::{DotsOf, DotsTable, FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
 use crate::judge;
 use crate::library::{Cartridge, Dots, Entry, Library};
@@ -20,7 +22,6 @@ use crate::problem::{Findings, Problem};
 use crate::provenance::{Figure, Provenance, Trust};
 use crate::rule::{Rule, Severity};
 use crate::stack::Stack;
-use crate::uncertainty::Uncertainty;
 
 /// The most stacks: a sheet numbers them with a byte.
 pub(crate) const MOST_STACKS: usize = 256;
@@ -66,14 +67,6 @@ struct Listing {
     stack: Stack,
     offset: Option<usize>,
     measured: Option<Measured>,
-}
-
-/// A measured or predicted curve as it was read.
-struct Measured {
-    curve: Curve,
-    uncertainty: Option<Uncertainty>,
-    provenance: Provenance,
-    file: PathBuf,
 }
 
 /// Reads the text of a library. The library of a folder can have curves and be based on the built-in one; the built-in
@@ -215,12 +208,12 @@ fn measurements(
             findings.error(Some(beyond.span().start), word, format!("more than {MOST_STACKS}"));
         }
         for table in tables.iter().take(MOST_STACKS) {
-            given(table.get_ref(), word, folder, wanted, findings);
+            curves::given(table.get_ref(), word, folder, wanted, findings);
         }
         named.extend(tables.iter().map(|table| table.get_ref().curve.get_ref().clone()));
     }
     if let Some(folder) = folder {
-        unused_curves(folder, &named, findings);
+        curves::unused(folder, &named, findings);
     }
 }
 
@@ -444,92 +437,6 @@ fn merge_rules(given: Vec<Spanned<Rule>>, rules: &mut Vec<Rule>, findings: &mut 
     }
 }
 
-/// Reads a `measured` or `predicted` curve and assigns it to its stack, which is appended to the list if it is new.
-fn given(
-    table: &MeasuredTable,
-    word: &str,
-    folder: Option<&Path>,
-    wanted: &mut Vec<Listing>,
-    findings: &mut Findings,
-) {
-    let owner = format!("{word} {}", table.stack.get_ref());
-    let offset = table.stack.span().start;
-    let stack = parse_stack(table.stack.get_ref(), &owner, offset, findings);
-    provenance(&owner, &format!("{word} curve"), [&table.by, &table.when, &table.setup], findings);
-    let field = format!("{owner}.curve");
-    let curve = match curve_path(folder, table.curve.get_ref()) {
-        Ok(path) => curve(&path, findings, table.curve.span().start, &field).map(|(c, u)| (c, u, path)),
-        Err(problem) => {
-            findings.error(Some(table.curve.span().start), field, problem);
-            None
-        }
-    };
-    let (Some(stack), Some((curve, uncertainty, file))) = (stack, curve) else { return };
-    let (by, when, setup) =
-        (table.by.get_ref().clone(), table.when.get_ref().clone(), table.setup.get_ref().clone());
-    let provenance = match word {
-        "measured" => Provenance::Measured { by, when, setup },
-        _ => Provenance::Predicted { by, when, setup },
-    };
-    let place = wanted.iter().position(|want| want.stack == stack).unwrap_or_else(|| {
-        wanted.push(Listing { stack, offset: Some(offset), measured: None });
-        wanted.len() - 1
-    });
-    if let Some(other) = &wanted[place].measured {
-        let problem = match other.provenance.word() {
-            other if other == word => format!("is {word} twice"),
-            other => format!("is {other} as well; a stack has one curve"),
-        };
-        findings.error(Some(offset), owner, problem);
-    }
-    wanted[place].offset.get_or_insert(offset);
-    wanted[place].measured = Some(Measured { curve, uncertainty, provenance, file });
-}
-
-/// The path of a file inside the folder; names that lead out of it are errors.
-fn curve_path(folder: Option<&Path>, name: &str) -> Result<PathBuf, String> {
-    let folder = folder.ok_or("a library without a folder cannot have curve files")?;
-    let plain = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-    if name.is_empty() || !plain {
-        return Err(format!("`{name}` must be the name of a file inside the library's folder"));
-    }
-    Ok(folder.join(name))
-}
-
-/// Reads a curve and its standard deviations, if it has them.
-fn curve(
-    path: &Path,
-    findings: &mut Findings,
-    offset: usize,
-    field: &str,
-) -> Option<(Curve, Option<Uncertainty>)> {
-    let text = match text(path, MOST_CURVE_BYTES) {
-        Ok(text) => text,
-        Err(problem) => {
-            findings.error(Some(offset), field, format!("{}: {problem}", path.display()));
-            return None;
-        }
-    };
-    let curve = Curve::from_csv(text.as_bytes(), path);
-    match curve.and_then(|curve| Ok((curve, Uncertainty::from_csv(&text, path)?))) {
-        Ok(read) => Some(read),
-        Err(CurveError::Csv { path, line, problem }) => {
-            findings.found.push(Problem {
-                file: path,
-                line: usize::try_from(line).ok().filter(|&line| line > 0),
-                field: field.into(),
-                severity: Severity::Error,
-                text: problem,
-            });
-            None
-        }
-        Err(error) => {
-            findings.error(Some(offset), field, error.to_string());
-            None
-        }
-    }
-}
-
 /// `YYYY-MM` or `YYYY-MM-DD`, with a month and a day that exist in some year.
 fn is_date(text: &str) -> bool {
     let number = |part: &str, digits: usize| -> Option<u32> {
@@ -544,26 +451,6 @@ fn is_date(text: &str) -> bool {
     number(year, 4).is_some()
         && number(month, 2).is_some_and(|month| (1..=12).contains(&month))
         && number(day, 2).is_some_and(|day| (1..=31).contains(&day))
-}
-
-/// Warns about curves in the folder that the library does not use, probably by mistake.
-fn unused_curves(folder: &Path, named: &[String], findings: &mut Findings) {
-    let Ok(list) = std::fs::read_dir(folder) else { return };
-    let mut unused: Vec<PathBuf> = list
-        .filter_map(|file| Some(file.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")))
-        .filter(|path| !named.iter().any(|name| folder.join(name) == *path))
-        .collect();
-    unused.sort();
-    for file in unused.into_iter().take(100) {
-        findings.found.push(Problem {
-            file,
-            line: None,
-            field: String::new(),
-            severity: Severity::Warning,
-            text: "this curve is not used by any `[[measured]]` or `[[predicted]]`".into(),
-        });
-    }
 }
 
 /// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. Lobes grow as 1 / cos toward

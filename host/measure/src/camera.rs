@@ -152,10 +152,9 @@ pub fn solve(photos: &[Vec<Seen>], (width, height): (usize, usize), known: &Know
     let mut damping = 1e-3;
     let start_focal = focal;
     let mut normal = Vec::new();
-    let mut sigma = 0.5;
     for step in 0..STEPS {
         let base = state.residuals(photos)?;
-        sigma = spread(&base).max(LEAST_ERROR);
+        let sigma = spread(&base).max(LEAST_ERROR);
         let weights: Vec<Vec<f64>> = base
             .iter()
             .map(|photo| {
@@ -182,11 +181,7 @@ pub fn solve(photos: &[Vec<Seen>], (width, height): (usize, usize), known: &Know
         let old = cost(&state, &base);
         let mut done = true;
         for _ in 0..10 {
-            let mut damped = normal.clone();
-            for i in 0..n {
-                damped[i * n + i] *= 1.0 + damping;
-            }
-            let Some(factors) = Cholesky::new(&damped, n) else {
+            let Some(factors) = Cholesky::damped(&normal, n, damping) else {
                 damping = (damping * 10.0).max(1e-6);
                 continue;
             };
@@ -205,7 +200,7 @@ pub fn solve(photos: &[Vec<Seen>], (width, height): (usize, usize), known: &Know
             break;
         }
     }
-    state.finished(photos, &normal, sigma)
+    state.finished(photos, &normal)
 }
 
 /// A quantity that is known beforehand: its deviation in standard errors and the slopes of that.
@@ -321,7 +316,7 @@ impl State {
         priors
     }
 
-    fn finished(self, photos: &[Vec<Seen>], normal: &[f64], sigma: f64) -> Option<Camera> {
+    fn finished(self, photos: &[Vec<Seen>], normal: &[f64]) -> Option<Camera> {
         let n = LENS + 6 * photos.len();
         let residuals = self
             .residuals(photos)?
@@ -329,7 +324,6 @@ impl State {
             .map(|r| (2.0 * r.iter().map(|r| r * r).sum::<f64>() / r.len() as f64).sqrt())
             .collect();
         // Weights hold 1 / sigma^2 already.
-        let _ = sigma;
         let factors = Cholesky::new(normal, n)?;
         let mut position = vec![0.0; photos.len()];
         let mut focal = 0.0;

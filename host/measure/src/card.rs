@@ -304,7 +304,8 @@ mod tests {
                 }
             }
         }
-        Radiance { width, height, variance: vec![1e-9; value.len()], bound: vec![0; width * height], value }
+        let none = vec![0; width * height];
+        Radiance { width, height, variance: vec![1e-9; value.len()], bound: none.clone(), first: none, value }
     }
 
     #[test]

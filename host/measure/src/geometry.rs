@@ -7,6 +7,7 @@
 
 use crate::MeasureError;
 use crate::setup::{Setup, Shape};
+use crate::slips::Slips;
 
 pub(crate) type Vector = [f64; 3];
 
@@ -96,6 +97,8 @@ pub(crate) enum Unknown {
     Depth,
     /// A coordinate of a light in mm.
     Light(usize, usize),
+    /// A coordinate in pixels of a photograph against where it was aligned to: its light, its place in the series, the axis.
+    Slip(usize, usize, usize),
 }
 
 /// Camera, sample, card and lights.
@@ -111,6 +114,7 @@ pub struct Scene {
     lights: Vec<Vector>,
     diameters: Vec<f64>,
     card: (Vector, Vector),
+    slips: Slips,
 }
 
 impl Scene {
@@ -176,6 +180,7 @@ impl Scene {
             lights: setup.light.iter().map(|light| light.position_mm).collect(),
             diameters: setup.light.iter().map(|light| light.diameter_mm).collect(),
             card: (setup.card.position_mm.unwrap_or(sample.centre_mm), unit(facing)),
+            slips: Slips::default(),
         })
     }
 
@@ -194,6 +199,12 @@ impl Scene {
         self.diameters[light]
     }
 
+    /// The same scene for photographs that may lie aside from where they were aligned to.
+    #[must_use]
+    pub(crate) fn with_slips(self, slips: Slips) -> Scene {
+        Scene { slips, ..self }
+    }
+
     /// The scene with one measure changed.
     #[must_use]
     pub(crate) fn changed(mut self, what: Unknown, by: f64) -> Scene {
@@ -206,6 +217,7 @@ impl Scene {
             Unknown::Across => self.centre = along(self.centre, by, self.frame[0]),
             Unknown::Depth => self.centre = along(self.centre, by, self.frame[2]),
             Unknown::Light(light, axis) => self.lights[light][axis] += by,
+            Unknown::Slip(light, shot, axis) => self.slips.shift(light, shot, axis, by),
         }
         self
     }
@@ -264,6 +276,12 @@ impl Scene {
         Some(self.view_of(p, n, self.lights[light]))
     }
 
+    /// What a pixel sees of which this photograph of the series is the first that is not full.
+    pub(crate) fn seen(&self, x: f64, y: f64, light: usize, first: u8) -> Option<View> {
+        let [dx, dy] = self.slips.at(light, first);
+        self.view(x + dx, y + dy, light)
+    }
+
     /// The place of the sample's surface that a pixel sees, unrolled: across (along the arc of a can) and along its axis in mm, from the middle
     /// of the side that faces the camera.
     pub(crate) fn unrolled(&self, x: f64, y: f64) -> Option<[f64; 2]> {
@@ -289,8 +307,15 @@ impl Scene {
     }
 
     /// The same under a part of the lamp that is off its middle by these millimetres, across the light's way.
-    pub(crate) fn view_under(&self, x: f64, y: f64, light: usize, off: [f64; 2]) -> Option<View> {
-        let (p, n) = self.hit(self.camera.ray(x, y))?;
+    pub(crate) fn seen_under(
+        &self,
+        [x, y]: [f64; 2],
+        light: usize,
+        first: u8,
+        off: [f64; 2],
+    ) -> Option<View> {
+        let [dx, dy] = self.slips.at(light, first);
+        let (p, n) = self.hit(self.camera.ray(x + dx, y + dy))?;
         let lamp = self.lights[light];
         let way = unit(along(p, -1.0, lamp));
         let side = unit(cross(way, if way[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [1.0, 0.0, 0.0] }));

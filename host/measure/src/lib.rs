@@ -48,6 +48,7 @@ pub mod resolution;
 mod response;
 mod scan;
 pub mod setup;
+mod slips;
 mod smooth;
 mod solve;
 

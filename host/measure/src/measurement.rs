@@ -20,6 +20,7 @@ use crate::photo;
 use crate::pictures::Copy;
 use crate::reduce::{self, Kind, Pixel, Reduced, Row};
 use crate::setup::{Setup, Shape, Trust};
+use crate::slips::Slips;
 use crate::solve::{self, Measure, Sample, Solved};
 
 /// Pixels that correct the geometry.
@@ -30,6 +31,8 @@ const HIGHLIGHT: f64 = 5.0;
 const FEWEST: usize = 200;
 /// A correction beyond this many tolerances is a mistake.
 const MISTAKE: f64 = 3.0;
+/// What the alignment of photographs that were moved may leave, in pixels.
+const SLIP: f64 = 0.15;
 /// Places on the outline that are enough to judge the radius by.
 const OUTLINED: usize = 8;
 /// Deviation of pixels of one half angle that is worth a word.
@@ -177,8 +180,14 @@ pub fn measure(
     }
     observer.end();
     let Some((_, scene)) = scene else { return Err(MeasureError::Scene("no photographs".into())) };
+    let scene = scene.with_slips(Slips::new(seen.iter().map(|seen| exposures(&seen.series.shots))));
     covered(&scene, &stacks, &seen)?;
     finish(setup, &scene, &stacks, seen, observer)
+}
+
+/// Relative exposures of a series.
+fn exposures(shots: &[Shot]) -> Vec<f64> {
+    shots.iter().map(|shot| shot.seconds * shot.ratio).collect()
 }
 
 /// Where the stacks of a setup file are.
@@ -261,7 +270,7 @@ fn covered(scene: &Scene, stacks: &[Stack], seen: &[Seen]) -> Result<(), Measure
 }
 
 /// What the pictures may correct, with the setup's tolerances.
-fn measures(setup: &Setup) -> Vec<Measure> {
+fn measures(setup: &Setup, seen: &[Seen]) -> Vec<Measure> {
     let sample = &setup.sample;
     let tilt = sample.tilt_tolerance_deg.to_radians();
     let mut measures = vec![(Unknown::Nod, tilt), (Unknown::Depth, sample.centre_tolerance_mm)];
@@ -277,6 +286,11 @@ fn measures(setup: &Setup) -> Vec<Measure> {
     for (i, light) in setup.light.iter().enumerate() {
         measures.extend((0..3).map(|axis| (Unknown::Light(i, axis), light.tolerance_mm)));
     }
+    for (i, seen) in seen.iter().enumerate() {
+        let moved: Vec<bool> = seen.series.shots.iter().map(|shot| shot.shift != [0.0; 2]).collect();
+        let shots = (0..moved.len()).filter(|&k| moved[k]);
+        measures.extend(shots.flat_map(|k| [0, 1].map(|axis| (Unknown::Slip(i, k, axis), SLIP))));
+    }
     measures
 }
 
@@ -288,7 +302,7 @@ fn samples(scene: &Scene, seen: &[Seen], patches: usize) -> Vec<Sample> {
         .flat_map(|seen| seen.pixels.iter().enumerate().flat_map(|(i, p)| p.iter().map(move |p| (i, p))))
     {
         let mean = pixel.value.iter().sum::<f64>() / 3.0;
-        let Some(view) = scene.view(pixel.x, pixel.y, pixel.light) else { continue };
+        let Some(view) = scene.seen(pixel.x, pixel.y, pixel.light, pixel.first) else { continue };
         if pixel.bound != 0 || mean <= 0.0 {
             continue;
         }
@@ -301,6 +315,7 @@ fn samples(scene: &Scene, seen: &[Seen], patches: usize) -> Vec<Sample> {
             light: pixel.light,
             patch,
             ln: mean.ln(),
+            first: pixel.first,
             sigma: variance.sqrt(),
         });
     }
@@ -327,6 +342,9 @@ fn describe(measures: &[Measure], solved: &Solved) -> Vec<Corrected> {
         Unknown::Across => ("middle of the sample, to the right".to_owned(), 1.0, "mm"),
         Unknown::Depth => ("middle of the sample, to the camera".to_owned(), 1.0, "mm"),
         Unknown::Light(i, axis) => (format!("lamp {}, {}", i + 1, ["x", "y", "z"][axis]), 1.0, "mm"),
+        Unknown::Slip(i, k, axis) => {
+            (format!("lamp {}, photograph {}, {}", i + 1, k + 1, ["across", "down"][axis]), 1.0, "pixels")
+        }
     };
     let rows = measures.iter().enumerate().map(|(k, (what, tolerance))| {
         let (name, factor, unit) = name(*what);
@@ -368,6 +386,11 @@ fn mistakes(
         }
     }
     match describe(measures, solved).into_iter().enumerate().find(|(k, _)| far(*k)) {
+        Some((k, wrong)) if matches!(measures[k].0, Unknown::Slip(..)) => Err(MeasureError::Scene(format!(
+            "the photographs do not fit each other: {} is off by {:.1} pixels after they were aligned; put the camera on a tripod and \
+             photograph the series again",
+            wrong.name, wrong.by
+        ))),
         Some((_, wrong)) => Err(MeasureError::Scene(format!(
             "the pictures do not fit the setup file: {} is off by {:.1} {}, and its tolerance is {:.1}; measure the setup again",
             wrong.name, wrong.by, wrong.unit, wrong.tolerance
@@ -384,7 +407,7 @@ fn finish(
     observer: &dyn Observer,
 ) -> Result<Taken, MeasureError> {
     observer.begin("fitting the geometry", 1);
-    let measures = measures(setup);
+    let measures = measures(setup, &seen);
     let outline: Vec<[f64; 2]> = seen.iter().flat_map(|seen| seen.outline.iter().copied()).collect();
     let solved = solve::solve(tape, &samples(tape, &seen, patches.len()), &outline, &measures);
     mistakes(setup, tape, &outline, &measures, &solved)?;

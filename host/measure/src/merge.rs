@@ -30,6 +30,9 @@ const COMPARABLE: usize = 150;
 const MOST_RATIO: f64 = 0.4;
 /// A difference of ratios between dark and bright tones that linear values do not have.
 const BENT: f64 = 0.06;
+/// Below so many standard deviations of noise a photograph is not used where longer ones are: sensors cut noise off at zero, so that
+/// it reads too bright, and it has next to no weight.
+const DARK: f32 = 4.0;
 /// Shifts below this many pixels are left alone.
 const STILL: f64 = 0.05;
 
@@ -64,6 +67,8 @@ pub struct Radiance {
     pub variance: Vec<f32>,
     /// For each pixel one bit a channel: the value is a lower bound.
     pub bound: Vec<u8>,
+    /// For each pixel the first photograph whose green is not full there, counted from the longest exposure; the last if all are.
+    pub first: Vec<u8>,
 }
 
 /// A photograph with its exposure, before it is read.
@@ -248,6 +253,7 @@ fn compare(
     let neighbours: Vec<Match> =
         (1..tones.len()).into_par_iter().map(|i| tones[i - 1].compare(&tones[i])).collect();
     let mut chain = vec![Link { shift: [0.0; 2], ratio: 0.0 }];
+    let mut alone = None;
     for (i, found) in (1..).zip(&neighbours) {
         let (name, path) = (exposures[i - 1].name(), &exposures[i].path);
         let largest = MOST_SHIFT * width as f64;
@@ -259,6 +265,7 @@ fn compare(
             ));
             let last = chain[i - 1];
             chain.push(last);
+            alone.get_or_insert(i);
             continue;
         }
         if strange(found) {
@@ -319,6 +326,17 @@ fn compare(
             ratio: last.ratio + ratio,
         });
     }
+    let moved = chain.iter().flat_map(|link| link.shift).fold(0.0f64, |most, d| most.max(d.abs()));
+    if let Some(i) = alone.filter(|_| moved > 0.0) {
+        return Err(MeasureError::photo(
+            &exposures[i].path,
+            format!(
+                "cannot be aligned: the camera moved by {moved:.1} pixels during the series, and too few tones are alike in this \
+                 photograph and {}; put the camera on a tripod and photograph the series again",
+                exposures[i - 1].name()
+            ),
+        ));
+    }
     // The photograph in the middle of the series is where the setup's positions hold.
     let middle = chain[chain.len() / 2].shift;
     for link in &mut chain {
@@ -349,18 +367,23 @@ struct Sums {
     value: Vec<f32>,
     weight: Vec<f32>,
     bound: Vec<u8>,
+    first: Vec<u8>,
+    /// Photographs added.
+    added: u8,
 }
 
 impl Sums {
     fn new((width, height): (usize, usize), noise: Noise, response: Response, white: [f32; 3]) -> Sums {
         let (value, weight) = (vec![0.0; 3 * width * height], vec![0.0; 3 * width * height]);
-        Sums { width, height, noise, response, white, value, weight, bound: vec![0; width * height] }
+        let (bound, first) = (vec![0; width * height], vec![0; width * height]);
+        Sums { width, height, noise, response, white, value, weight, bound, first, added: 0 }
     }
 
     /// Adds a photograph; `last` is the shortest exposure. Returns the share of pixels with a full channel.
     fn add(&mut self, photo: &Photo, time: f32, shift: [f64; 2], last: bool) -> f64 {
-        let Sums { width, height, noise, response, white, value, weight, bound } = self;
-        let (width, height) = (*width, *height);
+        let Sums { width, height, noise, response, white, value, weight, bound, first, added } = self;
+        let (width, height, own) = (*width, *height, *added);
+        *added = added.saturating_add(1);
         let still = shift.iter().all(|d| d.abs() < STILL);
         let kernel = shift.map(|d| catmull_rom((d - d.floor()) as f32));
         let base = shift.map(|d| d.floor() as i64);
@@ -390,10 +413,11 @@ impl Sums {
         let rows = value
             .par_chunks_mut(3 * width)
             .zip(weight.par_chunks_mut(3 * width))
-            .zip(bound.par_chunks_mut(width));
+            .zip(bound.par_chunks_mut(width))
+            .zip(first.par_chunks_mut(width));
         let full: usize = rows
             .enumerate()
-            .map(|(y, ((value, weight), bound))| {
+            .map(|(y, (((value, weight), bound), first))| {
                 let mut full = 0;
                 for x in 0..width {
                     let mut any = false;
@@ -407,13 +431,23 @@ impl Sums {
                                 value[i] = response.linear(c, CLIPPED * white[c]) / time;
                                 weight[i] = 1.0;
                                 bound[x] |= 1 << c;
+                                if c == 1 {
+                                    first[x] = own;
+                                }
                             }
                             continue;
+                        }
+                        if c == 1 && weight[i] == 0.0 {
+                            first[x] = own;
                         }
                         let v = response.linear(c, code);
                         let expected = if weight[i] > 0.0 { value[i] / weight[i] * time } else { v };
                         let step = response.step(c, code);
-                        let w = time * time / (noise.variance(expected) + step * step / 6.0).max(1e-20);
+                        let variance = (noise.variance(expected) + step * step / 6.0).max(1e-20);
+                        if weight[i] > 0.0 && expected * expected < DARK * DARK * variance {
+                            continue;
+                        }
+                        let w = time * time / variance;
                         value[i] += w * v / time;
                         weight[i] += w;
                     }
@@ -426,7 +460,7 @@ impl Sums {
     }
 
     fn finish(self) -> Radiance {
-        let Sums { width, height, mut value, mut weight, bound, .. } = self;
+        let Sums { width, height, mut value, mut weight, bound, first, .. } = self;
         value.par_iter_mut().zip(weight.par_iter_mut()).for_each(|(value, weight)| {
             if *weight > 0.0 {
                 *value /= *weight;
@@ -435,7 +469,7 @@ impl Sums {
                 *value = f32::NAN;
             }
         });
-        Radiance { width, height, value, variance: weight, bound }
+        Radiance { width, height, value, variance: weight, bound, first }
     }
 }
 

@@ -99,6 +99,8 @@ pub struct Pixel {
     pub variance: [f64; 3],
     /// A bit for each channel that is a lower bound.
     pub bound: u8,
+    /// The first photograph of the series that is not full there, counted from the longest exposure.
+    pub first: u8,
 }
 
 /// A curve from pixels.
@@ -157,8 +159,8 @@ fn predicted(scene: &Scene, pixel: &Pixel, view: &View, curve: &Logs) -> [f64; 3
         for i in [-1.0, 0.0, 1.0] {
             for off in lamps {
                 let off = off.map(|d| d * lamp);
-                let Some(view) = scene.view_under(pixel.x + i / 3.0, pixel.y + j / 3.0, pixel.light, off)
-                else {
+                let place = [pixel.x + i / 3.0, pixel.y + j / 3.0];
+                let Some(view) = scene.seen_under(place, pixel.light, pixel.first, off) else {
                     continue;
                 };
                 let f = value(curve, view.theta);
@@ -202,7 +204,7 @@ struct Bin {
 /// Pixels with their views, bin by bin, thinned to `MOST`.
 fn binned(scene: &Scene, pixels: &[Pixel]) -> Vec<Vec<(Pixel, View)>> {
     let mut bins: Vec<Vec<(Pixel, View)>> = vec![Vec::new(); BINS];
-    let seen: Vec<Option<View>> = pixels.par_iter().map(|p| scene.view(p.x, p.y, p.light)).collect();
+    let seen: Vec<Option<View>> = pixels.par_iter().map(|p| scene.seen(p.x, p.y, p.light, p.first)).collect();
     for (pixel, view) in pixels.iter().zip(seen) {
         if let Some(view) = view.filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON) {
             bins[(place(view.theta) as usize).min(BINS - 1)].push((*pixel, view));
@@ -336,7 +338,8 @@ fn shifts(scene: &Scene, pixels: &[Pixel], curve: &Logs, doubts: &[(Scene, Vec<f
     let means = |scene: &Scene, factors: Option<&[f64]>| -> Vec<Option<[f64; 3]>> {
         let mut values: Vec<Vec<[f64; 3]>> = vec![Vec::new(); BINS];
         for p in pixels.iter().step_by(step) {
-            let Some(v) = scene.view(p.x, p.y, p.light).filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON)
+            let Some(v) =
+                scene.seen(p.x, p.y, p.light, p.first).filter(|v| v.cos_i >= HORIZON && v.cos_o >= HORIZON)
             else {
                 continue;
             };
@@ -532,6 +535,7 @@ pub fn pixels(
                 f64::from(radiance.variance[3 * i + c]) / value(c).powi(2).max(1e-30)
             }),
             bound: radiance.bound[i],
+            first: radiance.first[i],
         }
     })
     .collect()

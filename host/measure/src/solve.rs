@@ -32,6 +32,8 @@ pub(crate) struct Sample {
     pub(crate) y: f64,
     pub(crate) light: usize,
     pub(crate) patch: usize,
+    /// The first photograph of the series that is not full there.
+    pub(crate) first: u8,
     /// Logarithm of the calibrated radiance.
     pub(crate) ln: f64,
     /// Its standard deviation.
@@ -72,7 +74,7 @@ fn deviations(scene: &Scene, samples: &[Sample], weights: &[f64], patches: usize
     let seen: Vec<Option<(f64, f64)>> = samples
         .iter()
         .map(|s| {
-            let view = scene.view(s.x, s.y, s.light)?;
+            let view = scene.seen(s.x, s.y, s.light, s.first)?;
             (view.cos_i > 0.05 && view.cos_o > 0.05).then(|| (node(view.theta), s.ln - view.irradiance.ln()))
         })
         .collect();
@@ -177,11 +179,7 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
         let old = cost(&(base, edge), &moved);
         let mut settled = true;
         for _ in 0..8 {
-            let mut damped = normal.clone();
-            for i in 0..n {
-                damped[i * n + i] *= 1.0 + damping;
-            }
-            let Some(factors) = Cholesky::new(&damped, n) else { break };
+            let Some(factors) = Cholesky::damped(&normal, n, damping) else { break };
             let by = factors.solve(&gradient);
             let next: Vec<f64> =
                 moved.iter().zip(&by).map(|(u, d)| (u + d.clamp(-3.0, 3.0)).clamp(-30.0, 30.0)).collect();
@@ -295,6 +293,7 @@ mod tests {
                     y,
                     light: 0,
                     patch: 0,
+                    first: 0,
                     ln: (f * view.irradiance).ln(),
                     sigma: 0.01,
                 });

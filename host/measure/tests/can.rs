@@ -1,11 +1,11 @@
 //! The circle closed: a printed chart of stacks round a can, its photographs, the library they give, and a document printed with it.
 //!
-//! The photographs are made here by a pinhole camera that shares nothing with the program: a ray for each part of a pixel, the can it
-//! meets, the dot of the wrapped sheet, that stack's curve, the inverse square of the lamp's distance, the noise and the 12
-//! bits of a sensor. What the ribbons really reflect differs from what the built-in library says. The program is told
+//! The photographs are made by a camera that shares nothing with the program: a ray for each part of a pixel, the can it
+//! meets, the dot of the wrapped sheet, that stack's curve, the inverse square of the lamp's distance. What the ribbons really reflect differs from what the built-in library says. The program is told
 //! where things stand by a tape that is a little off, and finds the stacks by the chart's marks.
 
-use std::f64::consts::PI;
+mod made;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -14,58 +14,24 @@ use appearance::brdf::Space;
 use appearance::gamut::{self, Mapped, Printable};
 use appearance::materials::Materials;
 use inks::{Library, Stack, ggx};
+use made::{Camera, Curves, DOTS_PER_MM, EYE, STACKS, V, chart, lit, stack, truth};
 use measure::measure;
 use measure::reduce::Kind;
 use measure::setup::Setup;
 use observe::Silent;
-use press::chart;
 use press::layout::{Layout, arrange};
-use press::sheet::{DotMap, Sheet};
+use press::sheet::DotMap;
 use protocol::paper::Paper;
-use rayon::prelude::*;
+use std::f64::consts::PI;
 
-type V = [f64; 3];
-
-const DOTS_PER_MM: f64 = 600.0 / 25.4;
-const SIZE: (usize, usize) = (1800, 900);
-const EYE: V = [0.0, 0.0, 1200.0];
-const FIELD_DEG: f64 = 14.0;
+const CAMERA: Camera =
+    Camera { size: (1800, 900), field_deg: 14.0, times: &[0.25, 0.0625, 0.0156, 0.0039, 0.00098], rays: 3 };
 const LAMP: V = [350.0, 30.0, 900.0];
 const RADIUS: f64 = 50.0;
 /// Where the chart's middle lies: along the arc and along the axis in mm, and its turn.
 const LIES: [f64; 3] = [9.5, 1.2, 0.012];
-const WHITE: V = [1.4, 1.0, 1.2];
-const TIMES: [f64; 5] = [0.25, 0.0625, 0.0156, 0.0039, 0.00098];
-/// The stacks of the chart.
-const STACKS: [&str; 4] = ["K", "MS", "MS+F", "MS+C"];
-
-fn dot(a: V, b: V) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn minus(a: V, b: V) -> V {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn unit(a: V) -> V {
-    a.map(|v| v / dot(a, a).sqrt())
-}
-
-fn stack(text: &str) -> Stack {
-    text.parse().unwrap()
-}
-
-/// What a stack really reflects: a diffuse part and a lobe that are not those of the library.
-fn truth(stack: &str, theta: f64) -> V {
-    let (diffuse, f0, alpha) = match stack {
-        "K" => ([0.03, 0.03, 0.032], [0.04; 3], 0.2),
-        "MS" => ([0.13, 0.13, 0.12], [0.5; 3], 0.33),
-        "MS+F" => ([0.08, 0.08, 0.075], [0.47; 3], 0.17),
-        "MS+C" => ([0.02, 0.07, 0.1], [0.06, 0.27, 0.4], 0.3),
-        _ => ([0.84, 0.85, 0.88], [0.04; 3], 0.28),
-    };
-    std::array::from_fn(|c| 0.96 * diffuse[c] / PI + f0[c] * ggx::lobe(theta, alpha))
-}
+/// Where the card begins at the left, and the width of its steps, in mm.
+const CARD: (f64, f64) = (70.0, 20.0);
 
 /// A library with these curves for the chart's stacks and paper.
 fn written(folder: &Path) -> Library {
@@ -89,39 +55,8 @@ fn written(folder: &Path) -> Library {
     Library::from_dir(folder).unwrap()
 }
 
-fn chart() -> Sheet {
-    let stacks: Vec<Stack> = STACKS.map(stack).to_vec();
-    let dots = chart::stacks(&stacks, Paper::A4, true).unwrap();
-    let paper = Paper::Custom { width: dots.width() as u16 + 100, length: dots.length() as u16 + 650 };
-    let layout = Layout { camera_marks: true, ..Layout::centred(paper) };
-    arrange(&dots, &layout, &Silent).unwrap().sheet
-}
-
-/// Curves at even steps.
-struct Curves(Vec<Vec<V>>);
-
-impl Curves {
-    fn new(dots: &DotMap) -> Curves {
-        let row =
-            |s: &Stack| (0..=2048).map(|i| truth(&s.to_string(), f64::from(i) / 2048.0 * 1.6)).collect();
-        Curves(dots.stacks().iter().map(row).collect())
-    }
-
-    fn at(&self, stack: usize, theta: f64) -> V {
-        let at = (theta / 1.6 * 2048.0).clamp(0.0, 2047.99);
-        let (a, b, t) = (self.0[stack][at as usize], self.0[stack][at as usize + 1], at.fract());
-        std::array::from_fn(|c| a[c] + t * (b[c] - a[c]))
-    }
-}
-
 /// The light from a direction of the camera: from the can, from the card beside it, or none.
 fn light(dots: &DotMap, curves: &Curves, d: V) -> V {
-    let lit = |p: V, n: V| {
-        let (to, away) = (minus(LAMP, p), minus(EYE, p));
-        let (l, v) = (unit(to), unit(away));
-        let h = unit(std::array::from_fn(|i| l[i] + v[i]));
-        (dot(n, h).clamp(-1.0, 1.0).acos(), 1e6 * dot(n, l).max(0.0) / dot(to, to))
-    };
     let (a, b, c) =
         (d[0] * d[0] + d[2] * d[2], EYE[0] * d[0] + EYE[2] * d[2], EYE[2] * EYE[2] - RADIUS * RADIUS);
     let root = b * b - a * c;
@@ -137,78 +72,25 @@ fn light(dots: &DotMap, curves: &Curves, d: V) -> V {
         if j < 0.0 || j >= length {
             return [0.0; 3];
         }
-        let (theta, irradiance) = lit(p, n);
+        let (theta, irradiance) = lit(p, n, LAMP);
         // Bare paper goes on round the can.
         let beside = i < 0.0 || i >= width;
         let own = if beside { 0 } else { usize::from(dots.index()[j as usize * dots.width() + i as usize]) };
         return curves.at(own, theta).map(|f| f * irradiance);
     }
-    let t = -EYE[2] / d[2];
-    let p: V = std::array::from_fn(|i| EYE[i] + t * d[i]);
-    if !(70.0..130.0).contains(&p[0]) || p[1].abs() > 12.0 {
-        return [0.0; 3];
-    }
-    let (_, irradiance) = lit(p, [0.0, 0.0, 1.0]);
-    [[0.9, 0.18, 0.036][((p[0] - 70.0) / 20.0) as usize] / PI * irradiance; 3]
-}
-
-fn focal() -> f64 {
-    0.5 * SIZE.0 as f64 / (0.5 * FIELD_DEG).to_radians().tan()
-}
-
-/// The series in a folder.
-fn photographed(dots: &DotMap, folder: &Path) {
-    let curves = Curves::new(dots);
-    let (width, height) = SIZE;
-    let radiance: Vec<V> = (0..width * height)
-        .into_par_iter()
-        .map(|i| {
-            let mut sum = [0.0; 3];
-            for k in 0..9 {
-                let part = |k: usize| (k as f64 + 0.5) / 3.0;
-                let (x, y) = ((i % width) as f64 + part(k % 3), (i / width) as f64 + part(k / 3));
-                let d = [(x - width as f64 / 2.0) / focal(), (height as f64 / 2.0 - y) / focal(), -1.0];
-                let seen = light(dots, &curves, d);
-                (0..3).for_each(|c| sum[c] += seen[c] / 9.0);
-            }
-            sum
-        })
-        .collect();
-    fs::create_dir_all(folder).unwrap();
-    TIMES.par_iter().enumerate().for_each(|(shot, time)| {
-        let mut state = 0x9e37_79b9_7f4a_7c15u64.wrapping_mul(shot as u64 + 3);
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1u64 << 53) as f64
-        };
-        let values: Vec<u16> = radiance
-            .iter()
-            .flat_map(|rgb| {
-                std::array::from_fn::<u16, 3, _>(|c| {
-                    let v = 90.0 * time * WHITE[c] * rgb[c];
-                    let normal = ((0..4).map(|_| random()).sum::<f64>() - 2.0) * 3f64.sqrt();
-                    let noisy = v + normal * (v / 20_000.0 + (1.5f64 / 4096.0).powi(2)).sqrt();
-                    16 * (4096.0 * noisy).round().clamp(0.0, 4095.0) as u16
-                })
-            })
-            .collect();
-        let picture = image::ImageBuffer::<image::Rgb<u16>, _>::from_raw(width as u32, height as u32, values);
-        picture.unwrap().save(folder.join(format!("exp_{shot}.png"))).unwrap();
-    });
+    made::card(d, CARD, LAMP)
 }
 
 /// What a tape says, and no word of where the stacks are.
 fn setup() -> Setup {
-    let (width, middle) = (SIZE.0 as f64, SIZE.1 as f64 / 2.0);
-    let px = |x: f64| width / 2.0 + x * focal() / EYE[2];
-    let card = [px(70.0), middle - 12.0 * focal() / EYE[2], px(130.0), middle + 12.0 * focal() / EYE[2]];
-    let times: String = TIMES.iter().enumerate().map(|(i, t)| format!("\"exp_{i}.png\" = {t}\n")).collect();
+    let (card, times) = (CAMERA.card_px(CARD), CAMERA.exposures("exp_"));
     Setup::parse(&format!(
         "format = 1\nby = \"A. Owner\"\nwhen = \"2026-11-02\"\n\
-         [camera]\nposition_mm = [0, 0, 1200]\nfield_of_view_deg = {FIELD_DEG}\n\
+         [camera]\nposition_mm = [0, 0, 1200]\nfield_of_view_deg = {}\n\
          [[light]]\nposition_mm = [353, 30, 898]\n\
          [sample]\nshape = \"cylinder\"\nradius_mm = 50.3\nheight_mm = 130\nchart = \"stacks.rgl\"\n\
-         [card]\nrectangle_px = {card:?}\n[exposures]\n{times}"
+         [card]\nrectangle_px = {card:?}\n[exposures]\n{times}",
+        CAMERA.field_deg
     ))
     .unwrap()
 }
@@ -268,11 +150,12 @@ fn fidelity(target: &Target, mapped: &Mapped, real: &Library) -> f64 {
 fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
     let folder = tempfile::tempdir().unwrap();
     let sheet = chart();
-    photographed(sheet.dots(), &folder.path().join("photos"));
     let photos = folder.path().join("photos");
+    let curves = Curves::new(sheet.dots());
+    CAMERA.photograph(&photos, "exp_", |d| light(sheet.dots(), &curves, d));
     // Another chart is not what is in the pictures.
     let stacks: Vec<Stack> = ["C", "MS"].map(stack).to_vec();
-    let dots = chart::stacks(&stacks, Paper::A4, true).unwrap();
+    let dots = press::chart::stacks(&stacks, Paper::A4, true).unwrap();
     let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
     let other = arrange(&dots, &layout, &Silent).unwrap().sheet;
     let said = measure(&photos, &setup(), Some(other.dots()), &Silent).err().unwrap().to_string();

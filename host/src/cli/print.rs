@@ -192,10 +192,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))?;
     }
+    let doubt = laid.halftoned.doubt;
     let advice = format!(
         "\nSeen from {EYE} m, print and document differ: average difference d = {:.3} (0.01: barely visible; 0.05: \
-         obvious).",
-        pictures.fidelity.mean
+         obvious).{}",
+        pictures.fidelity.mean,
+        doubt.map_or_else(String::new, |doubt| format!(" {doubt}."))
     );
     let halftone = Halftone::measured(&laid, observer)?;
     let page = report::page(&report::Subject {
@@ -204,6 +206,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         materials: &laid.halftoned.mapped.report.materials,
         kind: kind(&laid),
         fidelity: (&pictures.fidelity, EYE),
+        doubt,
         look: halftone.look.as_ref(),
         tones: &halftone.tones,
         spectrum: halftone.spectrum.as_ref(),
@@ -324,7 +327,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, dots: &Halftone) -> Value {
         "gamut": {
             "intent": mapped.intent, "light_weight": settings.gamut.light,
             "uses_bases": mapped.intent.uses_bases(), "gloss_scale": mapped.gloss_scale, "materials": materials,
-            "given_up": given_up, "pixels": pixels,
+            "given_up": given_up, "pixels": pixels, "measurement": halftoned.doubt,
             "foils": halftoned.foils.as_ref().map(|gain| json!({
                 "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),
                 "distance_with": gain.after, "distance_without": gain.before,

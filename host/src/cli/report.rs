@@ -8,7 +8,7 @@ use std::fmt::{self, Write as _};
 
 use anyhow::Result;
 use appearance::brdf::{Space, plot};
-use appearance::gamut::MaterialReport;
+use appearance::gamut::{Doubt, MaterialReport};
 use press::halftone::metrics::{Look, Tone};
 use press::job::page::escape;
 use press::job::plan::{Plan, grouped};
@@ -44,6 +44,8 @@ pub struct Subject<'a> {
     pub kind: &'a str,
     /// Document and print as an eye sees them, and its distance in metres.
     pub fidelity: (&'a Fidelity, f64),
+    /// How much of the distance the measurement of the stacks leaves open, if they were measured.
+    pub doubt: Option<Doubt>,
     /// How the halftone looks, if it is large enough.
     pub look: Option<&'a Look>,
     /// Its tones.
@@ -99,7 +101,7 @@ fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result 
          <a href=\"materials.png\"><img alt=\"materials before and after mapping, as balls\" src=\"materials.png\"></a>\n"
     )?;
     write_gamut(subject, plots, page)?;
-    write_errors(fidelity, eye, page)?;
+    write_errors(fidelity, eye, subject.doubt, page)?;
     write_halftone(subject, page)?;
     writeln!(page, "<h2>Passes</h2>\n<div class=\"many passes\">")?;
     for pass in &plan.passes {
@@ -139,7 +141,7 @@ fn write_gamut(subject: &Subject, plots: &[String], page: &mut String) -> fmt::R
     writeln!(page, "</div>")
 }
 
-fn write_errors(fidelity: &Fidelity, eye: f64, page: &mut String) -> fmt::Result {
+fn write_errors(fidelity: &Fidelity, eye: f64, doubt: Option<Doubt>, page: &mut String) -> fmt::Result {
     let row = |name: &str, value: f64| format!("<tr><td>{name}<td class=\"n\">{value:.3}");
     writeln!(
         page,
@@ -149,7 +151,8 @@ fn write_errors(fidelity: &Fidelity, eye: f64, page: &mut String) -> fmt::Result
         row("95 % of places below", fidelity.p95),
         row("largest d", fidelity.max),
         row("light, root mean square", fidelity.light_rmse)
-    )
+    )?;
+    doubt.map_or(Ok(()), |doubt| writeln!(page, "<p>{doubt}.</p>"))
 }
 
 fn write_halftone(subject: &Subject, page: &mut String) -> fmt::Result {
@@ -304,6 +307,7 @@ mod tests {
             materials: &materials,
             kind: "basis",
             fidelity: (&fidelity, 0.5),
+            doubt: Some(Doubt { distance: 0.03, deviation: 0.006, within: 0.124, known: 0.96 }),
             look: None,
             tones: &[],
             spectrum: spectrum.as_ref(),
@@ -312,9 +316,15 @@ mod tests {
         assert!(text.contains("&lt;script&gt;alert(1)"));
         assert!(!text.contains("<script") && !text.contains("<img src=x"));
         assert_eq!(text.matches("<svg").count(), DRAWN + 1);
-        for part in
-            ["0.017", "0.456", "100 % MS+C", "preview-02-cyan.png", "plan.html", "finest an eye resolves"]
-        {
+        for part in [
+            "0.017",
+            "0.456",
+            "12 % of the difference lies within your measurement",
+            "100 % MS+C",
+            "preview-02-cyan.png",
+            "plan.html",
+            "finest an eye resolves",
+        ] {
             assert!(text.contains(part), "{part}");
         }
         assert!(!text.contains("NaN") && !text.contains("inf"));

@@ -7,6 +7,8 @@
 //! Cost: n^3 / 6 operations a step beside the caller's. Limits: a local minimum near the start. Priors of the caller keep the equations
 //! regular.
 
+use crate::linear::Cholesky;
+
 /// A symmetric matrix, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Matrix {
@@ -22,17 +24,9 @@ pub(super) struct Normal {
     pub curvature: Matrix,
 }
 
-/// A lower triangle whose product with its transpose is a matrix.
-#[derive(Clone, Debug)]
-pub(super) struct Factor(Matrix);
-
 impl Matrix {
     pub fn zero(n: usize) -> Matrix {
         Matrix { n, values: vec![0.0; n * n] }
-    }
-
-    pub fn at(&self, i: usize, j: usize) -> f64 {
-        self.values[i * self.n + j]
     }
 
     pub fn at_mut(&mut self, i: usize, j: usize) -> &mut f64 {
@@ -40,46 +34,8 @@ impl Matrix {
     }
 
     /// Its factor; `None` unless it is positive definite.
-    pub fn factor(&self) -> Option<Factor> {
-        let n = self.n;
-        let mut l = Matrix::zero(n);
-        for i in 0..n {
-            for j in 0..=i {
-                let known: f64 = (0..j).map(|k| l.at(i, k) * l.at(j, k)).sum();
-                let rest = self.at(i, j) - known;
-                *l.at_mut(i, j) = if i == j {
-                    if !(rest.is_finite() && rest > 0.0) {
-                        return None;
-                    }
-                    rest.sqrt()
-                } else {
-                    rest / l.at(j, j)
-                };
-            }
-        }
-        Some(Factor(l))
-    }
-}
-
-impl Factor {
-    /// Solves `L y = b`; the square of y is `b A^-1 b`.
-    pub fn forward(&self, b: &[f64]) -> Vec<f64> {
-        let mut y = b.to_vec();
-        for i in 0..self.0.n {
-            let known: f64 = (0..i).map(|k| self.0.at(i, k) * y[k]).sum();
-            y[i] = (y[i] - known) / self.0.at(i, i);
-        }
-        y
-    }
-
-    /// Solves `A x = b`.
-    pub fn solve(&self, b: &[f64]) -> Vec<f64> {
-        let mut x = self.forward(b);
-        for i in (0..self.0.n).rev() {
-            let known: f64 = (i + 1..self.0.n).map(|k| self.0.at(k, i) * x[k]).sum();
-            x[i] = (x[i] - known) / self.0.at(i, i);
-        }
-        x
+    pub fn factor(&self) -> Option<Cholesky> {
+        Cholesky::new(&self.values, self.n)
     }
 }
 
@@ -137,27 +93,25 @@ fn step(x: &[f64], here: &Normal, damping: f64, bounds: &[[f64; 2]]) -> Option<V
             (x[i] <= bounds[i][0] && downhill < 0.0) || (x[i] >= bounds[i][1] && downhill > 0.0)
         })
         .collect();
-    let mut damped = here.curvature.clone();
+    let mut free = here.curvature.clone();
     let mut right: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
     for i in 0..n {
-        *damped.at_mut(i, i) *= 1.0 + damping;
         if held[i] {
             right[i] = 0.0;
             for j in 0..n {
-                *damped.at_mut(i, j) = 0.0;
-                *damped.at_mut(j, i) = 0.0;
+                *free.at_mut(i, j) = 0.0;
+                *free.at_mut(j, i) = 0.0;
             }
-            *damped.at_mut(i, i) = 1.0;
+            *free.at_mut(i, i) = 1.0;
         }
     }
-    let move_ = damped.factor()?.solve(&right);
+    let move_ = Cholesky::damped(&free.values, n, damping)?.solve(&right);
     Some((0..n).map(|i| (x[i] + move_[i]).clamp(bounds[i][0], bounds[i][1])).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     /// The normal equations of residuals, by differences.
     fn equations(residuals: &dyn Fn(&[f64]) -> Vec<f64>, x: &[f64]) -> Normal {
@@ -197,36 +151,5 @@ mod tests {
         assert!((free[0] - 1.0).abs() < 1e-5 && (free[1] - 1.0).abs() < 1e-5, "{free:?}");
         let bounded = least(&valley, vec![-1.2, 1.0], &[[-9.0, 0.5], [-9.0, 9.0]]);
         assert!((bounded[0] - 0.5).abs() < 1e-9 && (bounded[1] - 0.25).abs() < 1e-5, "{bounded:?}");
-    }
-
-    proptest! {
-        #[test]
-        fn factors_solve_their_matrix(entries in prop::collection::vec(-1.0f64..1.0, 25), b in prop::collection::vec(-1.0f64..1.0, 5)) {
-            let mut a = Matrix::zero(5);
-            for i in 0..5 {
-                for j in 0..5 {
-                    let dot: f64 = (0..5).map(|k| entries[5 * i + k] * entries[5 * j + k]).sum();
-                    *a.at_mut(i, j) = dot + if i == j { 0.1 } else { 0.0 };
-                }
-            }
-            let factor = a.factor().unwrap();
-            let x = factor.solve(&b);
-            for (i, b) in b.iter().enumerate() {
-                let found: f64 = (0..5).map(|j| a.at(i, j) * x[j]).sum();
-                prop_assert!((found - b).abs() < 1e-9);
-            }
-            let y = factor.forward(&b);
-            let inner: f64 = x.iter().zip(&b).map(|(x, b)| x * b).sum();
-            prop_assert!((y.iter().map(|y| y * y).sum::<f64>() - inner).abs() < 1e-9 * (1.0 + inner.abs()));
-        }
-    }
-
-    #[test]
-    fn a_matrix_that_is_not_positive_has_no_factor() {
-        let mut a = Matrix::zero(2);
-        *a.at_mut(0, 0) = 1.0;
-        assert!(a.factor().is_none());
-        *a.at_mut(1, 1) = f64::NAN;
-        assert!(a.factor().is_none());
     }
 }

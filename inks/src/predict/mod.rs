@@ -15,12 +15,14 @@ mod least_squares;
 
 use std::f64::consts::FRAC_PI_2;
 
+use protocol::ink::Kind;
 use serde::Serialize;
 
 use self::figures::Slot;
-use self::least_squares::{Factor, Matrix, Normal};
+use self::least_squares::{Matrix, Normal};
 use crate::curve::Curve;
 use crate::library::Library;
+use crate::linear::Cholesky;
 use crate::model::{ModelError, Optics};
 use crate::stack::Stack;
 use crate::uncertainty::SampleKind;
@@ -110,7 +112,7 @@ struct Fitted {
     optics: Optics,
     slots: Vec<Slot>,
     x: Vec<f64>,
-    factor: Factor,
+    factor: Cholesky,
     /// The factor on all standard deviations that the residuals ask for, at least 1.
     scale: f64,
 }
@@ -287,6 +289,63 @@ fn is_known(optics: &Optics, stack: &Stack, others: &[&Data]) -> bool {
     optics.lobes(stack).is_ok() && !stack.layers().is_empty() && stack.layers().iter().all(own)
 }
 
+/// What a sample of a left-out stack says of the model.
+#[derive(Clone, Copy, Debug)]
+struct Excess {
+    /// The squared difference of logarithms.
+    off: f64,
+    /// The variance that fit and measurement explain.
+    known: f64,
+    /// See [`filtered`].
+    filtered: f64,
+}
+
+/// What the model itself may be off, in logarithms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Misfit {
+    /// Variance of every sample.
+    even: f64,
+    /// Variance for each squared unit of [`filtered`].
+    filtering: f64,
+}
+
+impl Misfit {
+    /// The misfit that stacks which were left out show.
+    fn of(stacks: &[Vec<Excess>]) -> Misfit {
+        if stacks.is_empty() {
+            return Misfit { even: UNTESTED * UNTESTED, filtering: 0.0 };
+        }
+        // A straight line through what is not explained, over the squares. A square scatters as much as its mean, so samples count
+        // little where much is explained.
+        let mut sums = [0.0; 5];
+        for e in stacks.iter().flatten() {
+            let (x, y) = (e.filtered * e.filtered, e.off - e.known);
+            let weight = (e.known + MISFIT * MISFIT).powi(-2);
+            [1.0, x, y, x * x, x * y].into_iter().zip(&mut sums).for_each(|(v, sum)| *sum += weight * v);
+        }
+        let [_, x, y, xx, xy] = sums.map(|sum| sum / sums[0]);
+        let slope = ((xy - x * y) / (xx - x * x).max(1e-12)).max(0.0);
+        Misfit { even: (y - slope * x).max(MISFIT * MISFIT), filtering: slope }
+    }
+
+    /// Its standard deviation.
+    fn at(&self, filtered: f64) -> f64 {
+        (self.even + self.filtering * filtered * filtered).sqrt()
+    }
+}
+
+/// How far the light of a stack depends on what its layers do to each other: the logarithm of what its filters take away, times the
+/// number of layers that lie on others.
+fn filtered(optics: &Optics, stack: &Stack, theta: &[f64]) -> Result<Vec<[f64; 3]>, ModelError> {
+    let below: Vec<_> = stack.layers().iter().copied().filter(|ink| ink.kind() != Kind::Process).collect();
+    let overlaps = stack.layers().len().saturating_sub(1) as f64;
+    let (with, without) = (modelled(optics, stack, theta)?, modelled(optics, &Stack::new(below), theta)?);
+    let taken = |(with, without): (&[f64; 3], &[f64; 3])| {
+        std::array::from_fn(|c| overlaps * (without[c] - with[c]).max(0.0))
+    };
+    Ok(with.iter().zip(&without).map(taken).collect())
+}
+
 /// The root mean square of the relative differences between a model and a measurement.
 fn error(optics: &Optics, data: &Data) -> Result<f64, ModelError> {
     let model = modelled(optics, &data.stack, &data.theta)?;
@@ -319,11 +378,8 @@ impl Library {
                 None => (None, None),
                 Some(f) => (Some(error(&f.optics, d)?), Some(f.optics.lobes(&d.stack)?.curve(&grid()))),
             };
-            if let Some((f, off)) = without.as_ref().zip(left_out) {
-                let spread = f.spread(from, &d.stack, &d.theta);
-                let known =
-                    spread.iter().zip(&d.sigma).flat_map(|(a, b)| (0..3).map(|c| a[c] * a[c] + b[c] * b[c]));
-                excess.push((off * off - known.sum::<f64>() / (3 * d.theta.len()) as f64).max(0.0).sqrt());
+            if let Some(f) = &without {
+                excess.push(f.excess(from, d)?);
             }
             let (modelled, fitted) = (error(from, d)?, error(&fitted.optics, d)?);
             left.push(LeftOut { stack: d.stack.clone(), modelled, fitted, left_out, curve });
@@ -332,12 +388,12 @@ impl Library {
         let errors: Vec<f64> = left.iter().filter_map(|l| l.left_out).collect();
         let mean = |of: &[f64]| (of.iter().map(|e| e * e).sum::<f64>() / of.len() as f64).sqrt();
         let error = (!errors.is_empty()).then(|| mean(&errors));
-        let misfit = if excess.is_empty() { UNTESTED } else { mean(&excess).max(MISFIT) };
+        let misfit = Misfit::of(&excess);
         let modelled = self.entries().iter().filter(|entry| entry.lobes.is_some());
         let (known, unknown): (Vec<_>, Vec<_>) = modelled.partition(|e| is_known(from, &e.stack, &all));
         let stacks = known
             .into_iter()
-            .map(|entry| fitted.predict(from, &entry.stack, &all, misfit))
+            .map(|entry| fitted.predict(from, &entry.stack, &all, &misfit))
             .collect::<Result<_, _>>()?;
         Ok(Prediction {
             model: from.model.name.clone(),
@@ -373,20 +429,38 @@ impl Fitted {
         (0..theta.len()).map(|k| std::array::from_fn(|c| at(k, c))).collect()
     }
 
-    /// The curve of a stack and its standard deviations; `misfit` is what the model itself is off, as a share.
+    /// What the difference between this fit and a measurement exceeds what both say of themselves by.
+    fn excess(&self, from: &Optics, data: &Data) -> Result<Vec<Excess>, ModelError> {
+        let model = modelled(&self.optics, &data.stack, &data.theta)?;
+        let spread = self.spread(from, &data.stack, &data.theta);
+        let filtered = filtered(&self.optics, &data.stack, &data.theta)?;
+        let at = |k: usize, c: usize| Excess {
+            off: (model[k][c] - data.log[k][c]).powi(2),
+            known: spread[k][c].powi(2) + data.sigma[k][c].powi(2),
+            filtered: filtered[k][c],
+        };
+        let excess: Vec<Excess> = (0..data.theta.len()).flat_map(|k| (0..3).map(move |c| at(k, c))).collect();
+        Ok(excess)
+    }
+
+    /// The curve of a stack and its standard deviations.
     fn predict(
         &self,
         from: &Optics,
         stack: &Stack,
         data: &[&Data],
-        misfit: f64,
+        misfit: &Misfit,
     ) -> Result<Predicted, ModelError> {
         let theta = grid();
         let curve = self.optics.lobes(stack)?.curve(&theta);
         let spread = self.spread(from, stack, &theta);
-        let sigma =
-            |(s, v): (&[f64; 3], &[f64; 3])| std::array::from_fn(|c| s[c].hypot(misfit) * (v[c] + FLOOR));
-        let sigma = spread.iter().zip(curve.rgb()).map(sigma).collect();
+        let filtered = filtered(&self.optics, stack, &theta)?;
+        let sigma = |k: usize| {
+            std::array::from_fn(|c| {
+                spread[k][c].hypot(misfit.at(filtered[k][c])) * (curve.rgb()[k][c] + FLOOR)
+            })
+        };
+        let sigma = (0..theta.len()).map(sigma).collect();
         let shares = |d: &&&Data| d.stack.layers().iter().any(|ink| stack.layers().contains(ink));
         let from = data.iter().filter(shares).map(|d| d.stack.clone()).collect();
         Ok(Predicted { stack: stack.clone(), curve, sigma, from })

@@ -161,20 +161,28 @@ fn stacks_that_were_not_measured_are_predicted_within_their_bands() {
     assert_eq!(found.stacks.len() + found.unknown.len() + MEASURED.len(), 57);
 }
 
-/// Inks that do what the model does not know: resin on resin takes a fifth less, lobes have a second, wider part. The error is larger,
-/// leaving out finds most of it, and so the bands hold most of it.
+/// Inks that do what the model does not know: resin on resin takes less, lobes have a second, wider part. The error is larger,
+/// leaving out finds most of it, and so the bands hold most of it, also those of three process inks on each other, of which no stack
+/// was measured.
 #[test]
 fn what_the_model_cannot_express_widens_the_bands() {
+    for (lighter, haze) in [(0.1, 0.15), (0.05, 0.0)] {
+        unknown_to_the_model(lighter, haze);
+    }
+}
+
+/// Each layer of resin on another makes the exponent of the filters less by `lighter`; a lobe twice as wide has a share `haze`.
+fn unknown_to_the_model(lighter: f64, haze: f64) {
     let inks = other_inks();
     let truth = |stack: &Stack, t: f64| {
         let mut lobes = inks.lobes(stack).unwrap();
         let resin = stack.layers().iter().filter(|ink| ink.kind() == protocol::ink::Kind::Process).count();
-        let lighter = f64::from(u8::try_from(resin.saturating_sub(1)).unwrap());
-        lobes.kd = lobes.kd.map(|v| v.powf(1.0 - 0.1 * lighter));
+        let over = f64::from(u8::try_from(resin.saturating_sub(1)).unwrap());
+        lobes.kd = lobes.kd.map(|v| v.powf(1.0 - lighter * over));
         let haze = lobes
             .lobes
             .iter()
-            .map(|l| crate::Lobe { f0: l.f0.map(|v| 0.15 * v), alpha: (2.0 * l.alpha).min(1.0) });
+            .map(|l| crate::Lobe { f0: l.f0.map(|v| haze * v), alpha: (2.0 * l.alpha).min(1.0) });
         let haze: Vec<_> = haze.collect();
         lobes.lobes.extend(haze);
         lobes.at(t)
@@ -184,9 +192,18 @@ fn what_the_model_cannot_express_widens_the_bands() {
     let judged = judged(&found, &truth);
     let mean = |of: fn(&(f64, f64, f64)) -> f64| judged.iter().map(of).sum::<f64>() / judged.len() as f64;
     println!("mean error {:.3}, modelled {:.3}, inside {:.3}", mean(|j| j.0), mean(|j| j.1), mean(|j| j.2));
-    assert!(mean(|j| j.0) > 0.05 && mean(|j| j.0) < 0.5 * mean(|j| j.1));
-    // Stacks of three process inks, of which none was measured, are beyond their bands.
-    assert!(mean(|j| j.2) > 0.75, "{judged:?}");
+    assert!(mean(|j| j.0) < 0.5 * mean(|j| j.1) && mean(|j| j.2) > 0.9, "{judged:?}");
+    for name in ["C+M+Y", "C+M+Y+F"] {
+        let place = found.stacks.iter().position(|s| s.stack == name.parse().unwrap()).unwrap();
+        let Predicted { curve, sigma, .. } = &found.stacks[place];
+        let squares =
+            sigma.iter().zip(curve.rgb()).flat_map(|(s, v)| (0..3).map(|c| (s[c] / (v[c] + FLOOR)).powi(2)));
+        let band = (squares.sum::<f64>() / (3 * sigma.len()) as f64).sqrt();
+        let (off, _, inside) = judged[place];
+        println!("{name}: off by {off:.3}, {inside:.2} inside a band of {band:.3}");
+        // Wide enough, and not so wide that it says nothing.
+        assert!(inside > 0.85 && band < 3.0 * off, "{name}: {off}, {inside} inside {band}");
+    }
 }
 
 /// Leaving out: a stack whose ink no other has cannot be, and a wrong curve is found out by the others.

@@ -20,6 +20,22 @@ pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<
     document(&curve, path, space, source)
 }
 
+/// Opens a table of measurements of at most so many bytes, which `parse` averages over the difference angle.
+pub(super) fn averaged(
+    path: &Path,
+    space: Space,
+    mut source: Source<'_>,
+    most_bytes: u64,
+    parse: impl Fn(&[u8], &Path) -> Result<Curve, DocumentError>,
+) -> Result<Document, DocumentError> {
+    let bytes = source.read(path, most_bytes)?;
+    let averaged = parse(&bytes, path)?;
+    source.note(
+        "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),
+    );
+    document(&averaged, path, space, source)
+}
+
 /// The document of a curve read from `path`: a square of [`SWATCH_MM`] on a side.
 pub(super) fn document(
     curve: &Curve,

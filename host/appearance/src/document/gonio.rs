@@ -29,13 +29,8 @@ const MOST_WAVELENGTHS: usize = 1024;
 /// Cells of the half angle.
 const CELLS: usize = 64;
 
-pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
-    let bytes = source.read(path, MOST_BYTES)?;
-    let averaged = parse(&bytes, path)?;
-    source.note(
-        "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),
-    );
-    curve::document(&averaged, path, space, source)
+pub(super) fn open(path: &Path, space: Space, source: Source<'_>) -> Result<Document, DocumentError> {
+    curve::averaged(path, space, source, MOST_BYTES, parse)
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.

@@ -25,13 +25,8 @@ const HEADER: usize = 12;
 /// The largest file, in bytes.
 pub(super) const MOST_BYTES: u64 = HEADER as u64 + 24 * MOST_CELLS;
 
-pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
-    let bytes = source.read(path, MOST_BYTES)?;
-    let averaged = parse(&bytes, path)?;
-    source.note(
-        "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),
-    );
-    curve::document(&averaged, path, space, source)
+pub(super) fn open(path: &Path, space: Space, source: Source<'_>) -> Result<Document, DocumentError> {
+    curve::averaged(path, space, source, MOST_BYTES, parse)
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.

@@ -27,13 +27,8 @@ const THETA_H: usize = 90;
 /// Cells of theta_d and phi_d in the average.
 const CELLS: (usize, usize) = (36, 36);
 
-pub(super) fn open(path: &Path, space: Space, mut source: Source<'_>) -> Result<Document, DocumentError> {
-    let bytes = source.read(path, MOST_BYTES)?;
-    let averaged = parse(&bytes, path)?;
-    source.note(
-        "an isotropic material: measurements are averaged over the difference angle to a curve of the half angle".into(),
-    );
-    curve::document(&averaged, path, space, source)
+pub(super) fn open(path: &Path, space: Space, source: Source<'_>) -> Result<Document, DocumentError> {
+    curve::averaged(path, space, source, MOST_BYTES, parse)
 }
 
 /// The half-angle curve of a file's bytes; `path` names it in errors.

@@ -17,6 +17,7 @@ mod candidates;
 mod cartridges;
 mod choice;
 mod clamp;
+mod doubt;
 mod error;
 pub mod files;
 mod fitted;
@@ -35,6 +36,7 @@ mod tests;
 mod typical;
 
 pub use candidates::Printable;
+pub use doubt::{Doubt, doubt};
 pub use error::GamutError;
 pub use map::{Choice, Gain, choose, clamped, gain, map};
 pub use mix::{InkMix, MixError};

@@ -60,13 +60,14 @@ impl Picture {
 
     /// The same for the search of the grey card. Noise is not known here, and not needed.
     pub(crate) fn radiance(&self) -> Radiance {
-        let bound =
+        let bound: Vec<u8> =
             self.values.chunks_exact(3).map(|rgb| u8::from(rgb.iter().any(|v| *v >= self.full))).collect();
         Radiance {
             width: self.width,
             height: self.height,
             value: self.values.clone(),
             variance: vec![1e-12; self.values.len()],
+            first: vec![0; bound.len()],
             bound,
         }
     }

@@ -81,6 +81,21 @@ fn five_decades_come_back_with_their_variance() {
     assert!(radiance.bound.iter().all(|b| *b == 0));
 }
 
+/// Short exposures of dark ground are noise that the sensor cuts off at zero: a mean with them is too bright.
+#[test]
+fn dark_ground_is_not_made_brighter_by_short_exposures() {
+    let folder = tempfile::tempdir().unwrap();
+    let times = [1.0, 0.25, 0.06, 0.015, 0.004];
+    let exposures = times.map(|t| photograph(folder.path(), &format!("t{t}.png"), t, 30.0, (0, 0), false));
+    let (radiance, _) = merged(exposures.to_vec()).unwrap();
+    let (mut sum, mut expected) = (0.0, 0.0);
+    for (x, y) in (0..30).flat_map(|x| (0..240).map(move |y| (x, y))) {
+        sum += f64::from(radiance.value[3 * (y * 320 + x) as usize + 1]);
+        expected += 20_000.0 * light(x, y, 30.0);
+    }
+    assert!((sum / expected - 1.0).abs() < 0.005, "{}", sum / expected);
+}
+
 #[test]
 fn without_a_short_exposure_the_brightest_are_lower_bounds() {
     let folder = tempfile::tempdir().unwrap();

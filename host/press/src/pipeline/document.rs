@@ -12,7 +12,7 @@ use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
 use crate::sheet::DotMap;
 use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
-use appearance::gamut::{self, Gain, GamutError, Mapped, Printable};
+use appearance::gamut::{self, Doubt, Gain, GamutError, Mapped, Printable};
 use appearance::materials::{Reduced, resolution};
 use appearance::weights::WeightError;
 use observe::Observer;
@@ -43,6 +43,9 @@ pub struct Halftoned {
     pub dots: DotMap,
     /// What foils would bring, if the inks are the default, which leaves them out.
     pub foils: Option<Gain>,
+    /// How much of the distance between document and mixture lies within the measurement of the stacks, if one in use has
+    /// standard deviations.
+    pub doubt: Option<Doubt>,
 }
 
 /// Why a document does not become dots: the error of the stage that refused.
@@ -116,7 +119,8 @@ pub fn halftoned(
         true => foils(materials, library, &printable, &mapped, &settings.gamut)?,
         false => None,
     };
-    Ok(Halftoned { factoring, mapped, dots, foils })
+    let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
+    Ok(Halftoned { factoring, mapped, dots, foils, doubt })
 }
 
 /// What foils beside the default inks would bring.

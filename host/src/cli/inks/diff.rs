@@ -63,8 +63,8 @@ impl Row<'_> {
         let largest = &self.difference.largest;
         let times = match largest.ratio {
             ratio if (0.1..10.0).contains(&ratio) => format!("{:+.0} %", 100.0 * (ratio - 1.0)),
-            ratio if ratio > 1.0 => format!("x {ratio:.0}"),
-            ratio => format!("/ {:.0}", 1.0 / ratio),
+            ratio if ratio > 1.0 => format!("{ratio:.0} times the"),
+            ratio => format!("1/{:.0} of the", 1.0 / ratio),
         };
         format!("{times} {} at {:.0} deg", CHANNELS[largest.channel], largest.theta_deg)
     }
@@ -162,7 +162,7 @@ fn words(report: &Report<'_>) -> Result<String> {
     }
     text.push_str(
         "\nd is the difference people see (0.01: barely visible; 0.05: obvious). The band is the d that two standard\n\
-         deviations of the measurement make.\n",
+         deviations of the measurement make. The largest difference is that of the second to the first.\n",
     );
     Ok(text)
 }
