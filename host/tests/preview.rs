@@ -45,6 +45,26 @@ fn dots_and_jobs_show_the_print_alone() {
     assert!(said.contains("has printed dots and no document"), "{said}");
 }
 
+/// Steps copied from the page of a factored document are for that document.
+#[test]
+fn the_page_names_the_document_whose_bases_it_edits() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("factor tile -q --bases 2 -o tile.foil");
+    bench.done(&format!("preview tile.foil {SMALL} -o tile.html"));
+    let page = fs::read_to_string(bench.path("tile.html")).expect("a page");
+    let (_, rest) = page.split_once("\"fingerprint\":\"").expect("a fingerprint");
+    let steps = |fingerprint: &str| {
+        let text =
+            format!("format = 1\nfingerprint = \"{fingerprint}\"\n\n[[step]]\nbasis = 1\nrougher = 2.0\n");
+        fs::write(bench.path("steps.toml"), text).unwrap();
+    };
+    steps(&rest[..64]);
+    bench.done("edit tile.foil --steps steps.toml -q -o edited.foil");
+    steps(&"0".repeat(64));
+    bench.refused(1, "edit tile.foil --steps steps.toml -q -o other.foil");
+}
+
 /// Wear acts on documents, jobs and sheets alike: the same seed makes the same picture, another seed another one.
 #[test]
 fn a_worn_printer_prints_other_dots_and_says_which() {

@@ -40,8 +40,11 @@ impl Lit {
         if n == 1.0 || self.levels.is_empty() {
             return self;
         }
-        let bodies: Vec<[f64; 3]> =
-            self.curves.par_iter().map(|curve| body(space, &space.row(curve))).collect();
+        let flat = |curve: &Curve| {
+            let row = space.row(curve);
+            body(&Nearest::to(space, &row), &row)
+        };
+        let bodies: Vec<[f64; 3]> = self.curves.par_iter().map(flat).collect();
         let first = self.levels.swap_remove(0);
         let (width, height) = (first.width, first.height);
         let linear = channels(&first, self.stride, &bodies);
@@ -72,11 +75,10 @@ impl Lit {
 }
 
 /// The flat body of a row, in 1/sr: never more than the row has anywhere.
-fn body(space: &Space, row: &[f64]) -> [f64; 3] {
-    let diffuse = Nearest::to(space, row).diffuse;
+pub(crate) fn body(found: &Nearest, row: &[f64]) -> [f64; 3] {
     std::array::from_fn(|c| {
         let least = row.iter().skip(c).step_by(3).copied().fold(f64::INFINITY, f64::min);
-        (diffuse[c] / PI).min(least).max(0.0)
+        (found.diffuse[c] / PI).min(least).max(0.0)
     })
 }
 
