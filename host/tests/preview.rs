@@ -45,6 +45,69 @@ fn dots_and_jobs_show_the_print_alone() {
     assert!(said.contains("has printed dots and no document"), "{said}");
 }
 
+/// Steps copied from the page of a factored document are for that document.
+#[test]
+fn the_page_names_the_document_whose_bases_it_edits() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("factor tile -q --bases 2 -o tile.foil");
+    bench.done(&format!("preview tile.foil {SMALL} -o tile.html"));
+    let page = fs::read_to_string(bench.path("tile.html")).expect("a page");
+    let (_, rest) = page.split_once("\"fingerprint\":\"").expect("a fingerprint");
+    let steps = |fingerprint: &str| {
+        let text =
+            format!("format = 1\nfingerprint = \"{fingerprint}\"\n\n[[step]]\nbasis = 1\nrougher = 2.0\n");
+        fs::write(bench.path("steps.toml"), text).unwrap();
+    };
+    steps(&rest[..64]);
+    bench.done("edit tile.foil --steps steps.toml -q -o edited.foil");
+    steps(&"0".repeat(64));
+    bench.refused(1, "edit tile.foil --steps steps.toml -q -o other.foil");
+}
+
+/// Wear acts on documents, jobs and sheets alike: the same seed makes the same picture, another seed another one.
+#[test]
+fn a_worn_printer_prints_other_dots_and_says_which() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("print tile --size 12x8mm --paper postcard -q --to file:job.rgl");
+    let read = |name: &str| fs::read(bench.path(name)).unwrap();
+    let worn = |name: &str, more: &str| {
+        let said =
+            bench.done(&format!("preview job.rgl -q -o {name} --pixels 200 --exposure 0 --json {more}"));
+        serde_json::from_str::<Value>(&said).expect("JSON")["worn"].clone()
+    };
+    assert!(worn("new.png", "--registration-error 0mm").is_null());
+    let first = worn("one.png", "--registration-error 0.1mm --missing-dots 5%");
+    let share = first["changed_dots"].as_f64().unwrap() / first["planned_dots"].as_f64().unwrap();
+    assert!((0.05..1.0).contains(&share), "{first}");
+    assert!(first["passes"].as_array().unwrap().iter().any(|pass| pass["down_mm"] != 0.0), "{first}");
+    worn("again.png", "--registration-error 0.1mm --missing-dots 5%");
+    worn("two.png", "--registration-error 0.1mm --missing-dots 5% --wear-seed 2");
+    assert_eq!(read("one.png"), read("again.png"));
+    assert!(read("one.png") != read("new.png") && read("one.png") != read("two.png"));
+    // Light in the paper darkens.
+    worn("gain.exr", "--dot-gain 2");
+    worn("plain.exr", "");
+    let light = |name: &str| {
+        let picture = image::open(bench.path(name)).expect("a picture").into_rgba32f();
+        picture.pixels().map(|p| f64::from(p.0[0])).sum::<f64>()
+    };
+    assert!(light("gain.exr") < light("plain.exr"));
+
+    let said = bench.done(&format!("preview tile {SMALL} -o tile.html --missing-dots 5%"));
+    assert!(said.contains("dots whose stack is not as planned"), "{said}");
+    assert!(fs::read_to_string(bench.path("tile.html")).unwrap().contains("on a worn printer"));
+    for (args, expected) in [
+        ("-o out.html --dot-gain 2", "a page cannot show it"),
+        ("-o out.png --show document --missing-dots 1%", "act on printed dots"),
+        ("-o out.png --show mapped --dot-gain 1.5", "act on printed dots"),
+    ] {
+        let said = bench.refused(1, &format!("preview tile {SMALL} {args}"));
+        assert!(said.contains(expected), "{args}: {said}");
+    }
+}
+
 /// A print written as glTF is a document like any other.
 #[test]
 fn a_print_as_gltf_is_read_as_a_document() {

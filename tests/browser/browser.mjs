@@ -1,9 +1,13 @@
 // A real browser with the page in it, watched: whatever it asks of a network or complains of is kept.
 
+import { dirname } from 'node:path';
 import { chromium } from 'playwright-core';
 
-/** @param {{ width: number, height: number, touch?: boolean, webgl?: boolean, colorScheme?: 'light' | 'dark' }} how */
-export async function open(file, { width, height, touch = false, webgl = true, colorScheme = 'light' }) {
+/**
+ * @param {{ width: number, height: number, touch?: boolean, webgl?: boolean, colorScheme?: 'light' | 'dark', beside?: boolean }} how
+ * `beside` lets a page show the pictures that lie beside it.
+ */
+export async function open(file, { width, height, touch = false, webgl = true, colorScheme = 'light', beside = false }) {
   const browser = await chromium.launch({
     executablePath: process.env.FOILPRESS_CHROMIUM,
     // Software WebGL, which every machine has.
@@ -19,7 +23,9 @@ export async function open(file, { width, height, touch = false, webgl = true, c
   });
   page.on('pageerror', (error) => complaints.push(error.message));
   page.on('request', (request) => {
-    if (!/^(data|blob):/.test(request.url()) && request.url().split('#')[0] !== `file://${file}`) complaints.push(`asked for ${request.url()}`);
+    const own = request.url().split('#')[0] === `file://${file}`
+      || (beside && request.resourceType() === 'image' && request.url().startsWith(`file://${dirname(file)}/`));
+    if (!/^(data|blob):/.test(request.url()) && !own) complaints.push(`asked for ${request.url()}`);
   });
   await page.goto(`file://${file}`);
   if (webgl) await page.waitForSelector('#stage.ready', { timeout: 60_000 });

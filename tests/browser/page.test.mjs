@@ -98,7 +98,7 @@ test('every view, every pass and every slider changes picture and address', () =
   await page.selectOption('#with', 'stacks');
   assert.equal((await rested(page)).get('with'), 'stacks');
   await page.selectOption('#with', '');
-  for (const slider of await page.locator('input[type=range]').all()) {
+  for (const slider of await page.locator('input[type=range]:visible').all()) {
     const [address, before] = [(await rested(page)).toString(), await picture()];
     await slider.focus();
     const upper = await slider.evaluate((input) => Number(input.value) > (Number(input.min) + Number(input.max)) / 2);
@@ -162,6 +162,42 @@ test('the keyboard reaches and does everything', () => visit(desk, async (page) 
   for (const id of ['picture', 'handle', 'lamp', 'with', 'probe', 'share', 'reset']) assert.ok(reached.has(id), id);
 }));
 
+test('materials are edited by mouse and keyboard, and the steps are there to copy', () => visit(desk, async (page) => {
+  const picture = () => page.evaluate(() => document.querySelector('canvas').toDataURL());
+  const steps = () => page.inputValue('#steps');
+  await page.click('[data-show=document]');
+  await page.selectOption('#with', '');
+  await rested(page);
+  const before = await picture();
+  assert.equal(await steps(), '');
+  await page.selectOption('#basis', '1');
+  await page.focus('#sliders-edits label:nth-child(1) input');
+  for (let i = 0; i < 20; i++) await page.keyboard.press('ArrowRight');
+  let after = await rested(page);
+  assert.equal(after.get('edit'), '1,2,ffffff,1');
+  const rough = await picture();
+  assert.notEqual(rough, before);
+  const albedo = await page.locator('#sliders-edits label:nth-child(2) input').boundingBox();
+  await page.mouse.click(albedo.x + 0.125 * albedo.width, albedo.y + albedo.height / 2);
+  await page.fill('#tint', '#ff8000');
+  after = await rested(page);
+  assert.match(after.get('edit'), /^1,2,ff8000,0\.\d+$/);
+  assert.notEqual(await picture(), rough);
+  const text = await steps();
+  assert.match(text, /^format = 1\ndocument = ".*"\nfingerprint = "[0-9a-f]{64}"\n\n\[\[step\]\]\nbasis = 1\nrougher = 2\.0\ntint = "#ff8000"\nalbedo = 0\.\d+\n$/);
+  await page.click('#copySteps');
+  await page.waitForFunction(() => /Copied|Selected/.test(document.querySelector('#copySteps').textContent));
+  await page.evaluate(() => { location.hash = 'show=document&edit=1,x,ff8000,1;99,2,ffffff,1;0,2,<b>,1;-1,1,000000,1'; });
+  assert.equal((await rested(page)).get('edit'), null);
+  await page.evaluate(() => { location.hash = 'show=document&edit=0,2,ffffff,1'; });
+  await rested(page);
+  await page.click('#unedit');
+  after = await rested(page);
+  assert.deepEqual([after.get('edit'), await steps(), await picture() === before], [null, '', true]);
+  await page.click('[data-show=printed]');
+  assert.equal(await page.isVisible('#edits'), false);
+}));
+
 test('a spot tells its curve, its mixture and the inks of its dot', () => visit(desk, async (page) => {
   const [x, y] = await place(page);
   await page.mouse.click(x - 60, y + 40);
@@ -212,7 +248,8 @@ for (const colorScheme of ['light', 'dark']) {
   test(`no serious finding of axe-core, ${colorScheme}`, () => visit({ ...desk, colorScheme }, async (page) => {
     await page.focus('#picture');
     await page.keyboard.press('Enter');
-    for (const show of ['difference', 'stacks', 'passes']) {
+    await page.evaluate(() => { location.hash = 'edit=0,2,ffffff,1'; });
+    for (const show of ['document', 'difference', 'stacks', 'passes']) {
       await page.click(`[data-show=${show}]`);
       await rested(page);
       await page.evaluate(axe);

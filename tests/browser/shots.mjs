@@ -1,4 +1,5 @@
-// Draws the page in each of some states, and writes the canvas as PNG: `shots.mjs PAGE STATES.json FOLDER WIDTH HEIGHT`.
+// Draws the page in each of some states, and writes the canvas as PNG and the steps of its edits, if any, as TOML:
+// `shots.mjs PAGE STATES.json FOLDER WIDTH HEIGHT`.
 
 import { readFile, writeFile } from 'node:fs/promises';
 import { open, rested } from './browser.mjs';
@@ -19,6 +20,8 @@ for (const [i, state] of JSON.parse(await readFile(states, 'utf8')).entries()) {
   await rested(page);
   const url = await page.evaluate(() => document.querySelector('canvas').toDataURL('image/png'));
   await writeFile(`${folder}/${i}.png`, Buffer.from(url.split(',')[1], 'base64'));
+  const steps = await page.inputValue('#steps');
+  if (steps) await writeFile(`${folder}/${i}.toml`, steps);
 }
 await browser.close();
 if (complaints.length) throw new Error(complaints.join('\n'));

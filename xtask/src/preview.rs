@@ -1,4 +1,4 @@
-//! `cargo xtask preview`: the preview's page in a real browser.
+//! `cargo xtask preview`: the preview's page, the display's and the report in a real browser.
 //!
 //! Its sources are checked for types, its pictures are compared with those of the renderer, and every control is used by
 //! mouse, touch and keyboard. The browser is Debian's, drawing in software.

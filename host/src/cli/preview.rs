@@ -1,5 +1,7 @@
 //! `foilpress preview`: a document or a sheet as it looks, under any light and from any direction.
 
+mod wear;
+
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -11,6 +13,7 @@ use image::{DynamicImage, ImageFormat, Rgba32FImage};
 use inks::Library;
 use serde_json::json;
 
+use self::wear::{Told, WearArgs};
 use super::output::Staged;
 use super::preset::PresetArg;
 use super::print::{DotsArgs, Laid};
@@ -25,7 +28,9 @@ use press::preview::{Exposure, Probe, Radiance, Source, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
 use view::page::{Subject, Target, page};
-use view::{Camera, Glb, Light, Lit, Pose, Renderer, Scene, direction, glb, mapped, proportions};
+use view::{
+    Camera, Glb, Light, Lit, Pose, Renderer, Scene, direction, glb, mapped, places_for_dot_gain, proportions,
+};
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
 pub const BASES: usize = 12;
@@ -47,10 +52,17 @@ enum Show {
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Format {
+    /// A material, which needs no light.
+    Glb,
+    Lit(Picture),
+}
+
+/// What shows the sheet under light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Picture {
     Page,
     Png,
     Exr,
-    Glb,
 }
 
 /// A direction in degrees: azimuth to the right, elevation upwards.
@@ -168,6 +180,8 @@ pub struct Args {
     /// Pixels of the longer side of a picture or texture
     #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = clap::value_parser!(u16).range(16..=8192))]
     pixels: u16,
+    #[command(flatten)]
+    wear: WearArgs,
     /// Print what was written as JSON
     #[arg(long)]
     json: bool,
@@ -187,6 +201,8 @@ struct Shown {
     library: Library,
     dots: DotMap,
     target: Option<Both>,
+    /// What a worn printer made of the dots.
+    worn: Option<Told>,
 }
 
 /// A document and its mixture of inks.
@@ -210,8 +226,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     let probe = args.light_probe.as_deref().map(Probe::read_hdr).transpose()?;
     let staged = Staged::file(&args.output)?;
-    let shown = Shown::open(&args.dots, observer)?;
     let what = args.show.unwrap_or(Show::Printed);
+    args.wear.check(
+        what == Show::Printed || format == Format::Lit(Picture::Page),
+        format == Format::Lit(Picture::Page),
+    )?;
+    let mut shown = Shown::open(&args.dots, observer)?;
+    shown.worn = args.wear.apply(&mut shown.dots, &shown.library)?;
     if shown.target.is_none() && what != Show::Printed {
         bail!(
             "--show {}: {} has printed dots and no document; leave --show out, or name a document",
@@ -219,7 +240,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             args.dots.document.document
         );
     }
-    let longest = if format == Format::Page { STILL } else { args.pixels.into() };
+    let longest = if format == Format::Lit(Picture::Page) { STILL } else { args.pixels.into() };
     let size = shown.size();
     let stacks = reflectances(shown.dots.stacks(), &shown.library, &shown.space);
     let print = Source::Print {
@@ -234,10 +255,17 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         _ => print,
     };
     // Fine enough for the picture and never much finer.
-    let lit = Lit::new(&source, size, longest.clamp(64, 2048))?;
-    if format == Format::Glb {
-        return write_glb(args, &glb(&lit, &shown.space, &shown.name, observer)?, &shown, staged);
+    let mut places = longest.clamp(64, 2048);
+    if args.wear.dot_gain.is_some() {
+        places = places.max(places_for_dot_gain(size)).min(2048);
     }
+    let mut lit = Lit::new(&source, size, places)?;
+    if let Some(n) = args.wear.dot_gain {
+        lit = lit.with_dot_gain(&shown.space, n);
+    }
+    let Format::Lit(picture) = format else {
+        return write_glb(args, &glb(&lit, &shown.space, &shown.name, observer)?, &shown, staged);
+    };
     let (width, height) = proportions(size, longest);
     let scene = args.scene(size, width as f64 / height as f64, probe.clone());
     let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
@@ -245,12 +273,10 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         Some(stops) => Exposure(Exposure::PAPER.0 * stops.exp2()),
         None => Exposure::of(std::slice::from_ref(&radiance)),
     };
-    match format {
-        // Written above: it needs no light.
-        Format::Glb => {}
-        Format::Png => write_png(&radiance, exposure, staged.path())?,
-        Format::Exr => write_exr(&radiance, staged.path())?,
-        Format::Page => {
+    match picture {
+        Picture::Png => write_png(&radiance, exposure, staged.path())?,
+        Picture::Exr => write_exr(&radiance, staged.path())?,
+        Picture::Page => {
             let still = png(&radiance, exposure)?;
             let start = args.fragment(exposure, what, shown.target.is_some(), probe.is_some());
             let studio = Probe::studio(64);
@@ -283,11 +309,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let stops = f64::from(exposure.0 / Exposure::PAPER.0).log2();
         let report = json!({
             "written": args.output.display().to_string(), "bytes": bytes, "name": shown.name, "size_mm": size_mm,
-            "pixels": [width, height], "exposure_stops": stops,
+            "pixels": [width, height], "exposure_stops": stops, "worn": shown.worn.as_ref().map(Told::json),
         });
         writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
     } else {
         writeln!(out, "{} ({:.1} MB)", args.output.display(), bytes as f64 / 1e6)?;
+        shown.say(&mut out)?;
     }
     Ok(())
 }
@@ -354,7 +381,14 @@ impl Shown {
             let name =
                 path.file_stem().map_or_else(|| "sheet".into(), |stem| stem.to_string_lossy().into_owned());
             let library = work.inks.library()?;
-            return Ok(Shown { name, space: Space::half_angle(SAMPLES), library, dots, target: None });
+            return Ok(Shown {
+                name,
+                space: Space::half_angle(SAMPLES),
+                library,
+                dots,
+                target: None,
+                worn: None,
+            });
         }
         let Laid { document, library, settings, halftoned, .. } = work.laid(observer)?;
         let space = document.materials().space().clone();
@@ -372,7 +406,14 @@ impl Shown {
             mapped: mapped(mix, &library, &space),
             mixtures: mix.matrix.iter().map(words).collect(),
         };
-        Ok(Shown { name: document.name, space, library, dots: halftoned.dots, target: Some(both) })
+        Ok(Shown {
+            name: document.name,
+            space,
+            library,
+            dots: halftoned.dots,
+            target: Some(both),
+            worn: None,
+        })
     }
 
     /// Width and height in metres.
@@ -387,7 +428,12 @@ impl Shown {
             "{width:.0} x {height:.0} mm, {:.1} million dots of {stacks} {}",
             self.dots.index().len() as f64 / 1e6,
             if stacks == 1 { "stack" } else { "stacks" }
-        )
+        ) + &self.worn.as_ref().map_or_else(String::new, |worn| format!(", {}", worn.brief()))
+    }
+
+    /// Says what a worn printer made of the dots.
+    fn say(&self, out: &mut dyn std::io::Write) -> std::io::Result<()> {
+        self.worn.as_ref().map_or(Ok(()), |worn| worn.write(out))
     }
 }
 
@@ -411,9 +457,9 @@ pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
 fn format(output: &Path) -> Result<Format> {
     let ending = output.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     match ending.as_deref() {
-        Some("html" | "htm") => Ok(Format::Page),
-        Some("png") => Ok(Format::Png),
-        Some("exr") => Ok(Format::Exr),
+        Some("html" | "htm") => Ok(Format::Lit(Picture::Page)),
+        Some("png") => Ok(Format::Lit(Picture::Png)),
+        Some("exr") => Ok(Format::Lit(Picture::Exr)),
         Some("glb") => Ok(Format::Glb),
         _ => bail!("{}: the name of the file must end in .html, .png, .exr or .glb", output.display()),
     }
@@ -439,7 +485,7 @@ fn write_glb(args: &Args, glb: &Glb, shown: &Shown, staged: Staged) -> Result<()
         let size_mm = shown.size().map(|side| side * 1000.0);
         let report = json!({
             "written": args.output.display().to_string(), "bytes": bytes.len(), "name": shown.name, "size_mm": size_mm,
-            "pixels": texels, "distance": distance, "worst": worst,
+            "pixels": texels, "distance": distance, "worst": worst, "worn": shown.worn.as_ref().map(Told::json),
         });
         writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
     } else {
@@ -448,6 +494,7 @@ fn write_glb(args: &Args, glb: &Glb, shown: &Shown, staged: Staged) -> Result<()
             out,
             "one lobe a texel: difference d {distance:.3} (root mean square), {worst:.3} at worst; 0.01 is barely visible"
         )?;
+        shown.say(&mut out)?;
     }
     Ok(())
 }
@@ -480,7 +527,7 @@ mod tests {
 
     #[test]
     fn the_ending_decides_what_is_written() {
-        assert_eq!(format(Path::new("a/leaf.HTML")).unwrap(), Format::Page);
+        assert_eq!(format(Path::new("a/leaf.HTML")).unwrap(), Format::Lit(Picture::Page));
         assert!(format(Path::new("leaf.jpg")).unwrap_err().to_string().contains(".html, .png, .exr or .glb"));
         assert!(format(Path::new("leaf")).is_err());
     }

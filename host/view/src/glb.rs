@@ -64,7 +64,7 @@ pub fn glb(lit: &Lit, space: &Space, name: &str, observer: &dyn Observer) -> Res
             observer.advance(1);
             let texels = weights.chunks_exact(lit.stride).map(|weights| {
                 let mut mean = vec![0.0; space.columns()];
-                for (&weight, row) in weights.iter().zip(&rows).filter(|(weight, _)| **weight > 0.0) {
+                for (&weight, row) in weights.iter().zip(&rows).filter(|(weight, _)| **weight != 0.0) {
                     mean.iter_mut().zip(row).for_each(|(sum, f)| *sum += f64::from(weight) * f);
                 }
                 texel(&widths, space, &mean)

@@ -100,12 +100,7 @@ impl Lit {
                 out.iter_mut().zip(&used).for_each(|(out, &i)| *out = pixel[i]);
             },
         );
-        let mut levels = vec![Level { width, height, weights }];
-        while let Some(last) = levels.last()
-            && last.width.max(last.height) > 1
-        {
-            levels.push(halved(last, stride));
-        }
+        let levels = pyramid(Level { width, height, weights }, stride);
         let curves = used.iter().map(|&i| space.curve(rows[i])).collect();
         Ok(Lit { size, curves, stride, levels })
     }
@@ -119,6 +114,17 @@ impl Lit {
 fn greatest(mut most: Vec<f32>, pixel: &[f32]) -> Vec<f32> {
     most.iter_mut().zip(pixel).for_each(|(most, &w)| *most = most.max(w));
     most
+}
+
+/// A level and all smaller ones, down to a single place.
+pub(crate) fn pyramid(first: Level, stride: usize) -> Vec<Level> {
+    let mut levels = vec![first];
+    while let Some(last) = levels.last()
+        && last.width.max(last.height) > 1
+    {
+        levels.push(halved(last, stride));
+    }
+    levels
 }
 
 /// The next level: sides halved and rounded down, every place the mean over the area it covers.

@@ -13,7 +13,9 @@ use std::f64::consts::SQRT_2;
 use std::io::Write as _;
 
 use appearance::brdf::{Space, Table};
+use appearance::edit::fingerprint;
 use appearance::factor::Factored;
+use appearance::materials::{Metallic, Nearest};
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
@@ -28,6 +30,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::error::ViewError;
+use crate::gain::body;
 use crate::lit::fit;
 
 /// The longer side of a weight map.
@@ -49,8 +52,9 @@ const PROBE_ROWS: usize = 64;
 const PAPER: [u8; 3] = [250, 250, 247];
 
 /// The sources in the order of their use.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 8] = [
     include_str!("../web/geometry.js"),
+    include_str!("../web/edit.js"),
     include_str!("../web/data.js"),
     include_str!("../web/surroundings.js"),
     include_str!("../web/draw.js"),
@@ -134,7 +138,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
     });
     observer.advance(1);
     let target = subject.target.as_ref();
-    let document = target.map(|t| layer(t.document, &|i| format!("basis {}", i + 1))).transpose()?;
+    let document = target.map(|t| layer(t.document, &|i| format!("basis {i}"))).transpose()?;
     observer.advance(1);
     let mapped =
         target.map(|t| layer(t.mapped, &|i| t.mixtures.get(i).cloned().unwrap_or_default())).transpose()?;
@@ -149,6 +153,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
         "name": subject.name, "about": subject.about, "size": subject.size, "start": subject.start,
         "white": Exposure::PAPER.0, "steps": STEPS,
         "metric": { "angles": space.angles(), "radiance": every_third(space.radiance()), "weight": every_third(space.weight()) },
+        "edits": target.map(|t| edits(t.document)),
         "document": document, "mapped": mapped, "printed": printed, "difference": difference,
         "probe": { "width": probe.width(), "height": probe.height(), "texels": packed(&texels)? },
     });
@@ -264,6 +269,23 @@ fn layer(factored: &Factored, name: &dyn Fn(usize) -> String) -> Result<Layer, V
         curves: packed(&tables(&factored.space, &rows))?,
         weights: packed(&planes)?,
     })
+}
+
+/// What edits of the bases need: each as a body and one lobe, and what the document is known by. Bases are those of its [`layer`].
+fn edits(document: &Factored) -> serde_json::Value {
+    let Factored { space, bases, maps } = document;
+    let totals = maps.totals();
+    let surface = |i: &usize| {
+        let row = bases.row(*i);
+        let found = Nearest::to(space, row);
+        let Metallic { base, metallic } = found.metallic();
+        json!({
+            "number": i, "body": body(&found, row), "f0": found.f0, "alpha": found.alpha, "base": base, "metallic": metallic,
+        })
+    };
+    let used: Vec<usize> = (0..bases.len()).filter(|&i| totals[i] > 0).collect();
+    let surfaces: Vec<serde_json::Value> = used.par_iter().map(surface).collect();
+    json!({ "fingerprint": fingerprint(document), "surfaces": surfaces })
 }
 
 /// The distance d between document and print at every place of a coarse map.

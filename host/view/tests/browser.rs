@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use appearance::brdf::{Space, Table, reflectances};
+use appearance::edit::{Steps, apply, fingerprint};
 use appearance::factor::Factored;
 use appearance::weights::{ONE, WeightMaps};
 use image::{ImageFormat, RgbImage};
@@ -210,6 +211,19 @@ fn the_page_draws_what_the_renderer_draws() {
     // Single dots, 30 pixels wide, from far away under a far light.
     let zoom = 30.0 * DOTS.0 as f64 / PICTURE.0 as f64 * 1.08;
     fragments.push(format!("show=printed&light=20,10,0&probe=0&view=0,0&distance=0&tilt=0,0&curl=0&exposure=0&zoom={zoom}&pan=0,0"));
+    // Edits stay until they are undone, so they come last.
+    let edits = [
+        ("0,1.5,c08040,1", (20.0, 10.0, 0.0), 0.5, false),
+        ("1,0.6,ffffff,0.7;2,3,80ff80,1.6", (-15.0, 10.0, 0.4), 0.0, false),
+        ("0,4,ffffff,3;1,2.5,ff4040,1", (5.0, 0.0, 0.5), -0.5, true),
+    ];
+    let edited = |&(edit, light, stops, probe): &(&str, (f64, f64, f64), f64, bool)| {
+        format!(
+            "edit={edit}&{}",
+            fragment(&("document", &[light], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, probe, stops))
+        )
+    };
+    fragments.extend(edits.iter().map(edited));
     let list = folder.path().join("states.json");
     std::fs::write(&list, serde_json::to_string(&fragments).unwrap()).unwrap();
     let words = [&file, &list, &folder.path().to_path_buf()].map(|path| path.to_str().unwrap().to_owned());
@@ -242,7 +256,28 @@ fn the_page_draws_what_the_renderer_draws() {
         }
     }
 
-    // Every dot of the last picture, from the curve of its stack: each pixel well inside a dot.
+    // The steps that the page wrote, replayed by the program.
+    for (i, &(edit, light, stops, surrounded)) in edits.iter().enumerate() {
+        let i = states.len() + 1 + i;
+        let path = folder.path().join(format!("{i}.toml"));
+        let steps = Steps::read(&path, &made.space, &Silent).unwrap();
+        steps.check(&path, &fingerprint(&made.document)).unwrap();
+        let replayed = apply(&made.document, &steps.steps).unwrap().document;
+        let drawn = |document: &Factored| {
+            let lit = Lit::new(&Source::Factored(document), SIZE, LONGEST).unwrap();
+            let scene = scene(&[light], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, surrounded.then_some(&probe));
+            let radiance = Renderer::new(&lit).render(&scene, PICTURE.0, PICTURE.1, &Silent).unwrap();
+            picture(&radiance, Exposure((f64::from(Exposure::PAPER.0) * f64::exp2(stops)) as f32)).unwrap()
+        };
+        let (mean, most, _) = compared(&drawn(&replayed), &shot(i));
+        let (change, _, _) = compared(&drawn(&replayed), &drawn(&made.document));
+        println!("edit {edit}: mean {mean:.3}, most {most}, changed by {change:.1}");
+        if mean > 1.0 || most > 4 || change < 3.0 {
+            failed.push(format!("edit {edit}: mean {mean:.3}, most {most}, changed by {change:.1}"));
+        }
+    }
+
+    // Every dot of the picture after the states, from the curve of its stack: each pixel well inside a dot.
     let dots = shot(states.len());
     let mut seen = 0;
     for (x, y, found) in dots.enumerate_pixels() {

@@ -79,11 +79,33 @@ export class Drawing {
     layer.levels.forEach(({ width, height, data }, level) =>
       gl.texSubImage3D(gl.TEXTURE_2D_ARRAY, level, 0, 0, 0, width, height, groups, gl.RGBA, gl.UNSIGNED_BYTE, data));
     const curves = this.#texture(gl.TEXTURE_2D);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, steps, layer.channels);
+    this.#uploadCurves(layer);
+    return { weights, curves, layer, field: null, fieldKey: '' };
+  }
+
+  /**
+   * Writes the curves of a layer to the texture that is bound.
+   * @param {import('./data.js').Layer} layer
+   */
+  #uploadCurves(layer) {
+    const { gl, data: { steps } } = this;
     const texels = new Float32Array(layer.channels * steps * 4);
     for (let i = 0; i < layer.channels * steps; i++) texels.set(layer.curves.subarray(3 * i, 3 * i + 3), 4 * i);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, steps, layer.channels);
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, steps, layer.channels, gl.RGBA, gl.FLOAT, texels);
-    return { weights, curves, layer, field: null, fieldKey: '' };
+  }
+
+  /**
+   * Takes the curves of a layer again after they have changed.
+   * @param {string} name
+   */
+  recurve(name) {
+    const on = this.layers[name];
+    if (!on) return;
+    this.gl.activeTexture(this.gl.TEXTURE0);
+    this.gl.bindTexture(this.gl.TEXTURE_2D, on.curves);
+    this.#uploadCurves(on.layer);
+    on.fieldKey = '';
   }
 
   /** @param {Uint8Array} dots */

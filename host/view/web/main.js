@@ -2,6 +2,7 @@
 
 import { layer, stackWeights, unpacked, unpackedFloats } from './data.js';
 import { Drawing } from './draw.js';
+import { edited, editsWritten, steps, unedited } from './edit.js';
 import { clamp, placeAt, seen, windowHeight } from './geometry.js';
 import { chart, distance, element, inWords, reflectance, shares, weightsAt } from './spot.js';
 import { initial, MOST_LIGHTS, MOST_ZOOM, read, SHOWS, written } from './state.js';
@@ -29,11 +30,12 @@ const available = SHOWS.filter((show) =>
   show === 'document' ? data.document : show === 'mapped' ? data.mapped : show === 'difference' ? data.difference
     : show === 'passes' ? data.printed.passes.length > 0 : true);
 const leastRadius = data.size[0] / Math.PI;
-const limits = { shows: available, passes: data.printed.passes.length, leastRadius };
+const limits = { shows: available, passes: data.printed.passes.length, leastRadius, bases: data.edits ? data.edits.surfaces.length : 0 };
 
 const state = initial();
 let lamp = 0;
 let tool = 'light';
+let basis = 0;
 /** @type {Drawing | null} */
 let drawing = null;
 /** @type {Record<string, import('./data.js').Layer>} */
@@ -79,6 +81,7 @@ function frame(now) {
     lastFrame = now;
   }
   fit(moving ? coarse : 1);
+  applyEdits();
   drawing.draw(state, moving);
   overlays();
 }
@@ -98,6 +101,80 @@ function shareAddress() {
   } catch {
     location.hash = text;
   }
+}
+
+// ---- edits of the document ----
+
+let applied = '';
+/** @type {Float32Array} the curves as they were */
+let original = new Float32Array();
+
+/** Brings the curves of the document in line with the edits. */
+function applyEdits() {
+  const { document: layer } = layers;
+  const wanted = editsWritten(state.edits);
+  if (!layer || !data.edits || wanted === applied) return;
+  applied = wanted;
+  const { surfaces } = data.edits;
+  const last = data.metric.angles[data.metric.angles.length - 1];
+  const size = 3 * data.steps;
+  surfaces.forEach((surface, k) => {
+    const table = original.subarray(k * size, (k + 1) * size);
+    layer.curves.set(edited(table, surface, state.edits[k] ?? unedited(), last), k * size);
+  });
+  drawing?.recurve('document');
+}
+
+const editOf = () => (state.edits[basis] ??= unedited());
+
+function buildEdits() {
+  if (!data.edits || !data.document) return;
+  const which = /** @type {HTMLSelectElement} */ (byId('basis'));
+  which.append(...data.edits.surfaces.map(({ number }, k) => element('option', { value: k }, `basis ${number}`)));
+  which.addEventListener('change', () => {
+    basis = Number(which.value);
+    sync();
+  });
+  const into = byId('sliders-edits');
+  const isShown = () => [state.show, state.with].includes('document');
+  const times = (/** @type {number} */ v) => `× ${v.toFixed(2)}`;
+  const set = (/** @type {'rougher' | 'albedo'} */ what) => (/** @type {number} */ v) => (editOf()[what] = v);
+  slider(into, 'rougher', {
+    min: -3, max: 3, step: 0.05, shown: isShown, get: () => Math.log2(editOf().rougher),
+    set: (v) => set('rougher')(Number((2 ** v).toFixed(3))), words: () => times(editOf().rougher),
+  });
+  slider(into, 'albedo', { min: 0, max: 4, step: 0.05, shown: isShown, get: () => editOf().albedo, set: set('albedo'), words: times });
+  const tint = /** @type {HTMLInputElement} */ (byId('tint'));
+  tint.addEventListener('input', () => {
+    editOf().tint = tint.value;
+    sync();
+    redraw(true);
+  });
+  const text = /** @type {HTMLTextAreaElement} */ (byId('steps'));
+  byId('copySteps').addEventListener('click', async () => {
+    text.select();
+    try {
+      await navigator.clipboard.writeText(text.value);
+      byId('copySteps').textContent = 'Copied';
+    } catch {
+      byId('copySteps').textContent = 'Selected; copy it';
+    }
+  });
+  byId('unedit').addEventListener('click', () => {
+    state.edits = {};
+    sync();
+    redraw(false);
+  });
+  synced.push({
+    sync: () => {
+      byId('edits').hidden = !isShown();
+      which.value = String(basis);
+      tint.value = editOf().tint;
+      text.value = data.edits ? steps(data.name, data.edits.fingerprint, data.edits.surfaces, state.edits) : '';
+      byId('stepFile').hidden = !text.value;
+      byId('copySteps').textContent = 'Copy steps';
+    },
+  });
 }
 
 // ---- what lies over the picture ----
@@ -548,6 +625,7 @@ function build() {
     }
   });
 
+  buildEdits();
   const hasLight = () => state.lights.length > 0;
   const [light, sheet] = [byId('sliders-light'), byId('sliders-sheet')];
   const degrees = (/** @type {string} */ more, /** @type {string} */ less) => (/** @type {number} */ v) => inDegrees(v, more, less);
@@ -603,7 +681,10 @@ async function start() {
   ]);
   dots = bytes;
   layers = { printed: await stackWeights(data.printed, dots) };
-  if (document_) layers.document = document_;
+  if (document_) {
+    layers.document = document_;
+    original = document_.curves.slice();
+  }
   if (mapped) layers.mapped = mapped;
   /** @type {[string, string]} */
   const shaders = [byId('vertex').textContent ?? '', byId('fragment').textContent ?? ''];
@@ -626,6 +707,7 @@ async function start() {
     redraw(false);
   });
   fit(1);
+  applyEdits();
   drawing.draw(state, false);
   stage.classList.add('ready');
   overlays();

@@ -1,5 +1,6 @@
 // Everything a visitor can change, and how it is written in the address, so that a view can be shared.
 
+import { editsRead, editsWritten } from './edit.js';
 import { clamp } from './geometry.js';
 
 /**
@@ -7,7 +8,7 @@ import { clamp } from './geometry.js';
  * @typedef {{ azimuth: number, elevation: number, distance: number }} Lamp
  * @typedef {{ show: string, with: string, split: number, pass: number, lights: Lamp[], probe: boolean,
  *   view: [number, number], distance: number, turn: number, tip: number, curl: number,
- *   zoom: number, pan: [number, number], exposure: number }} State
+ *   zoom: number, pan: [number, number], exposure: number, edits: import('./edit.js').Edits }} State
  */
 
 export const MOST_LIGHTS = 4;
@@ -17,7 +18,7 @@ export const SHOWS = ['document', 'mapped', 'printed', 'difference', 'stacks', '
 /** @returns {State} */
 export const initial = () => ({
   show: 'printed', with: '', split: 0.5, pass: 0, lights: [{ azimuth: -25, elevation: 30, distance: 0.6 }],
-  probe: false, view: [0, 0], distance: 0.5, turn: 0, tip: 0, curl: 0, zoom: 1, pan: [0, 0], exposure: 0,
+  probe: false, view: [0, 0], distance: 0.5, turn: 0, tip: 0, curl: 0, zoom: 1, pan: [0, 0], exposure: 0, edits: {},
 });
 
 const rounded = (/** @type {number} */ v, digits = 2) => String(Number(v.toFixed(digits)));
@@ -36,6 +37,8 @@ export function written(s) {
     ['distance', rounded(s.distance, 3)], ['tilt', `${rounded(s.turn)},${rounded(s.tip)}`], ['curl', rounded(s.curl, 4)],
     ['zoom', rounded(s.zoom, 3)], ['pan', s.pan.map((v) => rounded(v, 5)).join(',')], ['exposure', rounded(s.exposure)],
   );
+  const edits = editsWritten(s.edits);
+  if (edits) parts.push(['edit', edits]);
   return parts.map(([key, value]) => `${key}=${value}`).join('&');
 }
 
@@ -43,7 +46,7 @@ export function written(s) {
  * Reads a fragment over a state. What is not understood is left as it was: addresses are typed and cut off by hand.
  * @param {string} text
  * @param {State} state
- * @param {{ shows: string[], passes: number, leastRadius: number }} limits
+ * @param {{ shows: string[], passes: number, leastRadius: number, bases: number }} limits
  */
 export function read(text, state, limits) {
   const given = new URLSearchParams(text.replace(/^#/, ''));
@@ -87,4 +90,6 @@ export function read(text, state, limits) {
   const pan = numbers('pan', 2);
   if (pan) state.pan = [clamp(pan[0], -5, 5), clamp(pan[1], -5, 5)];
   state.exposure = one('exposure', -8, 8, state.exposure);
+  const edit = given.get('edit');
+  if (edit !== null) state.edits = editsRead(edit, limits.bases);
 }

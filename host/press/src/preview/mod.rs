@@ -25,6 +25,7 @@ mod source;
 mod spectrum;
 pub mod sphere;
 mod tone;
+mod wear;
 
 pub use canvas::picture;
 pub use error::{LONGEST_SIDE, PreviewError};
@@ -38,3 +39,4 @@ pub use sheet_picture::{STANDARD_LIGHTS, sheet_picture};
 pub use source::Source;
 pub use spectrum::{Spectrum, spectrum};
 pub use tone::Exposure;
+pub use wear::{Moved, Wear, Worn};
