@@ -1,5 +1,5 @@
-//! What the tests of print queues and of PDF art need beside Rust, from Debian: a print server with its filters and clients,
-//! Ghostscript and Poppler.
+//! What the tests of print queues, of PDF art and of cameras' files need beside Rust, from Debian: a print server with its filters
+//! and clients, Ghostscript, Poppler and programs that develop RAW.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -9,7 +9,7 @@ use anyhow::{Result, bail};
 use crate::{cargo, command};
 
 /// Programs the tests start, and the packages they are in.
-const NEEDED: [(&str, &str); 9] = [
+const NEEDED: [(&str, &str); 11] = [
     ("/usr/sbin/cupsd", "cups-daemon"),
     ("/usr/lib/cups/daemon/cups-deviced", "cups"),
     ("/usr/bin/lp", "cups-client"),
@@ -19,6 +19,8 @@ const NEEDED: [(&str, &str); 9] = [
     ("/usr/bin/pdftocairo", "poppler-utils"),
     ("/usr/bin/man", "man-db"),
     ("/usr/bin/tesseract", "tesseract-ocr"),
+    ("/usr/bin/dcraw_emu", "libraw-bin"),
+    ("/usr/bin/dcraw", "dcraw"),
 ];
 
 /// Installs what is missing.

@@ -39,7 +39,7 @@ use core::convert::Infallible;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{InputPin, OutputPin};
 use heapless::Vec;
-use protocol::link::message::{Answer, Fault, Handshake, JobState, Lines, PortSettings};
+use protocol::link::message::{AT_REST, Answer, Fault, Handshake, JobState, Lines, PortSettings};
 
 /// What a printer has sent. Device IDs are some hundred bytes long.
 type Text = Vec<u8, 512>;
@@ -53,9 +53,6 @@ const BUSY_US: u32 = 100;
 /// Bytes the processor sends in one poll, and for how long at most it begins another.
 const HANDFUL: usize = 32;
 const HANDFUL_US: u64 = 300;
-
-/// Data and control lines at rest, as [`Port::rest`] leaves the latter: these levels end a wiring test.
-const AT_REST: (u8, u8) = (0, 0b0111);
 
 /// Who works the pins.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -29,7 +29,8 @@ const PICTURES: [&str; 6] = ["tif", "tiff", "png", "exr", "jpg", "jpeg"];
 const RAW: [&str; 11] = ["cr2", "cr3", "nef", "arw", "dng", "raf", "rw2", "orf", "pef", "srw", "nrw"];
 /// Developer programs with their arguments; the file's name follows, and the picture comes on standard output.
 const DEVELOPERS: [(&str, &[&str]); 2] = [
-    ("dcraw_emu", &["-4", "-T", "-W", "-o", "0", "-r", "1", "1", "1", "1", "-Z", "-"]),
+    // `-c 0`: white is the sensor's, and not the brightest value of each photograph.
+    ("dcraw_emu", &["-c", "0", "-4", "-T", "-W", "-o", "0", "-r", "1", "1", "1", "1", "-Z", "-"]),
     ("dcraw", &["-4", "-T", "-W", "-o", "0", "-r", "1", "1", "1", "1", "-c"]),
 ];
 
@@ -258,6 +259,9 @@ fn develop(programs: &[(&str, &[&str])], path: &Path) -> Result<Vec<u8>, Measure
          packages libraw-bin or dcraw on Debian) or develop it to a linear 16-bit TIFF",
     ))
 }
+
+#[cfg(test)]
+mod raw;
 
 #[cfg(test)]
 mod tests {

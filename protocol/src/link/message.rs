@@ -18,6 +18,9 @@ pub const VERSION: u8 = 5;
 /// know the same messages. With different fingerprints but the same version, both understand everything the older knows.
 pub const SCHEMA: u32 = 0x415e_b2c7;
 
+/// Levels of the data lines and of nStrobe, nAutoFd, nInit, nSelectIn (bits 0..3) at rest: with them a wiring test ends.
+pub const AT_REST: (u8, u8) = (0, 0b0111);
+
 /// How many ended jobs a bridge remembers.
 pub const PAST: usize = 16;
 

@@ -31,6 +31,8 @@ pub enum Need {
     Browser,
     /// Tesseract, which reads printed text.
     Reading,
+    /// Programs that develop cameras' RAW files: `dcraw_emu` and `dcraw`.
+    Raw,
 }
 
 impl Need {
@@ -47,6 +49,7 @@ impl Need {
             Need::Package => "package",
             Need::Browser => "browser",
             Need::Reading => "reading",
+            Need::Raw => "raw",
         }
     }
 

@@ -13,7 +13,7 @@
 
 use std::fmt;
 
-use protocol::link::message::Lines;
+use protocol::link::message::{AT_REST, Lines};
 use serde::Serialize;
 
 /// A line: its name, and where it is to be found.
@@ -72,7 +72,7 @@ pub struct Levels(pub u16);
 impl Levels {
     const ALL: u16 = 0xfff;
     /// nStrobe, nAutoFd and nInit high, nSelectIn low, data low.
-    pub const REST: Levels = Levels(0x700);
+    pub const REST: Levels = Levels((AT_REST.1 as u16) << 8 | AT_REST.0 as u16);
 
     /// Data1..Data8, Data1 in bit 0.
     pub fn data(self) -> u8 {
