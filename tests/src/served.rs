@@ -245,7 +245,9 @@ fn serve(
             }
         }
         match link.as_mut().map(|link| link.receive(&mut buffer, Duration::from_millis(1))) {
-            Some(Ok(count)) => engine.receive(&mut reader, &buffer[..count]),
+            Some(Ok(count)) => {
+                engine.receive(&mut reader, &buffer[..count]);
+            }
             Some(Err(_)) => link = None,
             None => std::thread::sleep(Duration::from_millis(1)),
         }

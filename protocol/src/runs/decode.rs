@@ -408,7 +408,7 @@ impl Runs {
     /// A run is known, in a band of `len` dots.
     fn run(&mut self, length: u32, len: u32, place: &mut Place<'_>) {
         self.end = self.done.saturating_add(length).min(len);
-        if self.index % 2 == 0 {
+        if self.index.is_multiple_of(2) {
             self.done = self.end;
         } else if self.done < self.end && self.done >= self.from && self.end <= self.to {
             place.canvas.ink(self.done - self.from, self.end - self.from);
@@ -483,7 +483,7 @@ impl Row {
                 }
                 rows.next(self.y, x, data.len())?.copy_from_slice(data);
                 read += data.len();
-                // At most what is left of the row.
+                #[expect(clippy::cast_possible_truncation, reason = "at most what is left of the row")]
                 let done = data.len() as u16;
                 *left -= done;
                 *run = if count == done { Run::Head } else { Run::Literal(count - done) };
