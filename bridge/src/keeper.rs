@@ -76,6 +76,8 @@ impl<M: Memory> Keeper<M> {
             let past = [PastJob::NONE; PAST];
             return (Keeper { memory, number: 0, place: 0, last: None, past, past_number: 0 }, None);
         };
+        // A slot may say anything.
+        let place = place % MARKS;
         let (past_number, _, past) = newest(&memory.past()).unwrap_or((0, 0, [PastJob::NONE; PAST]));
         let crossed = (0..MARKS).take_while(|at| memory.is_marked((place + at) % MARKS)).count();
         #[expect(clippy::cast_possible_truncation, reason = "at most MARKS")]
