@@ -129,23 +129,30 @@ impl JobWriter {
         if out.len() < ROW_ROOM + row.len() {
             return Err(Fault::NoRoom);
         }
+        // Behind the commands that usually stand before it: one more where the compression changes.
+        let usual = if self.blank > 0 { 2 * ROW_HEAD } else { ROW_HEAD };
         // Packed only if strictly shorter.
-        let packed = packbits::pack_into(row, &mut out[ROW_ROOM..ROW_ROOM + row.len() - 1]);
+        let packed = packbits::pack_into(row, &mut out[usual..usual + row.len() - 1]);
         let (compression, length) = match packed {
             Some(length) => (Compression::Packed, length),
             None => {
-                out[ROW_ROOM..ROW_ROOM + row.len()].copy_from_slice(row);
+                out[usual..usual + row.len()].copy_from_slice(row);
                 (Compression::Plain, row.len())
             }
         };
+        let changes = self.order.compression() != Some(compression);
+        let data = if changes { usual + ROW_HEAD } else { usual };
+        if changes {
+            out.copy_within(usual..usual + length, data);
+        }
         let mut order = self.order;
         let mut at = 0;
         let mut put = |command: Command<'_>| -> Result<(), Fault> {
             order.accept(&command).map_err(|refusal| refusal.fault)?;
-            at += encode_into(&command, &mut out[at..ROW_ROOM])?;
+            at += encode_into(&command, &mut out[at..data])?;
             Ok(())
         };
-        if self.order.compression() != Some(compression) {
+        if changes {
             put(Command::Compression(compression))?;
         }
         if self.blank > 0 {
@@ -158,11 +165,11 @@ impl JobWriter {
         let [low, high] = (length as u16).to_le_bytes();
         let letter = if last { b'V' } else { b'W' };
         out[at..at + ROW_HEAD].copy_from_slice(&[super::encode::ESC, b'*', b'b', low, high, letter]);
-        out.copy_within(ROW_ROOM..ROW_ROOM + length, at + ROW_HEAD);
+        debug_assert_eq!(at + ROW_HEAD, data);
         self.order = order;
         self.row += 1;
         self.blank = 0;
-        Ok(at + ROW_HEAD + length)
+        Ok(data + length)
     }
 
     /// The next `count` rows are blank.

@@ -520,7 +520,12 @@ impl Row {
                             _ => Run::Repeat(257 - u16::from(byte)),
                         },
                         Run::Repeat(count) | Run::Literal(count) => {
-                            rows.next(self.y, x, count.into())?.fill(byte);
+                            // What is blank is blank already.
+                            if byte == 0 {
+                                *x = rows.skip(*x, count)?;
+                            } else {
+                                rows.next(self.y, x, count.into())?.fill(byte);
+                            }
                             Run::Head
                         }
                     };

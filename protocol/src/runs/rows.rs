@@ -31,8 +31,13 @@ impl Rows<'_> {
         let from = usize::from(*x);
         let end = from + count;
         *x = u16::try_from(end).map_err(|_| Defect::Row)?;
-        self.inked.add(0, end);
+        self.inked.add(from, end);
         self.row(y).get_mut(from..end).ok_or(Defect::Row)
+    }
+
+    /// The place `count` bytes behind `x`.
+    pub(super) fn skip(&self, x: u16, count: u16) -> Result<u16, Defect> {
+        x.checked_add(count).filter(|&x| usize::from(x) <= self.stride).ok_or(Defect::Row)
     }
 
     /// Copies the row above to row `y`, which is not the first.
