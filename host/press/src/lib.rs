@@ -28,3 +28,4 @@ pub mod scratch;
 pub mod separate;
 pub mod sheet;
 pub mod simulate;
+mod split_mix;

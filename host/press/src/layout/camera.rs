@@ -11,6 +11,7 @@
 use std::sync::LazyLock;
 
 use crate::sheet::DotMap;
+use crate::split_mix;
 
 /// Cells along a side, the frame included.
 pub const CELLS: usize = 8;
@@ -32,14 +33,10 @@ const MENDED: u32 = 2;
 /// The patterns by number. A set bit is a dark cell; bit 0 is the top left, rows follow each other.
 static PATTERNS: LazyLock<Vec<u64>> = LazyLock::new(|| {
     let mut found: Vec<u64> = Vec::with_capacity(256 * CORNERS);
-    let mut state = 0x0f01_1b9e_5500_u64;
+    let mut tried = 0;
     while found.len() < 256 * CORNERS {
-        // Steele, Lea and Flood's SplitMix64.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = state;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        bits = (bits ^ (bits >> 31)) & ((1 << (INNER * INNER)) - 1);
+        let bits = split_mix::nth(0x0f01_1b9e_5500, tried) & ((1 << (INNER * INNER)) - 1);
+        tried += 1;
         // Even patches say little about where cells are.
         if !(12..=24).contains(&bits.count_ones()) {
             continue;

@@ -4,12 +4,11 @@
 //! of that it bears.
 //! Method: every pass is shifted and stretched by normal deviates of a given root mean square, and each of its dots is left out with a given
 //! probability. What then lies on a dot are the inks of the passes that reach it, in the order of the passes: a new stack. All
-//! deviates are hashes of seed, pass and place (`SplitMix64`), so the result does not depend on the number of threads.
-//! Cost: for each dot and pass one look at a table, and a hash where dots may be missing; some 10 ns a dot for seven passes.
+//! deviates follow from seed, pass and place alone, so the result does not depend on the number of threads.
+//! Cost: for each dot and pass one look at a table, and a number where dots may be missing; some 10 ns a dot for seven passes.
 //! Limits: shifts are whole dots of 0.042 mm, in each row by itself where the feed is off. What is shifted over the edge is lost, and bare
 //! paper comes in. Missing dots are independent; a dead element of a head would leave a line. Of more than 256 stacks the rarest show as
 //! the nearest of the others.
-//! Source: G. Steele, D. Lea, C. Flood, Fast splittable pseudorandom number generators, 2014.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -20,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::separate::{MOST_PASSES, SeparateError, passes};
 use crate::sheet::{DOTS_PER_MM, DotMap};
+use crate::split_mix::nth;
 
 /// How worn a printer is. The default is a new one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -72,17 +72,9 @@ pub struct Worn {
 /// The most stacks of a dot map.
 const MOST_STACKS: usize = 256;
 
-/// A hash of a seed and a number, uniform in 64 bits.
-fn hash(seed: u64, n: u64) -> u64 {
-    let mut z = seed.wrapping_add(n.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 /// A number above 0 and at most 1.
 fn uniform(seed: u64, n: u64) -> f64 {
-    ((hash(seed, n) >> 11) + 1) as f64 / (1u64 << 53) as f64
+    ((nth(seed, n) >> 11) + 1) as f64 / (1u64 << 53) as f64
 }
 
 /// A standard normal deviate (Box and Muller 1958).
@@ -97,7 +89,7 @@ impl Wear {
     }
 
     fn moved(&self, pass: usize, ink: Ink) -> Moved {
-        let deviate = |which: u64| normal(hash(self.seed, pass as u64), which);
+        let deviate = |which: u64| normal(nth(self.seed, pass as u64), which);
         let rms = self.registration * DOTS_PER_MM;
         Moved {
             ink,
@@ -158,13 +150,13 @@ impl Wear {
         let source = &dots.index()[start..start + dots.width()];
         let shift = moved.right.unsigned_abs() as usize;
         let (skipped, left) = if moved.right >= 0 { (0, shift) } else { (shift, 0) };
-        // So many dots of each row are missing as have a hash below this.
+        // So many dots of each row are missing as have a number below this.
         let least = (self.missing * (1u64 << 53) as f64) as u64;
-        let seed = hash(self.seed ^ 0x6d69_7373_696e_6721, pass as u64);
+        let seed = nth(self.seed ^ 0x6d69_7373_696e_6721, pass as u64);
         let landed = source.iter().enumerate().skip(skipped);
         for (out, (x, &dot)) in row.iter_mut().skip(left).zip(landed) {
             let has = passes_of[usize::from(dot)] >> pass & 1;
-            if has == 1 && (least == 0 || hash(seed, (start + x) as u64) >> 11 >= least) {
+            if has == 1 && (least == 0 || nth(seed, (start + x) as u64) >> 11 >= least) {
                 *out |= 1 << pass;
             }
         }
