@@ -70,6 +70,6 @@ for (const colorScheme of ['light', 'dark']) {
     assert.ok((await page.locator('img').count()) > 3);
     // No link within the page is dead.
     const links = await page.locator('a[href^="#"]').evaluateAll((all) => all.map((a) => a.getAttribute('href').slice(1)));
-    for (const id of links) assert.ok(await page.evaluate((id) => document.getElementById(id) !== null, id), id);
+    for (const id of links) assert.ok(await page.evaluate((target) => document.getElementById(target) !== null, id), id);
   }));
 }

@@ -1,6 +1,6 @@
 //! `cargo xtask preview`: the preview's page, the display's and the report in a real browser.
 //!
-//! Its sources are checked for types, its pictures are compared with those of the renderer, and every control is used by
+//! The sources of pages and scripts are checked, its pictures are compared with those of the renderer, and every control is used by
 //! mouse, touch and keyboard. The browser is Debian's, drawing in software.
 
 use std::env;
@@ -14,6 +14,7 @@ use crate::tools::{self, Node};
 use crate::{cargo, command, firmware, succeed};
 
 const CHROMIUM: &str = "chromium";
+const ESLINT: &str = "tests/browser/node_modules/eslint/bin/eslint.js";
 
 /// Runs the tests, or leaves them out where browser or Node cannot be had.
 pub fn run(root: &Path) -> Result<()> {
@@ -27,6 +28,8 @@ pub fn run(root: &Path) -> Result<()> {
     let install = ["ci", "--no-audit", "--no-fund", "--ignore-scripts", "--loglevel=error"];
     succeed(node.command("npm", &install).current_dir(&scripts))?;
     succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
+    let lint = [ESLINT, "--config", "tests/browser/eslint.config.js", "--max-warnings", "0", "host", "tests"];
+    succeed(node.command("node", &lint).current_dir(root))?;
     let args = ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
     let mut test = cargo(&args);
     test.current_dir(root)

@@ -326,7 +326,7 @@ async function start() {
     byId('stacks').append(item);
   }
   curves = await unpackedFloats(data.curves);
-  values = await Promise.all(data.frames.map((frame) => unpacked(frame.values)));
+  values = await Promise.all(data.frames.map((each) => unpacked(each.values)));
   listen();
   update();
 }

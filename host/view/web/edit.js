@@ -42,7 +42,7 @@ function visible(cos, alpha) {
  */
 export function edited(table, surface, edit, last) {
   if (isUnedited(edit)) return table;
-  const steps = table.length / 3;
+  const entries = table.length / 3;
   const alpha = clamp(surface.alpha * edit.rougher, WIDTHS[0], WIDTHS[1]);
   const k = alpha / surface.alpha;
   const tint = linearTint(edit.tint);
@@ -50,14 +50,14 @@ export function edited(table, surface, edit, last) {
   const albedo = edit.albedo > 1 && lightest > 0 ? Math.min(edit.albedo, Math.max(1 / lightest, 1)) : edit.albedo;
   const own = DIELECTRIC * (1 - surface.metallic);
   const out = new Float32Array(table.length);
-  for (let n = 0; n < steps; n++) {
-    const theta = 2 * Math.asin(Math.min(Math.SQRT1_2 * (n / (steps - 1)), 1));
+  for (let n = 0; n < entries; n++) {
+    const theta = 2 * Math.asin(Math.min(Math.SQRT1_2 * (n / (entries - 1)), 1));
     // Beyond its last sample a curve stays as it is there, so it is edited there.
     const tan = Math.tan(Math.min(theta, last)) / k;
     const read = Math.atan(tan);
     const from = Math.min(read, last);
-    const x = Math.min(Math.SQRT2 * Math.sin(from / 2), 1) * (steps - 1);
-    const i = Math.min(Math.floor(x), steps - 2);
+    const x = Math.min(Math.SQRT2 * Math.sin(from / 2), 1) * (entries - 1);
+    const i = Math.min(Math.floor(x), entries - 2);
     const fall = read > last ? (Math.tan(last) / tan) ** 4 : 1;
     const factor = k === 1 ? 1
       : (fall * visible(Math.cos(Math.min(theta, last)), alpha)) / visible(Math.cos(from), surface.alpha) / (k * k);
@@ -84,7 +84,7 @@ export function steps(name, fingerprint, surfaces, edits) {
     ...(tint === '#ffffff' ? [] : [`tint = "${tint}"`]), ...(albedo === 1 ? [] : [`albedo = ${decimal(albedo)}`]),
   ].join('\n'));
   // A JSON string is a TOML string once control characters are gone.
-  const title = JSON.stringify(name.replace(/[\u0000-\u001f\u007f-\u009f]/g, ' '));
+  const title = JSON.stringify(name.replace(/\p{Cc}/gu, ' '));
   return lines.length ? `format = 1\ndocument = ${title}\nfingerprint = "${fingerprint}"\n${lines.join('\n')}\n` : '';
 }
 

@@ -104,7 +104,8 @@ export function placeAt(scene, size, x, y) {
   const window = plus(plus(scene.corner, scaled(scene.right, x)), scaled(scene.up, -y));
   const o = scene.near ? scene.eye : window;
   const d = scene.near ? plus(window, scaled(scene.eye, -1)) : scaled(scene.towards, -1);
-  let [t, s] = [-o[2] / d[2], 0];
+  let t = -o[2] / d[2];
+  let s = o[0] + t * d[0];
   if (scene.curl > 0) {
     const r = scene.curl;
     const a = d[0] * d[0] + d[2] * d[2];
@@ -113,8 +114,6 @@ export function placeAt(scene, size, x, y) {
     const root = Math.sqrt(b * b - a * c);
     t = b < 0 ? c / (root - b) : (-b - root) / a;
     s = r * Math.atan2(o[0] + t * d[0], o[2] + t * d[2] + r);
-  } else {
-    s = o[0] + t * d[0];
   }
   const y2 = o[1] + t * d[1];
   const inside = Number.isFinite(t) && (!scene.near || t > 0) && Math.abs(s) <= size[0] / 2 && Math.abs(y2) <= size[1] / 2;

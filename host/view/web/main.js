@@ -111,16 +111,16 @@ let original = new Float32Array();
 
 /** Brings the curves of the document in line with the edits. */
 function applyEdits() {
-  const { document: layer } = layers;
+  const shown = layers.document;
   const wanted = editsWritten(state.edits);
-  if (!layer || !data.edits || wanted === applied) return;
+  if (!shown || !data.edits || wanted === applied) return;
   applied = wanted;
   const { surfaces } = data.edits;
   const last = data.metric.angles[data.metric.angles.length - 1];
   const size = 3 * data.steps;
   surfaces.forEach((surface, k) => {
     const table = original.subarray(k * size, (k + 1) * size);
-    layer.curves.set(edited(table, surface, state.edits[k] ?? unedited(), last), k * size);
+    shown.curves.set(edited(table, surface, state.edits[k] ?? unedited(), last), k * size);
   });
   drawing?.recurve('document');
 }

@@ -70,7 +70,7 @@ export function read(text, state, limits) {
   state.pass = Math.round(one('pass', 0, Math.max(limits.passes - 1, 0), state.pass));
   const lights = given.get('light');
   if (lights !== null) {
-    const lamps = lights.split(';').filter(Boolean).slice(0, MOST_LIGHTS).map((text) => text.split(',').map(Number));
+    const lamps = lights.split(';').filter(Boolean).slice(0, MOST_LIGHTS).map((lamp) => lamp.split(',').map(Number));
     if (lamps.every((l) => (l.length === 2 || l.length === 3) && l.every(Number.isFinite))) {
       state.lights = lamps.map(([a, e, d]) => ({
         azimuth: clamp(a, -180, 180), elevation: clamp(e, -90, 90), distance: d > 0 ? clamp(d, 0.05, 100) : 0,
