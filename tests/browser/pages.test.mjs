@@ -1,4 +1,4 @@
-// The other pages that the program writes: the display's and the report.
+// The other pages that the program writes: the display's, the report and a comparison.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
@@ -56,6 +56,25 @@ for (const colorScheme of ['light', 'dark']) {
       for (let i = 0; i < 6; i++) await page.keyboard.press('ArrowRight');
     });
     await changes('start again', () => page.click('#reset'));
+    const chosen = () => page.locator('#frames [aria-checked="true"]').textContent();
+    const speed = page.locator('#speed');
+    const slow = await page.locator('#playing output').textContent();
+    await speed.focus();
+    await page.keyboard.press('End');
+    assert.notEqual(await page.locator('#playing output').textContent(), slow);
+    const first = await chosen();
+    await page.click('#play');
+    assert.equal(await page.getAttribute('#play', 'aria-pressed'), 'true');
+    const seen = new Set();
+    for (let i = 0; i < 60 && seen.size < 2; i++) {
+      seen.add(await chosen());
+      await page.waitForTimeout(50);
+    }
+    assert.ok(seen.size > 1 && seen.has(first), `${[...seen]}`);
+    await page.click('#play');
+    const still = await chosen();
+    await page.waitForTimeout(600);
+    assert.equal(await chosen(), still);
     assert.equal(await page.isVisible('#message'), false);
   }));
 
@@ -71,5 +90,48 @@ for (const colorScheme of ['light', 'dark']) {
     // No link within the page is dead.
     const links = await page.locator('a[href^="#"]').evaluateAll((all) => all.map((a) => a.getAttribute('href').slice(1)));
     for (const id of links) assert.ok(await page.evaluate((target) => document.getElementById(target) !== null, id), id);
+  }));
+
+  test(`a comparison follows mouse, touch and keyboard, ${colorScheme}`, () => visit('photos/compare.html', { ...desk, touch: true, colorScheme }, async (page) => {
+    const pairs = page.locator('figure.pair');
+    assert.equal(await pairs.count(), 2);
+    for (const pair of await pairs.all()) {
+      await pair.scrollIntoViewIfNeeded();
+      const [slider, choice, over] = ['input[type="range"]', 'select', '.over'].map((part) => pair.locator(part));
+      const value = async () => Number(await slider.inputValue());
+      /** The photograph is drawn as far as the slider says. */
+      const split = async (expected, what) => {
+        assert.ok(Math.abs((await value()) - expected) <= 1, `${what}: ${await value()}, not ${expected}`);
+        const clip = await over.evaluate((image) => getComputedStyle(image).clipPath);
+        assert.ok(Math.abs(Number(/([\d.]+)%/.exec(clip)?.[1] ?? 0) - (100 - (await value()))) < 0.01, clip);
+      };
+      await split(50, 'at first');
+      await slider.focus();
+      await page.keyboard.press('Home');
+      await split(0, 'keyboard');
+      const box = await pair.locator('.stage').boundingBox();
+      await page.mouse.move(box.x + 0.2 * box.width, box.y + box.height / 2);
+      await page.mouse.down();
+      await page.mouse.move(box.x + 0.7 * box.width, box.y + box.height / 2);
+      await page.mouse.up();
+      await split(70, 'mouse');
+      await page.touchscreen.tap(box.x + 0.3 * box.width, box.y + box.height / 2);
+      await split(30, 'touch');
+      // Each view is one picture, and all of them differ.
+      const views = new Set();
+      for (let i = 0; i < (await choice.locator('option').count()); i++) {
+        await choice.selectOption({ index: i });
+        const shown = pair.locator('img.view:visible');
+        assert.equal(await shown.count(), 1);
+        views.add(await shown.getAttribute('src'));
+      }
+      assert.equal(views.size, 4);
+      assert.equal(await pair.locator('img').evaluateAll((all) => all.filter((image) => image.naturalWidth === 0).length), 0);
+    }
+    // Figures for both photographs, and all together.
+    assert.equal(await page.locator('h2:has-text("Figures") + div tr').count(), 4);
+    // Nothing is wider than a phone, but tables that scroll for themselves.
+    await page.setViewportSize({ width: 380, height: 740 });
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
   }));
 }

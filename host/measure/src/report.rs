@@ -6,6 +6,7 @@ use std::path::Path;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use plotters::prelude::*;
+use press::html::{self, escape};
 
 use crate::MeasureError;
 use crate::library;
@@ -16,26 +17,7 @@ const COLOURS: [(u8, u8, u8); 3] = [(208, 48, 48), (32, 140, 64), (48, 88, 220)]
 /// The largest picture that is put into a page, in bytes.
 const MOST_PICTURE: u64 = 16 << 20;
 
-const STYLE: &str = "body{font:15px/1.45 sans-serif;color:#111;max-width:960px;margin:1.5em auto;padding:0 1em}h1{font-size:1.5em}\
-    h2{font-size:1.15em;margin:1.6em 0 .3em}table{border-collapse:collapse}th,td{text-align:left;padding:.15em .8em;\
-    border-bottom:1px solid #ccc}td.n,th.n{text-align:right}img{max-width:100%;border:1px solid #999}svg{max-width:100%;height:auto}\
-    .again{background:#fff4d0;padding:.5em 1em}.clean{background:#e4f5e4;padding:.5em 1em}";
-
-/// Text as it stands in HTML: names come from files.
-pub(crate) fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            c if c.is_control() => safe.push(' '),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
+const STYLE: &str = "img{border:1px solid #999}.again{background:#fff4d0;padding:.5em 1em}.clean{background:#e4f5e4;padding:.5em 1em}";
 
 /// The page of a measurement's folder: a single HTML file that loads nothing else.
 ///
@@ -50,12 +32,9 @@ pub fn html(folder: &Path) -> Result<String, MeasureError> {
 }
 
 fn write_page(m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Result {
-    let title = format!("Measurement by {}, {}", escape(&m.by), escape(&m.when));
-    write!(
-        page,
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{title}</title><style>{STYLE}</style><h1>{title}</h1><p>{}.</p>",
-        escape(&m.setup)
-    )?;
+    let title = format!("Measurement by {}, {}", m.by, m.when);
+    let head = html::head(&title, &[html::READ, STYLE]);
+    write!(page, "{head}<body><h1>{}</h1><p>{}.</p>", escape(&title), escape(&m.setup))?;
     if m.again.is_empty() {
         page.push_str("<p class=\"clean\">Nothing needs to be photographed again.</p>");
     } else {
@@ -89,15 +68,16 @@ fn write_page(m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Re
             }
         }
     }
-    page.push_str("</html>\n");
+    page.push_str("</body></html>\n");
     Ok(())
 }
 
 fn exposures(m: &Measurement, page: &mut String) -> std::fmt::Result {
     for (i, series) in m.series.iter().enumerate() {
+        let wide = html::wide(&format!("exposures, lamp {}", i + 1));
         write!(
             page,
-            "<h2>Exposures, lamp {}</h2><table><tr><th>photograph<th class=n>time<th class=n>f-number<th class=n>ISO\
+            "<h2>Exposures, lamp {}</h2>{wide}<table><tr><th>photograph<th class=n>time<th class=n>f-number<th class=n>ISO\
              <th class=n>true exposure<th class=n>shift, pixels<th class=n>clipped",
             i + 1
         )?;
@@ -121,7 +101,7 @@ fn exposures(m: &Measurement, page: &mut String) -> std::fmt::Result {
         let balance = series.card.scale.map(|k| format!("{:.3}", k / series.card.scale[1])).join(", ");
         write!(
             page,
-            "</table><p>Grey card: the brightest step is off by {bright}, the darkest by {dark} (red, green, blue); white balance {balance}.</p>"
+            "</table></div><p>Grey card: the brightest step is off by {bright}, the darkest by {dark} (red, green, blue); white balance {balance}.</p>"
         )?;
     }
     Ok(())
@@ -134,10 +114,11 @@ fn geometry(m: &Measurement, page: &mut String) -> std::fmt::Result {
     } else {
         "The setup is exact, so the curves use its measures."
     };
+    let wide = html::wide("geometry");
     write!(
         page,
         "<h2>Geometry</h2><p>{used} Pixels of the same half angle differ by {:.1} % (by {:.1} % with the measures of the setup \
-         file).</p><table><tr><th>measure<th class=n>correction<th class=n>tolerance<th class=n>uncertain by<th>",
+         file).</p>{wide}<table><tr><th>measure<th class=n>correction<th class=n>tolerance<th class=n>uncertain by<th>",
         100.0 * g.misfit,
         100.0 * g.misfit_before
     )?;
@@ -152,7 +133,7 @@ fn geometry(m: &Measurement, page: &mut String) -> std::fmt::Result {
             escape(&row.unit)
         )?;
     }
-    page.push_str("</table>");
+    page.push_str("</table></div>");
     if let Some(radius) = g.radius_mm {
         write!(page, "<p>Radius of the can: {radius:.2} mm.</p>")?;
     }

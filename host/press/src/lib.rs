@@ -17,6 +17,7 @@
 pub mod chart;
 pub mod files;
 pub mod halftone;
+pub mod html;
 pub mod inspect;
 pub mod job;
 pub mod layers;

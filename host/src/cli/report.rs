@@ -10,7 +10,7 @@ use anyhow::Result;
 use appearance::brdf::{Space, plot};
 use appearance::gamut::{Doubt, MaterialReport};
 use press::halftone::metrics::{Look, Tone};
-use press::job::page::escape;
+use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
 use press::preview::{Report as Fidelity, Spectrum, mix_in_words};
 
@@ -20,17 +20,11 @@ const DRAWN: usize = 8;
 /// The finest pattern that an eye resolves, in cycles a degree.
 const RESOLVED: f64 = 30.0;
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1d1c1a;background:#f6f5f2;max-width:68rem;margin:0 auto;\
-    padding:1rem 1.2rem 3rem}h1{font-size:1.6rem;margin:.4rem 0;overflow-wrap:anywhere}h2{font-size:1.15rem;margin:2.2rem 0 .5rem}\
-    p{margin:.4rem 0;max-width:46rem}a{color:#8a4b12}img,svg{max-width:100%;height:auto;display:block}\
-    nav{display:flex;flex-wrap:wrap;gap:.3rem 1rem}.wide{overflow-x:auto}table{border-collapse:collapse}\
-    th,td{text-align:left;padding:.2rem .9rem .2rem 0;border-bottom:1px solid #dcd8d0;vertical-align:top}\
-    td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\
+const STYLE: &str = "img,svg{display:block}nav{display:flex;flex-wrap:wrap;gap:.3rem 1rem}\
     .many{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1rem;\
     margin-top:1rem}\
-    .passes{grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}figure{margin:0;background:#fff;padding:.6rem;\
-    border-radius:8px;min-width:0}figure>svg{max-width:min(100%,720px);margin:0 auto}\
-    figcaption{font-size:.88rem;overflow-wrap:anywhere}.faint{color:#5f5b55}";
+    .passes{grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}figure{background:#fff;padding:.6rem;\
+    border-radius:8px}figure>svg{max-width:min(100%,720px);margin:0 auto}";
 
 /// What the page shows.
 pub struct Subject<'a> {
@@ -79,11 +73,10 @@ fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result 
     let plan = subject.plan;
     let (name, (width, height)) = (escape(&plan.document), plan.size_mm);
     let (fidelity, eye) = subject.fidelity;
+    let head = html::head(&format!("{}: report of the print", plan.document), &[html::READ, STYLE]);
     write!(
         page,
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
-         content=\"width=device-width, initial-scale=1\"><title>{name}: report of the print</title><style>{STYLE}</style></head>\
-         <body>\n<h1>{name}</h1>\n<p>{width:.1} &times; {height:.1} mm on {}, {} passes. Seen from {eye} m, print and document \
+        "{head}<body>\n<h1>{name}</h1>\n<p>{width:.1} &times; {height:.1} mm on {}, {} passes. Seen from {eye} m, print and document \
          differ by d = {:.3} on average <span class=\"faint\">(0.01: barely visible; 0.05: obvious)</span>.</p>\n\
          <nav aria-label=\"Files\"><a href=\"plan.html\">The plan: cartridges, passes, ribbon, cautions</a>\
          <a href=\"preview.png\">All inks, dot for dot</a><a href=\"separation.png\">Stacks in false colours</a>\
@@ -118,10 +111,10 @@ fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result 
 
 /// Curves of the materials against what is printable.
 fn write_gamut(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result {
-    let kind = subject.kind;
+    let (kind, wide) = (subject.kind, html::wide("mixtures"));
     write!(
         page,
-        "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.</p>\n<div class=\"wide\"><table>\
+        "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.</p>\n{wide}<table>\
          <tr><th class=\"n\">{kind}<th class=\"n\">share<th class=\"n\">d<th class=\"n\">light<th>mixture"
     )?;
     for (material, number) in subject.materials.iter().zip(1..) {
@@ -173,9 +166,10 @@ fn write_halftone(subject: &Subject, page: &mut String) -> fmt::Result {
         }
         None => writeln!(page, "<p>The print is too small or too even for a spectrum.</p>")?,
     }
+    let wide = html::wide("tones");
     write!(
         page,
-        "<div class=\"wide\"><table><tr><th>stack<th class=\"n\">asked<th class=\"n\">printed<th class=\"n\">worst window\
+        "{wide}<table><tr><th>stack<th class=\"n\">asked<th class=\"n\">printed<th class=\"n\">worst window\
          <th class=\"n\">smallest cluster"
     )?;
     for tone in subject.tones {

@@ -12,6 +12,7 @@ use std::sync::OnceLock;
 
 use camera::{BRIGHTER, FOCAL, Picture, RADIAL, RIGHT, SHOTS, Sheet, Shot, V, dot, minus, photograph};
 use serde_json::Value;
+use testing::browser::Browser;
 use testing::program::Bench;
 use truth::{Truth, rms, size};
 
@@ -209,6 +210,14 @@ fn a_grey_card_is_white_where_the_paper_is_not() {
     let said = bench.refused(1, &format!("compare photos {PRINT} --job job.rgl --camera card.toml"));
     assert!(said.contains("left-1.png") && said.contains("no grey card"), "{said}");
     assert!(!bench.path("photos/compare.html").exists(), "half-written");
+}
+
+#[test]
+fn the_page_works_in_a_browser() {
+    let Some(browser) = Browser::find() else { return };
+    let bench = bench(&["left-1.png", "right-1.png"]);
+    bench.done(&format!("compare photos {PRINT} --job job.rgl --camera camera.toml"));
+    browser.test("pages.test.mjs", "comparison", &bench.path("."));
 }
 
 #[test]

@@ -22,6 +22,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use inks::Stack;
 use observe::Observer;
+use press::html;
 use press::preview::{Exposure, Probe, Source};
 use press::separate;
 use press::sheet::{Area, DotMap, colours, label};
@@ -50,6 +51,9 @@ const PROBE_ROWS: usize = 64;
 
 /// White paper in false colours.
 const PAPER: [u8; 3] = [250, 250, 247];
+
+/// What the pages that work look like.
+pub(crate) const STYLE: &str = include_str!("../web/style.css");
 
 /// The sources in the order of their use.
 const SCRIPTS: [&str; 8] = [
@@ -168,8 +172,8 @@ fn assembled(subject: &Subject, data: &str) -> String {
     let script = SCRIPTS.map(joined).concat();
     let still = BASE64_STANDARD.encode(subject.still);
     let parts = [
-        ("{{title}}", escaped(subject.name)),
-        ("{{style}}", include_str!("../web/style.css").to_owned()),
+        ("{{head}}", html::head(&format!("{} · Foilpress preview", subject.name), &[STYLE])),
+        ("{{title}}", html::escape(subject.name)),
         ("{{vertex}}", include_str!("../web/vertex.glsl").to_owned()),
         ("{{fragment}}", include_str!("../web/fragment.glsl").to_owned()),
         ("{{still}}", still),
@@ -208,21 +212,6 @@ pub(crate) fn joined(source: &str) -> String {
         out.push('\n');
     }
     out
-}
-
-/// Text as HTML.
-pub(crate) fn escaped(text: &str) -> String {
-    text.chars().fold(String::new(), |mut out, c| {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c if c.is_control() => out.push(' '),
-            c => out.push(c),
-        }
-        out
-    })
 }
 
 /// Bytes deflated (RFC 1950), as base64.

@@ -1,8 +1,6 @@
-//! The page in a real browser against the renderer, and every control of it. `cargo xtask preview` brings the browser and
-//! names it: `FOILPRESS_CHROMIUM`, `FOILPRESS_NODE`, and the scripts in `FOILPRESS_BROWSER`.
+//! The page in a real browser against the renderer, and every control of it.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::edit::{Steps, apply, fingerprint};
@@ -13,7 +11,7 @@ use inks::{Curve, Library, Stack};
 use observe::Silent;
 use press::preview::{Exposure, Probe, Source, picture};
 use press::sheet::{Area, DotMap};
-use testing::needs::{self, Need};
+use testing::browser::Browser;
 use view::page::{LONGEST, Subject, Target, page};
 use view::{Camera, Light, Lit, Pose, Renderer, Scene, direction};
 
@@ -21,12 +19,6 @@ const SIZE: [f64; 2] = [0.12, 0.09];
 const PICTURE: (usize, usize) = (600, 450);
 const DOTS: (usize, usize) = (1920, 1440);
 const NAME: &str = "<img src=x onerror=\"window.hacked=1\"></script><script>window.hacked=1</script>";
-
-/// Node and the folder of scripts.
-fn browser() -> Option<(PathBuf, PathBuf)> {
-    needs::path(Need::Browser, "FOILPRESS_CHROMIUM")?;
-    Some((needs::path(Need::Browser, "FOILPRESS_NODE")?, needs::path(Need::Browser, "FOILPRESS_BROWSER")?))
-}
 
 /// A document with gradients and borders of three materials, and dots of five stacks.
 struct Made {
@@ -160,15 +152,9 @@ fn compared(ours: &RgbImage, page: &RgbImage) -> (f64, u8, usize) {
     (sum / f64::from(width * height), most, smooth)
 }
 
-fn node(node: &Path, scripts: &Path, args: &[&str], page: &Path) {
-    let status =
-        Command::new(node).args(args).current_dir(scripts).env("FOILPRESS_PAGE", page).status().unwrap();
-    assert!(status.success(), "{args:?}: {status}");
-}
-
 #[test]
-fn the_page_draws_what_the_renderer_draws() {
-    let Some((program, scripts)) = browser() else { return };
+fn the_page_draws_what_the_renderer_draws_in_a_browser() {
+    let Some(browser) = Browser::find() else { return };
     let folder = tempfile::tempdir().unwrap();
     let made = Made::new();
     let probe = Probe::studio(64);
@@ -228,7 +214,7 @@ fn the_page_draws_what_the_renderer_draws() {
     std::fs::write(&list, serde_json::to_string(&fragments).unwrap()).unwrap();
     let words = [&file, &list, &folder.path().to_path_buf()].map(|path| path.to_str().unwrap().to_owned());
     let (width, height) = (PICTURE.0.to_string(), PICTURE.1.to_string());
-    node(&program, &scripts, &["shots.mjs", &words[0], &words[1], &words[2], &width, &height], &file);
+    browser.run(&["shots.mjs", &words[0], &words[1], &words[2], &width, &height], &file);
     let shot = |i: usize| image::open(folder.path().join(format!("{i}.png"))).unwrap().into_rgb8();
 
     let sources = [
@@ -315,15 +301,10 @@ fn the_page_draws_what_the_renderer_draws() {
 }
 
 #[test]
-fn every_control_does_what_it_says() {
-    let Some((program, scripts)) = browser() else { return };
+fn every_control_does_what_it_says_in_a_browser() {
+    let Some(browser) = Browser::find() else { return };
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("page.html");
     Made::new().page(&file, &Probe::studio(32));
-    node(
-        &program,
-        &scripts,
-        &["--test", "--test-reporter=spec", "--test-concurrency=1", "page.test.mjs"],
-        &file,
-    );
+    browser.test("page.test.mjs", ".", &file);
 }

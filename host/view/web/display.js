@@ -145,7 +145,7 @@ let asked = false;
 const reach = Math.round(data.side * data.tile * 100) / 100;
 /** @type {[keyof State, string, string, number, number, number, string][]} name, where, label, least, most, step, unit */
 const SLIDERS = [
-  ['speed', 'speed', 'speed', 0.5, 12, 0.5, ' /s'],
+  ['speed', 'playing', 'speed', 0.5, 12, 0.5, ' /s'],
   ['lightX', 'directions', 'light across', -80, 80, 1, '°'],
   ['lightY', 'directions', 'light up', -80, 80, 1, '°'],
   ['eyeX', 'directions', 'eye across', -80, 80, 1, '°'],
@@ -316,7 +316,7 @@ async function start() {
     button.addEventListener('click', () => show(i));
     byId('frames').append(button);
   }
-  if (data.frames.length < 3) byId('play').hidden = byId('speed').hidden = true;
+  if (data.frames.length < 3) byId('play').hidden = byId('playing').hidden = true;
   for (const [q, name] of data.stacks.entries()) {
     const item = document.createElement('li');
     const chip = document.createElement('span');

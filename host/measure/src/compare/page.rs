@@ -6,9 +6,9 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use press::html::{self, escape};
 
 use super::{Comparison, Errors, PhotoFigures, Pictures};
-use crate::report::escape;
 
 /// Stacks listed for a photograph.
 const STACKS: usize = 12;
@@ -16,7 +16,7 @@ const STACKS: usize = 12;
 /// The page. `name` says what was printed.
 pub fn html(name: &str, comparison: &Comparison, pictures: &[Pictures]) -> String {
     let mut page = String::new();
-    let title = format!("{} beside its photographs", escape(name));
+    let title = format!("{name} beside its photographs");
     let pictures: Vec<[String; 5]> = pictures.iter().map(encoded).collect();
     // Writing to a string does not fail.
     let _ = write_page(&title, comparison, &pictures, &mut page);
@@ -54,13 +54,8 @@ fn cells(errors: &Errors, page: &mut String) -> std::fmt::Result {
 }
 
 fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut String) -> std::fmt::Result {
-    write!(
-        page,
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'; \
-         script-src 'unsafe-inline'\"><title>{title}</title><style>{}</style><main><h1>{title}</h1>",
-        include_str!("page.css")
-    )?;
+    let head = html::head(title, &[html::READ, include_str!("page.css")]);
+    write!(page, "{head}<body><main><h1>{}</h1>", escape(title))?;
     let [width, height] = c.size_mm;
     let from = if c.document { "the document" } else { "the predicted print" };
     write!(
@@ -85,9 +80,10 @@ fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut 
         c.warnings.iter().try_for_each(|line| write!(page, "<li>{}", escape(line)))?;
         page.push_str("</ul></div>");
     }
+    let wide = html::wide("figures");
     write!(
         page,
-        "<h2>Figures</h2><div class=\"scroll\"><table><tr><th>photograph<th class=n>light<th class=n>view<th class=n>half angle{}",
+        "<h2>Figures</h2>{wide}<table><tr><th>photograph<th class=n>light<th class=n>view<th class=n>half angle{}",
         heads(c.document)
     )?;
     for photo in &c.photos {
@@ -109,7 +105,7 @@ fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut 
         stacks(photo, page)?;
     }
     camera(c, page)?;
-    writeln!(page, "</main><script>{}</script></html>", include_str!("page.js"))
+    writeln!(page, "</main><script>{}</script></body></html>", include_str!("page.js"))
 }
 
 fn pair(
@@ -147,10 +143,10 @@ fn stacks(photo: &PhotoFigures, page: &mut String) -> std::fmt::Result {
     if photo.stacks.is_empty() {
         return Ok(());
     }
-    let [least, most] = photo.half_angles_deg;
+    let ([least, most], wide) = (photo.half_angles_deg, html::wide(&format!("stacks of {}", photo.name)));
     write!(
         page,
-        "<details><summary>Stacks: photographed over predicted, half angles {least:.0} to {most:.0}°</summary><div class=\"scroll\"><table>\
+        "<details><summary>Stacks: photographed over predicted, half angles {least:.0} to {most:.0}°</summary>{wide}<table>\
          <tr><th>stack<th class=n>of the dots<th class=n>red<th class=n>green<th class=n>blue"
     )?;
     for factor in photo.stacks.iter().take(STACKS) {
@@ -167,11 +163,11 @@ fn stacks(photo: &PhotoFigures, page: &mut String) -> std::fmt::Result {
 }
 
 fn camera(c: &Comparison, page: &mut String) -> std::fmt::Result {
-    let lens = &c.lens;
+    let (lens, wide) = (&c.lens, html::wide("camera"));
     write!(
         page,
         "<h2>Camera</h2><p>Focal length {:.0} pixels, uncertain by {:.2} %; angle of view {:.1}°; distortion {:+.4}, {:+.4}. Millimetres \
-         count from the middle of the camera marks.</p><div class=\"scroll\"><table><tr><th>photograph<th class=n>camera, mm\
+         count from the middle of the camera marks.</p>{wide}<table><tr><th>photograph<th class=n>camera, mm\
          <th class=n>uncertain by<th class=n>lamp, mm<th class=n>marks<th class=n>off by<th class=n>paper off by<th class=n>seen",
         lens.focal_px,
         100.0 * lens.focal_error,

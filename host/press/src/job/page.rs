@@ -9,6 +9,7 @@ use image::{ImageFormat, RgbImage};
 
 use super::plan::{Plan, Suggestion, grouped};
 use super::ribbon;
+use crate::html::{self, escape};
 
 /// The pictures on the page: what the sheet will look like.
 pub struct Pictures {
@@ -36,37 +37,19 @@ pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageErro
     Ok(page)
 }
 
-/// Text as it stands in HTML: names come from untrusted files.
-pub fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            c if c.is_control() => safe.push(' '),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
-const STYLE: &str = "@page{margin:15mm}body{font:10.5pt/1.35 sans-serif;color:#111;max-width:180mm;margin:0 auto}\
-    h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}h2:first-of-type{clear:both}p{margin:1mm 0}\
-    table{border-collapse:collapse;width:100%}th,td{text-align:left;padding:.6mm 2mm;border-bottom:.2mm solid #bbb}\
-    th{font-weight:600}td.n,th.n{text-align:right}img{border:.2mm solid #999}\
+const STYLE: &str = "@page{margin:15mm}:root{background:#fff;color:#111;font:10.5pt/1.35 sans-serif}body{max-width:180mm;padding:0}\
+    h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}h2:first-of-type{clear:both}p{margin:1mm 0;max-width:none}\
+    table{width:100%}th,td{padding:.6mm 2mm;border-bottom:.2mm solid #bbb}th{font-weight:600}img{border:.2mm solid #999}\
     .sheet{float:right;width:52mm;margin:0 0 3mm 5mm}.passes{display:flex;flex-wrap:wrap;gap:3mm}\
-    figure{margin:0;break-inside:avoid}figure img{max-width:41mm;max-height:41mm}figcaption{font-size:8.5pt}\
+    figure{break-inside:avoid}figure img{max-width:41mm;max-height:41mm}figcaption{font-size:8.5pt}\
     .box{display:inline-block;width:3.4mm;height:3.4mm;border:.3mm solid #111;vertical-align:-.5mm}small{color:#555}";
 
 fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std::fmt::Result {
     let name = escape(&plan.document);
+    let head = html::head(&format!("{}: job plan", plan.document), &[html::READ, STYLE]);
     write!(
         page,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{name}: job plan</title>\
-         <style>{STYLE}</style></head><body>\n\
+        "{head}<body>\n\
          <img class=\"sheet\" alt=\"the sheet as it is printed\" src=\"data:image/png;base64,{sheet}\">\n<h1>{name}</h1>\n"
     )?;
     let (width, height) = plan.size_mm;
@@ -203,14 +186,4 @@ fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
         writeln!(page, "</ul>")?;
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::escape;
-
-    #[test]
-    fn names_from_files_stay_text() {
-        assert_eq!(escape("<b>\"a\" & 'c'\u{7}"), "&lt;b&gt;&quot;a&quot; &amp; &#39;c&#39; ");
-    }
 }

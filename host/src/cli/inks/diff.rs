@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use appearance::brdf::{Difference, Space, compare, plot};
 use inks::{Entry, Library, Origins, Stack};
-use press::job::page::escape;
+use press::html::{self, escape};
 use serde::Serialize;
 
 use super::page;
@@ -168,8 +168,9 @@ fn words(report: &Report<'_>) -> Result<String> {
 }
 
 fn write_page(target: &Path, report: &Report<'_>) -> Result<()> {
+    let wide = html::wide("differences");
     let mut body = format!(
-        "<p>Lines: {} ({}). Dashed: {} ({}). Bands are two standard deviations.</p><table><tr><th>stack<th class=n>d\
+        "<p>Lines: {} ({}). Dashed: {} ({}). Bands are two standard deviations.</p>{wide}<table><tr><th>stack<th class=n>d\
          <th class=n>light<th class=n>band<th>largest difference<th>verdict",
         escape(report.first),
         report.origins[0],
@@ -190,7 +191,7 @@ fn write_page(target: &Path, report: &Report<'_>) -> Result<()> {
         )?;
     }
     let equal = report.stacks.len() - differ().count();
-    write!(body, "</table><p>{equal} stacks are equal.")?;
+    write!(body, "</table></div><p>{equal} stacks are equal.")?;
     for (stacks, name) in [(&report.only_first, report.first), (&report.only_second, report.second)] {
         if !stacks.is_empty() {
             write!(body, " Only in {}: {}.", escape(name), listed(stacks))?;

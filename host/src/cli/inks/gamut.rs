@@ -12,6 +12,7 @@ use appearance::gamut::{
 };
 use inks::{InkSet, Stack};
 use observe::Observer;
+use press::html;
 use press::pipeline::document as stages;
 use protocol::ink::Ink;
 use serde_json::{Value, json};
@@ -148,12 +149,12 @@ fn mixture(weights: &[(Stack, f64)]) -> String {
 }
 
 fn write_page(target: &Path, document: &str, library: &str, space: &Space, found: &[Basis]) -> Result<()> {
-    let escape = press::job::page::escape;
+    let wide = html::wide("bases");
     let mut body = format!(
         "<p>Library: {}. Lines: the basis. Dashed: the best mixture of the library's stacks. d is the difference people see \
-         (0.01: barely visible; 0.05: obvious).</p><table><tr><th>basis<th class=n>share<th>nearest stack<th class=n>d\
+         (0.01: barely visible; 0.05: obvious).</p>{wide}<table><tr><th>basis<th class=n>share<th>nearest stack<th class=n>d\
          <th class=n>mixed d<th class=n>light<th>mixture",
-        escape(library)
+        html::escape(library)
     );
     for (i, basis) in found.iter().enumerate() {
         let m = &basis.mapped;
@@ -168,7 +169,7 @@ fn write_page(target: &Path, document: &str, library: &str, space: &Space, found
             mixture(&m.weights)
         )?;
     }
-    body.push_str("</table>");
+    body.push_str("</table></div>");
     for (i, basis) in found.iter().enumerate() {
         let curves = [space.curve(&basis.mapped.target), space.curve(&basis.mapped.printed)];
         let lines = [0, 1].map(|k: usize| plot::Line { curve: &curves[k], uncertainty: None });

@@ -9,6 +9,7 @@
 use appearance::brdf::{Space, reflectances};
 use appearance::document::SAMPLES;
 use inks::Library;
+use press::html;
 use press::preview::Exposure;
 use press::sheet::{DOTS_PER_MM, colours};
 use serde_json::json;
@@ -16,7 +17,7 @@ use serde_json::json;
 use super::grid::MARGIN;
 use super::{DisplayError, Frame, Grid, Placed};
 use crate::error::ViewError;
-use crate::page::{STEPS, escaped, filled, joined, packed, tables};
+use crate::page::{STEPS, STYLE, filled, joined, packed, tables};
 
 const SCRIPTS: [&str; 2] = [include_str!("../../web/data.js"), include_str!("../../web/display.js")];
 
@@ -74,11 +75,14 @@ pub fn page(subject: &Subject) -> Result<String, DisplayError> {
     Ok(filled(
         include_str!("../../web/display.html"),
         &[
-            ("{{title}}", escaped(subject.name)),
             (
-                "{{style}}",
-                [include_str!("../../web/style.css"), include_str!("../../web/display.css")].concat(),
+                "{{head}}",
+                html::head(
+                    &format!("{} · Foilpress display", subject.name),
+                    &[STYLE, include_str!("../../web/display.css")],
+                ),
             ),
+            ("{{title}}", html::escape(subject.name)),
             // `<` occurs only within strings.
             ("{{data}}", data.replace('<', "\\u003c")),
             ("{{script}}", SCRIPTS.map(joined).concat()),
