@@ -1,11 +1,11 @@
-//! The display's page and the report in a real browser.
+//! The display's page, and the report and the sheet's page of a print, in a real browser.
 
 use image::{Rgb, RgbImage};
 use testing::browser::Browser;
 use testing::program::{Bench, small_document};
 
 #[test]
-fn display_and_report_work_in_a_browser() {
+fn pages_work_in_a_browser() {
     let Some(browser) = Browser::find() else { return };
     let bench = Bench::new();
     for (name, bar) in [("one.png", 1), ("two.png", 3)] {
@@ -17,5 +17,5 @@ fn display_and_report_work_in_a_browser() {
     );
     small_document(&bench.path("tile"));
     bench.done("print tile --size 12x8mm --paper postcard -q -o print");
-    browser.test("pages.test.mjs", "display|report", &bench.path("."));
+    browser.test("pages.test.mjs", "display|report|sheet", &bench.path("."));
 }

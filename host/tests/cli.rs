@@ -28,6 +28,7 @@ fn a_folder_becomes_a_print_with_everything_in_it() {
             "report.html",
             "report.json",
             "separation.png",
+            "sheet.html",
             "sheet.png"
         ]
     );

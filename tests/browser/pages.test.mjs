@@ -5,7 +5,7 @@ import { readFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import { resolve } from 'node:path';
 import test from 'node:test';
-import { open } from './browser.mjs';
+import { open, rested } from './browser.mjs';
 
 const folder = resolve(process.env.FOILPRESS_PAGE ?? '.');
 const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
@@ -90,6 +90,16 @@ for (const colorScheme of ['light', 'dark']) {
     // No link within the page is dead.
     const links = await page.locator('a[href^="#"]').evaluateAll((all) => all.map((a) => a.getAttribute('href').slice(1)));
     for (const id of links) assert.ok(await page.evaluate((target) => document.getElementById(target) !== null, id), id);
+  }));
+
+  test(`the sheet's page shows document and print, ${colorScheme}`, () => visit('print/sheet.html', { ...desk, webgl: true, colorScheme }, async (page) => {
+    const at = await rested(page);
+    assert.deepEqual([at.get('show'), at.get('with')], ['document', 'printed']);
+    const before = await page.locator('#picture').screenshot();
+    await page.focus('#picture');
+    for (let i = 0; i < 8; i++) await page.keyboard.press('ArrowRight');
+    assert.notEqual((await rested(page)).get('light'), at.get('light'));
+    assert.notDeepEqual(await page.locator('#picture').screenshot(), before);
   }));
 
   test(`a comparison follows mouse, touch and keyboard, ${colorScheme}`, () => visit('photos/compare.html', { ...desk, touch: true, colorScheme }, async (page) => {

@@ -9,14 +9,13 @@ use inks::Library;
 
 use super::output::Staged;
 use super::preset::PresetArg;
-use super::preview::{BASES, printed};
+use super::preview::shown::printed;
 use super::print::{DotsArgs, Laid};
 use super::stdio::{read_job, show};
-use appearance::factor::{self, Factored};
+use appearance::factor::Factored;
 use measure::compare::{Comparison, Document, Errors, Printed, Setup, compare, page, space};
 use observe::Observer;
 use press::layout::{Layout, arrange};
-use press::pipeline::document::factored;
 use press::sheet::{Area, DotMap};
 use press::simulate;
 use view::mapped;
@@ -116,9 +115,9 @@ impl Args {
                 "--mirror: a mirrored print is compared without its document; leave DOC out and give --job"
             );
         }
-        let Laid { document, library, settings, halftoned, layout } = self.dots.laid(observer)?;
-        let layout = Layout { camera_marks: true, ..layout };
-        let page = arrange(&halftoned.dots, &layout, observer)?;
+        let laid = self.dots.laid(observer)?;
+        let layout = Layout { camera_marks: true, ..laid.layout.clone() };
+        let page = arrange(&laid.halftoned.dots, &layout, observer)?;
         if let Some(job) = &self.job {
             let printout = simulate::print(&read_job(job)?, &simulate::Setup::default(), observer)
                 .with_context(|| format!("{}", job.display()))?;
@@ -134,10 +133,8 @@ impl Args {
         let Some(&area) = page.laid.copies.first() else {
             bail!("nothing of the document lies on the sheet")
         };
-        let uses_bases = halftoned.mapped.report.intent.uses_bases();
-        let bases = settings.factor.bases.or((!uses_bases).then_some(BASES));
-        let target =
-            factored(&document, &factor::Settings { bases, ..settings.factor }, observer)?.0.into_owned();
+        let target = laid.bases(None, observer)?;
+        let Laid { document, library, halftoned, .. } = laid;
         let mixture = mapped(&halftoned.mapped.mix, &library, &space());
         let sheet = page.sheet.dots().clone();
         Ok(Work { name: document.name, sheet, library, document: Some((target, mixture, area)) })

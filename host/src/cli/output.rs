@@ -71,7 +71,7 @@ impl Kind {
                 Kind::Print => {
                     ["job.rgl", "plan.html", "sheet.png", "materials.png", "separation.png", "passes"].contains(&name)
                         || name == "preview.png"
-                        || ["report.html", "display.html"].contains(&name)
+                        || ["report.html", "sheet.html", "display.html"].contains(&name)
                         || (["preview-", "mask-", "seen-"].iter().any(|start| name.starts_with(start)) && picture(name))
                 }
                 Kind::Foil => {

@@ -95,7 +95,12 @@ impl Made {
             name: NAME,
             about: "a document for tests",
             size: SIZE,
-            target: Some(Target { document: &self.document, mapped: &self.mapped, mixtures: &mixtures }),
+            target: Some(Target {
+                document: &self.document,
+                mapped: &self.mapped,
+                mixtures: &mixtures,
+                editable: true,
+            }),
             dots: &self.dots,
             stacks: &self.stacks,
             space: &self.space,

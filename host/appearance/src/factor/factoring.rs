@@ -52,6 +52,15 @@ impl fmt::Display for Report {
             self.p95,
             self.max
         )?;
+        if self.asked.is_some_and(|asked| asked > self.materials) {
+            write!(
+                f,
+                "; {} were asked for, and the document has {} distinct material{}",
+                self.asked.unwrap_or_default(),
+                self.materials,
+                if self.materials == 1 { "" } else { "s" }
+            )?;
+        }
         match 100.0 * self.uncovered {
             few if few < 0.05 => Ok(()),
             share => {
@@ -122,12 +131,6 @@ fn learn(sample: &Sample, settings: &Settings, observer: &dyn Observer) -> (Pca,
     let pca = Pca::of(sample, axes, settings.seed);
     let most = sample.len();
     if most == 1 || settings.bases.is_some_and(|k| k >= most) {
-        if let Some(k) = settings.bases.filter(|&k| k > most) {
-            observer.note(&format!(
-                "{k} bases were requested, but the document has only {most} distinct material{}",
-                if most == 1 { "" } else { "s" }
-            ));
-        }
         return (pca, sample.x.clone());
     }
     let corners = Hull::of_corners(sample, &pca, settings.seed);

@@ -41,6 +41,8 @@ pub struct Halftoned {
     pub mapped: Mapped,
     /// The dots.
     pub dots: DotMap,
+    /// What the document was averaged to (across, down), if the print cannot show all its pixels.
+    pub cells: Option<(usize, usize)>,
     /// What foils would bring, if the inks are the default, which leaves them out.
     pub foils: Option<Gain>,
     /// How much of the distance between document and mixture lies within the measurement of the stacks, if one in use has
@@ -120,7 +122,7 @@ pub fn halftoned(
         false => None,
     };
     let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
-    Ok(Halftoned { factoring, mapped, dots, foils, doubt })
+    Ok(Halftoned { factoring, mapped, dots, cells, foils, doubt })
 }
 
 /// What foils beside the default inks would bring.

@@ -1,0 +1,195 @@
+//! What is looked at: printed dots, and the document and the mixture of inks that they stand for.
+//!
+//! Problem: `preview` shows documents, jobs and sheets, `print` what it has just printed, and both write the same page.
+//! Cost of a page: as many bases as make the document look like itself are fitted to it, at the page's own resolution.
+
+use std::path::Path;
+
+use ::view::page::{Subject, Target, page};
+use ::view::{Lit, Renderer, mapped, proportions};
+use anyhow::{Context, Result};
+use appearance::brdf::{Space, Table, reflectances};
+use appearance::document::SAMPLES;
+use appearance::factor::Factored;
+use image::ImageFormat;
+use inks::Library;
+use observe::Observer;
+use press::layout::Mm;
+use press::preview::{Exposure, Probe, Radiance, Source, mix_in_words, picture};
+use press::sheet::{Area, DotMap, Sheet};
+use press::simulate;
+
+use super::super::print::{DotsArgs, Laid};
+use super::super::stdio::read_job;
+use super::view::{Show, ViewArgs};
+use super::wear::Told;
+
+/// Pixels of the longer side of the picture in the page.
+const STILL: usize = 800;
+
+/// What there is to show.
+pub struct Shown {
+    pub name: String,
+    pub space: Space,
+    pub library: Library,
+    pub dots: DotMap,
+    pub target: Option<Both>,
+    /// What a worn printer made of the dots.
+    pub worn: Option<Told>,
+}
+
+/// A document and its mixture of inks.
+pub struct Both {
+    pub document: Factored,
+    pub mapped: Factored,
+    pub mixtures: Vec<String>,
+    /// Whether the document is as `factor` writes it.
+    pub whole: bool,
+}
+
+/// A page.
+pub struct Page {
+    pub html: String,
+    /// Width and height of its picture for browsers that cannot draw.
+    pub pixels: (usize, usize),
+    pub exposure: Exposure,
+}
+
+impl Shown {
+    /// What the argument names: a document, or printed dots.
+    pub fn open(work: &DotsArgs, observer: &dyn Observer) -> Result<Shown> {
+        let path = Path::new(&work.document.document);
+        if let Some(dots) = printed(path, observer)? {
+            let name =
+                path.file_stem().map_or_else(|| "sheet".into(), |stem| stem.to_string_lossy().into_owned());
+            let library = work.inks.library()?;
+            return Ok(Shown {
+                name,
+                space: Space::half_angle(SAMPLES),
+                library,
+                dots,
+                target: None,
+                worn: None,
+            });
+        }
+        Shown::of(work.laid(observer)?, None, observer)
+    }
+
+    /// A document with its dots: with all its detail, or averaged to these cells (across, down).
+    pub fn of(laid: Laid, cells: Option<(usize, usize)>, observer: &dyn Observer) -> Result<Shown> {
+        let bases = laid.bases(cells, observer)?;
+        let Laid { document, library, halftoned, .. } = laid;
+        let space = document.materials().space().clone();
+        let mix = &halftoned.mapped.mix;
+        let words = |row: &Vec<u16>| {
+            let parts = mix.stacks.iter().cloned().zip(row.iter().map(|&share| f64::from(share)));
+            mix_in_words(&parts.filter(|(_, share)| *share > 0.0).collect::<Vec<_>>())
+        };
+        let both = Both {
+            document: bases,
+            mapped: mapped(mix, &library, &space),
+            mixtures: mix.matrix.iter().map(words).collect(),
+            whole: cells.is_none() || document.as_factored().is_some(),
+        };
+        Ok(Shown {
+            name: document.name,
+            space,
+            library,
+            dots: halftoned.dots,
+            target: Some(both),
+            worn: None,
+        })
+    }
+
+    /// What the stacks of the dots reflect.
+    pub fn stacks(&self) -> Table {
+        reflectances(self.dots.stacks(), &self.library, &self.space)
+    }
+
+    /// What a picture shows.
+    pub fn source<'a>(&'a self, what: Show, stacks: &'a Table) -> Source<'a> {
+        match (what, &self.target) {
+            (Show::Document, Some(both)) => Source::Factored(&both.document),
+            (Show::Mapped, Some(both)) => Source::Factored(&both.mapped),
+            _ => {
+                Source::Print { dots: &self.dots, space: &self.space, stacks, area: Area::whole(&self.dots) }
+            }
+        }
+    }
+
+    /// The page on which light follows the hand, as it is at first with these options.
+    ///
+    /// # Errors
+    /// A scene that cannot be seen.
+    pub fn page(&self, view: &ViewArgs, probe: Option<&Probe>, observer: &dyn Observer) -> Result<Page> {
+        let (stacks, size) = (self.stacks(), self.size());
+        let lit = Lit::new(&self.source(view.what(), &stacks), size, STILL)?;
+        let (width, height) = proportions(size, STILL);
+        let scene = view.scene(size, width as f64 / height as f64, probe.cloned());
+        let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
+        let exposure = view.exposure(&radiance);
+        let studio = Probe::studio(64);
+        let subject = Subject {
+            name: &self.name,
+            about: &self.about(),
+            size,
+            target: self.target.as_ref().map(|both| Target {
+                document: &both.document,
+                mapped: &both.mapped,
+                mixtures: &both.mixtures,
+                editable: both.whole,
+            }),
+            dots: &self.dots,
+            stacks: &stacks,
+            space: &self.space,
+            probe: probe.unwrap_or(&studio),
+            start: &view.fragment(exposure, self.target.is_some(), probe.is_some()),
+            still: &png(&radiance, exposure)?,
+        };
+        Ok(Page { html: page(&subject, observer)?, pixels: (width, height), exposure })
+    }
+
+    /// Width and height in metres.
+    pub fn size(&self) -> [f64; 2] {
+        [self.dots.width(), self.dots.length()].map(|dots| Mm::of_dots(dots as i64).0 / 1000.0)
+    }
+
+    fn about(&self) -> String {
+        let [width, height] = self.size().map(|side| side * 1000.0);
+        let stacks = self.dots.census().iter().filter(|&&dots| dots > 0).count();
+        format!(
+            "{width:.0} x {height:.0} mm, {:.1} million dots of {stacks} {}",
+            self.dots.index().len() as f64 / 1e6,
+            if stacks == 1 { "stack" } else { "stacks" }
+        ) + &self.worn.as_ref().map_or_else(String::new, |worn| format!(", {}", worn.brief()))
+    }
+
+    /// Says what a worn printer made of the dots.
+    pub fn say(&self, out: &mut dyn std::io::Write) -> std::io::Result<()> {
+        self.worn.as_ref().map_or(Ok(()), |worn| worn.write(out))
+    }
+}
+
+/// The dots of a job or of a folder with a sheet; nothing for a document.
+pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
+    if path.join("dots.toml").is_file() {
+        return Ok(Some(DotMap::load(path)?));
+    }
+    if path.join("sheet.toml").is_file() {
+        return Ok(Some(Sheet::load(path)?.dots().clone()));
+    }
+    if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl")) {
+        return Ok(None);
+    }
+    let job = read_job(path)?;
+    let printout = simulate::print(&job, &simulate::Setup::default(), observer)
+        .with_context(|| format!("{}", path.display()))?;
+    Ok(Some(printout.sheet()?.dots().clone()))
+}
+
+/// A picture as PNG.
+pub fn png(radiance: &Radiance, exposure: Exposure) -> Result<Vec<u8>> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture(radiance, exposure)?.write_to(&mut bytes, ImageFormat::Png)?;
+    Ok(bytes.into_inner())
+}
