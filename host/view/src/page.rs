@@ -348,7 +348,12 @@ mod tests {
                 name,
                 about: "60 x 40 dots",
                 size: [0.00254, 0.00169],
-                target: Some(Target { document: &document, mapped: &document, mixtures: &[] }),
+                target: Some(Target {
+                    document: &document,
+                    mapped: &document,
+                    mixtures: &[],
+                    editable: true,
+                }),
                 dots: &dots,
                 stacks: &rows,
                 space: &space,
