@@ -18,10 +18,12 @@
 
 pub mod display;
 mod error;
+mod footprint;
 mod gain;
 mod glb;
 mod lit;
 pub mod page;
+mod ray;
 mod render;
 mod scene;
 mod surroundings;
