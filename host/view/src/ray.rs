@@ -71,7 +71,7 @@ impl Default for Hits {
 
 /// A surface that rays meet.
 trait Surface {
-    /// How many `d` from `o` the nearest point in front is; not finite if there is none.
+    /// How many `d` from `o` the nearest point is along the whole line; not finite if there is none.
     fn meet(&self, o: V, d: V) -> f32;
     /// The normal's x and z at a point of it, and how far along the paper the point is from the middle.
     fn point(&self, at: V) -> ([f32; 2], f32);
@@ -99,11 +99,13 @@ impl Surface for Flat {
 impl Surface for Bent {
     #[inline(always)]
     fn meet(&self, o: V, d: V) -> f32 {
+        // The axis lies a radius behind the origin; the square of the radius has cancelled in `c`.
         let a = d[0] * d[0] + d[2] * d[2];
-        let b = o[0] * d[0] + o[2] * d[2] + self.radius * d[2];
-        // The axis lies a radius behind the origin; its square has cancelled.
+        let b = o[0] * d[0] + (o[2] + self.radius) * d[2];
         let c = o[0] * o[0] + o[2] * o[2] + 2.0 * o[2] * self.radius;
-        let root = (b * b - a * c).sqrt();
+        // The line's distance from the axis, times the length of `d`. Instead of `b * b - a * c`, which cancels.
+        let beside = o[0] * d[2] - (o[2] + self.radius) * d[0];
+        let root = (self.radius * self.radius * a - beside * beside).sqrt();
         // The nearer root, by the formula that does not cancel. None is not a number.
         let (above, below) = if b < 0.0 { (c, root - b) } else { (-b - root, a) };
         above / below
@@ -152,20 +154,21 @@ impl Rays {
     pub fn follow(&self, x: usize, y: usize, hits: &mut Hits) {
         let bent = |radius: f32| Bent { radius, inverse: 1.0 / radius };
         match (self.eye, self.curl.map(bent)) {
-            (None, None) => self.hit(&Flat, |w| (w, self.towards.map(|c| -c)), |_| 1.0, x, y, hits),
-            (None, Some(bent)) => self.hit(&bent, |w| (w, self.towards.map(|c| -c)), |_| 1.0, x, y, hits),
-            (Some(eye), None) => self.hit(&Flat, |w| (eye, minus(w, eye)), |t| t, x, y, hits),
-            (Some(eye), Some(bent)) => self.hit(&bent, |w| (eye, minus(w, eye)), |t| t, x, y, hits),
+            (None, None) => self.hit(&Flat, |_| self.towards.map(|c| -c), |_| 1.0, x, y, hits),
+            (None, Some(bent)) => self.hit(&bent, |_| self.towards.map(|c| -c), |_| 1.0, x, y, hits),
+            (Some(eye), None) => self.hit(&Flat, |w| minus(w, eye), |t| 1.0 + t, x, y, hits),
+            (Some(eye), Some(bent)) => self.hit(&bent, |w| minus(w, eye), |t| 1.0 + t, x, y, hits),
         }
     }
 
-    /// `ray` makes origin and direction of a ray from its point in the window. `scale` is how long a step in the window has
-    /// become where the ray hits.
+    /// `ray` makes the direction of the ray through a point of the window, as far as from the eye. Rays are followed from the
+    /// window, which is near the sheet, both ways: from a far eye places would be rounded to its distance. `scale` is how
+    /// long a step in the window has become where the ray hits, so many directions from the window.
     #[inline(always)]
     fn hit(
         &self,
         surface: &impl Surface,
-        ray: impl Fn(V) -> (V, V),
+        ray: impl Fn(V) -> V,
         scale: impl Fn(f32) -> f32,
         x: usize,
         y: usize,
@@ -173,12 +176,13 @@ impl Rays {
     ) {
         let line: V = std::array::from_fn(|c| self.corner[c] - (y as f32 + 0.5) * self.up[c]);
         // What lies behind a near eye is not seen. A far eye has nothing behind it.
-        let least = if self.eye.is_some() { 0.0 } else { f32::NEG_INFINITY };
+        let least = if self.eye.is_some() { -1.0 } else { f32::NEG_INFINITY };
         let inverse = self.half.map(|half| 0.5 / half);
         let (right, up) = (self.right, self.up);
         for i in 0..BLOCK {
             let px = (x + i) as i32 as f32 + 0.5;
-            let (o, d) = ray([line[0] + px * right[0], line[1] + px * right[1], line[2] + px * right[2]]);
+            let o = [line[0] + px * right[0], line[1] + px * right[1], line[2] + px * right[2]];
+            let d = ray(o);
             let t = surface.meet(o, d);
             let at = [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]];
             let ([nx, nz], along) = surface.point(at);
@@ -286,6 +290,111 @@ pub(crate) fn minus(a: V, b: V) -> V {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Camera, Pose, direction};
+    use proptest::prelude::*;
+
+    const SIZE: [f64; 2] = [0.1, 0.08];
+    const PLACES: [usize; 2] = [2048, 1024];
+
+    /// Where the ray through a point of a picture (pixels) of a side of 100 meets the sheet, in f64: the point by bisection of
+    /// the ray, and the place along the paper.
+    fn by_hand(scene: &Scene, x: f64, y: f64) -> Option<([f64; 3], [f64; 2])> {
+        let frame = Frame::new(&scene.pose);
+        let towards = unit(scene.camera.towards);
+        let [right, up] = right_and_up(towards).map(|axis| frame.in_sheet(axis));
+        let towards = frame.in_sheet(towards);
+        let step = scene.camera.height / 100.0;
+        let window: [f64; 3] =
+            std::array::from_fn(|c| (x - 50.0) * step * right[c] + (50.0 - y) * step * up[c]);
+        // A far eye is far enough at 10 m, as its rays are parallel.
+        let eye: [f64; 3] = std::array::from_fn(|c| match scene.camera.distance {
+            Some(d) => d * towards[c],
+            None => window[c] + 10.0 * towards[c],
+        });
+        let along = |t: f64| -> [f64; 3] { std::array::from_fn(|c| eye[c] + t * (window[c] - eye[c])) };
+        let above = |p: [f64; 3]| match scene.pose.curl {
+            Some(r) => p[0].hypot(p[2] + r) - r,
+            None => p[2],
+        };
+        // Beyond the point nearest to the axis, or far beyond the plane.
+        let mut far = match scene.pose.curl {
+            Some(r) => {
+                let (d0, d2) = (window[0] - eye[0], window[2] - eye[2]);
+                -(eye[0] * d0 + (eye[2] + r) * d2) / (d0 * d0 + d2 * d2)
+            }
+            None => 100.0,
+        };
+        if above(along(far)) > 0.0 {
+            return None;
+        }
+        let mut near = 0.0;
+        for _ in 0..100 {
+            let middle = 0.5 * (near + far);
+            if above(along(middle)) > 0.0 { near = middle } else { far = middle }
+        }
+        let p = along(far);
+        let s = scene.pose.curl.map_or(p[0], |r| r * p[0].atan2(p[2] + r));
+        Some((p, [s, p[1]]))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn rays_meet_the_sheet_where_bisection_finds_it(
+            towards in (-60.0..60.0, -50.0..50.0),
+            distance in prop::option::of(0.15..2.0),
+            pose in (-0.3..0.3, -0.3..0.3, prop::option::of(1.0..30.0)),
+            zoom in 0.05..1.2,
+            row in 0..100usize,
+        ) {
+            let (turn, tip, curl) = pose;
+            let mut camera = Camera::whole(direction(towards.0, towards.1), distance, SIZE, 1.0);
+            camera.height *= zoom;
+            let pose = Pose { turn, tip, curl: curl.map(|c| c * SIZE[0] / std::f64::consts::PI) };
+            let scene = Scene { camera, pose, lights: Vec::new(), probe: None };
+            prop_assume!(scene.check(SIZE).is_ok());
+            let rays = Rays::new(&scene, SIZE, PLACES, 100, 100);
+            let mut hits = Hits::default();
+            rays.follow(20, row, &mut hits);
+            for i in 0..BLOCK {
+                let (x, y) = ((20 + i) as f64 + 0.5, row as f64 + 0.5);
+                let hand = by_hand(&scene, x, y);
+                let Some((at, place)) = hand.filter(|(_, p)| (0..2).all(|c| p[c].abs() < 0.49 * SIZE[c])) else {
+                    continue;
+                };
+                let normal = match scene.pose.curl {
+                    Some(r) => [at[0] / r, 0.0, (at[2] + r) / r],
+                    None => [0.0, 0.0, 1.0],
+                };
+                let view: [f64; 3] = std::array::from_fn(|c| f64::from(hits.view[c][i]));
+                let facing: f64 = (0..3).map(|c| normal[c] * view[c]).sum();
+                if facing < 0.1 {
+                    continue;
+                }
+                // A step of a hundredth of a pixel, which the curve of the sheet does not change.
+                let step = |dx: f64, dy: f64| {
+                    let (_, to) = by_hand(&scene, x + dx, y + dy).unwrap();
+                    let parts: [f64; 2] =
+                        std::array::from_fn(|c| 100.0 * (to[c] - place[c]) * PLACES[c] as f64 / SIZE[c]);
+                    parts[0].hypot(parts[1])
+                };
+                let level = step(0.01, 0.0).max(step(0.0, 0.01)).log2().max(0.0);
+                prop_assert!(hits.covered[i] > 0.0, "{} is not covered", x);
+                for c in 0..3 {
+                    prop_assert!((f64::from(hits.at[c][i]) - at[c]).abs() < 3e-7, "{:?}, not {:?}", hits.at[c][i], at);
+                }
+                for (c, n) in [normal[0], normal[2]].into_iter().enumerate() {
+                    prop_assert!((f64::from(hits.normal[c][i]) - n).abs() < 1e-5);
+                }
+                let (u, v) = (place[0] / SIZE[0] + 0.5, 0.5 - place[1] / SIZE[1]);
+                for (found, expected) in [(hits.place[0][i], u), (hits.place[1][i], v)] {
+                    prop_assert!((f64::from(found) - expected).abs() < 5e-6, "{}, not {}", found, expected);
+                }
+                prop_assert!((f64::from(hits.level[i]) - level).abs() < 0.02, "{}, not {}", hits.level[i], level);
+            }
+        }
+    }
 
     #[test]
     fn the_angle_is_that_of_the_library() {
