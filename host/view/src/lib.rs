@@ -21,6 +21,7 @@ mod error;
 mod footprint;
 mod gain;
 mod glb;
+mod light;
 mod lit;
 pub mod page;
 mod ray;

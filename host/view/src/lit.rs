@@ -25,13 +25,6 @@ const STEP: usize = 32;
 /// Weights of a place are stored in groups of this many, so that products run in lanes.
 pub(crate) const LANES: usize = 8;
 
-/// The sum of lanes, half by half.
-#[inline(always)]
-pub(crate) fn total(lanes: [f32; LANES]) -> f32 {
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
-}
-
 /// A document, a mixture or a printed sheet, ready to be lit. See the module text.
 pub struct Lit {
     /// Width and height in metres.

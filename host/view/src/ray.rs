@@ -213,14 +213,10 @@ impl Rays {
             let part = |at: f32| greater(lesser(at, 1.0), 0.0);
             hits.place[0][i] = part(0.5 + along * inverse[0]);
             hits.place[1][i] = part(0.5 - at[1] * inverse[1]);
-            for c in 0..3 {
-                hits.at[c][i] = at[c];
-            }
-            (hits.normal[0][i], hits.normal[1][i]) = (nx, nz);
-            let view = -1.0 / dot(d, d).sqrt();
-            for c in 0..3 {
-                hits.view[c][i] = view * d[c];
-            }
+            [hits.at[0][i], hits.at[1][i], hits.at[2][i]] = at;
+            [hits.normal[0][i], hits.normal[1][i]] = [nx, nz];
+            let back = -1.0 / dot(d, d).sqrt();
+            [hits.view[0][i], hits.view[1][i], hits.view[2][i]] = d.map(|c| back * c);
         }
     }
 }
@@ -231,7 +227,7 @@ fn angle(x: f32, z: f32) -> f32 {
     const TERMS: [f32; 8] = [
         -0.333_331_45,
         0.199_935_51,
-        -0.142_088_99,
+        -0.142_089,
         0.106_562_64,
         -0.075_289_64,
         0.042_909_614,

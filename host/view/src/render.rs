@@ -1,34 +1,31 @@
 //! The picture of a lit sheet.
 //!
 //! Problem: a frame of a million pixels and eight bases must follow a hand, on two cores.
-//! Method: rows run in parallel, and of a row [`BLOCK`] pixels at a time. [`Rays`] finds where their rays meet the sheet, and
-//! [`Weights`] reads the mean weights over their footprints. All curves lie in one table over the
-//! half angle, entry by entry ([`Fine`]), so a light costs one lookup and one product of weights and entries:
-//! `L = sum_k w_k f_k(theta_h) E cos_i`. Geometry runs in lanes over the pixels, products in lanes over the curves. A light
-//! probe is integrated on a grid over the sheet ([`Field`](crate::surroundings)).
-//! Cost: two entries of the table for each pixel and light, beside rays and weights.
+//! Method: rows run in parallel, and of a row [`BLOCK`] pixels at a time. [`Rays`] finds where their rays meet the sheet,
+//! [`Weights`] reads the mean weights over their footprints, and [`Curves`] mixes what the lights make of them. A light probe is
+//! integrated on a grid over the sheet ([`Field`](crate::surroundings)).
+//! Cost: that of its parts; on two cores 19 ms for a million pixels, eight curves and one light.
 //! Limits: one bounce and no shadows, which the outside of a cylinder does not need; edges of the sheet are smooth, the
 //! silhouette of a bent one is not. The back of a sheet is never seen: all of a bent one lies behind its middle, where
 //! [`Scene::check`] wants the eye in front.
 
 use appearance::wide::wide;
 use observe::Observer;
-use press::preview::{ENTRIES, Fine, LONGEST_SIDE, PreviewError, Radiance};
+use press::preview::{LONGEST_SIDE, PreviewError, Radiance};
 use rayon::prelude::*;
 
 use crate::error::ViewError;
 use crate::footprint::Weights;
-use crate::lit::{LANES, Lit, total};
-use crate::ray::{BLOCK, Hits, Rays, V, Values, dot, greater, minus};
-use crate::scene::{Frame, Light, Scene, unit};
+use crate::light::{Curves, Lamp, Lighting, Sums};
+use crate::lit::{LANES, Lit};
+use crate::ray::{BLOCK, Hits, Rays};
+use crate::scene::{Frame, Scene};
 use crate::surroundings::Field;
 
 /// Renders one [`Lit`] again and again. See the module text.
 pub struct Renderer<'a> {
     lit: &'a Lit,
-    fine: Fine,
-    /// For each entry the three channels, each with a value for every curve.
-    table: Vec<[f32; LANES]>,
+    curves: Curves,
 }
 
 /// A scene in the axes of the sheet.
@@ -38,45 +35,18 @@ struct Seen {
     field: Option<Field>,
 }
 
-/// A light in the axes of the sheet.
-enum Lamp {
-    /// Its unit direction.
-    Far(V),
-    /// Its place, and the square of its distance from the origin.
-    Near(V, f32),
-}
-
 /// What a thread needs for a block of pixels.
 struct Block {
     hits: Hits,
     weights: Weights,
     lighting: Lighting,
-    /// What each pixel sends to the eye in three channels, still apart by curves.
-    light: Vec<[[f32; LANES]; 3]>,
-}
-
-/// How a light falls on the pixels of a block.
-struct Lighting {
-    /// `E cos_i`, 0 where the light does not reach or the sheet covers nothing.
-    irradiance: Values,
-    /// The chord between the normal and the half vector.
-    chord: Values,
+    sums: Sums,
 }
 
 impl<'a> Renderer<'a> {
     /// Prepares the curves.
     pub fn new(lit: &'a Lit) -> Renderer<'a> {
-        let fine = Fine::new();
-        let groups = lit.stride / LANES;
-        let mut table = vec![[0.0; LANES]; ENTRIES * 3 * groups];
-        for (k, curve) in lit.curves.iter().enumerate() {
-            for (entry, rgb) in fine.table(curve).into_iter().enumerate() {
-                for (c, f) in rgb.into_iter().enumerate() {
-                    table[(entry * 3 + c) * groups + k / LANES][k % LANES] = f;
-                }
-            }
-        }
-        Renderer { lit, fine, table }
+        Renderer { lit, curves: Curves::new(lit) }
     }
 
     /// Renders `width` x `height` pixels.
@@ -145,25 +115,21 @@ impl<'a> Renderer<'a> {
     /// Brings a scene into the axes of the sheet.
     fn seen(&self, scene: &Scene, width: usize, height: usize, observer: &dyn Observer) -> Seen {
         let frame = Frame::new(&scene.pose);
-        let f32s = |v: [f64; 3]| frame.in_sheet(v).map(|c| c as f32);
-        let lamp = |light: &Light| match *light {
-            Light::Far(v) => Lamp::Far(f32s(unit(v))),
-            Light::Near(at) => Lamp::Near(f32s(at), dot(f32s(at), f32s(at))),
-        };
         let places = [self.lit.levels[0].width, self.lit.levels[0].height];
         Seen {
             rays: Rays::new(scene, self.lit.size, places, width, height),
-            lamps: scene.lights.iter().map(lamp).collect(),
-            field: scene.probe.as_ref().map(|probe| {
-                Field::new(probe, scene, self.lit, &self.fine, |light| self.product(light), observer)
-            }),
+            lamps: scene.lights.iter().map(|light| Lamp::new(light, &frame)).collect(),
+            field: scene
+                .probe
+                .as_ref()
+                .map(|probe| Field::new(probe, scene, self.lit, &self.curves, observer)),
         }
     }
 
     /// Renders a row, which is black and empty.
     #[inline(always)]
     fn row(&self, seen: &Seen, y: usize, row: &mut [[f32; 4]], block: &mut Block) {
-        let Block { hits, weights, lighting, light } = block;
+        let Block { hits, weights, lighting, sums } = block;
         for (n, out) in row.chunks_mut(BLOCK).enumerate() {
             seen.rays.follow(n * BLOCK, y, hits);
             hits.covered[out.len()..].fill(0.0);
@@ -171,100 +137,26 @@ impl<'a> Renderer<'a> {
                 continue;
             }
             weights.read(self.lit, hits);
-            light.fill([[0.0; LANES]; 3]);
+            sums.lanes.fill([[0.0; LANES]; 3]);
             for lamp in &seen.lamps {
                 lighting.fall(lamp, hits);
-                self.shade(lighting, weights, light);
+                self.curves.shade(lighting, weights, sums);
             }
             if let Some(field) = &seen.field {
-                field.shade(hits, weights, light);
+                field.shade(hits, weights, sums);
             }
-            for ((out, light), &covered) in out.iter_mut().zip(light.iter()).zip(&hits.covered) {
-                let [r, g, b] = light.map(|channel| total(channel) * covered);
-                *out = [r, g, b, covered];
-            }
+            sums.finish(&hits.covered, out);
         }
-    }
-
-    /// Adds the light of a lamp that pixels with these weights send to the eye.
-    #[inline(always)]
-    fn shade(&self, lighting: &Lighting, weights: &Weights, light: &mut [[[f32; LANES]; 3]]) {
-        let groups = self.lit.stride / LANES;
-        let weights = weights.values.chunks_exact(groups);
-        for (i, (light, weights)) in light.iter_mut().zip(weights).enumerate() {
-            let irradiance = lighting.irradiance[i];
-            if irradiance > 0.0 {
-                let (entry, s) = self.fine.at(lighting.chord[i]);
-                let near = &self.table[entry * 3 * groups..][..6 * groups];
-                let (near, far) = near.split_at(3 * groups);
-                for (c, light) in light.iter_mut().enumerate() {
-                    let (near, far) = (&near[c * groups..][..groups], &far[c * groups..][..groups]);
-                    let mut sum = *light;
-                    for ((w, near), far) in weights.iter().zip(near).zip(far) {
-                        for l in 0..LANES {
-                            sum[l] += irradiance * w[l] * (near[l] + s * (far[l] - near[l]));
-                        }
-                    }
-                    *light = sum;
-                }
-            }
-        }
-    }
-
-    /// For each channel and curve, the product of light on every entry with the curve.
-    fn product(&self, light: &[[f32; 3]]) -> Vec<[f32; LANES]> {
-        let groups = self.lit.stride / LANES;
-        let mut out = vec![[0.0; LANES]; 3 * groups];
-        for (light, entry) in light.iter().zip(self.table.chunks_exact(3 * groups)) {
-            if *light != [0.0; 3] {
-                let channels = out.chunks_exact_mut(groups).zip(entry.chunks_exact(groups));
-                for (c, (out, f)) in channels.enumerate() {
-                    let (out, f) = (out.as_flattened_mut().iter_mut(), f.as_flattened());
-                    out.zip(f).for_each(|(out, &f)| *out += light[c] * f);
-                }
-            }
-        }
-        out
     }
 }
 
 impl Block {
     fn new(lit: &Lit) -> Block {
-        let lighting = Lighting { irradiance: [0.0; BLOCK], chord: [0.0; BLOCK] };
         Block {
             hits: Hits::default(),
             weights: Weights::new(lit.stride),
-            lighting,
-            light: vec![[[0.0; LANES]; 3]; BLOCK],
-        }
-    }
-}
-
-impl Lighting {
-    #[inline(always)]
-    fn fall(&mut self, lamp: &Lamp, hits: &Hits) {
-        match *lamp {
-            Lamp::Far(towards) => self.fall_from(hits, |_| (towards, 1.0)),
-            Lamp::Near(lamp, square) => self.fall_from(hits, |at| {
-                let to = minus(lamp, at);
-                let inverse = 1.0 / dot(to, to).sqrt();
-                (to.map(|c| c * inverse), square * inverse * inverse)
-            }),
-        }
-    }
-
-    /// `lamp` is the unit direction to the light from a point of the sheet, and what distance leaves of it there.
-    #[inline(always)]
-    fn fall_from(&mut self, hits: &Hits, lamp: impl Fn(V) -> (V, f32)) {
-        for i in 0..BLOCK {
-            let (l, left) = lamp([hits.at[0][i], hits.at[1][i], hits.at[2][i]]);
-            let n = [hits.normal[0][i], 0.0, hits.normal[1][i]];
-            let cos = n[0] * l[0] + n[2] * l[2];
-            let h = [l[0] + hits.view[0][i], l[1] + hits.view[1][i], l[2] + hits.view[2][i]];
-            let inverse = 1.0 / greater(dot(h, h).sqrt(), 1e-12);
-            let d = [h[0] * inverse - n[0], h[1] * inverse - n[1], h[2] * inverse - n[2]];
-            self.chord[i] = dot(d, d).sqrt();
-            self.irradiance[i] = if (hits.covered[i] > 0.0) & (cos > 0.0) { left * cos } else { 0.0 };
+            lighting: Lighting::default(),
+            sums: Sums::default(),
         }
     }
 }
@@ -273,7 +165,7 @@ impl Lighting {
 mod tests {
     use super::*;
     use crate::lit::tests::uniform;
-    use crate::scene::{Camera, Pose, direction, right_and_up};
+    use crate::scene::{Camera, Light, Pose, direction, right_and_up};
     use observe::Silent;
     use std::f64::consts::PI;
 
@@ -428,7 +320,7 @@ mod tests {
         bases.push(&vec![0.2; space.columns()]);
         bases.push(&vec![0.0; space.columns()]);
         let data = (0..side * side).flat_map(|i| {
-            let on = (i % side + i / side) % 2 == 0;
+            let on = (i % side + i / side).is_multiple_of(2);
             [if on { ONE } else { 0 }, if on { 0 } else { ONE }]
         });
         let maps = WeightMaps::new(side, side, 2, data.collect()).unwrap();

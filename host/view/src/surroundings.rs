@@ -17,6 +17,7 @@ use press::preview::{ENTRIES, Fine, Probe};
 use rayon::prelude::*;
 
 use crate::footprint::{Corners, Weights};
+use crate::light::{Curves, Sums};
 use crate::lit::{LANES, Lit};
 use crate::ray::{BLOCK, Hits};
 use crate::scene::{Frame, Scene, dot, unit};
@@ -42,15 +43,8 @@ pub(crate) struct Field {
 }
 
 impl Field {
-    /// Gathers light on the grid. `product` turns light on every entry into values of a node.
-    pub fn new(
-        probe: &Probe,
-        scene: &Scene,
-        lit: &Lit,
-        fine: &Fine,
-        product: impl Fn(&[[f32; 3]]) -> Vec<[f32; LANES]> + Sync,
-        observer: &dyn Observer,
-    ) -> Field {
+    /// Gathers light on the grid.
+    pub fn new(probe: &Probe, scene: &Scene, lit: &Lit, curves: &Curves, observer: &dyn Observer) -> Field {
         let probe = probe.shrunk(ROWS);
         let frame = Frame::new(&scene.pose);
         let tree = Tree::new(&probe, &frame);
@@ -77,8 +71,14 @@ impl Field {
                         None => towards,
                     };
                     light.fill([0.0; 3]);
-                    tree.gather(normal.map(|c| c as f32), view.map(|c| c as f32), fine, OPENING, &mut light);
-                    row.extend(product(&light));
+                    tree.gather(
+                        normal.map(|c| c as f32),
+                        view.map(|c| c as f32),
+                        &curves.fine,
+                        OPENING,
+                        &mut light,
+                    );
+                    row.extend(curves.product(&light));
                 }
                 observer.advance(1);
                 row
@@ -90,14 +90,14 @@ impl Field {
 
     /// Adds what pixels with these weights send to the eye.
     #[inline(always)]
-    pub fn shade(&self, hits: &Hits, weights: &Weights, light: &mut [[[f32; LANES]; 3]]) {
+    pub fn shade(&self, hits: &Hits, weights: &Weights, sums: &mut Sums) {
         let mut corners = Corners::default();
         corners.find(&hits.place, self.nodes, self.nodes, true);
         let groups = weights.values.len() / BLOCK;
         let step = 3 * groups;
         let [across, down] = corners.next.map(|next| next * step);
         let weights = weights.values.chunks_exact(groups);
-        for (i, (light, weights)) in light.iter_mut().zip(weights).enumerate() {
+        for (i, (light, weights)) in sums.lanes.iter_mut().zip(weights).enumerate() {
             if hits.covered[i] > 0.0 {
                 let (right, below) = (corners.parts[0][i], corners.parts[1][i]);
                 let top = &self.values[corners.first[i] as usize * step..];
