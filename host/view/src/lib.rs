@@ -18,10 +18,13 @@
 
 pub mod display;
 mod error;
+mod footprint;
 mod gain;
 mod glb;
+mod light;
 mod lit;
 pub mod page;
+mod ray;
 mod render;
 mod scene;
 mod surroundings;

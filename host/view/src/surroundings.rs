@@ -16,7 +16,10 @@ use observe::Observer;
 use press::preview::{ENTRIES, Fine, Probe};
 use rayon::prelude::*;
 
-use crate::lit::Lit;
+use crate::footprint::{Corners, Weights};
+use crate::light::{Curves, Sums};
+use crate::lit::{LANES, Lit};
+use crate::ray::{BLOCK, Hits};
 use crate::scene::{Frame, Scene, dot, unit};
 
 /// Nodes along each side of the grid.
@@ -35,33 +38,24 @@ const HORIZON: f32 = 0.1;
 /// What each curve sends to the eye under a probe, all over a sheet.
 pub(crate) struct Field {
     nodes: usize,
-    /// Values of a node: for each channel one of every curve.
-    step: usize,
-    values: Vec<f32>,
+    /// Values of a node after another: for each channel one of every curve.
+    values: Vec<[f32; LANES]>,
 }
 
 impl Field {
-    /// Gathers light on the grid. `product` turns light on every entry into values of a node.
-    pub fn new(
-        probe: &Probe,
-        scene: &Scene,
-        lit: &Lit,
-        fine: &Fine,
-        product: impl Fn(&[[f32; 3]]) -> Vec<f32> + Sync,
-        observer: &dyn Observer,
-    ) -> Field {
+    /// Gathers light on the grid.
+    pub fn new(probe: &Probe, scene: &Scene, lit: &Lit, curves: &Curves, observer: &dyn Observer) -> Field {
         let probe = probe.shrunk(ROWS);
         let frame = Frame::new(&scene.pose);
         let tree = Tree::new(&probe, &frame);
         let towards = frame.in_sheet(unit(scene.camera.towards));
         let nodes = if scene.pose.curl.is_none() && scene.camera.distance.is_none() { 1 } else { NODES };
-        let step = 3 * lit.stride;
         observer.begin("lighting by the probe", nodes as u64);
-        let rows: Vec<Vec<f32>> = (0..nodes)
+        let rows: Vec<Vec<[f32; LANES]>> = (0..nodes)
             .into_par_iter()
             .map(|j| {
                 let mut light = vec![[0.0f32; 3]; ENTRIES];
-                let mut row = Vec::with_capacity(nodes * step);
+                let mut row = Vec::with_capacity(nodes * 3 * lit.stride / LANES);
                 for i in 0..nodes {
                     let part = |k: usize| if nodes == 1 { 0.0 } else { k as f64 / (nodes - 1) as f64 - 0.5 };
                     let (s, y) = (part(i) * lit.size[0], -part(j) * lit.size[1]);
@@ -77,42 +71,53 @@ impl Field {
                         None => towards,
                     };
                     light.fill([0.0; 3]);
-                    tree.gather(normal.map(|c| c as f32), view.map(|c| c as f32), fine, OPENING, &mut light);
-                    row.extend(product(&light));
+                    tree.gather(
+                        normal.map(|c| c as f32),
+                        view.map(|c| c as f32),
+                        &curves.fine,
+                        OPENING,
+                        &mut light,
+                    );
+                    row.extend(curves.product(&light));
                 }
                 observer.advance(1);
                 row
             })
             .collect();
         observer.end();
-        Field { nodes, step, values: rows.concat() }
+        Field { nodes, values: rows.concat() }
     }
 
-    /// What a place (metres from the middle of a sheet of `size`) with these weights sends to the eye.
-    pub fn at(&self, place: [f32; 2], size: [f64; 2], weights: &[f32]) -> [f32; 3] {
-        let most = self.nodes - 1;
-        let split = |at: f32| {
-            let at = (at.clamp(0.0, 1.0) * most as f32).min(most as f32);
-            let low = (at as usize).min(most.saturating_sub(1));
-            (low, (low + 1).min(most), at - low as f32)
-        };
-        let (left, right, across) = split(place[0] / size[0] as f32 + 0.5);
-        let (top, bottom, down) = split(0.5 - place[1] / size[1] as f32);
-        let mut sum = [0.0; 3];
-        for (x, y, part) in [
-            (left, top, (1.0 - across) * (1.0 - down)),
-            (right, top, across * (1.0 - down)),
-            (left, bottom, (1.0 - across) * down),
-            (right, bottom, across * down),
-        ] {
-            if part > 0.0 {
-                let node = &self.values[(y * self.nodes + x) * self.step..][..self.step];
-                for (sum, f) in sum.iter_mut().zip(node.chunks_exact(self.step / 3)) {
-                    *sum += part * f.iter().zip(weights).map(|(f, w)| f * w).sum::<f32>();
+    /// Adds what pixels with these weights send to the eye.
+    #[inline(always)]
+    pub fn shade(&self, hits: &Hits, weights: &Weights, sums: &mut Sums) {
+        let mut corners = Corners::default();
+        corners.find(&hits.place, self.nodes, self.nodes, true);
+        let groups = weights.values.len() / BLOCK;
+        let step = 3 * groups;
+        let [across, down] = corners.next.map(|next| next * step);
+        let weights = weights.values.chunks_exact(groups);
+        for (i, (light, weights)) in sums.lanes.iter_mut().zip(weights).enumerate() {
+            if hits.covered[i] > 0.0 {
+                let (right, below) = (corners.parts[0][i], corners.parts[1][i]);
+                let top = &self.values[corners.first[i] as usize * step..];
+                let bottom = &top[down..];
+                let (a, b) = (&top[..step], &top[across..][..step]);
+                let (c, d) = (&bottom[..step], &bottom[across..][..step]);
+                for (channel, light) in light.iter_mut().enumerate() {
+                    let mut sum = *light;
+                    for (k, w) in weights.iter().enumerate() {
+                        let k = channel * groups + k;
+                        let (a, b, c, d) = (a[k], b[k], c[k], d[k]);
+                        for l in 0..LANES {
+                            let (top, bottom) = (a[l] + right * (b[l] - a[l]), c[l] + right * (d[l] - c[l]));
+                            sum[l] += w[l] * (top + below * (bottom - top));
+                        }
+                    }
+                    *light = sum;
                 }
             }
         }
-        sum
     }
 }
 
