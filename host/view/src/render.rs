@@ -4,7 +4,7 @@
 //! Method: rows run in parallel, and of a row [`BLOCK`] pixels at a time. [`Rays`] finds where their rays meet the sheet,
 //! [`Weights`] reads the mean weights over their footprints, and [`Curves`] mixes what the lights make of them. A light probe is
 //! integrated on a grid over the sheet ([`Field`](crate::surroundings)).
-//! Cost: that of its parts; on two cores 20 ms for a million pixels, eight curves and one light.
+//! Cost: that of its parts; on two cores 23 ms for a million pixels, eight curves and one light.
 //! Limits: one bounce and no shadows, which the outside of a cylinder does not need; edges of the sheet are smooth, the
 //! silhouette of a bent one is not. The back of a sheet is never seen: all of a bent one lies behind its middle, where
 //! [`Scene::check`] wants the eye in front.
