@@ -7,8 +7,8 @@
 //! where the metric is Euclidean, is added to the targets of its pixels, and they are fitted anew from their mixtures. A second
 //! sweep adds what is missed still. A pixel that would hardly move keeps its clamped mixture bit for bit, and a flat material
 //! keeps it anyhow: a target moved away from the gamut has the same nearest mixture.
-//! Cost: two more fits of each pixel that moves; three rows of the space and two of mixtures for each cell.
-//! Limits: two sweeps, so not the optimum; each pixel by itself comes out farther from the document, by a few percent;
+//! Cost: two more fits of each pixel that moves; three rows of the space for each cell, of which there are at most 131072, so that the
+//! window of a large document with coarse pixels is wider than the eye's. Limits: two sweeps, so not the optimum; each pixel by itself comes out farther from the document, by a few percent;
 //! documents whose pixels are as large as the spot stay as they are.
 
 use observe::Observer;
@@ -26,6 +26,8 @@ use crate::weights::{ONE, quantise};
 const SWEEPS: u32 = 2;
 /// The shift, in distance, below which a pixel stays.
 const FELT: f64 = 0.002;
+/// The most cells: their rows then take 160 MB.
+const MOST_CELLS: usize = 1 << 17;
 /// The smallest spot in pixels over which there is anything to average.
 const LEAST: f64 = 2.0;
 
@@ -48,10 +50,7 @@ pub(super) fn please(
     let mut shift = vec![0f32; wanted.len()];
     let mut moves = vec![false; clamped.distance.len()];
     for sweep in 1..=SWEEPS {
-        let printed = cells.printed(candidates, &clamped.shares);
-        for ((shift, wanted), printed) in shift.iter_mut().zip(&wanted).zip(&printed) {
-            *shift += wanted - printed;
-        }
+        cells.add_missed(candidates, &clamped.shares, &wanted, &mut shift);
         let pass = Pass { first: sweep == 1, last: sweep == SWEEPS };
         cells.fit(candidates, pixels, clamped, &shift, &mut moves, pass)?;
         observer.advance(1);
@@ -81,13 +80,14 @@ struct Cells {
 
 impl Cells {
     fn new(width: usize, height: usize, spot: f64) -> Cells {
-        let longest = width.max(height).max(1) as f64;
-        let side = (spot * 3.0 / 8.0).round().clamp(1.0, longest) as usize;
+        // The square root, rounded up.
+        let few = ((width * height).div_ceil(MOST_CELLS).max(1) - 1).isqrt() + 1;
+        let side = ((spot * 3.0 / 8.0).round() as usize).clamp(1, width.max(height).max(1)).max(few);
         Cells { width, height, side, across: width.div_ceil(side), down: height.div_ceil(side) }
     }
 
-    /// Means of `n` numbers a pixel over the window around each cell.
-    fn means(&self, n: usize, read: impl Fn(usize, &mut [f32]) + Sync) -> Vec<f32> {
+    /// For each cell, the sums of `n` numbers a pixel, and the number of pixels.
+    fn sums(&self, n: usize, read: impl Fn(usize, &mut [f32]) + Sync) -> Vec<f32> {
         let line = self.across * (n + 1);
         let mut sums = vec![0f32; line * self.down];
         sums.par_chunks_mut(line).enumerate().for_each(|(row, sums)| {
@@ -101,59 +101,65 @@ impl Cells {
                 }
             }
         });
-        let mut means = vec![0f32; self.across * self.down * n];
-        means.par_chunks_mut(self.across * n).enumerate().for_each(|(row, means)| {
-            let mut window = vec![0f32; n + 1];
-            for (column, mean) in means.chunks_exact_mut(n).enumerate() {
-                window.fill(0.0);
-                for y in row.saturating_sub(1)..(row + 2).min(self.down) {
-                    for x in column.saturating_sub(1)..(column + 2).min(self.across) {
-                        let tap = if y == row { 2.0 } else { 1.0 } * if x == column { 2.0 } else { 1.0 };
-                        let sums = &sums[y * line + x * (n + 1)..][..n + 1];
-                        window.iter_mut().zip(sums).for_each(|(sum, v)| *sum += tap * v);
-                    }
-                }
-                mean.iter_mut().zip(&window).for_each(|(mean, sum)| *mean = sum / window[n]);
+        sums
+    }
+
+    /// Means over the window around a cell, from the sums of cells.
+    fn mean(&self, sums: &[f32], cell: usize, out: &mut [f64]) {
+        let n = out.len();
+        let (row, column) = (cell / self.across, cell % self.across);
+        out.fill(0.0);
+        let mut count = 0.0;
+        for y in row.saturating_sub(1)..(row + 2).min(self.down) {
+            for x in column.saturating_sub(1)..(column + 2).min(self.across) {
+                let tap = if y == row { 2.0 } else { 1.0 } * if x == column { 2.0 } else { 1.0 };
+                let sums = &sums[(y * self.across + x) * (n + 1)..][..n + 1];
+                out.iter_mut().zip(sums).for_each(|(out, &v)| *out += tap * f64::from(v));
+                count += tap * f64::from(sums[n]);
             }
-        });
-        means
+        }
+        out.iter_mut().for_each(|out| *out /= count);
     }
 
     /// Cube roots of the mean radiance of the document around each cell.
     fn wanted(&self, candidates: &Candidates, pixels: &dyn Materials) -> Result<Vec<f32>, GamutError> {
         let n = pixels.space().columns();
-        let means = self.means(n, |pixel, row| pixels.reflectance(pixel, row));
+        let sums = self.sums(n, |pixel, row| pixels.reflectance(pixel, row));
         let hull = &candidates.priced;
         let m = hull.metric().len();
         let mut roots = vec![0f32; self.across * self.down * m];
-        let of_cells = roots.par_chunks_exact_mut(m).zip(means.par_chunks_exact(n)).enumerate();
-        of_cells.try_for_each_init(Target::default, |target, (cell, (roots, mean))| {
-            let corner = (cell / self.across * self.width + cell % self.across) * self.side;
-            hull.aim(mean.iter().map(|&f| f64::from(f)), target).map_err(in_pixel(corner, self.width))?;
-            roots.iter_mut().zip(target.roots()).for_each(|(root, &r)| *root = r as f32);
-            Ok::<_, GamutError>(())
-        })?;
+        roots.par_chunks_exact_mut(m).enumerate().try_for_each_init(
+            || (vec![0.0; n], Target::default()),
+            |(mean, target), (cell, roots)| {
+                self.mean(&sums, cell, mean);
+                let corner = (cell / self.across * self.width + cell % self.across) * self.side;
+                hull.aim(mean.iter().copied(), target).map_err(in_pixel(corner, self.width))?;
+                roots.iter_mut().zip(target.roots()).for_each(|(root, &r)| *root = r as f32);
+                Ok::<_, GamutError>(())
+            },
+        )?;
         Ok(roots)
     }
 
-    /// Cube roots of the mean radiance of the print around each cell.
-    fn printed(&self, candidates: &Candidates, shares: &[u16]) -> Vec<f32> {
+    /// Adds what the mean of the print around each cell misses.
+    fn add_missed(&self, candidates: &Candidates, shares: &[u16], wanted: &[f32], shift: &mut [f32]) {
         let k = candidates.len();
-        let means = self.means(k, |pixel, out| {
+        let sums = self.sums(k, |pixel, out| {
             out.iter_mut().zip(&shares[pixel * k..]).for_each(|(out, &share)| *out = f32::from(share));
         });
         let hull = &candidates.priced;
         let m = hull.metric().len();
-        let mut roots = vec![0f32; self.across * self.down * m];
-        roots.par_chunks_exact_mut(m).zip(means.par_chunks_exact(k)).for_each_init(
+        shift.par_chunks_exact_mut(m).zip(wanted.par_chunks_exact(m)).enumerate().for_each_init(
             || (vec![0.0; k], vec![0.0; m]),
-            |(weights, seen), (roots, mean)| {
-                weights.iter_mut().zip(mean).for_each(|(w, &share)| *w = f64::from(share) / f64::from(ONE));
+            |(weights, seen), (cell, (shift, wanted))| {
+                self.mean(&sums, cell, weights);
+                weights.iter_mut().for_each(|w| *w /= f64::from(ONE));
                 hull.roots(weights, seen);
-                roots.iter_mut().zip(&*seen).for_each(|(root, &r)| *root = r as f32);
+                for ((shift, wanted), seen) in shift.iter_mut().zip(wanted).zip(&*seen) {
+                    *shift += wanted - *seen as f32;
+                }
             },
         );
-        roots
     }
 
     /// Fits the pixels that move to their targets moved by the shift around them.
@@ -317,9 +323,22 @@ mod tests {
     fn a_window_has_the_taps_of_the_comparison_and_keeps_the_sum_at_edges() {
         let cells = Cells::new(7, 5, 8.0 / 3.0);
         assert_eq!((cells.side, cells.across, cells.down), (1, 7, 5));
-        let spike = cells.means(1, |pixel, out| out[0] = if pixel == 2 * 7 + 3 { 16.0 } else { 0.0 });
-        assert_eq!([spike[2 * 7 + 3], spike[2 * 7 + 2], spike[7 + 2]], [4.0, 2.0, 1.0]);
-        let flat = Cells::new(11, 13, 8.0).means(2, |_, out| out.copy_from_slice(&[3.0, 5.0]));
-        assert!(flat.chunks(2).all(|v| (v[0] - 3.0).abs() < 1e-6 && (v[1] - 5.0).abs() < 1e-6));
+        let sums = cells.sums(1, |pixel, out| out[0] = if pixel == 2 * 7 + 3 { 16.0 } else { 0.0 });
+        let at = |cell: usize| {
+            let mut out = [0.0];
+            cells.mean(&sums, cell, &mut out);
+            out[0]
+        };
+        assert_eq!([at(2 * 7 + 3), at(2 * 7 + 2), at(7 + 2)], [4.0, 2.0, 1.0]);
+        let flat = Cells::new(11, 13, 8.0);
+        let sums = flat.sums(2, |_, out| out.copy_from_slice(&[3.0, 5.0]));
+        for cell in 0..flat.across * flat.down {
+            let mut out = [0.0; 2];
+            flat.mean(&sums, cell, &mut out);
+            assert!((out[0] - 3.0).abs() < 1e-6 && (out[1] - 5.0).abs() < 1e-6, "{out:?}");
+        }
+        // Never more cells than there may be.
+        let large = Cells::new(1600, 2300, 2.0);
+        assert!(large.across * large.down <= MOST_CELLS + large.across + large.down, "{}", large.side);
     }
 }
