@@ -29,7 +29,7 @@ use press::halftone::metrics::{self, Look, Tone};
 use press::layout::{Layout, Mm, Size};
 use press::pipeline::document::{self, Halftoned, Settings};
 use press::pipeline::{self, Draft, Request};
-use press::preview::{self, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
+use press::preview::{self, EYE, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
 use press::sheet::Area;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
@@ -38,8 +38,6 @@ const PANEL: usize = 480;
 const BALL: usize = 160;
 /// The half angle in radians at which dots are light or dark for their spectrum: beside the highlight.
 const ASIDE: f64 = 0.35;
-/// Where the eye is when print and document are compared, in metres.
-const EYE: f64 = 0.5;
 
 /// A document and everything that decides its dots.
 #[derive(ClapArgs, Debug)]

@@ -27,12 +27,11 @@ use self::regions::{CELL, Place, Regions, Sums};
 use super::candidates::Candidates;
 use super::clamp::Clamped;
 use super::error::GamutError;
-use super::prune::prune;
+use super::moved::{Solver, in_pixel};
 use super::sample;
 use crate::brdf::Table;
 use crate::materials::Materials;
-use crate::solve::{Mixer, MixtureError, Target};
-use crate::weights::{ONE, quantise};
+use crate::weights::quantise;
 
 /// The weight of contrast, mu.
 const CONTRAST: f64 = 16.0;
@@ -43,8 +42,6 @@ const EVERY: u32 = 4;
 /// The distance up to which the clamped mixture stays, and the one from which a pixel moves freely.
 const EXACT: f64 = 0.005;
 const FREE: f64 = 0.02;
-/// An invisible gap in squared distance.
-const ENOUGH: f64 = 1e-7;
 /// Pixels by which the kinds of materials are found, and the seed of their choice.
 const SAMPLE: usize = 1024;
 const SEED: u64 = 1;
@@ -164,100 +161,4 @@ fn run(
         Ok(sums)
     })
     .collect()
-}
-
-/// Names the pixel of a failed fit.
-fn in_pixel(pixel: usize, width: usize) -> impl FnOnce(MixtureError) -> GamutError {
-    move |source| GamutError::Mixture {
-        what: format!("pixel ({}, {})", pixel % width, pixel / width),
-        source,
-    }
-}
-
-/// Solves one pixel after another.
-struct Solver<'a> {
-    candidates: &'a Candidates,
-    pixels: &'a dyn Materials,
-    mixer: Mixer,
-    row: Vec<f32>,
-    target: Target,
-    /// Cube roots of the target before it is moved, and the same with the weights of the metric.
-    wanted: Vec<f64>,
-    look: Vec<f64>,
-    /// What is missed around the pixel, and by the pixel, in cube roots.
-    shift: Vec<f64>,
-    miss: Vec<f64>,
-    /// What a pixel in the gamut misses.
-    nothing: Vec<f64>,
-    weights: Vec<f64>,
-}
-
-impl<'a> Solver<'a> {
-    fn new(candidates: &'a Candidates, pixels: &'a dyn Materials) -> Solver<'a> {
-        let columns = vec![0.0; candidates.priced.metric().len()];
-        Solver {
-            candidates,
-            pixels,
-            mixer: Mixer::new(),
-            row: vec![0.0; pixels.space().columns()],
-            target: Target::default(),
-            wanted: columns.clone(),
-            look: columns.clone(),
-            shift: columns.clone(),
-            miss: columns.clone(),
-            nothing: columns,
-            weights: vec![0.0; candidates.len()],
-        }
-    }
-
-    /// Aims at a pixel.
-    fn aim(&mut self, pixel: usize) -> Result<(), MixtureError> {
-        self.pixels.reflectance(pixel, &mut self.row);
-        let hull = &self.candidates.priced;
-        hull.aim(self.row.iter().map(|&f| f64::from(f)), &mut self.target)?;
-        self.wanted.copy_from_slice(self.target.roots());
-        for ((look, root), weight) in self.look.iter_mut().zip(&self.wanted).zip(hull.metric()) {
-            *look = root * weight;
-        }
-        Ok(())
-    }
-
-    /// Takes the mixture to start from.
-    fn start(&mut self, shares: &[u16]) {
-        self.weights.iter_mut().zip(shares).for_each(|(w, &s)| *w = f64::from(s) / f64::from(ONE));
-    }
-
-    /// Solves equation 1 with the target moved by a part of the shift.
-    fn solve(&mut self, part: f64, finish: bool) -> Result<(), MixtureError> {
-        let hull = &self.candidates.priced;
-        self.target.shift(self.shift.iter().map(|c| part * c));
-        self.mixer.refine(hull, &self.target, &mut self.weights, ENOUGH)?;
-        if finish && prune(&mut self.weights) {
-            self.mixer.polish(hull, &self.target, &mut self.weights, ENOUGH)?;
-            // Weights that have become small now are not worth another round.
-            prune(&mut self.weights);
-        }
-        Ok(())
-    }
-
-    /// Finds what the mixture misses of the pixel. Returns distance d.
-    fn compare(&mut self) -> f64 {
-        let hull = &self.candidates.priced;
-        hull.roots(&self.weights, &mut self.miss);
-        let mut sum = 0.0;
-        for (j, ((miss, wanted), weight)) in
-            self.miss.iter_mut().zip(&self.wanted).zip(hull.metric()).enumerate()
-        {
-            *miss -= wanted;
-            if j < self.row.len() {
-                sum += (*miss * weight) * (*miss * weight);
-            }
-        }
-        sum.sqrt()
-    }
-
-    /// The distance in light between the mixture and the pixel.
-    fn light(&self) -> f64 {
-        self.candidates.light_distance(&self.weights, self.pixels.space(), &self.row)
-    }
 }

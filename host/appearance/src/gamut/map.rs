@@ -14,7 +14,7 @@ use super::fitted::Targets;
 use super::gloss::FEW_MERGED;
 use super::report::{GivenUp, Mapped, PixelReport, Report};
 use super::settings::{Gloss, Intent, Settings};
-use super::{assemble, basis, blend, cartridges, choice, clamp, local, sample, typical};
+use super::{assemble, basis, blend, cartridges, choice, clamp, eye, local, sample, typical};
 use crate::brdf::Table;
 use crate::materials::{Factored, Materials};
 use crate::solve::MixtureError;
@@ -256,7 +256,12 @@ impl<'a> Pixels<'a> {
                 kept = local::keep_contrast(candidates, self.pixels, &mut clamped, observer)?;
                 Intent::Contrast
             }
-            _ => Intent::Clamp,
+            _ => {
+                if let Some(spot) = self.settings.eye {
+                    kept = eye::please(candidates, self.pixels, &mut clamped, spot, observer)?;
+                }
+                Intent::Clamp
+            }
         };
         let pixels = self.report(&clamped, kept);
         let (width, height) = (self.pixels.width(), self.pixels.height());

@@ -92,6 +92,7 @@ pub struct PixelReport {
     pub gap: f64,
     /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
     pub merged: f64,
-    /// Mean weight of the clamped mixture in the result: 1 for clamp; for contrast, the share of pixels that keep it.
+    /// Mean weight of the clamped mixture in the result: 1 for clamp; for contrast, and with
+    /// [`Settings::eye`](super::Settings::eye), the share of pixels that keep it.
     pub clamped: f64,
 }

@@ -28,7 +28,7 @@ impl Intent {
 
 /// The weight of the distance in light beside distance d at which metals shine and other materials hardly change;
 /// `docs/decisions/metric-that-knows-light.md` has the figures.
-pub const LIGHT: f64 = 0.3;
+pub const LIGHT: f64 = 0.28;
 
 /// How the gloss of the bases is treated before they are mapped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -50,6 +50,9 @@ pub struct Settings {
     /// Mixtures are chosen by distance d and this times the distance in light ([`LIGHT`]), as sides of a right angle; 0 is
     /// the metric of the 2009 paper.
     pub light: f64,
+    /// Side in pixels of the square that an eye averages over. With it, clamped pixels are moved so that their means over such
+    /// squares come nearer, at the price of each by itself; without it, each pixel comes as near as it can.
+    pub eye: Option<f64>,
     /// How the gloss of the bases is treated.
     pub gloss: Gloss,
     /// The most cartridges in the result; the printer holds 7.
@@ -63,6 +66,7 @@ impl Default for Settings {
         Settings {
             intent: Intent::Auto,
             light: LIGHT,
+            eye: None,
             gloss: Gloss::WhereMerged,
             most_cartridges: 7,
             seed: 1,

@@ -9,7 +9,8 @@ use inks::{InkSet, Library};
 
 use crate::halftone::{self, HalftoneError, halftone};
 use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
-use crate::sheet::DotMap;
+use crate::preview::{EYE, spot_mm};
+use crate::sheet::{DOTS_PER_MM, DotMap};
 use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
 use appearance::gamut::{self, Doubt, Gain, GamutError, Mapped, Printable};
@@ -111,7 +112,9 @@ pub fn halftoned(
             Ok::<_, StageError>(Cow::Owned(factored))
         }
     };
-    let mapped = gamut::map(materials, bases, &printable, &settings.gamut, observer)?;
+    let mapping =
+        gamut::Settings { eye: spot(width, materials.width(), settings.halftone), ..settings.gamut.clone() };
+    let mapped = gamut::map(materials, bases, &printable, &mapping, observer)?;
     let chosen = halftone::Settings {
         method: settings.halftone,
         ..halftone::Settings::from_library(&mapped.mix.stacks, library)
@@ -123,6 +126,12 @@ pub fn halftoned(
     };
     let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
     Ok(Halftoned { factoring, mapped, dots, cells, foils, doubt })
+}
+
+/// Side in pixels of the spot that an eye averages over, if the dots are rearranged for the eye: then the mixtures are, too.
+fn spot(dots: u16, pixels: usize, method: halftone::Method) -> Option<f64> {
+    let dots_per_pixel = f64::from(dots) / pixels as f64;
+    (method == halftone::Method::Best).then(|| spot_mm(EYE) * DOTS_PER_MM / dots_per_pixel)
 }
 
 /// What foils beside the default inks would bring.

@@ -45,8 +45,11 @@ pub struct Report {
     pub map: Vec<f32>,
 }
 
+/// Where the eye is when a document and its print are compared, in metres: arm's length.
+pub const EYE: f64 = 0.5;
+
 /// Side in millimetres of the square window that the eye averages over at `metres`. See the module text.
-fn spot_mm(metres: f64) -> f64 {
+pub fn spot_mm(metres: f64) -> f64 {
     let cycles = 0.525 * 11f64.ln() + 3.91;
     let degrees = (2.0 / std::f64::consts::PI).sqrt() / cycles;
     1000.0 * metres * degrees.to_radians()

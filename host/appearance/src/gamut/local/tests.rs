@@ -8,6 +8,7 @@ use super::super::{Intent, Mapped, Printable, Settings, clamp};
 use super::*;
 use crate::brdf::Space;
 use crate::materials::Surface;
+use crate::weights::ONE;
 
 /// Materials given as rows.
 struct Rows {
