@@ -351,12 +351,10 @@ fn optimum(support: &Support, y: &mut [Lane]) {
         }
         y[i] = value;
     }
-    for lane in 0..LANES {
-        sum[lane] = (1.0 - sum[lane]) * support.per_ones;
-    }
+    let level = sum.map(|sum| (1.0 - sum) * support.per_ones);
     for (y, one) in y.iter_mut().zip(&support.ones) {
         for lane in 0..LANES {
-            y[lane] += sum[lane] * one;
+            y[lane] += level[lane] * one;
         }
     }
     let mut sum = [0.0; LANES];
@@ -375,12 +373,10 @@ fn optimum(support: &Support, y: &mut [Lane]) {
         }
     }
     // Rounding may have changed the sum.
-    for lane in 0..LANES {
-        sum[lane] = 1.0 / sum[lane];
-    }
+    let scale = sum.map(|sum| 1.0 / sum);
     for y in y {
         for lane in 0..LANES {
-            y[lane] *= sum[lane];
+            y[lane] *= scale[lane];
         }
     }
 }
