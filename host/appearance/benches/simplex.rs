@@ -1,12 +1,13 @@
 //! Least squares on the simplex for a stream of pixels, each started from the one before.
 //!
-//! The time of `scalar_products` includes the inner products with the target, that of `solve` does not. `lawson_hanson` is
-//! the textbook method on the same Gram matrix, which always starts cold.
+//! The time of `scalar_products` includes the inner products with the target, that of `solve` does not. `solve_in_lanes` has
+//! all pixels at once, and its time includes what is done once for a matrix. `lawson_hanson` is the textbook method on the same
+//! Gram matrix, which always starts cold.
 
 use appearance::brdf::{Space, Table};
 use appearance::document::Materials;
 use appearance::gamut::Printable;
-use appearance::solve::{Columns, Gram, Simplex};
+use appearance::solve::{Columns, Gram, Lanes, Simplex};
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
@@ -77,6 +78,20 @@ fn solve(bencher: Bencher, k: usize) {
         for h in &products {
             black_box(simplex.solve(&gram, h, &mut a).unwrap());
         }
+    });
+}
+
+#[divan::bench(args = [15, 57])]
+fn solve_in_lanes(bencher: Bencher, k: usize) {
+    let (stacks, targets) = problem(k);
+    let by_column = Columns::of_rows(&stacks);
+    let gram = Gram::of_rows(&stacks);
+    let (mut h, mut a) = (vec![0.0; k * PIXELS], vec![0.0; k * PIXELS]);
+    h.chunks_exact_mut(k).zip(targets.rows()).for_each(|(h, t)| by_column.products(t, h));
+    let typical: Vec<f64> = h.chunks_exact(k).step_by(PIXELS / 64).flatten().copied().collect();
+    bencher.counter(divan::counter::ItemsCount::new(PIXELS)).bench_local(|| {
+        let mut lanes = Lanes::new(&gram, &typical).unwrap();
+        black_box(lanes.solve(&h, &mut a).unwrap());
     });
 }
 

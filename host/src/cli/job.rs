@@ -130,19 +130,27 @@ pub fn make(
     let Draft { sheet, laid, separation, plan } = &job.draft;
     let folder = places.folder.create()?.to_path_buf();
     write(&folder.join("job.rgl"), &job.bytes)?;
-    let html = shown::page(plan, sheet, &separation.passes, laid.area, ground)?;
-    write(&folder.join("plan.html"), html.as_bytes())?;
-    // The page is the simulated sheet, dot for dot.
-    let across = shown::across(plan);
-    save_sheet(sheet, laid.area, across, ground, &folder.join("preview.png"))?;
-    printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
-        let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
-        save_pass(pass, laid.area, across, ground, &folder.join(name))
-    })?;
     let passes = folder.join("passes");
     fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
-    separate::files::save(separation, &passes)?;
-    sheet.save_colours(laid.area, &folder.join("separation.png"))?;
+    let across = shown::across(plan);
+    // One thread compresses a picture, so they are written beside each other, the largest first.
+    let pictures: [&(dyn Fn() -> Result<()> + Sync); 5] = [
+        // The page is the simulated sheet, dot for dot.
+        &|| Ok(save_sheet(sheet, laid.area, across, ground, &folder.join("preview.png"))?),
+        &|| Ok(sheet.save_colours(laid.area, &folder.join("separation.png"))?),
+        &|| {
+            let html = shown::page(plan, sheet, &separation.passes, laid.area, ground)?;
+            write(&folder.join("plan.html"), html.as_bytes())
+        },
+        &|| {
+            printout.passes.par_iter().enumerate().try_for_each(|(i, pass)| {
+                let name = format!("preview-{:02}-{}.png", i + 1, pass.ink.name());
+                Ok(save_pass(pass, laid.area, across, ground, &folder.join(name))?)
+            })
+        },
+        &|| Ok(separate::files::save(separation, &passes)?),
+    ];
+    pictures.par_iter().with_max_len(1).try_for_each(|picture| picture())?;
     Ok(Made { job, folder, places })
 }
 

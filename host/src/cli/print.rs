@@ -17,8 +17,9 @@ use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use super::preview::shown::Shown;
 use super::preview::view::ViewArgs;
+use super::progress::Beside;
 use super::report;
-use appearance::brdf::reflectances;
+use appearance::brdf::{Table, reflectances};
 use appearance::document::{Document, Materials};
 use appearance::factor::{self, Factored};
 use appearance::gamut::Gain;
@@ -209,11 +210,19 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
     let laid = args.work.dots.halftone(document, inks, library, observer)?;
     let ground = args.result.background.unwrap_or_default();
-    let made = job::make(&args.work.request(&laid), &laid.document.notes, &[], places, ground, observer)?;
-    let pictures = pictures(&laid, made.job.draft.separation.passes.len(), &probe, observer)?;
-    for (name, picture) in [("sheet.png", &pictures.sheet), ("materials.png", &pictures.materials)] {
-        picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))?;
-    }
+    // Some steps to a job are one thread's. What does not depend on it is looked at beside them.
+    let beside = Beside(observer);
+    let (made, seen) = rayon::join(
+        || job::make(&args.work.request(&laid), &laid.document.notes, &[], places, ground, observer),
+        || rayon::join(|| Pictures::new(&laid, &probe, &beside), || Halftone::measured(&laid, &beside)),
+    );
+    let (made, pictures, halftone) = (made?, seen.0?, seen.1?);
+    let sheet = pictures.sheet(&laid, made.job.draft.separation.passes.len(), observer)?;
+    let save = |name: &str, picture: &RgbImage| {
+        picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
+    };
+    let saved = rayon::join(|| save("sheet.png", &sheet), || save("materials.png", &pictures.materials));
+    saved.0.and(saved.1)?;
     let doubt = laid.halftoned.doubt;
     let advice = format!(
         "\nSeen from {EYE} m, print and document differ: average difference d = {:.3} (0.01: barely visible; 0.05: \
@@ -221,7 +230,6 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         pictures.fidelity.mean,
         doubt.map_or_else(String::new, |doubt| format!(" {doubt}."))
     );
-    let halftone = Halftone::measured(&laid, observer)?;
     let page = report::page(&report::Subject {
         plan: &made.job.draft.plan,
         space: laid.document.materials().space(),
@@ -242,46 +250,62 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 }
 
 /// What there is to look at, and how far print and document are apart.
-struct Pictures {
-    sheet: RgbImage,
+struct Pictures<'a> {
+    target: Source<'a>,
+    /// The reflectance of the stacks of the dots.
+    stacks: Table,
     materials: RgbImage,
     fidelity: preview::Report,
 }
 
-fn pictures(laid: &Laid, passes: usize, probe: &Probe, observer: &dyn Observer) -> Result<Pictures> {
-    let Laid { document, library, halftoned, .. } = laid;
-    let space = document.materials().space();
-    // The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
-    // printer profile do to the page is undone on paper.
-    let dots = &halftoned.dots;
-    let stacks = reflectances(dots.stacks(), library, space);
+impl<'a> Pictures<'a> {
+    fn new(laid: &'a Laid, probe: &Probe, observer: &dyn Observer) -> Result<Pictures<'a>> {
+        let Laid { document, library, halftoned, .. } = laid;
+        let space = document.materials().space();
+        let stacks = reflectances(halftoned.dots.stacks(), library, space);
+        let target = match document.as_factored() {
+            Some(factored) => Source::Factored(factored),
+            None => Source::Document(document.materials()),
+        };
+        let (printed, area) = printed(laid, &stacks);
+        let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
+        let mapped = &halftoned.mapped.report;
+        let kind = kind(laid);
+        let swatches: Vec<Swatch> = (1..)
+            .zip(&mapped.materials)
+            .map(|(number, material)| Swatch {
+                name: format!("{kind} {number}, {:.0} %", 100.0 * material.share),
+                target: &material.target,
+                printed: &material.printed,
+                mix: material.weights.clone(),
+            })
+            .collect();
+        let materials = preview::materials_picture(space, &swatches, probe, BALL, observer)?;
+        Ok(Pictures { target, stacks, materials, fidelity })
+    }
+
+    /// Document and print side by side, with the number of passes below.
+    fn sheet(&self, laid: &Laid, passes: usize, observer: &dyn Observer) -> Result<RgbImage> {
+        let (printed, area) = printed(laid, &self.stacks);
+        let (width, height) = (Mm::of_dots(area.width as i64).0, Mm::of_dots(area.length as i64).0);
+        let notes = [
+            format!("{width:.0} x {height:.0} mm, {passes} passes"),
+            format!(
+                "seen from {EYE} m: average d {:.3}, 95 % below {:.3}",
+                self.fidelity.mean, self.fidelity.p95
+            ),
+        ];
+        let name = &laid.document.name;
+        Ok(preview::sheet_picture(&self.target, &printed, &STANDARD_LIGHTS, PANEL, name, &notes, observer)?)
+    }
+}
+
+/// The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
+/// printer profile do to the page is undone on paper.
+fn printed<'a>(laid: &'a Laid, stacks: &'a Table) -> (Source<'a>, Area) {
+    let dots = &laid.halftoned.dots;
     let area = Area::whole(dots);
-    let target = match document.as_factored() {
-        Some(factored) => Source::Factored(factored),
-        None => Source::Document(document.materials()),
-    };
-    let printed = Source::Print { dots, space, stacks: &stacks, area };
-    let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
-    let (width, height) = (Mm::of_dots(area.width as i64).0, Mm::of_dots(area.length as i64).0);
-    let notes = [
-        format!("{width:.0} x {height:.0} mm, {passes} passes"),
-        format!("seen from {EYE} m: average d {:.3}, 95 % below {:.3}", fidelity.mean, fidelity.p95),
-    ];
-    let sheet =
-        preview::sheet_picture(&target, &printed, &STANDARD_LIGHTS, PANEL, &document.name, &notes, observer)?;
-    let mapped = &halftoned.mapped.report;
-    let kind = kind(laid);
-    let swatches: Vec<Swatch> = (1..)
-        .zip(&mapped.materials)
-        .map(|(number, material)| Swatch {
-            name: format!("{kind} {number}, {:.0} %", 100.0 * material.share),
-            target: &material.target,
-            printed: &material.printed,
-            mix: material.weights.clone(),
-        })
-        .collect();
-    let materials = preview::materials_picture(space, &swatches, probe, BALL, observer)?;
-    Ok(Pictures { sheet, materials, fidelity })
+    (Source::Print { dots, space: laid.document.materials().space(), stacks, area }, area)
 }
 
 /// What the materials of a report are.
@@ -305,11 +329,11 @@ impl Halftone {
         let looks = reflectances(dots.stacks(), library, space);
         let lightness = |row: &[f64]| luminance(space.curve(row).at(ASIDE)).cbrt();
         let values: Vec<f64> = looks.rows().map(lightness).collect();
-        Ok(Halftone {
-            look: metrics::look(mix, dots, &chosen)?,
-            tones: metrics::tones(mix, dots, observer)?,
-            spectrum: preview::spectrum(dots, &values),
-        })
+        let (tones, (look, spectrum)) = rayon::join(
+            || metrics::tones(mix, dots, observer),
+            || rayon::join(|| metrics::look(mix, dots, &chosen), || preview::spectrum(dots, &values)),
+        );
+        Ok(Halftone { look: look?, tones: tones?, spectrum })
     }
 }
 

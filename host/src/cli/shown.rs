@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use rayon::prelude::*;
 use serde_json::Value;
 
 use super::job::write;
@@ -51,7 +52,7 @@ pub fn page(plan: &Plan, sheet: &Sheet, passes: &[Pass], area: Area, ground: Gro
     let pictures = Pictures {
         sheet: thumbnail(sheet, across, ground, THUMBNAIL),
         passes: passes
-            .iter()
+            .par_iter()
             .map(|pass| pass_thumbnail(pass, area, across, ground, PASS_THUMBNAIL))
             .collect(),
     };

@@ -94,18 +94,22 @@ pub(super) fn map(
 
 /// The printed reflectance (1/sr) of clamped targets, given as rows.
 pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, GamutError> {
-    let mut mixer = Mixer::new();
-    let mut printed = Table::new(targets.columns());
-    for (i, row) in targets.rows().enumerate() {
+    let fit = |mixer: &mut Mixer, i: usize| {
         let mut weights = vec![0.0; candidates.len()];
         let hull = &candidates.priced;
-        hull.target(row)
+        hull.target(targets.row(i))
             .and_then(|target| {
                 mixer.tangent(hull, &target, &mut weights)?;
                 mixer.refine(hull, &target, &mut weights, ENOUGH)
             })
             .map_err(|source| GamutError::Mixture { what: format!("sampled pixel {i}"), source })?;
-        printed.push(&candidates.reflectance(weights.iter().copied()));
+        Ok(candidates.reflectance(weights.iter().copied()))
+    };
+    let rows: Vec<Result<Vec<f64>, GamutError>> =
+        (0..targets.len()).into_par_iter().map_init(Mixer::new, fit).collect();
+    let mut printed = Table::new(targets.columns());
+    for row in rows {
+        printed.push(&row?);
     }
     Ok(printed)
 }

@@ -177,6 +177,22 @@ impl Mixer {
         metric: Linear,
         a: &mut [f64],
     ) -> Result<(), MixtureError> {
+        let it = self;
+        wide!(fn(
+            it: &mut Mixer, hull: &Hull, target: &Target, metric: Linear, a: &mut [f64],
+        ) -> Result<(), MixtureError> {
+            it.linear_plainly(hull, target, metric, a)
+        })
+    }
+
+    #[inline(always)]
+    fn linear_plainly(
+        &mut self,
+        hull: &Hull,
+        target: &Target,
+        metric: Linear,
+        a: &mut [f64],
+    ) -> Result<(), MixtureError> {
         check(hull, target, a)?;
         self.resize(hull);
         let (k, m) = (hull.len(), hull.columns());

@@ -17,7 +17,7 @@ use super::gram::Gram;
 use super::vector::{add_scaled, dot, dot_short, wide};
 
 /// Reduced gradients within this share of the problem's scale count as zero: about a hundred roundings.
-const TOLERANCE: f64 = 4e-14;
+pub(super) const TOLERANCE: f64 = 4e-14;
 /// Squared relative distance to the hull of the support below which a point counts as dependent on it.
 const PIVOT_FLOOR: f64 = 1e-14;
 
@@ -156,6 +156,11 @@ impl Simplex {
         self.reset(n);
         let steps = self.search(gram, q, a, TOLERANCE * gram.largest(), most_steps(n));
         finish(frank_wolfe_gap(q, a), steps)
+    }
+
+    /// Forgets the factor of the last support, so that the next result does not depend on it even in the last bit.
+    pub(super) fn forget(&mut self) {
+        self.edition = 0;
     }
 
     #[inline(always)]
@@ -459,4 +464,4 @@ fn normalise(a: &mut [f64]) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

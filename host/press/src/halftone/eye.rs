@@ -1,10 +1,9 @@
-//! What the eye makes of a halftone: the error it sees, patterns, bands, and parts too thin to hold.
+//! What the eye makes of a halftone: the error it sees, patterns and bands.
 //!
 //! Problem: tones and clusters ([`super::metrics`]) do not say whether an area looks even.
 //! Method: dots and mixture are taken to coordinates in which the distance of two materials is that of what they
 //! reflect ([`Tangent`]); their difference, filtered by the eye's contrast sensitivity at a distance, is the error seen.
-//! Patterns are peaks of the autocorrelation of a stack's dots; bands are the spread of the means of rows and columns;
-//! a part is too thin where no rectangle of the minimum's area and sides of at most 2 to 1 fits.
+//! Patterns are peaks of the autocorrelation of a stack's dots; bands are the spread of the means of rows and columns.
 //! Cost: an FFT for each coordinate: 0.3 s for 512 x 512 dots and five stacks. Memory: 16 bytes a dot, four times for
 //! the autocorrelation.
 //! Limits: the error is periodic at the patch's border; a flat patch of 1024 x 1024 dots is needed to tell an
@@ -251,48 +250,6 @@ pub fn swing(width: usize, index: &[u8], stack: u8, side: usize) -> (f64, f64) {
     (spread(&rows, width), spread(&columns, height))
 }
 
-/// Dots in parts too thin for their stack: no rectangle that has only that stack, as many dots as `minimum(stack)` and sides of
-/// at most 2 to 1 covers them. It may reach over dots that `free` exempts, such as solids, and over the border. Exempt dots are
-/// not counted.
-pub fn thin(width: usize, index: &[u8], minimum: impl Fn(u8) -> usize, free: impl Fn(usize) -> bool) -> u64 {
-    let height = index.len() / width;
-    let free: Vec<bool> = (0..index.len()).map(free).collect();
-    let mut shapes: Vec<Vec<(isize, isize)>> = vec![Vec::new(); 256];
-    for &stack in index {
-        if shapes[usize::from(stack)].is_empty() {
-            shapes[usize::from(stack)] = holding(minimum(stack));
-        }
-    }
-    let covered = |x: usize, y: usize| {
-        let stack = index[y * width + x];
-        let alike = |x: isize, y: isize| {
-            if x < 0 || y < 0 || x >= width as isize || y >= height as isize {
-                return true;
-            }
-            let at = y as usize * width + x as usize;
-            free[at] || index[at] == stack
-        };
-        let (x, y) = (x as isize, y as isize);
-        shapes[usize::from(stack)].iter().any(|&(wide, high)| {
-            let fits =
-                |left: isize, top: isize| (top..top + high).all(|y| (left..left + wide).all(|x| alike(x, y)));
-            (y - high + 1..=y).any(|top| (x - wide + 1..=x).any(|left| fits(left, top)))
-        })
-    };
-    (0..index.len()).filter(|&at| !free[at] && !covered(at % width, at / width)).count() as u64
-}
-
-/// The smallest rectangles of at least so many dots whose sides are at most 2 to 1: widths and heights.
-fn holding(dots: usize) -> Vec<(isize, isize)> {
-    let fits = |wide: usize, high: usize| wide * high >= dots && wide.max(high) <= 2 * wide.min(high);
-    let longest = 2 * dots.isqrt() + 2;
-    (1..=longest)
-        .filter_map(|wide| {
-            (1..=longest).find(|&high| fits(wide, high)).map(|high| (wide as isize, high as isize))
-        })
-        .collect()
-}
-
 /// Discrete Fourier transform of rows of `width`, in place.
 fn transform(image: &mut [Complex<f64>], width: usize) {
     let height = image.len() / width;
@@ -346,32 +303,6 @@ mod tests {
         let (rows, columns) = swing(width, &scattered, 1, 1);
         assert!((0.8..1.25).contains(&rows) && (0.8..1.25).contains(&columns), "{rows} {columns}");
         assert!(swing(width, &lattice, 1, 4).0 > 3.0);
-    }
-
-    #[test]
-    fn a_line_is_thin_and_a_square_is_not() {
-        let width = 16;
-        let mut index = vec![0u8; width * width];
-        for y in 4..7 {
-            for x in 4..7 {
-                index[y * width + x] = 1;
-            }
-        }
-        assert_eq!(thin(width, &index, |_| 9, |_| false), 0);
-        // One more dot to the right of the square is covered by no rectangle.
-        index[5 * width + 7] = 1;
-        assert_eq!(thin(width, &index, |_| 9, |_| false), 1);
-        assert_eq!(thin(width, &index, |_| 9, |at| at == 5 * width + 7), 0);
-        assert_eq!(thin(width, &index, |_| 1, |_| false), 0);
-        // 2 x 4 dots hold 8, and 1 x 8 do not.
-        let bar = |wide: usize| -> Vec<u8> {
-            (0..width * width)
-                .map(|at| u8::from(at % width < 8 / wide && (3..3 + wide).contains(&(at / width))))
-                .collect()
-        };
-        assert_eq!(thin(width, &bar(2), |stack| if stack == 1 { 8 } else { 1 }, |_| false), 0);
-        assert_eq!(thin(width, &bar(1), |stack| if stack == 1 { 8 } else { 1 }, |_| false), 8);
-        assert_eq!(thin(width, &bar(2), |stack| if stack == 1 { 9 } else { 1 }, |_| false), 8);
     }
 
     /// Distances between stacks are the metric's, to first order.

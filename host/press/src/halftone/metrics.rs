@@ -16,6 +16,7 @@ use super::eye::{self, Eye, Tangent};
 use super::mix::Lattice;
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
 use super::solids::Solids;
+use super::thin;
 use super::{HalftoneError, SAMPLES, Settings, TONE, cells, check};
 use crate::sheet::DotMap;
 use crate::sheet::clusters::smallest_clusters;
@@ -94,8 +95,10 @@ pub fn tones(mix: &InkMix, dots: &DotMap, observer: &dyn Observer) -> Result<Vec
         })
         .collect();
 
-    let runs = runs(&lattice, &tiles, stacks, row);
-    let clusters = smallest_clusters(width, dots.index(), &std::array::from_fn(|stack| stack as u8));
+    let (runs, clusters) = rayon::join(
+        || runs(&lattice, &tiles, stacks, row),
+        || smallest_clusters(width, dots.index(), &std::array::from_fn(|stack| stack as u8)),
+    );
     let total = f64::from(walk.len());
     let tone = |q: usize| {
         let unit = f64::from(UNIT);
@@ -283,7 +286,7 @@ impl Window<'_> {
         Measured {
             seen: eye::errors_seen(&planes, self.eye),
             tones,
-            thin: eye::thin(width, &index, |stack| settings.minimum[usize::from(stack)].into(), free),
+            thin: thin::thin(width, &index, |stack| settings.minimum[usize::from(stack)].into(), free),
             flat,
         }
     }

@@ -24,6 +24,7 @@ mod regions;
 mod rule;
 mod search;
 mod solids;
+pub mod thin;
 
 use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};

@@ -69,10 +69,18 @@ impl Fine {
     #[inline(always)]
     pub fn at(&self, chord: f32) -> (usize, f32) {
         let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
-        let (k, s) = (step as usize, step.fract());
+        let (k, s) = parts(step);
         let place = self.places[k] + s * (self.places[k + 1] - self.places[k]);
-        (place as usize, place.fract())
+        parts(place)
     }
+}
+
+/// The whole and the fractional part of a number from 0 up to a million. Without `fract`, which calls a function for every number
+/// where the processor's oldest kind cannot truncate.
+#[inline(always)]
+fn parts(number: f32) -> (usize, f32) {
+    let whole = number as i32;
+    (whole as usize, number - whole as f32)
 }
 
 #[cfg(test)]

@@ -148,20 +148,26 @@ fn is_feasible(a: &[f64]) -> bool {
     a.iter().all(|&w| w >= 0.0) && (a.iter().sum::<f64>() - 1.0).abs() < 1e-14
 }
 
-/// Points and a target; some points are doubled, some lie between others, so that G is singular.
-fn problem() -> impl Strategy<Value = (Vec<Vec<f64>>, Vec<f64>)> {
+/// Points; some are doubled, some lie between others, so that G is singular.
+pub(in crate::solve) fn points() -> impl Strategy<Value = Vec<Vec<f64>>> {
     (1usize..24, 1usize..14).prop_flat_map(|(k, m)| {
         let point = prop::collection::vec(-1.0f64..1.0, m);
-        (prop::collection::vec(point, k), prop::collection::vec(-1.5f64..1.5, m), 0usize..4).prop_map(
-            |(mut rows, t, extra)| {
-                for i in 0..extra.min(rows.len()) {
-                    rows.push(rows[i].clone());
-                    let other = rows[(i + 1) % rows.len()].clone();
-                    rows.push(rows[i].iter().zip(&other).map(|(a, b)| 0.25 * a + 0.75 * b).collect());
-                }
-                (rows, t)
-            },
-        )
+        (prop::collection::vec(point, k), 0usize..4).prop_map(|(mut rows, extra)| {
+            for i in 0..extra.min(rows.len()) {
+                rows.push(rows[i].clone());
+                let other = rows[(i + 1) % rows.len()].clone();
+                rows.push(rows[i].iter().zip(&other).map(|(a, b)| 0.25 * a + 0.75 * b).collect());
+            }
+            rows
+        })
+    })
+}
+
+/// Points and a target.
+fn problem() -> impl Strategy<Value = (Vec<Vec<f64>>, Vec<f64>)> {
+    points().prop_flat_map(|rows| {
+        let columns = rows[0].len();
+        (Just(rows), prop::collection::vec(-1.5f64..1.5, columns))
     })
 }
 

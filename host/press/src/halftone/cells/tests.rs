@@ -1,7 +1,8 @@
 //! The claims of the cells: widths by trying every square, tones by counting, regions by changing their neighbours.
 
-use super::super::eye::{Eye, Tangent, error_planes, errors_seen, peak, swing, thin};
+use super::super::eye::{Eye, Tangent, error_planes, errors_seen, peak, swing};
 use super::super::solids::Solids;
+use super::super::thin::thin;
 use super::super::{Method, Settings, TONE, halftone};
 use super::Point;
 use super::cell::{Cell, fits_half};
