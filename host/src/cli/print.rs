@@ -222,7 +222,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
     };
     let saved = rayon::join(|| save("sheet.png", &sheet), || save("materials.png", &pictures.materials));
-    saved.0.and(saved.1)?;
+    saved.0?;
+    saved.1?;
     let doubt = laid.halftoned.doubt;
     let advice = format!(
         "\nSeen from {EYE} m, print and document differ: average difference d = {:.3} (0.01: barely visible; 0.05: \
