@@ -133,7 +133,7 @@ impl Args {
         let Some(&area) = page.laid.copies.first() else {
             bail!("nothing of the document lies on the sheet")
         };
-        let target = laid.bases(None, observer)?;
+        let target = laid.bases(observer)?;
         let Laid { document, library, halftoned, .. } = laid;
         let mixture = mapped(&halftoned.mapped.mix, &library, &space());
         let sheet = page.sheet.dots().clone();

@@ -20,10 +20,9 @@ use super::preview::view::ViewArgs;
 use super::progress::Beside;
 use super::report;
 use appearance::brdf::{Table, reflectances};
-use appearance::document::{Document, Materials};
+use appearance::document::Document;
 use appearance::factor::{self, Factored};
 use appearance::gamut::Gain;
-use appearance::materials::Reduced;
 use observe::Observer;
 use press::halftone;
 use press::halftone::metrics::{self, Look, Tone};
@@ -85,19 +84,12 @@ pub struct Laid {
 const BASES: usize = 12;
 
 impl Laid {
-    /// The document's bases for pictures of it: of all its detail, or averaged to these cells (across, down).
-    pub fn bases(&self, cells: Option<(usize, usize)>, observer: &dyn Observer) -> Result<Factored> {
-        let Laid { document, settings, halftoned, .. } = self;
-        if let Some(factored) = document.as_factored() {
-            return Ok(factored.clone());
-        }
-        let uses_bases = halftoned.mapped.report.intent.uses_bases();
-        let bases = settings.factor.bases.or((!uses_bases).then_some(BASES));
-        let settings = factor::Settings { bases, ..settings.factor };
-        let materials = document.materials();
-        let reduced = cells.map(|cells| Reduced::new(materials, cells));
-        let materials: &dyn Materials = reduced.as_ref().map_or(materials, |reduced| reduced);
-        Ok(factor::factor(materials, &settings, observer)?.factored)
+    /// The document's bases for pictures of it.
+    pub fn bases(&self, observer: &dyn Observer) -> Result<Factored> {
+        let uses_bases = self.halftoned.mapped.report.intent.uses_bases();
+        let bases = self.settings.factor.bases.or((!uses_bases).then_some(BASES));
+        let settings = factor::Settings { bases, ..self.settings.factor };
+        Ok(document::factored(&self.document, &settings, observer)?.0.into_owned())
     }
 }
 
@@ -244,8 +236,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     })?;
     job::write(&made.folder.join("report.html"), page.as_bytes())?;
     let report = report(&laid, &pictures.fidelity, &halftone);
-    let cells = laid.halftoned.cells;
-    let page = Shown::of(laid, cells, observer)?.page(&ViewArgs::default(), None, observer)?;
+    let document = laid.document.as_factored().cloned();
+    let page = Shown::of(laid, document).page(&ViewArgs::default(), None, observer)?;
     job::write(&made.folder.join("sheet.html"), page.html.as_bytes())?;
     made.finish(report, (&advice, "report.html"), &args.result, &args.deliver, observer)
 }

@@ -88,7 +88,7 @@ fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result 
     write!(
         page,
         "<h2>The sheet</h2>\n<p>Document above, print below, under four lights, and the dots under a lens. On <a href=\"sheet.html\">the sheet's own page</a> \
-         the light follows the hand.</p>\n\
+         the light follows the hand; <code>foilpress preview</code> puts the document beside it.</p>\n\
          <a href=\"sheet.png\"><img alt=\"document and print under four lights\" src=\"sheet.png\"></a>\n\
          <h2>Materials</h2>\n<p>Before and after they were fitted to the inks.</p>\n\
          <a href=\"materials.png\"><img alt=\"materials before and after mapping, as balls\" src=\"materials.png\"></a>\n"

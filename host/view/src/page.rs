@@ -99,8 +99,6 @@ pub struct Target<'a> {
     pub mapped: &'a Factored,
     /// What each basis of `mapped` is mixed of.
     pub mixtures: &'a [String],
-    /// Whether steps of edits can be replayed on this very document.
-    pub editable: bool,
 }
 
 /// Weights over curves.
@@ -159,7 +157,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
         "name": subject.name, "about": subject.about, "size": subject.size, "start": subject.start,
         "white": Exposure::PAPER.0, "steps": STEPS,
         "metric": { "angles": space.angles(), "radiance": every_third(space.radiance()), "weight": every_third(space.weight()) },
-        "edits": target.filter(|t| t.editable).map(|t| edits(t.document)),
+        "edits": target.map(|t| edits(t.document)),
         "document": document, "mapped": mapped, "printed": printed, "difference": difference,
         "probe": { "width": probe.width(), "height": probe.height(), "texels": packed(&texels)? },
     });
@@ -348,12 +346,7 @@ mod tests {
                 name,
                 about: "60 x 40 dots",
                 size: [0.00254, 0.00169],
-                target: Some(Target {
-                    document: &document,
-                    mapped: &document,
-                    mixtures: &[],
-                    editable: true,
-                }),
+                target: Some(Target { document: &document, mapped: &document, mixtures: &[] }),
                 dots: &dots,
                 stacks: &rows,
                 space: &space,

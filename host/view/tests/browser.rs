@@ -95,12 +95,7 @@ impl Made {
             name: NAME,
             about: "a document for tests",
             size: SIZE,
-            target: Some(Target {
-                document: &self.document,
-                mapped: &self.mapped,
-                mixtures: &mixtures,
-                editable: true,
-            }),
+            target: Some(Target { document: &self.document, mapped: &self.mapped, mixtures: &mixtures }),
             dots: &self.dots,
             stacks: &self.stacks,
             space: &self.space,

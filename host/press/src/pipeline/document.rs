@@ -42,8 +42,6 @@ pub struct Halftoned {
     pub mapped: Mapped,
     /// The dots.
     pub dots: DotMap,
-    /// What the document was averaged to (across, down), if the print cannot show all its pixels.
-    pub cells: Option<(usize, usize)>,
     /// What foils would bring, if the inks are the default, which leaves them out.
     pub foils: Option<Gain>,
     /// How much of the distance between document and mixture lies within the measurement of the stacks, if one in use has
@@ -125,7 +123,7 @@ pub fn halftoned(
         false => None,
     };
     let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
-    Ok(Halftoned { factoring, mapped, dots, cells, foils, doubt })
+    Ok(Halftoned { factoring, mapped, dots, foils, doubt })
 }
 
 /// Side in pixels of the spot that an eye averages over, if the dots are rearranged for the eye: then the mixtures are, too.

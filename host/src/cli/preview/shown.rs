@@ -1,7 +1,8 @@
 //! What is looked at: printed dots, and the document and the mixture of inks that they stand for.
 //!
 //! Problem: `preview` shows documents, jobs and sheets, `print` what it has just printed, and both write the same page.
-//! Cost of a page: as many bases as make the document look like itself are fitted to it, at the page's own resolution.
+//! Cost: bases that make a document look like itself are fitted to it for `preview`, which takes longer than its dots; `print` shows the
+//! dots alone unless the document came with bases.
 
 use std::path::Path;
 
@@ -43,8 +44,6 @@ pub struct Both {
     pub document: Factored,
     pub mapped: Factored,
     pub mixtures: Vec<String>,
-    /// Whether the document is as `factor` writes it.
-    pub whole: bool,
 }
 
 /// A page.
@@ -72,12 +71,13 @@ impl Shown {
                 worn: None,
             });
         }
-        Shown::of(work.laid(observer)?, None, observer)
+        let laid = work.laid(observer)?;
+        let bases = laid.bases(observer)?;
+        Ok(Shown::of(laid, Some(bases)))
     }
 
-    /// A document with its dots: with all its detail, or averaged to these cells (across, down).
-    pub fn of(laid: Laid, cells: Option<(usize, usize)>, observer: &dyn Observer) -> Result<Shown> {
-        let bases = laid.bases(cells, observer)?;
+    /// A document's dots, with the document beside them where it has bases.
+    pub fn of(laid: Laid, bases: Option<Factored>) -> Shown {
         let Laid { document, library, halftoned, .. } = laid;
         let space = document.materials().space().clone();
         let mix = &halftoned.mapped.mix;
@@ -85,20 +85,12 @@ impl Shown {
             let parts = mix.stacks.iter().cloned().zip(row.iter().map(|&share| f64::from(share)));
             mix_in_words(&parts.filter(|(_, share)| *share > 0.0).collect::<Vec<_>>())
         };
-        let both = Both {
-            document: bases,
+        let target = bases.map(|document| Both {
+            document,
             mapped: mapped(mix, &library, &space),
             mixtures: mix.matrix.iter().map(words).collect(),
-            whole: cells.is_none() || document.as_factored().is_some(),
-        };
-        Ok(Shown {
-            name: document.name,
-            space,
-            library,
-            dots: halftoned.dots,
-            target: Some(both),
-            worn: None,
-        })
+        });
+        Shown { name: document.name, space, library, dots: halftoned.dots, target, worn: None }
     }
 
     /// What the stacks of the dots reflect.
@@ -137,7 +129,6 @@ impl Shown {
                 document: &both.document,
                 mapped: &both.mapped,
                 mixtures: &both.mixtures,
-                editable: both.whole,
             }),
             dots: &self.dots,
             stacks: &stacks,
