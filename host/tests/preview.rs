@@ -45,6 +45,37 @@ fn dots_and_jobs_show_the_print_alone() {
     assert!(said.contains("has printed dots and no document"), "{said}");
 }
 
+/// A job shows the whole sheet with every copy on it, all alike.
+#[test]
+fn a_job_with_copies_shows_them_all() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("print tile --size 12x8mm --repeat 2x1 --gap 4mm --paper postcard -q --to file:job.rgl");
+    // Light and eye in front and far away: what a place reflects does not depend on where it is.
+    bench.done("preview job.rgl -q -o job.exr --pixels 640 --distance far --light 0,0");
+    let picture = image::open(bench.path("job.exr")).expect("a picture").into_rgba32f();
+    let paper = picture.get_pixel(picture.width() / 2, picture.height() / 8).0[0];
+    let printed = |left: u32, right: u32| {
+        let inked = |&(x, _, p): &(u32, u32, &image::Rgba<f32>)| {
+            (left..right).contains(&x) && p.0[3] == 1.0 && (p.0[0] / paper - 1.0).abs() > 0.05
+        };
+        picture.enumerate_pixels().filter(inked).count() as f64
+    };
+    let middle = picture.width() / 2;
+    let (left, right) = (printed(0, middle), printed(middle, picture.width()));
+    assert!(left > 500.0 && (left / right - 1.0).abs() < 0.1, "{left} and {right} pixels");
+    let output = bench
+        .command("preview tile --size 12x8mm --repeat 2x1 --paper postcard -o one.html")
+        .output()
+        .unwrap();
+    assert!(
+        testing::program::text(&output.stderr).contains("one copy of the document is shown"),
+        "{output:?}"
+    );
+    // The gap between them is bare.
+    assert!(printed(middle - 5, middle + 5) == 0.0);
+}
+
 /// Steps copied from the page of a factored document are for that document.
 #[test]
 fn the_page_names_the_document_whose_bases_it_edits() {

@@ -9,7 +9,7 @@
 //! often by more than its spread. Reconstruction is the best of all methods, but prints need not be.
 //! Source: Lawrence et al. 2006 for the problem; the growing penalty is new here.
 
-use crate::solve::{Gram, Simplex};
+use crate::solve::{Gram, Lanes};
 
 use super::columns::{accumulate, dot, mix};
 use super::parts;
@@ -61,20 +61,21 @@ fn code(sample: &Sample, bases: &[f32], tangent2: &[f32], weights: &mut [f64], b
         bases.chunks_exact(padded).flat_map(|row| row.iter().zip(tangent2).map(|(b, t)| b * t)).collect();
     let mut gram = Gram::empty();
     gram.refill_products(k, |i, j| f64::from(dot(&seen[i * padded..][..padded], &bases[j * padded..])));
-    let gram = &gram;
     let partial = parts::each_mut(sample.len(), weights, k, |range, weights| {
-        let mut simplex = Simplex::new();
         let mut matrix = vec![0.0f64; k * k];
         let mut right = vec![0.0f32; k * padded];
-        let mut h = vec![0.0; k];
-        for (i, a) in range.zip(weights.chunks_exact_mut(k)) {
+        let mut h = vec![0.0; range.len() * k];
+        for ((i, h), a) in range.clone().zip(h.chunks_exact_mut(k)).zip(weights.chunks_exact(k)) {
             let x = sample.row(i);
             for (h, row) in h.iter_mut().zip(seen.chunks_exact(padded)) {
                 *h = f64::from(dot(row, x));
             }
             h[dominant(a)] += bonus;
-            // Sizes agree and numbers are finite, so there is a solution.
-            let _ = simplex.solve(gram, &h, a);
+        }
+        // Sizes agree and numbers are finite, so there is a solution, near that of the last iteration.
+        let _ = Lanes::new(&gram, &[]).and_then(|mut lanes| lanes.solve_from(&h, weights));
+        for (i, a) in range.zip(weights.chunks_exact(k)) {
+            let x = sample.row(i);
             let w = sample.weight[i];
             for (l, &al) in a.iter().enumerate().filter(|(_, a)| **a > 0.0) {
                 matrix[l * k..][..k].iter_mut().zip(a.iter()).for_each(|(m, &am)| *m += w * al * am);

@@ -5,12 +5,12 @@
 //! Method: the same active set, with pixels sorted by support. Eight pixels with one support share its factor
 //! ([`Supports`]), and each operation of a substitution is done for all of them. Then the gradient of each says whether it is
 //! solved, or which point joins; a weight that would become negative says which one leaves. So pixels move from support to
-//! support, until none is left. Each begins with the best of a few mixtures: the single points, and solutions for pixels that were
-//! chosen in advance. A pixel whose support has no factor, or that visits too many, is solved by [`Simplex`](super::Simplex) from
+//! support, until none is left. Each begins with the weights that are known of it, or with the best of a few mixtures: the single
+//! points, and solutions for pixels that were chosen in advance. A pixel whose support has no factor, or that visits too many, is solved by [`Simplex`](super::Simplex) from
 //! where it is.
 //! Cost: `O(n p)` a visit and `O(n + s p)` for the start, with s mixtures to start from. Limits: gains by pixels that have supports in
 //! common; with hundreds of different ones it is no faster than one at a time.
-//! The result for a pixel depends on the matrix, the mixtures to start from and the pixel alone, not on its neighbours or the
+//! The result for a pixel depends on the matrix, what it starts from and the pixel alone, not on its neighbours or the
 //! width of vectors.
 //! Source: Van Benthem & Keenan 2004 for pixels sorted by support.
 
@@ -151,6 +151,16 @@ impl Lanes {
     /// If the lengths disagree or are no multiple of the number of rows, or something is not finite. Then `a` holds no
     /// solutions.
     pub fn solve(&mut self, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
+        a.fill(0.0);
+        self.solve_from(h, a)
+    }
+
+    /// The same where `a` holds weights that are nearly right, such as those for a matrix a little different: a pixel with weights that
+    /// are not negative and sum to one starts from their support.
+    ///
+    /// # Errors
+    /// Those of [`Lanes::solve`].
+    pub fn solve_from(&mut self, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
         let n = self.gram.len();
         if n == 0 || h.len() != a.len() || !h.len().is_multiple_of(n) {
             return Err(SimplexError::Size { points: n, products: h.len(), weights: a.len() });
@@ -259,6 +269,10 @@ impl Lanes {
                 let pixel = i * LANES + lane;
                 self.tolerance[pixel] = 2.0 * TOLERANCE * scale[lane];
                 self.visits[pixel] = 0;
+                if let Some(support) = self.known(a) {
+                    self.wait(support, pixel as u32);
+                    continue;
+                }
                 a.fill(0.0);
                 match self.starts.get(best[lane] as usize) {
                     Some(start) => {
@@ -270,6 +284,16 @@ impl Lanes {
             }
         }
         Ok(())
+    }
+
+    /// The support of weights on the simplex, if it has a factor.
+    fn known(&mut self, a: &[f64]) -> Option<u32> {
+        let sum: f64 = a.iter().sum();
+        if !(1.0 - 1e-9..=1.0 + 1e-9).contains(&sum) || a.iter().any(|&a| a < 0.0) {
+            return None;
+        }
+        let points = (0..).zip(a).filter(|(_, a)| **a > 0.0).map(|(k, _)| k).collect();
+        self.supports.of(&self.gram, points)
     }
 
     /// Has a pixel wait at a support.

@@ -15,7 +15,7 @@ use appearance::factor::Factored;
 use image::ImageFormat;
 use inks::Library;
 use observe::Observer;
-use press::layout::Mm;
+use press::layout::{Mm, Repeat};
 use press::preview::{Exposure, Probe, Radiance, Source, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
@@ -72,6 +72,9 @@ impl Shown {
             });
         }
         let laid = work.laid(observer)?;
+        if laid.layout.repeat != Repeat::Grid(1, 1) {
+            observer.note("one copy of the document is shown; `foilpress print` it and preview its job to see the whole sheet");
+        }
         let bases = laid.bases(observer)?;
         Ok(Shown::of(laid, Some(bases)))
     }

@@ -68,6 +68,24 @@ proptest! {
         }
     }
 
+    /// Whatever a pixel starts from: its own weights, those of another pixel, or what are no weights at all.
+    #[test]
+    fn starts_do_not_decide((rows, targets) in problems(), turn in 0usize..40, odd in prop::sample::select(vec![f64::NAN, -1.0, 7.0])) {
+        let (table, gram, h) = problem(&rows, &targets);
+        let n = rows.len();
+        let mut lanes = Lanes::new(&gram, &[]).unwrap();
+        let mut cold = vec![0.0; h.len()];
+        lanes.solve(&h, &mut cold).unwrap();
+        let mut warm = cold.clone();
+        warm.rotate_left(turn % targets.len() * n);
+        warm[0] = odd;
+        lanes.solve_from(&h, &mut warm).unwrap();
+        for ((cold, warm), t) in cold.chunks_exact(n).zip(warm.chunks_exact(n)).zip(&targets) {
+            prop_assert!(warm.iter().all(|&w| w >= 0.0) && (warm.iter().sum::<f64>() - 1.0).abs() < 1e-14, "{warm:?}");
+            prop_assert!((residual(&table, cold, t) - residual(&table, warm, t)).abs() < 1e-6);
+        }
+    }
+
     /// Bit by bit: in other company, in another order, after other pixels, and with vectors of any width.
     #[test]
     fn company_changes_nothing((rows, targets) in problems(), known in 0usize..10) {
