@@ -1,5 +1,12 @@
-//! The display's page, and the report and the sheet's page of a print, in a real browser.
+//! The display's page, the report and the sheet's page of a print, and a comparison, in a real browser.
 
+#[path = "compare/camera.rs"]
+#[expect(dead_code, reason = "tests of the figures need more of it")]
+mod camera;
+#[path = "compare/scenery.rs"]
+mod scenery;
+
+use camera::SHOTS;
 use image::{Rgb, RgbImage};
 use testing::browser::Browser;
 use testing::program::{Bench, small_document};
@@ -18,4 +25,13 @@ fn pages_work_in_a_browser() {
     small_document(&bench.path("tile"));
     bench.done("print tile --size 12x8mm --paper postcard -q -o print");
     browser.test("pages.test.mjs", "display|report|sheet", &bench.path("."));
+}
+
+#[test]
+fn a_comparison_works_in_a_browser() {
+    let Some(browser) = Browser::find() else { return };
+    let bench = Bench::new();
+    scenery::photographed(&bench, &[SHOTS[0], SHOTS[2]]);
+    bench.done(&format!("compare photos {} --job job.rgl --camera camera.toml", scenery::PRINT));
+    browser.test("pages.test.mjs", "comparison", &bench.path("."));
 }

@@ -30,9 +30,7 @@ pub fn run(root: &Path) -> Result<()> {
     succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
     let lint = [ESLINT, "--config", "tests/browser/eslint.config.js", "--max-warnings", "0", "host", "tests"];
     succeed(node.command("node", &lint).current_dir(root))?;
-    let tests =
-        ["--test", "browser", "--test", "compare", "--locked", "--", "--test-threads=1", "in_a_browser"];
-    let args = [&["test", "--workspace"][..], &tests].concat();
+    let args = ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_CHROMIUM", found()?)

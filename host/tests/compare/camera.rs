@@ -39,6 +39,7 @@ fn unit(a: V) -> V {
 }
 
 /// Where a camera stood, what it looked at, how it was turned, and the lamp that was on.
+#[derive(Clone, Copy)]
 pub struct Shot {
     pub name: &'static str,
     pub eye: V,

@@ -4,6 +4,7 @@
 //! white balance, lens and poses are not told to the program.
 
 mod camera;
+mod scenery;
 mod truth;
 
 use std::fs;
@@ -11,58 +12,21 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use camera::{BRIGHTER, FOCAL, Picture, RADIAL, RIGHT, SHOTS, Sheet, Shot, V, dot, minus, photograph};
+use scenery::{CAMERA, PRINT, photographed, three_materials};
 use serde_json::Value;
-use testing::browser::Browser;
 use testing::program::Bench;
 use truth::{Truth, rms, size};
-
-const PRINT: &str = "tile --size 60x40mm --paper postcard --camera-marks -q";
-const CAMERA: &str = "format = 1\n[[light]]\nphotos = \"left\"\nposition_mm = [-190, 150, 330]\n\
-    [[light]]\nphotos = \"right\"\nposition_mm = [260, -60, 420]\n";
 
 /// A folder with a document, its job, photographs of its print and the camera file; made once.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<(Bench, PathBuf)> = OnceLock::new();
     let (_, folder) = FOLDER.get_or_init(|| {
         let bench = Bench::new();
-        three_materials(&bench.path("tile"));
-        for step in [
-            "factor tile -q -o tile.foil",
-            "map tile.foil -q --document tile -o tile.mix",
-            "halftone tile.mix -q --size 60x40mm -o tile.dots",
-            "layout tile.dots -q --paper postcard --camera-marks -o tile.sheet",
-            "separate tile.sheet -q -o tile.passes",
-            "encode tile.passes -q -o job.rgl",
-        ] {
-            bench.done(step);
-        }
-        let sheet = Sheet::load(&bench.path("tile.sheet"));
-        fs::create_dir(bench.path("photos")).unwrap();
-        for shot in &SHOTS {
-            photograph(&sheet, shot, shot.exposure, true).save(bench.path("photos").join(shot.name)).unwrap();
-        }
-        fs::write(bench.path("camera.toml"), CAMERA).unwrap();
+        photographed(&bench, &SHOTS);
         let folder = bench.path("");
         (bench, folder)
     });
     folder
-}
-
-/// Red paint beside silver, and a disc of gold on both.
-fn three_materials(folder: &Path) {
-    fs::create_dir_all(folder).unwrap();
-    let maps: [(&str, [[u8; 3]; 3]); 3] = [
-        ("base_color.png", [[180, 30, 25], [200, 200, 205], [200, 160, 80]]),
-        ("roughness.png", [[90; 3], [130; 3], [120; 3]]),
-        ("metallic.png", [[0; 3], [255; 3], [255; 3]]),
-    ];
-    for (name, values) in maps {
-        let picture = image::RgbImage::from_fn(240, 160, |x, y| {
-            let disc = (f64::from(x) - 119.5).hypot(f64::from(y) - 79.5) < 45.0;
-            image::Rgb(values[if disc { 2 } else { usize::from(x >= 120) }])
-        });
-        picture.save(folder.join(name)).unwrap();
-    }
 }
 
 /// A bench with copies of what the shared folder has.
@@ -210,14 +174,6 @@ fn a_grey_card_is_white_where_the_paper_is_not() {
     let said = bench.refused(1, &format!("compare photos {PRINT} --job job.rgl --camera card.toml"));
     assert!(said.contains("left-1.png") && said.contains("no grey card"), "{said}");
     assert!(!bench.path("photos/compare.html").exists(), "half-written");
-}
-
-#[test]
-fn the_page_works_in_a_browser() {
-    let Some(browser) = Browser::find() else { return };
-    let bench = bench(&["left-1.png", "right-1.png"]);
-    bench.done(&format!("compare photos {PRINT} --job job.rgl --camera camera.toml"));
-    browser.test("pages.test.mjs", "comparison", &bench.path("."));
 }
 
 #[test]

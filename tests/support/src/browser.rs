@@ -1,5 +1,4 @@
-//! Scripts that drive a page in a real browser. `cargo xtask preview` brings browser and Node, and names them; it runs the tests
-//! whose names end in `in_a_browser`.
+//! Scripts that drive a page in a real browser. `cargo xtask preview` brings browser and Node, and names them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
