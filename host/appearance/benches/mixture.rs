@@ -2,14 +2,11 @@
 
 use appearance::brdf::Space;
 use appearance::document::Surface;
-use appearance::gamut::Printable;
+use appearance::gamut::{LIGHT, Printable};
 use appearance::solve::{Hull, Mixer, Target};
 use divan::{Bencher, black_box};
 use inks::{InkSet, Library};
 use protocol::ink::Ink;
-
-/// Weight of the distance in light.
-const LIGHT: f64 = 0.3;
 
 /// 57 stacks, 32 samples, and thirty surfaces from matte paint to polished metal.
 fn problem() -> (Hull, Vec<Target>) {

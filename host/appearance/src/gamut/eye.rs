@@ -8,8 +8,8 @@
 //! sweep adds what is missed still. A pixel that would hardly move keeps its clamped mixture bit for bit, and a flat material
 //! keeps it anyhow: a target moved away from the gamut has the same nearest mixture.
 //! Cost: two more fits of each pixel that moves; three rows of the space for each cell, of which there are at most 131072, so that the
-//! window of a large document with coarse pixels is wider than the eye's. Limits: two sweeps, so not the optimum; each pixel by itself comes out farther from the document, by a few percent;
-//! documents whose pixels are as large as the spot stay as they are.
+//! window of a large document with coarse pixels is wider than the eye's. Limits: two sweeps, so not the optimum; each pixel by
+//! itself comes out farther from the document, by a few percent; documents whose pixels are as large as the spot stay as they are.
 
 use observe::Observer;
 use rayon::prelude::*;
