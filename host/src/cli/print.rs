@@ -15,7 +15,7 @@ use super::inks::luminance;
 use super::job::{self, Places, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
-use super::preview::shown::Shown;
+use super::preview::shown::{Page, Shown};
 use super::preview::view::ViewArgs;
 use super::progress::Beside;
 use super::report;
@@ -206,9 +206,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let beside = Beside(observer);
     let (made, seen) = rayon::join(
         || job::make(&args.work.request(&laid), &laid.document.notes, &[], places, ground, observer),
-        || rayon::join(|| Pictures::new(&laid, &probe, &beside), || Halftone::measured(&laid, &beside)),
+        || {
+            let page = || shown(&laid, &beside);
+            let rest = || rayon::join(|| Halftone::measured(&laid, &beside), page);
+            rayon::join(|| Pictures::new(&laid, &probe, &beside), rest)
+        },
     );
-    let (made, pictures, halftone) = (made?, seen.0?, seen.1?);
+    let (made, pictures, halftone, looked_at) = (made?, seen.0?, seen.1.0?, seen.1.1?);
     let sheet = pictures.sheet(&laid, made.job.draft.separation.passes.len(), observer)?;
     let save = |name: &str, picture: &RgbImage| {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
@@ -236,10 +240,13 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     })?;
     job::write(&made.folder.join("report.html"), page.as_bytes())?;
     let report = report(&laid, &pictures.fidelity, &halftone);
-    let document = laid.document.as_factored().cloned();
-    let page = Shown::of(laid, document).page(&ViewArgs::default(), None, observer)?;
-    job::write(&made.folder.join("sheet.html"), page.html.as_bytes())?;
+    job::write(&made.folder.join("sheet.html"), looked_at.html.as_bytes())?;
     made.finish(report, (&advice, "report.html"), &args.result, &args.deliver, observer)
+}
+
+/// The page on which the sheet is looked at.
+fn shown(laid: &Laid, observer: &dyn Observer) -> Result<Page> {
+    Shown::of(laid, laid.document.as_factored().cloned()).page(&ViewArgs::default(), None, observer)
 }
 
 /// What there is to look at, and how far print and document are apart.

@@ -14,6 +14,10 @@ use super::columns::Columns;
 use super::root::inverse_cbrt;
 use super::simplex::SimplexError;
 use super::vector::add_scaled;
+use crate::wide::wide;
+
+/// The number of columns is a multiple of this.
+const LANES: usize = 8;
 
 /// Price of one layer of ink, in units of squared distance. It decides ties.
 pub(crate) const LAYER_PRICE: f64 = 1e-6;
@@ -130,6 +134,8 @@ impl Hull {
         if !light_of_radiance.is_empty() {
             weight.extend([light; 3]);
         }
+        // Columns of no weight, so that the loops over them have no rest.
+        weight.resize(weight.len().next_multiple_of(LANES), 0.0);
         let mut rows = Table::new(weight.len());
         let mut brightest = 0.0f64;
         let mut radiance = Vec::with_capacity(weight.len());
@@ -143,6 +149,7 @@ impl Hull {
                 brightest = brightest.max(f * c);
             }
             append_albedo(&light_of_radiance, &mut radiance);
+            radiance.resize(weight.len(), 0.0);
             rows.push(&radiance);
         }
         let darkest = DARKEST * if brightest > 0.0 { brightest } else { 1.0 };
@@ -177,7 +184,7 @@ impl Hull {
         self.rows.is_empty()
     }
 
-    /// Number of columns, those of light included.
+    /// Number of columns, those of light and those without weight included.
     pub(super) fn columns(&self) -> usize {
         self.rows.columns()
     }
@@ -209,13 +216,19 @@ impl Hull {
             .radiance
             .extend(reflectance.zip(&self.radiance).map(|(f, c)| if f < 0.0 { 0.0 } else { f * c }));
         append_albedo(&self.light, &mut target.radiance);
-        target.root.clear();
+        target.radiance.resize(self.columns(), 0.0);
         target.root.resize(self.columns(), 0.0);
-        for (root, &t) in target.root.iter_mut().zip(&target.radiance) {
-            // Values too small for the root count as black.
-            let r = inverse_cbrt(t.max(f64::MIN_POSITIVE));
-            *root = t * r * r;
-        }
+        let (radiance, roots) = (&target.radiance[..], &mut target.root[..]);
+        wide(
+            #[inline(always)]
+            || {
+                for (root, &t) in roots.iter_mut().zip(radiance) {
+                    // Values too small for the root count as black.
+                    let r = inverse_cbrt(if t > f64::MIN_POSITIVE { t } else { f64::MIN_POSITIVE });
+                    *root = t * r * r;
+                }
+            },
+        );
         match target.radiance.iter().position(|t| !t.is_finite()) {
             Some(column) => {
                 Err(MixtureError::Value { what: "the target", column, value: target.radiance[column] })

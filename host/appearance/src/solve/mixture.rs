@@ -286,7 +286,7 @@ impl Mixer {
             }
             steps += 1;
             self.choose(a);
-            self.solve_model(hull, a)?;
+            self.solve_model(hull, target, a)?;
             let (promised, priced) = self.full_step(hull, a);
             let before = squared;
             match self.search(hull, target, before, promised, priced) {
@@ -329,10 +329,20 @@ impl Mixer {
         }
     }
 
-    /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights.
+    /// Minimises the quadratic model over the working stacks; `working_weights` receives their weights. Its curvature is
+    /// Gauss-Newton's times `(2 cbrt t - cbrt f) / cbrt f`, the exact second derivative, limited to 0.25..9.
     #[inline(always)]
-    fn solve_model(&mut self, hull: &Hull, a: &[f64]) -> Result<(), SimplexError> {
+    fn solve_model(&mut self, hull: &Hull, target: &Target, a: &[f64]) -> Result<(), SimplexError> {
         let m = hull.columns();
+        let (inverse, t, weight) = (&self.inverse[..m], &target.root[..m], &hull.weight[..m]);
+        let stiffness = &mut self.stiffness[..m];
+        for j in 0..m {
+            let r = inverse[j];
+            let exact = 2.0 * t[j] * r - 1.0;
+            let exact = if exact > 0.25 { exact } else { 0.25 };
+            let exact = if exact < 9.0 { exact } else { 9.0 };
+            stiffness[j] = weight[j] * (r * r) * (1.0 / 3.0) * exact.sqrt();
+        }
         for (i, &k) in self.working.iter().enumerate() {
             let scaled = &mut self.scaled[i * m..][..m];
             for ((x, f), s) in scaled.iter_mut().zip(hull.rows.row(k)).zip(&self.stiffness) {
@@ -413,12 +423,13 @@ impl Mixer {
         }
     }
 
-    /// Returns the squared distance of the trial mixture and sets up the model around it: `pull` and `stiffness`.
+    /// Returns the squared distance of the trial mixture and sets up what the gradient and the model there need: `inverse`,
+    /// `residual` and `pull`.
     #[inline(always)]
     fn linearise(&mut self, hull: &Hull, target: &Target) -> f64 {
         let m = self.trial.len();
         let (mix, t, weight) = (&self.trial[..m], &target.root[..m], &hull.weight[..m]);
-        let (pull, stiffness) = (&mut self.pull[..m], &mut self.stiffness[..m]);
+        let pull = &mut self.pull[..m];
         // Loops without sums, so that the compiler can vectorise over the columns.
         let inverse = &mut self.inverse[..m];
         for (r, f) in inverse.iter_mut().zip(mix) {
@@ -431,12 +442,7 @@ impl Mixer {
             let f = if mix[j] > hull.darkest { mix[j] } else { hull.darkest };
             residual[j] = weight[j] * (f * r2 - t[j]);
             let tangent = weight[j] * r2 * (1.0 / 3.0);
-            // The second derivative relative to Gauss-Newton's, (2 cbrt t - cbrt f) / cbrt f, limited to 0.25..9.
-            let exact = 2.0 * t[j] * r - 1.0;
-            let exact = if exact > 0.25 { exact } else { 0.25 };
-            let exact = if exact < 9.0 { exact } else { 9.0 };
             pull[j] = residual[j] * tangent;
-            stiffness[j] = tangent * exact.sqrt();
         }
         dot(residual, residual)
     }

@@ -14,7 +14,7 @@
 //! Source: Lawson & Hanson 1974, chapter 23, with the equality kept exactly instead of by a heavily weighted row.
 
 use super::gram::Gram;
-use super::vector::{add_scaled, dot, dot_short, wide};
+use super::vector::{add_scaled, dot, dot_short, least, wide};
 
 /// Reduced gradients within this share of the problem's scale count as zero: about a hundred roundings.
 pub(super) const TOLERANCE: f64 = 4e-14;
@@ -445,7 +445,7 @@ fn evaluate(gram: &Gram, h: &[f64], a: &[f64], g: &mut [f64]) {
 #[inline(always)]
 pub(super) fn frank_wolfe_gap(g: &[f64], a: &[f64]) -> f64 {
     // A gradient that is not finite makes the inner product NaN, even where the weight is zero.
-    dot(g, a) - g.iter().copied().fold(f64::INFINITY, f64::min)
+    dot(g, a) - least(g)
 }
 
 /// Scales weights to sum 1. Returns false if they cannot be: a weight is negative or not finite, or all are zero.

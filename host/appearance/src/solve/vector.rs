@@ -43,6 +43,20 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((a + e) + (b + f)) + ((c + g) + (d + h)) + rest
 }
 
+/// The smallest element, infinity if there is none; elements that are not numbers do not count.
+#[inline(always)]
+pub fn least(a: &[f64]) -> f64 {
+    let smaller = |a: f64, b: f64| if a < b { a } else { b };
+    let (chunks, rest) = a.as_chunks::<8>();
+    let mut lanes = [f64::INFINITY; 8];
+    for chunk in chunks {
+        for lane in 0..8 {
+            lanes[lane] = smaller(chunk[lane], lanes[lane]);
+        }
+    }
+    rest.iter().chain(&lanes).fold(f64::INFINITY, |least, &a| smaller(a, least))
+}
+
 /// The inner product of vectors of about a dozen elements, where a plain loop is faster than eight sums.
 #[inline(always)]
 pub fn dot_short(a: &[f64], b: &[f64]) -> f64 {
@@ -73,6 +87,16 @@ mod tests {
             let plain: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
             assert_eq!(dot(&a, &b), plain, "whole numbers add without rounding");
             assert_eq!(dot_short(&a, &b), plain);
+        }
+    }
+
+    #[test]
+    fn the_smallest_element_of_every_length_is_found() {
+        for n in 1..40 {
+            for at in 0..n {
+                let a: Vec<f64> = (0..n).map(|i| if i == at { -1.0 } else { f64::from(i) }).collect();
+                assert_eq!(least(&a), -1.0);
+            }
         }
     }
 }

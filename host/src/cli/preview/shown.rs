@@ -76,11 +76,11 @@ impl Shown {
             observer.note("one copy of the document is shown; `foilpress print` it and preview its job to see the whole sheet");
         }
         let bases = laid.bases(observer)?;
-        Ok(Shown::of(laid, Some(bases)))
+        Ok(Shown::of(&laid, Some(bases)))
     }
 
     /// A document's dots, with the document beside them where it has bases.
-    pub fn of(laid: Laid, bases: Option<Factored>) -> Shown {
+    pub fn of(laid: &Laid, bases: Option<Factored>) -> Shown {
         let Laid { document, library, halftoned, .. } = laid;
         let space = document.materials().space().clone();
         let mix = &halftoned.mapped.mix;
@@ -90,10 +90,11 @@ impl Shown {
         };
         let target = bases.map(|document| Both {
             document,
-            mapped: mapped(mix, &library, &space),
+            mapped: mapped(mix, library, &space),
             mixtures: mix.matrix.iter().map(words).collect(),
         });
-        Shown { name: document.name, space, library, dots: halftoned.dots, target, worn: None }
+        let (name, library, dots) = (document.name.clone(), library.clone(), halftoned.dots.clone());
+        Shown { name, space, library, dots, target, worn: None }
     }
 
     /// What the stacks of the dots reflect.
