@@ -6,6 +6,7 @@
 //! few products (Analoui and Allebach 1992). The best change of a cell is made if it lessens the error: it or a half of it
 //! changes places with one of its eight neighbours or a half of that, or its own halves are arranged in another way
 //! ([`moves`]). Nothing else: every stack keeps its dots, so tones need no term of their own.
+//! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
 //! Parts of [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
 //! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with, and a third for each change, of which there
@@ -14,6 +15,7 @@
 //! as they are, and so do all stacks after the 64th. What is seen from a half is interpolated between cells.
 
 mod kernel;
+mod lines;
 mod moves;
 
 use std::ops::Range;
@@ -27,6 +29,7 @@ use super::cells::field::{Field, Row};
 use super::cells::plan::{BLOCK, Plan};
 
 use kernel::Kernel;
+use lines::Lines;
 
 /// Where a stack lies among all others.
 pub(super) type Point = [f32; 4];
@@ -104,6 +107,7 @@ struct Part<'a> {
     cells: Vec<Cell>,
     /// Stacks with weight on each, one bit each.
     allowed: Vec<u64>,
+    lines: Lines,
 }
 
 /// Exchanges cells of a page that was printed by cells. `points` are those of the stacks of the field.
@@ -117,7 +121,7 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], minimum: &[u1
     let down = plan.down();
     let whole = (0..down).step_by(PART).map(|top| top..(top + PART).min(down));
     let ends = (PART..down).step_by(PART).map(|cut| cut - 3 * MARGIN..(cut + 3 * MARGIN).min(down));
-    for parts in [whole.collect::<Vec<_>>(), ends.collect()] {
+    for (parts, again) in [(whole.collect::<Vec<_>>(), false), (ends.collect(), true)] {
         let (mut rest, mut top, mut tasks) = (&mut *index, 0, Vec::new());
         for rows in parts {
             let row = BLOCK * field.width;
@@ -133,6 +137,10 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], minimum: &[u1
                 #[inline(always)]
                 || {
                     let mut part = Part::new(field, plan, (points, small), &kernel, rows, dots);
+                    if again {
+                        // They are even over the whole parts, of which these rows are a piece.
+                        part.lines.accept_columns();
+                    }
                     for _ in 0..ROUNDS {
                         for row in first..end {
                             part.block_row(row);
@@ -164,6 +172,7 @@ impl<'a> Part<'a> {
             seen: Vec::new(),
             cells: Vec::new(),
             allowed: Vec::new(),
+            lines: Lines::new(field.width, rows.len()),
         };
         let mut start = 0;
         for by in rows.clone() {
@@ -191,6 +200,7 @@ impl<'a> Part<'a> {
                 }
                 if !cell.is_split() {
                     let error: Point = std::array::from_fn(|c| errors[0][c] + errors[1][c]);
+                    part.lines.add(place, (0, 0), error);
                     return part.around(
                         place,
                         REACH,
@@ -204,6 +214,9 @@ impl<'a> Part<'a> {
                             }
                         },
                     );
+                }
+                for (at, error) in place.halves(cell.stacked).into_iter().zip(errors) {
+                    part.lines.add(place, at, error);
                 }
                 part.around(
                     place,

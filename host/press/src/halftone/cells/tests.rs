@@ -350,6 +350,31 @@ fn flat_halves_do_not_repeat() {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    /// Flat mixtures of any tones: the ink of whole columns and rows varies no more than that of independent cells.
+    #[test]
+    fn columns_and_rows_of_flat_tones_are_even(
+        names in prop::sample::subsequence(vec!["SF", "C", "M", "Y", "K"], 1..4),
+        shares in prop::collection::vec(0.1f64..1.0, 4),
+        searched in any::<bool>(),
+    ) {
+        const SIDE: usize = 600;
+        let shares = &shares[..=names.len()];
+        let mix = plain(1, 1, shares.len(), |_, _| shares.iter().map(|share| share / shares.iter().sum::<f64>()).collect());
+        let stacks = std::iter::once("substrate").chain(names).map(|name| name.parse().unwrap()).collect();
+        let mix = InkMix { stacks, ..mix };
+        let method = if searched { Method::Best } else { Method::Cells };
+        let settings = Settings { method, ..Settings::from_library(&mix.stacks, &Library::builtin()) };
+        let sheet = halftone(&mix, (SIDE as u16, SIDE as u16), None, &settings, &Silent).unwrap();
+        let side = settings.minimum.iter().map(|&minimum| size_of(minimum)).max().unwrap();
+        for stack in 0..shares.len() {
+            let (rows, columns) = swing(SIDE, sheet.index(), stack as u8, side);
+            prop_assert!(rows < 1.05 && columns < 1.05, "{} swings by {rows:.2} and {columns:.2}", mix.stacks[stack]);
+        }
+    }
+}
+
 #[test]
 fn dots_do_not_depend_on_the_number_of_threads() {
     let mix = plain(50, 300, 9, |x, y| match (x / 5 + y / 7) % 5 {

@@ -4,7 +4,7 @@
 //! Method: for the response exp(-f/k) it is (1 + (r/a)^2)^(-3/2), a = 1 / (pi k). Centres of cells and halves lie on half dots.
 //! Memory: 600 kB for a side of 3 dots, 1 MB for 4.
 
-use super::{Point, REACH};
+use super::{Point, REACH, lines};
 use crate::halftone::cells::plan::BLOCK;
 
 /// From how far the eye looks, in dots: 0.3 m. What is even from near is even from afar.
@@ -15,7 +15,7 @@ const SCALE: f32 = 7.62;
 pub(super) struct Kernel {
     /// By side of the cells that see.
     tables: Vec<Vec<Point>>,
-    /// By side, values at distances up to three sides across and down, in half dots.
+    /// By side, values at distances up to three sides across and down, in half dots, with what columns and rows add.
     near: Vec<Vec<f32>>,
 }
 
@@ -31,7 +31,9 @@ impl Kernel {
                 tables[size] = Kernel::table(size);
                 let places =
                     (0..=3 * size as isize).flat_map(|y| (0..=3 * size as isize).map(move |x| (x, y)));
-                near[size] = places.map(|(x, y)| Kernel::value(x, y)).collect();
+                near[size] = places
+                    .map(|(x, y)| Kernel::value(x, y) + lines::common(size, x) + lines::common(size, y))
+                    .collect();
             }
         }
         Kernel { tables, near }

@@ -7,6 +7,7 @@
 //! Where a half may lie in four places, that is taken where the error that leaves or comes is seen most or least.
 //! Cost: for each neighbour up to four pairs of halves.
 
+use super::lines::Around;
 use super::{FIXED, NEAR, Part, Place, Point};
 use crate::halftone::cells::cell::Cell;
 
@@ -76,6 +77,11 @@ fn minus(a: Point, b: Point) -> Point {
     std::array::from_fn(|c| a[c] - b[c])
 }
 
+#[inline(always)]
+fn plus(a: Point, b: Point) -> Point {
+    std::array::from_fn(|c| a[c] + b[c])
+}
+
 impl Part<'_> {
     /// Makes the change of a cell that lessens the error most, if any does.
     #[inline(always)]
@@ -87,7 +93,8 @@ impl Part<'_> {
             && place.j > 1
             && (place.j + 2) * size < super::BLOCK;
         let cell = self.cells[place.number()];
-        let own = (self.small[size] != 0).then(|| self.view(place, (0, 0), inner));
+        let lines = self.lines.around(place);
+        let own = (self.small[size] != 0).then(|| self.view(place, (0, 0), inner, &lines.halves((0, 0))));
         // Differences below what rounding makes of the sums would go round in circles.
         let mut best = Best { change: -1e-5 * area, shifts: [None; 2], cells: [None; 2] };
         if let Some(own) = own.as_ref().filter(|own| own.cell.is_split()) {
@@ -102,16 +109,18 @@ impl Part<'_> {
             }
             let at = (dx as i32 * step, dy as i32 * step);
             if !cell.is_split() && !other.is_split() {
-                self.exchange(place, (there, at), &mut best);
+                self.exchange(place, (there, at, (dx, dy)), &lines, &mut best);
             }
             let Some(own) = &own else { continue };
-            let there = self.view(there, at, inner);
+            let there = self.view(there, at, inner, &lines.halves((dx, dy)));
             if cell.is_split() != other.is_split() {
                 self.exchange_split(own, &there, &mut best);
             }
             self.exchange_halves(own, &there, &mut best);
         }
         for shift in best.shifts.into_iter().flatten() {
+            self.lines.add(place, shift.from.at, shift.error.map(|error| -error));
+            self.lines.add(place, shift.to.at, shift.error);
             self.around(
                 place,
                 NEAR,
@@ -142,9 +151,9 @@ impl Part<'_> {
     }
 
     /// A cell `at` so many half dots from the one at work. From its halves an error is seen as the parabola through the
-    /// neighbours has it.
+    /// neighbours has it; `lines` adds what the columns and rows of its halves owe.
     #[inline(always)]
-    fn view(&self, place: Place, at: (i32, i32), inner: bool) -> View {
+    fn view(&self, place: Place, at: (i32, i32), inner: bool, lines: &[[Point; 2]; 2]) -> View {
         let cell = self.cells[place.number()];
         let seen = self.seen[place.number()];
         let mut halves = [[End { at, seen }; 2]; 2];
@@ -160,7 +169,7 @@ impl Part<'_> {
             for (half, sign) in [(0, -0.125), (1, 0.125)] {
                 let seen = std::array::from_fn(|c| {
                     let (slope, bend) = (after[c] - before[c], after[c] + before[c] - 2.0 * seen[c]);
-                    seen[c] + sign * slope + bend / 32.0
+                    seen[c] + sign * slope + bend / 32.0 + lines[usize::from(stacked)][half][c]
                 });
                 let at = (at.0 + ends[half].0, at.1 + ends[half].1);
                 halves[usize::from(stacked)][half] = End { at, seen };
@@ -194,7 +203,7 @@ impl Part<'_> {
         let mut change = 0.0;
         for &Shift { error, from, to } in shifts.iter().flatten() {
             change += 2.0 * dot(error, minus(to.seen, from.seen));
-            change += 2.0 * dot(error, error) * (1.0 - near(from, to));
+            change += 2.0 * dot(error, error) * (self.kernel.near(size, (0, 0)) - near(from, to));
         }
         if let [Some(a), Some(b)] = shifts {
             let common = near(a.to, b.to) + near(a.from, b.from) - near(a.to, b.from) - near(a.from, b.to);
@@ -229,7 +238,13 @@ impl Part<'_> {
 
     /// Two whole cells change places.
     #[inline(always)]
-    fn exchange(&self, place: Place, (there, at): (Place, (i32, i32)), best: &mut Best) {
+    fn exchange(
+        &self,
+        place: Place,
+        (there, at, beside): (Place, (i32, i32), (isize, isize)),
+        lines: &Around,
+        best: &mut Best,
+    ) {
         let size = place.zone.size;
         let area = (size * size) as f32;
         let (a, b) = (place.number(), there.number());
@@ -238,8 +253,8 @@ impl Part<'_> {
             return;
         }
         let error = minus(self.point(own.halves[0], area), self.point(other.halves[0], area));
-        let from = End { at: (0, 0), seen: self.seen[a] };
-        let to = End { at, seen: self.seen[b] };
+        let from = End { at: (0, 0), seen: plus(self.seen[a], lines.whole((0, 0))) };
+        let to = End { at, seen: plus(self.seen[b], lines.whole(beside)) };
         let cells = [Some((place, other)), Some((there, own))];
         self.weigh(size, [Some(Shift { error, from, to }), None], cells, best);
     }
