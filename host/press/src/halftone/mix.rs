@@ -19,6 +19,9 @@ use appearance::weights::ONE;
 /// The unit of basis weights within a stretch.
 const WEIGHT: u32 = 1 << 16;
 
+/// Weights that processors fetch together: 64 bytes.
+const LINE: usize = 32;
+
 /// The curve of all tiles with one size and orientation, as tables.
 pub(super) struct Shape {
     tile: Tile,
@@ -195,6 +198,24 @@ impl<'a> Lattice<'a> {
         self.shapes.iter().find(|shape| shape.fits(tile)).unwrap_or(&self.shapes[0])
     }
 
+    /// Reads a little of all pixels of a tile at once. Along the curve, each would be waited for by itself.
+    fn touch(&self, tile: &Tile) {
+        let (Axis::Between(across), Axis::Between(down)) = (&self.across, &self.down) else { return };
+        let pixels = |axis: &[(u32, u16)], from: u16, dots: u16| {
+            let (from, end) = (2 * usize::from(from), 2 * (usize::from(from) + usize::from(dots)));
+            axis[from].0 as usize..axis[end].0 as usize + 1
+        };
+        let maps = &self.mix.maps;
+        let (columns, channels) = (pixels(across, tile.x, tile.w), maps.channels());
+        let mut all = 0;
+        for row in pixels(down, tile.y, tile.h) {
+            let row =
+                &maps.data()[(row * maps.width() + columns.start) * channels..][..columns.len() * channels];
+            all |= row.iter().step_by(LINE).fold(0, |all, weight| all | weight);
+        }
+        std::hint::black_box(all);
+    }
+
     /// The mix along these tiles, from a dot of the curve of the first.
     pub(super) fn along_from<T: Iterator<Item = Tile>>(&self, mut tiles: T, offset: usize) -> Along<'_, T> {
         let tile = tiles.next().map(|tile| {
@@ -322,7 +343,10 @@ impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
         let (tile, shape, at) = match self.tile.take() {
             Some(here) => here,
             None => match self.tiles.next() {
-                Some(tile) => (tile, lattice.shape(&tile), 0),
+                Some(tile) => {
+                    lattice.touch(&tile);
+                    (tile, lattice.shape(&tile), 0)
+                }
                 // Never called beyond the last tile; if it were, the first stack would get all weight.
                 None => {
                     out.fill(Lanes::default());

@@ -25,7 +25,8 @@
 //! Method: the rule keeps demands instead of debts, over the horizon of the last decision. Printing d dots adds d weights at
 //! the far end of the window and subtracts d from the printed stack; a change of horizon adds or subtracts the weights
 //! between the two ends. While the current stack stays, no gap to it shrinks by more than 2 (1 - w) a dot, where w is its
-//! own weight at the far end. So one division gives the number of dots by which a run can safely continue.
+//! own weight at the far end. So one division gives the number of dots by which a run can safely continue. With one
+//! minimum cluster for all stacks, `even` walks the same way with less to keep.
 //!
 //! Debts of absent stacks. A stack without weight for [`ABSENT`] dots is parked: its debt is set aside and shared equally
 //! among the others, and taken back from them when it returns. Otherwise the stacks still present would owe the opposite
@@ -37,6 +38,8 @@
 
 use appearance::wide::wide;
 use std::collections::VecDeque;
+
+mod even;
 
 /// One dot of full weight.
 pub(super) const UNIT: i32 = 1 << 18;
@@ -218,6 +221,18 @@ impl Rule {
         }
         let (mut at, mut current) = (0u32, None);
         while at < self.dots {
+            if let Some(stack) = current
+                && self.classes.len() == 1
+            {
+                let (to, stack) = self.walk_evenly(at, stack, source, sink);
+                (at, current) = (to, Some(stack));
+                if at >= self.next_check {
+                    self.park(at);
+                }
+                if at >= self.dots {
+                    break;
+                }
+            }
             let (stack, run) = self.decide(at, current);
             for c in 0..self.classes.len() {
                 self.advance(c, run, source);

@@ -157,8 +157,8 @@ fn shares(stacks: usize) -> impl Strategy<Value = Vec<i32>> {
 /// Stretches, minima, and after how many dots a stack is absent.
 type Document = (Vec<(u32, Vec<i32>)>, Vec<u16>, u32);
 
-fn document() -> impl Strategy<Value = Document> {
-    (1usize..12).prop_flat_map(|stacks| {
+fn document(stacks: std::ops::Range<usize>) -> impl Strategy<Value = Document> {
+    stacks.prop_flat_map(|stacks| {
         let minimum = prop_oneof![
             (1u16..20).prop_map(move |c| vec![c; stacks]),
             prop::collection::vec(prop_oneof![Just(1u16), Just(4), Just(9), Just(16)], stacks),
@@ -171,12 +171,12 @@ fn document() -> impl Strategy<Value = Document> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
     #[test]
-    fn argmax_windows_and_jumps_give_the_literal_rule((stretches, minimum, absent) in document()) {
+    fn argmax_windows_and_jumps_give_the_literal_rule((stretches, minimum, absent) in document(1..12)) {
         prop_assert_eq!(fast(&stretches, &minimum, absent), literal(&stretches, &minimum, absent as usize));
     }
 
     #[test]
-    fn no_run_is_shorter_than_its_minimum((stretches, minimum, absent) in document()) {
+    fn no_run_is_shorter_than_its_minimum((stretches, minimum, absent) in document(1..12)) {
         let out = fast(&stretches, &minimum, absent);
         let runs: Vec<_> = out.chunk_by(|a, b| a == b).collect();
         for run in &runs {
@@ -185,7 +185,7 @@ proptest! {
     }
 
     #[test]
-    fn a_stack_is_printed_only_within_its_minimum_of_its_weight((stretches, minimum, absent) in document()) {
+    fn a_stack_is_printed_only_within_its_minimum_of_its_weight((stretches, minimum, absent) in document(1..12)) {
         let out = fast(&stretches, &minimum, absent);
         let wanted: Vec<&[i32]> = stretches
             .iter()
@@ -234,6 +234,15 @@ proptest! {
                 stretches.iter().map(|(n, w)| f64::from(*n) * f64::from(w[k]) / f64::from(UNIT)).sum();
             prop_assert!((printed - wanted).abs() <= 120.0, "{}: {} {}", k, printed, wanted);
         }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    /// Groups of eight stacks, some of them not full, and more than fit in arrays.
+    #[test]
+    fn many_stacks_follow_the_literal_rule((stretches, minimum, absent) in document(9..80)) {
+        prop_assert_eq!(fast(&stretches, &minimum, absent), literal(&stretches, &minimum, absent as usize));
     }
 }
 
