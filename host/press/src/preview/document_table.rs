@@ -49,8 +49,11 @@ const WAYS: [(&str, Intent, f64); 5] = [
     ("contrast", Intent::Contrast, LIGHT),
 ];
 
+/// The surface at a pixel.
+type Formula = fn(usize, usize) -> Surface;
+
 /// A document by a formula.
-struct Made(Space, fn(usize, usize) -> Surface);
+struct Made(Space, Formula);
 
 impl Materials for Made {
     fn width(&self) -> usize {
@@ -307,7 +310,7 @@ fn table_of_prints() {
         let document: Document = document::open(path, &Options::default(), &Silent).unwrap();
         table(name, document.materials(), document.size_mm, &probes);
     };
-    let made: [(&str, fn(usize, usize) -> Surface); 4] = [
+    let made: [(&str, Formula); 4] = [
         ("scratches", scratches),
         ("rungs", rungs),
         ("silver, alpha .02", mirror),
