@@ -1,7 +1,8 @@
 //! Least squares on the simplex for a stream of pixels, each started from the one before.
 //!
 //! The time of `scalar_products` includes the inner products with the target, that of `solve` does not. `solve_in_lanes` has
-//! all pixels at once, and its time includes what is done once for a matrix. `lawson_hanson` is the textbook method on the same
+//! all pixels at once, cold as in the first round of factoring by `sacls`, and its time includes what is done once for a matrix.
+//! `lawson_hanson` is the textbook method on the same
 //! Gram matrix, which always starts cold.
 
 use appearance::brdf::{Space, Table};

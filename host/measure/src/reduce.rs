@@ -8,7 +8,7 @@
 //! a GGX lobe fitted to the first samples continues the curve, above the largest the last sample; both are marked.
 //! Deviations add up: noise, disagreement between parts of the sample, geometry (one standard deviation of each
 //! measure), card. Cost: nine views a pixel and round, for at most `MOST` pixels a bin. Limits: peaks narrower than the blur are
-//! marked `blurred`: their height is a guess. Lens flare stays in.
+//! marked `blurred`, and samples beside them whose pixels mostly see the peak: their height is a guess. Lens flare stays in.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -38,6 +38,12 @@ pub const HORIZON: f64 = 0.15;
 const CLIPPED: f64 = 0.02;
 /// The factor between a pixel's mean and its middle beyond which the peak is not resolved.
 const BLURRED: f64 = 1.3;
+/// The share of light from blurred samples beyond which pixels say no more than those do.
+const FROM_BLURRED: f64 = 0.1;
+/// The relative standard deviation of a clipped or blurred sample, beside what else is uncertain of it.
+const GUESSED: f64 = 0.5;
+/// The largest relative standard deviation: nothing is known.
+const UNKNOWN: f64 = 2.0;
 /// Pixels along the sample's border that are left out.
 const BORDER: f64 = 2.5;
 /// Half angles above this (radians) are held constant.
@@ -147,6 +153,30 @@ fn predicted(scene: &Scene, pixel: &Pixel, view: &View, curve: &Logs) -> [f64; 3
     if view.theta > 0.52 {
         return value(curve, view.theta).map(|f| f * view.irradiance);
     }
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    each_part(scene, pixel, |view| {
+        let f = value(curve, view.theta);
+        for c in 0..3 {
+            sum[c] += f[c] * view.irradiance;
+        }
+        count += 1.0;
+    });
+    if count > 0.0 { sum.map(|s| s / count) } else { value(curve, view.theta).map(|f| f * view.irradiance) }
+}
+
+/// The share of a pixel's light, as a curve predicts it, that comes from half angles below this.
+fn share_below(scene: &Scene, pixel: &Pixel, curve: &Logs, theta: f64) -> f64 {
+    let (mut below, mut all) = (0.0, 0.0);
+    each_part(scene, pixel, |view| {
+        let light = value(curve, view.theta)[1] * view.irradiance;
+        all += light;
+        below += if view.theta < theta { light } else { 0.0 };
+    });
+    if all > 0.0 { below / all } else { 0.0 }
+}
+
+/// What parts of a pixel see under parts of the lamp.
+fn each_part(scene: &Scene, pixel: &Pixel, mut each: impl FnMut(View)) {
     let lamp = scene.diameter(pixel.light) / 2.0;
     // Points of a disc with its mean and variance.
     let lamps: &[[f64; 2]] = if lamp > 0.0 {
@@ -154,24 +184,17 @@ fn predicted(scene: &Scene, pixel: &Pixel, view: &View, curve: &Logs) -> [f64; 3
     } else {
         &[[0.0, 0.0]]
     };
-    let (mut sum, mut count) = ([0.0; 3], 0.0);
     for j in [-1.0, 0.0, 1.0] {
         for i in [-1.0, 0.0, 1.0] {
             for off in lamps {
                 let off = off.map(|d| d * lamp);
                 let place = [pixel.x + i / 3.0, pixel.y + j / 3.0];
-                let Some(view) = scene.seen_under(place, pixel.light, pixel.first, off) else {
-                    continue;
-                };
-                let f = value(curve, view.theta);
-                for c in 0..3 {
-                    sum[c] += f[c] * view.irradiance;
+                if let Some(view) = scene.seen_under(place, pixel.light, pixel.first, off) {
+                    each(view);
                 }
-                count += 1.0;
             }
         }
     }
-    if count > 0.0 { sum.map(|s| s / count) } else { value(curve, view.theta).map(|f| f * view.irradiance) }
 }
 
 /// Robust weighted mean of ratios: mean, standard deviation of one value, and which belong to it.
@@ -252,8 +275,22 @@ pub fn reduce(scene: &Scene, pixels: &[Pixel], doubts: &[(Scene, Vec<f64>)], car
         }
         fill(&mut curve);
     }
+    spread_blur(scene, &bins, &curve, &mut found);
     let geometry = shifts(scene, pixels, &curve, doubts);
     Reduced { rows: rows(&curve, &found, &geometry, card), used }
+}
+
+/// Marks samples beside a blurred peak, too, as long as their pixels see so much of it that its height decides what they are.
+fn spread_blur(scene: &Scene, bins: &[Vec<(Pixel, View)>], curve: &Logs, found: &mut [Bin; BINS]) {
+    let Some(last) = found.iter().rposition(|bin| bin.blurred) else { return };
+    let edge = FRAC_PI_2 * ((last + 1) as f64 / BINS as f64).powi(2);
+    for (bin, found) in bins.iter().zip(found).skip(last + 1).filter(|(bin, _)| bin.len() >= FEWEST) {
+        let shares: f64 = bin.iter().map(|(p, _)| share_below(scene, p, curve, edge)).sum();
+        found.blurred = shares > FROM_BLURRED * bin.len() as f64;
+        if !found.blurred {
+            break;
+        }
+    }
 }
 
 /// Ratios of a bin's pixels to the curve: its statistics, its correction, and each pixel's deviation.
@@ -427,6 +464,10 @@ fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> 
                     + card * card
                     + deviation[start].powi(2)
                     + (0.1 + 0.5 * (ln - z[start])).powi(2);
+                if found[start].blurred {
+                    // Nothing says how high a peak is of which no pixel sees a part alone.
+                    variance = UNKNOWN * UNKNOWN;
+                }
             } else if b > last {
                 ln = z[last];
                 variance = 0.09 + deviation[last].powi(2);
@@ -434,10 +475,12 @@ fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> 
             if measured(b) && found[b].clipped[c] {
                 // What the sensor's limit shows is a lower bound.
                 ln = ln.max(y[b]);
-                variance += 0.25;
+                variance += GUESSED * GUESSED;
+            } else if measured(b) && found[b].blurred {
+                variance += GUESSED * GUESSED;
             }
             row.rgb[c] = ln.exp();
-            row.sigma[c] = row.rgb[c] * variance.sqrt().min(2.0);
+            row.sigma[c] = row.rgb[c] * variance.sqrt().min(UNKNOWN);
         }
     }
     rows

@@ -20,6 +20,8 @@ pub(super) const ITERATIONS: usize = 60;
 const RAMP: usize = 36;
 /// The relative decrease of the objective below which it has settled.
 const SETTLED: f64 = 1e-4;
+/// Materials whose weights the others start from in the first round. Later ones start from their own.
+const TYPICAL: usize = 64;
 
 /// Improves `bases` (rows of the sample's columns); `lambda` is the sparsity. `done` is called after each iteration, with
 /// the objective once the penalty is constant.
@@ -28,13 +30,15 @@ pub(super) fn refine(sample: &Sample, bases: &mut [f32], lambda: f64, mut done: 
     let k = bases.len() / padded;
     let tangent2: Vec<f32> = sample.columns.omega.iter().map(|o| (o / 3.0).powi(2)).collect();
     let scale: f64 = (0..sample.len()).map(|i| sample.weight[i] * length2(sample.row(i), &tangent2)).sum();
-    let mut weights = vec![1.0 / k as f64; sample.len() * k];
+    // None are known before the first round.
+    let mut weights = vec![0.0; sample.len() * k];
     let mut last: Option<f64> = None;
     for iteration in 0..ITERATIONS {
         let held = iteration >= RAMP;
         let strength = lambda * (iteration.min(RAMP) as f64 / RAMP as f64);
         // The first round has no dominant weights yet: plain least squares.
-        let step = code(sample, bases, &tangent2, &mut weights, 0.5 * strength * scale);
+        let typical = if iteration == 0 { TYPICAL } else { 0 };
+        let step = code(sample, bases, &tangent2, &mut weights, 0.5 * strength * scale, typical);
         solve_bases(&step, bases, padded);
         let objective = held.then(|| objective(sample, bases, &tangent2, &weights, strength * scale));
         done(objective);
@@ -53,27 +57,41 @@ struct Normal {
     right: Vec<f64>,
 }
 
-/// Computes the weights of every material, with a `bonus` for the dominant one. Returns their normal equations.
-fn code(sample: &Sample, bases: &[f32], tangent2: &[f32], weights: &mut [f64], bonus: f64) -> Normal {
+/// Computes the weights of every material, with a `bonus` for the dominant one, from those of the last round or of some `typical`
+/// materials. Returns their normal equations.
+fn code(
+    sample: &Sample,
+    bases: &[f32],
+    tangent2: &[f32],
+    weights: &mut [f64],
+    bonus: f64,
+    typical: usize,
+) -> Normal {
     let padded = sample.columns.padded;
     let k = bases.len() / padded;
     let seen: Vec<f32> =
         bases.chunks_exact(padded).flat_map(|row| row.iter().zip(tangent2).map(|(b, t)| b * t)).collect();
     let mut gram = Gram::empty();
     gram.refill_products(k, |i, j| f64::from(dot(&seen[i * padded..][..padded], &bases[j * padded..])));
+    let products = |i: usize, h: &mut [f64]| {
+        for (h, row) in h.iter_mut().zip(seen.chunks_exact(padded)) {
+            *h = f64::from(dot(row, sample.row(i)));
+        }
+    };
+    let typical = typical.min(sample.len());
+    let mut some = vec![0.0; typical * k];
+    some.chunks_exact_mut(k).enumerate().for_each(|(i, h)| products(i * sample.len() / typical, h));
+    // Sizes agree and numbers are finite, so there is a solution, near that of the last round.
+    let lanes = Lanes::new(&gram, &some);
     let partial = parts::each_mut(sample.len(), weights, k, |range, weights| {
         let mut matrix = vec![0.0f64; k * k];
         let mut right = vec![0.0f32; k * padded];
         let mut h = vec![0.0; range.len() * k];
         for ((i, h), a) in range.clone().zip(h.chunks_exact_mut(k)).zip(weights.chunks_exact(k)) {
-            let x = sample.row(i);
-            for (h, row) in h.iter_mut().zip(seen.chunks_exact(padded)) {
-                *h = f64::from(dot(row, x));
-            }
+            products(i, h);
             h[dominant(a)] += bonus;
         }
-        // Sizes agree and numbers are finite, so there is a solution, near that of the last iteration.
-        let _ = Lanes::new(&gram, &[]).and_then(|mut lanes| lanes.solve_from(&h, weights));
+        let _ = lanes.clone().and_then(|mut lanes| lanes.solve_from(&h, weights));
         for (i, a) in range.zip(weights.chunks_exact(k)) {
             let x = sample.row(i);
             let w = sample.weight[i];

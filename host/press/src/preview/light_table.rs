@@ -5,8 +5,8 @@
 //! right: the columns of its hull are the pixels of the balls themselves, beside those of distance d, with a weight that is
 //! raised until d is what the metric pays.
 //!
-//! `FOILPRESS_DATA=... cargo test -p foilpress-press --lib table_of_weights -- --ignored --nocapture` and `table_of_bounds`
-//! print the tables of `docs/decisions/metric-that-knows-light.md`.
+//! `FOILPRESS_DATA=... cargo test -p foilpress-press --lib table_of_weights -- --ignored --nocapture`, `table_of_bounds`
+//! and `table_of_widths` print the tables of `docs/decisions/metric-that-knows-light.md`.
 
 use std::path::Path;
 
@@ -58,17 +58,31 @@ fn off(target: &super::Radiance, printed: &super::Radiance) -> f64 {
 }
 
 /// Twelve pixels of a document, evenly spread down its length.
+pub(super) fn twelve(pixels: &dyn Materials) -> impl Iterator<Item = usize> {
+    let (width, total) = (pixels.width(), pixels.width() * pixels.height());
+    (0..12).map(move |i| (2 * i + 1) * total / 24 + i * 37 % width)
+}
+
+/// The reflectance of these pixels.
 fn materials(path: &Path, space: &Space) -> Table {
     let document = document::open(&path.display().to_string(), &Options::default(), &Silent).unwrap();
     let pixels = document.materials();
-    let total = pixels.width() * pixels.height();
     let mut rows = Table::new(space.columns());
     let mut row = vec![0f32; space.columns()];
-    for i in 0..12 {
-        pixels.reflectance((2 * i + 1) * total / 24 + i * 37 % pixels.width(), &mut row);
+    for pixel in twelve(pixels) {
+        pixels.reflectance(pixel, &mut row);
         rows.push(&row.iter().map(|&f| f64::from(f)).collect::<Vec<_>>());
     }
     rows
+}
+
+/// Error of balls under each probe, root mean square over materials: each target is followed by its print.
+pub(super) fn errors_of_balls(space: &Space, both: &Table, probes: &[Probe; 3]) -> [f64; 3] {
+    probes.each_ref().map(|probe| {
+        let balls = under_probe(space, both, probe, 48, &Silent).unwrap();
+        let sum: f64 = balls.chunks(2).map(|pair| off(&pair[0], &pair[1]).powi(2)).sum();
+        (sum / (both.len() / 2) as f64).sqrt()
+    })
 }
 
 /// The materials of the tables.
@@ -93,7 +107,7 @@ fn documents(data: &Path, space: &Space) -> Vec<(String, Table)> {
 }
 
 /// Two measured light probes and the built-in one.
-fn probes(data: &Path) -> [Probe; 3] {
+pub(super) fn probes(data: &Path) -> [Probe; 3] {
     let measured = |name: &str| Probe::read_hdr(&data.join("env").join(name)).unwrap().shrunk(64);
     [measured("studio.hdr"), measured("venice.hdr"), Probe::studio(64)]
 }
@@ -128,14 +142,7 @@ fn table_of_weights() {
                     both.push(&material.printed);
                 }
                 let n = targets.len() as f64;
-                let seen: Vec<String> = probes
-                    .iter()
-                    .map(|probe| {
-                        let balls = under_probe(&space, &both, probe, 48, &Silent).unwrap();
-                        let sum: f64 = balls.chunks(2).map(|pair| off(&pair[0], &pair[1]).powi(2)).sum();
-                        format!("{:.3}", (sum / n).sqrt())
-                    })
-                    .collect();
+                let seen = errors_of_balls(&space, &both, &probes).map(|error| format!("{error:.3}"));
                 let (d, l) = ((d / n).sqrt(), (l / n).sqrt());
                 println!(
                     "{inks:8} {name:16} {light:.2}  d {d:.4}  light {l:.4}  {}  {words}",
@@ -143,6 +150,23 @@ fn table_of_weights() {
                 );
             }
         }
+    }
+}
+
+/// What a wider lobe alone costs: silver that reflects as much as the target's, its lobe as wide as printed foil or narrower.
+#[test]
+#[ignore = "prints a table"]
+fn table_of_widths() {
+    let Some(data) = testing::needs::data() else { return };
+    let space = Space::half_angle(32);
+    let silver = |alpha| surface(&space, [0.0; 3], [0.972, 0.960, 0.915], alpha);
+    let probes = probes(&data);
+    for alpha in [0.025, 0.03, 0.035, 0.04, 0.045, 0.06] {
+        let mut both = Table::new(space.columns());
+        both.push(&silver(0.02));
+        both.push(&silver(alpha));
+        let [studio, venice, soft] = errors_of_balls(&space, &both, &probes);
+        println!("alpha {alpha:.3}  studio {studio:.3}  Venice {venice:.3}  soft {soft:.3}");
     }
 }
 

@@ -10,6 +10,8 @@
 //! [`sheet_picture()`] and [`materials_picture()`] lay the results out.
 
 mod canvas;
+#[cfg(test)]
+mod document_table;
 mod error;
 mod fidelity;
 mod fine;

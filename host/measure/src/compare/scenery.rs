@@ -1,0 +1,322 @@
+//! One photograph beside its prediction.
+//!
+//! Problem: a photograph has the camera's perspective, the lamp's fall-off and an exposure of its own.
+//! Method: the renderer of `view` shows document, mixture and dots from the camera's place under its lamp, prepared once for all
+//! photographs; the paper around the marks, or the middle step of a grey card, gives exposure and white balance. Both are laid flat
+//! and compared square by square.
+//! Cost: three renderings a photograph. Limits: a lamp is a point.
+
+use std::f64::consts::PI;
+
+use appearance::brdf::reflectances;
+use image::RgbImage;
+use image::codecs::jpeg::JpegEncoder;
+use inks::{Curve, Stack};
+use observe::Observer;
+use press::preview::{Exposure, Radiance, Source, picture as shown};
+use press::sheet::Area;
+use view::{Light, Lit, Renderer, Scene};
+
+use super::figures::{self, Cover, Lighting, Squares, Steps};
+use super::flat::{Flat, Window};
+use super::picture::Picture;
+use super::{Card, PhotoFigures, Pictures, Printed, Setup, Shot, White, space};
+use crate::MeasureError;
+use crate::camera::{Camera, Lens, Pose};
+use crate::card;
+use crate::linear::median;
+
+/// Quality of the pictures: differences of a percent stay visible.
+const QUALITY: u8 = 88;
+/// Full colour of the difference: this part of the mean light.
+const DIFFERENCE: f64 = 0.3;
+
+/// What is compared, prepared once for all photographs.
+pub(super) struct Scenery {
+    window: Window,
+    print: Lit,
+    document: Option<(Lit, Lit)>,
+    shares: Vec<f32>,
+    stacks: Vec<(String, Curve)>,
+    paper: Curve,
+}
+
+fn view_error(error: impl std::fmt::Display) -> MeasureError {
+    MeasureError::Scene(error.to_string())
+}
+
+impl Scenery {
+    pub(super) fn new(
+        printed: &Printed<'_>,
+        area: Area,
+        middle: [f64; 2],
+        size: [f64; 2],
+        shot: &Shot,
+        camera: &Camera,
+    ) -> Result<Scenery, MeasureError> {
+        let Printed { sheet, library, document } = printed;
+        let space = &space();
+        // As fine as the photographs are.
+        let seen = |mm: f64| {
+            camera.lens.project(&camera.poses[0], [middle[0] + mm, middle[1], 0.0]).unwrap_or_default()
+        };
+        let (a, b) = (seen(-0.5), seen(0.5));
+        let pixels = (a[0] - b[0]).hypot(a[1] - b[1]);
+        if pixels < 1.0 {
+            return Err(MeasureError::Scene(format!(
+                "{}: a millimetre of the sheet is {pixels:.1} pixels; bring the camera nearer",
+                shot.name
+            )));
+        }
+        let window = Window::new(middle, size, pixels);
+        let metres = size.map(|side| side / 1000.0);
+        let rows = reflectances(sheet.stacks(), library, space);
+        let source = Source::Print { dots: sheet, space, stacks: &rows, area };
+        let longest = window.width.max(window.height).clamp(64, 2048);
+        let lit = |source: &Source<'_>| Lit::new(source, metres, longest).map_err(view_error);
+        let print = lit(&source)?;
+        let document = document
+            .as_ref()
+            .map(|both| Ok((lit(&Source::Factored(both.document))?, lit(&Source::Factored(both.mapped))?)))
+            .transpose()?;
+        let [across, down] = window.squares;
+        let shares = source.shares(across, down).map_err(view_error)?.unwrap_or_default();
+        let stacks = sheet
+            .stacks()
+            .iter()
+            .zip(rows.rows())
+            .map(|(stack, row)| (stack.to_string(), space.curve(row)))
+            .collect();
+        let bare = reflectances(&[Stack::SUBSTRATE], library, space);
+        let paper = space.curve(bare.row(0));
+        Ok(Scenery { window, print, document, shares, stacks, paper })
+    }
+
+    /// One photograph beside its prediction.
+    pub(super) fn compared(
+        &self,
+        shot: &Shot,
+        number: usize,
+        camera: &Camera,
+        setup: &Setup,
+        observer: &dyn Observer,
+    ) -> Result<(PhotoFigures, Pictures), MeasureError> {
+        let (pose, lens) = (&camera.poses[number], &camera.lens);
+        let window = &self.window;
+        let lamp = setup.light[shot.light].position_mm;
+        let lighting = Lighting { eye: pose.position(), lamp, middle: window.middle };
+        let picture = Picture::read(&shot.path, setup.linear)?;
+        let (paper, paper_deviation) = self.paper_scale(shot, &picture, &lighting)?;
+        let scale = match setup.white {
+            White::Paper => paper,
+            White::Card => card_scale(shot, &picture, &setup.card, &lighting, lens, pose)?,
+        };
+        let photo = picture.flat(window, lens, pose, scale);
+        let scene = self.scene(&lighting);
+        let render = |lit: &Lit| -> Result<Radiance, MeasureError> {
+            Renderer::new(lit).laid_flat(&scene, window.width, window.height, observer).map_err(view_error)
+        };
+        let print = render(&self.print)?;
+        let document = match &self.document {
+            Some((document, mapped)) => Some((render(document)?, render(mapped)?)),
+            None => None,
+        };
+        let seen = photo.squares(window);
+        let squares = |radiance: &Radiance| -> Squares {
+            flat(radiance).squares(window).into_iter().map(Option::unwrap_or_default).collect()
+        };
+        let predicted = squares(&print);
+        let targets = document.as_ref().map(|(document, mapped)| (squares(document), squares(mapped)));
+        let steps = Steps {
+            document: targets.as_ref().map(|(document, mapped)| (document, mapped)),
+            print: &predicted,
+            photo: &seen,
+        };
+        let cover = Cover { shares: &self.shares, stacks: &self.stacks };
+        let Some((errors, stacks)) = figures::errors(&steps, &cover, window, &lighting) else {
+            return Err(MeasureError::Scene(format!(
+                "{}: all of the print is clipped or outside the picture; expose shorter, or show all of it",
+                shot.name
+            )));
+        };
+        let half: Vec<f64> =
+            (0..seen.len()).map(|i| lighting.at(window.square(i)).0[2].to_degrees()).collect();
+        let figures = PhotoFigures {
+            name: shot.name.clone(),
+            marks: shot.marks.len(),
+            camera_mm: pose.position(),
+            camera_error_mm: camera.uncertain_mm[number],
+            camera_axes: pose.rotation,
+            residual_px: camera.residuals[number],
+            light_mm: lamp,
+            angles_deg: lighting.at(window.middle).0.map(f64::to_degrees),
+            half_angles_deg: [
+                half.iter().copied().fold(90.0, f64::min),
+                half.iter().copied().fold(0.0, f64::max),
+            ],
+            scale,
+            paper_deviation,
+            seen: seen.iter().flatten().count() as f64 / seen.len() as f64,
+            errors,
+            stacks,
+        };
+        let exposure = Exposure::of(std::slice::from_ref(&print));
+        let draw = |radiance: &Radiance| jpeg(&shown(radiance, exposure).map_err(view_error)?);
+        let pictures = Pictures {
+            difference: jpeg(&difference(&photo, &print, &predicted))?,
+            photo: draw(&radiance(&photo))?,
+            print: draw(&print)?,
+            document: match &document {
+                Some((document, mapped)) => Some((draw(document)?, draw(mapped)?)),
+                None => None,
+            },
+        };
+        Ok((figures, pictures))
+    }
+
+    /// The scene of a photograph, with its origin in the middle of the window, in metres.
+    fn scene(&self, lighting: &Lighting) -> Scene {
+        let [x, y] = self.window.middle;
+        let from = |p: [f64; 3]| [p[0] - x, p[1] - y, p[2]].map(|mm| mm / 1000.0);
+        let eye = from(lighting.eye);
+        let distance = eye.iter().map(|c| c * c).sum::<f64>().sqrt();
+        Scene {
+            camera: view::Camera { towards: eye, distance: Some(distance), middle: [0.0; 2], height: 1.0 },
+            pose: view::Pose::default(),
+            lights: vec![Light::Near(from(lighting.lamp))],
+            probe: None,
+        }
+    }
+
+    /// The factors that make the bare paper around the marks as bright as the library says, and how far single marks are
+    /// from them.
+    fn paper_scale(
+        &self,
+        shot: &Shot,
+        picture: &Picture,
+        lighting: &Lighting,
+    ) -> Result<([f64; 3], f64), MeasureError> {
+        let mut ratios: [Vec<f64>; 3] = Default::default();
+        let mut single: Vec<f64> = Vec::new();
+        for (mark, known) in &shot.marks {
+            let Some(plane) = mark.plane() else { continue };
+            let [left, top] = known.corners[0];
+            let cell = (known.corners[1][0] - left) / 8.0;
+            let mut own: [Vec<f64>; 3] = Default::default();
+            // Along the middle of the bare paper on all four sides.
+            for step in 0..36 {
+                let along = f64::from(step % 9) - 0.5;
+                let [x, y] = match step / 9 {
+                    0 => [along, -0.7],
+                    1 => [along, 8.7],
+                    2 => [-0.7, along],
+                    _ => [8.7, along],
+                };
+                let Some((light, full)) = picture.at(plane.at([x, y])) else { continue };
+                if full {
+                    return Err(MeasureError::Scene(format!(
+                        "{}: the paper beside a camera mark is clipped; expose shorter, so that white paper stays below the brightest \
+                         value",
+                        shot.name
+                    )));
+                }
+                let ([_, _, theta], irradiance) = lighting.at([left + x * cell, top - y * cell]);
+                let expected = self.paper.at(theta);
+                (0..3).for_each(|c| own[c].push(expected[c] * irradiance / light[c].max(1e-9)));
+            }
+            single.push(median(&mut own[1].clone()));
+            (0..3).for_each(|c| ratios[c].append(&mut own[c]));
+        }
+        let scale = ratios.map(|mut all| median(&mut all));
+        if scale.iter().any(|k| !(k.is_finite() && *k > 0.0 && *k < 1e6)) {
+            return Err(MeasureError::Scene(format!(
+                "{}: the paper beside the camera marks is black; expose longer, and check that the lamp of the camera file is the one that \
+                 was on",
+                shot.name
+            )));
+        }
+        let off = single.iter().map(|k| (k / scale[1] - 1.0).abs()).fold(0.0, f64::max);
+        Ok((scale, off))
+    }
+}
+
+/// The factors that make the middle step of a grey card in the sheet's plane as bright as it is.
+fn card_scale(
+    shot: &Shot,
+    picture: &Picture,
+    stated: &Card,
+    lighting: &Lighting,
+    lens: &Lens,
+    pose: &Pose,
+) -> Result<[f64; 3], MeasureError> {
+    let radiance = picture.radiance();
+    let named = |error: MeasureError| MeasureError::Scene(format!("{}: {error}", shot.name));
+    let steps = match stated.rectangle_px {
+        Some(rectangle) => card::steps_of(rectangle, &radiance),
+        None => card::find(&radiance, stated.reflectance).map_err(named)?,
+    };
+    let mut bright = stated.reflectance;
+    bright.sort_by(|a, b| b.total_cmp(a));
+    let mut ratios: [Vec<f64>; 3] = Default::default();
+    for (x, y, i) in card::inside(&radiance, steps[1]) {
+        if radiance.bound[i] != 0 {
+            return Err(MeasureError::Scene(format!(
+                "{}: the grey card is clipped; expose shorter",
+                shot.name
+            )));
+        }
+        let Some(place) = lens.on_sheet(pose, [x as f64 + 0.5, y as f64 + 0.5]) else { continue };
+        let irradiance = lighting.at(place).1;
+        (0..3).for_each(|c| {
+            ratios[c].push(bright[1] / PI * irradiance / f64::from(radiance.value[3 * i + c]).max(1e-9));
+        });
+    }
+    if ratios[0].len() < 12 {
+        return Err(MeasureError::Scene(format!(
+            "{}: the grey card's middle step has {} usable pixels; bring it nearer, or check card.rectangle_px",
+            shot.name,
+            ratios[0].len()
+        )));
+    }
+    Ok(ratios.map(|mut all| median(&mut all)))
+}
+
+fn flat(radiance: &Radiance) -> Flat {
+    let mut flat = Flat::new(radiance.width, radiance.height);
+    // The edge of the sheet covers its pixels in part.
+    flat.rgb = radiance.pixels.iter().map(|p| [p[0], p[1], p[2]].map(|v| v / p[3].max(1e-3))).collect();
+    flat
+}
+
+fn radiance(flat: &Flat) -> Radiance {
+    let pixel =
+        |(rgb, known): (&[f32; 3], &bool)| if *known { [rgb[0], rgb[1], rgb[2], 1.0] } else { [0.0; 4] };
+    Radiance {
+        width: flat.width,
+        height: flat.height,
+        pixels: flat.rgb.iter().zip(&flat.known).map(pixel).collect(),
+    }
+}
+
+fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, MeasureError> {
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, QUALITY).encode_image(picture).map_err(view_error)?;
+    Ok(bytes)
+}
+
+/// Red where the photograph is brighter than the print, blue where it is darker, white where they agree.
+fn difference(photo: &Flat, print: &Radiance, predicted: &Squares) -> RgbImage {
+    let mean = predicted.iter().flatten().sum::<f64>() / (3 * predicted.len().max(1)) as f64;
+    RgbImage::from_fn(photo.width as u32, photo.height as u32, |x, y| {
+        let i = y as usize * photo.width + x as usize;
+        if !photo.known[i] {
+            return image::Rgb([128, 128, 128]);
+        }
+        let covered = print.pixels[i][3].max(1e-3);
+        let off: f64 =
+            (0..3).map(|c| f64::from(photo.rgb[i][c] - print.pixels[i][c] / covered)).sum::<f64>() / 3.0;
+        let part = (off / (DIFFERENCE * mean.max(1e-12))).clamp(-1.0, 1.0);
+        let fade = |away: f64| (255.0 * (1.0 - away.max(0.0))) as u8;
+        image::Rgb([fade(-part), fade(part.abs()), fade(part)])
+    })
+}
