@@ -2,7 +2,7 @@
 //!
 //! Problem: the quality of a halftone depends on its tones, over the page and over a window that the eye averages, and on its
 //! smallest clusters, which decide whether foil sticks.
-//! Method: the requested weights are summed over the same lattice that the halftone reads. Windows are the walk's tiles of
+//! Method: the requested weights are summed over the same lattice that the halftone reads, before their shares are rounded. Windows are the walk's tiles of
 //! 64 by 64 dots or slightly less. Clusters are 4-connected components, found by joining the runs of neighbouring
 //! rows. Cost: about that of the halftone for tones, 20 ns a run for clusters. Memory: 12 bytes for each run of a row.
 
@@ -14,7 +14,6 @@ use serde::Serialize;
 use super::cells::field::{Field, Row};
 use super::eye::{self, Eye, Tangent};
 use super::mix::Lattice;
-use super::rule::{LANES, Lanes, Source, UNIT, blocks};
 use super::solids::Solids;
 use super::thin;
 use super::{HalftoneError, SAMPLES, Settings, TONE, cells, check};
@@ -22,6 +21,7 @@ use crate::sheet::DotMap;
 use crate::sheet::clusters::smallest_clusters;
 use appearance::brdf::Space;
 use appearance::gamut::InkMix;
+use appearance::wide::wide;
 use observe::Observer;
 
 /// Measurements of one stack on the printed rectangle.
@@ -69,22 +69,19 @@ pub fn tones(mix: &InkMix, dots: &DotMap, observer: &dyn Observer) -> Result<Vec
         let start = (usize::from(tile.y) + y) * width + usize::from(tile.x);
         &dots.index()[start..start + usize::from(tile.w)]
     };
-    // Asked in the rule's unit and printed in dots, window by window.
-    let windows: Vec<(Vec<i64>, Vec<i64>)> = tiles
+    // Asked and printed in dots, window by window.
+    let windows: Vec<(Vec<f64>, Vec<u32>)> = tiles
         .par_iter()
         .map(|tile| {
-            let (mut asked, mut printed) = (vec![0i64; stacks], vec![0i64; stacks]);
-            let mut weights = vec![Lanes::default(); blocks(lattice.stacks.len())];
-            let mut along = lattice.along(std::iter::once(*tile));
-            let mut walked = 0;
-            while walked < u32::from(tile.area()) {
-                let stretch = along.stretch(&mut weights);
-                for (lane, &q) in lattice.stacks.iter().enumerate() {
-                    asked[usize::from(q)] +=
-                        i64::from(weights[lane / LANES].0[lane % LANES]) * i64::from(stretch);
-                }
-                walked += stretch;
+            let mut asked = vec![0.0; stacks];
+            let dots = wide(
+                #[inline(always)]
+                || lattice.asked(tile),
+            );
+            for (&q, dots) in lattice.stacks.iter().zip(dots) {
+                asked[usize::from(q)] = dots;
             }
+            let mut printed = vec![0u32; stacks];
             for y in 0..usize::from(tile.h) {
                 for &stack in row(tile, y) {
                     printed[usize::from(stack)] += 1;
@@ -101,19 +98,18 @@ pub fn tones(mix: &InkMix, dots: &DotMap, observer: &dyn Observer) -> Result<Vec
     );
     let total = f64::from(walk.len());
     let tone = |q: usize| {
-        let unit = f64::from(UNIT);
-        let (mut asked, mut printed, mut worst, mut squares) = (0, 0, 0.0f64, 0.0);
+        let (mut asked, mut printed, mut worst, mut squares) = (0.0, 0, 0.0f64, 0.0);
         for ((tile, window), weight) in tiles.iter().zip(&windows).zip(tiles.iter().map(Tile::area)) {
             let dots = f64::from(tile.area());
-            let error = (window.1[q] as f64 - window.0[q] as f64 / unit) / dots;
-            (asked, printed) = (asked + window.0[q], printed + window.1[q]);
+            let error = (f64::from(window.1[q]) - window.0[q]) / dots;
+            (asked, printed) = (asked + window.0[q], printed + u64::from(window.1[q]));
             worst = worst.max(error.abs());
             squares += error * error * f64::from(weight);
         }
         let (count, shortest, sum) = runs[q];
         Tone {
             stack: mix.stacks[q].clone(),
-            asked: asked as f64 / unit / total,
+            asked: asked / total,
             printed: printed as f64 / total,
             worst_window: worst,
             rms_window: (squares / total).sqrt(),
@@ -271,7 +267,10 @@ impl Window<'_> {
             })
             .copied()
             .collect();
-        let (planes, shares) = self.errors(&index, points);
+        let (planes, shares) = wide(
+            #[inline(always)]
+            || self.errors(&index, points),
+        );
         let side = |stack: u8| cells::plan::size_of(settings.minimum[usize::from(stack)]);
         let free = |at: usize| solids.at(self.corner.0 + at % width, self.corner.1 + at / width) != TONE;
         let tones = (0..index.len()).filter(|&at| !free(at)).count() as u64;
@@ -293,6 +292,7 @@ impl Window<'_> {
 
     /// The error in each coordinate, and the share of each stack if it is the same everywhere. What a dot asks for is exact,
     /// whatever the method has made of it.
+    #[inline(always)]
     fn errors(&self, index: &[u8], points: &[[f32; 4]]) -> (Vec<Vec<f64>>, Option<Vec<f32>>) {
         let ((left, top), (width, length)) = (self.corner, self.eye.window());
         let field = self.field;

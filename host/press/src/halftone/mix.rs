@@ -242,6 +242,24 @@ impl<'a> Lattice<'a> {
         }
     }
 
+    /// What a tile asks for of each of `stacks`, in dots: the sum of the exact shares of its stretches.
+    #[inline(always)]
+    pub(super) fn asked(&self, tile: &Tile) -> Vec<f64> {
+        let mut along = self.along(std::iter::once(*tile));
+        let mut sums = vec![0u64; self.mix.maps.channels()];
+        while let Some(dots) = along.read() {
+            for (sum, &weight) in sums.iter_mut().zip(&along.weights) {
+                *sum += u64::from(dots) * u64::from(weight);
+            }
+        }
+        let unit = f64::from(WEIGHT) * f64::from(ONE);
+        let share = |&q: &u8| {
+            let shares = self.mix.matrix.iter().map(|shares| u64::from(shares[usize::from(q)]));
+            sums.iter().zip(shares).map(|(sum, share)| sum * share).sum::<u64>() as f64 / unit
+        };
+        self.stacks.iter().map(share).collect()
+    }
+
     /// Basis weights in units of 1/[`WEIGHT`] at a place in half dots, if neither axis is finer than the dots.
     #[inline(always)]
     fn between(&self, x: (u32, u16), y: (u32, u16), weights: &mut [u32]) {
@@ -336,24 +354,18 @@ pub(super) struct Along<'a, T> {
     mixed: Option<((u32, u16), (u32, u16))>,
 }
 
-impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
+impl<T: Iterator<Item = Tile>> Along<'_, T> {
+    /// Reads the basis weights of the next stretch, and returns the number of its dots; `None` beyond the last tile.
     #[inline(always)]
-    fn stretch(&mut self, out: &mut [Lanes]) -> u32 {
+    fn read(&mut self) -> Option<u32> {
         let lattice = self.lattice;
         let (tile, shape, at) = match self.tile.take() {
             Some(here) => here,
-            None => match self.tiles.next() {
-                Some(tile) => {
-                    lattice.touch(&tile);
-                    (tile, lattice.shape(&tile), 0)
-                }
-                // Never called beyond the last tile; if it were, the first stack would get all weight.
-                None => {
-                    out.fill(Lanes::default());
-                    out[0].0[0] = UNIT;
-                    return u32::MAX;
-                }
-            },
+            None => {
+                let tile = self.tiles.next()?;
+                lattice.touch(&tile);
+                (tile, lattice.shape(&tile), 0)
+            }
         };
         let (x, y, dots) = shape.stretches[at];
         self.tile = (at + 1 < shape.stretches.len()).then_some((tile, shape, at + 1));
@@ -368,8 +380,21 @@ impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
             }
             _ => lattice.over(x, y, &mut self.sums, &mut self.weights),
         }
-        lattice.shares(&self.weights, out);
-        u32::from(dots) - std::mem::take(&mut self.skip)
+        Some(u32::from(dots) - std::mem::take(&mut self.skip))
+    }
+}
+
+impl<T: Iterator<Item = Tile>> Source for Along<'_, T> {
+    #[inline(always)]
+    fn stretch(&mut self, out: &mut [Lanes]) -> u32 {
+        let Some(dots) = self.read() else {
+            // Never called beyond the last tile; if it were, the first stack would get all weight.
+            out.fill(Lanes::default());
+            out[0].0[0] = UNIT;
+            return u32::MAX;
+        };
+        self.lattice.shares(&self.weights, out);
+        dots
     }
 }
 

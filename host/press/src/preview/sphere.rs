@@ -15,6 +15,7 @@ use inks::Curve;
 use rayon::prelude::*;
 
 use appearance::brdf::{Space, Table};
+use appearance::wide::wide;
 use observe::Observer;
 
 use super::error::{PreviewError, check_size};
@@ -104,30 +105,35 @@ pub fn under_probe(
         .map_init(
             || vec![[0.0f32; 3]; ENTRIES],
             |light, y| {
-                let mut line = vec![[0.0f32; 4]; size * rows.len()];
-                for x in 0..size {
-                    let (mut nx, mut ny, mut count) = (0.0, 0.0, 0u8);
-                    subsamples(size, x, y, |sx, sy| {
-                        nx += sx;
-                        ny += sy;
-                        count += 1;
-                    });
-                    if count == 0 {
-                        continue;
-                    }
-                    let (nx, ny) = (nx / f64::from(count), ny / f64::from(count));
-                    let n = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()];
-                    light.fill([0.0; 3]);
-                    tree.gather(n.map(|v| v as f32), &fine, OPENING, light);
-                    let gathered = Planes::new(light);
-                    let covered = f32::from(count) / (SUBSAMPLES * SUBSAMPLES) as f32;
-                    for (table, line) in tables.iter().zip(line.chunks_exact_mut(size)) {
-                        let [r, g, b] = gathered.product(table).map(|sum| sum * covered);
-                        line[x] = [r, g, b, covered];
-                    }
-                }
-                observer.advance(1);
-                line
+                wide(
+                    #[inline(always)]
+                    || {
+                        let mut line = vec![[0.0f32; 4]; size * rows.len()];
+                        for x in 0..size {
+                            let (mut nx, mut ny, mut count) = (0.0, 0.0, 0u8);
+                            subsamples(size, x, y, |sx, sy| {
+                                nx += sx;
+                                ny += sy;
+                                count += 1;
+                            });
+                            if count == 0 {
+                                continue;
+                            }
+                            let (nx, ny) = (nx / f64::from(count), ny / f64::from(count));
+                            let n = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()];
+                            light.fill([0.0; 3]);
+                            tree.gather(n.map(|v| v as f32), &fine, OPENING, light);
+                            let gathered = Planes::new(light);
+                            let covered = f32::from(count) / (SUBSAMPLES * SUBSAMPLES) as f32;
+                            for (table, line) in tables.iter().zip(line.chunks_exact_mut(size)) {
+                                let [r, g, b] = gathered.product(table).map(|sum| sum * covered);
+                                line[x] = [r, g, b, covered];
+                            }
+                        }
+                        observer.advance(1);
+                        line
+                    },
+                )
             },
         )
         .collect();
@@ -263,6 +269,7 @@ impl Tree {
     }
 
     /// Adds the light on normal `n` to the entries of a table.
+    #[inline(always)]
     fn gather(&self, n: [f32; 3], fine: &Fine, opening: f32, light: &mut [[f32; 3]]) {
         let mut i = 0;
         while let Some(node) = self.nodes.get(i) {
@@ -307,6 +314,7 @@ impl Planes {
     }
 
     /// The sum over entries of light times reflectance, in a fixed order.
+    #[inline(always)]
     fn product(&self, other: &Planes) -> [f32; 3] {
         std::array::from_fn(|c| {
             let mut sums = [0.0; LANES];
