@@ -410,7 +410,7 @@ impl Runs {
         self.end = self.done.saturating_add(length).min(len);
         if self.index.is_multiple_of(2) {
             self.done = self.end;
-        } else if self.done < self.end && self.done >= self.from && self.end <= self.to {
+        } else if self.done < self.end && self.end <= self.to {
             place.canvas.ink(self.done - self.from, self.end - self.from);
             self.done = self.end;
         } else {

@@ -10,18 +10,22 @@
 //! 300 dpi are averaged to 300 dpi in linear light, because no cluster of dots is finer. White and black dots do not count
 //! in such an average: they are fixed. Limits: the accuracy of colours is that of the ink library.
 
+use std::borrow::Cow;
+
 use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
+use super::averages::averaged;
 use super::bits;
 use super::compose::Settings;
 use super::error::LayersError;
-use super::flat::{BLACK, Flat, TONE, WHITE, split};
+use super::flat::{BLACK, Flat, TONE, split};
 use super::intent::{Intent, Light, difference};
 use super::kinds::Kind;
 use super::lattice::{Lattice, Nodes, ends, step};
 use super::outline::{self, Treatment};
+use super::solids::Solids;
 use crate::halftone::{self, halftone};
 use crate::separate::{Plane, pack};
 use appearance::brdf::Space;
@@ -43,7 +47,8 @@ pub struct Colour {
     pub width: usize,
     /// Pixels down.
     pub height: usize,
-    /// sRGB, three bytes a pixel; 255, 255, 255 is bare paper. Empty if everything is black or white.
+    /// sRGB, three bytes a pixel; 255, 255, 255 is bare paper. Empty if everything is black or white, and as long as flat
+    /// colours may all become solids.
     pub rgb: Vec<u8>,
     /// For each pixel whether text or a drawing has its colour; empty if none has.
     pub(super) drawn: Vec<bool>,
@@ -74,8 +79,26 @@ impl Colour {
             let flat = flat.at_dots(size, dots);
             return Some(Colour::black(bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
         }
-        let colour = averaged(pixels, &flat, (size.0 as usize, size.1 as usize), dots);
+        let colour = averaged(|at| split(&pixels[at]).1, &flat, (size.0 as usize, size.1 as usize), dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
+    }
+
+    /// Flat colours alone; `None` if all are white.
+    pub(super) fn of_flat(flat: Flat, dots: (usize, usize)) -> Option<Colour> {
+        if flat.is_black_and_white() {
+            let black = bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK);
+            return (black.dots() > 0).then(|| Colour::black(black));
+        }
+        Some(Colour { flat, ..Colour::default() })
+    }
+
+    /// The colours between which dots are halftoned, without the flat ones: those of flat colours alone are averaged only now.
+    pub(super) fn averages(&self, dots: (usize, usize)) -> Cow<'_, Colour> {
+        if !self.rgb.is_empty() || self.flat.index.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let colour = |at: usize| self.flat.colours[usize::from(self.flat.index[at])].1;
+        Cow::Owned(averaged(colour, &self.flat, dots, dots))
     }
 
     /// Black dots on white.
@@ -132,7 +155,7 @@ impl Colour {
             }
             fixed => fixed,
         };
-        let mix = self.mix(fit)?;
+        let mix = self.averages(dots).mix(fit)?;
         // Larger art was refused when its size was decided.
         let size = (dots.0 as u16, dots.1 as u16);
         let toning = halftone::Settings {
@@ -291,142 +314,6 @@ impl Fit {
     }
 }
 
-/// The stacks as solid colours.
-struct Solids<'a> {
-    printable: &'a Printable,
-    /// Numbers of the bare paper and of the stack that prints black.
-    bare: usize,
-    black: usize,
-}
-
-impl Solids<'_> {
-    fn new<'a>(printable: &'a Printable, space: &Space) -> Solids<'a> {
-        let (bare, black) = ends(printable, space);
-        Solids { printable, bare, black }
-    }
-
-    /// The stack that a colour names: white and black, and cyan, magenta, yellow, red, green and blue at full strength, as
-    /// drawing programs and the conversion from CMYK write the inks. None of the six is printable in sRGB's sense.
-    fn named(&self, colour: [u8; 3]) -> Option<Stack> {
-        if colour.iter().any(|&v| v != 0 && v != 255) {
-            return None;
-        }
-        let stacks = &self.printable.stacks;
-        match colour {
-            [0, 0, 0] => Some(stacks[self.black].clone()),
-            _ => {
-                let filters = [Ink::Cyan, Ink::Magenta, Ink::Yellow];
-                let inks: Vec<Ink> =
-                    filters.into_iter().zip(colour).filter(|(_, v)| *v == 0).map(|(ink, _)| ink).collect();
-                let stack = Stack::new(inks);
-                stacks.contains(&stack).then_some(stack)
-            }
-        }
-    }
-
-    /// What a stack reflects at the raking end of its curve, relative to paper: the body's colour without the surface's gloss.
-    fn body(&self, stack: &Stack) -> Light {
-        match self.printable.stacks.iter().position(|known| known == stack) {
-            Some(at) => self.relative(at),
-            None => [1.0; 3],
-        }
-    }
-
-    fn relative(&self, stack: usize) -> Light {
-        let [row, paper] = [stack, self.bare].map(|stack| self.printable.curves.row(stack));
-        std::array::from_fn(|c| row[row.len() - 3 + c] / paper[row.len() - 3 + c])
-    }
-
-    /// The light that a colour asks for, between black and paper.
-    fn wanted(&self, colour: [u8; 3]) -> Light {
-        let black = self.relative(self.black);
-        let light = colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
-        std::array::from_fn(|c| black[c] + light[c] * (1.0 - black[c]))
-    }
-}
-
-/// The colours averaged to at most one pixel for two dots along each side.
-fn averaged<const N: usize>(
-    pixels: &[[u8; N]],
-    flat: &Flat,
-    size: (usize, usize),
-    dots: (usize, usize),
-) -> Colour {
-    let to = (size.0.min(dots.0.div_ceil(2)), size.1.min(dots.1.div_ceil(2)));
-    // Sums of linear light in 16 bits a channel: exact enough to restore every 8-bit sRGB value.
-    let linear: Vec<u32> = (0..=255u8)
-        .map(|v| (65535.0 * appearance::srgb::decode(f32::from(v) / 255.0)).round() as u32)
-        .collect();
-    let coded: Vec<u8> = (0..=65535)
-        .map(|light| {
-            let above = linear.partition_point(|&v| v < light).clamp(1, 255);
-            let nearer = light.abs_diff(linear[above]) <= light.abs_diff(linear[above - 1]);
-            (if nearer { above } else { above - 1 }) as u8
-        })
-        .collect();
-    // Whole pixels: pairs, or shared first and last pixels where the sides are no multiples. No dot shows the difference.
-    let span = |at: usize, from: usize, to: usize| match from.div_ceil(2) == to {
-        _ if from == to => at..at + 1,
-        true => 2 * at..(2 * at + 2).min(from),
-        false => at * from / to..((at + 1) * from).div_ceil(to),
-    };
-    let mut rgb = vec![255; to.0 * to.1 * 3];
-    let mut drawn = vec![false; to.0 * to.1];
-    // Pixels that are only white and black.
-    let mut plain = vec![true; to.0 * to.1];
-    let rows = rgb.par_chunks_exact_mut(to.0 * 3).zip(drawn.par_chunks_exact_mut(to.0));
-    rows.zip(plain.par_chunks_exact_mut(to.0)).enumerate().for_each(|(y, ((rgb, drawn), plain))| {
-        let rows = span(y, size.1, to.1);
-        if flat.index[rows.start * size.0..rows.end * size.0].iter().fold(0, |most, &dot| most.max(dot))
-            == WHITE
-        {
-            return;
-        }
-        for (x, out) in rgb.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-            let columns = span(x, size.0, to.0);
-            let at = || rows.clone().flat_map(|y| columns.clone().map(move |x| y * size.0 + x));
-            let toned = at().find(|&at| flat.index[at] > BLACK);
-            plain[x] = toned.is_none();
-            drawn[x] = toned.is_some_and(|at| flat.index[at] != TONE);
-            let (mut sum, mut count) = ([0u64; 3], 0);
-            for at in at().filter(|&at| toned.is_none() || flat.index[at] > BLACK) {
-                let colour = split(&pixels[at]).1;
-                sum.iter_mut().zip(colour).for_each(|(sum, v)| *sum += u64::from(linear[usize::from(v)]));
-                count += 1;
-            }
-            *out = sum.map(|sum| coded[((sum + count / 2) / count) as usize]);
-        }
-    });
-    spread(&mut rgb, &mut drawn, &plain, to.0);
-    if !drawn.contains(&true) {
-        drawn.clear();
-    }
-    Colour { width: to.0, height: to.1, rgb, drawn, ..Colour::default() }
-}
-
-/// Gives plain pixels beside others the colour of one of these: the halftone interpolates between pixels, and a tone must
-/// not fade towards an edge because white is beyond it.
-fn spread(rgb: &mut [u8], drawn: &mut [bool], plain: &[bool], width: usize) {
-    let height = plain.len() / width;
-    let busy: Vec<bool> = plain.par_chunks_exact(width).map(|row| row.contains(&false)).collect();
-    let beside = |at: usize, sides: usize| at.saturating_sub(1)..(at + 2).min(sides);
-    let taken: Vec<(usize, usize)> = (0..height)
-        .into_par_iter()
-        .filter(|&y| busy[beside(y, height)].contains(&true))
-        .flat_map_iter(|y| {
-            (0..width).filter_map(move |x| {
-                let at = y * width + x;
-                let mut near = beside(y, height).flat_map(|v| beside(x, width).map(move |u| v * width + u));
-                plain[at].then(|| near.find(|&near| !plain[near])).flatten().map(|from| (at, from))
-            })
-        })
-        .collect();
-    for (at, from) in taken {
-        rgb.copy_within(3 * from..3 * from + 3, 3 * at);
-        drawn[at] = drawn[from];
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::intent::oklab;
@@ -576,37 +463,6 @@ mod tests {
                     b <= 2 * r.max(g) || seen < 3.0,
                     "{intent:?}: {pixel:?} turns by {seen} towards purple"
                 );
-            }
-        }
-    }
-
-    #[test]
-    fn averages_are_of_light_not_of_numbers() {
-        // Of greys: white and black are not averaged.
-        let checks: Vec<[u8; 3]> =
-            (0..64 * 64).map(|at| if (at % 64 + at / 64) % 2 == 0 { [254; 3] } else { [1; 3] }).collect();
-        let half = Colour::of(&checks, (64, 64), (64, 64)).unwrap();
-        assert_eq!((half.width, half.height), (32, 32));
-        // sRGB of half the light.
-        assert!(half.rgb.iter().all(|&v| v == 187 || v == 188), "{:?}", &half.rgb[..6]);
-        let same = Colour::of(&checks, (64, 64), (128, 128)).unwrap();
-        assert_eq!(same.rgb, checks.concat(), "300 dpi stays as it is");
-    }
-
-    #[test]
-    fn a_tone_does_not_fade_towards_white_letters() {
-        let page: Vec<[u8; 3]> =
-            (0..40 * 40).map(|at| if (at % 40) % 13 < 5 { [255; 3] } else { [40, 60, 90] }).collect();
-        let colour = Colour::of(&page, (40, 40), (40, 40)).unwrap();
-        assert!(
-            colour.rgb.as_chunks::<3>().0.iter().all(|pixel| *pixel == [40, 60, 90] || *pixel == [255; 3])
-        );
-        for (at, pixel) in page.iter().enumerate().filter(|(_, pixel)| **pixel != [255; 3]) {
-            let (x, y) = (at % 40 / 2, at / 40 / 2);
-            let near = (y.saturating_sub(1)..(y + 2).min(20))
-                .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(20)).map(move |u| 20 * v + u));
-            for near in near {
-                assert_eq!(colour.rgb[3 * near..3 * near + 3], *pixel);
             }
         }
     }

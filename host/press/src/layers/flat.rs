@@ -86,6 +86,24 @@ impl Flat {
         flat
     }
 
+    /// The palette of colours that have so many dots each, and the number of each colour in it. There are no tones, and
+    /// [`MOST`] colours at most besides white and black.
+    pub(super) fn ordered(colours: &[(Kind, [u8; 3])], counts: &[u64]) -> (Vec<(Kind, [u8; 3])>, Vec<u8>) {
+        let plain = |rgb: [u8; 3]| rgb == [255; 3] || rgb == [0; 3];
+        let drawn = colours.iter().zip(counts).filter(|&(&(_, rgb), &dots)| dots > 0 && !plain(rgb));
+        let mut found: Vec<((Kind, [u8; 3]), u64)> = drawn.map(|(&key, &dots)| (key, dots)).collect();
+        sort(&mut found);
+        let mut palette = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
+        palette.extend(found.into_iter().map(|(key, _)| key));
+        let number = |&(kind, rgb): &(Kind, [u8; 3])| match rgb {
+            [255, 255, 255] => WHITE,
+            [0, 0, 0] => BLACK,
+            _ => palette.iter().position(|&known| known == (kind, rgb)).unwrap_or_default() as u8,
+        };
+        let table = colours.iter().map(number).collect();
+        (palette, table)
+    }
+
     /// Makes tones of the white and black dots of pictures that lie alone beside tones.
     fn forget_noise<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize) {
         let index = &self.index;
@@ -171,9 +189,14 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> V
                 || !all.iter().any(|&(other, near)| other == kind && near != colour && similar(near, colour))
         });
     }
-    colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
+    sort(&mut colours);
     colours.truncate(MOST);
     colours.into_iter().map(|(key, _)| key).collect()
+}
+
+/// Text first, then the most frequent.
+fn sort(colours: &mut [((Kind, [u8; 3]), u64)]) {
+    colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
 }
 
 #[cfg(test)]

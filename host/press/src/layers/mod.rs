@@ -9,6 +9,7 @@
 //! [`Artwork::notes`] reports everything the readers had to assume.
 
 mod artwork;
+mod averages;
 mod bits;
 mod cmyk;
 mod colour;
@@ -23,6 +24,7 @@ pub mod kinds;
 mod lattice;
 mod masks;
 pub mod names;
+mod numbered;
 mod open;
 mod options;
 mod order;
@@ -34,6 +36,7 @@ mod resample;
 mod reserved;
 mod resolution;
 mod size;
+mod solids;
 mod svg;
 mod svg_kinds;
 mod tiff;

@@ -2,9 +2,9 @@
 //!
 //! Problem: print systems hand over whole sheets, most of which is bare, at four bytes a pixel; and most pages are black text.
 //! Method: as long as a page is black and white alone, it is kept as one bit a pixel while it is read: what drew a black pixel
-//! does not matter. With the first other colour it becomes a page of pixels. The window around everything drawn is cut out
-//! and read as a picture.
-//! Cost: 1 ns a pixel; a bit or four bytes. Limits: no transparency.
+//! does not matter. With the first other colour, its pixels become numbers of colours (`numbered`), and with the first tone of a
+//! picture, pixels. The window around everything drawn is cut out and read as a picture.
+//! Cost: 1 ns a pixel; a bit, a byte or four bytes. Limits: no transparency.
 
 use std::io::{self, Read};
 use std::path::Path;
@@ -12,7 +12,9 @@ use std::path::Path;
 use super::artwork::Artwork;
 use super::colour::Colour;
 use super::error::{LayersError, wrong};
+use super::flat::WHITE;
 use super::kinds::{BYTES, Kind};
+use super::numbered::Numbered;
 use super::options::Options;
 use super::window::Window;
 use super::{bits, kinds, picture, size};
@@ -29,6 +31,8 @@ pub struct Page(Pixels);
 enum Pixels {
     /// One bit a pixel: black or white.
     Black(Plane),
+    /// Few flat colours.
+    Numbered(Numbered),
     /// sRGB, three bytes a pixel, and pixels across.
     Plain(Vec<u8>, usize),
     /// What drew each pixel, then its sRGB, and pixels across.
@@ -47,35 +51,39 @@ impl Page {
     /// Those of reading.
     pub fn read(input: &mut impl Read, (width, height): (usize, usize)) -> io::Result<Page> {
         let mut plane = bits::blank(width, height);
+        let mut numbered: Option<Numbered> = None;
         let mut strip = vec![0; BYTES * width * ROWS.min(height)];
         let mut last = vec![0; BYTES * width];
         for top in (0..height).step_by(ROWS) {
             let strip = &mut strip[..BYTES * width * ROWS.min(height - top)];
             input.read_exact(strip)?;
-            let rows = plane.bits[plane.stride * top..].chunks_exact_mut(plane.stride);
-            if rows.zip(strip.chunks_exact(BYTES * width)).all(|(bits, row)| black(row, bits)) {
-                last.copy_from_slice(&strip[strip.len() - BYTES * width..]);
+            if numbered.is_none() {
+                let rows = plane.bits[plane.stride * top..].chunks_exact_mut(plane.stride);
+                if rows.zip(strip.chunks_exact(BYTES * width)).all(|(bits, row)| black(row, bits)) {
+                    last.copy_from_slice(&strip[strip.len() - BYTES * width..]);
+                    continue;
+                }
+            }
+            let page = numbered.get_or_insert_with(|| Numbered::of(&plane, top, &last));
+            if page.read(top, strip) {
                 continue;
             }
             let mut pixels = vec![0; BYTES * width * height];
             let (before, rest) = pixels.split_at_mut(BYTES * width * top);
-            expand(&plane, before);
-            // Whether its black dots are noise is decided beside the first tones.
-            if let Some(row) = before.len().checked_sub(last.len()) {
-                before[row..].copy_from_slice(&last);
-            }
+            page.expand(before);
             let (these, rest) = rest.split_at_mut(strip.len());
             these.copy_from_slice(strip);
             input.read_exact(rest)?;
             return Ok(Page(Pixels::Tagged(pixels, width)));
         }
-        Ok(Page(Pixels::Black(plane)))
+        Ok(Page(numbered.map_or(Pixels::Black(plane), Pixels::Numbered)))
     }
 
     /// The window around everything that is not white; `None` for a blank page.
     pub fn bounds(&self) -> Option<Window> {
         match &self.0 {
             Pixels::Black(plane) => bits::bounds(plane),
+            Pixels::Numbered(page) => page.bounds(),
             Pixels::Plain(rgb, width) => Window::around(rgb, *width, 3, 255),
             Pixels::Tagged(pixels, width) => kinds::bounds(pixels, *width),
         }
@@ -99,6 +107,7 @@ impl Page {
         };
         let (width, height) = match &self.0 {
             Pixels::Black(plane) => (plane.width, plane.length),
+            Pixels::Numbered(page) => (page.width, page.length()),
             Pixels::Plain(rgb, width) => (*width, rgb.len() / 3 / (*width).max(1)),
             Pixels::Tagged(pixels, width) => (*width, pixels.len() / BYTES / (*width).max(1)),
         };
@@ -115,6 +124,17 @@ impl Page {
             Pixels::Black(plane) => {
                 let mut pixels = vec![0; BYTES * width * height];
                 expand(&plane, &mut pixels);
+                tagged(name, window.cut(pixels, width, BYTES), size, dots, options)
+            }
+            Pixels::Numbered(page) if dpi == DOTS && !options.reserved => {
+                let flat = page.flat(window);
+                let drawn = bits::from_bytes(wide, &flat.index, |dot| dot != WHITE);
+                let colour = Colour::of_flat(flat, dots);
+                Artwork { drawn, colour, ..Artwork::blank(name, dots) }
+            }
+            Pixels::Numbered(page) => {
+                let mut pixels = vec![0; BYTES * width * height];
+                page.expand(&mut pixels);
                 tagged(name, window.cut(pixels, width, BYTES), size, dots, options)
             }
             Pixels::Tagged(pixels, _) => tagged(name, window.cut(pixels, width, BYTES), size, dots, options),
@@ -161,16 +181,26 @@ mod tests {
     use proptest::prelude::*;
 
     /// Where the first tone is decides how much was read as bits before it.
-    fn page(width: usize, height: usize, seed: u32, tone: Option<usize>) -> Vec<u8> {
+    fn page(
+        (width, height): (usize, usize),
+        seed: u32,
+        (colours, most): (Vec<usize>, u32),
+        tone: Option<usize>,
+    ) -> Vec<u8> {
         let random = |i: usize| (i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 13;
         let pixel = |at: usize| match random(at) % 5 {
             0 => [(random(at + 9) % 8) as u8, 0, 0, 0],
             _ => [(random(at + 9) % 8) as u8, 255, 255, 255],
         };
         let mut pixels: Vec<[u8; 4]> = (0..width * height).map(pixel).collect();
+        // Text and drawings in some colours.
+        for at in colours {
+            let at = at % pixels.len();
+            pixels[at] = [[1, 4, 5][random(at + 3) as usize % 3], 20, (random(at + 5) % most) as u8, 90];
+        }
         if let Some(at) = tone {
             let at = at % pixels.len();
-            pixels[at] = [(random(at + 3) % 8) as u8, 90, (random(at + 5) % 256) as u8, 90];
+            pixels[at] = [[2, 3, 6][random(at + 3) as usize % 3], 90, (random(at + 5) % 256) as u8, 90];
         }
         pixels.concat()
     }
@@ -179,12 +209,22 @@ mod tests {
         #[test]
         fn a_page_is_the_same_whether_it_was_read_as_bits_or_not(
             width in 3usize..40, height in 3usize..100, seed: u32, tone in prop::option::of(any::<usize>()),
+            colours in prop_oneof![
+                Just(Vec::new()),
+                prop::collection::vec(any::<usize>(), 1..60),
+                prop::collection::vec(any::<usize>(), 900),
+            ],
+            most in prop_oneof![Just(1u32), Just(5), Just(256)],
             draft: bool, part in (0usize..3, 0usize..3, 0usize..3, 0usize..3)
         ) {
-            let pixels = page(width, height, seed, tone);
+            let is_black = tone.is_none() && colours.is_empty();
+            let pixels = page((width, height), seed, (colours, most), tone);
             let found = Page::read(&mut &pixels[..], (width, height)).unwrap();
             let whole = Page(Pixels::Tagged(pixels, width));
-            prop_assert_eq!(matches!(found.0, Pixels::Black(_)), tone.is_none());
+            prop_assert_eq!(matches!(found.0, Pixels::Black(_)), is_black);
+            let numbered = matches!(found.0, Pixels::Numbered(_));
+            prop_assert!(!numbered || tone.is_none() && !is_black);
+            prop_assert!(numbered || tone.is_some() || is_black || most > 5);
             prop_assert_eq!(found.bounds(), whole.bounds());
             let (left, top) = (part.0.min(width - 1), part.1.min(height - 1));
             let window = Window {
@@ -199,14 +239,20 @@ mod tests {
             prop_assert_eq!(&found.drawn, &whole.drawn);
             // What nothing is drawn on has no colour.
             if whole.drawn.dots() > 0 {
-                prop_assert_eq!(found.colour, whole.colour);
+                let dots = (whole.width, whole.length);
+                let averaged = |colour: Colour| Colour {
+                    flat: colour.flat.clone(),
+                    black: colour.black.clone(),
+                    ..colour.averages(dots).into_owned()
+                };
+                prop_assert_eq!(found.colour.map(averaged), whole.colour);
             }
         }
     }
 
     #[test]
     fn a_page_cut_short_and_a_window_beyond_it_are_errors() {
-        let pixels = page(9, 40, 1, None);
+        let pixels = page((9, 40), 1, (Vec::new(), 1), None);
         assert!(Page::read(&mut &pixels[..pixels.len() - 1], (9, 40)).is_err());
         let page = Page::read(&mut &pixels[..], (9, 40)).unwrap();
         let beyond = Window { left: 1, top: 0, width: 9, height: 9 };
