@@ -3,6 +3,11 @@
 //! Weights are fixed point with [`ONE`] as 1. At every pixel they sum to [`ONE`] exactly, so rounding cannot break the
 //! partition of unity on any machine. Layout: interleaved, `channels` values per pixel, rows from the top.
 
+use rayon::prelude::*;
+
+/// Pixels that a thread takes at a time.
+const RUN: usize = 1 << 14;
+
 /// Full weight. A power of two, so that products scale back by a shift.
 pub const ONE: u16 = 1 << 15;
 
@@ -56,11 +61,14 @@ impl WeightMaps {
         if data.len() != expected || expected == 0 {
             return Err(WeightError::Size { width, height, channels, expected, found: data.len() });
         }
-        for (pixel, weights) in data.chunks_exact(channels).enumerate() {
-            let sum: u32 = weights.iter().map(|&w| u32::from(w)).sum();
-            if sum != u32::from(ONE) {
-                return Err(WeightError::Sum { x: pixel % width, y: pixel / width, sum });
-            }
+        let sum = |weights: &[u16]| weights.iter().map(|&w| u32::from(w)).sum::<u32>();
+        let wrong = |(i, run): (usize, &[u16])| {
+            let at = run.chunks_exact(channels).position(|weights| sum(weights) != u32::from(ONE))?;
+            Some((i * RUN + at, sum(&run[at * channels..][..channels])))
+        };
+        let first = data.par_chunks(RUN * channels).enumerate().filter_map(wrong).min();
+        if let Some((pixel, sum)) = first {
+            return Err(WeightError::Sum { x: pixel % width, y: pixel / width, sum });
         }
         Ok(WeightMaps { width, height, channels, data })
     }
@@ -92,11 +100,17 @@ impl WeightMaps {
 
     /// The sum of each channel over all pixels; together [`ONE`] times the number of pixels.
     pub fn totals(&self) -> Vec<u64> {
-        let mut sums = vec![0u64; self.channels];
-        for pixel in self.data.chunks_exact(self.channels) {
+        let add = |mut sums: Vec<u64>, pixel: &[u16]| {
             sums.iter_mut().zip(pixel).for_each(|(sum, &weight)| *sum += u64::from(weight));
-        }
-        sums
+            sums
+        };
+        let both = |mut a: Vec<u64>, b: Vec<u64>| {
+            a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+            a
+        };
+        let none = || vec![0u64; self.channels];
+        let runs = self.data.par_chunks(RUN * self.channels);
+        runs.map(|run| run.chunks_exact(self.channels).fold(none(), add)).reduce(none, both)
     }
 
     /// All weights, interleaved.

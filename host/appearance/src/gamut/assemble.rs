@@ -1,12 +1,16 @@
 //! Turning weights over the candidates into the mix that the halftoner reads.
 
 use inks::Stack;
+use rayon::prelude::*;
 
 use super::candidates::Candidates;
 use super::error::GamutError;
 use super::mix::InkMix;
 use crate::brdf::Table;
 use crate::weights::{ONE, WeightError, WeightMaps};
+
+/// Pixels that a thread takes at a time.
+const RUN: usize = 1 << 14;
 
 /// Drops the candidates that no pixel uses. Returns the identity as matrix and the maps of the others.
 pub(super) fn compact(
@@ -15,16 +19,30 @@ pub(super) fn compact(
     width: usize,
     height: usize,
 ) -> Result<(Vec<Vec<u16>>, WeightMaps), WeightError> {
-    let mut used = vec![false; k];
-    for pixel in shares.chunks_exact(k) {
+    let any = |mut used: Vec<bool>, pixel: &[u16]| {
         used.iter_mut().zip(pixel).for_each(|(used, &w)| *used |= w > 0);
-    }
+        used
+    };
+    let either = |mut a: Vec<bool>, b: Vec<bool>| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a |= b);
+        a
+    };
+    let used = shares
+        .par_chunks(RUN * k)
+        .map(|run| run.chunks_exact(k).fold(vec![false; k], any))
+        .reduce(|| vec![false; k], either);
     let kept: Vec<usize> = (0..k).filter(|&q| used[q]).collect();
-    // In place: a value never moves to a later position.
-    for pixel in 0..width * height {
-        for (channel, &q) in kept.iter().enumerate() {
-            shares[pixel * kept.len() + channel] = shares[pixel * k + q];
+    // In place: a value never moves to a later position. Each run by itself, then the runs after each other.
+    shares.par_chunks_mut(RUN * k).for_each(|run| {
+        for pixel in 0..run.len() / k {
+            for (channel, &q) in kept.iter().enumerate() {
+                run[pixel * kept.len() + channel] = run[pixel * k + q];
+            }
         }
+    });
+    for first in (0..width * height).step_by(RUN) {
+        let pixels = RUN.min(width * height - first);
+        shares.copy_within(first * k..first * k + pixels * kept.len(), first * kept.len());
     }
     shares.truncate(width * height * kept.len());
     shares.shrink_to_fit();
