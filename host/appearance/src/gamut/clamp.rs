@@ -23,7 +23,7 @@ use observe::Observer;
 /// Materials per run: a run starts with nothing to start from, and thousands of cores are not expected.
 const RUN: usize = 8192;
 /// An invisible gap in squared distance: at d = 0.01 it is 5e-6 in d. A tenth of the price of a layer, which decides ties.
-const ENOUGH: f64 = 1e-7;
+pub(super) const ENOUGH: f64 = 1e-7;
 
 /// The mixture of every pixel over the candidates.
 pub(super) struct Clamped {

@@ -6,14 +6,12 @@
 //! Cost: two or three steps of the solver. Limits: those of [`Mixer::refine`].
 
 use super::candidates::Candidates;
+use super::clamp::ENOUGH;
 use super::error::GamutError;
 use super::prune::prune;
 use crate::materials::Materials;
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::ONE;
-
-/// An invisible gap in squared distance.
-const ENOUGH: f64 = 1e-7;
 
 /// Names the pixel of a failed fit.
 pub(super) fn in_pixel(pixel: usize, width: usize) -> impl FnOnce(MixtureError) -> GamutError {
