@@ -96,7 +96,12 @@ impl Knots {
         if from <= 0.0 || to <= 0.0 {
             return from + s * (to - from);
         }
-        let ln = |i: usize| sample(i).max(f64::MIN_POSITIVE).ln();
+        // All that the two slopes depend on.
+        let first = self.derivative[i].0.min(i.saturating_sub(2));
+        let last = self.x.len() - 1;
+        let logarithms: [f64; WINDOW + 1] =
+            std::array::from_fn(|j| sample((first + j).min(last)).max(f64::MIN_POSITIVE).ln());
+        let ln = |i: usize| logarithms[i - first];
         let h = self.x[i + 1] - self.x[i];
         let step = (to / from).ln();
         let (start, end) = (h * self.slope(i, ln), h * self.slope(i + 1, ln));
