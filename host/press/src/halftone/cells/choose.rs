@@ -165,6 +165,11 @@ impl<'a> Chooser<'a> {
         !self.small[side].is_empty()
     }
 
+    /// 0 for each stack that may have half of a cell of this side; nothing where such cells are not cut.
+    pub(super) fn small(&self, side: usize) -> &[f32] {
+        &self.small[side]
+    }
+
     /// What `area` dots print that ask for `want` and owe `debts`. With a side they are a whole cell, which may be cut into
     /// halves: which way, and which half comes first, says `turn`.
     #[inline(always)]

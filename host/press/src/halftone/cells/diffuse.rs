@@ -11,7 +11,7 @@
 //! Cost: about two dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
 use super::arrange::Errors;
-use super::border::{begin, usual};
+use super::border::{Usual, begin};
 use super::cell::Cell;
 use super::choose::{Chooser, Metric, NOISE, disturbing, textured};
 use super::field::{Field, LANES, Row};
@@ -304,13 +304,17 @@ impl<'a> Strip<'a> {
         // The first cell of a tone gets nothing, since the last one has nowhere to leave what it owes.
         if missing > 0.0 && missing < 1.0 {
             let slots = &mut self.slots[slot..slot + lanes];
-            begin(slots, &self.want, missing, area, begins.then_some(hash));
+            let usual = Usual::new(&self.want, area, self.chooser.small(size));
+            begin(slots, &self.want, missing, &usual, begins.then_some(hash));
         }
         let disturbance = self.disturbance * area as f32;
         let lot = hash.wrapping_mul(0x9e37_79b1);
         self.owe(slot, disturbance, (lot >> 24) as u8);
         // What owns fragments is not cut, for they print like its first dot.
         let side = (whole && area == size * size).then_some(size);
+        if side.is_none() && self.chooser.cuts(size) {
+            self.ask_whole(size, area);
+        }
         let mut cell = self.chooser.choose(&self.want, &self.asks, area as f32, side, lot >> 16);
         if !whole {
             cell = Cell::whole(self.holding(cell.halves[0].into(), area) as u8);
@@ -329,9 +333,9 @@ impl<'a> Strip<'a> {
         }
         let stays: f32 = shares.iter().sum();
         if !calm && stays > 0.0 && shares.contains(&0.0) {
-            let usual = usual(&self.want, area);
-            for (debt, &want) in self.debt.iter_mut().zip(&self.want) {
-                let usual = usual(want);
+            let usual = Usual::new(&self.want, area, self.chooser.small(size));
+            for (q, (debt, &want)) in self.debt.iter_mut().zip(&self.want).enumerate() {
+                let usual = usual.of(q, want);
                 *debt = usual + (*debt - usual) / stays;
             }
         }
@@ -353,6 +357,15 @@ impl<'a> Strip<'a> {
             }
         }
         cell
+    }
+
+    /// Adds to `self.asks` what a unit that is not cut would be owed more among its like, but is not among cells that may be cut.
+    fn ask_whole(&mut self, size: usize, area: usize) {
+        let (like, cut) =
+            (Usual::new(&self.want, area, &[]), Usual::new(&self.want, area, self.chooser.small(size)));
+        for (q, (asks, &want)) in self.asks.iter_mut().zip(&self.want).enumerate() {
+            *asks += like.of(q, want) - cut.of(q, want);
+        }
     }
 
     /// Divides the slots of a block for cells of another side.

@@ -450,6 +450,43 @@ fn flat_mixtures_do_not_repeat() {
     }
 }
 
+/// Where cells may be cut into halves, the first and last rows of cells have the ink of the tone: in a document that varies, and
+/// beside foil, which takes whole cells.
+#[test]
+fn tones_of_cells_that_may_be_cut_begin_and_end_with_their_ink() {
+    const LONG: usize = 12_000;
+    for (shares, minimum, varies, within) in [
+        (vec![0.97, 0.03], vec![8; 2], 0.003, 0.2),
+        (vec![0.88, 0.12], vec![8; 2], 0.003, 0.08),
+        (vec![0.88, 0.12], vec![8; 2], 0.02, 0.08),
+        (vec![0.75, 0.25], vec![8; 2], 0.02, 0.05),
+        (vec![0.8, 0.1, 0.1], vec![8; 3], 0.01, 0.08),
+        (vec![0.6, 0.1, 0.2, 0.1], vec![8; 4], 0.01, 0.08),
+        (vec![0.8, 0.1, 0.1], vec![8, 8, 16], 0.0, 0.15),
+        (vec![0.6, 0.1, 0.2, 0.1], vec![8, 8, 8, 16], 0.0, 0.15),
+    ] {
+        let last = shares.len() - 1;
+        let mix = plain(LONG / 12, 8, shares.len(), |x, y| {
+            let mut shares = shares.clone();
+            let more = if (x + y) % 2 == 0 { varies } else { -varies };
+            (shares[0], shares[last]) = (shares[0] - more, shares[last] + more);
+            shares
+        });
+        let dots = cells(&mix, (LONG, 96), &minimum, None, &Silent);
+        for (stack, share) in shares.iter().enumerate() {
+            for top in [0, 4, 88, 92] {
+                let rows = &dots[top * LONG..(top + 4) * LONG];
+                let printed =
+                    rows.iter().filter(|&&dot| usize::from(dot) == stack).count() as f64 / rows.len() as f64;
+                assert!(
+                    (printed / share - 1.0).abs() < within,
+                    "{shares:?}, minimum {minimum:?}: {printed:.4} of {stack} in rows from {top}"
+                );
+            }
+        }
+    }
+}
+
 /// Tints in small boxes, which borders cut all around, keep their tones on average.
 #[test]
 fn boxes_of_a_tint_have_its_tone() {
