@@ -9,7 +9,7 @@
 //! and beside it have the same sign, as at the bottom of a lobe and never in alternating noise.
 //! Below the first sample f is even in theta, so `ln f` goes on as a parabola in theta; above the last one it is constant.
 //! Beside a sample that is 0, f is linear in x.
-//! Cost: six logarithms and an exponential a value. Error with 32 samples: a test of [`Curve`](crate::Curve) has it.
+//! Cost: seven logarithms and an exponential a value. Error with 32 samples: a test of [`Curve`](crate::Curve) has it.
 //! Limits: beyond an extremum a value may exceed the sample by 2/27 of the larger step to a neighbour, in ln f; beyond
 //! 81.7 degrees, the last but one of 32 samples, errors grow to 2 % (`docs/decisions/between-samples.md`).
 

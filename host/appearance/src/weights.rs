@@ -5,8 +5,8 @@
 
 use rayon::prelude::*;
 
-/// Pixels that a thread takes at a time.
-const RUN: usize = 1 << 14;
+/// Pixels that a thread takes at a time where weights are only read or moved.
+pub(crate) const RUN: usize = 1 << 14;
 
 /// Full weight. A power of two, so that products scale back by a shift.
 pub const ONE: u16 = 1 << 15;

@@ -7,10 +7,7 @@ use super::candidates::Candidates;
 use super::error::GamutError;
 use super::mix::InkMix;
 use crate::brdf::Table;
-use crate::weights::{ONE, WeightError, WeightMaps};
-
-/// Pixels that a thread takes at a time.
-const RUN: usize = 1 << 14;
+use crate::weights::{ONE, RUN, WeightError, WeightMaps};
 
 /// Drops the candidates that no pixel uses. Returns the identity as matrix and the maps of the others.
 pub(super) fn compact(

@@ -2,7 +2,7 @@
 //!
 //! Problem: a million constrained fits in the perceptual metric, which takes hours or days according to the 2009 paper.
 //! Method: each distinct material, in reading order, starts from the mixture of the most similar one of the last few hundred
-//! ([`Recent`]). Two or three steps, with eight stacks in the quadratic and the gradient of all stacks, reach a gap below
+//! ([`Recent`]). Two or three steps, with half a dozen stacks in the quadratic and the gradient of all stacks, reach a gap below
 //! 1e-7 in squared distance. Weights below 0.5 % are pruned and the others solved again. Each thread takes whole runs of fixed
 //! length, so the result does not depend on the number of threads.
 //! Cost: about 7 microseconds per distinct material and core. Limits: the start matters where E is not convex; there the

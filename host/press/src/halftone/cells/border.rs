@@ -4,7 +4,8 @@
 //! Method: in the midst of a tone rare stacks are owed something on average and common ones have had too much ([`Usual`]).
 //! Beyond the border cells would owe that too: it comes in where a tone begins and is forgotten where it ends, and only
 //! what differs from it stays inside. So a tone neither begins too light nor ends in a line of what was left over.
-//! Cost: a few operations a stack, for cells beside a border.
+//! Cost: a few operations a stack, for cells beside a border. Limits: fitted to stacks that are equally far apart;
+//! reflectance moves debts between stacks that look alike.
 
 use super::choose::NOISE;
 

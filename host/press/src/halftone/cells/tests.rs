@@ -450,8 +450,8 @@ fn flat_mixtures_do_not_repeat() {
     }
 }
 
-/// Where cells may be cut into halves, the first and last rows of cells have the ink of the tone: in a document that varies, and
-/// beside foil, which takes whole cells.
+/// Where cells may be cut into halves, the first and last rows of cells have the ink of the tone, all stacks equally far apart: in
+/// a document that varies, and beside foil, which takes whole cells.
 #[test]
 fn tones_of_cells_that_may_be_cut_begin_and_end_with_their_ink() {
     const LONG: usize = 12_000;
