@@ -8,7 +8,7 @@
 
 use crate::brdf::Table;
 
-use super::vector::wide;
+use crate::wide::wide;
 
 /// Rows of a block: four of the widest vectors that are used, which hides the time an addition takes.
 const LANES: usize = 16;
@@ -41,10 +41,10 @@ impl Columns {
     /// # Panics
     /// If the lengths differ.
     pub fn products(&self, x: &[f64], h: &mut [f64]) {
-        let it = self;
-        wide!(fn(it: &Columns, x: &[f64], h: &mut [f64]) -> () {
-            it.multiply(x, h);
-        })
+        wide(
+            #[inline(always)]
+            || self.multiply(x, h),
+        );
     }
 
     /// [`Columns::products`], to be inlined where wide vectors are in use already.

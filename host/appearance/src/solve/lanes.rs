@@ -19,7 +19,7 @@ use std::collections::VecDeque;
 use super::gram::Gram;
 use super::simplex::{Certificate, Simplex, SimplexError, TOLERANCE};
 use super::supports::{MOST_POINTS, Support, Supports, row};
-use super::vector::wide;
+use crate::wide::wide;
 
 /// Pixels that share each operation: two of the widest vectors that are used.
 const LANES: usize = 8;
@@ -179,10 +179,10 @@ impl Lanes {
     }
 
     fn batch(&mut self, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
-        let it = self;
-        wide!(fn(it: &mut Lanes, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
-            it.batch_plainly(h, a)
-        })
+        wide(
+            #[inline(always)]
+            || self.batch_plainly(h, a),
+        )
     }
 
     #[inline(always)]

@@ -17,7 +17,8 @@ use super::gram::Gram;
 use super::hull::{DARKEST, Hull, MixtureError, Target};
 use super::root::inverse_cbrt;
 use super::simplex::{Simplex, SimplexError, frank_wolfe_gap};
-use super::vector::{add_scaled, dot, wide};
+use super::vector::{add_scaled, dot};
+use crate::wide::wide;
 
 /// Relative drop of the objective below which the search ends.
 const DROP: f64 = 1e-12;
@@ -177,12 +178,10 @@ impl Mixer {
         metric: Linear,
         a: &mut [f64],
     ) -> Result<(), MixtureError> {
-        let it = self;
-        wide!(fn(
-            it: &mut Mixer, hull: &Hull, target: &Target, metric: Linear, a: &mut [f64],
-        ) -> Result<(), MixtureError> {
-            it.linear_plainly(hull, target, metric, a)
-        })
+        wide(
+            #[inline(always)]
+            || self.linear_plainly(hull, target, metric, a),
+        )
     }
 
     #[inline(always)]
@@ -251,12 +250,10 @@ impl Mixer {
         reach: Reach,
         enough: f64,
     ) -> Result<Fit, MixtureError> {
-        let it = self;
-        wide!(fn(
-            it: &mut Mixer, hull: &Hull, target: &Target, a: &mut [f64], reach: Reach, enough: f64,
-        ) -> Result<Fit, MixtureError> {
-            it.descend_plainly(hull, target, a, reach, enough)
-        })
+        wide(
+            #[inline(always)]
+            || self.descend_plainly(hull, target, a, reach, enough),
+        )
     }
 
     #[inline(always)]

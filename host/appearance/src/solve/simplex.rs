@@ -14,7 +14,8 @@
 //! Source: Lawson & Hanson 1974, chapter 23, with the equality kept exactly instead of by a heavily weighted row.
 
 use super::gram::Gram;
-use super::vector::{add_scaled, dot, dot_short, least, wide};
+use super::vector::{add_scaled, dot, dot_short, least};
+use crate::wide::wide;
 
 /// Reduced gradients within this share of the problem's scale count as zero: about a hundred roundings.
 pub(super) const TOLERANCE: f64 = 4e-14;
@@ -93,10 +94,10 @@ impl Simplex {
     /// Uses the widest vectors of the processor. The order of additions does not depend on the width, and neither does the
     /// result.
     pub fn solve(&mut self, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
-        let it = self;
-        wide!(fn(it: &mut Simplex, gram: &Gram, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
-            it.solve_plainly(gram, h, a)
-        })
+        wide(
+            #[inline(always)]
+            || self.solve_plainly(gram, h, a),
+        )
     }
 
     #[inline(always)]

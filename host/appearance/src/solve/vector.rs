@@ -3,26 +3,6 @@
 //! Eight running sums are added pairwise at the end. Every vector unit can use them, and the result is the same bit for bit,
 //! because the order of additions does not depend on the width of the vectors.
 
-/// Calls a function in the form compiled for the widest vectors of the processor: `wide!(fn(x: T, ...) -> R { body })`, with
-/// variables of these names in scope. The body multiplies and adds in separate steps, so that both forms give the same
-/// results bit for bit; what it calls must be inlined to gain.
-macro_rules! wide {
-    (fn($($name:ident: $kind:ty),* $(,)?) -> $result:ty $body:block) => {{
-        #[cfg(target_arch = "x86_64")]
-        {
-            #[target_feature(enable = "avx2")]
-            fn wide($($name: $kind),*) -> $result $body
-            if is_x86_feature_detected!("avx2") {
-                #[expect(unsafe_code, reason = "a call to code compiled for a processor feature")]
-                // SAFETY: the only requirement of `wide` is that the processor has AVX2, just detected.
-                return unsafe { wide($($name),*) };
-            }
-        }
-        $body
-    }};
-}
-pub(super) use wide;
-
 /// The inner product of two vectors, over the shorter length.
 #[inline(always)]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {

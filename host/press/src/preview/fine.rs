@@ -68,19 +68,44 @@ impl Fine {
     /// The entry below a chord, `2 sin(theta_h / 2)` from 0 to the root of 2, and the fraction of the way to the next entry, which exists.
     #[inline(always)]
     pub fn at(&self, chord: f32) -> (usize, f32) {
-        let step = (chord * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
-        let (k, s) = parts(step);
-        let place = self.places[k] + s * (self.places[k + 1] - self.places[k]);
-        parts(place)
+        let ([entry], [part]) = self.at_each(&[chord]);
+        (entry, part)
+    }
+
+    /// [`Fine::at`] for several chords, a lane each.
+    #[inline(always)]
+    pub fn at_each<const N: usize>(&self, chords: &[f32; N]) -> ([usize; N], [f32; N]) {
+        let mut steps = *chords;
+        for step in &mut steps {
+            *step = (*step * (STEPS as f32 * std::f32::consts::FRAC_1_SQRT_2)).min(STEPS as f32 - 0.5);
+        }
+        let (entries, parts) = split(&steps);
+        let mut places = parts;
+        for (place, k) in places.iter_mut().zip(entries) {
+            *place = self.places[k] + *place * (self.places[k + 1] - self.places[k]);
+        }
+        split(&places)
     }
 }
 
-/// The whole and the fractional part of a number from 0 up to a million. Without `fract`, which calls a function for every number
-/// where the processor's oldest kind cannot truncate.
+/// The whole and the fractional parts of numbers from 0 up to a million. Beside 2^23 the fraction has no digits left: adding
+/// it rounds, without a call or a branch for each lane, as truncation to whole numbers has.
 #[inline(always)]
-fn parts(number: f32) -> (usize, f32) {
-    let whole = number as i32;
-    (whole as usize, number - whole as f32)
+fn split<const N: usize>(numbers: &[f32; N]) -> ([usize; N], [f32; N]) {
+    const COARSE: f32 = (1 << 23) as f32;
+    let (mut whole, mut parts) = ([0; N], [0.0; N]);
+    for k in 0..N {
+        let rounded = numbers[k] + COARSE;
+        let part = numbers[k] - (rounded - COARSE);
+        let below = part < 0.0;
+        parts[k] = if below { part + 1.0 } else { part };
+        whole[k] = (rounded.to_bits() & 0x7f_ffff).wrapping_sub(u32::from(below));
+    }
+    let mut entries = [0; N];
+    for k in 0..N {
+        entries[k] = whole[k] as usize;
+    }
+    (entries, parts)
 }
 
 #[cfg(test)]

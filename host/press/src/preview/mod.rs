@@ -19,6 +19,7 @@ mod flat;
 pub mod inks;
 #[cfg(test)]
 mod light_table;
+mod light_tree;
 mod materials_picture;
 mod probe;
 mod radiance;

@@ -153,9 +153,34 @@ impl Probe {
 }
 
 /// The direction at column `u` and row `v`, both 0 to 1.
-pub(super) fn direction(u: f64, v: f64) -> [f64; 3] {
-    let (phi, t) = (2.0 * PI * u, PI * v);
-    [phi.sin() * t.sin(), t.cos(), -phi.cos() * t.sin()]
+fn direction(u: f64, v: f64) -> [f64; 3] {
+    towards((2.0 * PI * u).sin_cos(), (PI * v).sin_cos())
+}
+
+/// The direction with sines and cosines of its angles around the vertical and from it.
+fn towards(around: (f64, f64), down: (f64, f64)) -> [f64; 3] {
+    [around.0 * down.0, down.1, -around.1 * down.0]
+}
+
+/// Directions at every quarter of a texel, corners included, without sines and cosines for each.
+pub(super) struct Directions {
+    around: Vec<(f64, f64)>,
+    down: Vec<(f64, f64)>,
+}
+
+impl Directions {
+    /// The directions of a probe.
+    pub fn new(probe: &Probe) -> Directions {
+        let angles = |texels: usize, whole: f64| {
+            (0..=4 * texels).map(|i| (whole * i as f64 / (4 * texels) as f64).sin_cos()).collect()
+        };
+        Directions { around: angles(probe.width, 2.0 * PI), down: angles(probe.height, PI) }
+    }
+
+    /// The direction at a place, in quarters of a texel from the upper left corner.
+    pub fn at(&self, x: usize, y: usize) -> [f64; 3] {
+        towards(self.around[x], self.down[y])
+    }
 }
 
 /// A rectangular lamp: its direction, half its size as tangents, panes across and down, radiance.

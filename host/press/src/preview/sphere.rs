@@ -7,8 +7,7 @@
 //! Probe: the sum over texels of `f(theta_h) cos_i L dOmega` is linear in the curve. So the light of each pixel is gathered
 //! once, as a weight for every entry of a fine table of the curve (`fine`), and each material is the product of these weights
 //! and its own table.
-//! The texels form a quadtree. A node replaces its texels where the curve and the cosine hardly change over it.
-//! Cost: a pass over some hundreds of nodes for each pixel, for any number of materials.
+//! Cost: see [`LightTree`] for the light, and a product of tables for each pixel and material.
 //! Limits: highlights narrower than a texel show the texels; 128 rows are enough for the sharpest foil.
 
 use inks::Curve;
@@ -20,18 +19,15 @@ use observe::Observer;
 
 use super::error::{PreviewError, check_size};
 use super::fine::{ENTRIES, Fine};
-use super::probe::{Probe, direction};
+use super::light_tree::{Gathered, LightTree, NORMALS, distance, dot, half};
+use super::probe::Probe;
 use super::radiance::Radiance;
 
 /// Places along each axis of a pixel at which coverage and light from one direction are sampled.
 const SUBSAMPLES: usize = 4;
 
-/// A node replaces its texels if its half vectors spread over no more than this fraction of their angle to the normal. A test
-/// shows that every pixel stays within 1 % of the sum over single texels, for the sharpest foil and for paper.
-const OPENING: f32 = 0.12;
-
-/// Sine of the reach of the largest nodes that may cross the horizon of a normal.
-const HORIZON: f32 = 0.1;
+/// Pixels whose light is gathered together: across and down.
+const TILE: [usize; 2] = [4, NORMALS / 4];
 
 /// A `size` x `size` picture of a ball of `curve` under a distant light in direction `light` (any length), with irradiance 1
 /// where the surface faces it.
@@ -97,53 +93,68 @@ pub fn under_probe(
         return Ok(Vec::new());
     }
     observer.begin("lighting material balls", size as u64);
-    let tree = Tree::new(probe);
+    let tree = LightTree::new(probe);
     let fine = Fine::new();
     let tables: Vec<Planes> = rows.rows().map(|row| Planes::new(&fine.table(&space.curve(row)))).collect();
-    let lines: Vec<Vec<[f32; 4]>> = (0..size)
+    let places: Vec<usize> = (0..size).step_by(TILE[1]).collect();
+    let bands: Vec<Vec<[f32; 4]>> = places
         .into_par_iter()
-        .map_init(
-            || vec![[0.0f32; 3]; ENTRIES],
-            |light, y| {
-                wide(
-                    #[inline(always)]
-                    || {
-                        let mut line = vec![[0.0f32; 4]; size * rows.len()];
-                        for x in 0..size {
-                            let (mut nx, mut ny, mut count) = (0.0, 0.0, 0u8);
-                            subsamples(size, x, y, |sx, sy| {
-                                nx += sx;
-                                ny += sy;
+        .map_init(Gathered::default, |gathered, top| {
+            let lines = TILE[1].min(size - top);
+            let mut band = vec![[0.0f32; 4]; lines * size * rows.len()];
+            wide(
+                #[inline(always)]
+                || {
+                    for left in (0..size).step_by(TILE[0]) {
+                        let mut pixels = [(0, 0.0); NORMALS];
+                        let mut normals = [[0.0; 3]; NORMALS];
+                        let mut count = 0;
+                        for (x, y) in
+                            (0..lines).flat_map(|y| (left..size.min(left + TILE[0])).map(move |x| (x, y)))
+                        {
+                            if let Some((normal, covered)) = facing(size, x, top + y) {
+                                pixels[count] = (y * size + x, covered);
+                                normals[count] = normal;
                                 count += 1;
-                            });
-                            if count == 0 {
-                                continue;
-                            }
-                            let (nx, ny) = (nx / f64::from(count), ny / f64::from(count));
-                            let n = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()];
-                            light.fill([0.0; 3]);
-                            tree.gather(n.map(|v| v as f32), &fine, OPENING, light);
-                            let gathered = Planes::new(light);
-                            let covered = f32::from(count) / (SUBSAMPLES * SUBSAMPLES) as f32;
-                            for (table, line) in tables.iter().zip(line.chunks_exact_mut(size)) {
-                                let [r, g, b] = gathered.product(table).map(|sum| sum * covered);
-                                line[x] = [r, g, b, covered];
                             }
                         }
-                        observer.advance(1);
-                        line
-                    },
-                )
-            },
-        )
+                        tree.gather(&normals[..count], &fine, gathered);
+                        for (k, &(pixel, covered)) in pixels[..count].iter().enumerate() {
+                            let light = Planes::new(gathered.of(k));
+                            for (table, ball) in tables.iter().zip(band.chunks_exact_mut(lines * size)) {
+                                let [r, g, b] = light.product(table).map(|sum| sum * covered);
+                                ball[pixel] = [r, g, b, covered];
+                            }
+                        }
+                    }
+                },
+            );
+            observer.advance(lines as u64);
+            band
+        })
         .collect();
     observer.end();
-    let ball = |i: usize| Radiance {
-        width: size,
-        height: size,
-        pixels: lines.iter().flat_map(|line| line[i * size..][..size].iter().copied()).collect(),
+    let ball = |i: usize| {
+        let parts = bands.iter().flat_map(|band| band.chunks_exact(band.len() / rows.len()).nth(i));
+        Radiance { width: size, height: size, pixels: parts.flatten().copied().collect() }
     };
     Ok((0..rows.len()).map(ball).collect())
+}
+
+/// The mean normal of what a pixel shows of the ball, and the part of the pixel that is covered; `None` beside the ball.
+fn facing(size: usize, x: usize, y: usize) -> Option<([f32; 3], f32)> {
+    let (mut nx, mut ny, mut count) = (0.0, 0.0, 0u8);
+    subsamples(size, x, y, |sx, sy| {
+        nx += sx;
+        ny += sy;
+        count += 1;
+    });
+    if count == 0 {
+        return None;
+    }
+    let (nx, ny) = (nx / f64::from(count), ny / f64::from(count));
+    let normal = [nx, ny, (1.0 - nx * nx - ny * ny).max(0.0).sqrt()].map(|v| v as f32);
+    Some((normal, f32::from(count) / (SUBSAMPLES * SUBSAMPLES) as f32))
 }
 
 /// Calls `inside` for every sub-sample of pixel (x, y) on the ball.
@@ -160,152 +171,13 @@ fn subsamples(size: usize, x: usize, y: usize, mut inside: impl FnMut(f64, f64))
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let d = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    dot(d, d).sqrt()
-}
-
-/// The half vector of a unit direction and the eye. For light from straight behind, some vector across the view.
-fn half(l: [f64; 3]) -> [f64; 3] {
-    let h = [l[0], l[1], l[2] + 1.0];
-    let length = dot(h, h).sqrt();
-    if length < 1e-6 { [1.0, 0.0, 0.0] } else { h.map(|v| v / length) }
-}
-
-/// A texel of a probe, or a group of them.
-struct Node {
-    /// Unit direction of the light, weighted by radiance.
-    towards: [f32; 3],
-    /// Its half vector with the eye.
-    half: [f32; 3],
-    /// Sum of radiance times solid angle.
-    light: [f32; 3],
-    /// Greatest sine of the angle between `towards` and the node's corners.
-    reach: f32,
-    /// Greatest distance between `half` and the half vectors at the corners; 0 for single texels.
-    spread: f32,
-    /// The node after this one's descendants.
-    next: u32,
-}
-
-/// A quadtree of nodes, each followed by its descendants.
-struct Tree {
-    nodes: Vec<Node>,
-}
-
-impl Tree {
-    fn new(probe: &Probe) -> Tree {
-        let mut tree = Tree { nodes: Vec::with_capacity(probe.rgb().len() * 4 / 3 + 64) };
-        tree.add(probe, [0, probe.width()], [0, probe.height()]);
-        tree
-    }
-
-    /// Adds the node of columns `x` and rows `y` (start, end) with its descendants. Each recursion halves the longer side, so
-    /// the depth is the logarithm of the number of texels.
-    fn add(&mut self, probe: &Probe, x: [usize; 2], y: [usize; 2]) {
-        let (mut light, mut mean, mut total) = ([0.0f64; 3], [0.0f64; 3], 0.0);
-        for row in y[0]..y[1] {
-            let omega = probe.solid_angle(row);
-            for column in x[0]..x[1] {
-                let texel = probe.rgb()[row * probe.width() + column].map(f64::from);
-                let d = probe.direction(column, row);
-                // Black texels have a tiny weight, because a dark node needs a direction, too.
-                let weight = omega * (texel.iter().sum::<f64>() + 1e-9);
-                total += weight;
-                for c in 0..3 {
-                    light[c] += omega * texel[c];
-                    mean[c] += weight * d[c];
-                }
-            }
-        }
-        let single = x[1] - x[0] == 1 && y[1] - y[0] == 1;
-        let length = dot(mean, mean).sqrt();
-        // Directions may cancel. Such a node is always opened, so its direction does not matter.
-        let scattered = length < 0.3 * total;
-        let towards = if length > 1e-12 * total { mean.map(|v| v / length) } else { [0.0, 1.0, 0.0] };
-        let h = half(towards);
-        let (mut reach, mut spread) = (0.0f64, 0.0f64);
-        if !single {
-            for j in 0..=4 {
-                for i in 0..=4 {
-                    let part = |r: [usize; 2], k: usize, n: usize| {
-                        (r[0] as f64 + (r[1] - r[0]) as f64 * k as f64 / 4.0) / n as f64
-                    };
-                    let d = direction(part(x, i, probe.width()), part(y, j, probe.height()));
-                    reach = reach.max(distance(d, towards));
-                    spread = spread.max(distance(half(d), h));
-                }
-            }
-            if scattered {
-                (reach, spread) = (2.0, 2.0);
-            }
-        }
-        let here = self.nodes.len();
-        self.nodes.push(Node {
-            towards: towards.map(|v| v as f32),
-            half: h.map(|v| v as f32),
-            light: light.map(|v| v as f32),
-            reach: reach as f32,
-            spread: spread as f32,
-            next: 0,
-        });
-        if !single {
-            let middle = |r: [usize; 2]| r[0] + (r[1] - r[0]) / 2;
-            if x[1] - x[0] >= y[1] - y[0] {
-                let m = middle(x);
-                self.add(probe, [x[0], m], y);
-                self.add(probe, [m, x[1]], y);
-            } else {
-                let m = middle(y);
-                self.add(probe, x, [y[0], m]);
-                self.add(probe, x, [m, y[1]]);
-            }
-        }
-        self.nodes[here].next = self.nodes.len() as u32;
-    }
-
-    /// Adds the light on normal `n` to the entries of a table.
-    #[inline(always)]
-    fn gather(&self, n: [f32; 3], fine: &Fine, opening: f32, light: &mut [[f32; 3]]) {
-        let mut i = 0;
-        while let Some(node) = self.nodes.get(i) {
-            let cos_i = n[0] * node.towards[0] + n[1] * node.towards[1] + n[2] * node.towards[2];
-            if cos_i <= -node.reach {
-                i = node.next as usize;
-                continue;
-            }
-            let d = [n[0] - node.half[0], n[1] - node.half[1], n[2] - node.half[2]];
-            let chord = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-            // The cosine has a kink at the horizon, so only small nodes may cross it.
-            let horizon = cos_i > node.reach || node.reach < HORIZON;
-            if node.spread > 0.0 && !(horizon && node.spread <= opening * chord) {
-                i += 1;
-                continue;
-            }
-            if cos_i > 0.0 {
-                let (k, s) = fine.at(chord);
-                let (near, far) = (cos_i * (1.0 - s), cos_i * s);
-                (0..3).for_each(|c| {
-                    light[k][c] += near * node.light[c];
-                    light[k + 1][c] += far * node.light[c];
-                });
-            }
-            i = node.next as usize;
-        }
-    }
-}
-
 /// A table with each channel by itself, so that products run in lanes.
 struct Planes([[f32; ENTRIES]; 3]);
 
 const LANES: usize = 8;
 
 impl Planes {
-    fn new(entries: &[[f32; 3]]) -> Planes {
+    fn new<const N: usize>(entries: &[[f32; N]]) -> Planes {
         let mut planes = Planes([[0.0; ENTRIES]; 3]);
         for (k, entry) in entries.iter().enumerate() {
             (0..3).for_each(|c| planes.0[c][k] = entry[c]);
