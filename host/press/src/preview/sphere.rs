@@ -7,7 +7,7 @@
 //! Probe: the sum over texels of `f(theta_h) cos_i L dOmega` is linear in the curve. So the light of each pixel is gathered
 //! once, as a weight for every entry of a fine table of the curve (`fine`), and each material is the product of these weights
 //! and its own table.
-//! Cost: see [`LightTree`] for the light, and a product of tables for each pixel and material.
+//! Cost: see `LightTree` for the light, and a product of tables for each pixel and material.
 //! Limits: highlights narrower than a texel show the texels; 128 rows are enough for the sharpest foil.
 
 use inks::Curve;
