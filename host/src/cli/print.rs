@@ -19,7 +19,7 @@ use super::preview::shown::{Page, Shown};
 use super::preview::view::ViewArgs;
 use super::progress::Beside;
 use super::report;
-use appearance::brdf::{Table, reflectances};
+use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::factor::{self, Factored};
 use appearance::gamut::Gain;
@@ -29,7 +29,7 @@ use press::halftone::metrics::{self, Look, Tone};
 use press::layout::{Layout, Mm, Size};
 use press::pipeline::document::{self, Halftoned, Settings};
 use press::pipeline::{self, Draft, Request};
-use press::preview::{self, EYE, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
+use press::preview::{self, EYE, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
 use press::sheet::Area;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
@@ -213,7 +213,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         },
     );
     let (made, pictures, halftone, looked_at) = (made?, seen.0?, seen.1.0?, seen.1.1?);
-    let sheet = pictures.sheet(&laid, made.job.draft.separation.passes.len(), observer)?;
+    let sheet = pictures.sheet(&laid, made.job.draft.separation.passes.len())?;
     let save = |name: &str, picture: &RgbImage| {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
     };
@@ -250,16 +250,15 @@ fn shown(laid: &Laid, observer: &dyn Observer) -> Result<Page> {
 }
 
 /// What there is to look at, and how far print and document are apart.
-struct Pictures<'a> {
-    target: Source<'a>,
-    /// The reflectance of the stacks of the dots.
-    stacks: Table,
+struct Pictures {
+    /// Document and print side by side.
+    sheet: Panels<'static>,
     materials: RgbImage,
     fidelity: preview::Report,
 }
 
-impl<'a> Pictures<'a> {
-    fn new(laid: &'a Laid, probe: &Probe, observer: &dyn Observer) -> Result<Pictures<'a>> {
+impl Pictures {
+    fn new(laid: &Laid, probe: &Probe, observer: &dyn Observer) -> Result<Pictures> {
         let Laid { document, library, halftoned, .. } = laid;
         let space = document.materials().space();
         let stacks = reflectances(halftoned.dots.stacks(), library, space);
@@ -267,7 +266,11 @@ impl<'a> Pictures<'a> {
             Some(factored) => Source::Factored(factored),
             None => Source::Document(document.materials()),
         };
-        let (printed, area) = printed(laid, &stacks);
+        // The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what
+        // mirror and printer profile do to the page is undone on paper.
+        let dots = &halftoned.dots;
+        let area = Area::whole(dots);
+        let printed = Source::Print { dots, space, stacks: &stacks, area };
         let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
         let mapped = &halftoned.mapped.report;
         let kind = kind(laid);
@@ -281,13 +284,14 @@ impl<'a> Pictures<'a> {
             })
             .collect();
         let materials = preview::materials_picture(space, &swatches, probe, BALL, observer)?;
-        Ok(Pictures { target, stacks, materials, fidelity })
+        let sheet = Panels::lit(&target, &printed, &STANDARD_LIGHTS, PANEL, observer)?;
+        Ok(Pictures { sheet, materials, fidelity })
     }
 
     /// Document and print side by side, with the number of passes below.
-    fn sheet(&self, laid: &Laid, passes: usize, observer: &dyn Observer) -> Result<RgbImage> {
-        let (printed, area) = printed(laid, &self.stacks);
-        let (width, height) = (Mm::of_dots(area.width as i64).0, Mm::of_dots(area.length as i64).0);
+    fn sheet(&self, laid: &Laid, passes: usize) -> Result<RgbImage> {
+        let dots = &laid.halftoned.dots;
+        let (width, height) = (Mm::of_dots(dots.width() as i64).0, Mm::of_dots(dots.length() as i64).0);
         let notes = [
             format!("{width:.0} x {height:.0} mm, {passes} passes"),
             format!(
@@ -295,17 +299,8 @@ impl<'a> Pictures<'a> {
                 self.fidelity.mean, self.fidelity.p95
             ),
         ];
-        let name = &laid.document.name;
-        Ok(preview::sheet_picture(&self.target, &printed, &STANDARD_LIGHTS, PANEL, name, &notes, observer)?)
+        Ok(self.sheet.picture(&laid.document.name, &notes)?)
     }
-}
-
-/// The document by itself: the simulated page was compared dot for dot with the one laid out from it, and what mirror and
-/// printer profile do to the page is undone on paper.
-fn printed<'a>(laid: &'a Laid, stacks: &'a Table) -> (Source<'a>, Area) {
-    let dots = &laid.halftoned.dots;
-    let area = Area::whole(dots);
-    (Source::Print { dots, space: laid.document.materials().space(), stacks, area }, area)
 }
 
 /// What the materials of a report are.

@@ -2,8 +2,10 @@
 //!
 //! Problem: a clamped document has no bases, yet people want to see what becomes of its materials.
 //! Method: greedy k-medoids. Of sampled pixels, the one is added that brings the others nearest to one that is there, in
-//! mean squared distance, until all are near or there are enough. Cost: `O(MOST n^2)` distances.
+//! mean squared distance, until all are near or there are enough. Cost: `O(MOST n^2)` distances, on all cores.
 //! Limits: a material on less than a few hundredths of the document may not be among them.
+
+use rayon::prelude::*;
 
 use crate::brdf::{Space, Table};
 
@@ -24,8 +26,8 @@ pub(super) fn rows(space: &Space, sample: &Table) -> (Table, Vec<f64>) {
     while chosen.len() < MOST.min(seen.len()) {
         let left =
             |new: usize| nearest.iter().enumerate().map(|(i, old)| old.0.min(apart(i, new))).sum::<f64>();
-        let sums = (0..seen.len()).map(|new| (left(new), new));
-        let Some((_, new)) = sums.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        let sums: Vec<f64> = (0..seen.len()).into_par_iter().map(left).collect();
+        let Some(new) = (0..sums.len()).min_by(|&a, &b| sums[a].total_cmp(&sums[b])) else { break };
         for (i, old) in nearest.iter_mut().enumerate() {
             let d = apart(i, new);
             if d < old.0 {

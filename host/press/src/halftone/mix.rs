@@ -10,6 +10,8 @@
 //! Cost: channels x stacks multiplications a stretch, eight at a time; stacks and channels without any weight are
 //! left out. Memory: a table of a few bytes for each half dot of the two sides.
 
+use std::ops::Range;
+
 use protocol::walk::{EDGE, MOST, Tile, Walk};
 
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
@@ -101,6 +103,20 @@ impl Axis {
             spans.push((first as u32, start as u32, parts.len() as u32));
         }
         Axis::Over { spans, parts }
+    }
+
+    /// The first pixel under a range of dots, and into `out` what falls on it and on each of the next.
+    pub(super) fn sum(&self, dots: Range<usize>, out: &mut Vec<u64>) -> usize {
+        out.clear();
+        let mut first = usize::MAX;
+        for dot in dots {
+            self.parts(2 * dot + 1, |pixel, part| {
+                first = first.min(pixel);
+                out.resize(out.len().max(pixel - first + 1), 0);
+                out[pixel - first] += part;
+            });
+        }
+        first
     }
 
     /// Calls `with(pixel, part)`; the parts sum to [`Axis::FULL`].
@@ -242,20 +258,31 @@ impl<'a> Lattice<'a> {
         }
     }
 
-    /// What a tile asks for of each of `stacks`, in dots: the sum of the exact shares of its stretches.
+    /// What a tile asks for of each of `stacks`, in dots: the sum over its dots, each at its own place. Every pixel is read once.
     #[inline(always)]
     pub(super) fn asked(&self, tile: &Tile) -> Vec<f64> {
-        let mut along = self.along(std::iter::once(*tile));
-        let mut sums = vec![0u64; self.mix.maps.channels()];
-        while let Some(dots) = along.read() {
-            for (sum, &weight) in sums.iter_mut().zip(&along.weights) {
-                *sum += u64::from(dots) * u64::from(weight);
+        let maps = &self.mix.maps;
+        let (mut across, mut down) = (Vec::new(), Vec::new());
+        let range = |from: u16, dots: u16| usize::from(from)..usize::from(from) + usize::from(dots);
+        let (left, top) = (
+            self.across.sum(range(tile.x, tile.w), &mut across),
+            self.down.sum(range(tile.y, tile.h), &mut down),
+        );
+        // At most ONE times the parts of the tile's dots: 2^15 * 2^36.
+        let mut sums = vec![0u64; maps.channels()];
+        for (y, &part_y) in (top..).zip(&down) {
+            let pixels =
+                maps.data()[(y * maps.width() + left) * maps.channels()..].chunks_exact(maps.channels());
+            for (pixel, &part_x) in pixels.zip(&across) {
+                for (sum, &weight) in sums.iter_mut().zip(pixel) {
+                    *sum += part_x * part_y * u64::from(weight);
+                }
             }
         }
-        let unit = f64::from(WEIGHT) * f64::from(ONE);
+        let unit = (f64::from(Axis::FULL) * f64::from(ONE)).powi(2);
         let share = |&q: &u8| {
-            let shares = self.mix.matrix.iter().map(|shares| u64::from(shares[usize::from(q)]));
-            sums.iter().zip(shares).map(|(sum, share)| sum * share).sum::<u64>() as f64 / unit
+            let shares = self.mix.matrix.iter().map(|shares| f64::from(shares[usize::from(q)]));
+            sums.iter().zip(shares).map(|(&sum, share)| sum as f64 * share).sum::<f64>() / unit
         };
         self.stacks.iter().map(share).collect()
     }

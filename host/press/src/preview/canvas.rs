@@ -8,6 +8,7 @@ use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, Size};
 use embedded_graphics::text::{Baseline, Text};
 use image::{Rgb, RgbImage};
+use rayon::prelude::*;
 
 use super::error::{PreviewError, check_size};
 use super::radiance::Radiance;
@@ -79,18 +80,17 @@ impl Canvas {
     /// Draws radiance over the background with its top left corner at (x, y).
     pub fn paste(&mut self, x: usize, y: usize, picture: &Radiance, exposure: Exposure) {
         let ground = linear(GROUND);
-        for (j, row) in picture.pixels.chunks_exact(picture.width).enumerate() {
-            for (i, &[r, g, b, covered]) in row.iter().enumerate() {
-                let (px, py) = ((x + i) as u32, (y + j) as u32);
-                if covered <= 0.0 || px >= self.image.width() || py >= self.image.height() {
-                    continue;
-                }
+        let (width, stride) = (picture.width.max(1), 3 * self.image.width() as usize);
+        let lines = self.image.par_chunks_exact_mut(stride.max(1)).skip(y);
+        lines.zip(picture.pixels.par_chunks_exact(width)).for_each(|(line, row)| {
+            let visible = line.as_chunks_mut::<3>().0.iter_mut().skip(x);
+            for (out, &[r, g, b, covered]) in visible.zip(row).filter(|(_, pixel)| pixel[3] > 0.0) {
                 // Tone mapping applies to the covered part; the result is then blended at the edge.
                 let shown = exposure.shown([r, g, b].map(|v| v / covered));
                 let blend = |c: usize| shown[c] * covered + ground[c] * (1.0 - covered);
-                self.image.put_pixel(px, py, Rgb(srgb([blend(0), blend(1), blend(2)])));
+                *out = srgb([blend(0), blend(1), blend(2)]);
             }
-        }
+        });
     }
 }
 

@@ -7,7 +7,7 @@
 //!
 //! [`sphere`] lights balls, [`Probe`] is the light around them, [`Source`] gives the reflectance of a document or a
 //! sheet at each pixel, [`flat()`] lights it, [`fidelity()`] compares two sources as the eye does, and
-//! [`sheet_picture()`] and [`materials_picture()`] lay the results out.
+//! [`Panels`] and [`materials_picture()`] lay the results out.
 
 mod canvas;
 #[cfg(test)]
@@ -38,7 +38,7 @@ pub use flat::{Light, flat};
 pub use materials_picture::{Swatch, materials_picture, mix_in_words};
 pub use probe::Probe;
 pub use radiance::Radiance;
-pub use sheet_picture::{STANDARD_LIGHTS, sheet_picture};
+pub use sheet_picture::{Panels, STANDARD_LIGHTS};
 pub use source::Source;
 pub use spectrum::{Spectrum, spectrum};
 pub use tone::Exposure;

@@ -31,53 +31,69 @@ const MAGNIFIED: usize = 5;
 /// Candidate places for the close-up, across and down.
 const PLACES: usize = 24;
 
-/// Lays out target and print under each of `lights`. Panels have the print's proportions, and `longest` pixels on their
-/// longer side. `title` stands above the picture and `notes` below it, one line each.
-///
-/// # Errors
-/// Those of [`flat()`], or a picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
-pub fn sheet_picture(
-    target: &Source,
-    print: &Source,
-    lights: &[(&str, Light)],
-    longest: usize,
-    title: &str,
-    notes: &[String],
-    observer: &dyn Observer,
-) -> Result<RgbImage, PreviewError> {
-    check_size(longest, longest)?;
-    let (width, height) = print.fit(longest);
-    let only: Vec<Light> = lights.iter().map(|l| l.1).collect();
-    let mut rows = vec![
-        ("target", flat(target, &only, width, height, observer)?),
-        ("print, simulated", flat(print, &only, width, height, observer)?),
-    ];
-    if let Some(panels) = close_up(print, &only, width, height, observer)? {
-        rows.push(("the print's dots", panels));
-    }
-    let exposure = Exposure::of(&rows[0].1);
+/// Target, print and its dots under each of some lights, not yet laid out.
+pub struct Panels<'a> {
+    lights: &'a [(&'a str, Light)],
+    width: usize,
+    height: usize,
+    rows: Vec<(&'static str, Vec<Radiance>)>,
+}
 
-    let head = GAP + Letters::Title.height() + GAP;
-    let label = Letters::Plain.height() + 6;
-    let foot = notes.len() * (Letters::Small.height() + 3) + GAP;
-    let wide = GAP + lights.len().max(1) * (width + GAP);
-    let mut canvas = Canvas::new(wide, head + rows.len() * (label + height + GAP) + foot)?;
-    canvas.text(GAP, GAP, Letters::Title, INK, title);
-    for (r, (name, panels)) in rows.iter().enumerate() {
-        let top = head + r * (label + height + GAP);
-        for (i, (panel, (light, _))) in panels.iter().zip(lights).enumerate() {
-            let left = GAP + i * (width + GAP);
-            let room = width / Letters::Plain.width();
-            let words = if i == 0 { format!("{name} · {light}") } else { (*light).to_string() };
-            canvas.text(left, top, Letters::Plain, INK, &shortened(&words, room));
-            canvas.paste(left, top + label, panel, exposure);
+impl<'a> Panels<'a> {
+    /// Lights target and print. Panels have the print's proportions, and `longest` pixels on their longer side.
+    ///
+    /// # Errors
+    /// Those of [`flat()`].
+    pub fn lit(
+        target: &Source,
+        print: &Source,
+        lights: &'a [(&'a str, Light)],
+        longest: usize,
+        observer: &dyn Observer,
+    ) -> Result<Panels<'a>, PreviewError> {
+        check_size(longest, longest)?;
+        let (width, height) = print.fit(longest);
+        let only: Vec<Light> = lights.iter().map(|l| l.1).collect();
+        let mut rows = vec![
+            ("target", flat(target, &only, width, height, observer)?),
+            ("print, simulated", flat(print, &only, width, height, observer)?),
+        ];
+        if let Some(panels) = close_up(print, &only, width, height, observer)? {
+            rows.push(("the print's dots", panels));
         }
+        Ok(Panels { lights, width, height, rows })
     }
-    let below = head + rows.len() * (label + height + GAP);
-    for (i, note) in notes.iter().enumerate() {
-        canvas.text(GAP, below + i * (Letters::Small.height() + 3), Letters::Small, FAINT, note);
+
+    /// Lays them out. `title` stands above the picture and `notes` below it, one line each.
+    ///
+    /// # Errors
+    /// A picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
+    pub fn picture(&self, title: &str, notes: &[String]) -> Result<RgbImage, PreviewError> {
+        let &Panels { lights, width, height, ref rows } = self;
+        let exposure = Exposure::of(&rows[0].1);
+
+        let head = GAP + Letters::Title.height() + GAP;
+        let label = Letters::Plain.height() + 6;
+        let foot = notes.len() * (Letters::Small.height() + 3) + GAP;
+        let wide = GAP + lights.len().max(1) * (width + GAP);
+        let mut canvas = Canvas::new(wide, head + rows.len() * (label + height + GAP) + foot)?;
+        canvas.text(GAP, GAP, Letters::Title, INK, title);
+        for (r, (name, panels)) in rows.iter().enumerate() {
+            let top = head + r * (label + height + GAP);
+            for (i, (panel, (light, _))) in panels.iter().zip(lights).enumerate() {
+                let left = GAP + i * (width + GAP);
+                let room = width / Letters::Plain.width();
+                let words = if i == 0 { format!("{name} · {light}") } else { (*light).to_string() };
+                canvas.text(left, top, Letters::Plain, INK, &shortened(&words, room));
+                canvas.paste(left, top + label, panel, exposure);
+            }
+        }
+        let below = head + rows.len() * (label + height + GAP);
+        for (i, note) in notes.iter().enumerate() {
+            canvas.text(GAP, below + i * (Letters::Small.height() + 3), Letters::Small, FAINT, note);
+        }
+        Ok(canvas.finish())
     }
-    Ok(canvas.finish())
 }
 
 /// The dots of a sheet, magnified [`MAGNIFIED`] times, as `width` x `height` pixels under each of `lights`. `None` for
@@ -156,8 +172,10 @@ mod tests {
             area: Area::whole(sheet.dots()),
         };
         let notes = ["a note".to_string()];
-        let picture =
-            sheet_picture(&print, &print, &STANDARD_LIGHTS, 60, "a sheet", &notes, &Silent).unwrap();
+        let picture = Panels::lit(&print, &print, &STANDARD_LIGHTS, 60, &Silent)
+            .unwrap()
+            .picture("a sheet", &notes)
+            .unwrap();
         assert_eq!(picture.width() as usize, GAP + 4 * (60 + GAP));
         let first = (2 * GAP + Letters::Title.height() + Letters::Plain.height() + 6) as u32;
         let step = (Letters::Plain.height() + 6 + 40 + GAP) as u32;

@@ -25,17 +25,9 @@ struct Spans {
 impl Spans {
     fn new(axis: &Axis, dots: usize, size: usize) -> Spans {
         let (mut from, mut parts) = (Vec::with_capacity(dots.div_ceil(size) + 1), Vec::new());
-        let mut sums: Vec<u64> = Vec::new();
+        let mut sums = Vec::new();
         for start in (0..dots).step_by(size) {
-            let mut first = usize::MAX;
-            sums.clear();
-            for dot in start..(start + size).min(dots) {
-                axis.parts(2 * dot + 1, |pixel, part| {
-                    first = first.min(pixel);
-                    sums.resize(sums.len().max(pixel - first + 1), 0);
-                    sums[pixel - first] += part;
-                });
-            }
+            let first = axis.sum(start..(start + size).min(dots), &mut sums);
             from.push((first as u32, parts.len() as u32));
             parts.extend(sums.iter().map(|&sum| sum as f32 / Axis::FULL as f32));
         }
@@ -158,8 +150,69 @@ impl<'a> Field<'a> {
         most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max().unwrap_or(0)
     }
 
+    /// On each dot of a window, row by row: the mean of `points` over its mixture, of which there is one for each stack of the
+    /// mix. And whether all pixels under the window are alike.
+    #[inline(always)]
+    pub(in crate::halftone) fn points(
+        &self,
+        (left, top): (usize, usize),
+        (width, height): (usize, usize),
+        points: &[[f32; 4]],
+    ) -> (Vec<[f32; 4]>, bool) {
+        let (maps, unit) = (&self.mix.maps, f32::from(ONE) * f32::from(ONE));
+        let of_channel = |shares: &Vec<u16>| {
+            let mut sum = [0.0; 4];
+            for (point, &share) in points.iter().zip(shares).filter(|(_, share)| **share > 0) {
+                (0..4).for_each(|c| sum[c] += f32::from(share) / unit * point[c]);
+            }
+            sum
+        };
+        let channels: Vec<[f32; 4]> = self.mix.matrix.iter().map(of_channel).collect();
+        let (across, down) = (&self.across[0].1, &self.down[0].1);
+        let (from, to) = (across.pixels(left).0, across.pixels(left + width - 1).1);
+        let row = |y: usize| {
+            maps.data()[(y * maps.width() + from) * channels.len()..][..(to - from) * channels.len()]
+                .chunks_exact(channels.len())
+        };
+        let first = maps.at(down.pixels(top).0 * maps.width() + from);
+        // Neighbouring rows of dots share their rows of pixels.
+        let mut same = true;
+        let mut kept = [(usize::MAX, vec![[0.0; 4]; to - from]), (usize::MAX, vec![[0.0; 4]; to - from])];
+        let mut sums = vec![[0.0; 4]; to - from];
+        let mut out = Vec::with_capacity(width * height);
+        for y in top..top + height {
+            sums.fill([0.0; 4]);
+            let (above, parts) = down.get(y);
+            for (y, &part) in (above..).zip(parts) {
+                let (of, values) = &mut kept[y % 2];
+                if *of != y {
+                    *of = y;
+                    for (value, weights) in values.iter_mut().zip(row(y)) {
+                        same &= weights == first;
+                        *value = [0.0; 4];
+                        for (&weight, channel) in weights.iter().zip(&channels) {
+                            (0..4).for_each(|c| value[c] += f32::from(weight) * channel[c]);
+                        }
+                    }
+                }
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    (0..4).for_each(|c| sum[c] += part * value[c]);
+                }
+            }
+            for x in left..left + width {
+                let (pixel, parts) = across.get(x);
+                let mut mean = [0.0; 4];
+                for (sum, &part) in sums[pixel - from..].iter().zip(parts) {
+                    (0..4).for_each(|c| mean[c] += part * sum[c]);
+                }
+                out.push(mean);
+            }
+        }
+        (out, same)
+    }
+
     /// Adds what one dot asks for, in dots.
-    pub(super) fn add_dot(&self, x: usize, y: usize, scratch: &mut Vec<f32>, out: &mut [f32]) {
+    pub(in crate::halftone) fn add_dot(&self, x: usize, y: usize, scratch: &mut Vec<f32>, out: &mut [f32]) {
         let (across, down) = (&self.across[0].1, &self.down[0].1);
         let ((left, parts_x), (top, parts_y)) = (across.get(x), down.get(y));
         let (maps, count) = (&self.mix.maps, self.mix.maps.channels());

@@ -295,15 +295,7 @@ fn halves_keep_tones_and_the_search_sees_less() {
     }
     let solids = Solids::new(&mix, side, side, None);
     let field = super::field::Field::new(&mix, side, side, &[], &solids);
-    let (mut row, mut want) = (super::field::Row::default(), vec![0.0; field.lanes]);
-    let mut asked = Vec::new();
-    for y in 0..side {
-        field.row(1, y, &mut row);
-        for x in 0..side {
-            field.cell(1, x, &mut row, &mut want);
-            asked.push((0..4).map(|c| (0..4).map(|q| want[q] * points[q][c]).sum()).collect::<Vec<f32>>());
-        }
-    }
+    let (asked, _) = field.points((0, 0), (side, side), &points);
     let seen = |dots: &[u8]| {
         let error = |c: usize| {
             let dots = dots.iter().zip(&asked);
@@ -371,6 +363,41 @@ proptest! {
         for stack in 0..shares.len() {
             let (rows, columns) = swing(SIDE, sheet.index(), stack as u8, side);
             prop_assert!(rows < 1.05 && columns < 1.05, "{} swings by {rows:.2} and {columns:.2}", mix.stacks[stack]);
+        }
+    }
+}
+
+proptest! {
+    /// Windows of documents coarser and finer than the dots, dot by dot through the shares of stacks.
+    #[test]
+    fn what_a_window_asks_for_is_what_its_dots_do(
+        pixels in (1usize..40, 1usize..40), dots in (1usize..60, 1usize..60), at in (0.0f64..1.0, 0.0f64..1.0),
+        flat in any::<bool>(), seed in any::<u64>(),
+    ) {
+        let mix = plain(pixels.0, pixels.1, 4, |x, y| {
+            let (x, y) = if flat { (0, 0) } else { (x, y) };
+            (0..4).map(|q| if q == 2 { 0.0 } else { 0.1 + noise(seed, x, y, q) }).collect()
+        });
+        let points = [[0.5, 0.1, 0.2, 0.9], [0.1, 0.7, 0.3, 0.2], [5.0; 4], [0.3, 0.0, 0.8, 0.4]];
+        let part = |dots: usize, at: f64| {
+            let from = (dots as f64 * at) as usize;
+            (from, (dots - from).div_ceil(2))
+        };
+        let ((left, width), (top, height)) = (part(dots.0, at.0), part(dots.1, at.1));
+        let solids = Solids::new(&mix, dots.0, dots.1, None);
+        let field = super::field::Field::new(&mix, dots.0, dots.1, &[], &solids);
+        let (found, same) = field.points((left, top), (width, height), &points);
+        prop_assert!(same || !flat);
+        prop_assert_eq!(found.len(), width * height);
+        let (mut scratch, mut want) = (Vec::new(), vec![0.0; field.lanes]);
+        for (i, found) in found.iter().enumerate() {
+            want.fill(0.0);
+            field.add_dot(left + i % width, top + i / width, &mut scratch, &mut want);
+            for (c, found) in found.iter().enumerate() {
+                let shares = field.stacks.iter().zip(&want);
+                let expected: f32 = shares.map(|(&q, share)| share * points[usize::from(q)][c]).sum();
+                prop_assert!((found - expected).abs() < 1e-5, "dot {i}: {found}, not {expected}");
+            }
         }
     }
 }
