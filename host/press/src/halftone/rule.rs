@@ -80,8 +80,8 @@ fn add(demand: &mut [Lanes], weights: &[Lanes], dots: i32) {
 
 /// The source of weights, in stretches of constant weight.
 pub(super) trait Source {
-    /// Writes the weights of the next stretch and returns its number of dots, at least one. Weights are 0 or more, sum to
-    /// [`UNIT`], and are 0 in lanes without a stack. Called only while dots are left.
+    /// Writes the weights of the next stretch and returns its number of dots, at least one; dots beyond the end of the walk do
+    /// not count. Weights are 0 or more, sum to [`UNIT`], and are 0 in lanes without a stack. Called only while dots are left.
     fn stretch(&mut self, weights: &mut [Lanes]) -> u32;
 }
 
@@ -426,7 +426,7 @@ impl Rule {
         }
         let class = &mut self.classes[c];
         let stretch = &self.ahead.held[class.stretch - self.ahead.first];
-        class.end = class.front.saturating_add(stretch.dots).min(self.dots);
+        class.end = class.front + stretch.dots;
         let (mut any, end) = (Lanes::default(), class.end as i32);
         for ((seen, member), weight) in self.seen.iter_mut().zip(&class.member).zip(&stretch.weights) {
             for l in 0..LANES {
@@ -440,14 +440,21 @@ impl Rule {
         }
     }
 
+    /// Reads the next stretch, to the end of the walk at most: a source may go on behind it.
+    #[inline(always)]
+    fn read<S: Source>(&mut self, source: &mut S, weights: &mut [Lanes]) -> u32 {
+        let dots = source.stretch(weights).min(self.dots - self.known).max(1);
+        self.known += dots;
+        dots
+    }
+
     /// Fetches the next stretch.
     #[inline(always)]
     fn fetch<S: Source>(&mut self, source: &mut S) {
         let mut stretch = self.ahead.spare.pop().unwrap_or_default();
         stretch.weights.resize(self.live.len(), Lanes::default());
-        stretch.dots = source.stretch(&mut stretch.weights).max(1);
-        self.known = self.known.saturating_add(stretch.dots);
-        let end = self.known.min(self.dots) as i32;
+        stretch.dots = self.read(source, &mut stretch.weights);
+        let end = self.known as i32;
         for (last, weight) in self.last.iter_mut().zip(&stretch.weights) {
             for l in 0..LANES {
                 last.0[l] = if weight.0[l] > 0 { end } else { last.0[l] };

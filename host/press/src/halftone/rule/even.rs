@@ -165,10 +165,9 @@ impl Rule {
             while dots > even.beyond {
                 dots -= even.beyond;
                 even.advance(even.beyond);
-                even.dots = source.stretch(&mut even.weights[..groups]).max(1);
+                even.dots = self.read(source, &mut even.weights[..groups]);
                 even.beyond = even.dots;
-                self.known = self.known.saturating_add(even.dots);
-                let end = self.known.min(self.dots) as i32;
+                let end = self.known as i32;
                 even.seen = each(|b, l| if even.weights[b].0[l] > 0 { end } else { even.seen[b].0[l] });
                 let back: [Lanes; B] = each(|b, l| i32::from(even.weights[b].0[l] > 0) & !live[b].0[l]);
                 if largest(&back) > 0 {
@@ -192,7 +191,7 @@ impl Rule {
         }
         let class = &mut self.classes[0];
         (class.front, class.used) = (even.front, even.dots - even.beyond);
-        class.end = even.front.saturating_add(even.beyond).min(self.dots);
+        class.end = even.front + even.beyond;
         class.until = class.end;
         (at, current)
     }

@@ -36,6 +36,12 @@ fn fast(stretches: &[(u32, Vec<i32>)], minimum: &[u16], absent: u32) -> Vec<usiz
     let mut wide = Runs::default();
     walk(&mut Rule::new(minimum, dots, absent), &mut Tape { stretches: stretches.iter() }, &mut wide);
     assert_eq!(runs.0, wide.0);
+    // And where the source goes on beyond the walk, as it does behind a segment between solids.
+    let mut longer = stretches.to_vec();
+    longer.last_mut().unwrap().0 += 16;
+    let mut cut = Runs::default();
+    walk(&mut Rule::new(minimum, dots, absent), &mut Tape { stretches: longer.iter() }, &mut cut);
+    assert_eq!(runs.0, cut.0);
     runs.0
 }
 
