@@ -1,6 +1,6 @@
 //! The printer's device ID: asked for by a host, or by the bridge itself when the printer has been switched on.
 
-use super::{events, foreign, negotiations, send, text};
+use super::{ID, events, foreign, introducing, negotiations, send, text};
 use bridge::driver::Event;
 use bridge::port::Timing;
 use bridge::printer_class::DeviceId;
@@ -53,8 +53,7 @@ fn a_busy_printer_tells_no_device_id_and_says_why_if_it_can() {
         [(Line::Busy, 1, Answer::Silent), (Line::PaperOut, 1, Answer::Stopped(Fault::PaperOut))]
     {
         let mut board = Board::new(2048, 2048);
-        let id = Some(b"\x00\x0cMFG:ALPS;;".to_vec());
-        let mut bench = Bench::new(&mut board, Peripheral { device_id: id, ..Peripheral::default() });
+        let mut bench = Bench::new(&mut board, introducing(ID));
         bench.cable.plan(0, Line::Busy, 1);
         bench.cable.plan(0, line, level);
         bench.cable.pass(1);
@@ -66,8 +65,7 @@ fn a_busy_printer_tells_no_device_id_and_says_why_if_it_can() {
 fn the_device_id_comes_back_as_it_is_and_is_shown_from_then_on() {
     let told = b"\x00\x1eMANUFACTURER:ALPS;MODEL:MD;";
     let mut board = Board::new(2048, 2048);
-    let peripheral = Peripheral { device_id: Some(told.to_vec()), ..Peripheral::default() };
-    let mut bench = Bench::new(&mut board, peripheral);
+    let mut bench = Bench::new(&mut board, introducing(told));
     assert_eq!(bench.ask(1, Ask::DeviceId), text(Answer::Bytes(told)));
     assert_eq!(bench.id.bytes(), b"\x00\x1dMANUFACTURER:ALPS;MODEL:MD;");
 }
@@ -76,14 +74,12 @@ fn the_device_id_comes_back_as_it_is_and_is_shown_from_then_on() {
 fn a_device_id_that_breaks_off_is_passed_on_and_one_beyond_the_room_is_cut() {
     let told = b"\x00\x1eMANUFACTURER:ALPS;MODEL:MD;".to_vec();
     let mut board = Board::new(2048, 2048);
-    let peripheral =
-        Peripheral { device_id: Some(told.clone()), dumb_after: Some(41), ..Peripheral::default() };
+    let peripheral = Peripheral { dumb_after: Some(41), ..introducing(&told) };
     let mut bench = Bench::new(&mut board, peripheral);
     assert_eq!(bench.ask(1, Ask::DeviceId), text(Answer::Bytes(&told[..20])));
     let long = [&b"\x10\x00MFG:ALPS;DES:"[..], &[b'x'; 2000], b";"].concat();
     let mut board = Board::new(2048, 2048);
-    let peripheral = Peripheral { device_id: Some(long.clone()), ..Peripheral::default() };
-    let mut bench = Bench::new(&mut board, peripheral);
+    let mut bench = Bench::new(&mut board, introducing(&long));
     assert_eq!(bench.ask(1, Ask::DeviceId), text(Answer::Bytes(&long[..512])));
     assert_eq!(bench.id.bytes().len(), 512);
     send(&mut bench, 7, b"after");
@@ -95,8 +91,7 @@ fn a_device_id_that_breaks_off_is_passed_on_and_one_beyond_the_room_is_cut() {
 fn a_printer_introduces_itself_once_each_time_it_is_switched_on() {
     let told = b"\x00\x1eMANUFACTURER:ALPS;MODEL:MD;".to_vec();
     let mut board = Board::new(2048, 2048);
-    let peripheral = Peripheral { device_id: Some(told.clone()), ..Peripheral::default() };
-    let mut bench = Bench::new(&mut board, peripheral);
+    let mut bench = Bench::new(&mut board, introducing(&told));
     let unheard = DeviceId::new().bytes().to_vec();
     bench.pass(480 * MS);
     assert_eq!((bench.id.bytes(), events(&bench)), (&unheard[..], vec![]));
@@ -139,9 +134,8 @@ fn a_printer_that_is_busy_or_in_use_is_not_asked_for_its_device_id() {
 #[test]
 fn a_job_that_comes_about_when_the_printer_is_asked_for_its_device_id_loses_nothing() {
     for at in (494..504).flat_map(|ms| [ms * MS, ms * MS + 300_000, ms * MS + 700_000]) {
-        let id = Some(b"\x00\x0cMFG:ALPS;;".to_vec());
         let mut board = Board::new(4096, 4096);
-        let mut bench = Bench::new(&mut board, Peripheral { device_id: id, ..Peripheral::default() });
+        let mut bench = Bench::new(&mut board, introducing(ID));
         bench.random = Some(seeded(at));
         bench.pass(at);
         let bytes = foreign(2_000);

@@ -1,11 +1,11 @@
 //! Jobs on their way to the paper: each byte crosses once, whatever the printer, the settings and resets do.
 
-use super::{foreign, send, settings};
+use super::{foreign, hear, send, settings, speak};
 use bridge::driver::Event;
 use bridge::port::Timing;
 use bridge::simulation::{Line, Pause, Peripheral, SimulatedPort, check};
 use model::bench::{Bench, MS};
-use model::{Board, Host, Job, framed, seeded};
+use model::{Board, Host, Job, seeded};
 use protocol::link::message::{Fault, Handshake, JobState, Lines, PortSettings, ToBridge};
 use rand::RngExt;
 
@@ -18,14 +18,8 @@ fn converse(bench: &mut Bench<'_>, job: &Job, mut now_and_then: impl FnMut(&mut 
         if let Some(state) = host.finished {
             return state;
         }
-        for frame in host.speak() {
-            bench.engine.receive(&mut bench.reader, &frame);
-        }
-        for _ in 0..10 {
-            bench.turn();
-        }
-        let said = bench.transmitted();
-        host.hear(&said);
+        speak(bench, &mut host);
+        hear(bench, &mut host, 10);
         if round % 3 == 0 {
             now_and_then(bench);
         }
@@ -111,13 +105,8 @@ fn a_bridge_that_is_reset_again_and_again_goes_on_at_the_byte() {
                 if host.finished.is_some() {
                     break;
                 }
-                for frame in host.speak() {
-                    bench.engine.receive(&mut bench.reader, &frame);
-                }
-                for _ in 0..random.random_range(1..20) {
-                    bench.turn();
-                }
-                host.hear(&bench.transmitted());
+                speak(&mut bench, &mut host);
+                hear(&mut bench, &mut host, random.random_range(1..20));
             }
             if let Some(state) = host.finished {
                 break state;
@@ -217,10 +206,7 @@ fn a_line_that_is_not_heeded_stops_nothing() {
     bench.cable.plan(0, Line::Select, 0);
     bench.cable.pass(1);
     let heed = Lines(Lines::ALL.0 & !Lines::SELECT);
-    bench.engine.receive(
-        &mut bench.reader,
-        &framed(&ToBridge::Configure(PortSettings { heed, ..Timing::DEFAULT.settings() })),
-    );
+    bench.tell(&ToBridge::Configure(PortSettings { heed, ..Timing::DEFAULT.settings() }));
     bench.turn();
     send(&mut bench, 7, b"text");
     bench.pass(10 * MS);

@@ -9,8 +9,12 @@ mod supply;
 use bridge::driver::Event;
 use bridge::port::Timing;
 use bridge::simulation::{Line, Peripheral, Response};
+use model::Host;
 use model::bench::Bench;
 use protocol::link::message::{Answer, Handshake, JobKind, PortSettings, ToBridge};
+
+/// A device ID.
+const ID: &[u8] = b"\x00\x0cMFG:ALPS;;";
 
 fn status() -> Vec<u8> {
     let mut answer = vec![0x02, 0x80, 0x21, 0x00, 0x10];
@@ -26,6 +30,26 @@ fn text(answer: Answer<'_>) -> String {
 /// A printer that answers the status question with these pieces.
 fn answering(status: Vec<Response>) -> Peripheral {
     Peripheral { status, ..Peripheral::default() }
+}
+
+/// A printer that has this device ID.
+fn introducing(id: &[u8]) -> Peripheral {
+    Peripheral { device_id: Some(id.to_vec()), ..Peripheral::default() }
+}
+
+/// What a host has to say arrives at the bridge.
+fn speak(bench: &mut Bench<'_>, host: &mut Host<'_>) {
+    for frame in host.speak() {
+        bench.engine.receive(&mut bench.reader, &frame);
+    }
+}
+
+/// So many turns of the bridge, and what it says in them arrives at a host.
+fn hear(bench: &mut Bench<'_>, host: &mut Host<'_>, turns: usize) {
+    for _ in 0..turns {
+        bench.turn();
+    }
+    host.hear(&bench.transmitted());
 }
 
 /// Opens a raw job of these bytes, and sends all of them at once.

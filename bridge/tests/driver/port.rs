@@ -1,6 +1,6 @@
 //! Who may use the port, and for how long.
 
-use super::{answering, events, foreign, send, settings, status, text};
+use super::{ID, answering, events, foreign, send, settings, status, text};
 use bridge::driver::Event;
 use bridge::port::Timing;
 use bridge::simulation::{Line, Peripheral, Response};
@@ -36,12 +36,11 @@ fn the_link_is_answered_and_a_job_is_taken_while_the_printer_is_asked() {
 
 #[test]
 fn a_task_goes_before_the_introduction_when_both_are_due() {
-    let id = Some(b"\x00\x0cMFG:ALPS;;".to_vec());
     let mut board = Board::new(4096, 4096);
     let mut bench = Bench::new(
         &mut board,
         Peripheral {
-            device_id: id,
+            device_id: Some(ID.to_vec()),
             status: vec![Response { after: 0, bytes: status() }],
             ..Peripheral::default()
         },

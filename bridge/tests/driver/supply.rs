@@ -1,6 +1,6 @@
 //! The printer's +5 V: without it nothing is driven and no byte counts, and a job that has lost it is over.
 
-use super::{answering, foreign, negotiations, send, settings, text};
+use super::{ID, answering, foreign, hear, introducing, negotiations, send, settings, speak, text};
 use bridge::port::Timing;
 use bridge::simulation::{Line, Peripheral};
 use model::bench::{Bench, MS};
@@ -57,15 +57,9 @@ fn nothing_is_strobed_while_the_sense_line_is_low_and_everything_arrives_when_it
                 let taken = bench.engine.local(&plain[..plain.len().min(64)]);
                 plain = &plain[taken..];
             } else {
-                for frame in host.speak() {
-                    bench.engine.receive(&mut bench.reader, &frame);
-                }
+                speak(&mut bench, &mut host);
             }
-            for _ in 0..10 {
-                bench.turn();
-            }
-            let said = bench.transmitted();
-            host.hear(&said);
+            hear(&mut bench, &mut host, 10);
             if round == 2_000 {
                 assert_eq!(bench.cable.taken().len(), 0, "{way}, {handshake:?}");
                 assert_eq!(
@@ -85,9 +79,8 @@ fn nothing_is_strobed_while_the_sense_line_is_low_and_everything_arrives_when_it
 
 #[test]
 fn a_printer_without_its_supply_is_neither_negotiated_with_nor_asked() {
-    let id = Some(b"\x00\x0cMFG:ALPS;;".to_vec());
     let mut board = Board::new(4096, 4096);
-    let mut bench = Bench::new(&mut board, Peripheral { device_id: id, ..answering(vec![]) });
+    let mut bench = Bench::new(&mut board, Peripheral { device_id: Some(ID.to_vec()), ..answering(vec![]) });
     bench.cable.plan(0, Line::Power, 0);
     bench.cable.pass(1);
     bench.pass(600 * MS);
@@ -240,8 +233,7 @@ fn no_byte_counts_that_was_strobed_while_the_cable_was_free() {
     for seed in 400..440 {
         let mut random = seeded(seed);
         let mut board = Board::new(4096, 4096);
-        let id = Some(b"\x00\x0cMFG:ALPS;;".to_vec());
-        let mut bench = Bench::new(&mut board, Peripheral { device_id: id, ..Peripheral::default() });
+        let mut bench = Bench::new(&mut board, introducing(ID));
         bench.random = Some(seeded(seed + 1000));
         for job in 1..6 {
             bench.cable.switch(false);
