@@ -25,11 +25,16 @@ struct Said {
 
 impl Rig {
     fn new() -> Rig {
-        Rig {
-            engine: Engine::new(memory(2048, 4096, 40_000), IDENTITY),
-            reader: Reader::new(),
-            printed: Vec::new(),
-        }
+        Rig::with(Engine::new(memory(2048, 4096, 40_000), IDENTITY))
+    }
+
+    fn with(engine: Engine<'static>) -> Rig {
+        Rig { engine, reader: Reader::new(), printed: Vec::new() }
+    }
+
+    /// The bridge after a reset.
+    fn restarted(&self) -> Rig {
+        Rig::with(Engine::resume(memory(2048, 2048, 40_000), IDENTITY, self.engine.checkpoint()))
     }
 
     fn tell(&mut self, message: ToBridge<'_>) -> Said {
@@ -53,6 +58,12 @@ impl Rig {
                 said.text.push(format!("{message:?}"));
             }
         }
+    }
+
+    /// Opens a raw job, and sends so many bytes of its data.
+    fn open(&mut self, job: u32, data: &[u8], count: usize) {
+        self.tell(ToBridge::Begin { job, kind: JobKind::Raw, length: data.len() as u32 });
+        self.tell(ToBridge::Data { job, offset: 0, bytes: &data[..count] });
     }
 
     /// Works and prints until nothing moves.
@@ -143,8 +154,7 @@ fn the_last_jobs_are_remembered_with_their_ends_through_resets() {
         offer(&mut rig, &stream, 500);
         rig.print();
         if id % 4 == 0 {
-            let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-            rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+            rig = rig.restarted();
         }
     }
     expected.truncate(PAST);
@@ -168,8 +178,7 @@ fn the_last_jobs_are_remembered_with_their_ends_through_resets() {
 fn a_printer_without_its_supply_gets_nothing_and_no_reset() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    rig.open(1, &stream, DATA_MAX);
     while rig.engine.work() {}
     assert!(!rig.engine.output().is_empty());
     let off = Lines(Lines::IDLE.0 & !Lines::POWER);
@@ -179,8 +188,7 @@ fn a_printer_without_its_supply_gets_nothing_and_no_reset() {
     assert!(!rig.engine.output().is_empty());
     // A job that ends where a reset is needed waits with it for the supply.
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: 3000 });
-    rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &[b'a'; 500] });
+    rig.open(2, &[b'a'; 3000], 500);
     rig.print();
     rig.tell(ToBridge::Cancel { job: 2 });
     rig.engine.port(off, Some(Fault::PowerOff));
@@ -382,8 +390,7 @@ fn a_fault_stops_the_job_and_its_end_lets_it_go_on() {
 fn a_printer_switched_off_in_the_middle_gets_nothing_more() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    rig.open(1, &stream, DATA_MAX);
     // Off before the first byte is no harm: it may be switched on yet.
     rig.engine.port(Lines(0), Some(Fault::PowerOff));
     assert_eq!(rig.engine.progress().state, JobState::Stopped(Fault::PowerOff));
@@ -398,17 +405,14 @@ fn a_printer_switched_off_in_the_middle_gets_nothing_more() {
 fn a_printer_that_went_in_a_job_is_reset_when_it_is_back_and_before_the_next_one() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    rig.open(1, &stream, DATA_MAX);
     while rig.engine.work() {}
     rig.engine.consumed(1);
     rig.engine.port(Lines(0), Some(Fault::PowerOff));
     // The host has the next one ready, and the bridge is restarted meanwhile: none of that counts as a reset.
-    let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+    let mut rig = rig.restarted();
     let begin = |rig: &mut Rig| {
-        rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: stream.len() as u32 });
-        rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &stream[..DATA_MAX] });
+        rig.open(2, &stream, DATA_MAX);
         while rig.engine.work() {}
     };
     begin(&mut rig);
@@ -422,8 +426,7 @@ fn a_printer_that_went_in_a_job_is_reset_when_it_is_back_and_before_the_next_one
             rig.engine.port(Lines::IDLE, None);
             assert_eq!(rig.engine.task(), Some(Task::Initialise));
         }
-        let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-        rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+        rig = rig.restarted();
         begin(&mut rig);
         assert!(rig.engine.output().is_empty() && rig.engine.task().is_none());
     }
@@ -440,12 +443,10 @@ fn a_printer_that_went_in_a_job_is_reset_when_it_is_back_and_before_the_next_one
 fn a_job_nobody_has_the_data_of_any_more_can_be_given_up() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..DATA_MAX] });
+    rig.open(1, &stream, DATA_MAX);
     while rig.engine.work() {}
     rig.engine.consumed(100);
-    let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+    let mut rig = rig.restarted();
     let said = rig.tell(ToBridge::Hello { version: VERSION, schema: SCHEMA });
     let progress = said.progress.unwrap();
     assert_eq!((progress.job, progress.accepted, progress.limit, progress.printed), (1, 0, 0, 100));
@@ -458,8 +459,7 @@ fn a_finished_job_is_remembered_through_a_reset() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
     rig.send(1, JobKind::Raw, &stream);
-    let engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
-    let mut rig = Rig { engine, reader: Reader::new(), printed: Vec::new() };
+    let mut rig = rig.restarted();
     // The host has not heard of the end and sends it again.
     assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
     assert!(rig.printed.is_empty(), "the sheet was printed twice");
@@ -471,8 +471,7 @@ fn text_passes_through_and_cancelling_it_resets_the_printer() {
     let mut rig = Rig::new();
     assert_eq!(rig.send(1, JobKind::Raw, &text).state, JobState::Done);
     assert!(rig.printed == text);
-    rig.tell(ToBridge::Begin { job: 2, kind: JobKind::Raw, length: 3000 });
-    rig.tell(ToBridge::Data { job: 2, offset: 0, bytes: &text[..500] });
+    rig.open(2, &text, 500);
     rig.print();
     rig.tell(ToBridge::Cancel { job: 2 });
     rig.print();
@@ -578,7 +577,7 @@ fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
     // Half a sheet at a reset of the bridge: nobody sends the rest, so the printer is reset.
     let mut rig = Rig::new();
     offer(&mut rig, &stream[..1500], 64);
-    let mut engine = Engine::resume(memory(2048, 2048, 40_000), IDENTITY, rig.engine.checkpoint());
+    let mut engine = rig.restarted().engine;
     assert_eq!(
         (engine.progress().state, engine.task()),
         (JobState::Lost, None),
@@ -592,8 +591,7 @@ fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
 fn a_raw_job_cancelled_before_its_first_row_has_not_touched_the_printer() {
     let stream = a_raw_job();
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream[..60] });
+    rig.open(1, &stream, 60);
     rig.print();
     rig.tell(ToBridge::Cancel { job: 1 });
     rig.print();
@@ -612,8 +610,7 @@ fn a_cancel_that_comes_too_late_changes_nothing() {
     }
     .printed();
     let mut rig = Rig::new();
-    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: stream.len() as u32 });
-    rig.tell(ToBridge::Data { job: 1, offset: 0, bytes: &stream });
+    rig.open(1, &stream, stream.len());
     while rig.engine.work() {}
     assert_eq!(rig.tell(ToBridge::Cancel { job: 1 }).progress.unwrap().state, JobState::Printing);
     rig.print();
@@ -671,19 +668,11 @@ fn a_page_too_wide_for_the_memory_is_refused_before_the_first_byte() {
         bits: vec![vec![1; 6000]],
         walk: Placed::whole(4800, 10),
     };
-    let mut rig = Rig {
-        engine: Engine::new(memory(2048, 2048, 38_399), IDENTITY),
-        reader: Reader::new(),
-        printed: Vec::new(),
-    };
+    let mut rig = Rig::with(Engine::new(memory(2048, 2048, 38_399), IDENTITY));
     let state = rig.send(1, JobKind::Streams, &planes.streams()).state;
     assert!(matches!(state, JobState::Broken(defect) if defect.what == DefectKind::TooLarge));
     assert!(rig.printed.is_empty());
-    let mut rig = Rig {
-        engine: Engine::new(memory(2048, 2048, 38_400), IDENTITY),
-        reader: Reader::new(),
-        printed: Vec::new(),
-    };
+    let mut rig = Rig::with(Engine::new(memory(2048, 2048, 38_400), IDENTITY));
     assert_eq!(rig.send(1, JobKind::Streams, &planes.streams()).state, JobState::Done);
 }
 
