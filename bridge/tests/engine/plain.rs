@@ -1,0 +1,100 @@
+//! Jobs through a plain printer interface, which has no frames and no numbers.
+
+use super::{Rig, a_raw_job, offer, refused};
+use bridge::engine::{LOCAL, Task};
+use model::{Planes, is_a_whole_job, seeded};
+use protocol::link::message::{Fault, JobKind, JobState, Lines, Refusal, ToBridge};
+
+#[test]
+fn jobs_through_a_plain_printer_interface_end_by_themselves() {
+    for size in [1, 64, 5000] {
+        let (mut rig, mut expected) = (Rig::new(), Vec::new());
+        for seed in 0..6 {
+            expected.extend(Planes::random(&mut seeded(seed)).printed());
+        }
+        offer(&mut rig, &expected, size);
+        rig.print();
+        assert_eq!((rig.engine.progress().job, rig.engine.progress().state), (LOCAL, JobState::Done));
+        assert!(rig.printed == expected, "in portions of {size}");
+        // The link has its turn afterwards.
+        let stream = a_raw_job();
+        assert_eq!(rig.send(1, JobKind::Raw, &stream).state, JobState::Done);
+    }
+}
+
+#[test]
+fn a_plain_printer_interface_that_falls_silent_leaves_a_whole_job_and_text_as_it_is() {
+    let mut rig = Rig::new();
+    let stream = a_raw_job();
+    offer(&mut rig, &stream[..stream.len() / 2], 64);
+    rig.engine.local_end();
+    rig.print();
+    assert!(matches!(rig.engine.progress().state, JobState::Broken(_)));
+    assert!(is_a_whole_job(&rig.printed));
+    let mut rig = Rig::new();
+    offer(&mut rig, b"plain text\r\n", 3);
+    rig.engine.local_end();
+    rig.print();
+    assert_eq!((rig.engine.progress().state, &rig.printed[..]), (JobState::Done, &b"plain text\r\n"[..]));
+}
+
+#[test]
+fn a_plain_printer_interface_that_is_reset_drops_what_has_not_begun_and_leaves_a_whole_job() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    rig.engine.local_reset();
+    assert_eq!(rig.engine.progress().state, JobState::None);
+    offer(&mut rig, &stream[..stream.len() / 2], 64);
+    let before = rig.printed.len();
+    rig.engine.local_reset();
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Cancelled);
+    assert!(is_a_whole_job(&rig.printed) && rig.printed.len() - before < 1300);
+    offer(&mut rig, &stream, 64);
+    rig.print();
+    assert_eq!(rig.engine.progress().state, JobState::Done);
+    assert!(rig.printed.ends_with(&stream));
+}
+
+#[test]
+fn a_plain_printer_interface_waits_only_while_nothing_is_on_its_way() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    assert_eq!(rig.engine.local_waits(), None);
+    rig.engine.local(&stream[..20]);
+    rig.print();
+    // Nothing has gone to the printer before the first row.
+    assert_eq!(rig.engine.local_waits(), Some(false));
+    offer(&mut rig, &stream[20..stream.len() / 2], 64);
+    rig.print();
+    assert_eq!(rig.engine.local_waits(), Some(true));
+    rig.engine.port(Lines::IDLE, Some(Fault::PaperOut));
+    assert_eq!(rig.engine.local_waits(), None);
+    rig.engine.port(Lines::IDLE, None);
+    offer(&mut rig, &stream[stream.len() / 2..], 64);
+    rig.print();
+    assert_eq!(rig.engine.local_waits(), None);
+}
+
+#[test]
+fn the_link_and_a_plain_printer_interface_do_not_mix_their_jobs() {
+    let stream = a_raw_job();
+    let mut rig = Rig::new();
+    assert!(rig.engine.local(&stream[..200]) > 0);
+    let said = rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 9 });
+    assert_eq!(said.text, refused(Refusal::JobOpen, 1));
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 9 });
+    assert_eq!(rig.engine.local(&stream[..200]), 0);
+    // Half a sheet at a reset of the bridge: nobody sends the rest, so the printer is reset.
+    let mut rig = Rig::new();
+    offer(&mut rig, &stream[..1500], 64);
+    let mut engine = rig.restarted().engine;
+    assert_eq!(
+        (engine.progress().state, engine.task()),
+        (JobState::Lost, None),
+        "nobody knows yet what is there"
+    );
+    engine.port(Lines::IDLE, None);
+    assert_eq!(engine.task(), Some(Task::Initialise));
+}
