@@ -6,7 +6,7 @@
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Something that is not part of the project.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -70,6 +70,9 @@ impl Need {
         assert!(!self.is_required(), "{line}, and FOILPRESS_REQUIRED asks for it");
         println!("skipped: {line}");
         if let Some(list) = std::env::var_os("FOILPRESS_SKIPS") {
+            if let Some(folder) = Path::new(&list).parent() {
+                let _ = std::fs::create_dir_all(folder);
+            }
             let list = OpenOptions::new().create(true).append(true).open(list);
             let written = list.and_then(|mut list| list.write_all(format!("{line}\n").as_bytes()));
             written.expect("FOILPRESS_SKIPS names a file that can be written");

@@ -175,7 +175,8 @@ impl Journal {
         write_durably(&staged.path().join("data"), job.data)?;
         let mut number = fresh_number(checksum, self.folder.as_os_str().as_encoded_bytes());
         while self.folder_of(number).exists() {
-            number = (number + 1) % ALONE;
+            // 0 is no job.
+            number = ((number + 1) % ALONE).max(1);
         }
         let entry = Entry {
             name: job.name.into(),
