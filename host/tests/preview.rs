@@ -30,6 +30,19 @@ fn a_document_becomes_a_page_a_picture_or_radiance() {
         "preview tile {SMALL} -o dark.png --exposure -2 --show mapped --pixels 120 --curl 0.02"
     ));
     assert!(red("dark.png") < 0.8 * red("bright.png"));
+
+    // Values below the old knee are kept by both curves; above it, cutting off is brighter.
+    let lit = format!("preview tile {SMALL} --light 20,10 --pixels 120");
+    bench.done(&format!("{lit} -o soft.png --exposure 1"));
+    let said = bench.done(&format!("{lit} -o cut.png --exposure 1 --tone-curve 1 --json"));
+    assert_eq!(serde_json::from_str::<Value>(&said).expect("JSON")["tone_curve"], 1.0);
+    assert!(red("cut.png") > 1.05 * red("soft.png"));
+    let said = bench.refused(2, &format!("{lit} -o cut.png --tone-curve 1.5"));
+    assert!(said.contains("expected a share of white from 0 to 1"), "{said}");
+    for option in ["--tone-curve 1", "--exposure 1"] {
+        let said = bench.refused(1, &format!("{lit} -o one.exr {option}"));
+        assert!(said.contains("leave --exposure and --tone-curve out"), "{said}");
+    }
 }
 
 #[test]

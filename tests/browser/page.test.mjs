@@ -235,7 +235,7 @@ test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
 }));
 
 test('an address brings back its view, and nonsense in it does no harm', () => visit(desk, async (page) => {
-  const view = 'show=printed&light=10,20,0;-30,40,0.5&probe=0&view=5,-5&distance=0.4&tilt=10,-20&curl=0.08&zoom=3&pan=0.01,-0.01&exposure=1.5';
+  const view = 'show=printed&light=10,20,0;-30,40,0.5&probe=0&view=5,-5&distance=0.4&tilt=10,-20&curl=0.08&zoom=3&pan=0.01,-0.01&exposure=1.5&knee=0.7';
   await page.evaluate((hash) => { location.hash = hash; }, view);
   assert.equal(decodeURIComponent((await rested(page)).toString()), view);
   await page.evaluate(() => { location.hash = 'show=<b>&light=NaN,1;2&zoom=1e99&pan=a&tilt=999,-999&curl=-1&distance=1e-9&exposure=Infinity&pass=77&split=-4'; });

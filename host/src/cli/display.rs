@@ -10,7 +10,7 @@ use appearance::materials::{Materials, Reduced, resolution};
 use clap::Args as ClapArgs;
 use inks::{InkSet, Library, Stack};
 use press::layout::{Layout, Mm, Point};
-use press::preview::{Exposure, Radiance, picture};
+use press::preview::{Radiance, ToneCurve, picture};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use view::direction;
@@ -320,7 +320,7 @@ impl Work<'_> {
             pixels.extend([[0.0; 4]; GAP]);
             pixels.extend_from_slice(b);
         }
-        Ok(picture(&Radiance { width, height: left.height, pixels }, Exposure::PAPER)?)
+        Ok(picture(&Radiance { width, height: left.height, pixels }, ToneCurve::PAPER)?)
     }
 
     fn about(&self) -> String {

@@ -14,7 +14,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 use image::{DynamicImage, ImageFormat, Rgba32FImage};
 use observe::Observer;
-use press::preview::{Exposure, Probe, Radiance};
+use press::preview::{Probe, Radiance};
 use serde_json::json;
 
 use self::shown::{Shown, png};
@@ -76,9 +76,12 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     }
     if format == Format::Glb && args.view.has_lights() {
         bail!(
-            "{}: a .glb has no lights; leave --light, --light-probe and --exposure out",
+            "{}: a .glb has no lights; leave --light, --light-probe, --exposure and --tone-curve out",
             args.output.display()
         );
+    }
+    if format == Format::Exr && args.view.has_tone() {
+        bail!("{}: an .exr holds radiance; leave --exposure and --tone-curve out", args.output.display());
     }
     let probe = args.view.light_probe.as_deref().map(Probe::read_hdr).transpose()?;
     let staged = Staged::file(&args.output)?;
@@ -95,11 +98,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             args.dots.document.document
         );
     }
-    let (exposure, (width, height)) = if is_page {
+    let (tone, (width, height)) = if is_page {
         let page = shown.page(&args.view, probe.as_ref(), observer)?;
         fs::write(staged.path(), page.html)
             .with_context(|| format!("cannot write {}", args.output.display()))?;
-        (page.exposure, page.pixels)
+        (page.tone, page.pixels)
     } else {
         let (size, stacks) = (shown.size(), shown.stacks());
         if args.wear.dot_gain.is_some() {
@@ -115,22 +118,21 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let (width, height) = proportions(size, args.pixels.into());
         let scene = args.view.scene(size, width as f64 / height as f64, probe);
         let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
-        let exposure = args.view.exposure(&radiance);
+        let tone = args.view.tone(&radiance);
         match format {
             Format::Exr => write_exr(&radiance, staged.path())?,
-            _ => fs::write(staged.path(), png(&radiance, exposure)?)?,
+            _ => fs::write(staged.path(), png(&radiance, tone)?)?,
         }
-        (exposure, (width, height))
+        (tone, (width, height))
     };
     let bytes = fs::metadata(staged.path()).map_or(0, |found| found.len());
     staged.commit()?;
     let mut out = std::io::stdout().lock();
     if args.json {
         let size_mm = shown.size().map(|side| side * 1000.0);
-        let stops = f64::from(exposure.0 / Exposure::PAPER.0).log2();
         let report = json!({
             "written": args.output.display().to_string(), "bytes": bytes, "name": shown.name, "size_mm": size_mm,
-            "pixels": [width, height], "exposure_stops": stops, "worn": shown.worn.as_ref().map(Told::json),
+            "pixels": [width, height], "exposure_stops": tone.in_stops(), "tone_curve": tone.knee, "worn": shown.worn.as_ref().map(Told::json),
         });
         writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
     } else {

@@ -23,7 +23,7 @@ use flate2::write::ZlibEncoder;
 use inks::Stack;
 use observe::Observer;
 use press::html;
-use press::preview::{Exposure, Probe, Source};
+use press::preview::{Probe, Source, ToneCurve};
 use press::separate;
 use press::sheet::{Area, DotMap, colours, label};
 use rayon::prelude::*;
@@ -56,7 +56,7 @@ const PAPER: [u8; 3] = [250, 250, 247];
 pub(crate) const STYLE: &str = include_str!("../web/style.css");
 
 /// The sources in the order of their use.
-const SCRIPTS: [&str; 8] = [
+const SCRIPTS: [&str; 15] = [
     include_str!("../web/geometry.js"),
     include_str!("../web/edit.js"),
     include_str!("../web/data.js"),
@@ -64,6 +64,13 @@ const SCRIPTS: [&str; 8] = [
     include_str!("../web/draw.js"),
     include_str!("../web/state.js"),
     include_str!("../web/spot.js"),
+    include_str!("../web/stage.js"),
+    include_str!("../web/controls.js"),
+    include_str!("../web/editing.js"),
+    include_str!("../web/lamps.js"),
+    include_str!("../web/look.js"),
+    include_str!("../web/hand.js"),
+    include_str!("../web/panel.js"),
     include_str!("../web/main.js"),
 ];
 
@@ -155,7 +162,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
     let every_third = |values: &[f64]| values.iter().step_by(3).copied().collect::<Vec<f64>>();
     let data = json!({
         "name": subject.name, "about": subject.about, "size": subject.size, "start": subject.start,
-        "white": Exposure::PAPER.0, "steps": STEPS,
+        "white": ToneCurve::PAPER.exposure, "steps": STEPS,
         "metric": { "angles": space.angles(), "radiance": every_third(space.radiance()), "weight": every_third(space.weight()) },
         "edits": target.map(|t| edits(t.document)),
         "document": document, "mapped": mapped, "printed": printed, "difference": difference,

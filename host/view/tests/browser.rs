@@ -9,7 +9,7 @@ use appearance::weights::{ONE, WeightMaps};
 use image::{ImageFormat, RgbImage};
 use inks::{Curve, Library, Stack};
 use observe::Silent;
-use press::preview::{Exposure, Probe, Source, picture};
+use press::preview::{Probe, Source, ToneCurve, picture};
 use press::sheet::{Area, DotMap};
 use testing::browser::Browser;
 use view::page::{LONGEST, Subject, Target, page};
@@ -89,7 +89,7 @@ impl Made {
         let scene = scene(&[(-25.0, 30.0, 0.6)], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, None);
         let radiance = Renderer::new(&lit).render(&scene, 400, 300, &Silent).unwrap();
         let mut still = std::io::Cursor::new(Vec::new());
-        picture(&radiance, Exposure::PAPER).unwrap().write_to(&mut still, ImageFormat::Png).unwrap();
+        picture(&radiance, ToneCurve::PAPER).unwrap().write_to(&mut still, ImageFormat::Png).unwrap();
         let mixtures: Vec<String> = (1..=3).map(|i| format!("mixture {i}")).collect();
         let subject = Subject {
             name: NAME,
@@ -162,29 +162,29 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
     made.page(&file, &probe);
     let far = [(20.0, 10.0, 0.0)];
     let two = [(-35.0, 20.0, 0.4), (50.0, -10.0, 0.0)];
-    type State<'a> = (&'a str, &'a [(f64, f64, f64)], (f64, f64), f64, (f64, f64), f64, bool, f64);
+    type State<'a> = (&'a str, &'a [(f64, f64, f64)], (f64, f64), f64, (f64, f64), f64, bool, f64, f32);
     let states: [State; 16] = [
-        ("document", &far, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0, false, 0.0),
-        ("document", &two, (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, false, 0.0),
-        ("document", &two, (25.0, 15.0), 0.3, (-20.0, 10.0), 0.0, false, 1.0),
-        ("document", &far, (10.0, 0.0), 0.5, (0.0, 0.0), 0.06, false, 0.0),
-        ("document", &[], (0.0, 0.0), 0.0, (20.0, 0.0), 0.0, true, 0.0),
-        ("document", &far, (0.0, 0.0), 0.5, (10.0, 5.0), 0.08, true, -1.0),
-        ("mapped", &two, (-30.0, 0.0), 0.5, (0.0, 0.0), 0.0, false, 0.5),
-        ("mapped", &far, (0.0, 20.0), 0.0, (0.0, 25.0), 0.1, false, 0.0),
-        ("mapped", &[], (0.0, 0.0), 0.4, (-30.0, 10.0), 0.0, true, 0.0),
-        ("printed", &far, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0, false, 0.0),
-        ("printed", &two, (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, false, -1.5),
-        ("printed", &two, (15.0, 10.0), 0.25, (20.0, 20.0), 0.0, false, 0.0),
-        ("printed", &far, (0.0, 0.0), 0.5, (0.0, 0.0), 0.05, false, 1.0),
-        ("printed", &[], (0.0, 0.0), 0.5, (0.0, 15.0), 0.0, true, 0.0),
-        ("printed", &[(0.0, 0.0, 0.3)], (0.0, 0.0), 0.3, (0.0, 0.0), 0.07, true, -2.0),
-        ("printed", &far, (60.0, 0.0), 0.0, (15.0, 0.0), 0.0, false, 0.0),
+        ("document", &far, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0, false, 0.0, 0.4),
+        ("document", &two, (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, false, 0.0, 1.0),
+        ("document", &two, (25.0, 15.0), 0.3, (-20.0, 10.0), 0.0, false, 1.0, 0.15),
+        ("document", &far, (10.0, 0.0), 0.5, (0.0, 0.0), 0.06, false, 0.0, 0.4),
+        ("document", &[], (0.0, 0.0), 0.0, (20.0, 0.0), 0.0, true, 0.0, 0.4),
+        ("document", &far, (0.0, 0.0), 0.5, (10.0, 5.0), 0.08, true, -1.0, 0.4),
+        ("mapped", &two, (-30.0, 0.0), 0.5, (0.0, 0.0), 0.0, false, 0.5, 0.4),
+        ("mapped", &far, (0.0, 20.0), 0.0, (0.0, 25.0), 0.1, false, 0.0, 0.4),
+        ("mapped", &[], (0.0, 0.0), 0.4, (-30.0, 10.0), 0.0, true, 0.0, 1.0),
+        ("printed", &far, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0, false, 0.0, 0.4),
+        ("printed", &two, (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, false, -1.5, 0.4),
+        ("printed", &two, (15.0, 10.0), 0.25, (20.0, 20.0), 0.0, false, 0.0, 0.4),
+        ("printed", &far, (0.0, 0.0), 0.5, (0.0, 0.0), 0.05, false, 1.0, 0.0),
+        ("printed", &[], (0.0, 0.0), 0.5, (0.0, 15.0), 0.0, true, 0.0, 0.4),
+        ("printed", &[(0.0, 0.0, 0.3)], (0.0, 0.0), 0.3, (0.0, 0.0), 0.07, true, -2.0, 0.4),
+        ("printed", &far, (60.0, 0.0), 0.0, (15.0, 0.0), 0.0, false, 0.0, 0.4),
     ];
-    let fragment = |&(show, lights, view, distance, tilt, curl, probe, stops): &State| {
+    let fragment = |&(show, lights, view, distance, tilt, curl, probe, stops, knee): &State| {
         let lights: Vec<String> = lights.iter().map(|(a, e, d)| format!("{a},{e},{d}")).collect();
         format!(
-            "show={show}&light={}&probe={}&view={},{}&distance={distance}&tilt={},{}&curl={curl}&exposure={stops}&zoom=1&pan=0,0",
+            "show={show}&light={}&probe={}&view={},{}&distance={distance}&tilt={},{}&curl={curl}&exposure={stops}&knee={knee}&zoom=1&pan=0,0",
             lights.join(";"),
             u8::from(probe),
             view.0,
@@ -196,7 +196,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
     let mut fragments: Vec<String> = states.iter().map(fragment).collect();
     // Single dots, 30 pixels wide, from far away under a far light.
     let zoom = 30.0 * DOTS.0 as f64 / PICTURE.0 as f64 * 1.08;
-    fragments.push(format!("show=printed&light=20,10,0&probe=0&view=0,0&distance=0&tilt=0,0&curl=0&exposure=0&zoom={zoom}&pan=0,0"));
+    fragments.push(format!("show=printed&light=20,10,0&probe=0&view=0,0&distance=0&tilt=0,0&curl=0&exposure=0&knee=0.4&zoom={zoom}&pan=0,0"));
     // Edits stay until they are undone, so they come last.
     let edits = [
         ("0,1.5,c08040,1", (20.0, 10.0, 0.0), 0.5, false),
@@ -206,7 +206,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
     let edited = |&(edit, light, stops, probe): &(&str, (f64, f64, f64), f64, bool)| {
         format!(
             "edit={edit}&{}",
-            fragment(&("document", &[light], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, probe, stops))
+            fragment(&("document", &[light], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, probe, stops, 0.4))
         )
     };
     fragments.extend(edits.iter().map(edited));
@@ -225,12 +225,12 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
     let lit: Vec<(&str, Lit)> =
         sources.iter().map(|(name, source)| (*name, Lit::new(source, SIZE, LONGEST).unwrap())).collect();
     let mut failed = Vec::new();
-    for (i, &(show, lights, view, distance, tilt, curl, surrounded, stops)) in states.iter().enumerate() {
+    for (i, &(show, lights, view, distance, tilt, curl, surrounded, stops, knee)) in states.iter().enumerate()
+    {
         let lit = &lit.iter().find(|(name, _)| *name == show).unwrap().1;
         let scene = scene(lights, view, distance, tilt, curl, surrounded.then_some(&probe));
         let radiance = Renderer::new(lit).render(&scene, PICTURE.0, PICTURE.1, &Silent).unwrap();
-        let ours =
-            picture(&radiance, Exposure((f64::from(Exposure::PAPER.0) * f64::exp2(stops)) as f32)).unwrap();
+        let ours = picture(&radiance, ToneCurve { knee, ..ToneCurve::stops(stops) }).unwrap();
         let (mean, most, smooth) = compared(&ours, &shot(i));
         println!("{}: mean {mean:.3}, most {most} at {smooth} places", fragments[i]);
         if mean > 1.0 || most > 4 || smooth < 20_000 {
@@ -253,7 +253,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
             let lit = Lit::new(&Source::Factored(document), SIZE, LONGEST).unwrap();
             let scene = scene(&[light], (0.0, 0.0), 0.5, (0.0, 0.0), 0.0, surrounded.then_some(&probe));
             let radiance = Renderer::new(&lit).render(&scene, PICTURE.0, PICTURE.1, &Silent).unwrap();
-            picture(&radiance, Exposure((f64::from(Exposure::PAPER.0) * f64::exp2(stops)) as f32)).unwrap()
+            picture(&radiance, ToneCurve::stops(stops)).unwrap()
         };
         let (mean, most, _) = compared(&drawn(&replayed), &shot(i));
         let (change, _, _) = compared(&drawn(&replayed), &drawn(&made.document));
@@ -285,7 +285,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
         let pixels =
             vec![[f[0] as f32 * l[2] as f32, f[1] as f32 * l[2] as f32, f[2] as f32 * l[2] as f32, 1.0]];
         let expected =
-            picture(&press::preview::Radiance { width: 1, height: 1, pixels }, Exposure::PAPER).unwrap();
+            picture(&press::preview::Radiance { width: 1, height: 1, pixels }, ToneCurve::PAPER).unwrap();
         let off = (0..3).map(|c| found.0[c].abs_diff(expected.get_pixel(0, 0).0[c])).max().unwrap();
         if off > 2 {
             failed.push(format!(

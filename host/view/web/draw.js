@@ -161,6 +161,7 @@ export class Drawing {
     gl.uniform1i(this.#place('lights'), scene.lights.length);
     gl.uniform4fv(this.#place('light'), lights);
     gl.uniform1f(this.#place('exposure'), data.white * 2 ** state.exposure);
+    gl.uniform1f(this.#place('knee'), state.knee);
     gl.uniform3fv(this.#place('ground'), GROUND.map(linear));
     gl.uniform2i(this.#place('dotSize'), data.printed.width, data.printed.length);
     gl.uniform1i(this.#place('tile'), this.tile ?? 1);

@@ -21,6 +21,7 @@ uniform int lights;
 uniform vec4 light[MOST_LIGHTS];  // direction or place, and 1 for near
 uniform bool surrounded;
 uniform float exposure;
+uniform float knee;         // share of white
 uniform vec3 ground;        // linear
 
 uniform sampler2DArray weights;   // four weights a layer
@@ -64,15 +65,15 @@ vec2 irradiance(vec4 l, vec3 at, vec3 n, vec3 v) {
 }
 
 float bent(float v) {
-  float over = v - 0.4;
-  return over <= 0.0 ? v : 0.4 + 0.6 * over / (over + 0.6);
+  float over = v - knee, room = 1.0 - knee;
+  return over <= 0.0 ? v : knee + room * over / (over + room);
 }
 
 // The tone curve of `tone.rs`.
 vec3 shown(vec3 rgb) {
   rgb = max(rgb * exposure, 0.0);
   float most = max(rgb.r, max(rgb.g, rgb.b));
-  if (most <= 0.4) return rgb;
+  if (most <= knee) return rgb;
   return 0.5 * (rgb * bent(most) / most + vec3(bent(rgb.r), bent(rgb.g), bent(rgb.b)));
 }
 

@@ -8,17 +8,21 @@ import { clamp } from './geometry.js';
  * @typedef {{ azimuth: number, elevation: number, distance: number }} Lamp
  * @typedef {{ show: string, with: string, split: number, pass: number, lights: Lamp[], probe: boolean,
  *   view: [number, number], distance: number, turn: number, tip: number, curl: number,
- *   zoom: number, pan: [number, number], exposure: number, edits: import('./edit.js').Edits }} State
+ *   zoom: number, pan: [number, number], exposure: number, knee: number, edits: import('./edit.js').Edits }} State
  */
 
 export const MOST_LIGHTS = 4;
 export const MOST_ZOOM = 400;
-export const SHOWS = ['document', 'mapped', 'printed', 'difference', 'stacks', 'passes'];
+/** What can be shown, and its name. @type {Record<string, string>} */
+export const TITLES = {
+  document: 'Document', mapped: 'Mapped', printed: 'Print', difference: 'Difference', stacks: 'Stacks', passes: 'Passes',
+};
+export const SHOWS = Object.keys(TITLES);
 
 /** @returns {State} */
 export const initial = () => ({
   show: 'printed', with: '', split: 0.5, pass: 0, lights: [{ azimuth: -25, elevation: 30, distance: 0.6 }],
-  probe: false, view: [0, 0], distance: 0.5, turn: 0, tip: 0, curl: 0, zoom: 1, pan: [0, 0], exposure: 0, edits: {},
+  probe: false, view: [0, 0], distance: 0.5, turn: 0, tip: 0, curl: 0, zoom: 1, pan: [0, 0], exposure: 0, knee: 0.4, edits: {},
 });
 
 const rounded = (/** @type {number} */ v, digits = 2) => String(Number(v.toFixed(digits)));
@@ -36,6 +40,7 @@ export function written(s) {
     ['light', lights.join(';')], ['probe', s.probe ? '1' : '0'], ['view', s.view.map((v) => rounded(v)).join(',')],
     ['distance', rounded(s.distance, 3)], ['tilt', `${rounded(s.turn)},${rounded(s.tip)}`], ['curl', rounded(s.curl, 4)],
     ['zoom', rounded(s.zoom, 3)], ['pan', s.pan.map((v) => rounded(v, 5)).join(',')], ['exposure', rounded(s.exposure)],
+    ['knee', rounded(s.knee)],
   );
   const edits = editsWritten(s.edits);
   if (edits) parts.push(['edit', edits]);
@@ -90,6 +95,7 @@ export function read(text, state, limits) {
   const pan = numbers('pan', 2);
   if (pan) state.pan = [clamp(pan[0], -5, 5), clamp(pan[1], -5, 5)];
   state.exposure = one('exposure', -8, 8, state.exposure);
+  state.knee = one('knee', 0, 1, state.knee);
   const edit = given.get('edit');
   if (edit !== null) state.edits = editsRead(edit, limits.bases);
 }

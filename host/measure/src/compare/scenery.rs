@@ -13,7 +13,7 @@ use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use inks::{Curve, Stack};
 use observe::Observer;
-use press::preview::{Exposure, Radiance, Source, picture as shown};
+use press::preview::{Radiance, Source, ToneCurve, picture as shown};
 use press::sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
@@ -160,8 +160,8 @@ impl Scenery {
             errors,
             stacks,
         };
-        let exposure = Exposure::of(std::slice::from_ref(&print));
-        let draw = |radiance: &Radiance| jpeg(&shown(radiance, exposure).map_err(view_error)?);
+        let tone = ToneCurve::of(std::slice::from_ref(&print));
+        let draw = |radiance: &Radiance| jpeg(&shown(radiance, tone).map_err(view_error)?);
         let pictures = Pictures {
             difference: jpeg(&difference(&photo, &print, &predicted))?,
             photo: draw(&radiance(&photo))?,

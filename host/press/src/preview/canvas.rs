@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::error::{PreviewError, check_size};
 use super::radiance::Radiance;
-use super::tone::{Exposure, linear, srgb};
+use super::tone::{ToneCurve, linear, srgb};
 
 /// The neutral background, sRGB.
 const GROUND: [u8; 3] = [52, 52, 52];
@@ -78,7 +78,7 @@ impl Canvas {
     }
 
     /// Draws radiance over the background with its top left corner at (x, y).
-    pub fn paste(&mut self, x: usize, y: usize, picture: &Radiance, exposure: Exposure) {
+    pub fn paste(&mut self, x: usize, y: usize, picture: &Radiance, tone: ToneCurve) {
         let ground = linear(GROUND);
         let (width, stride) = (picture.width.max(1), 3 * self.image.width() as usize);
         let lines = self.image.par_chunks_exact_mut(stride.max(1)).skip(y);
@@ -86,7 +86,7 @@ impl Canvas {
             let visible = line.as_chunks_mut::<3>().0.iter_mut().skip(x);
             for (out, &[r, g, b, covered]) in visible.zip(row).filter(|(_, pixel)| pixel[3] > 0.0) {
                 // Tone mapping applies to the covered part; the result is then blended at the edge.
-                let shown = exposure.shown([r, g, b].map(|v| v / covered));
+                let shown = tone.shown([r, g, b].map(|v| v / covered));
                 let blend = |c: usize| shown[c] * covered + ground[c] * (1.0 - covered);
                 *out = srgb([blend(0), blend(1), blend(2)]);
             }
@@ -121,9 +121,9 @@ impl DrawTarget for Canvas {
 ///
 /// # Errors
 /// A side that is 0 or too long.
-pub fn picture(radiance: &Radiance, exposure: Exposure) -> Result<RgbImage, PreviewError> {
+pub fn picture(radiance: &Radiance, tone: ToneCurve) -> Result<RgbImage, PreviewError> {
     let mut canvas = Canvas::new(radiance.width, radiance.height)?;
-    canvas.paste(0, 0, radiance, exposure);
+    canvas.paste(0, 0, radiance, tone);
     Ok(canvas.finish())
 }
 
@@ -156,7 +156,12 @@ mod tests {
     fn half_covered_pixels_are_half_ground() {
         let mut canvas = Canvas::new(3, 1).unwrap();
         let pixels = vec![[0.2, 0.2, 0.2, 1.0], [0.1, 0.1, 0.1, 0.5], [0.0; 4]];
-        canvas.paste(0, 0, &Radiance { width: 3, height: 1, pixels }, Exposure(1.0));
+        canvas.paste(
+            0,
+            0,
+            &Radiance { width: 3, height: 1, pixels },
+            ToneCurve { exposure: 1.0, ..ToneCurve::PAPER },
+        );
         let image = canvas.finish();
         let value = |x| linear(image.get_pixel(x, 0).0)[0];
         assert!((value(0) - 0.2).abs() < 2e-3);
@@ -168,7 +173,7 @@ mod tests {
     fn pictures_beyond_the_edge_are_cut_off() {
         let mut canvas = Canvas::new(2, 2).unwrap();
         let picture = Radiance { width: 3, height: 3, pixels: vec![[9.0, 9.0, 9.0, 1.0]; 9] };
-        canvas.paste(1, 1, &picture, Exposure(1.0));
+        canvas.paste(1, 1, &picture, ToneCurve { exposure: 1.0, ..ToneCurve::PAPER });
         let image = canvas.finish();
         assert_eq!(image.get_pixel(0, 1).0, GROUND);
         assert!(image.get_pixel(1, 1).0[0] > 240);

@@ -16,7 +16,7 @@ use super::error::{PreviewError, check_size};
 use super::probe::Probe;
 use super::radiance::Radiance;
 use super::sphere::{under_light, under_probe};
-use super::tone::Exposure;
+use super::tone::ToneCurve;
 
 /// One material before and after mapping.
 #[derive(Clone, Debug)]
@@ -62,7 +62,7 @@ pub fn materials_picture(
     // White paper is rendered only to set the exposure under the probe.
     rows.push(&vec![0.85 / std::f64::consts::PI; space.columns()]);
     let mut around = under_probe(space, &rows, &probe.shrunk(PROBE_ROWS), ball, observer)?;
-    let paper = around.pop().map_or(Exposure::PAPER, |p| Exposure::of(&[p]));
+    let paper = around.pop().map_or(ToneCurve::PAPER, |p| ToneCurve::of(&[p]));
     let near: Vec<Radiance> = (0..2 * swatches.len())
         .into_par_iter()
         .map(|i| under_light(&space.curve(rows.row(i)), LIGHT, ball))
@@ -91,7 +91,7 @@ pub fn materials_picture(
         canvas.text(x + pair + GAP, y + line, Letters::Small, FAINT, "print");
         for (side, left) in [(0, x), (1, x + pair + GAP)] {
             let top = y + 2 * line;
-            canvas.paste(left, top, &near[2 * i + side], Exposure::PAPER);
+            canvas.paste(left, top, &near[2 * i + side], ToneCurve::PAPER);
             canvas.paste(left + ball + 6, top, &around[2 * i + side], paper);
         }
         let words = mix_in_words(&swatch.mix);

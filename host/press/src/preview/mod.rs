@@ -41,5 +41,5 @@ pub use radiance::Radiance;
 pub use sheet_picture::{Panels, STANDARD_LIGHTS};
 pub use source::Source;
 pub use spectrum::{Spectrum, spectrum};
-pub use tone::Exposure;
+pub use tone::ToneCurve;
 pub use wear::{Moved, Wear, Worn};

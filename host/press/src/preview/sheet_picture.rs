@@ -13,7 +13,7 @@ use super::error::{PreviewError, check_size};
 use super::flat::{Light, flat};
 use super::radiance::Radiance;
 use super::source::Source;
-use super::tone::Exposure;
+use super::tone::ToneCurve;
 
 /// The default lights: above the middle, beside it, and low enough to show only the body colour.
 pub const STANDARD_LIGHTS: [(&str, Light); 4] = [
@@ -70,7 +70,7 @@ impl<'a> Panels<'a> {
     /// A picture larger than [`LONGEST_SIDE`](super::LONGEST_SIDE).
     pub fn picture(&self, title: &str, notes: &[String]) -> Result<RgbImage, PreviewError> {
         let &Panels { lights, width, height, ref rows } = self;
-        let exposure = Exposure::of(&rows[0].1);
+        let tone = ToneCurve::of(&rows[0].1);
 
         let head = GAP + Letters::Title.height() + GAP;
         let label = Letters::Plain.height() + 6;
@@ -85,7 +85,7 @@ impl<'a> Panels<'a> {
                 let room = width / Letters::Plain.width();
                 let words = if i == 0 { format!("{name} · {light}") } else { (*light).to_string() };
                 canvas.text(left, top, Letters::Plain, INK, &shortened(&words, room));
-                canvas.paste(left, top + label, panel, exposure);
+                canvas.paste(left, top + label, panel, tone);
             }
         }
         let below = head + rows.len() * (label + height + GAP);

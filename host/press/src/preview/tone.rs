@@ -3,59 +3,75 @@
 //! Method: one exposure for all pictures to compare, then a tone curve. It keeps darks and midtones, and compresses
 //! brighter values by `x / (x + room)` above the knee, so that a highlight a hundred times brighter than white keeps its
 //! shape. Half of the result is scaled by the largest channel (gold stays gold), the other half by each channel (the core
-//! of a highlight turns white, as on film). sRGB coding by `palette`. Limits: display-referred; compare radiance, not bytes.
+//! of a highlight turns white, as on film). With the knee at white all colours up to it are kept, and brighter ones are cut
+//! off. sRGB coding by `palette`. Limits: display-referred; compare radiance, not bytes.
 
 use palette::{LinSrgb, Srgb};
 
 use super::radiance::Radiance;
 
-/// The value above which the curve compresses, as a fraction of white.
-const KNEE: f32 = 0.4;
-
 /// The exposure maps the brighter middle of a picture to this: light enough for white paper, with room for highlights.
 const MIDDLE: f32 = 0.6;
 
-/// The factor of radiance before the tone curve.
+/// From radiance to display values: a factor, then the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exposure(pub f32);
+pub struct ToneCurve {
+    /// The factor of radiance, positive.
+    pub exposure: f32,
+    /// The value above which the curve compresses, as a fraction of white: 0 to 1.
+    pub knee: f32,
+}
 
-impl Exposure {
+impl ToneCurve {
     /// For white paper facing a light of irradiance 1, which reflects about 0.85 / pi: it becomes slightly darker than white.
-    pub const PAPER: Exposure = Exposure(3.0);
+    pub const PAPER: ToneCurve = ToneCurve { exposure: 3.0, knee: 0.4 };
 
     /// An exposure that keeps 70 % of the covered pixels of `pictures` below 0.6 of white. It is within a factor of 4 of
-    /// [`Exposure::PAPER`], so that black never looks white.
-    pub fn of(pictures: &[Radiance]) -> Exposure {
+    /// that of [`ToneCurve::PAPER`], so that black never looks white.
+    pub fn of(pictures: &[Radiance]) -> ToneCurve {
         let mut values: Vec<f32> = pictures
             .iter()
             .flat_map(|p| &p.pixels)
             .filter(|p| p[3] > 0.5)
             .map(|p| p[0].max(p[1]).max(p[2]))
             .collect();
+        let paper = ToneCurve::PAPER;
         if values.is_empty() {
-            return Exposure::PAPER;
+            return paper;
         }
         let at = (values.len() - 1) * 7 / 10;
         let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-        Exposure((MIDDLE / bright.max(1e-9)).clamp(Exposure::PAPER.0 / 4.0, Exposure::PAPER.0 * 4.0))
+        let exposure = (MIDDLE / bright.max(1e-9)).clamp(paper.exposure / 4.0, paper.exposure * 4.0);
+        ToneCurve { exposure, ..paper }
+    }
+
+    /// The exposure so many stops above that of [`ToneCurve::PAPER`].
+    pub fn stops(stops: f64) -> ToneCurve {
+        let exposure = (f64::from(ToneCurve::PAPER.exposure) * stops.exp2()) as f32;
+        ToneCurve { exposure, ..ToneCurve::PAPER }
+    }
+
+    /// How many stops the exposure lies above that of [`ToneCurve::PAPER`].
+    pub fn in_stops(self) -> f64 {
+        f64::from(self.exposure / ToneCurve::PAPER.exposure).log2()
     }
 
     /// Maps a linear colour before exposure to display values, linear from 0 to 1.
     pub fn shown(self, rgb: [f32; 3]) -> [f32; 3] {
-        let rgb = rgb.map(|v| (v * self.0).max(0.0));
+        let rgb = rgb.map(|v| (v * self.exposure).max(0.0));
         let most = rgb[0].max(rgb[1]).max(rgb[2]);
-        if most <= KNEE {
+        if most <= self.knee {
             return rgb;
         }
-        let together = bent(most) / most;
-        rgb.map(|v| 0.5 * (v * together + bent(v)))
+        let together = self.bent(most) / most;
+        rgb.map(|v| 0.5 * (v * together + self.bent(v)))
     }
-}
 
-/// The tone curve: the identity below the knee, approaching 1 above it, with equal slopes at the knee.
-fn bent(v: f32) -> f32 {
-    let (over, room) = (v - KNEE, 1.0 - KNEE);
-    if over <= 0.0 { v } else { KNEE + room * over / (over + room) }
+    /// The curve: the identity below the knee, approaching 1 above it, with equal slopes at the knee.
+    fn bent(self, v: f32) -> f32 {
+        let (over, room) = (v - self.knee, 1.0 - self.knee);
+        if over <= 0.0 { v } else { self.knee + room * over / (over + room) }
+    }
 }
 
 /// Encodes a linear colour from 0 to 1 as sRGB.
@@ -84,7 +100,11 @@ mod tests {
         let mut last = -1.0;
         // From black to 130 times white: beyond, steps this fine fall below the digits of f32.
         for i in 0..1200 {
-            let shown = Exposure(1.0).shown([1.5f32.powf(i as f32 / 100.0) - 1.0, 0.2, 0.1]);
+            let shown = ToneCurve { exposure: 1.0, ..ToneCurve::PAPER }.shown([
+                1.5f32.powf(i as f32 / 100.0) - 1.0,
+                0.2,
+                0.1,
+            ]);
             assert!(shown[0] > last && shown[0] <= 1.0, "step {i}: {} after {last}", shown[0]);
             last = shown[0];
         }
@@ -92,23 +112,39 @@ mod tests {
 
     #[test]
     fn darks_and_middles_are_left_alone() {
-        assert_eq!(Exposure(2.0).shown([0.05, 0.1, 0.2]), [0.1, 0.2, 0.4]);
+        assert_eq!(ToneCurve { exposure: 2.0, ..ToneCurve::PAPER }.shown([0.05, 0.1, 0.2]), [0.1, 0.2, 0.4]);
     }
 
     #[test]
     fn highlights_go_towards_white_but_keep_their_order() {
-        let [r, g, b] = Exposure(1.0).shown([18.0, 14.0, 6.0]);
+        let [r, g, b] = ToneCurve { exposure: 1.0, ..ToneCurve::PAPER }.shown([18.0, 14.0, 6.0]);
         assert!(r > g && g > b && b > 0.5, "{r} {g} {b}");
     }
 
     #[test]
     fn most_of_a_picture_leaves_room_for_what_shines() {
         let values: Vec<f32> = (1..=100).map(|i| i as f32 * 0.01).collect();
-        let exposure = Exposure::of(&[picture(&values)]);
-        let below = values.iter().filter(|&&v| v * exposure.0 <= 0.6 + 1e-6).count();
+        let exposure = ToneCurve::of(&[picture(&values)]).exposure;
+        let below = values.iter().filter(|&&v| v * exposure <= 0.6 + 1e-6).count();
         assert!((69..=71).contains(&below), "{below} of 100");
-        let black = Exposure::of(&[picture(&[0.0; 9])]);
-        assert!(black.0.is_finite() && black.0 <= 12.0, "{black:?}");
+        let black = ToneCurve::of(&[picture(&[0.0; 9])]).exposure;
+        assert!(black.is_finite() && black <= 12.0, "{black:?}");
+    }
+
+    #[test]
+    fn with_the_knee_at_white_colours_are_kept_or_cut_off() {
+        let cut = ToneCurve { exposure: 0.5, knee: 1.0 };
+        assert_eq!(cut.shown([0.4, 1.0, 1.9]), [0.2, 0.5, 0.95]);
+        let [r, g, b] = cut.shown([8.0, 4.0, 1.0]);
+        assert_eq!([r, g], [1.0, 0.75], "half keeps the hue of the highlight, half turns white");
+        assert!(b < g);
+        assert!(ToneCurve { exposure: 1.0, knee: 0.0 }.shown([0.5, 0.2, 0.1])[0] < 0.5);
+    }
+
+    #[test]
+    fn stops_double_the_exposure() {
+        assert_eq!(ToneCurve::stops(1.0).exposure, 2.0 * ToneCurve::PAPER.exposure);
+        assert!((ToneCurve::stops(-2.5).in_stops() + 2.5).abs() < 1e-6);
     }
 
     /// IEC 61966-2-1, by its formula.

@@ -16,7 +16,7 @@ use image::ImageFormat;
 use inks::Library;
 use observe::Observer;
 use press::layout::{Mm, Repeat};
-use press::preview::{Exposure, Probe, Radiance, Source, mix_in_words, picture};
+use press::preview::{Probe, Radiance, Source, ToneCurve, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
 
@@ -51,7 +51,7 @@ pub struct Page {
     pub html: String,
     /// Width and height of its picture for browsers that cannot draw.
     pub pixels: (usize, usize),
-    pub exposure: Exposure,
+    pub tone: ToneCurve,
 }
 
 impl Shown {
@@ -123,7 +123,7 @@ impl Shown {
         let (width, height) = proportions(size, STILL);
         let scene = view.scene(size, width as f64 / height as f64, probe.cloned());
         let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
-        let exposure = view.exposure(&radiance);
+        let tone = view.tone(&radiance);
         let studio = Probe::studio(64);
         let subject = Subject {
             name: &self.name,
@@ -138,10 +138,10 @@ impl Shown {
             stacks: &stacks,
             space: &self.space,
             probe: probe.unwrap_or(&studio),
-            start: &view.fragment(exposure, self.target.is_some(), probe.is_some()),
-            still: &png(&radiance, exposure)?,
+            start: &view.fragment(tone, self.target.is_some(), probe.is_some()),
+            still: &png(&radiance, tone)?,
         };
-        Ok(Page { html: page(&subject, observer)?, pixels: (width, height), exposure })
+        Ok(Page { html: page(&subject, observer)?, pixels: (width, height), tone })
     }
 
     /// Width and height in metres.
@@ -183,8 +183,8 @@ pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
 }
 
 /// A picture as PNG.
-pub fn png(radiance: &Radiance, exposure: Exposure) -> Result<Vec<u8>> {
+pub fn png(radiance: &Radiance, tone: ToneCurve) -> Result<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    picture(radiance, exposure)?.write_to(&mut bytes, ImageFormat::Png)?;
+    picture(radiance, tone)?.write_to(&mut bytes, ImageFormat::Png)?;
     Ok(bytes.into_inner())
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use ::view::{Camera, Light, Pose, Scene, direction};
 use clap::{Args, ValueEnum};
-use press::preview::{Exposure, Probe, Radiance};
+use press::preview::{Probe, Radiance, ToneCurve};
 
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -111,6 +111,9 @@ pub struct ViewArgs {
     /// [default: so that most of the picture is neither dark nor burnt out]
     #[arg(long, value_name = "STOPS", allow_hyphen_values = true, value_parser = stops)]
     exposure: Option<f32>,
+    /// Tone curve: brightness up to this share of white is kept, and what is brighter is compressed; 1 cuts it off at white
+    #[arg(long, value_name = "SHARE", default_value_t = ToneCurve::PAPER.knee, value_parser = share)]
+    tone_curve: f32,
 }
 
 impl Default for ViewArgs {
@@ -125,6 +128,7 @@ impl Default for ViewArgs {
             tilt: level,
             curl: None,
             exposure: None,
+            tone_curve: ToneCurve::PAPER.knee,
         }
     }
 }
@@ -133,6 +137,13 @@ fn stops(text: &str) -> Result<f32, String> {
     match text.parse() {
         Ok(stops) if (-10.0..=10.0).contains(&stops) => Ok(stops),
         _ => Err("expected a number of stops from -10 to 10, such as -1 or 0.5".into()),
+    }
+}
+
+fn share(text: &str) -> Result<f32, String> {
+    match text.parse() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("expected a share of white from 0 to 1, such as 0.4".into()),
     }
 }
 
@@ -156,12 +167,13 @@ impl ViewArgs {
         self.show.unwrap_or(Show::Printed)
     }
 
-    /// The exposure asked for, or one for this picture.
-    pub fn exposure(&self, radiance: &Radiance) -> Exposure {
-        match self.exposure {
-            Some(stops) => Exposure(Exposure::PAPER.0 * stops.exp2()),
-            None => Exposure::of(std::slice::from_ref(radiance)),
-        }
+    /// The tone curve with the exposure asked for, or with one for this picture.
+    pub fn tone(&self, radiance: &Radiance) -> ToneCurve {
+        let tone = match self.exposure {
+            Some(stops) => ToneCurve::stops(f64::from(stops)),
+            None => ToneCurve::of(std::slice::from_ref(radiance)),
+        };
+        ToneCurve { knee: self.tone_curve, ..tone }
     }
 
     /// The lights named; without any and without a probe, one.
@@ -174,11 +186,16 @@ impl ViewArgs {
 
     /// Whether there are options that only light needs.
     pub fn has_lights(&self) -> bool {
-        !self.light.is_empty() || self.light_probe.is_some() || self.exposure.is_some()
+        !self.light.is_empty() || self.light_probe.is_some() || self.has_tone()
+    }
+
+    /// Whether there are options of the tone curve.
+    pub fn has_tone(&self) -> bool {
+        self.exposure.is_some() || self.tone_curve != ToneCurve::PAPER.knee
     }
 
     /// The same scene as the page's address holds it.
-    pub fn fragment(&self, exposure: Exposure, both: bool, probe: bool) -> String {
+    pub fn fragment(&self, tone: ToneCurve, both: bool, probe: bool) -> String {
         let lamp = |Lamp(Degrees(a, e), distance): &Lamp| format!("{a},{e},{}", distance.unwrap_or(0.0));
         let lights: Vec<String> = self.lamps().iter().map(lamp).collect();
         let name = |show| match show {
@@ -192,7 +209,7 @@ impl ViewArgs {
             _ => format!("show={}", name(self.what())),
         };
         format!(
-            "{shows}&light={}&probe={}&view={},{}&distance={}&tilt={},{}&curl={}&exposure={:.2}",
+            "{shows}&light={}&probe={}&view={},{}&distance={}&tilt={},{}&curl={}&exposure={:.2}&knee={}",
             lights.join(";"),
             u8::from(probe),
             self.view.0,
@@ -201,7 +218,8 @@ impl ViewArgs {
             self.tilt.0,
             self.tilt.1,
             self.curl.unwrap_or(0.0),
-            f64::from(exposure.0 / Exposure::PAPER.0).log2(),
+            tone.in_stops(),
+            tone.knee,
         )
     }
 }
@@ -221,6 +239,8 @@ mod tests {
         for text in ["0", "-1", "inf", "near", "1,2"] {
             assert!(text.parse::<Distance>().is_err(), "{text}");
         }
+        assert!(share("1.01").is_err() && share("NaN").is_err() && share("-0.1").is_err());
+        assert_eq!(share("1"), Ok(1.0));
         assert!("1,2,3".parse::<Degrees>().unwrap_err().contains("30,15"));
     }
 }

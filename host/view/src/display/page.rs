@@ -10,7 +10,7 @@ use appearance::brdf::{Space, reflectances};
 use appearance::document::SAMPLES;
 use inks::Library;
 use press::html;
-use press::preview::Exposure;
+use press::preview::ToneCurve;
 use press::sheet::{DOTS_PER_MM, colours};
 use serde_json::json;
 
@@ -64,7 +64,7 @@ pub fn page(subject: &Subject) -> Result<String, DisplayError> {
         "order": (0..tile * tile).map(|i| grid.stack_in_tile(i % tile, i / tile)).collect::<Vec<_>>(),
         "edges": [edges(cells.0), edges(cells.1)], "side": grid.screen().cell_mm(),
         "passes": (0..=255u8).map(|value| grid.screen().passes(value)).collect::<Vec<f64>>(),
-        "brightness": grid.brightness(), "white": Exposure::PAPER.0, "steps": STEPS,
+        "brightness": grid.brightness(), "white": ToneCurve::PAPER.exposure, "steps": STEPS,
         "stacks": grid.stacks().iter().map(ToString::to_string).collect::<Vec<_>>(),
         "colours": colours(grid.stacks()),
         "curves": packed(&tables(&space, &rows)).map_err(ViewError::from)?,

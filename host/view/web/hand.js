@@ -1,0 +1,120 @@
+// The picture under the hand: mouse, touch, wheel and keys move light, sheet and picture, and a tap looks at a spot.
+
+import { arrows, mark, sync } from './controls.js';
+import { clamp } from './geometry.js';
+import { hemisphere, place } from './lamps.js';
+import { look } from './look.js';
+import { byId, canvas, faceTheEye, held, metresPerPixel, redraw, state } from './stage.js';
+import { MOST_ZOOM } from './state.js';
+
+/** @type {(x: number, y: number, by: string) => void} */
+function drag(x, y, by) {
+  if (by === 'move') {
+    const step = metresPerPixel();
+    state.pan = [clamp(state.pan[0] - x * step, -5, 5), clamp(state.pan[1] + y * step, -5, 5)];
+  } else if (by === 'sheet') {
+    state.turn = clamp(state.turn + 0.25 * x, -80, 80);
+    state.tip = clamp(state.tip - 0.25 * y, -80, 80);
+    faceTheEye();
+  } else if (state.lights[held.lamp]) {
+    const r = hemisphere() / 90;
+    place(held.lamp, state.lights[held.lamp].azimuth + x / r, state.lights[held.lamp].elevation - y / r);
+    return;
+  }
+  sync();
+  redraw(true);
+}
+
+/**
+ * Zooms, and keeps the point of the picture where it is.
+ * @param {number} by
+ * @param {number} x from the middle of the picture, in pixels
+ * @param {number} y
+ */
+function zoom(by, x = 0, y = 0) {
+  const before = metresPerPixel();
+  state.zoom = clamp(state.zoom * by, 0.5, MOST_ZOOM);
+  const change = before - metresPerPixel();
+  state.pan = [clamp(state.pan[0] + x * change, -5, 5), clamp(state.pan[1] - y * change, -5, 5)];
+  redraw(true);
+}
+
+function whole() {
+  state.zoom = 1;
+  state.pan = [0, 0];
+  redraw(false);
+}
+
+/** @type {Map<number, { x: number, y: number }>} */
+const fingers = new Map();
+let travelled = 0;
+
+canvas.addEventListener('pointerdown', (event) => {
+  canvas.setPointerCapture(event.pointerId);
+  fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+  travelled = fingers.size > 1 ? Infinity : 0;
+});
+canvas.addEventListener('pointermove', (event) => {
+  const finger = fingers.get(event.pointerId);
+  if (!finger) return;
+  const [x, y] = [event.clientX - finger.x, event.clientY - finger.y];
+  travelled += Math.abs(x) + Math.abs(y);
+  if (fingers.size === 2) {
+    const [other] = [...fingers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
+    const before = Math.hypot(finger.x - other.x, finger.y - other.y);
+    const after = Math.hypot(event.clientX - other.x, event.clientY - other.y);
+    const box = canvas.getBoundingClientRect();
+    drag(x / 2, y / 2, 'move');
+    zoom(after / Math.max(before, 1), (event.clientX + other.x) / 2 - box.left - box.width / 2, (event.clientY + other.y) / 2 - box.top - box.height / 2);
+  } else if (fingers.size === 1 && travelled > 4) {
+    drag(x, y, event.buttons & 6 ? 'move' : event.shiftKey ? 'sheet' : held.tool);
+  }
+  [finger.x, finger.y] = [event.clientX, event.clientY];
+});
+const lift = (/** @type {PointerEvent} */ event) => {
+  if (!fingers.delete(event.pointerId)) return;
+  if (event.type === 'pointerup' && fingers.size === 0 && travelled <= 4) {
+    const box = canvas.getBoundingClientRect();
+    look(event.clientX - box.left, event.clientY - box.top);
+  }
+};
+canvas.addEventListener('pointerup', lift);
+canvas.addEventListener('pointercancel', lift);
+canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+canvas.addEventListener('wheel', (event) => {
+  event.preventDefault();
+  const box = canvas.getBoundingClientRect();
+  const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 : 1;
+  zoom(Math.exp(clamp(-event.deltaY * lines, -300, 300) / 400), event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2);
+}, { passive: false });
+canvas.addEventListener('keydown', (event) => {
+  if (event.ctrlKey || event.metaKey) return;
+  const arrow = arrows(event);
+  if (arrow) {
+    const [x, y] = arrow;
+    if (event.altKey) drag(-40 * x, 40 * y, 'move');
+    else if (event.shiftKey) drag(12 * x, -12 * y, 'sheet');
+    else if (state.lights[held.lamp]) place(held.lamp, state.lights[held.lamp].azimuth + 3 * x, state.lights[held.lamp].elevation + 3 * y);
+  } else if (event.key === '+' || event.key === '=') zoom(1.25);
+  else if (event.key === '-') zoom(0.8);
+  else if (event.key === '0') whole();
+  else if (event.key === 'Enter') look(canvas.clientWidth / 2, canvas.clientHeight / 2);
+  else if (event.key.toLowerCase() === 'l') choose('light');
+  else if (event.key.toLowerCase() === 't') choose('sheet');
+  else if (event.key.toLowerCase() === 'm') choose('move');
+  else return;
+  event.preventDefault();
+});
+
+/** @param {string} name */
+function choose(name) {
+  held.tool = name;
+  mark(byId('tools'), 'aria-pressed', (button) => button.dataset.tool === held.tool);
+}
+
+for (const button of byId('tools').querySelectorAll('[data-tool]')) {
+  button.addEventListener('click', () => choose(/** @type {HTMLElement} */ (button).dataset.tool ?? 'light'));
+}
+byId('nearer').addEventListener('click', () => zoom(1.5));
+byId('farther').addEventListener('click', () => zoom(1 / 1.5));
+byId('whole').addEventListener('click', whole);
