@@ -121,9 +121,9 @@ const QUALITY: [(&str, &str, u16); 2] =
     [("Normal", "Normal (600 dpi)", 600), ("Draft", "Draft (rendered at 300 dpi)", 300)];
 
 const HALFTONE: [(&str, &str, Method); 3] = [
-    ("Walk", "Runs along a curve", Method::Walk),
     ("Cells", "Compact clusters", Method::Cells),
     ("Best", "Compact clusters, searched (slower)", Method::Best),
+    ("Walk", "Runs along a curve", Method::Walk),
 ];
 
 const INTENT: [(&str, &str, Intent); 3] = [

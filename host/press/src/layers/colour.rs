@@ -21,11 +21,11 @@ use super::bits;
 use super::compose::Settings;
 use super::error::LayersError;
 use super::flat::{BLACK, Flat, TONE, split};
-use super::intent::{Intent, Light, difference};
-use super::kinds::Kind;
-use super::lattice::{Lattice, Nodes, ends, step};
-use super::outline::{self, Treatment};
+use super::intent::Intent;
+use super::lattice::{Lattice, Nodes, ends, step, with_tints};
+use super::outline;
 use super::solids::Solids;
+use super::treatments::treatments;
 use crate::halftone::{self, halftone};
 use crate::separate::{Plane, pack};
 use appearance::brdf::Space;
@@ -33,12 +33,6 @@ use appearance::document::SAMPLES;
 use appearance::gamut::{self, InkMix, Printable};
 use appearance::weights::{ONE, WeightMaps};
 use observe::Observer;
-
-/// A flat colour is printed as a stack that is at most so much farther from it in Oklab than the best mixture; 0.02 is barely
-/// visible.
-const SAME: f64 = 0.05;
-/// Least weight of a stack in the mixture of a colour that the stack may stand for.
-const NEARLY: f64 = 1.0 / 8.0;
 
 /// Colours to print with the process inks.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -144,9 +138,9 @@ impl Colour {
         if let Some(done) = self.without_tones(&solids) {
             return Ok(done);
         }
-        let mut fit = self.fit(&printable, space, settings, observer)?;
+        let mut fit = self.fit((&printable, &solids), space, settings, observer)?;
         let fixed = (!self.flat.index.is_empty()).then(|| {
-            let treatments = self.treatments(&mut fit, &solids);
+            let treatments = treatments(&self.flat, dots.0, &mut fit, &solids);
             outline::fixed(&self.flat, dots.0, &treatments)
         });
         let fixed = match fixed {
@@ -166,9 +160,9 @@ impl Colour {
     }
 
     /// Fits the nodes of the lattices that are needed.
-    fn fit(
+    pub(super) fn fit(
         &self,
-        printable: &Printable,
+        (printable, solids): (&Printable, &Solids<'_>),
         space: Space,
         settings: &Settings,
         observer: &dyn Observer,
@@ -184,10 +178,16 @@ impl Colour {
         // A colour is the light of the whole surface: its rows are flat, so the light would only count it twice.
         let clamp =
             gamut::Settings { intent: gamut::Intent::Clamp, light: 0.0, ..gamut::Settings::default() };
-        let InkMix { stacks, maps, matrix } = gamut::clamped(&lattice, printable, &clamp, observer)?.mix;
+        let mut mix = gamut::clamped(&lattice, printable, &clamp, observer)?.mix;
+        let of_drawings = intents.len() - 1;
+        if of_drawings > 0 {
+            let named = |colour| solids.named(colour);
+            mix = with_tints(mix, of_drawings, settings.gamma, named).map_err(gamut::GamutError::from)?;
+        }
+        let InkMix { stacks, maps, matrix } = mix;
         let channels = maps.channels();
         let steps = std::array::from_fn(step);
-        Ok(Fit { stacks, matrix, channels, nodes: Nodes::new(&maps), steps, of_drawings: intents.len() - 1 })
+        Ok(Fit { stacks, matrix, channels, nodes: Nodes::new(&maps), steps, of_drawings })
     }
 
     /// The mixture of stacks at every pixel.
@@ -236,40 +236,6 @@ impl Colour {
         }
         Some((stacks, index.par_iter().map(|&dot| number[usize::from(dot)]).collect()))
     }
-
-    /// How each flat colour is printed, from the weights of the stacks in its mixture. Stacks that colours name and nothing
-    /// else uses are added to the mix.
-    fn treatments(&self, fit: &mut Fit, solids: &Solids<'_>) -> Vec<Treatment> {
-        let bodies: Vec<Light> = fit.stacks.iter().map(|stack| solids.body(stack)).collect();
-        let mut treatment = |&(_, colour): &(Kind, [u8; 3])| {
-            if let Some(stack) = solids.named(colour) {
-                let known = fit.stacks.iter().position(|known| *known == stack);
-                return Treatment::Solid(known.unwrap_or_else(|| {
-                    fit.stacks.push(stack);
-                    fit.matrix.iter_mut().for_each(|shares| shares.push(0));
-                    fit.stacks.len() - 1
-                }) as u8);
-            }
-            let weights = &fit.weights(colour)[..bodies.len()];
-            let wanted = solids.wanted(colour);
-            let mixed =
-                std::array::from_fn(|c| weights.iter().zip(&bodies).map(|(w, body)| w * body[c]).sum());
-            let off = |stack: usize| difference(bodies[stack], wanted);
-            let inked = || (1..weights.len()).filter(|&stack| weights[stack] > 0.0);
-            let nearest = inked()
-                .filter(|&stack| weights[stack] >= NEARLY)
-                .min_by(|&a, &b| off(a).total_cmp(&off(b)))
-                .or_else(|| inked().max_by(|&a, &b| weights[a].total_cmp(&weights[b])));
-            match nearest {
-                None => Treatment::Solid(0),
-                Some(stack) if off(stack) <= difference(mixed, wanted) + SAME => {
-                    Treatment::Solid(stack as u8)
-                }
-                Some(stack) => Treatment::Shape { solid: stack as u8, dark: weights[0] < 0.5 },
-            }
-        };
-        self.flat.colours.iter().map(&mut treatment).collect()
-    }
 }
 
 /// The inks of black: black ink or, without it, the darkest stack of these process inks.
@@ -283,8 +249,8 @@ fn black_inks(inks: &InkSet, library: &Library) -> Vec<Ink> {
 }
 
 /// The nodes of the lattices, fitted.
-struct Fit {
-    stacks: Vec<Stack>,
+pub(super) struct Fit {
+    pub stacks: Vec<Stack>,
     /// Shares of the stacks in each channel.
     matrix: Vec<Vec<u16>>,
     channels: usize,
@@ -296,8 +262,18 @@ struct Fit {
 }
 
 impl Fit {
+    /// The number of a stack, which is added if nothing uses it yet.
+    pub fn number(&mut self, stack: Stack) -> u8 {
+        let known = self.stacks.iter().position(|known| *known == stack);
+        known.unwrap_or_else(|| {
+            self.stacks.push(stack);
+            self.matrix.iter_mut().for_each(|shares| shares.push(0));
+            self.stacks.len() - 1
+        }) as u8
+    }
+
     /// The weights of the stacks in a flat colour.
-    fn weights(&self, colour: [u8; 3]) -> Vec<f64> {
+    pub fn weights(&self, colour: [u8; 3]) -> Vec<f64> {
         let (mut sums, mut weights) = (self.nodes.scratch(), vec![0; self.channels]);
         self.nodes.between(
             self.of_drawings,
@@ -316,7 +292,9 @@ impl Fit {
 
 #[cfg(test)]
 mod tests {
-    use super::super::intent::oklab;
+    use super::super::intent::{Light, difference, oklab};
+    use super::super::kinds::Kind;
+    use super::super::treatments::{Shape, Treatment};
     use super::*;
     use observe::Silent;
     use protocol::ink::Kind as InkKind;
@@ -332,7 +310,10 @@ mod tests {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let settings = Settings { intent, ..Settings::default() };
-        (colour.mix(colour.fit(&printable, space, &settings, &Silent).unwrap()).unwrap(), printable)
+        let fit =
+            colour.fit((&printable, &Solids::new(&printable, &space)), space.clone(), &settings, &Silent);
+        let mix = colour.mix(fit.unwrap()).unwrap();
+        (mix, printable)
     }
 
     fn process() -> InkSet {
@@ -468,6 +449,30 @@ mod tests {
     }
 
     #[test]
+    fn a_tint_of_an_ink_is_that_ink_alone() {
+        // As CMYK arrives: 30 % cyan, 80 % magenta, 50 % yellow, and 40 % of magenta and yellow.
+        let tints = [
+            ([179, 255, 255], "C", 0.3),
+            ([255, 51, 255], "M", 0.8),
+            ([255, 255, 127], "Y", 0.5),
+            ([255, 153, 153], "M+Y", 0.4),
+        ];
+        let pixels: Vec<[u8; 4]> =
+            tints.iter().flat_map(|&([r, g, b], ..)| [[Kind::DRAWING, r, g, b]; 4]).collect();
+        let colour = Colour::of(&pixels, (16, 1), (16, 1)).unwrap();
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process(), &space);
+        let solids = Solids::new(&printable, &space);
+        let fit = colour.fit((&printable, &solids), space, &Settings::default(), &Silent).unwrap();
+        for (rgb, name, share) in tints {
+            let weights = fit.weights(rgb);
+            let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
+            assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
+            assert!((of(name) + of("substrate") - 1.0).abs() < 0.002, "{name}: {weights:?}");
+        }
+    }
+
+    #[test]
     fn inks_are_found_in_flat_colours() {
         let names = [
             [0, 0, 0],
@@ -488,14 +493,15 @@ mod tests {
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
-        let mut fit = colour.fit(&printable, space.clone(), &Settings::default(), &Silent).unwrap();
-        let treatments = colour.treatments(&mut fit, &solids);
+        let mut fit =
+            colour.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        let treatments = treatments(&colour.flat, pixels.len(), &mut fit, &solids);
         let found = |rgb: [u8; 3]| {
             let at = colour.flat.colours.iter().position(|(_, colour)| *colour == rgb).unwrap();
             match treatments[at] {
                 Treatment::Solid(stack) => fit.stacks[usize::from(stack)].to_string(),
-                Treatment::Shape { solid, dark } => {
-                    format!("{} {}", if dark { "dark" } else { "pale" }, fit.stacks[usize::from(solid)])
+                Treatment::Shape(Shape { solids, dark, .. }) => {
+                    format!("{} {}", if dark { "dark" } else { "pale" }, fit.stacks[usize::from(solids[0])])
                 }
             }
         };

@@ -39,6 +39,34 @@ pub struct Flat {
     pub(super) index: Vec<u8>,
 }
 
+/// Pairs of colours with dots that lie beside each other, a bit each.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Touching([[u64; 4]; 256]);
+
+impl Touching {
+    fn none() -> Box<Touching> {
+        Box::new(Touching([[0; 4]; 256]))
+    }
+
+    #[inline]
+    fn add(&mut self, a: u8, b: u8) {
+        if a != b {
+            self.0[usize::from(a)][usize::from(b / 64)] |= 1 << (b % 64);
+        }
+    }
+
+    fn joined(mut self: Box<Touching>, other: Box<Touching>) -> Box<Touching> {
+        self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened()).for_each(|(a, b)| *a |= b);
+        self
+    }
+
+    /// Whether dots of two colours lie beside each other.
+    pub fn has(&self, a: u8, b: u8) -> bool {
+        let from = |a: u8, b: u8| self.0[usize::from(a)][usize::from(b / 64)] >> (b % 64) & 1 == 1;
+        from(a, b) || from(b, a)
+    }
+}
+
 /// Kind and colour of a pixel of three bytes, or of four with a tag before them.
 #[inline(always)]
 pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (Kind, [u8; 3]) {
@@ -77,9 +105,11 @@ impl Flat {
         for (stretch, colour) in masks.stretches() {
             let number = match colour {
                 K_OF_PICTURES if N == 4 => BLACK,
+                [255, 255, 255] => WHITE,
+                [0, 0, 0] => BLACK,
                 colour => numbers.get(&(Kind::Drawing, colour)).copied().unwrap_or(TONE),
             };
-            index[stretch.start..stretch.end].fill(number);
+            index[stretch].fill(number);
         }
         let mut flat = Flat { colours, index };
         flat.forget_noise(pixels, width);
@@ -130,6 +160,20 @@ impl Flat {
         Flat { index: resample::nearest(self.index, size, dots), ..self }
     }
 
+    /// Which colours touch.
+    pub(super) fn touching(&self, width: usize) -> Box<Touching> {
+        let rows = self.index.par_chunks(width).enumerate().map(|(y, row)| {
+            let mut touching = Touching::none();
+            let above = if y > 0 { &self.index[(y - 1) * width..y * width] } else { row };
+            for (x, (&dot, &over)) in row.iter().zip(above).enumerate() {
+                touching.add(dot, over);
+                touching.add(dot, row[x.saturating_sub(1)]);
+            }
+            touching
+        });
+        rows.reduce(Touching::none, Touching::joined)
+    }
+
     /// Whether the halftone has nothing to do: every dot is white or black.
     pub(super) fn is_black_and_white(&self) -> bool {
         !self.index.is_empty()
@@ -173,8 +217,13 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> V
             counts
         })
         .collect();
-    let mut counts: Counts =
-        masks.colours.iter().map(|(&colour, &dots)| ((Kind::Drawing, colour), dots)).collect();
+    let plain = |colour: [u8; 3]| colour == [255; 3] || colour == [0; 3];
+    let mut counts: Counts = masks
+        .colours
+        .iter()
+        .filter(|(colour, _)| !plain(**colour))
+        .map(|(&colour, &dots)| ((Kind::Drawing, colour), dots))
+        .collect();
     for part in gathered {
         // In a fixed order, because the number of colours is limited.
         let mut part: Vec<_> = part.into_iter().collect();

@@ -3,6 +3,8 @@
 //! Problem: a fit of eq. 1 takes 10 microseconds, a page has thirty million dots.
 //! Method: 17 x 17 x 17 colours are fitted, once for each intent in use. A pixel is interpolated among the four corners of the
 //! tetrahedron around it. An interpolated mixture is a mixture, so every pixel is printable.
+//! Text and drawings name inks by the primaries of sRGB, none of which is printable as it looks. So that a tint does not differ
+//! from its solid in hue, the lines from white to the primaries are tints of those stacks ([`with_tints`]).
 //! Cost: 60 ms for the fit, 20 ns a pixel. Limits: colours between nodes are as exact as the interpolation.
 
 use inks::Stack;
@@ -12,8 +14,8 @@ use rayon::prelude::*;
 use super::intent::{Hull, Intent, Light};
 use appearance::brdf::Space;
 use appearance::document::Materials;
-use appearance::gamut::Printable;
-use appearance::weights::{ONE, WeightMaps};
+use appearance::gamut::{InkMix, Printable};
+use appearance::weights::{ONE, WeightError, WeightMaps};
 
 /// Nodes along an edge of the lattice.
 pub(super) const NODES: usize = 17;
@@ -94,6 +96,54 @@ impl Nodes {
     fn of(&self, node: usize) -> &[[u16; 8]] {
         &self.lanes[node * self.each..][..self.each]
     }
+}
+
+/// Prints the lines from white to the six primaries of a lattice as paper and the stack that each primary names, in shares that
+/// fall evenly along the line: 30 % cyan is cyan on 30 % of the dots.
+pub(super) fn with_tints(
+    mix: InkMix,
+    lattice: usize,
+    gamma: f64,
+    named: impl Fn([u8; 3]) -> Option<Stack>,
+) -> Result<InkMix, WeightError> {
+    let InkMix { mut stacks, maps, mut matrix } = mix;
+    let old = maps.channels();
+    // The channel that is nothing but a stack.
+    let mut channel = |stack: &Stack| {
+        let number = stacks.iter().position(|known| known == stack).unwrap_or_else(|| {
+            stacks.push(stack.clone());
+            matrix.iter_mut().for_each(|shares| shares.push(0));
+            stacks.len() - 1
+        });
+        matrix.iter().position(|shares| shares[number] == ONE).unwrap_or_else(|| {
+            let mut shares = vec![0; stacks.len()];
+            shares[number] = ONE;
+            matrix.push(shares);
+            matrix.len() - 1
+        })
+    };
+    let paper = channel(&Stack::SUBSTRATE);
+    let primaries = (1..7u8).map(|bits| [4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 }));
+    let lines: Vec<([u8; 3], usize)> =
+        primaries.filter_map(|colour| Some((colour, channel(&named(colour)?)))).collect();
+    let channels = matrix.len();
+    let mut data = vec![0; maps.data().len() / old * channels];
+    for (out, weights) in data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old)) {
+        out[..old].copy_from_slice(weights);
+    }
+    for (colour, stack) in lines {
+        for level in 0..NODES {
+            let along = colour.map(|v| if v > 0 { NODES - 1 } else { level });
+            let node = lattice * ALL + along.into_iter().fold(0, |node, at| node * NODES + at);
+            let light = (level as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
+            let out = &mut data[node * channels..(node + 1) * channels];
+            out.fill(0);
+            out[stack] = (f64::from(ONE) * (1.0 - light)).round() as u16;
+            out[paper] = ONE - out[stack];
+        }
+    }
+    let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
+    Ok(InkMix { stacks, maps, matrix })
 }
 
 /// The lattices as a document: one matte pixel for every node, in order of intent, red, green and blue.

@@ -4,15 +4,17 @@
 //! a photograph, both lose their outline.
 //! Method: a stretch of a row is what lies between white, black and what is no picture. Stretches that touch are one shape. A
 //! shape in exactly one colour is line art: photographs have no such shapes beyond specks, so a colour counts only if its
-//! shapes have [`LEAST`] dots.
-//! Cost: 1 ns a pixel of pictures, 20 ns a stretch. Limits: a mask that touches pixels of another colour is a picture.
+//! shapes have [`LEAST`] dots. Shapes in several colours may be flat art ([`posters`](super::posters)).
+//! Cost: 1 ns a pixel of pictures, 20 ns a stretch. Limits: a speck of another colour makes a picture of a mask, unless both are flat art.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::flat::split;
 use super::kinds::Kind;
+use super::posters::{self, Span};
 
 /// The least dots of a colour in shapes of its own: a square of eight dots.
 const LEAST: u64 = 64;
@@ -32,6 +34,8 @@ pub(super) struct Stretch {
 /// The shapes in one colour, stretch by stretch, and the dots of each of their colours.
 pub(super) struct Masks {
     stretches: Vec<Stretch>,
+    /// What flat art in several colours is made of.
+    spans: Vec<Span>,
     /// The dots of each colour.
     pub colours: HashMap<[u8; 3], u64>,
 }
@@ -65,20 +69,40 @@ impl Masks {
         let mut colours = HashMap::new();
         for at in 0..all.len() {
             let root = root(&mut all, at);
-            all[at].colour = all[root].colour;
+            (all[at].parent, all[at].colour) = (root, all[root].colour);
             if let Some(colour) = all[at].colour {
                 *colours.entry(colour).or_default() += (all[at].end - all[at].start) as u64;
             }
         }
         colours.retain(|_, dots| *dots >= LEAST);
+        let spans = flat_art(pixels, width, &all);
+        for (span, colour) in &spans {
+            *colours.entry(*colour).or_default() += span.len() as u64;
+        }
         all.retain(|stretch| stretch.colour.is_some_and(|colour| colours.contains_key(&colour)));
-        Masks { stretches: all, colours }
+        Masks { stretches: all, spans, colours }
     }
 
-    /// The stretches with the colour of each.
-    pub fn stretches(&self) -> impl Iterator<Item = (&Stretch, [u8; 3])> {
-        self.stretches.iter().filter_map(|stretch| Some((stretch, stretch.colour?)))
+    /// The stretches of line art and flat art, with the colour of each.
+    pub fn stretches(&self) -> impl Iterator<Item = Span> {
+        self.in_one_colour().chain(self.spans.iter().cloned())
     }
+
+    fn in_one_colour(&self) -> impl Iterator<Item = Span> {
+        self.stretches.iter().filter_map(|stretch| Some((stretch.start..stretch.end, stretch.colour?)))
+    }
+}
+
+/// The spans of shapes in several colours that are flat art. Every stretch knows its root.
+fn flat_art<const N: usize>(pixels: &[[u8; N]], width: usize, all: &[Stretch]) -> Vec<Span> {
+    let mut shapes: HashMap<usize, Vec<Range<usize>>> = HashMap::new();
+    for stretch in all.iter().filter(|stretch| stretch.colour.is_none()) {
+        shapes.entry(stretch.parent).or_default().push(stretch.start..stretch.end);
+    }
+    let mut shapes: Vec<Vec<Range<usize>>> = shapes.into_values().collect();
+    shapes.sort_unstable_by_key(|shape| shape[0].start);
+    let spans = shapes.par_iter().map(|shape| posters::spans(pixels, width, shape).unwrap_or_default());
+    spans.collect::<Vec<_>>().concat()
 }
 
 impl Stretch {
@@ -162,8 +186,8 @@ mod tests {
             let is_enough = |pixel: &[u8; 4]| kinds.iter().zip(enough).any(|(kind, enough)| enough && kind == pixel);
             let masks = Masks::of(&pages, width);
             let mut found = vec![false; pages.len()];
-            for (stretch, colour) in masks.stretches() {
-                for at in stretch.start..stretch.end {
+            for (stretch, colour) in masks.in_one_colour() {
+                for at in stretch {
                     prop_assert_eq!(split(&pages[at]).1, colour);
                     found[at] = true;
                 }

@@ -32,6 +32,7 @@ mod outline;
 mod page;
 pub mod pdf;
 mod picture;
+mod posters;
 mod resample;
 mod reserved;
 mod resolution;
@@ -40,6 +41,7 @@ mod solids;
 mod svg;
 mod svg_kinds;
 mod tiff;
+mod treatments;
 mod white;
 mod window;
 

@@ -6,32 +6,21 @@
 //! than paper are printed in the nearest solid. Wide ones keep their rim, all dots beside another shape, in that solid
 //! and are screened inside; so do thin letters with more paper than ink, which a solid would make too dark. All other
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
-//! Cost: 3 ns a dot of such shapes, 0.3 ns of others. Memory: 16 bytes a run of a row. Limits: widths are measured with
-//! squares, so a slanting stroke counts as thinner than it is.
+//! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
+//! solid or in paper; such a wide one has its rim in the next solid or none.
+//! Cost: 3 ns a dot of such shapes, 0.3 ns of others. Memory: 16 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
+//! widths are measured with squares, so a slanting stroke counts as thinner than it is.
 
 use rayon::prelude::*;
 
 use super::flat::{Flat, TONE, similar};
 use super::kinds::Kind;
+use super::treatments::{CHOICES, Shape, Treatment};
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.
 const STROKE: u8 = 9;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 const LETTER: u8 = 24;
-
-/// How the dots of a colour are printed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Treatment {
-    /// As this stack.
-    Solid(u8),
-    /// By the shape they belong to.
-    Shape {
-        /// The solid nearest to the colour.
-        solid: u8,
-        /// Whether the colour has more ink than paper.
-        dark: bool,
-    },
-}
 
 /// A stretch of a row that belongs to one shape.
 struct Run {
@@ -61,25 +50,112 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         return fixed;
     }
     let (runs, rows) = shapes(flat, width, &shaped);
+    let grounds = Grounds::of(flat, width, treatments, (&runs, &rows));
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for at in rows[y]..rows[y + 1] {
-            let (run, shape) = (&runs[at], &runs[root(&runs, at as u32) as usize]);
+            let (run, root) = (&runs[at], root(&runs, at as u32));
             let (kind, _) = flat.colours[usize::from(run.colour)];
-            let Some(Treatment::Shape { solid, dark }) = of(run.colour) else { continue };
-            let thin = shape.side < most(kind);
-            if thin && dark {
-                fixed[run.start as usize..run.end as usize].fill(solid);
-            } else if dark || thin && kind == Kind::Text {
-                let start = run.start as usize;
-                for (x, dot) in (start..).zip(&mut fixed[start..run.end as usize]) {
-                    if at_the_rim(flat, width, (x, y)) {
-                        *dot = solid;
+            let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
+            let (thin, first) = (runs[root as usize].side < most(kind), shape.solids[0]);
+            let solid = grounds.as_ref().map_or(Some(first), |grounds| grounds.solid(root, &shape));
+            let (start, end) = (run.start as usize, run.end as usize);
+            match solid {
+                Some(solid) if thin && (shape.dark || solid != first) => fixed[start..end].fill(solid),
+                Some(solid) if solid > 0 && (shape.dark || thin && kind == Kind::Text) => {
+                    for (x, dot) in (start..).zip(&mut fixed[start..end]) {
+                        if at_the_rim(flat, width, (x, y)) {
+                            *dot = solid;
+                        }
                     }
                 }
+                _ => {}
             }
         }
     });
     fixed
+}
+
+/// What shapes lie on, where one of them may lie on its own solid.
+struct Grounds {
+    /// For each run: of the border of the shape it is the root of, the dots of other shapes, and those of them that are printed
+    /// as each of its stacks.
+    border: Vec<(u32, [u32; CHOICES])>,
+}
+
+impl Grounds {
+    /// Counts the borders; `None` if no two colours have a stack in common.
+    fn of(
+        flat: &Flat,
+        width: usize,
+        treatments: &[Treatment],
+        (runs, rows): (&[Run], &[usize]),
+    ) -> Option<Grounds> {
+        let shape = |colour: u8| match treatments.get(usize::from(colour)) {
+            Some(Treatment::Shape(shape)) => Some(shape),
+            _ => None,
+        };
+        // The stacks of a shape that dots of another colour are printed as, a bit each.
+        let meet = |shape: &Shape, beside: u8| -> u8 {
+            let (stack, yields) = match treatments.get(usize::from(beside)) {
+                Some(&Treatment::Solid(stack)) => (stack, true),
+                Some(Treatment::Shape(other)) => (other.solids[0], other.dark && other.rank < shape.rank),
+                None => return 0,
+            };
+            let same = shape.solids.iter().enumerate().filter(|&(_, &solid)| yields && solid == stack);
+            same.fold(0, |bits, (at, _)| bits | 1 << at)
+        };
+        let met: Vec<u8> = (0..=255u8)
+            .flat_map(|own| (0..=255u8).map(move |beside| (own, beside)))
+            .map(|(own, beside)| match shape(own) {
+                Some(shape) if own != beside && !joined_or_none(flat, own, beside) => meet(shape, beside),
+                _ => 0,
+            })
+            .collect();
+        if !met.iter().any(|bits| bits & 1 == 1) {
+            return None;
+        }
+        let mut border = vec![(0, [0; CHOICES]); runs.len()];
+        for y in 0..rows.len() - 1 {
+            for at in rows[y]..rows[y + 1] {
+                let run = &runs[at];
+                let (all, stacks) = &mut border[run.parent as usize];
+                let mut count = |beside: u8| {
+                    if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
+                        *all += 1;
+                        let bits = met[256 * usize::from(run.colour) + usize::from(beside)];
+                        stacks
+                            .iter_mut()
+                            .enumerate()
+                            .for_each(|(at, dots)| *dots += u32::from(bits >> at & 1));
+                    }
+                };
+                let (start, end) = (run.start as usize, run.end as usize);
+                let row = &flat.index[y * width..(y + 1) * width];
+                start
+                    .checked_sub(1)
+                    .into_iter()
+                    .chain((end < width).then_some(end))
+                    .for_each(|x| count(row[x]));
+                let others = [y.checked_sub(1), (y + 2 < rows.len()).then_some(y + 1)];
+                for other in others.into_iter().flatten() {
+                    flat.index[other * width..][start..end].iter().for_each(|&beside| count(beside));
+                }
+            }
+        }
+        Some(Grounds { border })
+    }
+
+    /// The solid of a shape: the nearest that it does not lie on.
+    fn solid(&self, root: u32, shape: &Shape) -> Option<u8> {
+        let (all, stacks) = self.border[root as usize];
+        let free = |&(_, dots): &(u8, u32)| 2 * dots < all.max(1);
+        shape.solids.into_iter().zip(stacks).find(free).map(|(solid, _)| solid)
+    }
+}
+
+/// Whether a colour of the palette can belong to the shape of another, or is none of the palette.
+fn joined_or_none(flat: &Flat, own: u8, beside: u8) -> bool {
+    usize::from(beside) < flat.colours.len() && joined(flat, own, beside)
 }
 
 fn most(kind: Kind) -> u8 {
@@ -201,8 +277,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const DARK: Treatment = Treatment::Shape { solid: 7, dark: true };
-    const LIGHT: Treatment = Treatment::Shape { solid: 7, dark: false };
+    const DARK: Treatment = Treatment::Shape(Shape { solids: [7, 5, 0, 0], dark: true, rank: 9 });
+    const LIGHT: Treatment = Treatment::Shape(Shape { solids: [7, 0, 0, 0], dark: false, rank: 9 });
 
     /// Paper, black, then a colour of this kind with this treatment, at all dots that satisfy `is`.
     fn drawn(
@@ -245,6 +321,49 @@ mod tests {
         assert_eq!(letter[20..40][4..12], [0, 7, TONE, TONE, TONE, TONE, 7, 0]);
         let line = drawn((20, 20), Kind::Drawing, LIGHT, |x, _| (5..11).contains(&x));
         assert_eq!(line[20..40][4..12], [0, TONE, TONE, TONE, TONE, TONE, TONE, 0]);
+    }
+
+    /// A letter of treatment [`DARK`] or [`LIGHT`] on a ground that is printed so, `share` of its border on it and the rest on paper.
+    fn on_a_ground(letter: Treatment, wide: usize, ground: Treatment, share: f64) -> Vec<u8> {
+        let colours = vec![
+            (Kind::Picture, [255; 3]),
+            (Kind::Picture, [0; 3]),
+            (Kind::Text, [128; 3]),
+            (Kind::Drawing, [60; 3]),
+        ];
+        let index = (0..60 * 60)
+            .map(|at| match (at % 60, at / 60) {
+                (x, y) if (20..20 + wide).contains(&x) && (10..50).contains(&y) => 2,
+                (_, y) if (y as f64) < 10.0 + 40.0 * share => 3,
+                _ => 0,
+            })
+            .collect();
+        fixed(&Flat { colours, index }, 60, &[Treatment::Solid(0), Treatment::Solid(1), letter, ground])
+    }
+
+    #[test]
+    fn what_lies_on_its_own_solid_is_printed_in_the_next() {
+        let at = |fixed: &[u8], x: usize| fixed[30 * 60 + x];
+        // Thin: in the next stack, or in paper.
+        let letter = on_a_ground(DARK, 6, Treatment::Solid(7), 1.0);
+        assert_eq!([19, 20, 25, 26].map(|x| at(&letter, x)), [7, 5, 5, 7]);
+        let pale = on_a_ground(LIGHT, 6, Treatment::Solid(7), 1.0);
+        assert_eq!([19, 20, 25, 26].map(|x| at(&pale, x)), [7, 0, 0, 7]);
+        // Wide: its rim is in the next, or there is none.
+        let wide = on_a_ground(DARK, 30, Treatment::Solid(7), 1.0);
+        assert_eq!([19, 20, 21, 48, 49, 50].map(|x| at(&wide, x)), [7, 5, TONE, TONE, 5, 7]);
+        let pale = on_a_ground(LIGHT, 30, Treatment::Solid(7), 1.0);
+        assert_eq!([19, 20, 49, 50].map(|x| at(&pale, x)), [7, TONE, TONE, 7]);
+        // On another solid, or where its solid is only beside a small part of it, nothing changes.
+        let other = on_a_ground(DARK, 6, Treatment::Solid(4), 1.0);
+        assert_eq!([19, 20, 25, 26].map(|x| at(&other, x)), [4, 7, 7, 4]);
+        let partly = on_a_ground(DARK, 6, Treatment::Solid(7), 0.2);
+        assert_eq!(partly[15 * 60 + 22], 7);
+        assert_eq!(at(&partly, 22), 7);
+        // Of two shapes the nearer to the solid keeps it.
+        let ground = |rank| Treatment::Shape(Shape { solids: [7, 0, 0, 0], dark: true, rank });
+        assert_eq!(at(&on_a_ground(DARK, 6, ground(3), 1.0), 22), 5);
+        assert_eq!(at(&on_a_ground(DARK, 6, ground(12), 1.0), 22), 7);
     }
 
     #[test]

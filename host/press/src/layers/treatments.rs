@@ -1,0 +1,202 @@
+//! How each flat colour is printed: as a stack, or by the shape it belongs to.
+//!
+//! Problem: letters and areas are sharpest in a stack, but a stack may stand for several colours, and what is drawn in one of
+//! them on another would vanish.
+//! Method: the stack that a colour names ([`Solids`]), or one that looks like the mixture that would be printed in its place.
+//! Where two colours that can be told apart touch, only the one nearer to the stack is printed as it; the other is printed by
+//! its shapes, of which each knows the stacks that may stand for it, the nearest first.
+//! Cost: 1 ns a dot where two such colours share a stack, nothing on other pages. Limits: contact is that of colours anywhere on
+//! the page; `outline` looks at each shape.
+
+use super::colour::Fit;
+use super::flat::Flat;
+use super::intent::{Light, difference};
+use super::solids::Solids;
+
+/// A flat colour is printed as a stack that differs from its mixture by at most so much in Oklab; 0.02 is barely visible.
+const SAME: f64 = 0.05;
+/// Colours of sRGB that differ by more can be told apart where they touch.
+const APART: f64 = 0.02;
+/// Least weight of a stack in the mixture of a colour that the stack may stand for.
+const NEARLY: f64 = 1.0 / 8.0;
+/// Stacks that may stand for a colour; the last is repeated where there are fewer.
+pub(super) const CHOICES: usize = 4;
+
+/// How the dots of a colour are printed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Treatment {
+    /// As this stack.
+    Solid(u8),
+    /// By the shape they belong to.
+    Shape(Shape),
+}
+
+/// What may stand for a colour that is no stack.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Shape {
+    /// The nearest stack with ink, then others of its mixture and paper, the nearest first.
+    pub solids: [u8; CHOICES],
+    /// Whether the colour has more ink than paper.
+    pub dark: bool,
+    /// Among all colours: those nearer to their stack keep it first.
+    pub rank: u8,
+}
+
+/// How each flat colour is printed, from the weights of the stacks in its mixture. Stacks that colours name and nothing else
+/// uses are added to the mix.
+pub(super) fn treatments(flat: &Flat, width: usize, fit: &mut Fit, solids: &Solids<'_>) -> Vec<Treatment> {
+    let bodies: Vec<Light> = fit.stacks.iter().map(|stack| solids.body(stack)).collect();
+    let found: Vec<Found> =
+        flat.colours.iter().map(|&(_, colour)| Found::of(colour, fit, &bodies, solids)).collect();
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by(|&a, &b| found[a].off.total_cmp(&found[b].off).then(a.cmp(&b)));
+    let mut rank = vec![0; found.len()];
+    order.iter().enumerate().for_each(|(place, &at)| rank[at] = place as u8);
+    let parted = parted(flat, width, &found, &rank);
+    let treatment = |at: usize| match found[at].shape {
+        Some((solids, dark)) if !found[at].is_solid || parted[at] => {
+            Treatment::Shape(Shape { solids, dark, rank: rank[at] })
+        }
+        _ => Treatment::Solid(found[at].stack),
+    };
+    (0..found.len()).map(treatment).collect()
+}
+
+/// What the inks make of a flat colour.
+struct Found {
+    colour: [u8; 3],
+    /// The stack nearest to it.
+    stack: u8,
+    /// How far the stack is from what would be printed in its place; none for a stack that the colour names.
+    off: f64,
+    /// Whether it may be printed as that stack.
+    is_solid: bool,
+    /// Stacks that may stand for it, and whether it is dark; `None` for a stack that the colour names.
+    shape: Option<([u8; CHOICES], bool)>,
+}
+
+impl Found {
+    fn of(colour: [u8; 3], fit: &mut Fit, bodies: &[Light], solids: &Solids<'_>) -> Found {
+        if let Some(stack) = solids.named(colour) {
+            return Found { colour, stack: fit.number(stack), off: 0.0, is_solid: true, shape: None };
+        }
+        let weights = &fit.weights(colour)[..bodies.len()];
+        let wanted = solids.wanted(colour);
+        let mixed = std::array::from_fn(|c| weights.iter().zip(bodies).map(|(w, body)| w * body[c]).sum());
+        let off = |stack: usize| difference(bodies[stack], wanted);
+        let inked = || (1..weights.len()).filter(|&stack| weights[stack] > 0.0);
+        let mut near: Vec<usize> = inked().filter(|&stack| weights[stack] >= NEARLY).collect();
+        near.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
+        let most = || inked().max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
+        let Some(nearest) = near.first().copied().or_else(most) else {
+            return Found { colour, stack: 0, off: 0.0, is_solid: true, shape: None };
+        };
+        // Paper stands for a colour where it is nearer than the inks that are left, or where none is.
+        let mut others: Vec<usize> = near.into_iter().skip(1).chain([0]).collect();
+        others.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
+        let ranked: Vec<usize> = std::iter::once(nearest).chain(others).take(CHOICES).collect();
+        let choices = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
+        let from_mixture = difference(bodies[nearest], mixed);
+        Found {
+            colour,
+            stack: nearest as u8,
+            off: from_mixture,
+            is_solid: from_mixture <= SAME,
+            shape: Some((choices, weights[0] < 0.5)),
+        }
+    }
+}
+
+/// The colours that may not be printed as their stack, because a colour that can be told from them is printed as it beside
+/// them.
+fn parted(flat: &Flat, width: usize, found: &[Found], rank: &[u8]) -> Vec<bool> {
+    let light = |colour: [u8; 3]| colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
+    let share = |a: usize, b: usize| {
+        found[a].stack == found[b].stack
+            && found[a].is_solid
+            && found[b].is_solid
+            && difference(light(found[a].colour), light(found[b].colour)) > APART
+    };
+    let mut parted = vec![false; found.len()];
+    let pairs = || (0..found.len()).flat_map(|a| (0..found.len()).map(move |b| (a, b)));
+    let rivals: Vec<(usize, usize)> =
+        pairs().filter(|&(a, b)| found[a].shape.is_some() && rank[b] < rank[a] && share(a, b)).collect();
+    if rivals.is_empty() {
+        return parted;
+    }
+    let touching = flat.touching(width);
+    for (a, b) in rivals {
+        parted[a] |= touching.has(a as u8, b as u8);
+    }
+    parted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::colour::Colour;
+    use super::super::compose::Settings;
+    use super::super::flat::TONE;
+    use super::super::kinds::Kind;
+    use super::super::outline::fixed;
+    use super::*;
+    use appearance::brdf::Space;
+    use appearance::document::SAMPLES;
+    use appearance::gamut::Printable;
+    use inks::{InkSet, Library};
+    use observe::Silent;
+    use protocol::ink::Kind as InkKind;
+
+    /// A ground with a bar of another colour, seven dots wide: what each is printed as in the middle.
+    fn printed(fit: &mut Fit, solids: &Solids<'_>, kind: Kind, [ground, bar]: [[u8; 3]; 2]) -> [u8; 2] {
+        let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
+        let mut number = |kind: Kind, rgb: [u8; 3]| {
+            let plain = colours.iter().position(|&(_, known)| known == rgb);
+            plain.unwrap_or_else(|| {
+                colours.push((kind, rgb));
+                colours.len() - 1
+            }) as u8
+        };
+        let (under, over) = (number(Kind::Drawing, ground), number(kind, bar));
+        let inside = |at: usize| (20..27).contains(&(at % 60)) && (10..40).contains(&(at / 60));
+        let index = (0..60 * 50).map(|at| if inside(at) { over } else { under }).collect();
+        let flat = Flat { colours, index };
+        let treatments = treatments(&flat, 60, fit, solids);
+        let fixed = fixed(&flat, 60, &treatments);
+        [fixed[25 * 60 + 5], fixed[25 * 60 + 23]]
+    }
+
+    #[test]
+    fn no_letter_vanishes_in_its_ground() {
+        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let solids = Solids::new(&printable, &space);
+        let levels = [0u8, 85, 170, 255];
+        let colours: Vec<[u8; 3]> =
+            (0..64).map(|at| [at / 16, at / 4 % 4, at % 4].map(|i| levels[i])).collect();
+        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        let light = |rgb: [u8; 3]| rgb.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
+        let (mut same, mut solid) = (Vec::new(), 0);
+        for &ground in &colours {
+            for &bar in colours.iter().filter(|&&bar| difference(light(bar), light(ground)) > 0.1) {
+                for kind in [Kind::Text, Kind::Drawing] {
+                    let [under, over] = printed(&mut fit, &solids, kind, [ground, bar]);
+                    if over != TONE {
+                        solid += 1;
+                        if under == over {
+                            same.push((ground, bar));
+                        }
+                    }
+                }
+            }
+        }
+        assert!(
+            same.is_empty(),
+            "{} of {solid} letters vanish, such as {:?}",
+            same.len(),
+            &same[..4.min(same.len())]
+        );
+        assert!(solid > 3000, "{solid}");
+    }
+}
