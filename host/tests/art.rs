@@ -293,6 +293,10 @@ fn ribbon_has_its_price_in_ledger_and_plan() {
     assert!(fs::read_to_string(bench.path("plan.html")).unwrap().contains("for the ribbon of white"));
     let totals = json(&bench.done("ledger --json"));
     assert_eq!(totals["ribbons"][0]["price"]["ribbon_mm"], 25400.0);
+    // A new price keeps the length.
+    assert!(bench.done("ledger price white 13 EUR").contains("white: 13.00 EUR a cartridge of 25.4"));
+    assert_eq!(json(&bench.done("ledger --json"))["ribbons"][0]["price"]["ribbon_mm"], 25400.0);
+    assert!(bench.done("ledger price gold 20 EUR").contains("metallic-gold: 20.00 EUR"));
     for wrong in ["white twelve EUR", "white -1 EUR", "white 12 12", "white 12 EUR --length 2", "tin 12 EUR"]
     {
         bench.refused(2, &format!("ledger price {wrong}"));

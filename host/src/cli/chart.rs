@@ -9,9 +9,10 @@ use serde_json::Value;
 use super::args::{HalftoneArg, InkArgs};
 use super::deliver::DeliverArgs;
 use super::job::{Artwork, JobArgs, ResultArgs};
-use super::layout::{MediaArgs, ink};
+use super::layout::MediaArgs;
 use observe::Observer;
 use press::chart;
+use press::layers::names::typed;
 use press::layout::{self, Layout};
 use press::separate::MOST_CARTRIDGES;
 use press::sheet::DotMap;
@@ -113,7 +114,7 @@ struct Stacks {
 #[derive(ClapArgs, Debug)]
 struct Registration {
     /// Inks, separated by commas; the first is compared with each of the others
-    #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = ink)]
+    #[arg(long, value_name = "INKS", value_delimiter = ',', default_value = "black,cyan,magenta,yellow", value_parser = typed)]
     inks: Vec<Ink>,
     #[command(flatten)]
     whole: WholePage,
@@ -122,7 +123,7 @@ struct Registration {
 #[derive(ClapArgs, Debug)]
 struct Calibration {
     /// Ink to print with
-    #[arg(long, default_value = "black", value_parser = ink)]
+    #[arg(long, default_value = "black", value_parser = typed)]
     ink: Ink,
     #[command(flatten)]
     whole: WholePage,

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use inks::InkSet;
-use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::{Media, Resolution};
 
@@ -116,15 +115,6 @@ impl LayoutArgs {
             cut: self.crop,
             profile: profile(self.profile.as_deref(), observer)?,
         })
-    }
-}
-
-/// One ink by its name; the error for a misspelt one suggests the name meant.
-pub fn ink(name: &str) -> Result<Ink, String> {
-    let set: InkSet = name.parse().map_err(|error: inks::InkSetError| error.to_string())?;
-    match set.iter().collect::<Vec<_>>()[..] {
-        [ink] => Ok(ink),
-        _ => Err(format!("`{name}` is not one ink")),
     }
 }
 

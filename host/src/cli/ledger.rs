@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::{Args as ClapArgs, Subcommand};
 use protocol::ink::Ink;
 
-use device::ledger::{self, Event, Ledger, totals};
+use device::ledger::{self, Event, Ledger, Line, totals};
 use device::printers::Printers;
 use device::send::journal::Journal;
 use press::job::cost::Price;
@@ -34,13 +34,13 @@ enum Command {
     /// Record a new cartridge of an ink and restart its count
     New {
         /// Ink of the cartridge
-        #[arg(value_parser = super::layout::ink)]
+        #[arg(value_parser = press::layers::names::typed)]
         ink: Ink,
     },
     /// Record the price of a cartridge; plans and the ledger then say what the ribbon costs
     Price {
         /// Ink of the cartridge
-        #[arg(value_parser = super::layout::ink)]
+        #[arg(value_parser = press::layers::names::typed)]
         ink: Ink,
         /// Price of one cartridge
         #[arg(value_parser = amount)]
@@ -48,7 +48,8 @@ enum Command {
         /// Currency, such as EUR
         #[arg(value_parser = currency)]
         currency: String,
-        /// Ribbon in one cartridge, such as 20m [default: what earlier cartridges gave between two `ledger new`]
+        /// Ribbon in one cartridge, such as 20m [default: the length given last, or what earlier cartridges gave between two
+        /// `ledger new`]
         #[arg(long, value_name = "LENGTH", value_parser = ribbon_length)]
         length: Option<f64>,
     },
@@ -94,8 +95,15 @@ pub fn run(args: &Args) -> Result<()> {
         return super::show(&format!("{}: a new cartridge, counted from now on\n", ink.name()));
     }
     if let Some(Command::Price { ink, price, currency, length }) = &args.command {
-        let (ink, amount, ribbon_mm) = (ink.name().to_owned(), *price, *length);
-        let said = format!("{ink}: {amount:.2} {currency} a cartridge, from now on\n");
+        let (ink, amount) = (ink.name().to_owned(), *price);
+        let lines = ledger.lines()?.0;
+        let given = |line: &Line| match &line.event {
+            Event::Price { ink: priced, ribbon_mm, .. } if *priced == ink => *ribbon_mm,
+            _ => None,
+        };
+        let ribbon_mm = length.or_else(|| lines.iter().rev().find_map(given));
+        let length = ribbon_mm.map_or_else(String::new, |mm| format!(" of {}", ribbon::length(mm)));
+        let said = format!("{ink}: {amount:.2} {currency} a cartridge{length}, from now on\n");
         ledger.append(Event::Price { ink, amount, currency: currency.clone(), ribbon_mm })?;
         return super::show(&said);
     }

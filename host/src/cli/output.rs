@@ -152,11 +152,11 @@ impl Staged {
             match foreign {
                 None => Ok(()),
                 Some(foreign) if foreign == target => bail!(
-                    "{} exists and was not written by this command; choose another place with -o",
+                    "{} exists and was not written by this command; choose another folder",
                     target.display()
                 ),
                 Some(foreign) => bail!(
-                    "{} exists and holds {}, which this command did not write; choose another place with -o",
+                    "{} exists and holds {}, which this command did not write; choose another folder",
                     target.display(),
                     foreign.strip_prefix(target).unwrap_or(&foreign).display()
                 ),
