@@ -81,7 +81,7 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     {
         return Ok(art);
     }
-    if svg::is_svg(&start) {
+    if svg::is_svg(file, &start) {
         return svg::read(file, options, observer);
     }
     if !options.reserved && names::ink(&stem(file)).is_some() {

@@ -5,10 +5,12 @@ use std::path::PathBuf;
 
 mod damage;
 mod drawings;
+mod layered;
 mod pages;
 mod pictures;
 mod plates;
 mod sizes;
+mod thin;
 
 use super::*;
 use observe::Silent;

@@ -1,0 +1,188 @@
+//! A drawing, or a layer of it, rendered to dots without soft edges.
+//!
+//! Problem: the renderer leaves out what it cannot load, and says so nowhere.
+//! Method: linked pictures and fonts are loaded here, so a picture that is missing is an error, and a drawing can also be
+//! rendered without its pictures or its text. Cost: four bytes a dot. Limits: drawings within a linked drawing may hold
+//! pictures, but not link them, as SVG demands.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use percent_encoding::percent_decode_str;
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{self, ImageHrefResolver, ImageKind, fontdb};
+
+use super::super::error::{LayersError, wrong};
+use super::thin;
+
+/// What is left out of a rendering.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Without {
+    Nothing,
+    Text,
+    /// Pictures made of pixels.
+    Pictures,
+}
+
+/// What the renderer met in a drawing.
+#[derive(Default)]
+struct Met {
+    pictures: bool,
+    missing: Option<String>,
+}
+
+/// Renders drawings from one file.
+pub(super) struct Renderer {
+    path: PathBuf,
+    fonts: Arc<fontdb::Database>,
+}
+
+/// A drawing as the renderer understands it.
+pub(super) struct Drawn {
+    pub tree: usvg::Tree,
+    /// Whether pictures made of pixels are drawn.
+    pub pictures: bool,
+}
+
+impl Renderer {
+    /// `text` says whether the drawing needs fonts.
+    pub fn new(path: &Path, text: bool) -> Result<Renderer, LayersError> {
+        let mut fonts = fontdb::Database::new();
+        if text {
+            load_fonts(path, &mut fonts)?;
+        }
+        Ok(Renderer { path: path.to_path_buf(), fonts: Arc::new(fonts) })
+    }
+
+    /// Whether text can be drawn.
+    pub fn has_fonts(&self) -> bool {
+        !self.fonts.is_empty()
+    }
+
+    /// Reads a drawing.
+    pub fn parsed(&self, text: &str, without: Without) -> Result<Drawn, LayersError> {
+        let met = Arc::new(Mutex::new(Met::default()));
+        let options = self.options(without, &met);
+        let tree = usvg::Tree::from_str(text, &options).map_err(|error| self.unreadable(&error))?;
+        drop(options);
+        let met = std::mem::take(&mut *met.lock().unwrap_or_else(PoisonError::into_inner));
+        match met.missing {
+            Some(name) => Err(wrong(
+                &self.path,
+                format!(
+                    "its picture {name} cannot be read; put it where the drawing links it, or embed it as PNG"
+                ),
+            )),
+            None => Ok(Drawn { tree, pictures: met.pictures }),
+        }
+    }
+
+    /// The size of a drawing, which may follow from all that is drawn in it.
+    pub fn size(&self, text: &str) -> Result<usvg::Size, LayersError> {
+        // Pictures that are missing matter only where they are printed.
+        let tree = usvg::Tree::from_str(text, &self.options(Without::Nothing, &Arc::default()));
+        tree.map(|tree| tree.size()).map_err(|error| self.unreadable(&error))
+    }
+
+    fn unreadable(&self, error: &usvg::Error) -> LayersError {
+        wrong(&self.path, format!("the drawing cannot be read: {error}"))
+    }
+
+    /// Renders a drawing; the result has straight alpha.
+    pub fn rendered(
+        &self,
+        drawn: &Drawn,
+        scale: Transform,
+        (width, height): (u32, u32),
+    ) -> Result<Vec<u8>, LayersError> {
+        let mut pixmap =
+            Pixmap::new(width, height).ok_or_else(|| wrong(&self.path, "the drawing is too large"))?;
+        let options = self.options(Without::Nothing, &Arc::default());
+        let thick = thin::thickened(&drawn.tree, scale, &options);
+        resvg::render(thick.as_ref().unwrap_or(&drawn.tree), scale, &mut pixmap.as_mut());
+        Ok(straight(pixmap))
+    }
+
+    fn options(&self, without: Without, met: &Arc<Mutex<Met>>) -> usvg::Options<'static> {
+        let fonts = if without == Without::Text { Arc::default() } else { self.fonts.clone() };
+        usvg::Options {
+            resources_dir: self.path.parent().map(Path::to_path_buf),
+            shape_rendering: usvg::ShapeRendering::CrispEdges,
+            text_rendering: usvg::TextRendering::OptimizeSpeed,
+            fontdb: fonts,
+            image_href_resolver: pictures(without, met),
+            ..usvg::Options::default()
+        }
+    }
+}
+
+/// Loads pictures, and takes down what it met.
+fn pictures(without: Without, met: &Arc<Mutex<Met>>) -> ImageHrefResolver<'static> {
+    let taken = move |met: &Mutex<Met>, kind: Option<ImageKind>, name: &dyn Fn() -> String| {
+        let mut met = met.lock().unwrap_or_else(PoisonError::into_inner);
+        match kind {
+            Some(drawing @ ImageKind::SVG(_)) => Some(drawing),
+            Some(picture) => {
+                met.pictures = true;
+                (without != Without::Pictures).then_some(picture)
+            }
+            None => {
+                met.missing.get_or_insert_with(name);
+                None
+            }
+        }
+    };
+    let (data, string) =
+        (ImageHrefResolver::default_data_resolver(), ImageHrefResolver::default_string_resolver());
+    let (of_data, of_string) = (met.clone(), met.clone());
+    ImageHrefResolver {
+        resolve_data: Box::new(move |mime, bytes, options| {
+            let kind = data(mime, bytes, options);
+            taken(&of_data, kind, &|| format!("of the type `{mime}`"))
+        }),
+        resolve_string: Box::new(move |href, options| {
+            // Links are addresses, so a space is written `%20`.
+            let local = href.strip_prefix("file://").unwrap_or(href);
+            let plain = percent_decode_str(local).decode_utf8().unwrap_or(Cow::Borrowed(local));
+            let kind = string(href, options).or_else(|| string(&plain, options));
+            taken(&of_string, kind, &|| format!("`{href}`"))
+        }),
+    }
+}
+
+/// Loads this computer's fonts. The renderer draws text of a missing family in the default family and leaves it out if that
+/// is missing too, so one is chosen here.
+fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersError> {
+    fonts.load_system_fonts();
+    let default = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
+    if fonts.query(&default).is_some() {
+        return Ok(());
+    }
+    // A regular upright face replaces any other best; the least name makes the choice the same every time.
+    let plain = |face: &fontdb::FaceInfo| {
+        face.style == fontdb::Style::Normal && face.weight == fontdb::Weight::NORMAL && !face.monospaced
+    };
+    let named = |face: &fontdb::FaceInfo| Some((!plain(face), face.families.first()?.0.clone()));
+    match fonts.faces().filter_map(named).min() {
+        Some((_, family)) => {
+            fonts.set_serif_family(family);
+            Ok(())
+        }
+        None => Err(wrong(path, "it has text, but this computer has no fonts; convert the text to paths")),
+    }
+}
+
+/// Straight alpha from the renderer's premultiplied alpha.
+fn straight(pixmap: Pixmap) -> Vec<u8> {
+    let mut rgba = pixmap.take();
+    for pixel in rgba.as_chunks_mut::<4>().0 {
+        let alpha = u32::from(pixel[3]);
+        if alpha != 0 && alpha != 255 {
+            for v in &mut pixel[..3] {
+                *v = ((u32::from(*v) * 255 + alpha / 2) / alpha).min(255) as u8;
+            }
+        }
+    }
+    rgba
+}

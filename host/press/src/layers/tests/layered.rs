@@ -1,0 +1,200 @@
+//! Where layers of ink are found in an SVG drawing, and what becomes of everything else.
+
+use super::drawings::drawing;
+use super::*;
+
+/// Ink and dots of each layer, and the notes.
+fn layers(name: &str, content: &str) -> (Vec<(Ink, u64)>, Vec<String>) {
+    let bench = Bench::new();
+    let art = read(&[bench.write(name, drawing(content))], &Options::default());
+    (art.layers.iter().map(|layer| (layer.ink, extent(layer).4)).collect(), art.notes)
+}
+
+fn noted(notes: &[String], words: &str) -> bool {
+    notes.iter().any(|note| note.contains(words))
+}
+
+const BLACK: &str = r##"<g id="black"><rect x="30" width="5" height="5"/></g>"##;
+
+#[test]
+fn layers_are_found_in_links_switches_drawings_clones_and_single_shapes() {
+    let square = r##"<rect width="8" height="4"/>"##;
+    for content in [
+        format!(r##"<a href="x"><g id="white">{square}</g></a>"##),
+        format!(
+            r##"<switch><foreignObject requiredExtensions="x"/><g><g id="White">{square}</g></g></switch>"##
+        ),
+        format!(
+            r##"<svg x="5" y="5" width="16" height="8" viewBox="0 0 16 8"><g id="white">{square}</g></svg>"##
+        ),
+        format!(r##"<defs><g id="white">{square}</g></defs><use href="#white" x="10"/>"##),
+        r##"<path id="white" d="M0 0h8v4h-8z"/>"##.into(),
+        r##"<path id="white" d="M0 0h4v4h-4z"/><path id="white-2" d="M10 0h4v4h-4z"/>"##.into(),
+    ] {
+        let (found, notes) = layers("art.svg", &format!("{content}{BLACK}"));
+        assert_eq!((found.len(), found[0].0, found[1].0), (2, Ink::White, Ink::Black), "{content}");
+        assert!(near(found[0].1, dots(8.0) * dots(4.0), 0.02), "{content}: {found:?}");
+        assert!(near(found[1].1, dots(5.0) * dots(5.0), 0.02), "{content}: {found:?}");
+        assert!(!noted(&notes, "left out, because"), "{notes:?}");
+    }
+    let names = r##"<g id="Gold_x0020_Foil"><rect width="8" height="4"/></g>"##;
+    assert_eq!(layers("art.svg", names).0[0].0, Ink::GoldFoil);
+}
+
+#[test]
+fn everything_drawn_beside_the_layers_is_listed_once() {
+    let (found, notes) = layers(
+        "art.svg",
+        r##"<g id="white"><rect width="9" height="9"/></g><text x="5" y="15">Outside of all the layers</text>
+        <g id="logo"><rect x="30" width="9" height="9"/></g><g id="empty"/><g style="display: none"><path d="M0 0h9v9"/></g>
+        <g id="fronts"><g id="black"><path d="M0 0h9v9"/></g><circle r="2"/><circle r="3"/></g><g id="goldd"><line x2="3"/></g>"##,
+    );
+    assert_eq!(found.len(), 2);
+    let listed: Vec<_> = notes.iter().filter(|note| note.contains("left out, because")).collect();
+    assert_eq!(listed.len(), 1, "{notes:?}");
+    let wanted = "no layer of an ink: text `Outside of all the laye…`, group `logo`, group `goldd` (did you mean `gold`?), \
+                  circle (2)";
+    assert!(listed[0].ends_with(wanted), "{listed:?}");
+}
+
+#[test]
+fn an_ink_within_a_layer_is_a_layer_of_its_own() {
+    let (found, notes) = layers(
+        "art.svg",
+        r##"<g id="white"><rect width="9" height="9"/><g id="gold"><rect x="20" width="6" height="6"/></g></g>"##,
+    );
+    assert_eq!((found[0].0, found[1].0), (Ink::White, Ink::MetallicGold));
+    assert!(
+        near(found[0].1, dots(9.0).powi(2), 0.02) && near(found[1].1, dots(6.0).powi(2), 0.02),
+        "{found:?}"
+    );
+    assert!(noted(&notes, "`gold` lies within layer `white`: printed as a layer of its own"), "{notes:?}");
+    // A clone of one layer in another is art of the other.
+    let clone =
+        r##"<g id="white"><rect width="9" height="9"/></g><g id="black"><use href="#white" x="20"/></g>"##;
+    let (found, _) = layers("art.svg", clone);
+    assert_eq!(found.len(), 2);
+    assert!(found.iter().all(|layer| near(layer.1, dots(9.0).powi(2), 0.02)), "{found:?}");
+}
+
+#[test]
+fn layers_with_one_identifier_are_both_drawn() {
+    let bench = Bench::new();
+    let twice = r##"<g id="1-white"><rect width="9" height="9"/></g><g id="2-white"><rect x="20" width="4" height="4"/></g>"##;
+    let svg = drawing(&twice.replace("2-white", "1-white"));
+    let art = read(&[bench.write("art.svg", svg)], &Options::default());
+    let found: Vec<u64> = art.layers.iter().map(|layer| extent(layer).4).collect();
+    assert!(near(found[0], dots(9.0).powi(2), 0.02) && near(found[1], dots(4.0).powi(2), 0.02), "{found:?}");
+}
+
+#[test]
+fn the_clips_masks_opacity_and_transforms_around_a_layer_hold() {
+    let (found, notes) = layers(
+        "art.svg",
+        r##"<g opacity="0"><g id="black"><rect width="9" height="9"/></g></g>
+        <g clip-path="url(#c)"><clipPath id="c"><rect width="5" height="5"/></clipPath>
+          <g transform="translate(1 0)"><g id="gold"><rect width="20" height="20"/></g></g></g>
+        <mask id="m"><rect width="40" height="30" fill="#fff"/><rect width="10" height="30" fill="#000"/></mask>
+        <g mask="url(#m)"><g id="white"><rect width="40" height="30" fill="#fff"/></g></g>"##,
+    );
+    assert_eq!(found.iter().map(|layer| layer.0).collect::<Vec<_>>(), [Ink::MetallicGold, Ink::White]);
+    assert!(near(found[0].1, dots(4.0) * dots(5.0), 0.02), "{found:?}");
+    assert!(near(found[1].1, dots(30.0) * dots(30.0), 0.005), "{found:?}");
+    assert!(noted(&notes, "layer `black` is hidden or empty"), "{notes:?}");
+}
+
+#[test]
+fn a_layer_that_holds_a_picture_keeps_its_white_shapes() {
+    let bench = Bench::new();
+    bench.grey("a scan.png", (20, 10), &[[0u8; 10], [255; 10]].concat().repeat(10));
+    let svg = drawing(
+        r##"<g id="white"><rect width="12" height="30" fill="#fff"/>
+        <image href="a%20scan.png" x="20" width="20" height="10" style="image-rendering:pixelated"/></g>"##,
+    );
+    let art = read(&[bench.write("art.svg", svg)], &Options::default());
+    let found = extent(&art.layers[0]).4;
+    assert!(near(found, dots(12.0) * dots(30.0) + dots(10.0) * dots(10.0), 0.01), "{found}");
+    assert!(noted(&art.notes, "its pictures are ink where they are dark"), "{:?}", art.notes);
+}
+
+#[test]
+fn a_missing_picture_is_an_error_unless_it_is_not_drawn() {
+    let bench = Bench::new();
+    let image = r##"<image href="missing.png" width="20" height="20"/>"##;
+    let shape = r##"<rect width="5" height="5"/>"##;
+    let error = refused(&[bench.write("art.svg", drawing(&format!("{shape}{image}")))]);
+    assert!(error.contains("art.svg: its picture `missing.png` cannot be read"), "{error}");
+    let error =
+        refused(&[bench.write("art.svg", drawing(&format!(r##"<g id="white">{shape}{image}</g>"##)))]);
+    assert!(error.contains("`missing.png`"), "{error}");
+    let (found, notes) = layers("art.svg", &format!(r##"<g id="white">{shape}</g>{image}"##));
+    assert!(found.len() == 1 && noted(&notes, "no layer of an ink: image (1)"), "{notes:?}");
+}
+
+#[test]
+fn flowed_text_is_named_where_it_would_be_drawn() {
+    let flowed = r##"<foreignObject width="30" height="9"><p xmlns="http://www.w3.org/1999/xhtml">Hello <b>there</b></p></foreignObject>
+        <flowRoot><flowRegion><rect width="30" height="10"/></flowRegion><flowPara>Old</flowPara></flowRoot>"##;
+    let shape = r##"<rect width="3" height="3"/>"##;
+    let words = "flowed text cannot be drawn and is left out: `Hello there`, `Old`; convert";
+    for content in [format!("{shape}{flowed}"), format!(r##"<g id="black">{shape}{flowed}</g>"##)] {
+        let bench = Bench::new();
+        let art = read(&[bench.write("art.svg", drawing(&content))], &Options::default());
+        assert!(noted(&art.notes, words), "{:?}", art.notes);
+    }
+    // A switch offers plain text beside it.
+    let (_, notes) = layers(
+        "art.svg",
+        &format!(r##"<g id="black">{shape}<switch>{flowed}<path d="M9 9h9v9"/></switch></g>"##),
+    );
+    assert!(!noted(&notes, "flowed text"), "{notes:?}");
+}
+
+#[test]
+fn a_drawing_with_prefixes_has_its_text() {
+    let bench = Bench::new();
+    let mut fonts = resvg::usvg::fontdb::Database::new();
+    fonts.load_system_fonts();
+    if fonts.is_empty() {
+        return;
+    }
+    let text = r##"<svg:text x="5" y="20" font-size="15">HHH</svg:text>"##;
+    let svg = |content: &str| {
+        format!(
+            r##"<svg:svg xmlns:svg="http://www.w3.org/2000/svg" width="40mm" height="30mm" viewBox="0 0 40 30">{content}</svg:svg>"##
+        )
+    };
+    let layered = svg(&format!(r##"<svg:g id="black">{text}</svg:g>"##));
+    let art = read(&[bench.write("art.svg", layered)], &Options::default());
+    assert!(extent(&art.layers[0]).4 > 5000);
+    let art = read(&[bench.write("plain.svg", svg(text))], &Options::default());
+    assert!(art.opaque.unwrap().dots() > 5000);
+}
+
+#[test]
+fn drawings_are_read_in_their_encoding_and_behind_long_comments() {
+    let bench = Bench::new();
+    let svg = drawing(r##"<g id="white" class="weiß"><rect width="9" height="9"/></g>"##);
+    let latin: Vec<u8> =
+        format!("<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>{svg}").chars().map(|c| c as u8).collect();
+    let utf16: Vec<u8> = format!("\u{feff}{svg}").encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let long = format!("<!-- {} -->{svg}", "words ".repeat(2000));
+    for bytes in [latin, utf16, long.into_bytes()] {
+        let art = read(&[bench.write("art.svg", bytes)], &Options::default());
+        assert!(near(extent(&art.layers[0]).4, dots(9.0).powi(2), 0.02));
+    }
+    let bad = [b"<svg xmlns='http://www.w3.org/2000/svg' id='".as_slice(), b"\xdf'/>"].concat();
+    assert!(refused(&[bench.write("bad.svg", bad)]).contains("save the drawing as UTF-8"));
+}
+
+#[test]
+fn a_drawing_without_a_size_is_as_large_as_all_that_is_drawn() {
+    let bench = Bench::new();
+    // The page's ground is drawn in no layer.
+    let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" style="background-color:#fff"><g id="white"><rect width="96" height="48"/></g>
+        <g id="black"><rect x="96" y="48" width="96" height="60"/></g></svg>"##;
+    let art = read(&[bench.write("art.svg", svg)], &Options::default());
+    assert_eq!((art.width, art.length), (1200, 675));
+    let found: Vec<_> = art.layers.iter().map(extent).collect();
+    assert_eq!(found, [(0, 0, 599, 299, 180_000), (600, 300, 1199, 674, 225_000)]);
+}
