@@ -107,7 +107,12 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
             notes.extend(picture::to_srgb(path, &profile, base == 1, &mut rgba)?);
         }
         let pixels = Pixels { path: path.to_path_buf(), width, height, dpi, rgba, notes: Vec::new() };
-        picture::artwork_of(&stem(path), pixels, dots, options)
+        let mut art = picture::artwork_of(&stem(path), pixels, dots, options);
+        if let Some(colour) = art.colour.as_mut().filter(|_| art.layers.is_empty()) {
+            // A spot channel lies under or over the picture, as it does with CMYK plates. A reserved colour stands instead of it.
+            colour.overprints = true;
+        }
+        art
     };
     for (channel, plane) in channels.into_iter().zip(planes) {
         let Some(named) = channel.ink else { continue };
