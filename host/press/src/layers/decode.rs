@@ -11,6 +11,7 @@ use image::{DynamicImage, ImageDecoder, ImageFormat};
 use super::error::{LayersError, io, wrong};
 use super::resolution::{self, Dpi};
 use super::size::{MOST_BYTES, MOST_PIXELS, check_pixels};
+use super::tiff_pages;
 
 /// A decoded picture.
 pub(super) struct Decoded {
@@ -19,15 +20,20 @@ pub(super) struct Decoded {
     pub profile: Option<Vec<u8>>,
 }
 
-/// Decodes a whole picture.
-pub(super) fn decode(path: &Path, mut file: impl Read) -> Result<Decoded, LayersError> {
+/// Decodes a whole picture; of a TIFF with several pages the one of this number.
+pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Result<Decoded, LayersError> {
     let mut bytes = Vec::new();
     file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(io(path, "read it"))?;
-    let format = image::guess_format(&bytes).ok().filter(|format| {
+    let guessed = image::guess_format(&bytes).ok();
+    let format = guessed.filter(|format| {
         matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff | ImageFormat::Pnm)
     });
     let Some(format) = format else {
-        let found = if bytes.is_empty() { "an empty file" } else { "an unknown format" };
+        let found = match guessed {
+            Some(format) => format!("{format:?}").to_uppercase() + ", which is not read; save it as PNG",
+            None if bytes.is_empty() => "an empty file".into(),
+            None => "an unknown format".into(),
+        };
         return Err(wrong(
             path,
             format!("expected a PNG, TIFF, JPEG, PNM, SVG, PDF or PostScript file, found {found}"),
@@ -38,6 +44,9 @@ pub(super) fn decode(path: &Path, mut file: impl Read) -> Result<Decoded, Layers
             path,
             "the picture is CMYK, which is four layers instead of one; convert it to greyscale",
         ));
+    }
+    if format == ImageFormat::Tiff {
+        tiff_pages::choose(path, &mut bytes, page)?;
     }
     let bad = |error: image::ImageError| wrong(path, format!("cannot decode the picture: {error}"));
     let mut reader = image::ImageReader::with_format(Cursor::new(&bytes[..]), format);

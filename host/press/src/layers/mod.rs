@@ -40,6 +40,7 @@ mod solids;
 mod svg;
 mod svg_kinds;
 mod tiff;
+mod tiff_pages;
 mod white;
 mod window;
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 mod damage;
 mod drawings;
+mod files;
 mod pages;
 mod pictures;
 mod plates;

@@ -6,7 +6,7 @@
 //! resource block (extra channels only, 0 is full ink, as Photoshop displays them). CMYK channels are the plates of the
 //! process inks. The decoder drops extra channels unless the file is greyscale, so the photometric tag is changed in memory
 //! first.
-//! Cost: the file in memory, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel, the file's first image.
+//! Cost: the file in memory, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel; one page ([`tiff_pages`]).
 //! Source: TIFF 6.0 sections 16 and 18; Adobe's file format specification for the resource block.
 
 use std::path::Path;
@@ -23,6 +23,7 @@ use super::options::Options;
 use super::picture::{self, Pixels};
 use super::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 use super::size::{self, MOST_BYTES, Unstated};
+use super::tiff_pages;
 
 const INK_SET: Tag = Tag::Unknown(332);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);
@@ -53,6 +54,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
         return Err(wrong(path, "the file is larger than a gigabyte"));
     }
     let mut bytes = std::fs::read(path).map_err(&reading)?;
+    tiff_pages::choose(path, &mut bytes, options.page())?;
     let Some(mut decoder) = tiff_decoder(&bytes) else { return Ok(None) };
     let number = |decoder: &mut TiffDecoder<'_>, tag| decoder.find_tag_unsigned::<u16>(tag).ok().flatten();
     let photometric = number(&mut decoder, Tag::PhotometricInterpretation).unwrap_or(BLACK_IS_ZERO);

@@ -186,7 +186,7 @@ fn ghostscript_leaves(
         let (mut drawn, mut spots) = (false, Vec::new());
         for (name, file) in plates_beside(&draft, folder)? {
             // A page paints every pixel it touches, so a draft misses nothing.
-            if coverage::scan(&file)?.coverage.iter().any(|&c| c > 0) {
+            if coverage::scan(&file, None)?.coverage.iter().any(|&c| c > 0) {
                 drawn = true;
                 if !PROCESS.contains(&name.as_str()) {
                     spots.push(name);
@@ -230,7 +230,7 @@ fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Ve
         .collect();
     drafts.sort();
     let leaf = |(number, file): (u32, PathBuf)| {
-        let scan = coverage::scan(&file)?;
+        let scan = coverage::scan(&file, None)?;
         let drawn = scan.coverage.iter().any(|&c| c > 0);
         let size = (scan.width.into(), scan.height.into());
         Ok(Leaf { number, size, rounded_mm: ROUNDED_MM, drawn, spots: Vec::new() })

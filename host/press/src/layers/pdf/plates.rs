@@ -113,7 +113,7 @@ pub(super) fn separated_part(
     let (mut plates, mut notes) = (Vec::new(), Vec::new());
     let (mut process, mut others) = (Vec::new(), Vec::new());
     for (plate, file) in plates_beside(&full, &folder)? {
-        let scan = coverage::scan(&file)?;
+        let scan = coverage::scan(&file, None)?;
         if (scan.width, scan.height) != (width, height) {
             return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
         }
