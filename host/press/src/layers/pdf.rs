@@ -7,6 +7,7 @@
 //! kind of each pixel ([`kinds`](super::kinds)), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
+mod complaint;
 mod draw;
 mod plates;
 
@@ -25,9 +26,10 @@ use super::options::{Options, Pages};
 use super::picture;
 use super::size::{self, Unstated};
 use crate::scratch::Scratch;
-use draw::{DRAFT, Leaf, Part, Program, Tagged};
+use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
+pub use complaint::{doubt, no_page};
 pub use plates::{Separated, separated, spots};
 
 /// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.
@@ -44,18 +46,14 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let only = options.page();
     observer.begin("reading pages", 2);
     let mut program = Program::Ghostscript;
-    let mut leaves = program.leaves(path, only, Part::CropBox, &folder);
-    if let (Err(LayersError::Program { .. }), true) = (&leaves, is_pdf(path)?) {
+    let mut drafts = program.leaves(path, only, Part::CropBox, &folder);
+    if let (Err(LayersError::Program { .. }), true) = (&drafts, is_pdf(path)?) {
         program = Program::Poppler;
-        leaves = program.leaves(path, only, Part::CropBox, &folder);
+        drafts = program.leaves(path, only, Part::CropBox, &folder);
     }
-    let leaves = leaves?;
+    let Drafts { leaves, said } = drafts?;
     observer.advance(1);
-    let missing = match only {
-        Some(number) => format!("there is no page {number}, or the file is damaged"),
-        None => "it has no page, or the file is damaged".into(),
-    };
-    let first = leaves.first().ok_or_else(|| wrong(path, missing))?;
+    let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
     let document = Document { path, program, folder: &folder, options };
     let mut art = match &options.pages {
         Pages::Number(_) => document.page(first)?,
@@ -63,6 +61,7 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
     };
     observer.end();
+    art.notes.extend(doubt(&said).map(|doubt| format!("{}: {doubt}", path.display())));
     if program == Program::Poppler {
         art.notes.push(format!(
             "{}: read by Poppler, without spot plates; install Ghostscript to print them in their inks",

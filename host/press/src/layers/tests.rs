@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 mod damage;
+mod documents;
 mod drawings;
 mod files;
 mod pages;
