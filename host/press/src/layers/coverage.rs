@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::decode::decode;
 use super::error::{LayersError, io, resolution_in_words, wrong};
+use super::orientation::Turn;
 use super::resolution::{Dpi, of_png};
 use super::size::{MOST_BYTES, check_pixels};
 
@@ -194,6 +195,7 @@ fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, LayersError>
     let (width, height) = (reader.info().width, reader.info().height);
     check_pixels(path, width, height)?;
     let dpi = reader.info().pixel_dims.and_then(of_png);
+    let turn = Turn::of_exif(reader.info().exif_metadata.as_deref());
     let channels = reader.output_color_type().0.samples();
     let mut builder = CoverageBuilder::new(width as usize * height as usize, channels % 2 == 0);
     if reader.info().interlaced {
@@ -209,5 +211,7 @@ fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, LayersError>
         }
     }
     let (coverage, by) = builder.finish();
-    Ok(Scan { path: path.to_path_buf(), width, height, dpi, coverage, by })
+    let coverage = turn.plane(coverage, (width, height));
+    let (width, height) = turn.size((width, height));
+    Ok(Scan { path: path.to_path_buf(), width, height, dpi: turn.dpi(dpi), coverage, by })
 }

@@ -28,6 +28,7 @@ mod numbered;
 mod open;
 mod options;
 mod order;
+mod orientation;
 mod outline;
 mod page;
 pub mod pdf;

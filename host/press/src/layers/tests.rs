@@ -11,6 +11,7 @@ mod pages;
 mod pictures;
 mod plates;
 mod sizes;
+mod turned;
 
 use super::*;
 use observe::Silent;

@@ -20,6 +20,7 @@ use super::coverage::{Coverage, Scan};
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
+use super::orientation::Turn;
 use super::picture::{self, Pixels};
 use super::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 use super::size::{self, MOST_BYTES, Unstated};
@@ -86,11 +87,14 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
     let (width, height) =
         decoder.dimensions().map_err(|error| wrong(path, format!("the file is damaged: {error}")))?;
     size::check_pixels(path, width, height)?;
-    let dpi = of_tiff(&mut decoder);
+    let turn = Turn::of_tag(number(&mut decoder, Tag::Orientation));
+    let dpi = turn.dpi(of_tiff(&mut decoder));
     let profile = decoder.find_tag(PROFILE).ok().flatten().and_then(|value| value.into_u8_vec().ok());
     drop(decoder);
     set_photometric(&mut bytes);
     let planes = planes(path, &bytes, samples, width as usize * height as usize)?;
+    let planes: Vec<_> = planes.into_iter().map(|plane| turn.plane(plane, (width, height))).collect();
+    let (width, height) = turn.size((width, height));
 
     if base == 4 {
         notes.push(cmyk::note(path, profile.is_some()));
