@@ -181,7 +181,7 @@ pub(super) fn opaque_artwork<const N: usize>(
 }
 
 /// The dots whose pixel of `N` bytes satisfies `is`.
-fn plane_of<const N: usize>(
+pub(super) fn plane_of<const N: usize>(
     pixels: &[u8],
     size: (u32, u32),
     dots: (usize, usize),

@@ -151,3 +151,52 @@ fn a_spot_channel_lies_under_a_picture_in_rgb_as_it_does_under_plates() {
         assert_eq!(laid, [("black", 25), ("white", 190)], "{name}");
     }
 }
+
+#[test]
+fn opacity_beside_plates_is_transparency_and_no_ink() {
+    let bench = Bench::new();
+    let none = vec![0; 200];
+    let all = channel(0, 0, 19, 9, false);
+    let opaque = channel(0, 0, 9, 9, false);
+    let plates = |extra: &[Vec<u8>]| {
+        [vec![none.clone(), none.clone(), none.clone(), all.clone()], extra.to_vec()].concat()
+    };
+    let kinds = |kinds: &[u16]| (338, 3, kinds.iter().flat_map(|kind| kind.to_le_bytes()).collect());
+    let spot = channel(15, 0, 19, 9, true);
+    for (name, channels, tags, white) in [
+        ("alone.tif", plates(std::slice::from_ref(&opaque)), vec![kinds(&[2])], None),
+        // Photoshop lists it among the names, or not.
+        (
+            "unlisted.tif",
+            plates(&[opaque.clone(), spot.clone()]),
+            vec![kinds(&[2, 0]), photoshop(&["White"])],
+            Some(50),
+        ),
+        (
+            "listed.tif",
+            plates(&[opaque.clone(), spot]),
+            vec![kinds(&[2, 0]), photoshop(&["Alpha 1", "White"])],
+            Some(50),
+        ),
+    ] {
+        let art = read(&[bench.write(name, tiff_file((20, 10), &channels, 5, &tags))], &Options::default());
+        let inked = |ink: Ink| art.layers.iter().find(|layer| layer.ink == ink).map(|layer| extent(layer).4);
+        assert_eq!((inked(Ink::Black), inked(Ink::White)), (Some(100), white), "{name}");
+        assert_eq!(art.opaque.as_ref().map(|plane| plane.dots()), Some(100), "{name}");
+    }
+    // Multiplied before, the plates are as they are; and RGB is read in the same way beside a spot channel.
+    let channels = [vec![none.clone(); 3], vec![opaque.clone(), opaque.clone()]].concat();
+    let art = read(
+        &[bench.write("times.tif", tiff_file((20, 10), &channels, 5, &[kinds(&[1])]))],
+        &Options::default(),
+    );
+    assert_eq!((art.layers.len(), extent(&art.layers[0]).4), (1, 100));
+    let channels = [vec![none.clone(); 3], vec![opaque, channel(0, 0, 19, 0, true)]].concat();
+    let tags = [kinds(&[2, 0]), photoshop(&["White"])];
+    let art = read(&[bench.write("rgb.tif", tiff_file((20, 10), &channels, 2, &tags))], &Options::default());
+    assert_eq!(art.opaque.as_ref().map(|plane| plane.dots()), Some(100));
+    let composed = compose(&art, &Settings::default(), &inks::Library::builtin(), &Silent).unwrap();
+    let mut laid: Vec<_> = composed.report.laid.iter().map(|laid| (laid.ink, laid.dots)).collect();
+    laid.sort_unstable();
+    assert_eq!(laid, [("black", 100), ("white", 20)]);
+}
