@@ -425,3 +425,38 @@ fn lists_are_there_for_programs() {
     assert_eq!(found["bridges"][0]["addresses"][0], "tcp:127.0.0.1:1");
     assert!(!found["problems"].as_array().unwrap().is_empty() && found["jobs_folder"].is_string(), "{found}");
 }
+
+#[test]
+fn a_document_without_a_page_to_draw_says_why_in_layers_and_in_a_queue() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    // An empty document whose password nobody knows.
+    let objects = "%PDF-1.4\n1 0 obj\n<< /Type /Catalog /Pages 2 0 R >>\nendobj\n2 0 obj\n<< /Type /Pages /Kids [] /Count 0 >>\nendobj\n";
+    let locked = format!(
+        "{objects}xref\n0 3\n0000000000 65535 f \n{:010} 00000 n \n{:010} 00000 n \ntrailer << /Size 3 /Root 1 0 R /Encrypt \
+         << /Filter /Standard /V 1 /R 2 /O <{}> /U <{}> /P -4 >> /ID [<33> <33>] >>\nstartxref\n{}\n%%EOF\n",
+        objects.find("1 0 obj").unwrap(),
+        objects.find("2 0 obj").unwrap(),
+        "11".repeat(32),
+        "22".repeat(32),
+        objects.len()
+    );
+    for (name, document, why) in [
+        ("stub.pdf", "%PDF-1.4\n", "it is damaged (Ghostscript says `"),
+        ("locked.pdf", &locked, "it is encrypted and needs a password"),
+        ("none.ps", "%!PS\n1 pop\n", "it has no page"),
+    ] {
+        fs::write(bench.path(name), document).unwrap();
+        let file = bench.path(name).display().to_string();
+        for command in
+            [format!("layers {file}"), format!("cups-filter 1 me title 1 FoilpressSpots=Named {file}")]
+        {
+            let output = bench.command(&command).output().unwrap();
+            let said = text(&output.stderr);
+            assert!(!output.status.success() && said.contains(why), "{command}: {said}");
+            assert!(!said.contains("blank"), "{command}: {said}");
+        }
+    }
+}

@@ -161,7 +161,7 @@ impl Process {
                 // What cannot be read is not shown.
                 let _ = (&mut pipe).take(MOST_WORDS).read_to_end(&mut text);
                 let _ = io::copy(&mut pipe, &mut io::sink());
-                String::from_utf8_lossy(&text).into_owned()
+                self::text(&text)
             })
         });
         let child = Arc::new(Mutex::new(child));
@@ -241,6 +241,15 @@ impl Process {
             .collect();
         Err(ProcessError::Failed(if said.is_empty() { "no reason given".into() } else { said.join("; ") }))
     }
+}
+
+/// Words of a program or a document in any encoding: each line is UTF-8, else Latin-1, so that unlike bytes stay unlike.
+pub(crate) fn text(bytes: &[u8]) -> String {
+    let line = |line: &[u8]| match std::str::from_utf8(line) {
+        Ok(line) => line.to_owned(),
+        Err(_) => line.iter().map(|&byte| char::from(byte)).collect(),
+    };
+    bytes.split_inclusive(|&byte| byte == b'\n').map(line).collect()
 }
 
 impl Drop for Process {

@@ -42,10 +42,10 @@ pub struct LayersArgs {
     /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one
     #[arg(long, value_name = "DPI", value_parser = dpi)]
     pub dpi: Option<f64>,
-    /// Page of a PDF or PostScript file [default: the only page with art; several are an error]
+    /// Page of a PDF, PostScript or TIFF file [default: the only page with art; several are an error]
     #[arg(long, value_name = "N", value_parser = page)]
     pub page: Option<u32>,
-    /// Read one page per ink from a PDF or PostScript file: the ink of each page, such as white,gold,black
+    /// Read one page per ink from a PDF, PostScript or TIFF file: the ink of each page, such as white,gold,black
     #[arg(long, value_name = "INKS", value_delimiter = ',', value_parser = names::typed, conflicts_with = "page")]
     pub pages: Vec<Ink>,
     /// Layers that keep their tones, and are halftoned; other layers are solid where they are darker than half

@@ -62,6 +62,9 @@ pub enum FilterError {
     /// It failed.
     #[error("Ghostscript could not draw the document: {0}")]
     Ghostscript(String),
+    /// No page, as of a damaged or encrypted document.
+    #[error("the document cannot be printed: {0}")]
+    NoPage(String),
     /// Raster pages.
     #[error(transparent)]
     Raster(#[from] RasterError),
@@ -225,7 +228,8 @@ fn within_limit(number: usize) -> Result<(), FilterError> {
 fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
     let mut drawing = Drawing::begin(path, only, dpi)?;
-    let mut number = only.unwrap_or(1);
+    let first = only.unwrap_or(1);
+    let mut number = first;
     while let Some(size) = drawing.next_page()? {
         within_limit(number)?;
         let paper = page::paper(number, size, dpi, press.choices)?;
@@ -233,7 +237,15 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
         press.write(&job)?;
         number += 1;
     }
-    drawing.end()
+    let said = drawing.end()?;
+    if number == first {
+        let page = only.and_then(|page| u32::try_from(page).ok());
+        return Err(FilterError::NoPage(layers::pdf::no_page(&said, page)));
+    }
+    if let Some(doubt) = layers::pdf::doubt(&said) {
+        press.observer.note(&doubt);
+    }
+    Ok(())
 }
 
 /// The job of a page that is a picture; empty if nothing is on it.

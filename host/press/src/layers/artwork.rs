@@ -40,6 +40,16 @@ pub struct Layer {
     pub shape: Shape,
 }
 
+impl Layer {
+    /// Whether it prints nothing.
+    pub(super) fn is_blank(&self) -> bool {
+        match &self.shape {
+            Shape::Solid(plane) => plane.dots() == 0,
+            Shape::Tone(tones) => tones.iter().all(|&tone| tone == 0),
+        }
+    }
+}
+
 /// Art at 600 dpi, or at 1200 x 600.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Artwork {
@@ -122,6 +132,9 @@ fn layer(
              left out"
         )),
         Coverage::Drawn => notes.push(format!("{name}: drawn in several colours; all of it is ink")),
+        Coverage::NotWhite => {
+            notes.push(format!("{name}: drawn in one colour and white; the colour is ink, white is not"))
+        }
     }
     let toned = plate && named.ink.kind() == Kind::Process && has_tones(&scan.coverage);
     if toned {

@@ -18,10 +18,11 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::artwork::Artwork;
 use super::coverage::{Coverage, Scan};
-use super::decode::jpeg_frame;
+use super::decode::{jpeg_frame, whole_jpeg};
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
+use super::orientation::Turn;
 use super::resolution::{self, Dpi};
 use super::size::{self, MOST_BYTES, Unstated};
 
@@ -38,6 +39,7 @@ pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork
     let Some((4, height, width)) = jpeg_frame(&bytes) else { return Ok(None) };
     let (width, height) = (u32::from(width), u32::from(height));
     size::check_pixels(path, width, height)?;
+    whole_jpeg(path, &bytes)?;
     if options.reserved {
         return Err(wrong(path, "the picture is CMYK, but reserved colours are sRGB; convert it to sRGB"));
     }
@@ -55,6 +57,7 @@ pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork
     decoder.set_options(usual.jpeg_set_out_colorspace(stored));
     let pixels = decoder.decode().map_err(bad)?;
     let profile = decoder.icc_profile().is_some();
+    let turn = Turn::of_exif(decoder.exif().map(Vec::as_slice));
     let (pixels, rest) = pixels.as_chunks::<4>();
     if pixels.len() != width as usize * height as usize || !rest.is_empty() {
         return Err(wrong(path, "its number of pixels differs from that in its header"));
@@ -68,9 +71,10 @@ pub(super) fn read_jpeg(path: &Path, options: &Options) -> Result<Option<Artwork
             [c, m, y, k].map(|v| 255 - v)
         }
     };
-    let plates = (0..4).map(|plate| pixels.iter().map(|pixel| inks(pixel)[plate]).collect()).collect();
-    let dpi = resolution::of_file(&bytes, image::ImageFormat::Jpeg);
-    artwork(path, (width, height), dpi, plates, profile, options).map(Some)
+    let plate = |plate: usize| pixels.iter().map(|pixel| inks(pixel)[plate]).collect();
+    let plates = (0..4).map(|number| turn.plane(plate(number), (width, height))).collect();
+    let dpi = turn.dpi(resolution::of_file(&bytes, image::ImageFormat::Jpeg));
+    artwork(path, turn.size((width, height)), dpi, plates, profile, options).map(Some)
 }
 
 /// Red, green and blue of a luminance and two differences.

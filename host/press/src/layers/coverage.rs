@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::decode::decode;
 use super::error::{LayersError, io, resolution_in_words, wrong};
+use super::orientation::Turn;
 use super::resolution::{Dpi, of_png};
 use super::size::{MOST_BYTES, check_pixels};
 
@@ -17,7 +18,8 @@ use super::size::{MOST_BYTES, check_pixels};
 /// A layer of a drawing: its opacity, because what is drawn in the layer of an ink is ink. Other art follows its pixels.
 /// Opaque art: the distance of the darkest of red, green and blue from white, so black art is ink, and so is art drawn in
 /// the ink's own saturated colour. Art in one colour on a transparent background: its opacity, whatever the colour. Other
-/// art with transparency: the product of the two, so dark and opaque is ink.
+/// art with transparency: the product of the two, so dark and opaque is ink. A page is drawn by programs that fill its ground
+/// with white, so beside another colour white is ground: a page in white and one colour is ink where it has that colour.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Coverage {
     /// Dark is ink.
@@ -28,6 +30,8 @@ pub(super) enum Coverage {
     DarkAndOpaque,
     /// Whatever is drawn, in several colours, is ink.
     Drawn,
+    /// Whatever is drawn, in one colour, is ink, except the white ground.
+    NotWhite,
 }
 
 /// The coverage of a layer's picture.
@@ -57,6 +61,23 @@ impl Scan {
         builder.row(rgba, 4);
         let by = if builder.one_colour() { Coverage::Opaque } else { Coverage::Drawn };
         Scan { path: path.to_path_buf(), width, height, dpi: None, coverage: builder.alpha, by }
+    }
+
+    /// The coverage of a page: red, green, blue and opacity of each pixel.
+    pub fn of_page(path: &Path, size: (u32, u32), rgba: &[u8]) -> Scan {
+        let scan = Scan::of_drawing(path, size, rgba);
+        if scan.by != Coverage::DarkAndOpaque {
+            return scan;
+        }
+        let pixels = rgba.as_chunks::<4>().0;
+        let mut builder = CoverageBuilder::of_drawing(0);
+        let ink = |pixel: &[u8; 4]| pixel[..3] != [255; 3];
+        pixels.iter().filter(|pixel| ink(pixel)).for_each(|pixel| builder.widen(pixel));
+        if !builder.one_colour() {
+            return scan;
+        }
+        let coverage = pixels.iter().map(|pixel| if ink(pixel) { pixel[3] } else { 0 }).collect();
+        Scan { coverage, by: Coverage::NotWhite, ..scan }
     }
 
     /// The coverage of a layer that was drawn on nothing and has tones: red, green, blue and opacity of each pixel.
@@ -109,9 +130,15 @@ impl CoverageBuilder {
         self.dark.push(255 - colour[0].min(colour[1]).min(colour[2]));
         self.alpha.push(alpha);
         self.transparent |= alpha < 255;
+        let [r, g, b] = colour;
+        self.widen(&[r, g, b, alpha]);
+    }
+
+    /// Takes a pixel's colour into the range.
+    fn widen(&mut self, &[ref colour @ .., alpha]: &[u8; 4]) {
         // Opaque pixels only: programs store any colour under transparent ones.
         if alpha >= 250 {
-            for (range, v) in self.range.iter_mut().zip(colour) {
+            for (range, &v) in self.range.iter_mut().zip(colour) {
                 *range = (range.0.min(v), range.1.max(v));
             }
         }
@@ -135,8 +162,8 @@ impl CoverageBuilder {
     }
 }
 
-/// Reads the coverage of one layer's picture.
-pub(super) fn scan(path: &Path) -> Result<Scan, LayersError> {
+/// Reads the coverage of one layer's picture; of a TIFF with several pages that of the page of this number.
+pub(super) fn scan(path: &Path, page: Option<u32>) -> Result<Scan, LayersError> {
     let file = std::fs::File::open(path).map_err(io(path, "open it"))?;
     if file.metadata().map_err(io(path, "read its size"))?.len() > MOST_BYTES {
         return Err(wrong(path, "the file is larger than a gigabyte"));
@@ -146,7 +173,7 @@ pub(super) fn scan(path: &Path) -> Result<Scan, LayersError> {
     if start.starts_with(b"\x89PNG") {
         return scan_png(path, file);
     }
-    let picture = decode(path, file)?;
+    let picture = decode(path, file, page)?;
     let (width, height) = (picture.image.width(), picture.image.height());
     let alpha = picture.image.color().has_alpha();
     let mut builder = CoverageBuilder::new(width as usize * height as usize, alpha);
@@ -168,6 +195,7 @@ fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, LayersError>
     let (width, height) = (reader.info().width, reader.info().height);
     check_pixels(path, width, height)?;
     let dpi = reader.info().pixel_dims.and_then(of_png);
+    let turn = Turn::of_exif(reader.info().exif_metadata.as_deref());
     let channels = reader.output_color_type().0.samples();
     let mut builder = CoverageBuilder::new(width as usize * height as usize, channels % 2 == 0);
     if reader.info().interlaced {
@@ -183,5 +211,7 @@ fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, LayersError>
         }
     }
     let (coverage, by) = builder.finish();
-    Ok(Scan { path: path.to_path_buf(), width, height, dpi, coverage, by })
+    let coverage = turn.plane(coverage, (width, height));
+    let (width, height) = turn.size((width, height));
+    Ok(Scan { path: path.to_path_buf(), width, height, dpi: turn.dpi(dpi), coverage, by })
 }

@@ -98,6 +98,13 @@ pub(super) fn ink(name: &str) -> Option<Named> {
         .map(|ink| Named { place, ink })
 }
 
+/// The ink of one of several pages for which these inks are named. Equal inks need to know at which depth they lie: that of
+/// their page.
+pub(super) fn of_page(inks: &[Ink], page: u32, ink: Ink) -> Named {
+    let repeated = inks.iter().enumerate().any(|(at, ink)| inks[..at].contains(ink));
+    Named { place: repeated.then_some(page), ink }
+}
+
 /// A file name without its extension.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "art".into(), |stem| stem.to_string_lossy().into_owned())

@@ -1,26 +1,33 @@
 //! Reads art from files: chooses the reader by what a file holds, and joins several files into one artwork.
 //!
 //! Method: the first bytes tell PDF, PostScript, TIFF, SVG and JPEG apart. A picture whose name is that of an ink is a
-//! layer; any other picture is colour for the process inks. Cost: that of the readers; files are read in pairs, so both
+//! layer, and so is a page of a TIFF for which an ink is named; any other picture is colour for the process inks. Cost: that of the readers; files are read in pairs, so both
 //! cores work and at most two layers are in memory as bytes. Limits: layers must have the same size in pixels.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use observe::Observer;
+use protocol::ink::Ink;
 use rayon::prelude::*;
 
-use super::artwork::Artwork;
+use super::artwork::{Artwork, Layer};
 use super::coverage::{self, Scan};
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
-use super::options::Options;
+use super::options::{Options, Pages};
 use super::resolution::Dpi;
-use super::size::{self, Unstated};
-use super::{cmyk, pdf, picture, svg, tiff};
+use super::size::{self, MOST_BYTES, Unstated};
+use super::{cmyk, pdf, picture, svg, tiff, tiff_pages};
 
 /// File extensions of pictures.
 const PICTURES: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm"];
+
+/// File extensions of art that is not read as one of several layers.
+const OTHERS: [&str; 18] = [
+    "ai", "avif", "bmp", "eps", "gif", "heic", "jp2", "jxl", "kra", "pdf", "ps", "psb", "psd", "svg", "svgz",
+    "tga", "webp", "xcf",
+];
 
 /// The most pictures in a folder.
 const MOST_FILES: usize = 64;
@@ -38,13 +45,19 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
             return Err(LayersError::Nothing { reason });
         }
         [folder] if folder.is_dir() => {
-            let files = pictures_in(folder)?;
+            without_pages(folder, options)?;
+            let Listing { pictures, others } = listing(folder)?;
             // Resolved, so that `.` has a name as well.
             let own = std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
-            named_files(&stem(&own), &files, options, observer)?
+            let mut art = named_files(&stem(&own), &pictures, options, observer)?;
+            art.notes.extend(left_out(folder, &others));
+            art
         }
         [file] => open_file(file, options, observer)?,
-        files => named_files(&common_name(files), files, options, observer)?,
+        files => {
+            without_pages(&files[0], options)?;
+            named_files(&common_name(files), files, options, observer)?
+        }
     };
     art.across = options.across.max(1);
     art.name.retain(|c| !c.is_control());
@@ -61,8 +74,8 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
 /// a folder of such pictures. Serves commands that expect something else and want to point here.
 pub fn is_art(path: &Path) -> bool {
     if path.is_dir() {
-        return pictures_in(path)
-            .is_ok_and(|files| files.iter().all(|file| names::ink(&stem(file)).is_some()));
+        return listing(path)
+            .is_ok_and(|listing| listing.pictures.iter().all(|file| names::ink(&stem(file)).is_some()));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     ["svg", "pdf", "ps", "eps"].contains(&extension.as_str())
@@ -70,16 +83,19 @@ pub fn is_art(path: &Path) -> bool {
 }
 
 fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
-    let mut start = Vec::new();
-    let opened = std::fs::File::open(file).map_err(io(file, "open it"))?;
-    opened.take(1 << 12).read_to_end(&mut start).map_err(io(file, "read it"))?;
-    if start.starts_with(b"%PDF") || start.starts_with(b"%!") {
+    let start = start_of(file)?;
+    if pdf::is_document(&start) {
         return pdf::read(file, options, observer);
     }
-    if (start.starts_with(b"II*\0") || start.starts_with(b"MM\0*"))
-        && let Some(art) = tiff::read(file, options)?
-    {
-        return Ok(art);
+    if start.starts_with(b"II*\0") || start.starts_with(b"MM\0*") {
+        if let Pages::Inks(inks) = &options.pages {
+            return pages_of_inks(file, inks, options, observer);
+        }
+        if let Some(art) = tiff::read(file, options)? {
+            return Ok(art);
+        }
+    } else {
+        without_pages(file, options)?;
     }
     if svg::is_svg(file, &start) {
         return svg::read(file, options, observer);
@@ -92,7 +108,7 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     {
         return Ok(art);
     }
-    let pixels = picture::read(file)?;
+    let pixels = picture::read(file, options.page())?;
     let mut art = picture::artwork(&stem(file), pixels, options)?;
     if let Some(known) = names::closest(&stem(file)).filter(|_| !options.reserved) {
         art.notes.push(format!(
@@ -103,27 +119,78 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     Ok(art)
 }
 
-/// The pictures in a folder, sorted by name.
-fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, LayersError> {
+/// The first bytes of a file.
+fn start_of(file: &Path) -> Result<Vec<u8>, LayersError> {
+    let mut start = Vec::new();
+    let opened = std::fs::File::open(file).map_err(io(file, "open it"))?;
+    opened.take(1 << 12).read_to_end(&mut start).map_err(io(file, "read it"))?;
+    Ok(start)
+}
+
+/// Refuses a choice of pages where there are none.
+fn without_pages(path: &Path, options: &Options) -> Result<(), LayersError> {
+    if options.pages == Pages::Only {
+        return Ok(());
+    }
+    let problem = "it has no pages to choose from; pages are those of one PDF, PostScript or TIFF file";
+    Err(wrong(path, problem))
+}
+
+/// What a folder holds, sorted by name.
+struct Listing {
+    /// Pictures that are read as layers.
+    pictures: Vec<PathBuf>,
+    /// Other files that seem to be art.
+    others: Vec<PathBuf>,
+}
+
+fn listing(folder: &Path) -> Result<Listing, LayersError> {
     let listed = io(folder, "list it");
-    let mut files = Vec::new();
+    let (mut files, mut others) = (Vec::new(), Vec::new());
     for entry in std::fs::read_dir(folder).map_err(&listed)? {
         let path = entry.map_err(&listed)?.path();
         let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if extension.is_some_and(|e| PICTURES.contains(&e.as_str())) && !hidden && path.is_file() {
+        let extension = extension.unwrap_or_default();
+        if hidden || !path.is_file() {
+            continue;
+        }
+        if PICTURES.contains(&extension.as_str()) {
             files.push(path);
+        } else if OTHERS.contains(&extension.as_str()) {
+            others.push(path);
         }
     }
     if files.is_empty() {
-        return Err(wrong(folder, "there is no picture in the folder; name pictures white.png, gold.png, …"));
+        let found = left_out(folder, &others).map_or(String::new(), |note| format!(" ({note})"));
+        let problem =
+            format!("there is no picture in the folder{found}; name pictures white.png, gold.png, …");
+        return Err(wrong(folder, problem));
     }
     if files.len() > MOST_FILES {
         let problem = format!("the folder has {} pictures; expected at most {MOST_FILES}", files.len());
         return Err(wrong(folder, problem));
     }
     files.sort();
-    Ok(files)
+    others.sort();
+    Ok(Listing { pictures: files, others })
+}
+
+/// A note on the files of a folder that are left out, if there are any.
+fn left_out(folder: &Path, others: &[PathBuf]) -> Option<String> {
+    const NAMED: usize = 8;
+    let mut names: Vec<_> =
+        others.iter().take(NAMED).filter_map(|file| Some(file.file_name()?.to_string_lossy())).collect();
+    if others.len() > NAMED {
+        names.push("…".into());
+    }
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: left out {}; in a folder only PNG, TIFF, JPEG and PNM are layers",
+            folder.display(),
+            names.join(", ")
+        )
+    })
 }
 
 /// One layer for each file; each file is named after its ink.
@@ -133,32 +200,101 @@ fn named_files(
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Artwork, LayersError> {
-    let named: Vec<names::Named> = files
-        .iter()
-        .map(|path| {
-            let name = stem(path);
-            names::ink(&name).ok_or_else(|| LayersError::UnknownInk {
-                path: path.clone(),
-                suggestion: names::closest(&name),
-                name,
-            })
-        })
-        .collect::<Result<_, _>>()?;
-    observer.begin("reading layers", files.len() as u64);
+    let source = |path: &PathBuf| {
+        let ink = stem(path);
+        let named = names::ink(&ink).ok_or_else(|| LayersError::UnknownInk {
+            path: path.clone(),
+            suggestion: names::closest(&ink),
+            name: ink,
+        })?;
+        let start = start_of(path)?;
+        if pdf::is_document(&start) || svg::is_svg(&start) {
+            let kind = if svg::is_svg(&start) { "SVG" } else { "PDF or PostScript" };
+            let problem = format!(
+                "it is {kind}, which is read alone and cannot be one of several layers; export it as PNG, or draw all \
+                 layers in it"
+            );
+            return Err(wrong(path, problem));
+        }
+        let label = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Ok(Source { path: path.clone(), page: options.page(), label, named })
+    };
+    let sources: Vec<Source> = files.iter().map(source).collect::<Result<_, _>>()?;
+    layers(name, &sources, options, observer)
+}
+
+/// One layer for each page of a TIFF.
+fn pages_of_inks(
+    file: &Path,
+    inks: &[Ink],
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Artwork, LayersError> {
+    let reading = io(file, "read it");
+    if std::fs::metadata(file).map_err(&reading)?.len() > MOST_BYTES {
+        return Err(wrong(file, "the file is larger than a gigabyte"));
+    }
+    let pages = tiff_pages::count(&std::fs::read(file).map_err(&reading)?);
+    if pages != inks.len() {
+        let problem = format!("it has {pages} pages, but {} inks are named for them", inks.len());
+        return Err(wrong(file, problem));
+    }
+    let source = |(page, &ink): (u32, &Ink)| Source {
+        path: file.to_path_buf(),
+        page: Some(page),
+        label: format!("page {page}"),
+        named: names::of_page(inks, page, ink),
+    };
+    let sources: Vec<Source> = (1..).zip(inks).map(source).collect();
+    layers(&stem(file), &sources, options, observer)
+}
+
+/// An error about a page that has art, of which the ink that is named for it gets nothing.
+pub(super) fn no_dot(path: &Path, page: &str, ink: Ink) -> LayersError {
+    let problem = format!(
+        "{page} has art, but {} gets no dot of it: nothing on it is dark enough to be ink; draw it in black, or in one \
+         colour on nothing",
+        ink.name()
+    );
+    wrong(path, problem)
+}
+
+/// Where a layer is.
+struct Source {
+    path: PathBuf,
+    /// Page of a TIFF.
+    page: Option<u32>,
+    /// What notes call it.
+    label: String,
+    named: names::Named,
+}
+
+/// One layer for each source, all of one size.
+fn layers(
+    name: &str,
+    sources: &[Source],
+    options: &Options,
+    observer: &dyn Observer,
+) -> Result<Artwork, LayersError> {
+    observer.begin("reading layers", sources.len() as u64);
     let mut first: Option<First> = None;
     let mut art: Option<Artwork> = None;
     let mut notes = Vec::new();
-    for (files, named) in files.chunks(2).zip(named.chunks(2)) {
-        let scans: Vec<_> = files.par_iter().map(|file| coverage::scan(file)).collect();
-        for (scan, named) in scans.into_iter().zip(named) {
+    for sources in sources.chunks(2) {
+        let scans: Vec<_> =
+            sources.par_iter().map(|source| coverage::scan(&source.path, source.page)).collect();
+        for (scan, source) in scans.into_iter().zip(sources) {
             let scan = scan?;
             let dots = match &first {
                 Some(first) => first.check(&scan, options)?,
                 None => first.insert(First::new(&scan, options, &mut notes)?).dots,
             };
-            let file =
-                scan.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-            art.get_or_insert_with(|| Artwork::blank(name, dots)).add(scan, &file, *named, false, options);
+            let art = art.get_or_insert_with(|| Artwork::blank(name, dots));
+            let drawn = source.page.is_some() && scan.coverage.iter().any(|&c| c > 0);
+            art.add(scan, &source.label, source.named, false, options);
+            if drawn && art.layers.last().is_none_or(Layer::is_blank) {
+                return Err(no_dot(&source.path, &source.label, source.named.ink));
+            }
             observer.advance(1);
         }
     }

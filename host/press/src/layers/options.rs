@@ -16,7 +16,7 @@ pub struct Options {
     pub reserved: bool,
     /// Largest difference of red, green and blue from a reserved colour; `None` for each ink's own tolerance.
     pub tolerance: Option<u8>,
-    /// Pages of a PDF or PostScript file.
+    /// Pages of a PDF, PostScript or TIFF file.
     pub pages: Pages,
     /// Layers that keep their tones, and are halftoned; all others are ink or paper.
     pub tones: InkSet,
@@ -26,6 +26,13 @@ pub struct Options {
     pub inks: InkSet,
     /// Room on the page: art without a size of its own is fitted to it.
     pub room: Room,
+}
+
+impl Options {
+    /// The page that was chosen by its number.
+    pub(super) fn page(&self) -> Option<u32> {
+        if let Pages::Number(number) = self.pages { Some(number) } else { None }
+    }
 }
 
 /// Which pages of a document to read.

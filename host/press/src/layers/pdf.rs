@@ -7,6 +7,7 @@
 //! kind of each pixel ([`kinds`](super::kinds)), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
+mod complaint;
 mod draw;
 mod plates;
 
@@ -16,37 +17,43 @@ use std::path::Path;
 
 use protocol::ink::Ink;
 
-use super::artwork::Artwork;
+use super::artwork::{Artwork, Layer};
 use super::coverage::Scan;
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
+use super::open::no_dot;
 use super::options::{Options, Pages};
 use super::picture;
 use super::size::{self, Unstated};
 use crate::scratch::Scratch;
-use draw::{DRAFT, Leaf, Part, Program, Tagged};
+use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
+pub use complaint::{doubt, no_page};
 pub use plates::{Separated, separated, spots};
+
+/// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.
+const EPS_WITH_PREVIEW: &[u8] = b"\xc5\xd0\xd3\xc6";
+
+/// Whether these are the first bytes of a document for [`read`].
+pub(super) fn is_document(start: &[u8]) -> bool {
+    start.starts_with(b"%PDF") || start.starts_with(b"%!") || start.starts_with(EPS_WITH_PREVIEW)
+}
 
 /// Reads a document.
 pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
-    let only = if let Pages::Number(number) = options.pages { Some(number) } else { None };
+    let only = options.page();
     observer.begin("reading pages", 2);
     let mut program = Program::Ghostscript;
-    let mut leaves = program.leaves(path, only, Part::CropBox, &folder);
-    if let (Err(LayersError::Program { .. }), true) = (&leaves, is_pdf(path)?) {
+    let mut drafts = program.leaves(path, only, Part::CropBox, &folder);
+    if let (Err(LayersError::Program { .. }), true) = (&drafts, is_pdf(path)?) {
         program = Program::Poppler;
-        leaves = program.leaves(path, only, Part::CropBox, &folder);
+        drafts = program.leaves(path, only, Part::CropBox, &folder);
     }
-    let leaves = leaves?;
+    let Drafts { leaves, said } = drafts?;
     observer.advance(1);
-    let missing = match only {
-        Some(number) => format!("there is no page {number}, or the file is damaged"),
-        None => "it has no page, or the file is damaged".into(),
-    };
-    let first = leaves.first().ok_or_else(|| wrong(path, missing))?;
+    let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
     let document = Document { path, program, folder: &folder, options };
     let mut art = match &options.pages {
         Pages::Number(_) => document.page(first)?,
@@ -54,6 +61,7 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
     };
     observer.end();
+    art.notes.extend(doubt(&said).map(|doubt| format!("{}: {doubt}", path.display())));
     if program == Program::Poppler {
         art.notes.push(format!(
             "{}: read by Poppler, without spot plates; install Ghostscript to print them in their inks",
@@ -121,7 +129,7 @@ impl Document<'_> {
             Program::Ghostscript => self.drawn(leaf, dpi)?,
             Program::Poppler => {
                 let pixels =
-                    picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?)?;
+                    picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?, None)?;
                 let dots = (pixels.width as usize, pixels.height as usize);
                 let mut art = picture::drawing(&name, pixels, dots, self.options);
                 art.notes.retain(|note| !note.contains("colour profile"));
@@ -161,8 +169,6 @@ impl Document<'_> {
         let first = &leaves[0];
         let mut notes = Vec::new();
         let dpi = self.dpi(first, &mut notes)?;
-        // Equal inks need to know at which depth they lie: that of their page.
-        let repeated = inks.iter().enumerate().any(|(at, ink)| inks[..at].contains(ink));
         let mut art: Option<Artwork> = None;
         observer.begin("drawing pages", inks.len() as u64);
         for (leaf, &ink) in leaves.iter().zip(inks) {
@@ -180,9 +186,12 @@ impl Document<'_> {
             let name = format!("page {}", leaf.number);
             let scan = self.layer(leaf, dpi)?;
             let dots = (scan.width as usize, scan.height as usize);
-            let place = repeated.then_some(leaf.number);
+            let named = names::of_page(inks, leaf.number, ink);
             let art = art.get_or_insert_with(|| Artwork::blank(&stem(path), dots));
-            art.add(scan, &name, names::Named { place, ink }, false, self.options);
+            art.add(scan, &name, named, false, self.options);
+            if leaf.drawn && art.layers.last().is_none_or(Layer::is_blank) {
+                return Err(no_dot(path, &name, ink));
+            }
             observer.advance(1);
         }
         observer.end();
@@ -194,8 +203,9 @@ impl Document<'_> {
 
     /// A page as coverage.
     fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, LayersError> {
-        let pixels = picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?)?;
-        Ok(Scan::of_drawing(self.path, (pixels.width, pixels.height), &pixels.rgba))
+        let drawn = self.program.picture(self.path, leaf.number, dpi, self.folder)?;
+        let pixels = picture::read(&drawn, None)?;
+        Ok(Scan::of_page(self.path, (pixels.width, pixels.height), &pixels.rgba))
     }
 
     /// The resolution at which a page has its final number of dots.

@@ -33,10 +33,10 @@ pub(super) struct Pixels {
     pub notes: Vec<String>,
 }
 
-/// Reads a picture and converts its colours to sRGB.
-pub(super) fn read(path: &Path) -> Result<Pixels, LayersError> {
+/// Reads a picture and converts its colours to sRGB; of a TIFF with several pages the one of this number.
+pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, LayersError> {
     let file = File::open(path).map_err(io(path, "open it"))?;
-    let decoded = decode(path, BufReader::new(file))?;
+    let decoded = decode(path, BufReader::new(file), page)?;
     let (width, height) = (decoded.image.width(), decoded.image.height());
     let mut notes = Vec::new();
     let deep = matches!(
@@ -181,7 +181,7 @@ pub(super) fn opaque_artwork<const N: usize>(
 }
 
 /// The dots whose pixel of `N` bytes satisfies `is`.
-fn plane_of<const N: usize>(
+pub(super) fn plane_of<const N: usize>(
     pixels: &[u8],
     size: (u32, u32),
     dots: (usize, usize),

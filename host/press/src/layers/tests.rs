@@ -4,13 +4,16 @@ use std::fs;
 use std::path::PathBuf;
 
 mod damage;
+mod documents;
 mod drawings;
+mod files;
 mod layered;
 mod pages;
 mod pictures;
 mod plates;
 mod sizes;
 mod thin;
+mod turned;
 
 use super::*;
 use observe::Silent;

@@ -4,9 +4,10 @@
 //! either the largest value or zero.
 //! Method: names come from the InkNames tag (every channel is an ink, the largest value is full ink) or from Photoshop's
 //! resource block (extra channels only, 0 is full ink, as Photoshop displays them). CMYK channels are the plates of the
-//! process inks. The decoder drops extra channels unless the file is greyscale, so the photometric tag is changed in memory
+//! process inks. An extra channel that the file calls opacity, and that names no ink, is the transparency of all others.
+//! The decoder drops extra channels unless the file is greyscale, so the photometric tag is changed in memory
 //! first.
-//! Cost: the file in memory, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel, the file's first image.
+//! Cost: the file in memory, and one byte a pixel for each channel. Limits: 8 and 16 bits a channel; one page ([`tiff_pages`]).
 //! Source: TIFF 6.0 sections 16 and 18; Adobe's file format specification for the resource block.
 
 use std::path::Path;
@@ -20,9 +21,11 @@ use super::coverage::{Coverage, Scan};
 use super::error::{LayersError, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
+use super::orientation::Turn;
 use super::picture::{self, Pixels};
 use super::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 use super::size::{self, MOST_BYTES, Unstated};
+use super::tiff_pages;
 
 const INK_SET: Tag = Tag::Unknown(332);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);
@@ -44,6 +47,27 @@ struct Channel {
     ink: Option<names::Named>,
     /// Whether 0 is full ink.
     inverted: bool,
+    opacity: Option<Opacity>,
+}
+
+/// What a channel of opacity means for the others.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Opacity {
+    /// They were multiplied with it.
+    Associated,
+    /// They were not.
+    Unassociated,
+}
+
+impl Opacity {
+    /// From a value of the tag ExtraSamples.
+    fn of(extra: Option<&u16>) -> Option<Opacity> {
+        match extra {
+            Some(1) => Some(Opacity::Associated),
+            Some(2) => Some(Opacity::Unassociated),
+            _ => None,
+        }
+    }
 }
 
 /// Reads a TIFF with plates or spot channels; `None` if it is a plain picture.
@@ -53,6 +77,7 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
         return Err(wrong(path, "the file is larger than a gigabyte"));
     }
     let mut bytes = std::fs::read(path).map_err(&reading)?;
+    tiff_pages::choose(path, &mut bytes, options.page())?;
     let Some(mut decoder) = tiff_decoder(&bytes) else { return Ok(None) };
     let number = |decoder: &mut TiffDecoder<'_>, tag| decoder.find_tag_unsigned::<u16>(tag).ok().flatten();
     let photometric = number(&mut decoder, Tag::PhotometricInterpretation).unwrap_or(BLACK_IS_ZERO);
@@ -77,18 +102,24 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
         return Ok(None);
     }
     let mut notes = Vec::new();
-    let channels = channels(path, base, samples, &named_inks, &named_extra, photometric, &mut notes)?;
+    let named = Names { inks: named_inks, extra: named_extra, kinds: extra_samples(&mut decoder) };
+    let channels = channels(path, base, samples, &named, photometric, &mut notes)?;
     if photometric != SEPARATED && channels.iter().all(|channel| channel.ink.is_none()) {
         return Ok(None);
     }
     let (width, height) =
         decoder.dimensions().map_err(|error| wrong(path, format!("the file is damaged: {error}")))?;
     size::check_pixels(path, width, height)?;
-    let dpi = of_tiff(&mut decoder);
+    let turn = Turn::of_tag(number(&mut decoder, Tag::Orientation));
+    let dpi = turn.dpi(of_tiff(&mut decoder));
     let profile = decoder.find_tag(PROFILE).ok().flatten().and_then(|value| value.into_u8_vec().ok());
     drop(decoder);
     set_photometric(&mut bytes);
     let planes = planes(path, &bytes, samples, width as usize * height as usize)?;
+    let planes: Vec<_> = planes.into_iter().map(|plane| turn.plane(plane, (width, height))).collect();
+    let (width, height) = turn.size((width, height));
+    let opacity =
+        channels.iter().zip(&planes).find_map(|(channel, plane)| Some((channel.opacity?, plane.clone())));
 
     if base == 4 {
         notes.push(cmyk::note(path, profile.is_some()));
@@ -100,18 +131,44 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
     let mut art = if photometric == SEPARATED {
         Artwork::blank(&stem(path), dots)
     } else {
-        let colour = |c: usize| &planes[if base == 3 { c } else { 0 }];
-        let mut rgba: Vec<u8> =
-            (0..planes[0].len()).flat_map(|at| [colour(0)[at], colour(1)[at], colour(2)[at], 255]).collect();
+        let colour = |c: usize, at: usize| {
+            let value = planes[if base == 3 { c } else { 0 }][at];
+            match &opacity {
+                Some((Opacity::Associated, opacity)) if opacity[at] > 0 => {
+                    (u32::from(value) * 255 / u32::from(opacity[at])).min(255) as u8
+                }
+                _ => value,
+            }
+        };
+        let alpha = |at: usize| opacity.as_ref().map_or(255, |(_, opacity)| opacity[at]);
+        let mut rgba: Vec<u8> = (0..planes[0].len())
+            .flat_map(|at| [colour(0, at), colour(1, at), colour(2, at), alpha(at)])
+            .collect();
         if let Some(profile) = profile {
             notes.extend(picture::to_srgb(path, &profile, base == 1, &mut rgba)?);
         }
         let pixels = Pixels { path: path.to_path_buf(), width, height, dpi, rgba, notes: Vec::new() };
-        picture::artwork_of(&stem(path), pixels, dots, options)
+        let mut art = picture::artwork_of(&stem(path), pixels, dots, options);
+        if let Some(colour) = art.colour.as_mut().filter(|_| art.layers.is_empty()) {
+            // A spot channel lies under or over the picture, as it does with CMYK plates. A reserved colour stands instead of it.
+            colour.overprints = true;
+        }
+        art
     };
-    for (channel, plane) in channels.into_iter().zip(planes) {
+    if let Some((_, opacity)) = opacity.as_ref().filter(|(_, opacity)| opacity.iter().any(|&a| a < 255)) {
+        art.opaque = Some(picture::plane_of::<1>(opacity, (width, height), dots, |&[a]| a > 0));
+    }
+    for (at, (channel, plane)) in channels.into_iter().zip(planes).enumerate() {
         let Some(named) = channel.ink else { continue };
-        let coverage = if channel.inverted { plane.iter().map(|v| 255 - v).collect() } else { plane };
+        let coverage = match &opacity {
+            _ if channel.inverted => plane.iter().map(|v| 255 - v).collect(),
+            // A spot channel is a plate of its own, which no transparency of the picture thins.
+            Some((Opacity::Unassociated, opacity)) if at < base => {
+                let times = |(&v, &a): (&u8, &u8)| ((u32::from(v) * u32::from(a) + 127) / 255) as u8;
+                plane.iter().zip(opacity).map(times).collect()
+            }
+            _ => plane,
+        };
         let (path, by) = (path.to_path_buf(), Coverage::Dark);
         let scan = Scan { path, width, height, dpi, coverage, by };
         art.add(scan, &channel.name, named, true, options);
@@ -120,27 +177,51 @@ pub(super) fn read(path: &Path, options: &Options) -> Result<Option<Artwork>, La
     Ok(Some(art))
 }
 
+/// What a file says of its channels.
+struct Names {
+    /// Names of all inks.
+    inks: Vec<String>,
+    /// Photoshop's names of the extra channels.
+    extra: Vec<String>,
+    /// Values of ExtraSamples, one for each of the last channels.
+    kinds: Vec<u16>,
+}
+
+fn extra_samples(decoder: &mut TiffDecoder<'_>) -> Vec<u16> {
+    let values = decoder.find_tag(Tag::ExtraSamples).ok().flatten();
+    values.and_then(|value| value.into_u16_vec().ok()).unwrap_or_default()
+}
+
 fn channels(
     path: &Path,
     base: usize,
     samples: usize,
-    named_inks: &[String],
-    named_extra: &[String],
+    named: &Names,
     photometric: u16,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Channel>, LayersError> {
     let mut channels = Vec::new();
+    // Opacity may be among Photoshop's names or not.
+    let all_named = named.extra.len() >= samples - base;
+    let mut extra = named.extra.iter();
     for at in 0..samples {
         if at < base {
             let ink = PLATES.get(at).filter(|_| photometric == SEPARATED);
             let name = ink.map_or_else(String::new, |&ink| cmyk::plate_of(ink));
             let ink = ink.map(|&ink| names::Named { place: None, ink });
-            channels.push(Channel { name, ink, inverted: false });
+            channels.push(Channel { name, ink, inverted: false, opacity: None });
             continue;
         }
-        let (name, inverted) = match (named_inks.get(at), named_extra.get(at - base)) {
-            (Some(name), _) if base == 0 || named_inks.len() == samples => (name, false),
-            (_, Some(name)) => (name, true),
+        let kind = (at + named.kinds.len()).checked_sub(samples).and_then(|at| named.kinds.get(at));
+        let opacity = Opacity::of(kind);
+        let of_photoshop = if opacity.is_none() || all_named { extra.next() } else { None };
+        let (name, inverted) = match (named.inks.get(at), of_photoshop) {
+            (Some(name), _) if base == 0 || named.inks.len() == samples => (name, false),
+            (_, Some(name)) if opacity.is_none() || names::ink(name).is_some() => (name, true),
+            _ if opacity.is_some() => {
+                channels.push(Channel { name: String::new(), ink: None, inverted: false, opacity });
+                continue;
+            }
             _ => {
                 return Err(wrong(
                     path,
@@ -158,7 +239,7 @@ fn channels(
                 path.display()
             ));
         }
-        channels.push(Channel { name: name.clone(), ink, inverted });
+        channels.push(Channel { name: name.clone(), ink, inverted, opacity: None });
     }
     Ok(channels)
 }

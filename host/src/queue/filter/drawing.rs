@@ -87,9 +87,9 @@ impl Drawing {
         }
     }
 
-    /// Sees to it that all was drawn.
-    pub(super) fn end(self) -> Result<(), FilterError> {
+    /// Sees to it that all was drawn, and returns what Ghostscript said.
+    pub(super) fn end(self) -> Result<String, FilterError> {
         self.process.advance();
-        self.process.end(|| false).map(drop).map_err(failed)
+        self.process.end(|| false).map_err(failed)
     }
 }

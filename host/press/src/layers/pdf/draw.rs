@@ -5,7 +5,7 @@
 //! page; Ghostscript can read only the file (its safer mode); Poppler knows no plates.
 
 use std::fs::File;
-use std::io::{BufReader, Read as _};
+use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -14,6 +14,7 @@ use super::super::error::{LayersError, io, wrong};
 use super::super::kinds;
 use super::super::names::stem;
 use super::super::size::check_pixels;
+use super::EPS_WITH_PREVIEW;
 use crate::process::{self, MOST_PAGES, Process, ProcessError};
 use crate::scratch::Scratch;
 
@@ -44,10 +45,18 @@ pub(super) struct Leaf {
     pub spots: Vec<String>,
 }
 
+/// What the drafts of a document tell.
+pub(super) struct Drafts {
+    /// Its pages; none if it cannot be read.
+    pub leaves: Vec<Leaf>,
+    /// What the program said.
+    pub said: String,
+}
+
 /// The part of a page to draw.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
-    /// The part that is meant to be seen.
+    /// The part that is meant to be seen: of a page in PDF its crop box, of an EPS file its bounding box.
     CropBox,
     /// The whole sheet.
     Sheet,
@@ -71,7 +80,7 @@ impl Program {
         only: Option<u32>,
         part: Part,
         folder: &Scratch,
-    ) -> Result<Vec<Leaf>, LayersError> {
+    ) -> Result<Drafts, LayersError> {
         match self {
             Program::Ghostscript => ghostscript_leaves(path, only, part, folder),
             Program::Poppler => poppler_leaves(path, only, folder),
@@ -92,7 +101,7 @@ impl Program {
         let picture = folder.path().join("page.png");
         match self {
             Program::Ghostscript => {
-                let options = [one_page(page), crop(Part::CropBox)].concat();
+                let options = [one_page(page), crop(path, Part::CropBox)?].concat();
                 ghostscript(path, &options, "pngalpha", dpi, &picture, || false)?;
             }
             Program::Poppler => {
@@ -132,7 +141,7 @@ pub(super) fn tagged(
     let picture = folder.path().join("page.pam");
     let conversions = kinds::conversions().map_err(io(path, "keep the conversion of its colours"))?;
     let convert = vec![format!("-sSourceObjectICC={}", conversions.path().display())];
-    let options = [one_page(page), crop(part), convert].concat();
+    let options = [one_page(page), crop(path, part)?, convert].concat();
     ghostscript(path, &options, kinds::DEVICE, dpi, &picture, || false)?;
     let damaged = || wrong(path, format!("page {page} cannot be drawn"));
     let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
@@ -149,8 +158,31 @@ fn one_page(page: u32) -> Vec<String> {
     vec![format!("-dFirstPage={page}"), format!("-dLastPage={page}")]
 }
 
-fn crop(part: Part) -> Vec<String> {
-    if part == Part::CropBox { vec!["-dUseCropBox".into()] } else { Vec::new() }
+fn crop(path: &Path, part: Part) -> Result<Vec<String>, LayersError> {
+    if part == Part::Sheet {
+        return Ok(Vec::new());
+    }
+    let mut options = vec!["-dUseCropBox".into()];
+    if is_eps(path).map_err(io(path, "read it"))? {
+        options.push("-dEPSCrop".into());
+    }
+    Ok(options)
+}
+
+/// Whether a file is EPS: one picture, whose size is its bounding box, also if a preview for DOS lies beside it.
+fn is_eps(path: &Path) -> std::io::Result<bool> {
+    let mut file = File::open(path)?;
+    let mut start = Vec::new();
+    (&mut file).take(64).read_to_end(&mut start)?;
+    if start.starts_with(EPS_WITH_PREVIEW)
+        && let Some(place) = start.get(4..).and_then(|rest| rest.first_chunk())
+    {
+        file.seek(SeekFrom::Start(u32::from_le_bytes(*place).into()))?;
+        start.clear();
+        file.take(64).read_to_end(&mut start)?;
+    }
+    let line = start.split(|&byte| matches!(byte, b'\r' | b'\n')).next().unwrap_or_default();
+    Ok(line.starts_with(b"%!PS-Adobe-") && line.windows(4).any(|word| word == b"EPSF"))
 }
 
 fn pages(page: u32) -> Vec<String> {
@@ -162,14 +194,14 @@ fn ghostscript_leaves(
     only: Option<u32>,
     part: Part,
     folder: &Scratch,
-) -> Result<Vec<Leaf>, LayersError> {
+) -> Result<Drafts, LayersError> {
     let place = |number: u32| match only {
         Some(_) => folder.path().join("draft.tif"),
         None => folder.path().join(format!("draft{number}.tif")),
     };
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
     let options =
-        [vec!["-sCompression=lzw".into()], only.map_or_else(Vec::new, one_page), crop(part)].concat();
+        [vec!["-sCompression=lzw".into()], only.map_or_else(Vec::new, one_page), crop(path, part)?].concat();
     let options = [options, vec!["-c".into(), SAYS_SIZES.into()]].concat();
     let mut begun = 0;
     let progressed = || {
@@ -186,7 +218,7 @@ fn ghostscript_leaves(
         let (mut drawn, mut spots) = (false, Vec::new());
         for (name, file) in plates_beside(&draft, folder)? {
             // A page paints every pixel it touches, so a draft misses nothing.
-            if coverage::scan(&file)?.coverage.iter().any(|&c| c > 0) {
+            if coverage::scan(&file, None)?.coverage.iter().any(|&c| c > 0) {
                 drawn = true;
                 if !PROCESS.contains(&name.as_str()) {
                     spots.push(name);
@@ -199,7 +231,7 @@ fn ghostscript_leaves(
         let (size, rounded_mm) = exact(draft, stated).map_or((draft, ROUNDED_MM), |size| (size, 0.0));
         leaves.push(Leaf { number, size, rounded_mm, drawn, spots });
     }
-    Ok(leaves)
+    Ok(Drafts { leaves, said })
 }
 
 /// The sizes of pages that Ghostscript says ([`SAYS_SIZES`]), in points.
@@ -220,9 +252,9 @@ fn exact(draft: (f64, f64), stated: Option<&(f64, f64)>) -> Option<(f64, f64)> {
     ways.into_iter().find(near)
 }
 
-fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Vec<Leaf>, LayersError> {
+fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Drafts, LayersError> {
     let options = [vec!["-r".into(), DRAFT.to_string()], only.map_or_else(Vec::new, pages)];
-    poppler(path, &options.concat(), &folder.path().join("draft"))?;
+    let said = poppler(path, &options.concat(), &folder.path().join("draft"))?;
     let listing = std::fs::read_dir(folder.path()).map_err(io(path, "list its pages"))?;
     let mut drafts: Vec<(u32, PathBuf)> = listing
         .filter_map(|entry| Some(entry.ok()?.path()))
@@ -230,15 +262,16 @@ fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Ve
         .collect();
     drafts.sort();
     let leaf = |(number, file): (u32, PathBuf)| {
-        let scan = coverage::scan(&file)?;
+        let scan = coverage::scan(&file, None)?;
         let drawn = scan.coverage.iter().any(|&c| c > 0);
         let size = (scan.width.into(), scan.height.into());
         Ok(Leaf { number, size, rounded_mm: ROUNDED_MM, drawn, spots: Vec::new() })
     };
-    drafts.into_iter().map(leaf).collect()
+    let leaves = drafts.into_iter().map(leaf).collect::<Result<_, LayersError>>()?;
+    Ok(Drafts { leaves, said })
 }
 
-/// The names and files of the plates beside a separated page, such as `page(Gold Foil).tif`.
+/// The names and files of the plates beside a separated page, such as `page(Gold Foil).tif` or `page(Wei%DF).tif`.
 pub(super) fn plates_beside(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
     let prefix = stem(page);
     let mut plates = Vec::new();
@@ -247,11 +280,32 @@ pub(super) fn plates_beside(page: &Path, folder: &Scratch) -> Result<Vec<(String
         let name = stem(&file);
         let plate = name.strip_prefix(&prefix).and_then(|rest| rest.strip_prefix('(')?.strip_suffix(')'));
         if let Some(plate) = plate {
-            plates.push((plate.to_owned(), file.clone()));
+            plates.push((decoded(plate), file.clone()));
         }
     }
     plates.sort();
     Ok(plates)
+}
+
+/// The name of a plate from that of its file, where Ghostscript writes `%XX` for every byte that may not be in a file name.
+fn decoded(plate: &str) -> String {
+    let mut bytes = Vec::new();
+    let mut rest = plate.as_bytes();
+    while let Some((&byte, after)) = rest.split_first() {
+        let digits = after.get(..2).filter(|two| byte == b'%' && two.iter().all(u8::is_ascii_hexdigit));
+        let digits = digits.and_then(|two| std::str::from_utf8(two).ok());
+        match digits.and_then(|two| u8::from_str_radix(two, 16).ok()) {
+            Some(code) => {
+                bytes.push(code);
+                rest = &after[2..];
+            }
+            None => {
+                bytes.push(byte);
+                rest = after;
+            }
+        }
+    }
+    process::text(&bytes)
 }
 
 /// Separates a page into a TIFF for each plate beside `to`. Returns what Ghostscript says of them.
@@ -262,7 +316,7 @@ pub(super) fn separate(
     dpi: (f64, f64),
     to: &Path,
 ) -> Result<String, LayersError> {
-    let options = [one_page(page), crop(part), vec!["-dPrintSpotCMYK".into()]].concat();
+    let options = [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into()]].concat();
     ghostscript(path, &options, "tiffsep", dpi, to, || false)
 }
 
@@ -335,6 +389,24 @@ fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plate_has_the_name_that_ghostscript_says() {
+        for (file, name) in [
+            ("Gold Foil", "Gold Foil"),
+            ("Red%2FOrange", "Red/Orange"),
+            ("PANTONE 100%25", "PANTONE 100%"),
+            ("Wei%C3%9F", "Wei\u{df}"),
+            // No UTF-8, so Latin-1, as old programs write it.
+            ("Wei%DF", "Wei\u{df}"),
+            ("100%", "100%"),
+            ("%4", "%4"),
+            ("%+1%g1", "%+1%g1"),
+        ] {
+            assert_eq!(decoded(file), name);
+        }
+        assert_eq!(process::text(b"caf\xe9\ncaf\xc3\xa9\n"), "caf\u{e9}\ncaf\u{e9}\n");
+    }
 
     #[test]
     fn a_page_has_the_size_that_is_said_of_it_unless_its_draft_is_another() {

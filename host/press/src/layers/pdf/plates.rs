@@ -75,7 +75,7 @@ pub(super) fn layers(
 /// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
 pub fn spots(path: &Path) -> Result<Vec<Vec<String>>, LayersError> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
-    let leaves = Program::Ghostscript.leaves(path, None, Part::Sheet, &folder)?;
+    let leaves = Program::Ghostscript.leaves(path, None, Part::Sheet, &folder)?.leaves;
     leaves.iter().map(|leaf| layers(path, &leaf.spots, &mut Vec::new())).collect()
 }
 
@@ -113,7 +113,7 @@ pub(super) fn separated_part(
     let (mut plates, mut notes) = (Vec::new(), Vec::new());
     let (mut process, mut others) = (Vec::new(), Vec::new());
     for (plate, file) in plates_beside(&full, &folder)? {
-        let scan = coverage::scan(&file)?;
+        let scan = coverage::scan(&file, None)?;
         if (scan.width, scan.height) != (width, height) {
             return Err(wrong(path, format!("plate {plate} of page {page} differs in size from the page")));
         }

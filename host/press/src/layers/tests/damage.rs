@@ -28,6 +28,27 @@ fn damaged_files_are_errors_that_name_the_file() {
     assert!(refused(&[bench.path("nowhere.png")]).contains("cannot open it"));
 }
 
+#[test]
+fn a_jpeg_that_was_cut_short_is_refused_as_a_layer_as_colour_and_as_plates() {
+    let bench = Bench::new();
+    let noise = |x: u32, y: u32| image::Luma([(x.wrapping_mul(y * y + 7919) % 251) as u8]);
+    let mut whole = std::io::Cursor::new(Vec::new());
+    image::GrayImage::from_fn(64, 64, noise).write_to(&mut whole, image::ImageFormat::Jpeg).unwrap();
+    for (name, bytes) in [
+        ("white.jpg", whole.get_ref().as_slice()),
+        ("photo.jpg", whole.get_ref()),
+        ("plates.jpg", include_bytes!("../cmyk.jpg")),
+    ] {
+        let options = Options { dpi: Some(600.0), ..Options::default() };
+        read(&[bench.write(name, bytes)], &options);
+        for cut in [bytes.len() / 2, bytes.len() - 30, bytes.len() - 2] {
+            let text = refused(&[bench.write(name, &bytes[..cut])]);
+            assert!(text.contains(name) && !text.contains("no resolution"), "{text}");
+            assert!(cut < bytes.len() - 30 || text.contains("the file was cut short"), "{cut}: {text}");
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     #[test]

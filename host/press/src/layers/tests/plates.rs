@@ -116,3 +116,87 @@ fn plates_with_tones_keep_them() {
     assert_eq!(art.layers.len(), 2, "blank plates are no layers");
     assert_eq!((art.layers[1].ink, extent(&art.layers[1])), (Ink::Black, (3, 3, 6, 6, 16)));
 }
+
+/// A file's Photoshop resource with the names of its extra channels.
+fn photoshop(names: &[&str]) -> (u16, u16, Vec<u8>) {
+    let mut names: Vec<u8> =
+        names.iter().flat_map(|name| [&[name.len() as u8], name.as_bytes()].concat()).collect();
+    let size = (names.len() as u32).to_be_bytes();
+    names.resize(names.len().next_multiple_of(2), 0);
+    (34377, 1, [b"8BIM\x03\xee\0\0".to_vec(), size.to_vec(), names].concat())
+}
+
+#[test]
+fn a_spot_channel_lies_under_a_picture_in_rgb_as_it_does_under_plates() {
+    let bench = Bench::new();
+    // Black in a corner, on white that covers the paper but for its last column.
+    let (black, white) = (channel(0, 0, 4, 4, true), channel(0, 0, 18, 9, true));
+    let files = [
+        ("rgb.tif", vec![black.clone(), black.clone(), black, white.clone()], 2, vec![0, 0]),
+        (
+            "cmyk.tif",
+            [vec![vec![0; 200]; 3], vec![channel(0, 0, 4, 4, false), white]].concat(),
+            5,
+            vec![0, 0],
+        ),
+    ];
+    for (name, channels, photometric, extra) in files {
+        let tags = [(338, 3, extra), photoshop(&["White"])];
+        let file = bench.write(name, tiff_file((20, 10), &channels, photometric, &tags));
+        let art = read(&[file], &Options::default());
+        let composed = compose(&art, &Settings::default(), &inks::Library::builtin(), &Silent).unwrap();
+        let mut laid: Vec<_> = composed.report.laid.iter().map(|laid| (laid.ink, laid.dots)).collect();
+        laid.sort_unstable();
+        // Paper that is white in the picture gets no ink of it.
+        assert_eq!(laid, [("black", 25), ("white", 190)], "{name}");
+    }
+}
+
+#[test]
+fn opacity_beside_plates_is_transparency_and_no_ink() {
+    let bench = Bench::new();
+    let none = vec![0; 200];
+    let all = channel(0, 0, 19, 9, false);
+    let opaque = channel(0, 0, 9, 9, false);
+    let plates = |extra: &[Vec<u8>]| {
+        [vec![none.clone(), none.clone(), none.clone(), all.clone()], extra.to_vec()].concat()
+    };
+    let kinds = |kinds: &[u16]| (338, 3, kinds.iter().flat_map(|kind| kind.to_le_bytes()).collect());
+    let spot = channel(15, 0, 19, 9, true);
+    for (name, channels, tags, white) in [
+        ("alone.tif", plates(std::slice::from_ref(&opaque)), vec![kinds(&[2])], None),
+        // Photoshop lists it among the names, or not.
+        (
+            "unlisted.tif",
+            plates(&[opaque.clone(), spot.clone()]),
+            vec![kinds(&[2, 0]), photoshop(&["White"])],
+            Some(50),
+        ),
+        (
+            "listed.tif",
+            plates(&[opaque.clone(), spot]),
+            vec![kinds(&[2, 0]), photoshop(&["Alpha 1", "White"])],
+            Some(50),
+        ),
+    ] {
+        let art = read(&[bench.write(name, tiff_file((20, 10), &channels, 5, &tags))], &Options::default());
+        let inked = |ink: Ink| art.layers.iter().find(|layer| layer.ink == ink).map(|layer| extent(layer).4);
+        assert_eq!((inked(Ink::Black), inked(Ink::White)), (Some(100), white), "{name}");
+        assert_eq!(art.opaque.as_ref().map(|plane| plane.dots()), Some(100), "{name}");
+    }
+    // Multiplied before, the plates are as they are; and RGB is read in the same way beside a spot channel.
+    let channels = [vec![none.clone(); 3], vec![opaque.clone(), opaque.clone()]].concat();
+    let art = read(
+        &[bench.write("times.tif", tiff_file((20, 10), &channels, 5, &[kinds(&[1])]))],
+        &Options::default(),
+    );
+    assert_eq!((art.layers.len(), extent(&art.layers[0]).4), (1, 100));
+    let channels = [vec![none.clone(); 3], vec![opaque, channel(0, 0, 19, 0, true)]].concat();
+    let tags = [kinds(&[2, 0]), photoshop(&["White"])];
+    let art = read(&[bench.write("rgb.tif", tiff_file((20, 10), &channels, 2, &tags))], &Options::default());
+    assert_eq!(art.opaque.as_ref().map(|plane| plane.dots()), Some(100));
+    let composed = compose(&art, &Settings::default(), &inks::Library::builtin(), &Silent).unwrap();
+    let mut laid: Vec<_> = composed.report.laid.iter().map(|laid| (laid.ink, laid.dots)).collect();
+    laid.sort_unstable();
+    assert_eq!(laid, [("black", 100), ("white", 20)]);
+}
