@@ -309,3 +309,34 @@ test('dragging stays fluid, coarser if it must, and rest draws finely', () => vi
   assert.ok(usual <= 34 || least < fine / 4, `${usual} ms a frame, ${least} of ${fine} pixels`);
   console.log(`${usual} ms a frame while dragging, ${least} of ${fine} pixels wide`);
 }));
+/** Draws everything so many times over, and keeps what was drawn when, and how widely. */
+const slow = (/** @type {number} */ times) => {
+  window.frames_ = [];
+  const once = WebGL2RenderingContext.prototype.drawArrays;
+  WebGL2RenderingContext.prototype.drawArrays = function drawArrays(...given) {
+    window.frames_.push([performance.now(), this.canvas.width]);
+    for (let i = 0; i < times; i++) once.apply(this, given);
+  };
+};
+test('a picture that takes long is coarse from the first move until the hand rests', () => visit({ ...desk, scale: 2, before: [slow, 4] }, async (page) => {
+  await page.evaluate(() => { location.hash = 'show=printed&with='; });
+  await rested(page);
+  const fine = await page.evaluate(() => document.querySelector('canvas').width);
+  await page.click('[data-tool=sheet]');
+  const [x, y] = await place(page);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.evaluate(() => { window.frames_ = []; });
+  for (const until = Date.now() + 4000; Date.now() < until;) {
+    await page.mouse.move(x + (Date.now() / 20) % 80, y);
+    await page.waitForTimeout(10);
+  }
+  const frames = await page.evaluate(() => window.frames_);
+  await page.mouse.up();
+  const widths = frames.map(([, width]) => width);
+  assert.ok(widths.length > 8, `${widths.length} frames in 4 s`);
+  assert.ok(Math.max(...widths) < 0.6 * fine, `${widths} of ${fine}`);
+  await rested(page);
+  assert.equal(await page.evaluate(() => document.querySelector('canvas').width), fine);
+  console.log(`${widths.length} frames in 4 s, ${widths[0]} and then ${widths[2]} of ${fine} pixels wide`);
+}));

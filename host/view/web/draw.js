@@ -183,6 +183,22 @@ export class Drawing {
 
   /**
    * @param {string} show
+  /** Waits until the card has drawn all that it was told to. */
+  done() {
+    const { gl } = this;
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    return new Promise((/** @type {(value: void) => void} */ resolve) => {
+      const ask = () => {
+        if (!fence || gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED) {
+          gl.deleteSync(fence);
+          resolve();
+        } else setTimeout(ask, 2);
+      };
+      setTimeout(ask);
+    });
+  }
+
    * @param {import('./state.js').State} state
    * @param {boolean} coarse
    */

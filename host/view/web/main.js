@@ -5,7 +5,7 @@ import { rechoose } from './controls.js';
 import { layer, stackWeights, unpacked, unpackedFloats } from './data.js';
 import { Drawing } from './draw.js';
 import { build } from './panel.js';
-import { byId, canvas, data, drawn, drawNow, faceTheEye, limits, redraw, stage, state } from './stage.js';
+import { byId, canvas, data, drawn, eachFrame, faceTheEye, limits, redraw, stage, state } from './stage.js';
 import { read } from './state.js';
 
 /** @param {string} text */
@@ -51,8 +51,8 @@ async function start() {
     rechoose();
     redraw(false);
   });
-  drawNow();
-  stage.classList.add('ready');
+  eachFrame.after.push(() => stage.classList.add('ready'));
+  // It is told of the size at first, too.
 }
 
 start().catch((/** @type {Error} */ error) => say(`The page cannot draw: ${error.message}. The picture shows the sheet under one light.`));
