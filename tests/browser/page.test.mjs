@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import test from 'node:test';
+import { deflateSync } from 'node:zlib';
 import { open, rested } from './browser.mjs';
 
 const file = process.env.FOILPRESS_PAGE;
@@ -333,6 +334,30 @@ test('a picture that takes long is coarse from the first move until the hand res
   }
   const frames = await page.evaluate(() => window.frames_);
   await page.mouse.up();
+}));
+
+/** A panorama of 4 x 2 texels with a sun that no number of 16 bits holds. */
+const texels = deflateSync(Buffer.from(Float32Array.from({ length: 24 }, (_, i) => (i > 2 && i < 6 ? 3e7 : 0.1)).buffer)).toString('base64');
+const hot = (/** @type {string} */ probe) => {
+  const { parse } = JSON;
+  JSON.parse = (text, ...more) => {
+    const read = parse(text, ...more);
+    if (read.probe) Object.assign(read.probe, { width: 4, height: 2, texels: probe });
+    return read;
+  };
+};
+test('a sun makes the page white, not black', () => visit({ ...desk, before: [hot, texels] }, async (page) => {
+  for (const show of ['document', 'printed']) {
+    await page.evaluate((what) => { location.hash = `show=${what}&light=&probe=1&tilt=0,0&exposure=2`; }, show);
+    await rested(page);
+    const middle = await page.evaluate(() => {
+      const from = document.querySelector('canvas');
+      const to = new OffscreenCanvas(1, 1).getContext('2d');
+      to.drawImage(from, from.width * 0.52, from.height * 0.52, 1, 1, 0, 0, 1, 1);
+      return [...to.getImageData(0, 0, 1, 1).data];
+    });
+    assert.ok(Math.max(...middle.slice(0, 3)) > 150, `${show}: ${middle}`);
+  }
   const widths = frames.map(([, width]) => width);
   assert.ok(widths.length > 8, `${widths.length} frames in 4 s`);
   assert.ok(Math.max(...widths) < 0.6 * fine, `${widths} of ${fine}`);
