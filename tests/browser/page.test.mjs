@@ -117,6 +117,26 @@ test('every view, every pass and every slider changes picture and address', () =
   await page.click('#lights button:first-child');
   await page.click('#fewer');
   assert.equal((await rested(page)).get('light').split(';').length, 1);
+  // The focus stays among the lights, and each new light has a place of its own.
+  const focused = () => page.evaluate(() => document.activeElement.id);
+  for (const id of ['more', 'more', 'light4']) {
+    await page.focus('#more');
+    await page.keyboard.press('Enter');
+    assert.equal(await focused(), id);
+  }
+  await page.focus('#light2');
+  await page.keyboard.press('Enter');
+  assert.equal(await focused(), 'light2');
+  assert.equal(await page.getAttribute('#light2', 'aria-pressed'), 'true');
+  const places = (await rested(page)).get('light').split(';').map(numbers);
+  for (const [i, [a, e]] of places.entries()) {
+    for (const [b, f] of places.slice(i + 1)) assert.ok(Math.hypot(a - b, e - f) > 20, JSON.stringify(places));
+  }
+  // Without a light there is nothing to slide.
+  for (let i = 0; i < 4; i++) await page.click('#fewer');
+  assert.equal((await rested(page)).get('light'), '');
+  assert.deepEqual(await page.locator('#sliders-light .slider:visible span').allTextContents(), ['exposure', 'tone curve']);
+  await page.evaluate(() => document.querySelectorAll('#sliders-light input').forEach((input) => input.dispatchEvent(new Event('input'))));
   await page.click('#reset');
   assert.equal((await rested(page)).get('probe'), '0');
 }));

@@ -29,6 +29,7 @@ export function slider(into, name, how) {
     sync();
     redraw(true);
   });
+    if (how.shown && !how.shown()) return;
   synced.push(() => {
     label.hidden = how.shown ? !how.shown() : false;
     if (label.hidden) return;

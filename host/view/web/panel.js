@@ -7,12 +7,22 @@ import { element } from './spot.js';
 import { available, byId, data, faceTheEye, held, leastRadius, limits, redraw, shareAddress, state } from './stage.js';
 import { initial, MOST_LIGHTS, read, TITLES } from './state.js';
 
+/** Where lights are put that are added. */
+const PLACES = [[35, 20], [-35, -20], [30, -35], [-25, 30]];
+
 /** @param {string} show */
 function showFirst(show) {
   state.show = show;
   if (state.with === show) state.with = '';
   rechoose();
   redraw(false);
+}
+
+/** Where a new light goes: the place that is farthest from all others. */
+function freePlace() {
+  const fromOthers = (/** @type {number[]} */ [a, e]) => Math.min(Infinity, ...state.lights.map((l) => Math.hypot(l.azimuth - a, l.elevation - e)));
+  const [azimuth, elevation] = PLACES.reduce((best, place) => (fromOthers(place) > fromOthers(best) ? place : best));
+  return { azimuth, elevation };
 }
 
 /** Brings the choices in line with the state. */
@@ -32,7 +42,7 @@ function choices() {
   held.lamp = clamp(held.lamp, 0, Math.max(state.lights.length - 1, 0));
   const lights = byId('lights');
   const numbers = state.lights.map((_, i) => {
-    const button = element('button', { type: 'button', 'aria-pressed': String(i === held.lamp), 'aria-label': `Choose light ${i + 1}` }, String(i + 1));
+    const button = element('button', { type: 'button', id: `light${i + 1}`, 'aria-pressed': String(i === held.lamp), 'aria-label': `Choose light ${i + 1}` }, String(i + 1));
     button.addEventListener('click', () => {
       held.lamp = i;
       rechoose();
@@ -42,7 +52,7 @@ function choices() {
   });
   const more = element('button', { type: 'button', id: 'more' }, '+ add');
   more.addEventListener('click', () => {
-    state.lights.push({ azimuth: 35, elevation: 20, distance: 0.6 });
+    state.lights.push({ ...freePlace(), distance: 0.6 });
     held.lamp = state.lights.length - 1;
     rechoose();
     redraw(false);
@@ -53,9 +63,9 @@ function choices() {
     rechoose();
     redraw(false);
   });
-  const focused = document.activeElement?.id;
+  const focused = lights.contains(document.activeElement) ? document.activeElement?.id ?? '' : null;
   lights.replaceChildren(...numbers, ...(state.lights.length < MOST_LIGHTS ? [more] : []), ...(state.lights.length ? [fewer] : []));
-  if (focused === 'more' || focused === 'fewer') document.getElementById(focused)?.focus();
+  if (focused !== null) (document.getElementById(focused) ?? numbers[held.lamp] ?? more).focus();
   legend();
 }
 
