@@ -246,9 +246,46 @@ test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
   await touch('touchEnd');
   assert.ok(numbers((await rested(page)).get('light'))[0] > before[0] + 5);
   await touch('touchStart', [x - 40, y], [x + 40, y]);
+  // One line each.
+  for (const span of await page.locator('#spot figcaption span').all()) assert.ok((await span.boundingBox()).height < 30);
+  // The mark lies where the spot does.
+  const centre = async (/** @type {string} */ what) => {
+    const box = await page.locator(what).boundingBox();
+    return [box.x + box.width / 2, box.y + box.height / 2];
+  };
+  const near = ([a, b], [c, d]) => assert.ok(Math.hypot(a - c, b - d) < 2, `${[a, b]}, not ${[c, d]}`);
+  const [mx, my] = await centre('#picture');
+  // Looking may have scrolled the page; the picture stays in sight.
+  const [px, py] = [mx + 80, my + 50];
+  await page.mouse.click(px, py);
+  await page.waitForTimeout(600);
+  const [nx, ny] = await centre('#picture');
+  near(await centre('#ring'), [px + nx - mx, py + ny - my]);
+  await page.click('#nearer');
+  await rested(page);
+  near(await centre('#ring'), [nx + 1.5 * 80, ny + 1.5 * 50]);
+  for (const how of ['tilt=20,-15&distance=0.4', 'tilt=-15,10&distance=0&curl=0.06', 'view=25,10&distance=0.3&curl=0.08&pan=0.01,0.005']) {
+    await page.evaluate((hash) => { location.hash = `show=printed&view=0,0&curl=0&pan=0,0&zoom=1&${hash}`; }, how);
+    await rested(page);
+    await page.mouse.click(nx + 70, ny - 40);
+    near(await centre('#ring'), [nx + 70, ny - 40]);
+  }
+  // What was said of the spot follows an edit.
+  const said = () => page.locator('#d').innerText();
+  const before = await said();
+  await page.evaluate(() => { location.hash = 'show=document&edit=0,3,ff0000,0.5;1,3,ff0000,0.5;2,3,ff0000,0.5'; });
+  await rested(page);
+  assert.match(await said(), /Print and edited document differ/);
+  assert.notEqual((await said()).match(/0\.\d+/)[0], before.match(/0\.\d+/)[0]);
+  await page.click('#unedit');
+  await rested(page);
+  assert.equal(await said(), before);
+  await page.evaluate(() => { location.hash = 'show=document&view=0,0&tilt=0,0&curl=0&pan=0,0&zoom=1&distance=0.5'; });
+  await rested(page);
   await touch('touchMove', [x - 60, y], [x + 60, y]);
   await touch('touchMove', [x - 90, y], [x + 90, y]);
   await touch('touchEnd');
+  assert.equal(await page.isVisible('#ring'), false);
   assert.ok(Number((await rested(page)).get('zoom')) > 1.8);
   await page.touchscreen.tap(x, y);
   assert.match(await page.locator('#spot').textContent(), /This dot/);
@@ -281,6 +318,11 @@ for (const colorScheme of ['light', 'dark']) {
   }));
 }
 
+  // What is said of the spot comes into sight below the picture.
+  await page.waitForFunction(() => {
+    const [said, picture] = ['#spot h2', '#picture'].map((what) => document.querySelector(what).getBoundingClientRect());
+    return said.top >= picture.bottom && said.bottom < innerHeight;
+  });
 test('five hundred changes of light leave no memory behind', () => visit({ width: 620, height: 400 }, async (page) => {
   const used = () => page.evaluate(() => {
     globalThis.gc();
