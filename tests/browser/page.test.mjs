@@ -220,6 +220,16 @@ test('materials are edited by mouse and keyboard, and the steps are there to cop
 }));
 
 test('a spot tells its curve, its mixture and the inks of its dot', () => visit(desk, async (page) => {
+  assert.equal((await rested(page)).get('edit'), '0,2,ffffff,1');
+  // An address without edits is that of the document as it was.
+  await page.evaluate(() => { location.hash = 'show=document'; });
+  after = await rested(page);
+  assert.deepEqual([after.get('edit'), await picture() === before], [null, true]);
+  await page.evaluate(() => { location.hash = 'show=document&with=printed'; });
+  assert.equal((await rested(page)).get('with'), 'printed');
+  await page.evaluate(() => { location.hash = 'exposure=0'; });
+  assert.equal((await rested(page)).get('with'), null);
+  await page.evaluate((hash) => { location.hash = `${hash}&edit=0,2,ffffff,1`; }, 'show=document');
   const [x, y] = await place(page);
   await page.mouse.click(x - 60, y + 40);
   assert.equal(await page.locator('#spot svg path').count(), 2);
@@ -324,6 +334,20 @@ for (const colorScheme of ['light', 'dark']) {
     return said.top >= picture.bottom && said.bottom < innerHeight;
   });
 test('five hundred changes of light leave no memory behind', () => visit({ width: 620, height: 400 }, async (page) => {
+  // Whatever the program takes, the page takes; a control shows the end of its range and changes nothing.
+  const far = 'show=printed&light=150,0,0.02&probe=0&view=0,88&distance=0.02&tilt=0,5&curl=0&zoom=1&pan=0,0&exposure=9.5&knee=0.4';
+  for (const hash of [far, far.replace('view=0,88', 'view=120,0').replace('tilt=0,5', 'tilt=85,0')]) {
+    await page.evaluate((to) => { location.hash = to; }, hash);
+    assert.equal(decodeURIComponent((await rested(page)).toString()), hash);
+  }
+  await page.focus('#picture');
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await rested(page)).get('light'), '150,0,0.02');
+  await page.keyboard.press('ArrowLeft');
+  assert.equal((await rested(page)).get('light'), '147,0,0.02');
+  await page.evaluate(() => { location.hash = 'light=20,0,50&distance=50'; });
+  await rested(page);
+  assert.equal(await page.locator('#sliders-light output').nth(2).innerText(), '50.00 m');
   const used = () => page.evaluate(() => {
     globalThis.gc();
     globalThis.gc();

@@ -1,6 +1,6 @@
 // The picture under the hand: mouse, touch, wheel and keys move light, sheet and picture, and a tap looks at a spot.
 
-import { arrows, mark, sync } from './controls.js';
+import { arrows, mark, sync, within } from './controls.js';
 import { clamp } from './geometry.js';
 import { hemisphere, place } from './lamps.js';
 import { look } from './look.js';
@@ -13,8 +13,8 @@ function drag(x, y, by) {
     const step = metresPerPixel();
     state.pan = [clamp(state.pan[0] - x * step, -5, 5), clamp(state.pan[1] + y * step, -5, 5)];
   } else if (by === 'sheet') {
-    state.turn = clamp(state.turn + 0.25 * x, -80, 80);
-    state.tip = clamp(state.tip - 0.25 * y, -80, 80);
+    state.turn = within(state.turn + 0.25 * x, state.turn, 80);
+    state.tip = within(state.tip - 0.25 * y, state.tip, 80);
     faceTheEye();
   } else if (state.lights[held.lamp]) {
     const r = hemisphere() / 90;

@@ -8,7 +8,13 @@ import { build } from './panel.js';
 import { byId, canvas, data, drawn, eachFrame, faceTheEye, limits, redraw, stage, state } from './stage.js';
 import { read } from './state.js';
 
-/** @param {string} text */
+/** How near to its edge an address may show the sheet: the program's limit. */
+const EDGE = 1e-3;
+
+/**
+ * Says why nothing can be moved, and takes away what would do nothing.
+ * @param {string} text
+ */
 function say(text) {
   const message = byId('message');
   message.textContent = text;
@@ -19,7 +25,7 @@ async function start() {
   build();
   read(data.start, state, limits);
   read(location.hash, state, limits);
-  faceTheEye();
+  faceTheEye(EDGE);
   rechoose();
   const gl = canvas.getContext('webgl2', { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true });
   if (!gl || typeof DecompressionStream === 'undefined') {
@@ -47,8 +53,10 @@ async function start() {
   addEventListener('hashchange', (event) => {
     // The page may have written its own address since.
     read(new URL(event.newURL).hash, state, limits);
-    faceTheEye();
+    faceTheEye(EDGE);
     rechoose();
+    // What an address leaves out when there is none of it.
+    Object.assign(state, { with: '', edits: {} });
     redraw(false);
   });
   eachFrame.after.push(() => stage.classList.add('ready'));

@@ -149,8 +149,8 @@ export function build() {
   // The last step is far away.
   const near = (/** @type {number} */ d) => (d > 0 ? Math.log(d / 0.1) / Math.log(30) : 1.04);
   const metres = (/** @type {number} */ v) => (v > 1.02 ? 0 : 0.1 * 30 ** v);
-  const inMetres = (/** @type {number} */ v) => (metres(v) ? `${metres(v).toFixed(2)} m` : 'far');
-  slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: inMetres });
+  const inMetres = (/** @type {number} */ d) => (d ? `${d.toFixed(2)} m` : 'far');
+  slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: () => inMetres(chosen().distance) });
   slider(light, 'exposure', { min: -5, max: 5, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v >= 0.05 ? '+' : ''}${Math.abs(v) < 0.05 ? '0' : v.toFixed(1)} EV` });
   slider(light, 'tone curve', { min: 0, max: 1, step: 0.05, get: () => state.knee, set: (v) => (state.knee = v), words: (v) => (v < 1 ? `soft above ${Math.round(100 * v)} %` : 'cut off at white') });
   const turned = (/** @type {'turn' | 'tip'} */ which) => (/** @type {number} */ v) => {
@@ -163,7 +163,7 @@ export function build() {
     min: 0, max: 1, step: 0.01, get: () => (state.curl > 0 ? leastRadius / state.curl : 0),
     set: (v) => (state.curl = v > 0 ? leastRadius / v : 0), words: () => (state.curl > 0 ? `r ${(state.curl * 1000).toFixed(0)} mm` : 'flat'),
   });
-  slider(sheet, 'eye', { min: 0, max: 1.04, step: 0.01, get: () => near(state.distance), set: (v) => (state.distance = metres(v)), words: inMetres });
+  slider(sheet, 'eye', { min: 0, max: 1.04, step: 0.01, get: () => near(state.distance), set: (v) => (state.distance = metres(v)), words: () => inMetres(state.distance) });
   const viewed = (/** @type {0 | 1} */ i) => (/** @type {number} */ v) => {
     state.view[i] = v;
     faceTheEye();
