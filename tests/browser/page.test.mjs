@@ -306,6 +306,16 @@ test('an address brings back its view, and nonsense in it does no harm', () => v
   const view = 'show=printed&light=10,20,0;-30,40,0.5&probe=0&view=5,-5&distance=0.4&tilt=10,-20&curl=0.08&zoom=3&pan=0.01,-0.01&exposure=1.5&knee=0.7';
   await page.evaluate((hash) => { location.hash = hash; }, view);
   assert.equal(decodeURIComponent((await rested(page)).toString()), view);
+  // The finger that is lifted last drags nothing.
+  const still = (await rested(page)).get('light');
+  await touch('touchStart', [x - 40, y], [x + 40, y]);
+  await touch('touchMove', [x - 45, y], [x + 45, y]);
+  await touch('touchEnd', [x - 45, y]);
+  for (const by of [20, 40]) {
+    await session.send('Input.dispatchTouchEvent', { type: 'touchMove', touchPoints: [{ x: x + 45 - by, y: y + by, id: 1 }] });
+  }
+  await touch('touchEnd');
+  assert.equal((await rested(page)).get('light'), still);
   await page.evaluate(() => { location.hash = 'show=<b>&light=NaN,1;2&zoom=1e99&pan=a&tilt=999,-999&curl=-1&distance=1e-9&exposure=Infinity&pass=77&split=-4'; });
   const after = await rested(page);
   assert.equal(after.get('show'), 'printed');

@@ -48,11 +48,14 @@ function whole() {
 /** @type {Map<number, { x: number, y: number }>} */
 const fingers = new Map();
 let travelled = 0;
+/** Whether there were two fingers: the one that is lifted last drags nothing. */
+let pinched = false;
 
 canvas.addEventListener('pointerdown', (event) => {
   canvas.setPointerCapture(event.pointerId);
   fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-  travelled = fingers.size > 1 ? Infinity : 0;
+  if (fingers.size === 1) [travelled, pinched] = [0, false];
+  else pinched = true;
 });
 canvas.addEventListener('pointermove', (event) => {
   const finger = fingers.get(event.pointerId);
@@ -66,14 +69,14 @@ canvas.addEventListener('pointermove', (event) => {
     const box = canvas.getBoundingClientRect();
     drag(x / 2, y / 2, 'move');
     zoom(after / Math.max(before, 1), (event.clientX + other.x) / 2 - box.left - box.width / 2, (event.clientY + other.y) / 2 - box.top - box.height / 2);
-  } else if (fingers.size === 1 && travelled > 4) {
+  } else if (!pinched && travelled > 4) {
     drag(x, y, event.buttons & 6 ? 'move' : event.shiftKey ? 'sheet' : held.tool);
   }
   [finger.x, finger.y] = [event.clientX, event.clientY];
 });
 const lift = (/** @type {PointerEvent} */ event) => {
   if (!fingers.delete(event.pointerId)) return;
-  if (event.type === 'pointerup' && fingers.size === 0 && travelled <= 4) {
+  if (event.type === 'pointerup' && !pinched && travelled <= 4) {
     const box = canvas.getBoundingClientRect();
     look(event.clientX - box.left, event.clientY - box.top);
   }
