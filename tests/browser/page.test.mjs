@@ -428,6 +428,15 @@ test('a picture that takes long is coarse from the first move until the hand res
     await page.mouse.move(x + (Date.now() / 20) % 80, y);
     await page.waitForTimeout(10);
   }
+  const uncovered = () => page.locator('#message').evaluate((message) => {
+    const { left, top, width, height } = message.getBoundingClientRect();
+    return [0.02, 0.5, 0.98].every((x) => document.elementFromPoint(left + x * width, top + height / 2) === message);
+  });
+  for (const size of [desk, { width: 390, height: 780 }]) {
+    await page.setViewportSize({ width: size.width, height: size.height });
+    assert.ok(await uncovered(), JSON.stringify(size));
+  }
+  for (const control of ['#tools', 'aside', '#scale', '.lamp']) assert.equal(await page.locator(control).locator('visible=true').count(), 0, control);
   const frames = await page.evaluate(() => window.frames_);
   await page.mouse.up();
 }));

@@ -16,6 +16,8 @@ const EDGE = 1e-3;
  * @param {string} text
  */
 function say(text) {
+  document.body.classList.add('still');
+  stage.classList.remove('ready');
   const message = byId('message');
   message.textContent = text;
   message.hidden = false;
@@ -49,18 +51,18 @@ async function start() {
     drawn.drawing = make();
     redraw(false);
   });
+  eachFrame.after.push(() => stage.classList.add('ready'));
+  // It is told of the size at first, too.
   new ResizeObserver(() => redraw(false)).observe(canvas);
   addEventListener('hashchange', (event) => {
+    // What an address leaves out when there is none of it.
+    Object.assign(state, { with: '', edits: {} });
     // The page may have written its own address since.
     read(new URL(event.newURL).hash, state, limits);
     faceTheEye(EDGE);
     rechoose();
-    // What an address leaves out when there is none of it.
-    Object.assign(state, { with: '', edits: {} });
     redraw(false);
   });
-  eachFrame.after.push(() => stage.classList.add('ready'));
-  // It is told of the size at first, too.
 }
 
 start().catch((/** @type {Error} */ error) => say(`The page cannot draw: ${error.message}. The picture shows the sheet under one light.`));
