@@ -208,6 +208,15 @@ test('materials are edited by mouse and keyboard, and the steps are there to cop
   assert.match(text, /^format = 1\ndocument = ".*"\nfingerprint = "[0-9a-f]{64}"\n\n\[\[step\]\]\nbasis = 1\nrougher = 2\.0\ntint = "#ff8000"\nalbedo = 0\.\d+\n$/);
   await page.click('#copySteps');
   await page.waitForFunction(() => /Copied|Selected/.test(document.querySelector('#copySteps').textContent));
+  await page.waitForFunction(() => document.querySelector('#copySteps').textContent === 'Copy steps');
+  assert.equal(await page.locator('#factor').innerText(), 'foilpress factor DOC --bases 3 -o DOC.foil');
+  const chip = () => page.locator('#basisColour').evaluate((found) => getComputedStyle(found).backgroundColor);
+  const colours = [];
+  for (const basis of ['0', '1', '2']) {
+    await page.selectOption('#basis', basis);
+    colours.push(await chip());
+  }
+  assert.equal(new Set(colours).size, 3, colours.join(' '));
   await page.evaluate(() => { location.hash = 'show=document&edit=1,x,ff8000,1;99,2,ffffff,1;0,2,<b>,1;-1,1,000000,1'; });
   assert.equal((await rested(page)).get('edit'), null);
   await page.evaluate(() => { location.hash = 'show=document&edit=0,2,ffffff,1'; });

@@ -6,6 +6,9 @@ import { element } from './spot.js';
 import { byId, data, drawn, eachFrame, held, redraw, state } from './stage.js';
 
 let applied = '';
+/** Angles of a document unless `--samples` says otherwise. */
+const SAMPLES = 32;
+
 /** The curves as they were. @type {Float32Array} */
 let original = new Float32Array();
 
@@ -31,9 +34,11 @@ const editOf = () => (state.edits[held.basis] ??= unedited());
 export function buildEdits() {
   if (!data.edits || !data.document) return;
   const which = /** @type {HTMLSelectElement} */ (byId('basis'));
-  which.append(...data.edits.surfaces.map(({ number }, k) => element('option', { value: k }, `basis ${number}`)));
+  which.append(...surfaces.map(({ number }, k) => element('option', { value: k }, `basis ${number}`)));
   which.addEventListener('change', () => {
     held.basis = Number(which.value);
+  const { bases, samples, surfaces } = data.edits;
+  byId('factor').textContent = `foilpress factor DOC --bases ${bases}${samples === SAMPLES ? '' : ` --samples ${samples}`} -o DOC.foil`;
     sync();
   });
   const into = byId('sliders-edits');
