@@ -220,15 +220,6 @@ test('materials are edited by mouse and keyboard, and the steps are there to cop
   await page.evaluate(() => { location.hash = 'show=document&edit=1,x,ff8000,1;99,2,ffffff,1;0,2,<b>,1;-1,1,000000,1'; });
   assert.equal((await rested(page)).get('edit'), null);
   await page.evaluate(() => { location.hash = 'show=document&edit=0,2,ffffff,1'; });
-  await rested(page);
-  await page.click('#unedit');
-  after = await rested(page);
-  assert.deepEqual([after.get('edit'), await steps(), await picture() === before], [null, '', true]);
-  await page.click('[data-show=printed]');
-  assert.equal(await page.isVisible('#edits'), false);
-}));
-
-test('a spot tells its curve, its mixture and the inks of its dot', () => visit(desk, async (page) => {
   assert.equal((await rested(page)).get('edit'), '0,2,ffffff,1');
   // An address without edits is that of the document as it was.
   await page.evaluate(() => { location.hash = 'show=document'; });
@@ -239,6 +230,15 @@ test('a spot tells its curve, its mixture and the inks of its dot', () => visit(
   await page.evaluate(() => { location.hash = 'exposure=0'; });
   assert.equal((await rested(page)).get('with'), null);
   await page.evaluate((hash) => { location.hash = `${hash}&edit=0,2,ffffff,1`; }, 'show=document');
+  await rested(page);
+  await page.click('#unedit');
+  after = await rested(page);
+  assert.deepEqual([after.get('edit'), await steps(), await picture() === before], [null, '', true]);
+  await page.click('[data-show=printed]');
+  assert.equal(await page.isVisible('#edits'), false);
+}));
+
+test('a spot tells its curve, its mixture and the inks of its dot', () => visit(desk, async (page) => {
   const [x, y] = await place(page);
   await page.mouse.click(x - 60, y + 40);
   assert.equal(await page.locator('#spot svg path').count(), 2);
@@ -246,25 +246,6 @@ test('a spot tells its curve, its mixture and the inks of its dot', () => visit(
   const sum = shares.reduce((a, b) => a + b, 0);
   assert.ok(sum >= 97 && sum <= 103, String(sum));
   assert.match(await page.locator('#dot').textContent(), /This dot: .+\(.+\)/);
-  const box = await page.locator('#picture').boundingBox();
-  await page.mouse.click(box.x + 4, box.y + 0.6 * box.height);
-  assert.match(await page.locator('#spot').textContent(), /Beside the sheet/);
-}));
-
-test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
-  await page.evaluate(() => { location.hash = 'show=printed'; });
-  const session = await page.context().newCDPSession(page);
-  const [x, y] = await place(page);
-  const touch = (type, ...points) => session.send('Input.dispatchTouchEvent', {
-    type, touchPoints: points.map(([px, py], id) => ({ x: px, y: py, id })),
-  });
-  const before = numbers((await rested(page)).get('light') ?? '-25,30');
-  await touch('touchStart', [x, y]);
-  await touch('touchMove', [x + 20, y]);
-  await touch('touchMove', [x + 50, y]);
-  await touch('touchEnd');
-  assert.ok(numbers((await rested(page)).get('light'))[0] > before[0] + 5);
-  await touch('touchStart', [x - 40, y], [x + 40, y]);
   // One line each.
   for (const span of await page.locator('#spot figcaption span').all()) assert.ok((await span.boundingBox()).height < 30);
   // The mark lies where the spot does.
@@ -301,20 +282,30 @@ test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
   assert.equal(await said(), before);
   await page.evaluate(() => { location.hash = 'show=document&view=0,0&tilt=0,0&curl=0&pan=0,0&zoom=1&distance=0.5'; });
   await rested(page);
+  const box = await page.locator('#picture').boundingBox();
+  await page.mouse.click(box.x + 4, box.y + 0.6 * box.height);
+  assert.match(await page.locator('#spot').textContent(), /Beside the sheet/);
+  assert.equal(await page.isVisible('#ring'), false);
+}));
+
+test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
+  await page.evaluate(() => { location.hash = 'show=printed'; });
+  const session = await page.context().newCDPSession(page);
+  const [x, y] = await place(page);
+  const touch = (type, ...points) => session.send('Input.dispatchTouchEvent', {
+    type, touchPoints: points.map(([px, py], id) => ({ x: px, y: py, id })),
+  });
+  const before = numbers((await rested(page)).get('light') ?? '-25,30');
+  await touch('touchStart', [x, y]);
+  await touch('touchMove', [x + 20, y]);
+  await touch('touchMove', [x + 50, y]);
+  await touch('touchEnd');
+  assert.ok(numbers((await rested(page)).get('light'))[0] > before[0] + 5);
+  await touch('touchStart', [x - 40, y], [x + 40, y]);
   await touch('touchMove', [x - 60, y], [x + 60, y]);
   await touch('touchMove', [x - 90, y], [x + 90, y]);
   await touch('touchEnd');
-  assert.equal(await page.isVisible('#ring'), false);
   assert.ok(Number((await rested(page)).get('zoom')) > 1.8);
-  await page.touchscreen.tap(x, y);
-  assert.match(await page.locator('#spot').textContent(), /This dot/);
-  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, 'nothing is cut off');
-}));
-
-test('an address brings back its view, and nonsense in it does no harm', () => visit(desk, async (page) => {
-  const view = 'show=printed&light=10,20,0;-30,40,0.5&probe=0&view=5,-5&distance=0.4&tilt=10,-20&curl=0.08&zoom=3&pan=0.01,-0.01&exposure=1.5&knee=0.7';
-  await page.evaluate((hash) => { location.hash = hash; }, view);
-  assert.equal(decodeURIComponent((await rested(page)).toString()), view);
   // The finger that is lifted last drags nothing.
   const still = (await rested(page)).get('light');
   await touch('touchStart', [x - 40, y], [x + 40, y]);
@@ -325,10 +316,77 @@ test('an address brings back its view, and nonsense in it does no harm', () => v
   }
   await touch('touchEnd');
   assert.equal((await rested(page)).get('light'), still);
+  await page.touchscreen.tap(x, y);
+  assert.match(await page.locator('#spot').textContent(), /This dot/);
+  // What is said of the spot comes into sight below the picture.
+  await page.waitForFunction(() => {
+    const [said, picture] = ['#spot h2', '#picture'].map((what) => document.querySelector(what).getBoundingClientRect());
+    return said.top >= picture.bottom && said.bottom < innerHeight;
+  });
+  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, 'nothing is cut off');
+}));
+
+test('an address brings back its view, and nonsense in it does no harm', () => visit(desk, async (page) => {
+  const view = 'show=printed&light=10,20,0;-30,40,0.5&probe=0&view=5,-5&distance=0.4&tilt=10,-20&curl=0.08&zoom=3&pan=0.01,-0.01&exposure=1.5&knee=0.7';
+  await page.evaluate((hash) => { location.hash = hash; }, view);
+  assert.equal(decodeURIComponent((await rested(page)).toString()), view);
   await page.evaluate(() => { location.hash = 'show=<b>&light=NaN,1;2&zoom=1e99&pan=a&tilt=999,-999&curl=-1&distance=1e-9&exposure=Infinity&pass=77&split=-4'; });
   const after = await rested(page);
   assert.equal(after.get('show'), 'printed');
   assert.equal(after.get('zoom'), '400');
+  // Whatever the program takes, the page takes; a control shows the end of its range and changes nothing.
+  const far = 'show=printed&light=150,0,0.02&probe=0&view=0,88&distance=0.02&tilt=0,5&curl=0&zoom=1&pan=0,0&exposure=9.5&knee=0.4';
+  for (const hash of [far, far.replace('view=0,88', 'view=120,0').replace('tilt=0,5', 'tilt=85,0')]) {
+    await page.evaluate((to) => { location.hash = to; }, hash);
+    assert.equal(decodeURIComponent((await rested(page)).toString()), hash);
+  }
+  await page.focus('#picture');
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await rested(page)).get('light'), '150,0,0.02');
+  await page.keyboard.press('ArrowLeft');
+  assert.equal((await rested(page)).get('light'), '147,0,0.02');
+  await page.evaluate(() => { location.hash = 'light=20,0,50&distance=50'; });
+  await rested(page);
+  assert.equal(await page.locator('#sliders-light output').nth(2).innerText(), '50.00 m');
+}));
+
+test('the scale lies beside the tools, wide and low', () => visit({ width: 844, height: 390 }, async (page) => {
+  for (const size of [{ width: 844, height: 390 }, { width: 960, height: 600 }, { width: 1000, height: 600 }, { width: 390, height: 844 }]) {
+    await page.setViewportSize(size);
+    // The scale has another width at each.
+    for (const zoom of [1, 1.3, 1.6, 1.9]) {
+      await page.evaluate((by) => { location.hash = `zoom=${by}`; }, zoom);
+      await rested(page);
+      const [scale, tools] = await Promise.all(['#scale', '#tools'].map((what) => page.locator(what).boundingBox()));
+      assert.ok(scale.y + scale.height <= tools.y || scale.x >= tools.x + tools.width, JSON.stringify([size, scale, tools]));
+    }
+  }
+  const behind = await page.locator('#scale').evaluate((scale) => getComputedStyle(scale).backgroundColor);
+  assert.match(behind, /rgba\(24, 24, 24/);
+}));
+
+/** A panorama of 4 x 2 texels with a sun that no number of 16 bits holds. */
+const texels = deflateSync(Buffer.from(Float32Array.from({ length: 24 }, (_, i) => (i > 2 && i < 6 ? 3e7 : 0.1)).buffer)).toString('base64');
+const hot = (/** @type {string} */ probe) => {
+  const { parse } = JSON;
+  JSON.parse = (text, ...more) => {
+    const read = parse(text, ...more);
+    if (read.probe) Object.assign(read.probe, { width: 4, height: 2, texels: probe });
+    return read;
+  };
+};
+test('a sun makes the page white, not black', () => visit({ ...desk, before: [hot, texels] }, async (page) => {
+  for (const show of ['document', 'printed']) {
+    await page.evaluate((what) => { location.hash = `show=${what}&light=&probe=1&tilt=0,0&exposure=2`; }, show);
+    await rested(page);
+    const middle = await page.evaluate(() => {
+      const from = document.querySelector('canvas');
+      const to = new OffscreenCanvas(1, 1).getContext('2d');
+      to.drawImage(from, from.width * 0.52, from.height * 0.52, 1, 1, 0, 0, 1, 1);
+      return [...to.getImageData(0, 0, 1, 1).data];
+    });
+    assert.ok(Math.max(...middle.slice(0, 3)) > 150, `${show}: ${middle}`);
+  }
 }));
 
 for (const colorScheme of ['light', 'dark']) {
@@ -347,26 +405,7 @@ for (const colorScheme of ['light', 'dark']) {
   }));
 }
 
-  // What is said of the spot comes into sight below the picture.
-  await page.waitForFunction(() => {
-    const [said, picture] = ['#spot h2', '#picture'].map((what) => document.querySelector(what).getBoundingClientRect());
-    return said.top >= picture.bottom && said.bottom < innerHeight;
-  });
 test('five hundred changes of light leave no memory behind', () => visit({ width: 620, height: 400 }, async (page) => {
-  // Whatever the program takes, the page takes; a control shows the end of its range and changes nothing.
-  const far = 'show=printed&light=150,0,0.02&probe=0&view=0,88&distance=0.02&tilt=0,5&curl=0&zoom=1&pan=0,0&exposure=9.5&knee=0.4';
-  for (const hash of [far, far.replace('view=0,88', 'view=120,0').replace('tilt=0,5', 'tilt=85,0')]) {
-    await page.evaluate((to) => { location.hash = to; }, hash);
-    assert.equal(decodeURIComponent((await rested(page)).toString()), hash);
-  }
-  await page.focus('#picture');
-  await page.keyboard.press('ArrowRight');
-  assert.equal((await rested(page)).get('light'), '150,0,0.02');
-  await page.keyboard.press('ArrowLeft');
-  assert.equal((await rested(page)).get('light'), '147,0,0.02');
-  await page.evaluate(() => { location.hash = 'light=20,0,50&distance=50'; });
-  await rested(page);
-  assert.equal(await page.locator('#sliders-light output').nth(2).innerText(), '50.00 m');
   const used = () => page.evaluate(() => {
     globalThis.gc();
     globalThis.gc();
@@ -389,6 +428,15 @@ test('five hundred changes of light leave no memory behind', () => visit({ width
 test('without WebGL2 there is a picture and a sentence', () => visit({ ...desk, webgl: false }, async (page) => {
   await page.waitForSelector('#message:not([hidden])');
   assert.match(await page.locator('#message').textContent(), /no WebGL2/);
+  const uncovered = () => page.locator('#message').evaluate((message) => {
+    const { left, top, width, height } = message.getBoundingClientRect();
+    return [0.02, 0.5, 0.98].every((x) => document.elementFromPoint(left + x * width, top + height / 2) === message);
+  });
+  for (const size of [desk, { width: 390, height: 780 }]) {
+    await page.setViewportSize({ width: size.width, height: size.height });
+    assert.ok(await uncovered(), JSON.stringify(size));
+  }
+  for (const control of ['#tools', 'aside', '#scale', '.lamp']) assert.equal(await page.locator(control).locator('visible=true').count(), 0, control);
   assert.ok(await page.locator('#still').evaluate((image) => image.naturalWidth > 0 && image.offsetWidth > 0));
 }));
 
@@ -415,6 +463,7 @@ test('dragging stays fluid, coarser if it must, and rest draws finely', () => vi
   assert.ok(usual <= 34 || least < fine / 4, `${usual} ms a frame, ${least} of ${fine} pixels`);
   console.log(`${usual} ms a frame while dragging, ${least} of ${fine} pixels wide`);
 }));
+
 /** Draws everything so many times over, and keeps what was drawn when, and how widely. */
 const slow = (/** @type {number} */ times) => {
   window.frames_ = [];
@@ -437,41 +486,8 @@ test('a picture that takes long is coarse from the first move until the hand res
     await page.mouse.move(x + (Date.now() / 20) % 80, y);
     await page.waitForTimeout(10);
   }
-  const uncovered = () => page.locator('#message').evaluate((message) => {
-    const { left, top, width, height } = message.getBoundingClientRect();
-    return [0.02, 0.5, 0.98].every((x) => document.elementFromPoint(left + x * width, top + height / 2) === message);
-  });
-  for (const size of [desk, { width: 390, height: 780 }]) {
-    await page.setViewportSize({ width: size.width, height: size.height });
-    assert.ok(await uncovered(), JSON.stringify(size));
-  }
-  for (const control of ['#tools', 'aside', '#scale', '.lamp']) assert.equal(await page.locator(control).locator('visible=true').count(), 0, control);
   const frames = await page.evaluate(() => window.frames_);
   await page.mouse.up();
-}));
-
-/** A panorama of 4 x 2 texels with a sun that no number of 16 bits holds. */
-const texels = deflateSync(Buffer.from(Float32Array.from({ length: 24 }, (_, i) => (i > 2 && i < 6 ? 3e7 : 0.1)).buffer)).toString('base64');
-const hot = (/** @type {string} */ probe) => {
-  const { parse } = JSON;
-  JSON.parse = (text, ...more) => {
-    const read = parse(text, ...more);
-    if (read.probe) Object.assign(read.probe, { width: 4, height: 2, texels: probe });
-    return read;
-  };
-};
-test('a sun makes the page white, not black', () => visit({ ...desk, before: [hot, texels] }, async (page) => {
-  for (const show of ['document', 'printed']) {
-    await page.evaluate((what) => { location.hash = `show=${what}&light=&probe=1&tilt=0,0&exposure=2`; }, show);
-    await rested(page);
-    const middle = await page.evaluate(() => {
-      const from = document.querySelector('canvas');
-      const to = new OffscreenCanvas(1, 1).getContext('2d');
-      to.drawImage(from, from.width * 0.52, from.height * 0.52, 1, 1, 0, 0, 1, 1);
-      return [...to.getImageData(0, 0, 1, 1).data];
-    });
-    assert.ok(Math.max(...middle.slice(0, 3)) > 150, `${show}: ${middle}`);
-  }
   const widths = frames.map(([, width]) => width);
   assert.ok(widths.length > 8, `${widths.length} frames in 4 s`);
   assert.ok(Math.max(...widths) < 0.6 * fine, `${widths} of ${fine}`);

@@ -4,6 +4,9 @@ import { clamp } from './geometry.js';
 import { element } from './spot.js';
 import { redraw } from './stage.js';
 
+/** How long a button says what it did, in milliseconds. */
+const ANSWERED = 2500;
+
 /** What follows every change. @type {(() => void)[]} */
 export const synced = [];
 export const sync = () => synced.forEach((follow) => follow());
@@ -26,11 +29,11 @@ export function slider(into, name, how) {
   const output = element('output');
   const label = element('label', { class: 'slider' }, element('span', {}, name), input, output);
   input.addEventListener('input', () => {
+    if (how.shown && !how.shown()) return;
     how.set(Number(input.value));
     sync();
     redraw(true);
   });
-    if (how.shown && !how.shown()) return;
   synced.push(() => {
     label.hidden = how.shown ? !how.shown() : false;
     if (label.hidden) return;

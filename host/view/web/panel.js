@@ -1,6 +1,6 @@
 // The controls beside the picture: what is shown, the lights, how the sheet is held, and the legend.
 
-import { arrows, inDegrees, mark, rechoose, rechosen, slider } from './controls.js';
+import { answer, arrows, inDegrees, mark, rechoose, rechosen, slider } from './controls.js';
 import { buildEdits } from './editing.js';
 import { clamp } from './geometry.js';
 import { element } from './spot.js';
@@ -132,9 +132,9 @@ export function build() {
     shareAddress();
     try {
       await navigator.clipboard.writeText(location.href);
-      byId('share').textContent = 'Copied';
+      answer(byId('share'), 'Copied');
     } catch {
-      byId('share').textContent = 'The address above is this view';
+      answer(byId('share'), 'The address above is this view');
     }
   });
 
@@ -152,7 +152,7 @@ export function build() {
   const inMetres = (/** @type {number} */ d) => (d ? `${d.toFixed(2)} m` : 'far');
   slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: () => inMetres(chosen().distance) });
   slider(light, 'exposure', { min: -5, max: 5, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v >= 0.05 ? '+' : ''}${Math.abs(v) < 0.05 ? '0' : v.toFixed(1)} EV` });
-  slider(light, 'tone curve', { min: 0, max: 1, step: 0.05, get: () => state.knee, set: (v) => (state.knee = v), words: (v) => (v < 1 ? `soft above ${Math.round(100 * v)} %` : 'cut off at white') });
+  slider(light, 'tone curve', { min: 0, max: 1, step: 0.05, get: () => state.knee, set: (v) => (state.knee = v), words: (v) => (v < 1 ? `from ${Math.round(100 * v)} %` : 'cut off') });
   const turned = (/** @type {'turn' | 'tip'} */ which) => (/** @type {number} */ v) => {
     state[which] = v;
     faceTheEye();
