@@ -4,18 +4,20 @@ import { dirname } from 'node:path';
 import { chromium } from 'playwright-core';
 
 /**
- * @param {{ width: number, height: number, touch?: boolean, webgl?: boolean, colorScheme?: 'light' | 'dark', beside?: boolean }} how
- * `beside` lets a page show the pictures that lie beside it.
+ * @param {{ width: number, height: number, touch?: boolean, webgl?: boolean, colorScheme?: 'light' | 'dark', beside?: boolean,
+ *   scale?: number, before?: [(given: any) => void, any] }} how
+ * `beside` lets a page show the pictures that lie beside it; `before` runs in the page before its own script.
  */
-export async function open(file, { width, height, touch = false, webgl = true, colorScheme = 'light', beside = false }) {
+export async function open(file, { width, height, touch = false, webgl = true, colorScheme = 'light', beside = false, scale = 1, before }) {
   const browser = await chromium.launch({
     executablePath: process.env.FOILPRESS_CHROMIUM,
     // Software WebGL, which every machine has.
     args: ['--no-sandbox', '--js-flags=--expose-gc',
       ...(webgl ? ['--use-angle=swiftshader', '--enable-unsafe-swiftshader'] : ['--disable-gpu', '--disable-3d-apis'])],
   });
-  const context = await browser.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, colorScheme });
+  const context = await browser.newContext({ viewport: { width, height }, hasTouch: touch, isMobile: touch, colorScheme, deviceScaleFactor: scale });
   const page = await context.newPage();
+  if (before) await page.addInitScript(...before);
   const complaints = [];
   page.on('console', (message) => {
     // The software renderer tells its authors that reading pixels is slow.

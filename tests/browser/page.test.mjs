@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import test from 'node:test';
+import { deflateSync } from 'node:zlib';
 import { open, rested } from './browser.mjs';
 
 const file = process.env.FOILPRESS_PAGE;
@@ -116,6 +117,26 @@ test('every view, every pass and every slider changes picture and address', () =
   await page.click('#lights button:first-child');
   await page.click('#fewer');
   assert.equal((await rested(page)).get('light').split(';').length, 1);
+  // The focus stays among the lights, and each new light has a place of its own.
+  const focused = () => page.evaluate(() => document.activeElement.id);
+  for (const id of ['more', 'more', 'light4']) {
+    await page.focus('#more');
+    await page.keyboard.press('Enter');
+    assert.equal(await focused(), id);
+  }
+  await page.focus('#light2');
+  await page.keyboard.press('Enter');
+  assert.equal(await focused(), 'light2');
+  assert.equal(await page.getAttribute('#light2', 'aria-pressed'), 'true');
+  const places = (await rested(page)).get('light').split(';').map(numbers);
+  for (const [i, [a, e]] of places.entries()) {
+    for (const [b, f] of places.slice(i + 1)) assert.ok(Math.hypot(a - b, e - f) > 20, JSON.stringify(places));
+  }
+  // Without a light there is nothing to slide.
+  for (let i = 0; i < 4; i++) await page.click('#fewer');
+  assert.equal((await rested(page)).get('light'), '');
+  assert.deepEqual(await page.locator('#sliders-light .slider:visible span').allTextContents(), ['exposure', 'tone curve']);
+  await page.evaluate(() => document.querySelectorAll('#sliders-light input').forEach((input) => input.dispatchEvent(new Event('input'))));
   await page.click('#reset');
   assert.equal((await rested(page)).get('probe'), '0');
 }));
@@ -187,9 +208,28 @@ test('materials are edited by mouse and keyboard, and the steps are there to cop
   assert.match(text, /^format = 1\ndocument = ".*"\nfingerprint = "[0-9a-f]{64}"\n\n\[\[step\]\]\nbasis = 1\nrougher = 2\.0\ntint = "#ff8000"\nalbedo = 0\.\d+\n$/);
   await page.click('#copySteps');
   await page.waitForFunction(() => /Copied|Selected/.test(document.querySelector('#copySteps').textContent));
+  await page.waitForFunction(() => document.querySelector('#copySteps').textContent === 'Copy steps');
+  assert.equal(await page.locator('#factor').innerText(), 'foilpress factor DOC --bases 3 -o DOC.foil');
+  const chip = () => page.locator('#basisColour').evaluate((found) => getComputedStyle(found).backgroundColor);
+  const colours = [];
+  for (const basis of ['0', '1', '2']) {
+    await page.selectOption('#basis', basis);
+    colours.push(await chip());
+  }
+  assert.equal(new Set(colours).size, 3, colours.join(' '));
   await page.evaluate(() => { location.hash = 'show=document&edit=1,x,ff8000,1;99,2,ffffff,1;0,2,<b>,1;-1,1,000000,1'; });
   assert.equal((await rested(page)).get('edit'), null);
   await page.evaluate(() => { location.hash = 'show=document&edit=0,2,ffffff,1'; });
+  assert.equal((await rested(page)).get('edit'), '0,2,ffffff,1');
+  // An address without edits is that of the document as it was.
+  await page.evaluate(() => { location.hash = 'show=document'; });
+  after = await rested(page);
+  assert.deepEqual([after.get('edit'), await picture() === before], [null, true]);
+  await page.evaluate(() => { location.hash = 'show=document&with=printed'; });
+  assert.equal((await rested(page)).get('with'), 'printed');
+  await page.evaluate(() => { location.hash = 'exposure=0'; });
+  assert.equal((await rested(page)).get('with'), null);
+  await page.evaluate((hash) => { location.hash = `${hash}&edit=0,2,ffffff,1`; }, 'show=document');
   await rested(page);
   await page.click('#unedit');
   after = await rested(page);
@@ -206,9 +246,46 @@ test('a spot tells its curve, its mixture and the inks of its dot', () => visit(
   const sum = shares.reduce((a, b) => a + b, 0);
   assert.ok(sum >= 97 && sum <= 103, String(sum));
   assert.match(await page.locator('#dot').textContent(), /This dot: .+\(.+\)/);
+  // One line each.
+  for (const span of await page.locator('#spot figcaption span').all()) assert.ok((await span.boundingBox()).height < 30);
+  // The mark lies where the spot does.
+  const centre = async (/** @type {string} */ what) => {
+    const box = await page.locator(what).boundingBox();
+    return [box.x + box.width / 2, box.y + box.height / 2];
+  };
+  const near = ([a, b], [c, d]) => assert.ok(Math.hypot(a - c, b - d) < 2, `${[a, b]}, not ${[c, d]}`);
+  const [mx, my] = await centre('#picture');
+  // Looking may have scrolled the page; the picture stays in sight.
+  const [px, py] = [mx + 80, my + 50];
+  await page.mouse.click(px, py);
+  await page.waitForTimeout(600);
+  const [nx, ny] = await centre('#picture');
+  near(await centre('#ring'), [px + nx - mx, py + ny - my]);
+  await page.click('#nearer');
+  await rested(page);
+  near(await centre('#ring'), [nx + 1.5 * 80, ny + 1.5 * 50]);
+  for (const how of ['tilt=20,-15&distance=0.4', 'tilt=-15,10&distance=0&curl=0.06', 'view=25,10&distance=0.3&curl=0.08&pan=0.01,0.005']) {
+    await page.evaluate((hash) => { location.hash = `show=printed&view=0,0&curl=0&pan=0,0&zoom=1&${hash}`; }, how);
+    await rested(page);
+    await page.mouse.click(nx + 70, ny - 40);
+    near(await centre('#ring'), [nx + 70, ny - 40]);
+  }
+  // What was said of the spot follows an edit.
+  const said = () => page.locator('#d').innerText();
+  const before = await said();
+  await page.evaluate(() => { location.hash = 'show=document&edit=0,3,ff0000,0.5;1,3,ff0000,0.5;2,3,ff0000,0.5'; });
+  await rested(page);
+  assert.match(await said(), /Print and edited document differ/);
+  assert.notEqual((await said()).match(/0\.\d+/)[0], before.match(/0\.\d+/)[0]);
+  await page.click('#unedit');
+  await rested(page);
+  assert.equal(await said(), before);
+  await page.evaluate(() => { location.hash = 'show=document&view=0,0&tilt=0,0&curl=0&pan=0,0&zoom=1&distance=0.5'; });
+  await rested(page);
   const box = await page.locator('#picture').boundingBox();
   await page.mouse.click(box.x + 4, box.y + 0.6 * box.height);
   assert.match(await page.locator('#spot').textContent(), /Beside the sheet/);
+  assert.equal(await page.isVisible('#ring'), false);
 }));
 
 test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
@@ -229,8 +306,23 @@ test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
   await touch('touchMove', [x - 90, y], [x + 90, y]);
   await touch('touchEnd');
   assert.ok(Number((await rested(page)).get('zoom')) > 1.8);
+  // The finger that is lifted last drags nothing.
+  const still = (await rested(page)).get('light');
+  await touch('touchStart', [x - 40, y], [x + 40, y]);
+  await touch('touchMove', [x - 45, y], [x + 45, y]);
+  await touch('touchEnd', [x - 45, y]);
+  for (const by of [20, 40]) {
+    await session.send('Input.dispatchTouchEvent', { type: 'touchMove', touchPoints: [{ x: x + 45 - by, y: y + by, id: 1 }] });
+  }
+  await touch('touchEnd');
+  assert.equal((await rested(page)).get('light'), still);
   await page.touchscreen.tap(x, y);
   assert.match(await page.locator('#spot').textContent(), /This dot/);
+  // What is said of the spot comes into sight below the picture.
+  await page.waitForFunction(() => {
+    const [said, picture] = ['#spot h2', '#picture'].map((what) => document.querySelector(what).getBoundingClientRect());
+    return said.top >= picture.bottom && said.bottom < innerHeight;
+  });
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, 'nothing is cut off');
 }));
 
@@ -242,6 +334,59 @@ test('an address brings back its view, and nonsense in it does no harm', () => v
   const after = await rested(page);
   assert.equal(after.get('show'), 'printed');
   assert.equal(after.get('zoom'), '400');
+  // Whatever the program takes, the page takes; a control shows the end of its range and changes nothing.
+  const far = 'show=printed&light=150,0,0.02&probe=0&view=0,88&distance=0.02&tilt=0,5&curl=0&zoom=1&pan=0,0&exposure=9.5&knee=0.4';
+  for (const hash of [far, far.replace('view=0,88', 'view=120,0').replace('tilt=0,5', 'tilt=85,0')]) {
+    await page.evaluate((to) => { location.hash = to; }, hash);
+    assert.equal(decodeURIComponent((await rested(page)).toString()), hash);
+  }
+  await page.focus('#picture');
+  await page.keyboard.press('ArrowRight');
+  assert.equal((await rested(page)).get('light'), '150,0,0.02');
+  await page.keyboard.press('ArrowLeft');
+  assert.equal((await rested(page)).get('light'), '147,0,0.02');
+  await page.evaluate(() => { location.hash = 'light=20,0,50&distance=50'; });
+  await rested(page);
+  assert.equal(await page.locator('#sliders-light output').nth(2).innerText(), '50.00 m');
+}));
+
+test('the scale lies beside the tools, wide and low', () => visit({ width: 844, height: 390 }, async (page) => {
+  for (const size of [{ width: 844, height: 390 }, { width: 960, height: 600 }, { width: 1000, height: 600 }, { width: 390, height: 844 }]) {
+    await page.setViewportSize(size);
+    // The scale has another width at each.
+    for (const zoom of [1, 1.3, 1.6, 1.9]) {
+      await page.evaluate((by) => { location.hash = `zoom=${by}`; }, zoom);
+      await rested(page);
+      const [scale, tools] = await Promise.all(['#scale', '#tools'].map((what) => page.locator(what).boundingBox()));
+      assert.ok(scale.y + scale.height <= tools.y || scale.x >= tools.x + tools.width, JSON.stringify([size, scale, tools]));
+    }
+  }
+  const behind = await page.locator('#scale').evaluate((scale) => getComputedStyle(scale).backgroundColor);
+  assert.match(behind, /rgba\(24, 24, 24/);
+}));
+
+/** A panorama of 4 x 2 texels with a sun that no number of 16 bits holds. */
+const texels = deflateSync(Buffer.from(Float32Array.from({ length: 24 }, (_, i) => (i > 2 && i < 6 ? 3e7 : 0.1)).buffer)).toString('base64');
+const hot = (/** @type {string} */ probe) => {
+  const { parse } = JSON;
+  JSON.parse = (text, ...more) => {
+    const read = parse(text, ...more);
+    if (read.probe) Object.assign(read.probe, { width: 4, height: 2, texels: probe });
+    return read;
+  };
+};
+test('a sun makes the page white, not black', () => visit({ ...desk, before: [hot, texels] }, async (page) => {
+  for (const show of ['document', 'printed']) {
+    await page.evaluate((what) => { location.hash = `show=${what}&light=&probe=1&tilt=0,0&exposure=2`; }, show);
+    await rested(page);
+    const middle = await page.evaluate(() => {
+      const from = document.querySelector('canvas');
+      const to = new OffscreenCanvas(1, 1).getContext('2d');
+      to.drawImage(from, from.width * 0.52, from.height * 0.52, 1, 1, 0, 0, 1, 1);
+      return [...to.getImageData(0, 0, 1, 1).data];
+    });
+    assert.ok(Math.max(...middle.slice(0, 3)) > 150, `${show}: ${middle}`);
+  }
 }));
 
 for (const colorScheme of ['light', 'dark']) {
@@ -283,6 +428,15 @@ test('five hundred changes of light leave no memory behind', () => visit({ width
 test('without WebGL2 there is a picture and a sentence', () => visit({ ...desk, webgl: false }, async (page) => {
   await page.waitForSelector('#message:not([hidden])');
   assert.match(await page.locator('#message').textContent(), /no WebGL2/);
+  const uncovered = () => page.locator('#message').evaluate((message) => {
+    const { left, top, width, height } = message.getBoundingClientRect();
+    return [0.02, 0.5, 0.98].every((x) => document.elementFromPoint(left + x * width, top + height / 2) === message);
+  });
+  for (const size of [desk, { width: 390, height: 780 }]) {
+    await page.setViewportSize({ width: size.width, height: size.height });
+    assert.ok(await uncovered(), JSON.stringify(size));
+  }
+  for (const control of ['#tools', 'aside', '#scale', '.lamp']) assert.equal(await page.locator(control).locator('visible=true').count(), 0, control);
   assert.ok(await page.locator('#still').evaluate((image) => image.naturalWidth > 0 && image.offsetWidth > 0));
 }));
 
@@ -308,4 +462,40 @@ test('dragging stays fluid, coarser if it must, and rest draws finely', () => vi
   // On a machine too slow for that the picture is as coarse as it gets.
   assert.ok(usual <= 34 || least < fine / 4, `${usual} ms a frame, ${least} of ${fine} pixels`);
   console.log(`${usual} ms a frame while dragging, ${least} of ${fine} pixels wide`);
+}));
+
+/** Draws everything so many times over, and keeps what was drawn when and how widely, and when the hand moved. */
+const slow = (/** @type {number} */ times) => {
+  window.frames_ = [];
+  window.moves_ = [];
+  addEventListener('pointermove', (event) => window.moves_.push(event.timeStamp), { capture: true });
+  const once = WebGL2RenderingContext.prototype.drawArrays;
+  WebGL2RenderingContext.prototype.drawArrays = function drawArrays(...given) {
+    window.frames_.push([performance.now(), this.canvas.width]);
+    for (let i = 0; i < times; i++) once.apply(this, given);
+  };
+};
+test('a picture that takes long is coarse from the first move until the hand rests', () => visit({ ...desk, scale: 2, before: [slow, 4] }, async (page) => {
+  await page.evaluate(() => { location.hash = 'show=printed&with='; });
+  await rested(page);
+  const fine = await page.evaluate(() => document.querySelector('canvas').width);
+  await page.click('[data-tool=sheet]');
+  const [x, y] = await place(page);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.evaluate(() => { window.frames_ = []; });
+  for (const until = Date.now() + 4000; Date.now() < until;) {
+    await page.mouse.move(x + (Date.now() / 20) % 80, y);
+    await page.waitForTimeout(10);
+  }
+  const [frames, moves] = await page.evaluate(() => [window.frames_, window.moves_]);
+  await page.mouse.up();
+  const widths = frames.map(([, width]) => width);
+  assert.ok(widths.length > 5, `${widths.length} frames in 4 s`);
+  // On a busy machine the hand of the test pauses, too.
+  const hasty = frames.filter(([at, width]) => width > 0.6 * fine && moves.some((move) => move > at - 100 && move < at - 30));
+  assert.deepEqual(hasty, [], `${widths} of ${fine}`);
+  await rested(page);
+  assert.equal(await page.evaluate(() => document.querySelector('canvas').width), fine);
+  console.log(`${widths.length} frames in 4 s, ${widths[0]} and then ${widths[2]} of ${fine} pixels wide`);
 }));

@@ -281,7 +281,10 @@ fn edits(document: &Factored) -> serde_json::Value {
     };
     let used: Vec<usize> = (0..bases.len()).filter(|&i| totals[i] > 0).collect();
     let surfaces: Vec<serde_json::Value> = used.par_iter().map(surface).collect();
-    json!({ "fingerprint": fingerprint(document), "surfaces": surfaces })
+    // `factor` with as many bases and angles makes the same document: so the page can say how.
+    json!({
+        "fingerprint": fingerprint(document), "bases": bases.len(), "samples": space.angles().len(), "surfaces": surfaces,
+    })
 }
 
 /// The distance d between document and print at every place of a coarse map.

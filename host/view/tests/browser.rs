@@ -197,7 +197,7 @@ fn the_page_draws_what_the_renderer_draws_in_a_browser() {
     // Single dots, 30 pixels wide, from far away under a far light.
     let zoom = 30.0 * DOTS.0 as f64 / PICTURE.0 as f64 * 1.08;
     fragments.push(format!("show=printed&light=20,10,0&probe=0&view=0,0&distance=0&tilt=0,0&curl=0&exposure=0&knee=0.4&zoom={zoom}&pan=0,0"));
-    // Edits stay until they are undone, so they come last.
+    // Edited documents, each in an address of its own.
     let edits = [
         ("0,1.5,c08040,1", (20.0, 10.0, 0.0), 0.5, false),
         ("1,0.6,ffffff,0.7;2,3,80ff80,1.6", (-15.0, 10.0, 0.4), 0.0, false),

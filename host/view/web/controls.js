@@ -1,7 +1,11 @@
 // What controls have in common: each brings itself in line with the state after every change.
 
+import { clamp } from './geometry.js';
 import { element } from './spot.js';
 import { redraw } from './stage.js';
+
+/** How long a button says what it did, in milliseconds. */
+const ANSWERED = 2500;
 
 /** What follows every change. @type {(() => void)[]} */
 export const synced = [];
@@ -25,6 +29,7 @@ export function slider(into, name, how) {
   const output = element('output');
   const label = element('label', { class: 'slider' }, element('span', {}, name), input, output);
   input.addEventListener('input', () => {
+    if (how.shown && !how.shown()) return;
     how.set(Number(input.value));
     sync();
     redraw(true);
@@ -58,3 +63,22 @@ export const arrows = (event) =>
 
 export const inDegrees = (/** @type {number} */ v, /** @type {string} */ more, /** @type {string} */ less) =>
   `${Math.abs(Math.round(v))}° ${v < -0.5 ? less : more}`;
+
+/**
+ * What a drag or an arrow may make of a value: as far as `limit`, and from beyond it only back.
+ * @param {number} value
+ * @param {number} old
+ * @param {number} limit
+ */
+export const within = (value, old, limit) => clamp(value, Math.min(-limit, old), Math.max(limit, old));
+
+/**
+ * Words on a button for a while.
+ * @param {HTMLElement} button
+ * @param {string} text
+ */
+export function answer(button, text) {
+  const usual = (button.dataset.usual ??= button.textContent ?? '');
+  button.textContent = text;
+  setTimeout(() => (button.textContent = usual), ANSWERED);
+}

@@ -9,6 +9,8 @@ import { MOST_LIGHTS } from './state.js';
 const GROUND = [52, 52, 52];
 /** Nodes of the grid under a light probe: at rest, and while something moves. */
 const NODES = { fine: 33, coarse: 9 };
+/** The largest number of 16 bits: a sun may send more, and infinity has no colour. */
+const MOST_HALF = 65504;
 const MODES = { lit: 0, difference: 1, stacks: 2, passes: 3 };
 
 const linear = (/** @type {number} */ v) => {
@@ -181,6 +183,22 @@ export class Drawing {
     }
   }
 
+  /** Waits until the card has drawn all that it was told to. */
+  done() {
+    const { gl } = this;
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    return new Promise((/** @type {(value: void) => void} */ resolve) => {
+      const ask = () => {
+        if (!fence || gl.isContextLost() || gl.getSyncParameter(fence, gl.SYNC_STATUS) === gl.SIGNALED) {
+          gl.deleteSync(fence);
+          resolve();
+        } else setTimeout(ask, 2);
+      };
+      setTimeout(ask);
+    });
+  }
+
   /**
    * @param {string} show
    * @param {import('./state.js').State} state
@@ -228,7 +246,7 @@ export class Drawing {
     if (on.fieldKey === `${held} ${NODES.fine}` || on.fieldKey === `${held} ${side}`) return;
     on.fieldKey = `${held} ${side}`;
     if (on.field) gl.deleteTexture(on.field);
-    const values = field(this.probe, state, data.size, on.layer.curves, data.steps, side);
+    const values = field(this.probe, state, data.size, on.layer.curves, data.steps, side).map((v) => Math.min(v, MOST_HALF));
     gl.activeTexture(gl.TEXTURE0);
     on.field = this.#texture(gl.TEXTURE_2D_ARRAY, gl.LINEAR);
     gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA16F, side, side, on.layer.channels);

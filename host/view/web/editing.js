@@ -1,9 +1,13 @@
 // The sliders that edit the document's materials, and the steps that they write.
 
-import { slider, sync, synced } from './controls.js';
+import { answer, slider, sync, synced } from './controls.js';
 import { edited, editsWritten, steps, unedited } from './edit.js';
+import { clamp } from './geometry.js';
 import { element } from './spot.js';
 import { byId, data, drawn, eachFrame, held, redraw, state } from './stage.js';
+
+/** Angles of a document unless `--samples` says otherwise. */
+const SAMPLES = 32;
 
 let applied = '';
 /** The curves as they were. @type {Float32Array} */
@@ -26,12 +30,17 @@ function applyEdits() {
   drawn.drawing?.recurve('document');
 }
 
+/** Linear shares of light as sRGB bytes. @param {number[]} base */
+const coded = (base) => base.map((v) => Math.round(255 * clamp(v <= 0.0031308 ? 12.92 * v : 1.055 * v ** (1 / 2.4) - 0.055, 0, 1)));
+
 const editOf = () => (state.edits[held.basis] ??= unedited());
 
 export function buildEdits() {
   if (!data.edits || !data.document) return;
+  const { bases, samples, surfaces } = data.edits;
+  byId('factor').textContent = `foilpress factor DOC --bases ${bases}${samples === SAMPLES ? '' : ` --samples ${samples}`} -o DOC.foil`;
   const which = /** @type {HTMLSelectElement} */ (byId('basis'));
-  which.append(...data.edits.surfaces.map(({ number }, k) => element('option', { value: k }, `basis ${number}`)));
+  which.append(...surfaces.map(({ number }, k) => element('option', { value: k }, `basis ${number}`)));
   which.addEventListener('change', () => {
     held.basis = Number(which.value);
     sync();
@@ -56,9 +65,9 @@ export function buildEdits() {
     text.select();
     try {
       await navigator.clipboard.writeText(text.value);
-      byId('copySteps').textContent = 'Copied';
+      answer(byId('copySteps'), 'Copied');
     } catch {
-      byId('copySteps').textContent = 'Selected; copy it';
+      answer(byId('copySteps'), 'Selected; copy it');
     }
   });
   byId('unedit').addEventListener('click', () => {
@@ -69,10 +78,10 @@ export function buildEdits() {
   synced.push(() => {
     byId('edits').hidden = !isShown();
     which.value = String(held.basis);
+    byId('basisColour').style.backgroundColor = `rgb(${coded(surfaces[held.basis].base).join(' ')})`;
     tint.value = editOf().tint;
     text.value = data.edits ? steps(data.name, data.edits.fingerprint, data.edits.surfaces, state.edits) : '';
     byId('stepFile').hidden = !text.value;
-    byId('copySteps').textContent = 'Copy steps';
   });
 }
 

@@ -119,3 +119,26 @@ export function placeAt(scene, size, x, y) {
   const inside = Number.isFinite(t) && (!scene.near || t > 0) && Math.abs(s) <= size[0] / 2 && Math.abs(y2) <= size[1] / 2;
   return inside ? [s, y2] : null;
 }
+
+/**
+ * Where a point of the sheet lies in the picture, or null where it faces away or lies outside.
+ * @param {ReturnType<typeof seen>} scene
+ * @param {[number, number]} place metres right and up of the middle
+ * @returns {[number, number] | null}
+ */
+export function pixelOf(scene, [s, y]) {
+  const { curl: r, towards, eye, near, corner, right, up } = scene;
+  /** @type {Vector} */
+  const n = r > 0 ? [Math.sin(s / r), 0, Math.cos(s / r)] : [0, 0, 1];
+  /** @type {Vector} */
+  const at = r > 0 ? [r * n[0], y, r * (n[2] - 1)] : [s, y, 0];
+  const fromEye = plus(at, scaled(eye, -1));
+  if (near ? dot(n, fromEye) >= 0 : dot(n, towards) <= 0) return null;
+  // Along the ray into the window, which goes through the middle of the sheet.
+  const depth = near ? -dot(fromEye, towards) : 1;
+  if (depth <= 0) return null;
+  const inWindow = near ? plus(eye, scaled(fromEye, dot(eye, towards) / depth)) : at;
+  const across = plus(inWindow, scaled(corner, -1));
+  const square = scene.pixel * scene.pixel;
+  return [dot(across, right) / square, -dot(across, up) / square];
+}

@@ -1,6 +1,6 @@
 // The picture under the hand: mouse, touch, wheel and keys move light, sheet and picture, and a tap looks at a spot.
 
-import { arrows, mark, sync } from './controls.js';
+import { arrows, mark, sync, within } from './controls.js';
 import { clamp } from './geometry.js';
 import { hemisphere, place } from './lamps.js';
 import { look } from './look.js';
@@ -13,8 +13,8 @@ function drag(x, y, by) {
     const step = metresPerPixel();
     state.pan = [clamp(state.pan[0] - x * step, -5, 5), clamp(state.pan[1] + y * step, -5, 5)];
   } else if (by === 'sheet') {
-    state.turn = clamp(state.turn + 0.25 * x, -80, 80);
-    state.tip = clamp(state.tip - 0.25 * y, -80, 80);
+    state.turn = within(state.turn + 0.25 * x, state.turn, 80);
+    state.tip = within(state.tip - 0.25 * y, state.tip, 80);
     faceTheEye();
   } else if (state.lights[held.lamp]) {
     const r = hemisphere() / 90;
@@ -48,11 +48,14 @@ function whole() {
 /** @type {Map<number, { x: number, y: number }>} */
 const fingers = new Map();
 let travelled = 0;
+/** Whether there were two fingers: the one that is lifted last drags nothing. */
+let pinched = false;
 
 canvas.addEventListener('pointerdown', (event) => {
   canvas.setPointerCapture(event.pointerId);
   fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-  travelled = fingers.size > 1 ? Infinity : 0;
+  if (fingers.size === 1) [travelled, pinched] = [0, false];
+  else pinched = true;
 });
 canvas.addEventListener('pointermove', (event) => {
   const finger = fingers.get(event.pointerId);
@@ -66,14 +69,14 @@ canvas.addEventListener('pointermove', (event) => {
     const box = canvas.getBoundingClientRect();
     drag(x / 2, y / 2, 'move');
     zoom(after / Math.max(before, 1), (event.clientX + other.x) / 2 - box.left - box.width / 2, (event.clientY + other.y) / 2 - box.top - box.height / 2);
-  } else if (fingers.size === 1 && travelled > 4) {
+  } else if (!pinched && travelled > 4) {
     drag(x, y, event.buttons & 6 ? 'move' : event.shiftKey ? 'sheet' : held.tool);
   }
   [finger.x, finger.y] = [event.clientX, event.clientY];
 });
 const lift = (/** @type {PointerEvent} */ event) => {
   if (!fingers.delete(event.pointerId)) return;
-  if (event.type === 'pointerup' && fingers.size === 0 && travelled <= 4) {
+  if (event.type === 'pointerup' && !pinched && travelled <= 4) {
     const box = canvas.getBoundingClientRect();
     look(event.clientX - box.left, event.clientY - box.top);
   }

@@ -1,6 +1,6 @@
 // What lies over the picture: a lamp for each light, the handle of a split picture, and the scale.
 
-import { arrows, inDegrees, rechoose, sync } from './controls.js';
+import { arrows, inDegrees, rechoose, sync, within } from './controls.js';
 import { clamp } from './geometry.js';
 import { element } from './spot.js';
 import { byId, canvas, drawn, eachFrame, held, metresPerPixel, redraw, state } from './stage.js';
@@ -78,8 +78,9 @@ function addLampButton(i) {
 
 /** @type {(i: number, azimuth: number, elevation: number) => void} */
 export function place(i, azimuth, elevation) {
-  state.lights[i].azimuth = clamp(azimuth, -88, 88);
-  state.lights[i].elevation = clamp(elevation, -88, 88);
+  const light = state.lights[i];
+  light.azimuth = within(azimuth, light.azimuth, 88);
+  light.elevation = within(elevation, light.elevation, 88);
   sync();
   redraw(true);
 }

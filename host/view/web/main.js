@@ -5,11 +5,19 @@ import { rechoose } from './controls.js';
 import { layer, stackWeights, unpacked, unpackedFloats } from './data.js';
 import { Drawing } from './draw.js';
 import { build } from './panel.js';
-import { byId, canvas, data, drawn, drawNow, faceTheEye, limits, redraw, stage, state } from './stage.js';
+import { byId, canvas, data, drawn, eachFrame, faceTheEye, limits, redraw, stage, state } from './stage.js';
 import { read } from './state.js';
 
-/** @param {string} text */
+/** How near to its edge an address may show the sheet: the program's limit. */
+const EDGE = 1e-3;
+
+/**
+ * Says why nothing can be moved, and takes away what would do nothing.
+ * @param {string} text
+ */
 function say(text) {
+  document.body.classList.add('still');
+  stage.classList.remove('ready');
   const message = byId('message');
   message.textContent = text;
   message.hidden = false;
@@ -19,7 +27,7 @@ async function start() {
   build();
   read(data.start, state, limits);
   read(location.hash, state, limits);
-  faceTheEye();
+  faceTheEye(EDGE);
   rechoose();
   const gl = canvas.getContext('webgl2', { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: true });
   if (!gl || typeof DecompressionStream === 'undefined') {
@@ -43,16 +51,18 @@ async function start() {
     drawn.drawing = make();
     redraw(false);
   });
+  eachFrame.after.push(() => stage.classList.add('ready'));
+  // It is told of the size at first, too.
   new ResizeObserver(() => redraw(false)).observe(canvas);
   addEventListener('hashchange', (event) => {
+    // What an address leaves out when there is none of it.
+    Object.assign(state, { with: '', edits: {} });
     // The page may have written its own address since.
     read(new URL(event.newURL).hash, state, limits);
-    faceTheEye();
+    faceTheEye(EDGE);
     rechoose();
     redraw(false);
   });
-  drawNow();
-  stage.classList.add('ready');
 }
 
 start().catch((/** @type {Error} */ error) => say(`The page cannot draw: ${error.message}. The picture shows the sheet under one light.`));

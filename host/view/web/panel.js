@@ -1,11 +1,14 @@
 // The controls beside the picture: what is shown, the lights, how the sheet is held, and the legend.
 
-import { arrows, inDegrees, mark, rechoose, rechosen, slider } from './controls.js';
+import { answer, arrows, inDegrees, mark, rechoose, rechosen, slider } from './controls.js';
 import { buildEdits } from './editing.js';
 import { clamp } from './geometry.js';
 import { element } from './spot.js';
 import { available, byId, data, faceTheEye, held, leastRadius, limits, redraw, shareAddress, state } from './stage.js';
 import { initial, MOST_LIGHTS, read, TITLES } from './state.js';
+
+/** Where lights are put that are added. */
+const PLACES = [[35, 20], [-35, -20], [30, -35], [-25, 30]];
 
 /** @param {string} show */
 function showFirst(show) {
@@ -13,6 +16,13 @@ function showFirst(show) {
   if (state.with === show) state.with = '';
   rechoose();
   redraw(false);
+}
+
+/** Where a new light goes: the place that is farthest from all others. */
+function freePlace() {
+  const fromOthers = (/** @type {number[]} */ [a, e]) => Math.min(Infinity, ...state.lights.map((l) => Math.hypot(l.azimuth - a, l.elevation - e)));
+  const [azimuth, elevation] = PLACES.reduce((best, place) => (fromOthers(place) > fromOthers(best) ? place : best));
+  return { azimuth, elevation };
 }
 
 /** Brings the choices in line with the state. */
@@ -32,7 +42,7 @@ function choices() {
   held.lamp = clamp(held.lamp, 0, Math.max(state.lights.length - 1, 0));
   const lights = byId('lights');
   const numbers = state.lights.map((_, i) => {
-    const button = element('button', { type: 'button', 'aria-pressed': String(i === held.lamp), 'aria-label': `Choose light ${i + 1}` }, String(i + 1));
+    const button = element('button', { type: 'button', id: `light${i + 1}`, 'aria-pressed': String(i === held.lamp), 'aria-label': `Choose light ${i + 1}` }, String(i + 1));
     button.addEventListener('click', () => {
       held.lamp = i;
       rechoose();
@@ -42,7 +52,7 @@ function choices() {
   });
   const more = element('button', { type: 'button', id: 'more' }, '+ add');
   more.addEventListener('click', () => {
-    state.lights.push({ azimuth: 35, elevation: 20, distance: 0.6 });
+    state.lights.push({ ...freePlace(), distance: 0.6 });
     held.lamp = state.lights.length - 1;
     rechoose();
     redraw(false);
@@ -53,9 +63,9 @@ function choices() {
     rechoose();
     redraw(false);
   });
-  const focused = document.activeElement?.id;
+  const focused = lights.contains(document.activeElement) ? document.activeElement?.id ?? '' : null;
   lights.replaceChildren(...numbers, ...(state.lights.length < MOST_LIGHTS ? [more] : []), ...(state.lights.length ? [fewer] : []));
-  if (focused === 'more' || focused === 'fewer') document.getElementById(focused)?.focus();
+  if (focused !== null) (document.getElementById(focused) ?? numbers[held.lamp] ?? more).focus();
   legend();
 }
 
@@ -122,9 +132,9 @@ export function build() {
     shareAddress();
     try {
       await navigator.clipboard.writeText(location.href);
-      byId('share').textContent = 'Copied';
+      answer(byId('share'), 'Copied');
     } catch {
-      byId('share').textContent = 'The address above is this view';
+      answer(byId('share'), 'The address above is this view');
     }
   });
 
@@ -139,10 +149,10 @@ export function build() {
   // The last step is far away.
   const near = (/** @type {number} */ d) => (d > 0 ? Math.log(d / 0.1) / Math.log(30) : 1.04);
   const metres = (/** @type {number} */ v) => (v > 1.02 ? 0 : 0.1 * 30 ** v);
-  const inMetres = (/** @type {number} */ v) => (metres(v) ? `${metres(v).toFixed(2)} m` : 'far');
-  slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: inMetres });
+  const inMetres = (/** @type {number} */ d) => (d ? `${d.toFixed(2)} m` : 'far');
+  slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: () => inMetres(chosen().distance) });
   slider(light, 'exposure', { min: -5, max: 5, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v >= 0.05 ? '+' : ''}${Math.abs(v) < 0.05 ? '0' : v.toFixed(1)} EV` });
-  slider(light, 'tone curve', { min: 0, max: 1, step: 0.05, get: () => state.knee, set: (v) => (state.knee = v), words: (v) => (v < 1 ? `soft above ${Math.round(100 * v)} %` : 'cut off at white') });
+  slider(light, 'tone curve', { min: 0, max: 1, step: 0.05, get: () => state.knee, set: (v) => (state.knee = v), words: (v) => (v < 1 ? `from ${Math.round(100 * v)} %` : 'cut off') });
   const turned = (/** @type {'turn' | 'tip'} */ which) => (/** @type {number} */ v) => {
     state[which] = v;
     faceTheEye();
@@ -153,7 +163,7 @@ export function build() {
     min: 0, max: 1, step: 0.01, get: () => (state.curl > 0 ? leastRadius / state.curl : 0),
     set: (v) => (state.curl = v > 0 ? leastRadius / v : 0), words: () => (state.curl > 0 ? `r ${(state.curl * 1000).toFixed(0)} mm` : 'flat'),
   });
-  slider(sheet, 'eye', { min: 0, max: 1.04, step: 0.01, get: () => near(state.distance), set: (v) => (state.distance = metres(v)), words: inMetres });
+  slider(sheet, 'eye', { min: 0, max: 1.04, step: 0.01, get: () => near(state.distance), set: (v) => (state.distance = metres(v)), words: () => inMetres(state.distance) });
   const viewed = (/** @type {0 | 1} */ i) => (/** @type {number} */ v) => {
     state.view[i] = v;
     faceTheEye();

@@ -1,14 +1,14 @@
 // The picture on the screen: what it shows, drawn once a frame at most and coarser while something moves, and the address that
 // holds the view.
 
-import { seen, windowHeight } from './geometry.js';
+import { clamp, seen, windowHeight } from './geometry.js';
 import { initial, SHOWS, written } from './state.js';
 
 /** A frame that takes longer while something moves is drawn coarser, in milliseconds. */
 const SLOW = 30;
-/** How long the hand rests before the picture is drawn finely, in milliseconds. */
+/** How long the hand rests after a frame before the picture is drawn finely, in milliseconds. */
 const REST = 140;
-const MOST_COARSE = 6;
+const MOST_COARSE = 10;
 
 /** @type {<T extends HTMLElement>(id: string) => T} */
 export const byId = (id) => {
@@ -36,53 +36,73 @@ export const held = { lamp: 0, tool: 'light', basis: 0 };
  */
 export const drawn = { drawing: null, layers: {}, dots: new Uint8Array() };
 /**
- * What is done before the picture is drawn, and after.
- * @type {{ before: (() => void)[], after: (() => void)[] }}
+ * What is done before the picture is drawn, and after; each is told whether something moves.
+ * @type {Record<'before' | 'after', ((motion: boolean) => void)[]>}
  */
 export const eachFrame = { before: [], after: [] };
 
-let asked = false;
+/** Whether something changed since the last frame was begun. */
+let stale = false;
+/** Whether a frame is asked for or still being drawn: the next one waits for it, so that none queue up. */
+let busy = false;
 let moving = false;
 let coarse = 1;
-let lastFrame = 0;
+/** How long the last fine frame took. */
+let fine = 0;
 /** @type {number | undefined} */
 let rest;
+let resting = 0;
 
 /** @param {boolean} inMotion */
 export function redraw(inMotion) {
+  if (inMotion && !moving) coarse = clamp(Math.sqrt(fine / SLOW), 1, MOST_COARSE);
   moving = inMotion;
+  stale = true;
   stage.classList.add('changing');
   clearTimeout(rest);
-  rest = setTimeout(() => {
+  cancelAnimationFrame(resting);
+  if (!busy) next();
+}
+
+function next() {
+  busy = true;
+  requestAnimationFrame(async () => {
+    stale = false;
+    const motion = moving;
+    const took = await draw(motion);
+    busy = false;
+    // One frame knows how coarse the next has to be: time goes with the number of pixels.
+    if (!motion) fine = took;
+    else if (took > SLOW) coarse = Math.min(coarse * Math.max(Math.sqrt(took / SLOW), 1.1), MOST_COARSE);
+    else if (took < SLOW / 2) coarse = Math.max(coarse / 1.1, 1);
+    if (stale) next();
+    else rest = setTimeout(settle, REST);
+  });
+}
+
+/** What the hand did during a slow frame is told right before the next one, so it rests only if nothing is told then. */
+function settle() {
+  resting = requestAnimationFrame(() => {
     shareAddress();
     if (moving) redraw(false);
     else stage.classList.remove('changing');
-  }, REST);
-  if (!asked) {
-    asked = true;
-    requestAnimationFrame(frame);
-  }
+  });
 }
 
-/** @param {number} now */
-function frame(now) {
-  asked = false;
-  if (moving) {
-    const took = now - lastFrame;
-    if (took > SLOW && took < 1000) coarse = Math.min(coarse * 1.4, MOST_COARSE);
-    else if (took < SLOW / 2) coarse = Math.max(coarse / 1.1, 1);
-    lastFrame = now;
-  }
-  drawNow();
-}
-
-export function drawNow() {
+/**
+ * @param {boolean} motion
+ * @returns {Promise<number>} how long it took, in milliseconds
+ */
+async function draw(motion) {
   const { drawing } = drawn;
-  if (!drawing) return;
-  fit(moving ? coarse : 1);
-  eachFrame.before.forEach((step) => step());
-  drawing.draw(state, moving);
-  eachFrame.after.forEach((step) => step());
+  if (!drawing) return 0;
+  const begun = performance.now();
+  fit(motion ? coarse : 1);
+  eachFrame.before.forEach((step) => step(motion));
+  drawing.draw(state, motion);
+  eachFrame.after.forEach((step) => step(motion));
+  await drawing.done();
+  return performance.now() - begun;
 }
 
 /** @param {number} by how many times coarser than the screen */
@@ -107,9 +127,12 @@ export function metresPerPixel() {
   return windowHeight(data.size, canvas.clientWidth / canvas.clientHeight) / state.zoom / canvas.clientHeight;
 }
 
-/** The sheet is never turned so far that its back would be seen. */
-export function faceTheEye() {
-  while (seen(state, data.size, 1, 1).towards[2] < 0.02) {
+/**
+ * The sheet is never turned so far that its back would be seen.
+ * @param {number} least of the cosine between the sheet's normal and the eye; an address may go as far as the program does
+ */
+export function faceTheEye(least = 0.02) {
+  while (seen(state, data.size, 1, 1).towards[2] < least) {
     state.turn *= 0.97;
     state.tip *= 0.97;
     if (Math.abs(state.turn) + Math.abs(state.tip) < 1) {

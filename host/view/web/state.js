@@ -13,6 +13,8 @@ import { clamp } from './geometry.js';
 
 export const MOST_LIGHTS = 4;
 export const MOST_ZOOM = 400;
+/** Eye and lights come no nearer, in metres. These limits and those of angles are the program's. */
+const NEAREST = 0.01;
 /** What can be shown, and its name. @type {Record<string, string>} */
 export const TITLES = {
   document: 'Document', mapped: 'Mapped', printed: 'Print', difference: 'Difference', stacks: 'Stacks', passes: 'Passes',
@@ -78,23 +80,23 @@ export function read(text, state, limits) {
     const lamps = lights.split(';').filter(Boolean).slice(0, MOST_LIGHTS).map((lamp) => lamp.split(',').map(Number));
     if (lamps.every((l) => (l.length === 2 || l.length === 3) && l.every(Number.isFinite))) {
       state.lights = lamps.map(([a, e, d]) => ({
-        azimuth: clamp(a, -180, 180), elevation: clamp(e, -90, 90), distance: d > 0 ? clamp(d, 0.05, 100) : 0,
+        azimuth: clamp(a, -180, 180), elevation: clamp(e, -90, 90), distance: d > 0 ? clamp(d, NEAREST, 100) : 0,
       }));
     }
   }
   if (given.has('probe')) state.probe = given.get('probe') === '1';
   const view = numbers('view', 2);
-  if (view) state.view = [clamp(view[0], -85, 85), clamp(view[1], -85, 85)];
+  if (view) state.view = [clamp(view[0], -180, 180), clamp(view[1], -90, 90)];
   const distance = one('distance', 0, 100, state.distance);
-  state.distance = distance > 0 ? Math.max(distance, 0.05) : 0;
+  state.distance = distance > 0 ? Math.max(distance, NEAREST) : 0;
   const tilt = numbers('tilt', 2);
-  if (tilt) [state.turn, state.tip] = [clamp(tilt[0], -80, 80), clamp(tilt[1], -80, 80)];
+  if (tilt) [state.turn, state.tip] = [clamp(tilt[0], -180, 180), clamp(tilt[1], -90, 90)];
   const curl = one('curl', 0, 1000, state.curl);
   state.curl = curl > 0 ? Math.max(curl, limits.leastRadius) : 0;
   state.zoom = one('zoom', 0.5, MOST_ZOOM, state.zoom);
   const pan = numbers('pan', 2);
   if (pan) state.pan = [clamp(pan[0], -5, 5), clamp(pan[1], -5, 5)];
-  state.exposure = one('exposure', -8, 8, state.exposure);
+  state.exposure = one('exposure', -10, 10, state.exposure);
   state.knee = one('knee', 0, 1, state.knee);
   const edit = given.get('edit');
   if (edit !== null) state.edits = editsRead(edit, limits.bases);
