@@ -95,6 +95,13 @@ pub fn halftoned(
             pixels.0, pixels.1
         ));
     }
+    let across_mm = f64::from(width) / DOTS_PER_MM / pixels.0 as f64;
+    if across_mm > SOFT_MM && !is_one_material(materials) {
+        observer.note(&format!(
+            "a pixel of the document is {across_mm:.1} mm wide on paper, so borders between pixels will be about {across_mm:.0} mm \
+             soft; enlarge the maps without smoothing to print them hard"
+        ));
+    }
     let reduced = cells.map(|cells| Reduced::new(materials, cells));
     let materials: &dyn Materials = reduced.as_ref().map_or(materials, |reduced| reduced);
     let printable = Printable::combined(library, &settings.inks, materials.space());
@@ -124,6 +131,20 @@ pub fn halftoned(
     };
     let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
     Ok(Halftoned { factoring, mapped, dots, foils, doubt })
+}
+
+/// The width of a pixel on paper from which a border between two is plainly soft.
+const SOFT_MM: f64 = 2.0;
+
+/// Whether all pixels are equal. The document is coarse, so they are few.
+fn is_one_material(materials: &dyn Materials) -> bool {
+    let row = |pixel| {
+        let mut row = vec![0f32; materials.space().columns()];
+        materials.reflectance(pixel, &mut row);
+        row
+    };
+    let first = row(0);
+    (1..materials.width() * materials.height()).all(|pixel| row(pixel) == first)
 }
 
 /// Side in pixels of the spot that an eye averages over, if the dots are rearranged for the eye: then the mixtures are, too.
