@@ -95,6 +95,20 @@ fn soft_borders_of_coarse_documents_are_announced() {
 }
 
 #[test]
+fn differences_say_what_they_count() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let said = |args: &str| text(&bench.run(&format!("plan tile {SMALL} {args}")).stderr);
+    let light = said("");
+    let of = "with silver-foil the inks would come";
+    assert!(light.contains(of) && light.contains("nearer to this document (root mean square"), "{light}");
+    assert!(light.contains("difference, light included, "), "{light}");
+    let paper = said("--preset paper");
+    assert!(paper.contains(of) && paper.contains("nearer to the bases of this document"), "{paper}");
+    assert!(paper.contains("difference d ") && !paper.contains("light included"), "{paper}");
+}
+
+#[test]
 fn nothing_is_sent_before_the_plan_was_confirmed() {
     let bench = Bench::new();
     small_document(&bench.path("tile"));

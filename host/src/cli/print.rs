@@ -22,7 +22,7 @@ use super::report;
 use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::factor::{self, Factored};
-use appearance::gamut::Gain;
+use appearance::gamut::{self, Gain, Intent};
 use observe::Observer;
 use press::halftone;
 use press::halftone::metrics::{self, Look, Tone};
@@ -137,31 +137,39 @@ impl DotsArgs {
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
-        if !halftoned.mapped.report.intent.uses_bases() && self.factor.is_chosen() {
-            observer.note(
-                "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses \
-                 bases",
-            );
+        let report = &halftoned.mapped.report;
+        if !report.intent.uses_bases() && self.factor.is_chosen() {
+            observer.note(match report.not_blended {
+                None => "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses bases",
+                Some(_) => {
+                    "every pixel was fitted by itself; --bases and --factor decided only that intent `blend` would not do \
+                     better; --intent basis uses bases"
+                }
+            });
         }
-        if let Some(words) = halftoned.foils.as_ref().and_then(foils_in_words) {
+        if let Some(words) =
+            halftoned.foils.as_ref().and_then(|gain| foils_in_words(gain, report.intent, &settings.gamut))
+        {
             observer.note(&words);
         }
         Ok(Laid { document, library, settings, layout, halftoned })
     }
 }
 
-/// What foils would bring, if that can be seen.
-fn foils_in_words(gain: &Gain) -> Option<String> {
+/// What foils would bring to what the intent maps, if that can be seen.
+fn foils_in_words(gain: &Gain, intent: Intent, settings: &gamut::Settings) -> Option<String> {
     /// Share of the difference that is worth the trouble.
     const WORTH: f64 = 0.1;
     let share = 1.0 - gain.after / gain.before;
     let names: Vec<&str> = gain.inks.iter().map(|ink| ink.name()).collect();
     (share >= WORTH).then(|| {
         format!(
-            "with {} this document would come {:.0} % nearer (root mean square difference {:.3} instead of {:.3}); \
+            "with {} the inks would come {:.0} % nearer to {} (root mean square difference{} {:.3} instead of {:.3}); \
              --inks +foil allows foils",
             names.join(" and "),
             100.0 * share,
+            if intent == Intent::Basis { "the bases of this document" } else { "this document" },
+            settings.measure(),
             gain.after,
             gain.before
         )
@@ -371,7 +379,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, dots: &Halftone) -> Value {
         "gamut": {
             "intent": mapped.intent, "light_weight": settings.gamut.light,
             "uses_bases": mapped.intent.uses_bases(), "gloss_scale": mapped.gloss_scale, "materials": materials,
-            "given_up": given_up, "pixels": pixels, "measurement": halftoned.doubt,
+            "given_up": given_up, "pixels": pixels, "merged_pairs_if_blended": mapped.not_blended, "measurement": halftoned.doubt,
             "foils": halftoned.foils.as_ref().map(|gain| json!({
                 "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),
                 "distance_with": gain.after, "distance_without": gain.before,

@@ -112,7 +112,6 @@ pub fn halftoned(
         (None, _) => {
             let factor::Factoring { factored, report } =
                 factor::factor(materials, &settings.factor, observer)?;
-            observer.note(&report.to_string());
             factoring = Some(report);
             Ok::<_, StageError>(Cow::Owned(factored))
         }
@@ -120,6 +119,11 @@ pub fn halftoned(
     let mapping =
         gamut::Settings { eye: spot(width, materials.width(), settings.halftone), ..settings.gamut.clone() };
     let mapped = gamut::map(materials, bases, &printable, &mapping, observer)?;
+    // The automatic choice may have tried bases that it does not use.
+    let factoring = factoring.filter(|_| mapped.report.intent.uses_bases());
+    if let Some(report) = &factoring {
+        observer.note(&report.to_string());
+    }
     let chosen = halftone::Settings {
         method: settings.halftone,
         ..halftone::Settings::from_library(&mapped.mix.stacks, library)
@@ -163,8 +167,7 @@ fn foils(
 ) -> Result<Option<Gain>, GamutError> {
     let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
     let more = Printable::combined(library, &all, materials.space());
-    let before = (!mapped.report.intent.uses_bases()).then_some(mapped.sampled);
-    gamut::gain(materials, printable, before, &more, settings)
+    gamut::gain(&mapped.judged, printable, &more, materials.space(), settings)
 }
 
 /// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a
