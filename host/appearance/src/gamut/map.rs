@@ -258,11 +258,11 @@ impl<'a> Pixels<'a> {
     /// Fits each pixel, without bases.
     fn fitted(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<Mapped, GamutError> {
         let clamped = clamp::map(&chosen.candidates, self.pixels, observer)?;
-        self.from_clamped(chosen, clamped, None, observer)
+        self.without_bases(chosen, clamped, None, observer)
     }
 
     /// What becomes of clamped pixels without bases.
-    fn from_clamped(
+    fn without_bases(
         &self,
         chosen: &Chosen,
         mut clamped: Clamped,
@@ -385,7 +385,7 @@ impl<'a> Pixels<'a> {
                 percent(clamped),
                 percent(blended)
             ));
-            return self.from_clamped(chosen, blend.clamped, Some(blended), observer);
+            return self.without_bases(chosen, blend.clamped, Some(blended), observer);
         }
         observer.note(&format!(
             "{} of the pairs of different materials would look alike if each were printed as closely as the inks allow, and {} \
