@@ -86,7 +86,7 @@ fn soft_borders_of_coarse_documents_are_announced() {
         text(&output.stderr)
     };
     let coarse = said("plan tile --size 90mm");
-    assert!(coarse.contains("a pixel of the document is 3.7 mm wide on paper"), "{coarse}");
+    assert!(coarse.contains("a pixel of the document is 3.8 mm wide on paper"), "{coarse}");
     assert!(coarse.contains("about 4 mm soft"), "{coarse}");
     assert!(!said("plan tile --size 30mm").contains(" soft"));
     // One material has no borders, however large its only pixel is.
@@ -97,8 +97,12 @@ fn soft_borders_of_coarse_documents_are_announced() {
 #[test]
 fn differences_say_what_they_count() {
     let bench = Bench::new();
-    small_document(&bench.path("tile"));
-    let said = |args: &str| text(&bench.run(&format!("plan tile {SMALL} {args}")).stderr);
+    fs::create_dir(bench.path("mirror")).expect("a folder");
+    for (name, grey) in [("base_color", 230), ("roughness", 60), ("metallic", 255)] {
+        let picture = image::RgbImage::from_pixel(4, 4, image::Rgb([grey; 3]));
+        picture.save(bench.path(&format!("mirror/{name}.png"))).expect("a picture");
+    }
+    let said = |args: &str| text(&bench.run(&format!("plan mirror {SMALL} {args}")).stderr);
     let light = said("");
     let of = "with silver-foil the inks would come";
     assert!(light.contains(of) && light.contains("nearer to this document (root mean square"), "{light}");
