@@ -68,6 +68,48 @@ fn what_would_be_cut_is_refused_in_mm_before_the_long_work() {
             .refused(2, &format!("print tile --size 12x8mm {}", args.replace("--gap -1mm", "--gap=-1mm")));
         assert!(said.contains(word), "{args}: {said}");
     }
+    // More than the page holds can be cut, more than any sheet cannot; --crop is advised where it helps.
+    let said = bench.refused(1, "plan tile --size 250mm");
+    assert!(said.contains("a4 has room for") && said.contains("--crop"), "{said}");
+    let said = bench.refused(1, "plan tile --size 400mm --crop");
+    assert!(said.contains("the largest sheet") && said.contains("give a smaller --size"), "{said}");
+    assert!(!said.contains("--crop") && !said.contains("a4"), "{said}");
+}
+
+#[test]
+fn soft_borders_of_coarse_documents_are_announced() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let said = |args: &str| {
+        let output = bench.run(args);
+        assert!(output.status.success(), "{args}: {}", text(&output.stderr));
+        text(&output.stderr)
+    };
+    let coarse = said("plan tile --size 90mm");
+    assert!(coarse.contains("a pixel of the document is 3.8 mm wide on paper"), "{coarse}");
+    assert!(coarse.contains("about 4 mm soft"), "{coarse}");
+    assert!(!said("plan tile --size 30mm").contains(" soft"));
+    // One material has no borders, however large its only pixel is.
+    fs::write(bench.path("one.csv"), "theta_h_deg,r,g,b\n0,0.3,0.2,0.1\n90,0.3,0.2,0.1\n").expect("a curve");
+    assert!(!said("plan one.csv").contains(" soft"));
+}
+
+#[test]
+fn differences_say_what_they_count() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("mirror")).expect("a folder");
+    for (name, grey) in [("base_color", 230), ("roughness", 60), ("metallic", 255)] {
+        let picture = image::RgbImage::from_pixel(4, 4, image::Rgb([grey; 3]));
+        picture.save(bench.path(&format!("mirror/{name}.png"))).expect("a picture");
+    }
+    let said = |args: &str| text(&bench.run(&format!("plan mirror {SMALL} {args}")).stderr);
+    let light = said("");
+    let of = "with silver-foil the inks would come";
+    assert!(light.contains(of) && light.contains("nearer to this document (root mean square"), "{light}");
+    assert!(light.contains("difference, light included, "), "{light}");
+    let paper = said("--preset paper");
+    assert!(paper.contains(of) && paper.contains("nearer to the bases of this document"), "{paper}");
+    assert!(paper.contains("difference d ") && !paper.contains("light included"), "{paper}");
 }
 
 #[test]

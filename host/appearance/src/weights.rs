@@ -3,6 +3,8 @@
 //! Weights are fixed point with [`ONE`] as 1. At every pixel they sum to [`ONE`] exactly, so rounding cannot break the
 //! partition of unity on any machine. Layout: interleaved, `channels` values per pixel, rows from the top.
 
+pub(crate) mod grey;
+
 use rayon::prelude::*;
 
 /// Pixels that a thread takes at a time where weights are only read or moved.

@@ -38,6 +38,7 @@ pub fn of(error: &anyhow::Error) -> Option<String> {
             (_, Some(SizeError::TooLarge { .. }), _) => {
                 Some("give a smaller --size, a larger --paper, or cut with --crop")
             }
+            (_, Some(SizeError::BeyondSheets { .. }), _) => Some("give a smaller --size"),
             (_, Some(SizeError::TooSmall { .. }), _) => Some("give a larger --size"),
             (.., Some(ChartError::TooMany { .. })) => Some("name the inks with --inks"),
             _ => None,

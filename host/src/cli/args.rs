@@ -164,7 +164,7 @@ pub struct HalftoneArg {
 pub struct GamutArgs {
     /// How to treat materials that no ink can make: basis keeps their differences (the paper's way), clamp keeps each
     /// one as close as possible, blend lies between, contrast keeps differences between neighbours, auto clamps unless
-    /// that would make different materials look alike
+    /// that would make different materials look alike that blend keeps apart
     #[arg(long, value_name = "INTENT", default_value = "auto", value_parser = choice::<Intent>())]
     pub intent: Intent,
     /// What "close" means: light counts how much light a material returns beside the shape of its highlight, so that

@@ -95,7 +95,7 @@ impl Choice for Intent {
         (
             Intent::Auto,
             "auto",
-            "Clamp, unless that merges more than 1 % of pairs of materials that differ; then blend",
+            "Clamp, unless that merges more than 1 % of pairs of materials that differ and blend merges clearly fewer",
         ),
         (Intent::Basis, "basis", "Map the bases and keep the weights: relative differences survive"),
         (

@@ -15,14 +15,14 @@ use super::inks::luminance;
 use super::job::{self, Places, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
-use super::preview::shown::{Page, Shown};
+use super::preview::shown::Shown;
 use super::preview::view::ViewArgs;
 use super::progress::Beside;
 use super::report;
 use appearance::brdf::reflectances;
 use appearance::document::Document;
 use appearance::factor::{self, Factored};
-use appearance::gamut::Gain;
+use appearance::gamut::{self, Gain, InkMix, Intent};
 use observe::Observer;
 use press::halftone;
 use press::halftone::metrics::{self, Look, Tone};
@@ -137,31 +137,39 @@ impl DotsArgs {
             size: self.size,
         };
         let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
-        if !halftoned.mapped.report.intent.uses_bases() && self.factor.is_chosen() {
-            observer.note(
-                "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses \
-                 bases",
-            );
+        let report = &halftoned.mapped.report;
+        if !report.intent.uses_bases() && self.factor.is_chosen() {
+            observer.note(match report.not_blended {
+                None => "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses bases",
+                Some(_) => {
+                    "every pixel was fitted by itself; --bases and --factor decided only that intent `blend` would not do \
+                     better; --intent basis uses bases"
+                }
+            });
         }
-        if let Some(words) = halftoned.foils.as_ref().and_then(foils_in_words) {
+        if let Some(words) =
+            halftoned.foils.as_ref().and_then(|gain| foils_in_words(gain, report.intent, &settings.gamut))
+        {
             observer.note(&words);
         }
         Ok(Laid { document, library, settings, layout, halftoned })
     }
 }
 
-/// What foils would bring, if that can be seen.
-fn foils_in_words(gain: &Gain) -> Option<String> {
+/// What foils would bring to what the intent maps, if that can be seen.
+fn foils_in_words(gain: &Gain, intent: Intent, settings: &gamut::Settings) -> Option<String> {
     /// Share of the difference that is worth the trouble.
     const WORTH: f64 = 0.1;
     let share = 1.0 - gain.after / gain.before;
     let names: Vec<&str> = gain.inks.iter().map(|ink| ink.name()).collect();
     (share >= WORTH).then(|| {
         format!(
-            "with {} this document would come {:.0} % nearer (root mean square difference {:.3} instead of {:.3}); \
+            "with {} the inks would come {:.0} % nearer to {} (root mean square difference{} {:.3} instead of {:.3}); \
              --inks +foil allows foils",
             names.join(" and "),
             100.0 * share,
+            if intent == Intent::Basis { "the bases of this document" } else { "this document" },
+            settings.measure(),
             gain.after,
             gain.before
         )
@@ -200,19 +208,25 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     };
     let document = args.work.dots.document.open(observer)?;
     let places = Places::new(&document.name, &args.result, &args.deliver)?;
-    let laid = args.work.dots.halftone(document, inks, library, observer)?;
+    let mut laid = args.work.dots.halftone(document, inks, library, observer)?;
+    // Of a fine document the mixture takes the most memory. It is given back as soon as it was measured.
+    let mix = laid.halftoned.mapped.mix.take();
     let ground = args.result.background.unwrap_or_default();
     // Some steps to a job are one thread's. What does not depend on it is looked at beside them.
     let beside = Beside(observer);
     let (made, seen) = rayon::join(
         || job::make(&args.work.request(&laid), &laid.document.notes, &[], places, ground, observer),
         || {
-            let page = || shown(&laid, &beside);
-            let rest = || rayon::join(|| Halftone::measured(&laid, &beside), page);
+            let rest = || {
+                let halftone = Halftone::measured(&laid, &mix, &beside)?;
+                let shown = Shown::of(&laid, &mix, laid.document.as_factored().cloned());
+                drop(mix);
+                Ok::<_, anyhow::Error>((halftone, shown.page(&ViewArgs::default(), None, &beside)?))
+            };
             rayon::join(|| Pictures::new(&laid, &probe, &beside), rest)
         },
     );
-    let (made, pictures, halftone, looked_at) = (made?, seen.0?, seen.1.0?, seen.1.1?);
+    let (made, pictures, (halftone, looked_at)) = (made?, seen.0?, seen.1?);
     let sheet = pictures.sheet(&laid, made.job.draft.separation.passes.len())?;
     let save = |name: &str, picture: &RgbImage| {
         picture.save(made.folder.join(name)).with_context(|| format!("cannot write {name}"))
@@ -242,11 +256,6 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let report = report(&laid, &pictures.fidelity, &halftone);
     job::write(&made.folder.join("sheet.html"), looked_at.html.as_bytes())?;
     made.finish(report, (&advice, "report.html"), &args.result, &args.deliver, observer)
-}
-
-/// The page on which the sheet is looked at.
-fn shown(laid: &Laid, observer: &dyn Observer) -> Result<Page> {
-    Shown::of(laid, laid.document.as_factored().cloned()).page(&ViewArgs::default(), None, observer)
 }
 
 /// What there is to look at, and how far print and document are apart.
@@ -316,9 +325,9 @@ struct Halftone {
 }
 
 impl Halftone {
-    fn measured(laid: &Laid, observer: &dyn Observer) -> Result<Halftone> {
+    fn measured(laid: &Laid, mix: &InkMix, observer: &dyn Observer) -> Result<Halftone> {
         let Laid { document, library, halftoned, .. } = laid;
-        let (mix, dots) = (&halftoned.mapped.mix, &halftoned.dots);
+        let dots = &halftoned.dots;
         let chosen = halftone::Settings::from_library(&mix.stacks, library);
         let space = document.materials().space();
         let looks = reflectances(dots.stacks(), library, space);
@@ -371,7 +380,7 @@ fn report(laid: &Laid, fidelity: &preview::Report, dots: &Halftone) -> Value {
         "gamut": {
             "intent": mapped.intent, "light_weight": settings.gamut.light,
             "uses_bases": mapped.intent.uses_bases(), "gloss_scale": mapped.gloss_scale, "materials": materials,
-            "given_up": given_up, "pixels": pixels, "measurement": halftoned.doubt,
+            "given_up": given_up, "pixels": pixels, "merged_pairs_if_blended": mapped.not_blended, "measurement": halftoned.doubt,
             "foils": halftoned.foils.as_ref().map(|gain| json!({
                 "inks": gain.inks.iter().map(|ink| ink.name()).collect::<Vec<_>>(),
                 "distance_with": gain.after, "distance_without": gain.before,

@@ -1,8 +1,7 @@
 //! Reading and writing the factored document, a folder.
 //!
 //! `NAME.foil/` contains `document.toml` (the index), `bases.csv` (`basis,theta_h_deg,r,g,b`, reflectance in 1/sr) and one
-//! 16-bit grey PNG of weights per basis. Weights are stored as `round(w 65535 / 32768)` with `w` in units of 1/32768; since
-//! that scale is above one, rounding back restores every weight exactly. The weights of every pixel must sum to one, up to
+//! 16-bit grey PNG of weights per basis ([`grey`](crate::weights::grey)). The weights of every pixel must sum to one, up to
 //! rounding to 16 bits. Writing fills a temporary folder and renames it at the end.
 
 use std::collections::BTreeMap;
@@ -21,7 +20,8 @@ use super::picture::{MOST_PIXELS, Picture};
 use super::source::{MOST_BYTES, Source};
 use crate::brdf::{Space, Table};
 use crate::materials::{Factored, check_reflectance};
-use crate::weights::{ONE, WeightMaps, quantise};
+use crate::weights::WeightMaps;
+use crate::weights::grey::{from_greys, to_grey};
 
 /// The file that marks a folder as a factored document.
 pub(super) const INDEX: &str = "document.toml";
@@ -61,16 +61,6 @@ struct BasisRow {
     r: f64,
     g: f64,
     b: f64,
-}
-
-/// The stored form of a weight, 0..=65535, from units of 1/[`ONE`].
-pub(crate) fn stored(weight: u16) -> u16 {
-    ((u32::from(weight) * 65_535 + u32::from(ONE) / 2) / u32::from(ONE)) as u16
-}
-
-/// The weight nearest to a stored value.
-fn weight(stored: u16) -> u16 {
-    ((u32::from(stored) * u32::from(ONE) + 32_767) / 65_535) as u16
 }
 
 fn io(path: &Path, attempt: &'static str) -> impl FnOnce(std::io::Error) -> DocumentError {
@@ -116,7 +106,7 @@ pub fn write(
     for basis in 0..factored.maps.channels() {
         let file = format!("weights-{basis:02}.png");
         for (pixel, out) in row.chunks_exact_mut(2).enumerate() {
-            out.copy_from_slice(&stored(factored.maps.at(pixel)[basis]).to_ne_bytes());
+            out.copy_from_slice(&to_grey(factored.maps.at(pixel)[basis]).to_ne_bytes());
         }
         let at = inside.join(&file);
         let output = BufWriter::new(std::fs::File::create_new(&at).map_err(io(&at, "write"))?);
@@ -155,20 +145,6 @@ pub fn write(
     let mut file = std::fs::File::create_new(&at).map_err(io(&at, "write"))?;
     file.write_all(text.as_bytes()).map_err(io(&at, "write"))?;
     std::fs::rename(&inside, path).map_err(io(path, "write"))
-}
-
-/// The weights of a pixel from its grey values. Written values give the original weights; painted values, which sum to
-/// white up to one rounding each, are rounded by largest remainder. Any other sum stays wrong and becomes an error.
-fn from_greys(grey: &[u16], weights: &mut [u16]) {
-    weights.iter_mut().zip(grey).for_each(|(w, &g)| *w = weight(g));
-    if weights.iter().map(|&w| u32::from(w)).sum::<u32>() == u32::from(ONE) {
-        return;
-    }
-    let sum: u32 = grey.iter().map(|&g| u32::from(g)).sum();
-    if sum.abs_diff(u32::from(u16::MAX)) as usize <= grey.len() {
-        let exact: Vec<f64> = grey.iter().map(|&g| f64::from(g)).collect();
-        quantise(&exact, weights);
-    }
 }
 
 /// Reads the factored document in the folder `path`.
@@ -307,6 +283,7 @@ fn read_bases(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::weights::quantise;
     use observe::Silent;
     use proptest::prelude::*;
 
@@ -329,13 +306,6 @@ mod tests {
         }
         let maps = WeightMaps::new(width, height, bases, data).unwrap();
         Factored { space, bases: table, maps }
-    }
-
-    #[test]
-    fn every_weight_survives_the_file() {
-        for w in 0..=ONE {
-            assert_eq!(weight(stored(w)), w);
-        }
     }
 
     proptest! {
@@ -365,31 +335,6 @@ mod tests {
         std::fs::copy(path.join("weights-00.png"), path.join("weights-01.png")).unwrap();
         let error = observe::with_causes(&read(&path, &Silent).unwrap_err());
         assert!(error.contains("a.foil") && error.contains("pixel (0, 0)"), "{error}");
-    }
-
-    proptest! {
-        /// An artist who paints in the maps keeps the sum of grey values, not of our units.
-        #[test]
-        fn painted_greys_that_sum_to_white_are_weights(
-            mut cuts in prop::collection::vec(0u16..=u16::MAX, 1..8), off in -1i32..=1,
-        ) {
-            cuts.extend([0, u16::MAX]);
-            cuts.sort_unstable();
-            let mut grey: Vec<u16> = cuts.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            grey[0] = (i32::from(grey[0]) + off).clamp(0, 65535) as u16;
-            let mut weights = vec![0; grey.len()];
-            from_greys(&grey, &mut weights);
-            prop_assert_eq!(weights.iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
-            for (&w, &g) in weights.iter().zip(&grey) {
-                prop_assert!((f64::from(w) - f64::from(g) * 32768.0 / 65535.0).abs() <= 2.0);
-            }
-            // A step of 8 bits is more than rounding.
-            if grey[0] < 65000 {
-                grey[0] += 257;
-                from_greys(&grey, &mut weights);
-                prop_assert!(weights.iter().map(|&w| u32::from(w)).sum::<u32>() != u32::from(ONE));
-            }
-        }
     }
 
     #[test]

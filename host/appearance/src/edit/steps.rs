@@ -40,8 +40,9 @@ use super::mask::{Mask, Painted};
 use super::replacement::Replacement;
 use super::surface::{Surface, Tint};
 use crate::brdf::Space;
+use crate::document::DocumentError;
 use crate::document::source::Source;
-use crate::document::{DocumentError, foil};
+use crate::weights::grey::to_grey;
 
 /// The name under which an edited document has its steps.
 pub const FILE_NAME: &str = "steps.toml";
@@ -234,7 +235,7 @@ impl Steps {
 fn write_mask(painted: &Painted, at: &Path) -> Result<(), DocumentError> {
     let io = |source| DocumentError::Io { path: at.to_path_buf(), attempt: "write", source };
     let output = BufWriter::new(std::fs::File::create_new(at).map_err(io)?);
-    let greys: Vec<u8> = painted.values.iter().flat_map(|&w| foil::stored(w).to_ne_bytes()).collect();
+    let greys: Vec<u8> = painted.values.iter().flat_map(|&w| to_grey(w).to_ne_bytes()).collect();
     PngEncoder::new(output)
         .write_image(&greys, painted.width as u32, painted.height as u32, ExtendedColorType::L16)
         .map_err(|error| io(std::io::Error::other(error)))

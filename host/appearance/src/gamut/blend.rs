@@ -4,17 +4,24 @@
 //! and are never exact. Any average of the two is printable.
 //! Method: the weight s falls from 1 at an invisible distance to 0 at an obvious one (smoothstep). A guided filter then
 //! smooths it within a material and lets it change where the material does, so that no new edges appear.
-//! Cost: 20 passes over the pixels, independent of the radius.
+//! Cost: 20 passes over the pixels, independent of the radius, and a comparison of each pixel with its average.
 //! Source: He, Sun & Tang 2010 for the filter; the guide is the mean cube root of the reflected radiance.
 
 use rayon::prelude::*;
 
+use super::candidates::Candidates;
+use super::clamp::Clamped;
+use super::error::GamutError;
+use super::moved::{Solver, in_pixel};
 use super::prune::prune;
+use crate::materials::Materials;
 use crate::weights::{ONE, WeightMaps, quantise};
 
 /// The distance up to which a clamped pixel counts as in the gamut, and the one from which it counts as far outside.
 const INVISIBLE: f32 = 0.01;
 const OBVIOUS: f32 = 0.05;
+/// Pixels per parallel task.
+const RUN: usize = 1024;
 /// Half the window of the filter, in pixels, and the difference in brightness that counts as an edge.
 const RADIUS: usize = 8;
 const EDGE: f64 = 0.02;
@@ -31,29 +38,51 @@ pub(super) fn shares(distance: &[f32], brightness: &[f32], width: usize) -> Vec<
     guided(&near, brightness, width, RADIUS, EDGE * EDGE)
 }
 
-/// Averages the clamped weights of each pixel (over as many candidates as a row of `bases` has) with its mixture of the
-/// mapped bases; `s` is the weight of the former. Weights below 0.5 % are left out.
-pub(super) fn mix(clamped: &mut [u16], s: &[f32], maps: &WeightMaps, bases: &[Vec<u16>]) {
-    let k = bases[0].len();
-    clamped.par_chunks_mut(k * 1024).enumerate().for_each(|(chunk, clamped)| {
+/// Averages the clamped mixture of each pixel with its mixture of the mapped bases; `s` is the weight of the former. The
+/// distances become those of the averages.
+pub(super) fn mix(
+    candidates: &Candidates,
+    pixels: &dyn Materials,
+    clamped: &mut Clamped,
+    s: &[f32],
+    maps: &WeightMaps,
+    bases: &[Vec<u16>],
+) -> Result<(), GamutError> {
+    let k = candidates.len();
+    let seen = clamped.distance.par_chunks_mut(RUN).zip(clamped.light.par_chunks_mut(RUN));
+    let runs = clamped.shares.par_chunks_mut(k * RUN).zip(seen).enumerate();
+    runs.map(|(run, (shares, (distance, light)))| {
+        let mut solver = Solver::new(candidates, pixels);
         let mut row = vec![0.0; k];
-        for (i, shares) in clamped.chunks_exact_mut(k).enumerate() {
-            let pixel = chunk * 1024 + i;
-            let s = f64::from(s[pixel]);
-            row.fill(0.0);
-            for (&weight, basis) in maps.at(pixel).iter().zip(bases) {
-                if weight > 0 {
-                    let w = (1.0 - s) * f64::from(weight) / f64::from(ONE);
-                    row.iter_mut().zip(basis).for_each(|(row, &b)| *row += w * f64::from(b));
-                }
-            }
-            for (row, &share) in row.iter_mut().zip(shares.iter()) {
-                *row = (*row + s * f64::from(share)) / f64::from(ONE);
-            }
-            prune(&mut row);
-            quantise(&row, shares);
+        for (i, shares) in shares.chunks_exact_mut(k).enumerate() {
+            let pixel = run * RUN + i;
+            average(shares, s[pixel], maps.at(pixel), bases, &mut row);
+            solver.aim(pixel).map_err(in_pixel(pixel, pixels.width()))?;
+            solver.start(shares);
+            distance[i] = solver.compare() as f32;
+            light[i] = solver.light() as f32;
         }
-    });
+        Ok(())
+    })
+    .collect()
+}
+
+/// The average of a pixel's clamped mixture, with weight `s`, and its mixture of the mapped bases. Weights below 0.5 % are
+/// left out. `row` has room for one number a candidate.
+pub(super) fn average(shares: &mut [u16], s: f32, weights: &[u16], bases: &[Vec<u16>], row: &mut [f64]) {
+    let s = f64::from(s);
+    row.fill(0.0);
+    for (&weight, basis) in weights.iter().zip(bases) {
+        if weight > 0 {
+            let w = (1.0 - s) * f64::from(weight) / f64::from(ONE);
+            row.iter_mut().zip(basis).for_each(|(row, &b)| *row += w * f64::from(b));
+        }
+    }
+    for (row, &share) in row.iter_mut().zip(shares.iter()) {
+        *row = (*row + s * f64::from(share)) / f64::from(ONE);
+    }
+    prune(row);
+    quantise(row, shares);
 }
 
 /// The guided filter, with the result limited to 0..=1.

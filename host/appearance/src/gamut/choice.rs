@@ -3,11 +3,13 @@
 //! Problem: the model tells hundreds of stacks apart, of which a document gains by a few, and some of the usual ones print
 //! badly.
 //! Method: a sample is fitted to all stacks of the chosen cartridges. Of those beyond the usual ones, the ones with the largest
-//! shares stay. Then each stack that a rule advises against is left out, those in least use first, as long as the sample
-//! stays within 1 % of the distance it had. Cost: one fit of the sample, and one of the targets concerned for each such stack.
+//! shares stay, and so do those with the largest shares where no stack may be used that a rule advises against: what takes
+//! such a stack's place has no share beside it. Then the stacks advised against are left out, all of them or those in least
+//! use first, as long as the sample stays within 1 % of the distance it had. Cost: one fit of the sample, and one of the
+//! targets concerned for each such stack.
 
 use super::candidates::Candidates;
-use super::fitted::Targets;
+use super::fitted::{Fitted, Targets};
 use crate::solve::MixtureError;
 
 /// The most stacks beyond the usual ones, and the share of the document from which one is worth it.
@@ -27,29 +29,59 @@ pub(super) fn choose(
 ) -> Result<Vec<usize>, MixtureError> {
     let fitted = targets.fit(candidates, allowed, None)?;
     let shares = targets.shares(&fitted);
-    let mut extra: Vec<usize> =
-        allowed.iter().copied().filter(|&k| candidates.extra[k] && shares[k] >= WORTH).collect();
-    extra.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
-    extra.truncate(MOST_EXTRA);
+    let mut extra = worthwhile(candidates, allowed, &shares);
+    let without_warned =
+        |some: &[usize]| -> Vec<usize> { some.iter().copied().filter(|&k| !candidates.warned[k]).collect() };
+    let free = without_warned(allowed);
+    let (mut instead, mut without) = (Vec::new(), None);
+    if !free.is_empty() && allowed.iter().any(|&k| candidates.warned[k] && shares[k] > 0.0) {
+        // Afresh: what is left of a mixture without most of it may be no good start.
+        let fitted = targets.fit(candidates, &free, None)?;
+        instead = worthwhile(candidates, &free, &targets.shares(&fitted));
+        without = Some(fitted);
+        instead.retain(|k| !extra.contains(k));
+        extra.extend(&instead);
+    }
     let mut chosen: Vec<usize> =
         allowed.iter().copied().filter(|k| !candidates.extra[*k] || extra.contains(k)).collect();
 
     let mut fitted = targets.fit(candidates, &chosen, Some(&fitted))?;
     let most = fitted.loss * SLACK + UNSEEN;
-    let shares = targets.shares(&fitted);
-    let mut warned: Vec<usize> = chosen.iter().copied().filter(|&k| candidates.warned[k]).collect();
-    warned.sort_by(|&a, &b| shares[a].total_cmp(&shares[b]).then(a.cmp(&b)));
-    for stack in warned {
-        let without: Vec<usize> = chosen.iter().copied().filter(|&k| k != stack).collect();
-        if without.is_empty() {
-            break;
+    // Takes them instead, if the sample stays near enough.
+    let take = |some: Vec<usize>, start: Option<&Fitted>, chosen: &mut Vec<usize>, fitted: &mut Fitted| {
+        if some.is_empty() || some.len() == chosen.len() {
+            return Ok(some.len() == chosen.len());
         }
-        let less = targets.fit(candidates, &without, Some(&fitted))?;
-        if less.loss <= most {
-            (chosen, fitted) = (without, less);
+        let less = targets.fit(candidates, &some, start.or(Some(fitted)))?;
+        let near = less.loss <= most;
+        if near {
+            (*chosen, *fitted) = (some, less);
+        }
+        Ok::<_, MixtureError>(near)
+    };
+    if !take(without_warned(&chosen), without.as_ref(), &mut chosen, &mut fitted)? {
+        let shares = targets.shares(&fitted);
+        let mut warned: Vec<usize> = chosen.iter().copied().filter(|&k| candidates.warned[k]).collect();
+        warned.sort_by(|&a, &b| shares[a].total_cmp(&shares[b]).then(a.cmp(&b)));
+        for stack in warned {
+            let others = chosen.iter().copied().filter(|&k| k != stack).collect();
+            take(others, None, &mut chosen, &mut fitted)?;
         }
     }
+    // What was to take the place of stacks that had to stay is not offered.
+    let shares = targets.shares(&fitted);
+    let needed = chosen.iter().copied().filter(|k| !instead.contains(k) || shares[*k] >= WORTH).collect();
+    take(needed, None, &mut chosen, &mut fitted)?;
     Ok(chosen)
+}
+
+/// The stacks beyond the usual ones that are worth it, those with the largest shares first.
+fn worthwhile(candidates: &Candidates, allowed: &[usize], shares: &[f64]) -> Vec<usize> {
+    let mut extra: Vec<usize> =
+        allowed.iter().copied().filter(|&k| candidates.extra[k] && shares[k] >= WORTH).collect();
+    extra.sort_by(|&a, &b| shares[b].total_cmp(&shares[a]).then(a.cmp(&b)));
+    extra.truncate(MOST_EXTRA);
+    extra
 }
 
 #[cfg(test)]
@@ -78,6 +110,8 @@ mod tests {
         };
         // Just as dark: it takes the place of the one that prints badly.
         assert_eq!(chosen(0.004, 0.003), [0, 2]);
+        // A little lighter: it has no share beside the other, and is found all the same.
+        assert_eq!(chosen(0.004_01, 0.003), [0, 2]);
         // Not nearly: what prints badly is needed, and the other is no help.
         assert_eq!(chosen(0.03, 0.003), [0, 1]);
         // Nothing but the substrate is needed, and a usual stack stays if no rule is against it.

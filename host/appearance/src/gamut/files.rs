@@ -1,7 +1,7 @@
 //! A mapped document as a folder: `mix.toml` and one 16-bit grey PNG per weight map.
 //!
-//! `mix.toml` holds the stacks and the matrix. `weights-000.png` and so on hold a weight `w` (of 32768) as
-//! `w * 65535 / 32768`, rounded, so that full weight is white in any viewer; reading restores the same weights. Reading is
+//! `mix.toml` holds the stacks and the matrix. `weights-000.png` and so on hold the weights as greys
+//! ([`grey`](crate::weights::grey)); reading restores the same weights. Reading is
 //! strict: wrong sizes, wrong sums and unknown keys are errors that name the file and the field. Each file is written under
 //! a temporary name and renamed; a caller that needs the whole folder to appear at once must rename it too.
 
@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::mix::{InkMix, MixError};
+use crate::weights::grey::{from_greys, to_grey};
 use crate::weights::{ONE, WeightError, WeightMaps};
 
 /// The name of the description in the folder.
@@ -203,8 +204,13 @@ pub fn load(folder: &Path) -> Result<(InkMix, Provenance), MixFileError> {
             data.resize(width * height * channels, 0);
         }
         for (pixel, grey) in grey.chunks_exact(2).enumerate() {
-            data[pixel * channels + channel] = from_grey(u16::from_be_bytes([grey[0], grey[1]]));
+            data[pixel * channels + channel] = u16::from_be_bytes([grey[0], grey[1]]);
         }
+    }
+    let mut grey = vec![0; channels];
+    for weights in data.chunks_exact_mut(channels) {
+        grey.copy_from_slice(weights);
+        from_greys(&grey, weights);
     }
     let maps = WeightMaps::new(width, height, channels, data)
         .map_err(|source| MixFileError::Weights { path: folder.to_path_buf(), source })?;
@@ -238,15 +244,6 @@ fn map_name(channel: usize) -> String {
     format!("weights-{channel:03}.png")
 }
 
-fn to_grey(weight: u16) -> u16 {
-    // At most ONE, so at most 65535.
-    ((u32::from(weight) * 65535 + u32::from(ONE) / 2) / u32::from(ONE)) as u16
-}
-
-fn from_grey(grey: u16) -> u16 {
-    ((u32::from(grey) * u32::from(ONE) + 32767) / 65535) as u16
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -271,14 +268,6 @@ mod tests {
         assert!(text.contains(from), "{text}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
         observe::with_causes(&load(folder.path()).unwrap_err())
-    }
-
-    #[test]
-    fn every_weight_survives_its_grey() {
-        for weight in 0..=ONE {
-            assert_eq!(from_grey(to_grey(weight)), weight);
-        }
-        assert_eq!(to_grey(ONE), u16::MAX);
     }
 
     #[test]
@@ -328,6 +317,35 @@ mod tests {
         assert!(observe::with_causes(&error).contains("pixel (0, 0)"), "{error}");
         std::fs::remove_file(&path).unwrap();
         assert!(matches!(load(folder.path()), Err(MixFileError::Io { .. })));
+    }
+
+    /// Painted greys of which no weight is a whole number, though they sum to white: as they are read in a `.foil` folder.
+    #[test]
+    fn greys_that_sum_to_white_are_weights() {
+        let folder = saved();
+        let path = folder.path().join(FILE_NAME);
+        let text = std::fs::read_to_string(&path).unwrap();
+        let at = text.find("matrix").unwrap();
+        let end = at + text[at..].find("\n[").unwrap_or(text.len() - at);
+        let unit = "matrix = [[32768, 0, 0], [0, 32768, 0], [0, 0, 32768]]\n";
+        let text = format!("{}{unit}{}", &text[..at], &text[end..]);
+        std::fs::write(&path, text.replace("width = 3", "width = 1").replace("height = 2", "height = 1"))
+            .unwrap();
+        let paint = |greys: [u16; 3]| {
+            for (channel, grey) in greys.into_iter().enumerate() {
+                let file = File::create(folder.path().join(map_name(channel))).unwrap();
+                let mut encoder = png::Encoder::new(file, 1, 1);
+                encoder.set_color(png::ColorType::Grayscale);
+                encoder.set_depth(png::BitDepth::Sixteen);
+                encoder.write_header().unwrap().write_image_data(&grey.to_be_bytes()).unwrap();
+            }
+            load(folder.path())
+        };
+        let (read, _) = paint([32767, 19661, 13107]).unwrap();
+        assert_eq!(read.maps.at(0).iter().map(|&w| u32::from(w)).sum::<u32>(), u32::from(ONE));
+        assert!(read.maps.at(0).iter().zip([16383, 9830, 6553]).all(|(&w, near)| w.abs_diff(near) <= 1));
+        let error = paint([32767, 19661, 13200]).unwrap_err();
+        assert!(observe::with_causes(&error).contains("pixel (0, 0)"), "{error}");
     }
 
     #[test]

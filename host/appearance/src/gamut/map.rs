@@ -6,24 +6,27 @@ use inks::{InkSet, Stack};
 use observe::Observer;
 use protocol::ink::Ink;
 
+use super::basis::Bases;
 use super::candidates::{Candidates, Printable};
 use super::cartridges::{Cartridges, Precision};
 use super::clamp::Clamped;
 use super::error::GamutError;
 use super::fitted::Targets;
 use super::gloss::FEW_MERGED;
-use super::report::{GivenUp, Mapped, PixelReport, Report};
+use super::report::{GivenUp, Judged, Mapped, PixelReport, Report};
 use super::settings::{Gloss, Intent, Settings};
 use super::{assemble, basis, blend, cartridges, choice, clamp, eye, local, sample, typical};
-use crate::brdf::Table;
+use crate::brdf::{Space, Table};
 use crate::materials::{Factored, Materials};
 use crate::solve::MixtureError;
-use crate::weights::WeightMaps;
+use crate::weights::{ONE, WeightMaps};
 
 /// Pixels that the intent is chosen by and pairs are drawn from.
 const SAMPLE: usize = 1024;
 /// Pixels that cartridges are chosen by.
 const CARTRIDGE_SAMPLE: usize = 256;
+/// The automatic choice blends if at most this share of the pairs that clamping merges are still merged.
+const HELPS: f64 = 0.8;
 
 /// Pixels of that sample from which typical materials are chosen.
 const TYPICAL_SAMPLE: usize = 256;
@@ -41,25 +44,28 @@ pub fn map<'a, E: From<GamutError>>(
     observer: &dyn Observer,
 ) -> Result<Mapped, E> {
     let document = Pixels::new(pixels, printable, settings)?;
-    let (chosen, bases) = match settings.intent {
-        Intent::Clamp | Intent::Contrast => {
-            return Ok(document.fitted(&document.choose(None, observer)?, observer)?);
-        }
+    match settings.intent {
+        Intent::Clamp | Intent::Contrast => document.fitted(&document.choose(None, observer)?, observer),
         Intent::Auto => {
             let chosen = document.choose(None, observer)?;
-            if document.clamping_keeps(&chosen, observer)? {
+            if document.clamping_keeps(&chosen)? {
                 return Ok(document.fitted(&chosen, observer)?);
             }
-            (chosen, factored()?)
+            let bases = factored()?;
+            check_bases(&bases, pixels)?;
+            document.blended_if_that_helps(&chosen, &bases, observer)
         }
         Intent::Basis | Intent::Blend => {
             let bases = factored()?;
             check_bases(&bases, pixels)?;
-            (document.choose(Some(&bases), observer)?, bases)
+            let chosen = document.choose(Some(&bases), observer)?;
+            match settings.intent {
+                Intent::Basis => document.by_bases(&chosen, &bases, observer),
+                _ => document.blended(&chosen, &bases, document.blend(&chosen, &bases, observer)?, observer),
+            }
         }
-    };
-    check_bases(&bases, pixels)?;
-    Ok(document.with_bases(&chosen, &bases, observer)?)
+    }
+    .map_err(E::from)
 }
 
 /// [`map`] with [`Intent::Clamp`], which needs no bases.
@@ -76,7 +82,8 @@ pub fn clamped(
     document.fitted(&document.choose(None, observer)?, observer)
 }
 
-/// How much nearer a document gets with more inks: root mean square distances of a sample, in the metric of the settings.
+/// How much nearer inks come to a document with others beside them: root mean square distances of what cartridges are chosen by
+/// ([`Judged`]), in the metric of the settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gain {
     /// With the inks at hand.
@@ -87,29 +94,29 @@ pub struct Gain {
     pub inks: Vec<Ink>,
 }
 
-/// What the stacks of `more` would bring beside those at hand, under the same limit of cartridges; `None` if nothing.
-/// `before` is the distance with those at hand if a mapping without bases has found it ([`Mapped::sampled`]).
+/// What the stacks of `more` would bring beside those at hand, under the same limit of cartridges, to what a mapping with
+/// `settings` judged its cartridges by ([`Mapped::judged`]); `None` if nothing.
 ///
 /// # Errors
 /// Those of the mapping.
 pub fn gain(
-    pixels: &dyn Materials,
+    judged: &Judged,
     at_hand: &Printable,
-    before: Option<f64>,
     more: &Printable,
+    space: &Space,
     settings: &Settings,
 ) -> Result<Option<Gain>, GamutError> {
-    let settings = Settings { intent: Intent::Clamp, ..settings.clone() };
-    let distance = |printable| -> Result<(f64, InkSet), GamutError> {
-        let document = Pixels::new(pixels, printable, &settings)?;
-        let best = document.cartridges(&document.targets(None)?, &observe::Silent)?;
-        Ok((best.chosen, InkSet::of(best.stacks.iter().flat_map(|&k| document.all.inks[k].iter()))))
-    };
-    let before = before.map_or_else(|| Ok(distance(at_hand)?.0), Ok::<_, GamutError>)?;
-    let (after, best) = distance(more)?;
+    check_stacks(more)?;
+    let all = Candidates::new(space, more, settings.light).map_err(in_target("the stacks"))?;
+    let rows = judged.rows.rows().enumerate();
+    let rows = rows.map(|(i, row)| all.free.target(row).map_err(in_target(format!("material {i}"))));
+    let targets = Targets { rows: rows.collect::<Result<_, _>>()?, importance: judged.importance.clone() };
+    let best =
+        cartridges::choose(&all, &targets, settings.most_cartridges, Precision::PRINT, &observe::Silent)?;
+    let used = InkSet::of(best.stacks.iter().flat_map(|&k| all.inks[k].iter()));
     let known = InkSet::of(at_hand.stacks.iter().flat_map(|stack| stack.layers().iter().copied()));
-    let inks = best.iter().filter(|&ink| !known.contains(ink)).collect();
-    let gain = Gain { before, after, inks };
+    let inks = used.iter().filter(|&ink| !known.contains(ink)).collect();
+    let gain = Gain { before: judged.distance, after: best.chosen, inks };
     Ok((gain.after < gain.before && !gain.inks.is_empty()).then_some(gain))
 }
 
@@ -141,7 +148,7 @@ pub fn choose(
 ) -> Result<Choice, GamutError> {
     let settings = Settings { intent: Intent::Clamp, ..settings.clone() };
     let document = Pixels::new(pixels, printable, &settings)?;
-    let targets = document.targets(None)?;
+    let (targets, _) = document.targets(None)?;
     let all = &document.all;
     let best = cartridges::choose(all, &targets, settings.most_cartridges, Precision::EXACT, observer)?;
     Ok(Choice {
@@ -166,8 +173,14 @@ struct Pixels<'a> {
 struct Chosen {
     candidates: Candidates,
     given_up: Vec<GivenUp>,
-    /// Root mean square distance of the sample with the cartridges that were.
-    distance: f64,
+    judged: Judged,
+}
+
+/// Clamped pixels and mapped bases, and the weight of the former at each pixel.
+struct Blend {
+    bases: Bases,
+    clamped: Clamped,
+    s: Vec<f32>,
 }
 
 impl<'a> Pixels<'a> {
@@ -185,12 +198,18 @@ impl<'a> Pixels<'a> {
     }
 
     /// What cartridges and stacks are chosen by: sampled pixels and the bases, whichever the intent maps.
-    fn targets(&self, bases: Option<&Factored>) -> Result<Targets, GamutError> {
+    fn targets(&self, bases: Option<&Factored>) -> Result<(Targets, Table), GamutError> {
+        let mut rows = Table::new(self.pixels.space().columns());
         let mut targets = Targets { rows: Vec::new(), importance: Vec::new() };
+        let mut add = |row: &[f64], importance: f64, what: String| {
+            rows.push(row);
+            targets.rows.push(self.all.free.target(row).map_err(in_target(what))?);
+            targets.importance.push(importance);
+            Ok::<_, GamutError>(())
+        };
         if let Some(bases) = bases {
             for (i, (row, share)) in bases.bases.rows().zip(bases.shares()).enumerate() {
-                targets.rows.push(self.all.free.target(row).map_err(in_target(format!("basis {i}")))?);
-                targets.importance.push(share);
+                add(row, share, format!("basis {i}"))?;
             }
         }
         if self.settings.intent != Intent::Basis {
@@ -198,17 +217,16 @@ impl<'a> Pixels<'a> {
             let total = self.pixels.width() * self.pixels.height();
             let few = sample::pixels(total, CARTRIDGE_SAMPLE, self.settings.seed ^ 1);
             for (row, pixel) in sample::rows(self.pixels, &few).rows().zip(&few) {
-                targets.rows.push(self.all.free.target(row).map_err(in_target(format!("pixel {pixel}")))?);
-                targets.importance.push(1.0 / few.len() as f64);
+                add(row, 1.0 / few.len() as f64, format!("pixel {pixel}"))?;
             }
         }
-        Ok(targets)
+        Ok((targets, rows))
     }
 
     fn cartridges(&self, targets: &Targets, observer: &dyn Observer) -> Result<Cartridges, GamutError> {
         let most = self.settings.most_cartridges;
         let cartridges = cartridges::choose(&self.all, targets, most, Precision::PRINT, observer)?;
-        if let Some(words) = in_words(&cartridges, most) {
+        if let Some(words) = in_words(&cartridges, self.settings) {
             observer.note(&words);
         }
         Ok(cartridges)
@@ -216,32 +234,41 @@ impl<'a> Pixels<'a> {
 
     /// Chooses cartridges, and the stacks that they print.
     fn choose(&self, bases: Option<&Factored>, observer: &dyn Observer) -> Result<Chosen, GamutError> {
-        let targets = self.targets(bases)?;
+        let (targets, rows) = self.targets(bases)?;
         let cartridges = self.cartridges(&targets, observer)?;
         let stacks =
             choice::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
         let candidates = self.all.subset(&stacks);
         check_number(&candidates.stacks)?;
-        Ok(Chosen { candidates, given_up: cartridges.given_up, distance: cartridges.chosen })
+        let judged = Judged { rows, importance: targets.importance, distance: cartridges.chosen };
+        Ok(Chosen { candidates, given_up: cartridges.given_up, judged })
     }
 
     /// Whether clamping keeps most pairs of sampled materials apart.
-    fn clamping_keeps(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<bool, GamutError> {
+    fn clamping_keeps(&self, chosen: &Chosen) -> Result<bool, GamutError> {
         let clamped = clamp::rows(&chosen.candidates, &self.sample)?;
-        let merged = sample::merged_share(self.pixels.space(), &self.sample, &clamped, self.settings.seed);
-        if merged > FEW_MERGED {
-            observer.note(&format!(
-                "{:.0} % of the pairs of different materials would look alike if each were printed as closely as the inks \
-                 allow, so closeness is traded for difference (intent `blend`); choose intent `clamp` for closeness alone, \
-                 `basis` for differences alone",
-                100.0 * merged
-            ));
-        }
-        Ok(merged <= FEW_MERGED)
+        Ok(self.merged(&clamped) <= FEW_MERGED)
+    }
+
+    /// The share of pairs of sampled pixels that are merged if these rows are what is printed there.
+    fn merged(&self, printed: &Table) -> f64 {
+        sample::merged_share(self.pixels.space(), &self.sample, printed, self.settings.seed)
     }
 
     /// Fits each pixel, without bases.
     fn fitted(&self, chosen: &Chosen, observer: &dyn Observer) -> Result<Mapped, GamutError> {
+        let clamped = clamp::map(&chosen.candidates, self.pixels, observer)?;
+        self.without_bases(chosen, clamped, None, observer)
+    }
+
+    /// What becomes of clamped pixels without bases.
+    fn without_bases(
+        &self,
+        chosen: &Chosen,
+        mut clamped: Clamped,
+        not_blended: Option<f64>,
+        observer: &dyn Observer,
+    ) -> Result<Mapped, GamutError> {
         let Chosen { candidates, given_up, .. } = chosen;
         let few = TYPICAL_SAMPLE.min(self.sample.len());
         let mut some = Table::new(self.sample.columns());
@@ -249,7 +276,6 @@ impl<'a> Pixels<'a> {
         let space = self.pixels.space();
         let (rows, shares) = typical::rows(space, &some);
         let shown = basis::map(space, &rows, &shares, candidates, Gloss::Keep)?;
-        let mut clamped = clamp::map(candidates, self.pixels, observer)?;
         let mut kept = 1.0;
         let intent = match self.settings.intent {
             Intent::Contrast => {
@@ -264,11 +290,10 @@ impl<'a> Pixels<'a> {
             }
         };
         let pixels = self.report(&clamped, kept);
-        let (width, height) = (self.pixels.width(), self.pixels.height());
-        let (shares, maps) = assemble::compact(clamped.shares, candidates.len(), width, height)?;
+        let mixed = self.compact(clamped, candidates.len())?;
         self.mapped(
             chosen,
-            (shares, maps),
+            mixed,
             Report {
                 intent,
                 cartridges: Vec::new(),
@@ -276,48 +301,137 @@ impl<'a> Pixels<'a> {
                 gloss_scale: None,
                 materials: shown.reports,
                 pixels: Some(pixels),
+                not_blended,
             },
         )
     }
 
-    fn with_bases(
+    /// Maps the bases and keeps the weights.
+    fn by_bases(
         &self,
         chosen: &Chosen,
         document: &Factored,
         observer: &dyn Observer,
     ) -> Result<Mapped, GamutError> {
-        let Chosen { candidates, given_up, .. } = chosen;
+        let bases = self.bases(chosen, document)?;
+        say_gloss(&bases, observer);
+        self.mapped(
+            chosen,
+            (bases.shares, document.maps.clone()),
+            Report {
+                intent: Intent::Basis,
+                cartridges: Vec::new(),
+                given_up: chosen.given_up.clone(),
+                gloss_scale: bases.gloss_scale,
+                materials: bases.reports,
+                pixels: None,
+                not_blended: None,
+            },
+        )
+    }
+
+    fn bases(&self, chosen: &Chosen, document: &Factored) -> Result<Bases, GamutError> {
+        let Chosen { candidates, .. } = chosen;
         let space = self.pixels.space();
-        let bases = basis::map(space, &document.bases, &document.shares(), candidates, self.settings.gloss)?;
-        if let Some(factor) = bases.gloss_scale {
-            observer.note(&format!(
-                "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in print",
-                100.0 * factor
-            ));
+        basis::map(space, &document.bases, &document.shares(), candidates, self.settings.gloss)
+    }
+
+    /// Everything that a blend averages.
+    fn blend(
+        &self,
+        chosen: &Chosen,
+        document: &Factored,
+        observer: &dyn Observer,
+    ) -> Result<Blend, GamutError> {
+        let bases = self.bases(chosen, document)?;
+        let clamped = clamp::map(&chosen.candidates, self.pixels, observer)?;
+        let s = blend::shares(&clamped.distance, &clamped.brightness, self.pixels.width());
+        Ok(Blend { bases, clamped, s })
+    }
+
+    /// Blends if that keeps clearly more pairs of sampled materials apart than clamping does.
+    fn blended_if_that_helps(
+        &self,
+        chosen: &Chosen,
+        document: &Factored,
+        observer: &dyn Observer,
+    ) -> Result<Mapped, GamutError> {
+        let blend = self.blend(chosen, document, observer)?;
+        let candidates = &chosen.candidates;
+        let k = candidates.len();
+        let (mut row, mut shares) = (vec![0.0; k], vec![0; k]);
+        let reflectance =
+            |shares: &[u16]| candidates.reflectance(shares.iter().map(|&s| f64::from(s) / f64::from(ONE)));
+        let columns = self.sample.columns();
+        let (mut clamped, mut blended) = (Table::new(columns), Table::new(columns));
+        for &pixel in &self.sampled {
+            shares.copy_from_slice(&blend.clamped.shares[pixel * k..][..k]);
+            clamped.push(&reflectance(&shares));
+            blend::average(
+                &mut shares,
+                blend.s[pixel],
+                document.maps.at(pixel),
+                &blend.bases.shares,
+                &mut row,
+            );
+            blended.push(&reflectance(&shares));
         }
-        let (mixed, pixels) = if self.settings.intent == Intent::Basis {
-            ((bases.shares, document.maps.clone()), None)
-        } else {
-            let mut clamped = clamp::map(candidates, self.pixels, observer)?;
-            let s = blend::shares(&clamped.distance, &clamped.brightness, self.pixels.width());
-            let mean = s.iter().map(|&s| f64::from(s)).sum::<f64>() / s.len() as f64;
-            blend::mix(&mut clamped.shares, &s, &document.maps, &bases.shares);
-            let report = self.report(&clamped, mean);
-            let (width, height) = (self.pixels.width(), self.pixels.height());
-            (assemble::compact(clamped.shares, candidates.len(), width, height)?, Some(report))
-        };
+        let (clamped, blended) = (self.merged(&clamped), self.merged(&blended));
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        if blended > HELPS * clamped {
+            observer.note(&format!(
+                "{} of the pairs of different materials look alike in print, because the inks cannot tell them apart; intent \
+                 `blend` would merge {}, so each pixel is printed as closely as the inks allow (intent `clamp`)",
+                percent(clamped),
+                percent(blended)
+            ));
+            return self.without_bases(chosen, blend.clamped, Some(blended), observer);
+        }
+        observer.note(&format!(
+            "{} of the pairs of different materials would look alike if each were printed as closely as the inks allow, and {} \
+             do if closeness is traded for difference (intent `blend`), so it is; choose intent `clamp` for closeness alone, \
+             `basis` for differences alone",
+            percent(clamped),
+            percent(blended)
+        ));
+        self.blended(chosen, document, blend, observer)
+    }
+
+    /// Averages clamped pixels and mapped bases.
+    fn blended(
+        &self,
+        chosen: &Chosen,
+        document: &Factored,
+        Blend { bases, mut clamped, s }: Blend,
+        observer: &dyn Observer,
+    ) -> Result<Mapped, GamutError> {
+        say_gloss(&bases, observer);
+        let candidates = &chosen.candidates;
+        let mean = s.iter().map(|&s| f64::from(s)).sum::<f64>() / s.len() as f64;
+        blend::mix(candidates, self.pixels, &mut clamped, &s, &document.maps, &bases.shares)?;
+        let pixels = self.report(&clamped, mean);
+        let mixed = self.compact(clamped, candidates.len())?;
         self.mapped(
             chosen,
             mixed,
             Report {
-                intent: if pixels.is_some() { Intent::Blend } else { Intent::Basis },
+                intent: Intent::Blend,
                 cartridges: Vec::new(),
-                given_up: given_up.clone(),
+                given_up: chosen.given_up.clone(),
                 gloss_scale: bases.gloss_scale,
                 materials: bases.reports,
-                pixels,
+                pixels: Some(pixels),
+                not_blended: None,
             },
         )
+    }
+
+    fn compact(
+        &self,
+        clamped: Clamped,
+        candidates: usize,
+    ) -> Result<(Vec<Vec<u16>>, WeightMaps), GamutError> {
+        Ok(assemble::compact(clamped.shares, candidates, self.pixels.width(), self.pixels.height())?)
     }
 
     /// The facts about the pixels that are known before the mix is: all but the merged pairs.
@@ -341,18 +455,27 @@ impl<'a> Pixels<'a> {
     /// The mix, with what the report can say only of it.
     fn mapped(
         &self,
-        Chosen { candidates, distance, .. }: &Chosen,
+        Chosen { candidates, judged, .. }: &Chosen,
         (shares, maps): (Vec<Vec<u16>>, WeightMaps),
         mut report: Report,
     ) -> Result<Mapped, GamutError> {
         let (mix, curves) = assemble::assemble(candidates, shares, maps)?;
         if let Some(pixels) = &mut report.pixels {
             let printed = sample::printed(&mix, &curves, &self.sampled);
-            let seed = self.settings.seed;
-            pixels.merged = sample::merged_share(self.pixels.space(), &self.sample, &printed, seed);
+            pixels.merged = self.merged(&printed);
         }
         report.cartridges = mix.inks();
-        Ok(Mapped { mix, report, sampled: *distance })
+        Ok(Mapped { mix, report, judged: judged.clone() })
+    }
+}
+
+/// Says by how much the gloss of all bases was reduced.
+fn say_gloss(bases: &Bases, observer: &dyn Observer) {
+    if let Some(factor) = bases.gloss_scale {
+        observer.note(&format!(
+            "the gloss of all materials is reduced to {:.0} %, so that the glossiest ones still differ in print",
+            100.0 * factor
+        ));
     }
 }
 
@@ -363,19 +486,20 @@ fn in_target(what: impl Into<String>) -> impl FnOnce(MixtureError) -> GamutError
 }
 
 /// A sentence that names the inks that were left out and what that costs.
-fn in_words(cartridges: &Cartridges, most: usize) -> Option<String> {
+fn in_words(cartridges: &Cartridges, settings: &Settings) -> Option<String> {
     let names: Vec<&str> = cartridges.given_up.iter().map(|given_up| given_up.ink.name()).collect();
     let listed = match names.split_last()? {
         (last, []) => format!("{last} is"),
         (last, others) => format!("{} and {last} are", others.join(", ")),
     };
     let (before, after) = (format!("{:.4}", cartridges.all), format!("{:.4}", cartridges.chosen));
+    let measure = settings.measure();
     let cost = if before == after {
-        format!("the root mean square difference stays at {before}")
+        format!("the root mean square difference{measure} stays at {before}")
     } else {
-        format!("the root mean square difference changes from {before} to {after}")
+        format!("the root mean square difference{measure} changes from {before} to {after}")
     };
-    Some(format!("{listed} left out to use at most {most} cartridges; {cost}"))
+    Some(format!("{listed} left out to use at most {} cartridges; {cost}", settings.most_cartridges))
 }
 
 fn check_stacks(printable: &Printable) -> Result<(), GamutError> {

@@ -63,6 +63,17 @@ impl InkMix {
         Ok(mix)
     }
 
+    /// Takes the mix out and leaves bare substrate of one pixel in its place, for whoever keeps what a mix came with.
+    #[must_use]
+    pub fn take(&mut self) -> InkMix {
+        let bare = InkMix {
+            stacks: vec![Stack::SUBSTRATE],
+            maps: WeightMaps::uniform(1, 1),
+            matrix: vec![vec![ONE]],
+        };
+        std::mem::replace(self, bare)
+    }
+
     /// Checks that the parts are valid.
     pub fn check(&self) -> Result<(), MixError> {
         if self.stacks.is_empty() {

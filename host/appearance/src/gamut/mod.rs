@@ -6,7 +6,7 @@
 //! the 2009 paper: convex combinations of convex combinations are printable); [`Intent::Clamp`] maps every pixel by eq. 1;
 //! [`Intent::Blend`] changes smoothly from clamping, where the material is in the gamut, to the mapped bases, where it is
 //! far outside; [`Intent::Contrast`] clamps in the gamut and outside it keeps differences between neighbours.
-//! [`Intent::Auto`] clamps unless that merges materials that differ.
+//! [`Intent::Auto`] clamps unless that merges materials that differ and blending keeps clearly more of them apart.
 //! Cost: a millisecond per basis; 7 to 10 microseconds per pixel and core for clamp and blend, three times that for
 //! contrast. Limits: the mixture is exact only for light that does not scatter sideways in the paper.
 
@@ -43,5 +43,5 @@ pub use error::GamutError;
 pub use map::{Choice, Gain, choose, clamped, gain, map};
 pub use mix::{InkMix, MixError};
 pub use redundancy::{LeftOut, redundancy};
-pub use report::{GivenUp, Mapped, MaterialReport, PixelReport, Report};
+pub use report::{GivenUp, Judged, Mapped, MaterialReport, PixelReport, Report};
 pub use settings::{Gloss, Intent, LIGHT, Settings};

@@ -5,6 +5,7 @@ use protocol::ink::Ink;
 
 use super::mix::InkMix;
 use super::settings::Intent;
+use crate::brdf::Table;
 
 /// A mapped document and the report of the mapping.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,9 +14,19 @@ pub struct Mapped {
     pub mix: InkMix,
     /// The report.
     pub report: Report,
-    /// Root mean square distance, with the cartridges chosen and in the metric of the settings, of what they were chosen by:
-    /// sampled pixels, the bases or both, whichever the intent maps.
-    pub sampled: f64,
+    /// What cartridges were chosen by.
+    pub judged: Judged,
+}
+
+/// What cartridges were chosen by: sampled pixels, the bases or both, whichever the intent maps.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Judged {
+    /// Their reflectance (1/sr), one per row.
+    pub rows: Table,
+    /// What each counts.
+    pub importance: Vec<f64>,
+    /// Their root mean square distance with the cartridges chosen, in the metric of the settings.
+    pub distance: f64,
 }
 
 /// The report of a mapping.
@@ -34,6 +45,9 @@ pub struct Report {
     pub materials: Vec<MaterialReport>,
     /// The pixels, for the intents that map them.
     pub pixels: Option<PixelReport>,
+    /// The share of merged pairs ([`PixelReport::merged`]) that [`Intent::Blend`] would leave, if [`Intent::Auto`] tried it
+    /// and clamped all the same.
+    pub not_blended: Option<f64>,
 }
 
 /// An ink that was left out: root mean square distances of the sample, in the metric of the settings.
@@ -80,7 +94,7 @@ pub struct MaterialReport {
 /// The pixels of a mapping that fits each of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelReport {
-    /// Root mean square distance d between pixels and their mixtures; for blend, between pixels and their clamped mixtures.
+    /// Root mean square distance d between pixels and their mixtures.
     pub rms: f64,
     /// Root mean square distance in light between them.
     pub light: f64,
@@ -88,7 +102,7 @@ pub struct PixelReport {
     pub p95: f64,
     /// The largest distance d.
     pub max: f64,
-    /// The largest gap of any pixel before pruning, in squared distance.
+    /// The largest gap of any clamped pixel before pruning, in squared distance.
     pub gap: f64,
     /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
     pub merged: f64,

@@ -6,7 +6,8 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intent {
-    /// Clamp, unless that merges more than 1 % of the pairs of different materials; then blend.
+    /// Clamp, unless that merges more than 1 % of the pairs of different materials and blending at least a fifth fewer; then
+    /// blend.
     #[default]
     Auto,
     /// Map the bases and keep the weights: relative differences survive.
@@ -71,5 +72,12 @@ impl Default for Settings {
             most_cartridges: 7,
             seed: 1,
         }
+    }
+}
+
+impl Settings {
+    /// What a difference in this metric counts, in words that follow "difference".
+    pub fn measure(&self) -> &'static str {
+        if self.light > 0.0 { ", light included," } else { " d" }
     }
 }

@@ -237,14 +237,106 @@ fn the_ladder_stays_a_ladder_when_its_ends_are_the_bases() {
 }
 
 #[test]
-fn clamping_the_ladder_merges_it_and_the_automatic_choice_knows() {
+fn clamping_the_ladder_merges_it() {
     let weight = |p: usize, c: usize| f64::from(u8::from(p == c));
     let clamp = Settings { intent: Intent::Clamp, ..Settings::default() };
     let (clamped, report) = rungs(&[0, 1, 2, 3], weight, &clamp);
     assert!(clamped[..3].iter().all(|r| *r > 0.99), "{clamped:?}");
     assert!(report.pixels.unwrap().merged > 0.01);
-    let (_, report) = rungs(&[0, 1, 2, 3], weight, &Settings::default());
-    assert_eq!(report.intent, Intent::Blend);
+}
+
+/// Stripes of gloss far beyond what can be printed, each a basis: clamping prints them alike, a blend scales them apart.
+#[test]
+fn the_automatic_choice_blends_where_that_keeps_materials_apart() {
+    let space = space();
+    let (printable, _) = ladder(&space);
+    let stripes = [4.0, 2.0, 1.0].map(|s| surface([0.3; 3], [s; 3], 0.2));
+    let stripe = |pixel: usize| pixel % 72 / 24;
+    let document =
+        document(&space, &stripes, maps(72, 8, 3, |pixel, c| f64::from(u8::from(stripe(pixel) == c))));
+    let run = |intent| {
+        let settings = Settings { intent, ..Settings::default() };
+        map(&document, None, &printable, &settings, &Silent).unwrap()
+    };
+    let (auto, clamped) = (run(Intent::Auto), run(Intent::Clamp));
+    let merged = |mapped: &Mapped| mapped.report.pixels.unwrap().merged;
+    assert_eq!(auto.report.intent, Intent::Blend);
+    assert!(merged(&auto) < 0.8 * merged(&clamped), "{} {}", merged(&auto), merged(&clamped));
+}
+
+/// All materials that clamping merges are far outside the gamut, and one basis stands for them: a blend prints all of them as that
+/// basis and keeps no more apart.
+#[test]
+fn the_automatic_choice_clamps_where_a_blend_merges_as_many() {
+    let space = space();
+    let (printable, _) = ladder(&space);
+    let surfaces: Vec<Surface> =
+        (0..64).map(|i| surface([0.3; 3], [0.1 + 0.1 * (i % 8) as f32; 3], 0.2)).collect();
+    let one = document(&space, &surfaces[7..8], WeightMaps::uniform(8, 8));
+    let pixels = Field { space: space.clone(), width: 8, surfaces };
+    let run = |intent| {
+        let settings = Settings { intent, ..Settings::default() };
+        map(&one, Some(&pixels), &printable, &settings, &Silent).unwrap()
+    };
+    let (auto, clamped, blended) = (run(Intent::Auto), run(Intent::Clamp), run(Intent::Blend));
+    let merged = |mapped: &Mapped| mapped.report.pixels.unwrap().merged;
+    assert!(merged(&clamped) > 0.01 && merged(&blended) >= merged(&clamped), "{}", merged(&blended));
+    assert_eq!((auto.report.intent, auto.report.not_blended), (Intent::Clamp, Some(merged(&blended))));
+    assert_eq!((auto.mix, auto.report.pixels), (clamped.mix, clamped.report.pixels));
+}
+
+/// The figures of a blend are those of what is printed, not of what was clamped on the way.
+#[test]
+fn reported_distances_are_those_of_the_mix() {
+    let space = space();
+    let printable = everything(&space);
+    let pixels = field(&space, 20, 19);
+    let document = document(&space, &four(), pattern(20, 19));
+    for intent in [Intent::Clamp, Intent::Blend, Intent::Contrast] {
+        let settings = Settings { intent, ..Settings::default() };
+        let mapped = map(&document, Some(&pixels), &printable, &settings, &Silent).unwrap();
+        let (mut distances, mut light) = (Vec::new(), 0.0);
+        let mut row = vec![0f32; space.columns()];
+        for pixel in 0..380 {
+            pixels.reflectance(pixel, &mut row);
+            let target: Vec<f64> = row.iter().map(|&f| f64::from(f)).collect();
+            let printed = printed_row(&mapped.mix, &printable, pixel);
+            distances.push(space.distance(&target, &printed));
+            light += space.light_distance(&target, &printed).powi(2) / 380.0;
+        }
+        distances.sort_by(f64::total_cmp);
+        let rms = (distances.iter().map(|d| d * d).sum::<f64>() / 380.0).sqrt();
+        let report = mapped.report.pixels.unwrap();
+        let expected = [rms, light.sqrt(), distances[379 * 95 / 100], distances[379]];
+        for (found, expected) in [report.rms, report.light, report.p95, report.max].iter().zip(expected) {
+            // Shares are rounded to 1/32768.
+            assert!((found - expected).abs() < 3e-4, "{intent:?}: {report:?}, not {expected}");
+        }
+    }
+}
+
+/// What other inks would bring is what a mapping with them, of the same intent, finds by the same materials.
+#[test]
+fn the_gain_of_inks_is_judged_by_what_the_intent_maps() {
+    let space = space();
+    let library = Library::builtin();
+    let few = Printable::from_library(&library, &"process,finish".parse().unwrap(), &space);
+    let more = Printable::from_library(&library, &"process,finish,SF,P".parse().unwrap(), &space);
+    let pixels = field(&space, 12, 10);
+    let document = document(&space, &four(), pattern(12, 10));
+    for intent in [Intent::Basis, Intent::Clamp, Intent::Blend] {
+        let settings = Settings { intent, gloss: Gloss::Keep, light: 0.0, ..Settings::default() };
+        let run = |printable| map(&document, Some(&pixels), printable, &settings, &Silent).unwrap();
+        let (without, with) = (run(&few), run(&more));
+        let gain = gain(&without.judged, &few, &more, &space, &settings).unwrap().unwrap();
+        assert_eq!((gain.before, gain.after), (without.judged.distance, with.judged.distance), "{intent:?}");
+        assert!(gain.inks.contains(&Ink::SilverFoil), "{gain:?}");
+        if intent == Intent::Basis {
+            let materials = &with.report.materials;
+            let square: f64 = materials.iter().map(|basis| basis.share * basis.distance.powi(2)).sum();
+            assert!((gain.after / square.sqrt() - 1.0).abs() < 0.02, "{} {}", gain.after, square.sqrt());
+        }
+    }
 }
 
 #[test]

@@ -43,6 +43,20 @@ pub enum SizeError {
         /// Printable height in mm.
         most_height: f64,
     },
+    /// Larger than any sheet, though what lies beyond the printable area would be cut off.
+    #[error(
+        "{width:.1} x {height:.1} mm does not fit the largest sheet, which has room for {most_width:.1} x {most_height:.1} mm"
+    )]
+    BeyondSheets {
+        /// Width asked for, in mm.
+        width: f64,
+        /// Height asked for, in mm.
+        height: f64,
+        /// Printable width of the largest sheet in mm.
+        most_width: f64,
+        /// Its printable height in mm.
+        most_height: f64,
+    },
     /// Less than a dot.
     #[error("{width:.4} x {height:.4} mm is smaller than a dot (1 dot is {:.4} mm)", 1.0 / DOTS_PER_MM)]
     TooSmall {
@@ -119,12 +133,13 @@ pub fn dots(
         return Err(SizeError::TooSmall { width, height });
     }
     if dots.0 > most.0 as f64 || dots.1 > most.1 as f64 {
-        return Err(SizeError::TooLarge {
-            width,
-            height,
-            paper: layout.paper.name(),
-            most_width: most.0 as f64 / DOTS_PER_MM,
-            most_height: most.1 as f64 / DOTS_PER_MM,
+        let (most_width, most_height) = (most.0 as f64 / DOTS_PER_MM, most.1 as f64 / DOTS_PER_MM);
+        return Err(match layout.cut {
+            true => SizeError::BeyondSheets { width, height, most_width, most_height },
+            false => {
+                let paper = layout.paper.name();
+                SizeError::TooLarge { width, height, paper, most_width, most_height }
+            }
         });
     }
     // No layout has more room than the largest sheet, whose sides are u16.

@@ -95,6 +95,13 @@ pub fn halftoned(
             pixels.0, pixels.1
         ));
     }
+    let across_mm = f64::from(width) / DOTS_PER_MM / pixels.0 as f64;
+    if across_mm > SOFT_MM && !is_one_material(materials) {
+        observer.note(&format!(
+            "a pixel of the document is {across_mm:.1} mm wide on paper, so borders between pixels will be about {across_mm:.0} mm \
+             soft; enlarge the maps without smoothing to print them hard"
+        ));
+    }
     let reduced = cells.map(|cells| Reduced::new(materials, cells));
     let materials: &dyn Materials = reduced.as_ref().map_or(materials, |reduced| reduced);
     let printable = Printable::combined(library, &settings.inks, materials.space());
@@ -105,7 +112,6 @@ pub fn halftoned(
         (None, _) => {
             let factor::Factoring { factored, report } =
                 factor::factor(materials, &settings.factor, observer)?;
-            observer.note(&report.to_string());
             factoring = Some(report);
             Ok::<_, StageError>(Cow::Owned(factored))
         }
@@ -113,6 +119,11 @@ pub fn halftoned(
     let mapping =
         gamut::Settings { eye: spot(width, materials.width(), settings.halftone), ..settings.gamut.clone() };
     let mapped = gamut::map(materials, bases, &printable, &mapping, observer)?;
+    // The automatic choice may have tried bases that it does not use.
+    let factoring = factoring.filter(|_| mapped.report.intent.uses_bases());
+    if let Some(report) = &factoring {
+        observer.note(&report.to_string());
+    }
     let chosen = halftone::Settings {
         method: settings.halftone,
         ..halftone::Settings::from_library(&mapped.mix.stacks, library)
@@ -124,6 +135,20 @@ pub fn halftoned(
     };
     let doubt = gamut::doubt(materials, &mapped.mix, library, settings.gamut.seed);
     Ok(Halftoned { factoring, mapped, dots, foils, doubt })
+}
+
+/// The width of a pixel on paper from which a border between two is plainly soft.
+const SOFT_MM: f64 = 2.0;
+
+/// Whether all pixels are equal. The document is coarse, so they are few.
+fn is_one_material(materials: &dyn Materials) -> bool {
+    let row = |pixel| {
+        let mut row = vec![0f32; materials.space().columns()];
+        materials.reflectance(pixel, &mut row);
+        row
+    };
+    let first = row(0);
+    (1..materials.width() * materials.height()).all(|pixel| row(pixel) == first)
 }
 
 /// Side in pixels of the spot that an eye averages over, if the dots are rearranged for the eye: then the mixtures are, too.
@@ -142,8 +167,7 @@ fn foils(
 ) -> Result<Option<Gain>, GamutError> {
     let all = InkSet::of(InkSet::default().iter().chain([Ink::SilverFoil, Ink::GoldFoil]));
     let more = Printable::combined(library, &all, materials.space());
-    let before = (!mapped.report.intent.uses_bases()).then_some(mapped.sampled);
-    gamut::gain(materials, printable, before, &more, settings)
+    gamut::gain(&mapped.judged, printable, &more, materials.space(), settings)
 }
 
 /// The resolution that a print of so many dots has for a document of so many pixels, if it is less than the document's: a

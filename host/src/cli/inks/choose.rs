@@ -60,7 +60,7 @@ fn words(choice: &Choice, name: &str, at_hand: usize) -> Result<String, std::fmt
         "best cartridges for {name}: {} of {at_hand}\n\n{:<18} {:>14} {:>9}\n",
         choice.chosen.len(),
         "cartridge",
-        "d without it",
+        "without it",
         "cost"
     );
     for given in &choice.chosen {
@@ -68,7 +68,7 @@ fn words(choice: &Choice, name: &str, at_hand: usize) -> Result<String, std::fmt
         writeln!(text, "{:<18} {:>14.4} {cost:>+9.4}", given.ink.name(), given.without)?;
     }
     if !choice.given_up.is_empty() {
-        writeln!(text, "\n{:<18} {:>14} {:>9}", "left out", "d with it", "gain")?;
+        writeln!(text, "\n{:<18} {:>14} {:>9}", "left out", "with it", "gain")?;
         for given in &choice.given_up {
             let gain = given.with - given.without;
             writeln!(text, "{:<18} {:>14.4} {gain:>+9.4}", given.ink.name(), given.with)?;
@@ -76,8 +76,8 @@ fn words(choice: &Choice, name: &str, at_hand: usize) -> Result<String, std::fmt
     }
     writeln!(
         text,
-        "\nd = {:.4} with these cartridges, {:.4} with all inks at hand: the root mean square difference over\n\
-         {} pixels, light included (0.01: barely visible; 0.05: obvious).",
+        "\n{:.4} with these cartridges, {:.4} with all inks at hand: root mean square differences over {} pixels,\n\
+         light included (0.01: barely visible; 0.05: obvious).",
         choice.distance, choice.all, choice.pixels
     )?;
     Ok(text)

@@ -12,6 +12,7 @@ use anyhow::{Context, Result};
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::SAMPLES;
 use appearance::factor::Factored;
+use appearance::gamut::InkMix;
 use image::ImageFormat;
 use inks::Library;
 use observe::Observer;
@@ -76,14 +77,13 @@ impl Shown {
             observer.note("one copy of the document is shown; `foilpress print` it and preview its job to see the whole sheet");
         }
         let bases = laid.bases(observer)?;
-        Ok(Shown::of(&laid, Some(bases)))
+        Ok(Shown::of(&laid, &laid.halftoned.mapped.mix, Some(bases)))
     }
 
-    /// A document's dots, with the document beside them where it has bases.
-    pub fn of(laid: &Laid, bases: Option<Factored>) -> Shown {
+    /// A document's dots, with the document and its mixture beside them where it has bases.
+    pub fn of(laid: &Laid, mix: &InkMix, bases: Option<Factored>) -> Shown {
         let Laid { document, library, halftoned, .. } = laid;
         let space = document.materials().space().clone();
-        let mix = &halftoned.mapped.mix;
         let words = |row: &Vec<u16>| {
             let parts = mix.stacks.iter().cloned().zip(row.iter().map(|&share| f64::from(share)));
             mix_in_words(&parts.filter(|(_, share)| *share > 0.0).collect::<Vec<_>>())
