@@ -152,6 +152,119 @@ fn a_worn_printer_prints_other_dots_and_says_which() {
     }
 }
 
+/// The height of the window is that of the whole sheet by the zoom, and the place asked for is in its middle (`seen` in
+/// geometry.js): a pixel of the zoomed picture lies on the sheet where the formula says, and nothing lies beside the sheet.
+#[test]
+fn a_zoomed_picture_shows_the_places_that_the_formula_says() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let lit = "preview tile --size 12x8mm -q --light 0,0 --distance far --exposure 0 --tone-curve 1";
+    let (zoom, x, y) = (10.0, 3.0, 0.25);
+    bench.done(&format!("{lit} -o near.png --pixels 300 --zoom {zoom} --middle {x}x{y}mm"));
+    bench.done(&format!("{lit} -o whole.png --pixels 3000"));
+    let [near, whole] =
+        ["near.png", "whole.png"].map(|name| image::open(bench.path(name)).expect("a picture").into_rgb8());
+    // The sheet is a whole number of dots.
+    let [width, height] = [12.0, 8.0].map(|mm: f64| (mm * 600.0 / 25.4).round() * 25.4 / 600.0);
+    // Millimetres of a pixel of a picture in the sheet's proportions: it shows 1.08 times the greater side.
+    let tall = |w: u32, h: u32| 1.08 * height.max(width * f64::from(h) / f64::from(w)) / f64::from(h);
+    let (small, large) = (tall(near.width(), near.height()) / zoom, tall(whole.width(), whole.height()));
+    let (mut compared, mut off, mut levels) = (0, 0, std::collections::BTreeSet::new());
+    for (px, py, found) in near.enumerate_pixels() {
+        let from_middle = |p: u32, side: u32| f64::from(p) + 0.5 - 0.5 * f64::from(side);
+        let (at_x, at_y) =
+            (x + from_middle(px, near.width()) * small, y + from_middle(py, near.height()) * small);
+        if at_y < -2.0 * small {
+            assert_eq!(found, near.get_pixel(0, 0), "beside the sheet at {px}, {py}");
+        } else if at_y > 2.0 * small {
+            let on = |at: f64, side: f64, pixels: u32| {
+                ((at - 0.5 * side) / large + 0.5 * f64::from(pixels)) as u32
+            };
+            let (ox, oy) = (on(at_x, width, whole.width()), on(at_y, height, whole.height()));
+            let expected = whole.get_pixel(ox, oy).0;
+            // The pixels of the two pictures do not lie on each other, so edges of dots differ.
+            let near = (ox - 1..=ox + 1).flat_map(|i| (oy - 1..=oy + 1).map(move |j| (i, j)));
+            let even = |p: [u8; 3]| (0..3).all(|c| p[c].abs_diff(expected[c]) < 3);
+            if near.into_iter().all(|(i, j)| even(whole.get_pixel(i, j).0)) {
+                compared += 1;
+                off += u32::from(!even(found.0));
+                levels.insert(found.0);
+            }
+        }
+    }
+    assert!(compared > 10_000 && levels.len() > 1, "{compared} places, {} colours", levels.len());
+    assert!(off * 100 < compared, "{off} of {compared} places");
+
+    bench.done(&format!("preview tile {SMALL} -o tile.html --zoom 10 --middle 3x4mm"));
+    let page = fs::read_to_string(bench.path("tile.html")).unwrap();
+    assert!(page.contains("&zoom=10&pan=-0.00"), "the page opens there");
+    for (args, expected) in [
+        ("-o out.png --middle 13x4mm", "is not on the sheet, which is 12.0 x 8.0 mm"),
+        ("-o out.glb --zoom 2", "a .glb is the whole sheet"),
+    ] {
+        let said = bench.refused(1, &format!("preview tile {SMALL} {args}"));
+        assert!(said.contains(expected), "{args}: {said}");
+    }
+}
+
+/// From near by dots show, from farther away they do not, and the sheet keeps its brightness.
+#[test]
+fn an_eye_far_away_sees_no_dots() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let contrast = |name: &str, more: &str| {
+        let said = bench.done(&format!(
+            "preview tile {SMALL} -o {name} --pixels 256 --zoom 4 --light 0,0 --distance far --json {more}"
+        ));
+        let picture = image::open(bench.path(name)).expect("a picture").into_rgba32f();
+        let values: Vec<f64> = picture.pixels().map(|p| f64::from(p.0[1])).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let spread = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        let report: Value = serde_json::from_str(&said).expect("JSON");
+        (mean, spread.sqrt() / mean, report["seen_from_mm"].clone())
+    };
+    let (mean, dots, told) = contrast("dots.exr", "");
+    assert!(told.is_null());
+    let mut last = dots;
+    for (metres, more) in [(0.1, ""), (0.5, "--missing-dots 0.1%"), (5.0, "--dot-gain 1.0001")] {
+        let (seen, spread, told) = contrast("seen.exr", &format!("--seen-from {metres}m {more}"));
+        assert_eq!(told, 1000.0 * metres);
+        assert!((seen / mean - 1.0).abs() < 0.1, "{metres} m: {seen}, not {mean}");
+        assert!(spread < 0.9 * last, "{metres} m: {spread}, after {last}");
+        last = spread;
+    }
+    for (args, expected) in [
+        ("-o out.html --seen-from 0.5m", "a page shows dots as they are"),
+        ("-o out.glb --seen-from 0.5m", "a .glb is the material"),
+    ] {
+        let said = bench.refused(1, &format!("preview tile {SMALL} {args}"));
+        assert!(said.contains(expected), "{args}: {said}");
+    }
+}
+
+/// A sky with a sun of a strength that no lamp has.
+#[test]
+fn a_real_sun_does_not_burn_the_picture_out() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let mut sky = image::Rgb32FImage::from_fn(512, 256, |_, y| {
+        let v = 0.3 + 0.7 * (255 - y) as f32 / 255.0;
+        image::Rgb([v; 3])
+    });
+    for (x, y) in [(255, 80), (256, 80), (255, 81), (256, 81)] {
+        sky.put_pixel(x, y, image::Rgb([1e5; 3]));
+    }
+    sky.save(bench.path("sun.hdr")).unwrap();
+    bench.done(&format!("preview tile {SMALL} -o sun.png --light-probe sun.hdr --pixels 120 --distance far"));
+    let picture = image::open(bench.path("sun.png")).expect("a picture").into_rgb8();
+    let white = picture.pixels().filter(|p| p.0.iter().all(|&v| v > 250)).count();
+    let total = (picture.width() * picture.height()) as usize;
+    assert!(white * 4 < total, "{white} of {total} pixels are white");
+    let mut values: Vec<u8> = picture.pixels().map(|p| p.0[0].max(p.0[1]).max(p.0[2])).collect();
+    values.sort_unstable();
+    assert!((90..240).contains(&values[total / 2]), "the middle is {}", values[total / 2]);
+}
+
 /// A print written as glTF is a document like any other.
 #[test]
 fn a_print_as_gltf_is_read_as_a_document() {

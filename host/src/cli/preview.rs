@@ -8,8 +8,7 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use ::view::page::LONGEST;
-use ::view::{Glb, Lit, Renderer, glb, places_for_dot_gain, proportions};
+use ::view::{Glb, Lit, Renderer, finer, glb, places_for_dot_gain, proportions};
 use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 use image::{DynamicImage, ImageFormat, Rgba32FImage};
@@ -42,6 +41,7 @@ enum Format {
     foilpress preview sample:leaf -o leaf.html\n  \
     foilpress preview sample:card -o card.png --light -40,30 --view 20,10 --curl 0.1\n  \
     foilpress preview sample:dove -o dove.exr --show document --light 0,60,0.5 --distance far\n  \
+    foilpress preview sample:leaf -o near.png --zoom 40 --middle 20x30mm --seen-from 0.5m\n  \
     foilpress preview sample:leaf -o leaf.glb                              (for other renderers)\n\n\
     DOC may also be a job (.rgl), or a folder written by `halftone`, `layout` or `simulate`; these show printed dots alone.\n\
     Angles are in degrees: the first to the right, the second upwards; 0,0 is straight above the sheet. All lights have the\n\
@@ -80,6 +80,15 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             args.output.display()
         );
     }
+    if format == Format::Glb && args.view.has_part() {
+        bail!("{}: a .glb is the whole sheet; leave --zoom and --middle out", args.output.display());
+    }
+    if args.view.seen_from.is_some() && format == Format::Page {
+        bail!("--seen-from: a page shows dots as they are, at whatever zoom; write a picture (.png or .exr)");
+    }
+    if args.view.seen_from.is_some() && format == Format::Glb {
+        bail!("--seen-from: a .glb is the material, whoever looks at it; write a picture (.png or .exr)");
+    }
     if format == Format::Exr && args.view.has_tone() {
         bail!("{}: an .exr holds radiance; leave --exposure and --tone-curve out", args.output.display());
     }
@@ -87,8 +96,6 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let staged = Staged::file(&args.output)?;
     let (what, is_page) = (args.view.what(), format == Format::Page);
     args.wear.check(what == Show::Printed || is_page, is_page)?;
-    // Fine enough for the picture and never much finer.
-    let mut places = if is_page { LONGEST } else { usize::from(args.pixels).clamp(64, 2048) };
     let mut shown = Shown::open(&args.dots, observer)?;
     shown.worn = args.wear.apply(&mut shown.dots, &shown.library)?;
     if shown.target.is_none() && what != Show::Printed {
@@ -105,19 +112,42 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         (page.tone, page.pixels)
     } else {
         let (size, stacks) = (shown.size(), shown.stacks());
-        if args.wear.dot_gain.is_some() {
-            places = places.max(places_for_dot_gain(size)).min(2048);
-        }
-        let mut lit = Lit::new(&shown.source(what, &stacks), size, places)?;
-        if let Some(n) = args.wear.dot_gain {
-            lit = lit.with_dot_gain(&shown.space, n);
-        }
-        if format == Format::Glb {
-            return write_glb(args, &glb(&lit, &shown.space, &shown.name, observer)?, &shown, staged);
-        }
         let (width, height) = proportions(size, args.pixels.into());
-        let scene = args.view.scene(size, width as f64 / height as f64, probe);
-        let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
+        let lit = |pixels: f64| -> Result<Lit> {
+            // A .glb has no dots to look at.
+            let mut places = match format {
+                Format::Glb => usize::from(args.pixels).clamp(64, 2048),
+                _ => shown.places(what, pixels),
+            };
+            if args.wear.dot_gain.is_some() {
+                places = places.max(places_for_dot_gain(size)).min(2048);
+            }
+            let lit = Lit::new(&shown.source(what, &stacks), size, places)?;
+            Ok(match args.wear.dot_gain {
+                Some(n) => lit.with_dot_gain(&shown.space, n),
+                None => lit,
+            })
+        };
+        let pixels = f64::from(args.pixels);
+        if format == Format::Glb {
+            let glb = glb(&lit(pixels)?, &shown.space, &shown.name, observer)?;
+            return write_glb(args, &glb, &shown, staged);
+        }
+        let scene = args.view.scene(size, width as f64 / height as f64, probe)?;
+        let pixels = pixels * args.view.zoom;
+        let radiance = match args.view.seen_from {
+            Some(metres) => {
+                let (finer, enough) = finer(&scene.camera, width, height, metres);
+                if !enough {
+                    observer.note(
+                        "the picture is coarser than what an eye sees from there; take more --pixels or a larger --zoom",
+                    );
+                }
+                let lit = lit(pixels * finer as f64)?;
+                Renderer::new(&lit).seen_from(&scene, (width, height), metres, finer, observer)?
+            }
+            None => Renderer::new(&lit(pixels)?).render(&scene, width, height, observer)?,
+        };
         let tone = args.view.tone(&radiance);
         match format {
             Format::Exr => write_exr(&radiance, staged.path())?,
@@ -132,7 +162,8 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let size_mm = shown.size().map(|side| side * 1000.0);
         let report = json!({
             "written": args.output.display().to_string(), "bytes": bytes, "name": shown.name, "size_mm": size_mm,
-            "pixels": [width, height], "exposure_stops": tone.in_stops(), "tone_curve": tone.knee, "worn": shown.worn.as_ref().map(Told::json),
+            "pixels": [width, height], "exposure_stops": tone.in_stops(), "tone_curve": tone.knee, "zoom": args.view.zoom,
+            "seen_from_mm": args.view.seen_from.map(|metres| 1000.0 * metres), "worn": shown.worn.as_ref().map(Told::json),
         });
         writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;
     } else {

@@ -4,10 +4,13 @@
 //! Method: trilinear (Williams 1983). The value is a line between two levels of the pyramid, so each level has a share, which
 //! falls to nothing one level further. For each level that a block of pixels needs, places and fractions are found in lanes
 //! over the pixels; then the weights of four places a pixel are mixed in lanes over the curves.
+//! A pixel that sees few printed dots looks at the dots instead: the mean of sixteen places of it up to two dots a pixel, as in the
+//! page, and of two places a dot in both directions where the map has fewer places than that. What dot gain takes from a dot is
+//! what it takes from the mean around, in proportion to the flat bodies.
 //! Cost: for each pixel four places of two levels. Limits: alike in all directions, so a sheet seen at a grazing angle is
 //! soft across.
 
-use crate::lit::{LANES, Level, Lit};
+use crate::lit::{Dots, LANES, Level, Lit};
 use crate::ray::{BLOCK, Hits, Values, greater, lesser};
 
 /// 2^23: numbers below it that were added to it are integers, in the lowest bits of their sum.
@@ -58,6 +61,10 @@ impl Corners {
 pub(crate) struct Weights {
     corners: Corners,
     shares: Values,
+    /// What pixels read from the map: 0 for none.
+    read: Values,
+    /// At how many places across and down pixels look at the dots: 0 for none.
+    sides: [u32; BLOCK],
     /// As many groups of lanes a pixel as the curves take.
     pub values: Vec<[f32; LANES]>,
 }
@@ -68,6 +75,8 @@ impl Weights {
         Weights {
             corners: Corners::default(),
             shares: [0.0; BLOCK],
+            read: [0.0; BLOCK],
+            sides: [0; BLOCK],
             values: vec![[0.0; LANES]; BLOCK * stride / LANES],
         }
     }
@@ -75,13 +84,28 @@ impl Weights {
     /// Reads the weights of all pixels that the sheet covers.
     #[inline(always)]
     pub fn read(&mut self, lit: &Lit, hits: &Hits) {
+        self.read = hits.covered;
+        let Some(dots) = &lit.dots else { return self.mean(lit, hits) };
+        self.sides = dots.sides(hits);
+        if lit.bodies.is_empty() {
+            for i in 0..BLOCK {
+                self.read[i] = if self.sides[i] > 0 { 0.0 } else { self.read[i] };
+            }
+        }
+        self.mean(lit, hits);
+        self.look(lit, dots, hits);
+    }
+
+    /// Reads the mean weights from the map.
+    #[inline(always)]
+    fn mean(&mut self, lit: &Lit, hits: &Hits) {
         let groups = lit.stride / LANES;
         let last = (lit.levels.len() - 1) as f32;
         // A level below the first needed one and above the last has no share in any pixel.
         let (mut first, mut end) = (u32::MAX, 0);
         for i in 0..BLOCK {
             let level = integer(floor(lesser(hits.level[i], last)));
-            let seen = hits.covered[i] > 0.0;
+            let seen = self.read[i] > 0.0;
             first = first.min(if seen { level } else { u32::MAX });
             end = end.max(if seen { level + 2 } else { 0 });
         }
@@ -90,7 +114,7 @@ impl Weights {
         for number in first as usize..end {
             for i in 0..BLOCK {
                 let share = 1.0 - (lesser(hits.level[i], last) - number as f32).abs();
-                self.shares[i] = if hits.covered[i] > 0.0 { share } else { 0.0 };
+                self.shares[i] = if self.read[i] > 0.0 { share } else { 0.0 };
             }
             let level = &lit.levels[number];
             self.corners.find(&hits.place, level.width, level.height, false);
@@ -125,6 +149,78 @@ impl Weights {
     }
 }
 
+impl Weights {
+    /// Makes the weights of pixels from the dots that they look at.
+    fn look(&mut self, lit: &Lit, dots: &Dots, hits: &Hits) {
+        let groups = lit.stride / LANES;
+        for (i, out) in self.values.chunks_exact_mut(groups).enumerate() {
+            let side = self.sides[i];
+            if side == 0 {
+                continue;
+            }
+            let out = out.as_flattened_mut();
+            let known = lit.bodies.len();
+            let around = bodies(out, &lit.bodies);
+            let lost = lit.bodies.first().map(|_| [out[known], out[known + 1], out[known + 2]]);
+            out.fill(0.0);
+            let part = 1.0 / (side * side) as f32;
+            dots.each(hits, i, side, |curve| out[usize::from(curve)] += part);
+            if let Some(lost) = lost {
+                let here = bodies(out, &lit.bodies);
+                for c in 0..3 {
+                    out[known + c] = if around[c] > 0.0 { here[c] * (lost[c] / around[c]) } else { 0.0 };
+                }
+            }
+        }
+    }
+}
+
+/// The flat body of a mixture.
+fn bodies(weights: &[f32], bodies: &[[f32; 3]]) -> [f32; 3] {
+    let mut sum = [0.0; 3];
+    for (w, body) in weights.iter().zip(bodies) {
+        (0..3).for_each(|c| sum[c] += w * body[c]);
+    }
+    sum
+}
+
+impl Dots {
+    /// For each pixel of a block, at how many places across and down it looks at the dots; 0 if it sees too many of them.
+    #[inline(always)]
+    fn sides(&self, hits: &Hits) -> [u32; BLOCK] {
+        let mut sides = [0; BLOCK];
+        for (i, side) in sides.iter_mut().enumerate() {
+            let square = |step: &[Values; 2]| {
+                let (across, down) = (step[0][i] * self.density[0], step[1][i] * self.density[1]);
+                across * across + down * down
+            };
+            let dots = greater(square(&hits.steps[0]), square(&hits.steps[1])).sqrt();
+            // Not so where it is no number, at silhouettes.
+            let few = (hits.covered[i] > 0.0) & (dots < self.few);
+            let places = if dots < 2.0 { 4 } else { 2 * integer(floor(lesser(dots, 100.0)) + 1.0) };
+            *side = if few { places } else { 0 };
+        }
+        sides
+    }
+
+    /// Calls `each` with the curve of the dot at `side` x `side` places of a pixel.
+    fn each(&self, hits: &Hits, i: usize, side: u32, mut each: impl FnMut(u8)) {
+        let step = |n: usize| {
+            let [right, up] = &hits.steps[n];
+            [right[i] * self.density[0], -up[i] * self.density[1]]
+        };
+        let (across, down) = (step(0), step(1));
+        let middle = [hits.place[0][i] * self.width as f32, hits.place[1][i] * self.height as f32];
+        let part = |n: u32| (n as f32 + 0.5) / side as f32 - 0.5;
+        let place = |at: f32, side: usize| greater(lesser(at, (side - 1) as f32), 0.0) as usize;
+        for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+            let at = |c: usize| middle[c] + part(x) * across[c] + part(y) * down[c];
+            let (column, row) = (place(at(0), self.width), place(at(1), self.height));
+            each(self.curves[row * self.width + column]);
+        }
+    }
+}
+
 /// The greatest integer up to a number from 0 to 2^22. Unlike [`f32::floor`] it is no call anywhere.
 #[inline(always)]
 pub(crate) fn floor(x: f32) -> f32 {
@@ -150,7 +246,7 @@ mod tests {
         let noise = |i: usize| (i.wrapping_mul(2_654_435_761) >> 9 & 0xffff) as f32 / 65536.0;
         let weights = (0..width * height * stride).map(noise).collect();
         let levels = pyramid(Level { width, height, weights }, stride);
-        Lit { size: [0.1, 0.1], curves: Vec::new(), stride, levels }
+        Lit { size: [0.1, 0.1], curves: Vec::new(), stride, levels, dots: None, bodies: Vec::new() }
     }
 
     /// The weight of curve `k`, by the formula of Williams in f64.

@@ -68,6 +68,7 @@ impl Lit {
             let flat = std::array::from_fn(|channel| f64::from(u8::from(channel == c)));
             self.curves.push(Curve::sampled(space.angles(), |_| flat));
         }
+        self.bodies = bodies.iter().map(|body| body.map(|d| d as f32)).collect();
         self.stride = stride;
         self.levels = pyramid(Level { width, height, weights }, stride);
         self
@@ -193,6 +194,31 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Dots that are looked at one by one lose together what their mean loses.
+    #[test]
+    fn single_dots_darken_as_their_mean() {
+        use press::sheet::{Area, DotMap};
+        let space = Space::half_angle(64);
+        let mut stacks = Table::new(space.columns());
+        for body in BODIES {
+            stacks.push(&space.row(&Curve::sampled(space.angles(), |_| body.map(|d| d / PI))));
+        }
+        let names = ["substrate", "C"].map(|stack| stack.parse::<inks::Stack>().unwrap());
+        let index = (0..SIDE * SIDE).map(|i| u8::from((i % SIDE + i / SIDE).is_multiple_of(2))).collect();
+        let dots = DotMap::new(SIDE, SIDE, names.to_vec(), index).unwrap();
+        let source = Source::Print { dots: &dots, space: &space, stacks: &stacks, area: Area::whole(&dots) };
+        let mut lit = Lit::new(&source, SIZE, SIDE).unwrap().with_dot_gain(&space, 2.0);
+        let sharp = seen(&lit, 40.0);
+        lit.dots = None;
+        let mean = seen(&lit, 40.0);
+        for c in 0..3 {
+            let root = 0.5 * (BODIES[0][c].sqrt() + BODIES[1][c].sqrt());
+            let expected = 40f64.to_radians().cos() * root * root / PI;
+            assert!((sharp[c] / expected - 1.0).abs() < 0.01, "{sharp:?}[{c}], not {expected}");
+            assert!((sharp[c] / mean[c] - 1.0).abs() < 0.01, "{sharp:?}, not {mean:?}");
         }
     }
 

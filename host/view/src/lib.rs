@@ -3,7 +3,7 @@
 //! [`Lit`] is what is lit: a few curves over the half angle and a weight for each of them at every place. A [`Scene`] says
 //! where the eye and the lights are and how the sheet is held. [`Renderer`] makes a picture of both, and [`page`] writes a
 //! page that makes the same pictures in a browser, where they follow the hand. [`glb`] writes what is lit for other programs.
-//! [`Lit::with_dot_gain`] adds what light does inside the paper. [`display`] lays a screen over a printed grid of stacks and shows what is seen.
+//! [`Lit::with_dot_gain`] adds what light does inside the paper, [`Renderer::seen_from`] what an eye does at a distance. [`display`] lays a screen over a printed grid of stacks and shows what is seen.
 //! Units: metres, radians; x points right, y up, z to the eye that looks straight at the sheet. The origin is the middle of
 //! the sheet. Radiance is that of a surface under irradiance 1 where it faces the light, linear Rec. 709.
 #![forbid(unsafe_code)]
@@ -18,6 +18,7 @@
 
 pub mod display;
 mod error;
+mod eye;
 mod footprint;
 mod gain;
 mod glb;
@@ -30,6 +31,7 @@ mod scene;
 mod surroundings;
 
 pub use error::ViewError;
+pub use eye::finer;
 pub use gain::{DOT_GAIN, places_for_dot_gain};
 pub use glb::{Glb, glb};
 pub use lit::{Lit, fit, mapped};

@@ -4,7 +4,9 @@
 //! Method: reflectance is linear, so all three are sums of a few curves with weights that add up to 1: bases for a document,
 //! stacks for dots. A pixel of a map is the mean over exactly the area it covers, and a pyramid of maps, each half as wide
 //! as the one before, gives the mean over any larger area (Williams 1983).
-//! Cost: 4 bytes for each weight, and a third more for the pyramid. Limits: detail finer than a pixel of the map is averaged.
+//! Printed dots stay beside their maps ([`Dots`]), for pixels that see few of them.
+//! Cost: 4 bytes for each weight, and a third more for the pyramid; a byte for each dot. Limits: detail of documents that is finer than
+//! a pixel of the map is averaged.
 
 use appearance::brdf::{Table, reflectances};
 use appearance::factor::Factored;
@@ -12,12 +14,19 @@ use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 use inks::{Curve, Library};
 use press::preview::Source;
+use press::sheet::{Area, DotMap};
 use rayon::prelude::*;
 
 use crate::error::ViewError;
 
 /// Most curves of one picture: as many as a dot map can have stacks.
 const MOST_CURVES: usize = 256;
+
+/// Pixels of fewer dots than this look at the dots, as in the page.
+const FEW: f32 = 2.0;
+
+/// Pixels of more dots than this never do: they would look at more than 256 places.
+const MOST_FEW: f32 = 8.0;
 
 /// Sides of maps are multiples of this, so that the first levels of the pyramid halve exactly.
 const STEP: usize = 32;
@@ -33,6 +42,21 @@ pub struct Lit {
     /// Weights of a place: as many as curves, rounded up to whole lanes.
     pub(crate) stride: usize,
     pub(crate) levels: Vec<Level>,
+    /// The dots of a print.
+    pub(crate) dots: Option<Dots>,
+    /// With dot gain, the flat body of each curve: the last three weights of a place are what its bodies lose.
+    pub(crate) bodies: Vec<[f32; 3]>,
+}
+
+/// Printed dots, each with the number of its curve.
+pub(crate) struct Dots {
+    pub width: usize,
+    pub height: usize,
+    pub curves: Vec<u8>,
+    /// Dots of a metre across and down.
+    pub density: [f32; 2],
+    /// Pixels of fewer dots than this look at them.
+    pub few: f32,
 }
 
 /// One level of the pyramid.
@@ -101,13 +125,39 @@ impl Lit {
             },
         );
         let levels = pyramid(Level { width, height, weights }, stride);
+        let dots = match source {
+            Source::Print { dots, area, .. } => Some(Dots::new(dots, area, &used, size, [width, height])),
+            _ => None,
+        };
         let curves = used.iter().map(|&i| space.curve(rows[i])).collect();
-        Ok(Lit { size, curves, stride, levels })
+        Ok(Lit { size, curves, stride, levels, dots, bodies: Vec::new() })
     }
 
     /// Width and height of the sheet in metres.
     pub fn size(&self) -> [f64; 2] {
         self.size
+    }
+}
+
+impl Dots {
+    /// The dots of an area that is as large as the sheet. `used` are the stacks of the curves, and `places` those of the finest map.
+    fn new(dots: &DotMap, area: &Area, used: &[usize], size: [f64; 2], places: [usize; 2]) -> Dots {
+        let mut number = [0u8; MOST_CURVES];
+        used.iter().enumerate().for_each(|(curve, &stack)| number[stack] = curve as u8);
+        let row = |y: usize| &dots.index()[(area.top + y) * dots.width() + area.left..][..area.width];
+        let curves = (0..area.length)
+            .into_par_iter()
+            .flat_map_iter(|y| row(y).iter().map(|&stack| number[usize::from(stack)]));
+        let (width, height) = (area.width, area.length);
+        // Where a pixel is smaller than a place of the map, too.
+        let place = (width as f32 / places[0] as f32).max(height as f32 / places[1] as f32);
+        Dots {
+            width,
+            height,
+            curves: curves.collect(),
+            density: [width as f32 / size[0] as f32, height as f32 / size[1] as f32],
+            few: place.clamp(FEW, MOST_FEW),
+        }
     }
 }
 

@@ -53,6 +53,8 @@ pub(crate) struct Hits {
     pub place: [Values; 2],
     /// The level of the pyramid whose places are as large as the pixel, 0 or more.
     pub level: Values,
+    /// A pixel to the right and one up on the paper: each to the right and up, in metres.
+    pub steps: [[Values; 2]; 2],
 }
 
 impl Default for Hits {
@@ -65,6 +67,7 @@ impl Default for Hits {
             view: [none; 3],
             place: [none; 2],
             level: none,
+            steps: [[none; 2]; 2],
         }
     }
 }
@@ -209,6 +212,9 @@ impl Rays {
                 let (s, y) = (s * self.density[0], y * self.density[1]);
                 s * s + y * y
             };
+            for (hits, step) in hits.steps.iter_mut().zip([across, down]) {
+                (hits[0][i], hits[1][i]) = (step[0], step[1]);
+            }
             hits.level[i] = 0.5 * log2(greater(greater(length(across), length(down)), 1.0));
             let part = |at: f32| greater(lesser(at, 1.0), 0.0);
             hits.place[0][i] = part(0.5 + along * inverse[0]);

@@ -345,6 +345,82 @@ mod tests {
         }
     }
 
+    /// Dots of three stacks, a flat grey each, without order, and what is lit with maps of `places`.
+    fn print(side: usize, places: usize) -> (Vec<u8>, Lit) {
+        use appearance::brdf::{Space, Table};
+        use press::sheet::{Area, DotMap};
+        let space = Space::half_angle(16);
+        let mut stacks = Table::new(space.columns());
+        [0.2, 0.05, 0.01].iter().for_each(|grey| stacks.push(&vec![*grey; space.columns()]));
+        let names = ["substrate", "C", "K"].map(|stack| stack.parse::<inks::Stack>().unwrap());
+        let dot = |i: usize| ((i as u32).wrapping_mul(2_654_435_761) >> 13) as u8 % 3;
+        let index: Vec<u8> = (0..side * side).map(dot).collect();
+        let dots = DotMap::new(side, side, names.to_vec(), index.clone()).unwrap();
+        let source = press::preview::Source::Print {
+            dots: &dots,
+            space: &space,
+            stacks: &stacks,
+            area: Area::whole(&dots),
+        };
+        (index, Lit::new(&source, [0.01, 0.01], places).unwrap())
+    }
+
+    /// Far eye and light in front: each pixel is the mean of the dots at sixteen places of it up to two dots a pixel, and of a
+    /// finer grid where the map is coarser than that; maps make no difference.
+    #[test]
+    fn few_dots_of_a_pixel_are_looked_at_one_by_one() {
+        let side = 256;
+        for (places, per_pixel) in [(64, 0.05), (64, 0.9), (128, 1.9), (64, 3.1)] {
+            let (index, lit) = print(side, places);
+            let pixels = 100;
+            let height = per_pixel * 0.01 / side as f64 * f64::from(pixels);
+            let scene = Scene {
+                camera: Camera { towards: [0.0, 0.0, 1.0], distance: None, middle: [1e-5, 2e-5], height },
+                pose: Pose::default(),
+                lights: vec![Light::Far([0.0, 0.0, 1.0])],
+                probe: None,
+            };
+            let picture = Renderer::new(&lit).render(&scene, 100, 100, &Silent).unwrap();
+            let places = if per_pixel < 2.0 { 4 } else { 8 };
+            let mut off = 0;
+            let mut seen = 0;
+            for (i, found) in picture.pixels.iter().enumerate().filter(|(_, p)| p[3] == 1.0) {
+                let at = |p: usize, n: u32, middle: f64| {
+                    let p = p as f64 + (f64::from(n) + 0.5) / f64::from(places) - 50.0;
+                    let dot = p * per_pixel + middle * side as f64 / 0.01 + 0.5 * side as f64;
+                    (dot.max(0.0) as usize).min(side - 1)
+                };
+                let mut mean = 0.0;
+                for (x, y) in (0..places).flat_map(|y| (0..places).map(move |x| (x, y))) {
+                    let dot = index[at(i / 100, y, -2e-5) * side + at(i % 100, x, 1e-5)];
+                    mean += [0.2, 0.05, 0.01][usize::from(dot)] / f64::from(places * places);
+                }
+                seen += 1;
+                // A place at the very edge of a dot may fall on the other side in f32.
+                off += u32::from((f64::from(found[0]) - mean).abs() > 1e-5);
+            }
+            assert!(seen > 4000 && off * 200 < seen, "{per_pixel} dots a pixel: {off} of {seen}");
+        }
+    }
+
+    /// Pixels of many dots are read from the map, and their mean is that of the dots.
+    #[test]
+    fn many_dots_of_a_pixel_are_their_mean() {
+        let (_, lit) = print(512, 256);
+        let scene = Scene {
+            camera: Camera { towards: [0.0, 0.0, 1.0], distance: None, middle: [0.0; 2], height: 0.009 },
+            pose: Pose::default(),
+            lights: vec![Light::Far([0.0, 0.0, 1.0])],
+            probe: None,
+        };
+        let mean = |pixels: usize| {
+            let picture = Renderer::new(&lit).render(&scene, pixels, pixels, &Silent).unwrap();
+            picture.pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() / picture.pixels.len() as f64
+        };
+        let (many, few) = (mean(20), mean(700));
+        assert!((many / few - 1.0).abs() < 0.01, "{many} and {few}");
+    }
+
     /// Pixels are equal bit for bit with the widest lanes of this processor and with those that every processor of its kind has.
     #[test]
     fn pictures_do_not_depend_on_the_processor() {

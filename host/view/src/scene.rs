@@ -44,6 +44,38 @@ impl Camera {
         let height = 1.08 * size[1].max(size[0] / aspect.max(1e-3));
         Camera { towards, distance, middle: [0.0; 2], height }
     }
+
+    /// The same eye with a window that is so many times smaller, and with a place of the sheet in its middle (metres right and
+    /// up of the sheet's middle, along the paper).
+    ///
+    /// # Errors
+    /// A place that is turned away from the eye or lies behind it.
+    pub fn zoomed(self, zoom: f64, [s, y]: [f64; 2], pose: &Pose) -> Result<Camera, ViewError> {
+        let frame = Frame::new(pose);
+        let towards = unit(self.towards);
+        let [right, up] = right_and_up(towards).map(|axis| frame.in_sheet(axis));
+        let towards = frame.in_sheet(towards);
+        let (at, normal) = match pose.curl {
+            Some(r) => {
+                let (sin, cos) = (s / r).sin_cos();
+                ([r * sin, y, r * (cos - 1.0)], [sin, 0.0, cos])
+            }
+            None => ([s, y, 0.0], [0.0, 0.0, 1.0]),
+        };
+        let view = match self.distance {
+            Some(d) => std::array::from_fn(|c| d * towards[c] - at[c]),
+            None => towards,
+        };
+        // The ray from the eye to the place meets the window so many times as far away.
+        let scale = self.distance.map_or(1.0, |d| d / (d - dot(towards, at)));
+        if dot(normal, view) <= 0.0 || !(scale > 0.0 && scale.is_finite()) {
+            return Err(ViewError::Camera(
+                "the eye does not see the place in the middle of the picture; choose another place, or turn the sheet".into(),
+            ));
+        }
+        let middle = [right, up].map(|axis| scale * dot(axis, at));
+        Ok(Camera { middle, height: self.height / zoom, ..self })
+    }
 }
 
 /// How the sheet is held.
@@ -223,6 +255,36 @@ mod tests {
         ] {
             assert!(said.contains(expected), "{said}");
         }
+    }
+
+    /// Wherever the eye is and however the sheet is held, the ray through the middle of the picture meets the place, and the
+    /// window is so many times smaller.
+    #[test]
+    fn the_place_that_was_asked_for_is_in_the_middle() {
+        use crate::ray::{BLOCK, Hits, Rays};
+        let size = [0.12, 0.09];
+        for (towards, distance, pose) in [
+            ((0.0, 0.0), Some(0.5), Pose::default()),
+            ((0.0, 0.0), None, Pose { curl: Some(0.06), ..Pose::default() }),
+            ((20.0, -35.0), Some(0.3), Pose { turn: 0.4, tip: -0.7, curl: None }),
+            ((-15.0, 10.0), Some(0.25), Pose { turn: -0.2, tip: 0.3, curl: Some(0.05) }),
+        ] {
+            for [s, y] in [[0.0, 0.0], [0.04, 0.03], [-0.05, -0.044]] {
+                let whole = Camera::whole(direction(towards.0, towards.1), distance, size, 4.0 / 3.0);
+                let camera = whole.zoomed(25.0, [s, y], &pose).unwrap();
+                assert!((camera.height * 25.0 / whole.height - 1.0).abs() < 1e-12);
+                let scene = Scene { camera, pose, lights: Vec::new(), probe: None };
+                let rays = Rays::new(&scene, size, [64, 64], BLOCK + 1, 3);
+                let mut hits = Hits::default();
+                rays.follow(BLOCK / 2, 1, &mut hits);
+                let found = [(hits.place[0][0] - 0.5) * 0.12, (0.5 - hits.place[1][0]) * 0.09];
+                let off = (f64::from(found[0]) - s).hypot(f64::from(found[1]) - y);
+                assert!(off < 1e-6, "{pose:?}: {found:?}, not {s}, {y}");
+            }
+        }
+        let behind = Pose { curl: Some(0.04), ..Pose::default() };
+        let whole = Camera::whole([0.0, 0.0, 1.0], Some(0.5), size, 4.0 / 3.0);
+        assert!(whole.zoomed(2.0, [0.0595, 0.0], &Pose { turn: 0.6, ..behind }).is_err());
     }
 
     #[test]

@@ -117,8 +117,13 @@ impl Tangent {
 }
 
 /// Contrast sensitivity at `f` cycles per degree, 1 at 0.
-fn sensitivity(f: f64) -> f64 {
+pub fn sensitivity(f: f64) -> f64 {
     (-f / (0.525 * LUMINANCE.ln() + 3.91)).exp()
+}
+
+/// How many metres a degree of the eye's view spans, so many metres away.
+pub fn degree(metres: f64) -> f64 {
+    2.0 * (PI / 360.0).tan() * metres
 }
 
 /// The eye's filter on windows of one size, from some distances.
@@ -137,9 +142,7 @@ impl Eye {
         for y in 0..=height / 2 {
             for x in 0..=width / 2 {
                 let f = (x as f64 / width as f64).hypot(y as f64 / height as f64);
-                // Dots of a degree of the eye's view.
-                let degree = |metres: &f64| 2.0 * (PI / 360.0).tan() * metres * DOTS;
-                seen.extend(metres.iter().map(|metres| sensitivity(f * degree(metres)).powi(2)));
+                seen.extend(metres.iter().map(|&metres| sensitivity(f * DOTS * degree(metres)).powi(2)));
             }
         }
         Eye { width, height, distances: metres.len(), seen }

@@ -29,6 +29,14 @@ impl ToneCurve {
     /// An exposure that keeps 70 % of the covered pixels of `pictures` below 0.6 of white. It is within a factor of 4 of
     /// that of [`ToneCurve::PAPER`], so that black never looks white.
     pub fn of(pictures: &[Radiance]) -> ToneCurve {
+        let paper = ToneCurve::PAPER;
+        let exposure = ToneCurve::under_a_probe(pictures).exposure;
+        ToneCurve { exposure: exposure.clamp(paper.exposure / 4.0, paper.exposure * 4.0), ..paper }
+    }
+
+    /// The same without a limit: the light of a panorama has any strength, while lamps have an irradiance of 1. A picture that is
+    /// all black stays so.
+    pub fn under_a_probe(pictures: &[Radiance]) -> ToneCurve {
         let mut values: Vec<f32> = pictures
             .iter()
             .flat_map(|p| &p.pixels)
@@ -41,8 +49,8 @@ impl ToneCurve {
         }
         let at = (values.len() - 1) * 7 / 10;
         let (_, bright, _) = values.select_nth_unstable_by(at, f32::total_cmp);
-        let exposure = (MIDDLE / bright.max(1e-9)).clamp(paper.exposure / 4.0, paper.exposure * 4.0);
-        ToneCurve { exposure, ..paper }
+        let exposure = MIDDLE / *bright;
+        if *bright > 1e-9 && exposure > 0.0 { ToneCurve { exposure, ..paper } } else { paper }
     }
 
     /// The exposure so many stops above that of [`ToneCurve::PAPER`].
@@ -129,6 +137,22 @@ mod tests {
         assert!((69..=71).contains(&below), "{below} of 100");
         let black = ToneCurve::of(&[picture(&[0.0; 9])]).exposure;
         assert!(black.is_finite() && black <= 12.0, "{black:?}");
+    }
+
+    /// Whatever the strength of its light, a picture under a probe looks the same; lamps have one strength.
+    #[test]
+    fn under_a_probe_no_light_is_too_strong_or_too_weak() {
+        let values: Vec<f32> = (1..=100).map(|i| i as f32 * 0.01).collect();
+        for strength in [1e-6, 1e-3, 1.0, 60.0, 1e5, 1e20] {
+            let lit = picture(&values.iter().map(|v| v * strength).collect::<Vec<_>>());
+            let tone = ToneCurve::under_a_probe(std::slice::from_ref(&lit));
+            let below = lit.pixels.iter().filter(|p| p[0] * tone.exposure <= 0.6 + 1e-5).count();
+            assert!((69..=71).contains(&below), "{strength}: {below} of 100");
+            let limited = ToneCurve::of(&[lit]).in_stops();
+            assert!((-2.001..=2.001).contains(&limited), "{strength}: {limited}");
+        }
+        assert_eq!(ToneCurve::under_a_probe(&[picture(&[0.0; 9])]), ToneCurve::PAPER);
+        assert_eq!(ToneCurve::under_a_probe(&[]), ToneCurve::PAPER);
     }
 
     #[test]

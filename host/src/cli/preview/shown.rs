@@ -29,6 +29,9 @@ use super::wear::Told;
 /// Pixels of the longer side of the picture in the page.
 const STILL: usize = 800;
 
+/// The most places on the longer side of a weight map, for the memory's sake.
+const MOST_PLACES: usize = 2048;
+
 /// What there is to show.
 pub struct Shown {
     pub name: String,
@@ -113,15 +116,26 @@ impl Shown {
         }
     }
 
+    /// Places on the longer side of a weight map that is fine enough for a sheet of so many pixels. The renderer looks at the dots of a
+    /// print where a pixel has fewer than two, so its map needs no more places than half the dots.
+    pub fn places(&self, what: Show, pixels: f64) -> usize {
+        let most = match what {
+            Show::Printed => self.dots.width().max(self.dots.length()).div_ceil(2).clamp(64, MOST_PLACES),
+            _ => MOST_PLACES,
+        };
+        (pixels.ceil() as usize).clamp(64, most)
+    }
+
     /// The page on which light follows the hand, as it is at first with these options.
     ///
     /// # Errors
     /// A scene that cannot be seen.
     pub fn page(&self, view: &ViewArgs, probe: Option<&Probe>, observer: &dyn Observer) -> Result<Page> {
         let (stacks, size) = (self.stacks(), self.size());
-        let lit = Lit::new(&self.source(view.what(), &stacks), size, STILL)?;
+        let places = self.places(view.what(), STILL as f64 * view.zoom);
+        let lit = Lit::new(&self.source(view.what(), &stacks), size, places)?;
         let (width, height) = proportions(size, STILL);
-        let scene = view.scene(size, width as f64 / height as f64, probe.cloned());
+        let scene = view.scene(size, width as f64 / height as f64, probe.cloned())?;
         let radiance = Renderer::new(&lit).render(&scene, width, height, observer)?;
         let tone = view.tone(&radiance);
         let studio = Probe::studio(64);
@@ -138,7 +152,7 @@ impl Shown {
             stacks: &stacks,
             space: &self.space,
             probe: probe.unwrap_or(&studio),
-            start: &view.fragment(tone, self.target.is_some(), probe.is_some()),
+            start: &view.fragment(&scene.camera, tone, self.target.is_some(), probe.is_some()),
             still: &png(&radiance, tone)?,
         };
         Ok(Page { html: page(&subject, observer)?, pixels: (width, height), tone })

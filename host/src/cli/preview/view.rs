@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use ::view::{Camera, Light, Pose, Scene, direction};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use press::layout::{Mm, Point};
 use press::preview::{Probe, Radiance, ToneCurve};
 
 /// What is shown.
@@ -76,6 +78,25 @@ impl FromStr for Distance {
     }
 }
 
+/// How many times the sheet is enlarged: as far as the page goes.
+fn zoom(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(zoom) if (0.5..=400.0).contains(&zoom) => Ok(zoom),
+        _ => Err("expected a number from 0.5 to 400, such as 40".into()),
+    }
+}
+
+/// A length in metres, which may also be written as `0.5m`.
+fn seen_from(text: &str) -> Result<f64, String> {
+    let metres = match text.trim().strip_suffix('m').map(str::parse) {
+        Some(Ok(metres)) => Some(metres),
+        _ => text.parse().ok().map(|Mm(mm)| mm / 1000.0),
+    };
+    metres
+        .filter(|metres| (0.01..=100.0).contains(metres))
+        .ok_or_else(|| "expected a length from 1cm to 100m, such as 0.5m or 40cm".into())
+}
+
 /// So many finite numbers, separated by commas.
 fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
     let values: Option<Vec<f64>> =
@@ -101,6 +122,16 @@ pub struct ViewArgs {
     /// Distance of the eye in metres, or far
     #[arg(long, value_name = "M", default_value = "0.5")]
     distance: Distance,
+    /// Enlarge the sheet so many times: 1 shows all of it, and the page goes on from there
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = zoom)]
+    pub zoom: f64,
+    /// Place on the sheet in the middle of the picture, such as 20x30mm: across and down from its top left corner
+    /// [default: the sheet's middle]
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    middle: Option<Point>,
+    /// Blur the picture as an eye so far away sees the sheet, such as 0.5m, to see whether dots show; not for a page or a .glb
+    #[arg(long, value_name = "LENGTH", value_parser = seen_from)]
+    pub seen_from: Option<f64>,
     /// Turn the sheet to the right and tip it back, in degrees
     #[arg(long, value_name = "TURN,TIP", default_value = "0,0", allow_hyphen_values = true)]
     tilt: Degrees,
@@ -125,6 +156,9 @@ impl Default for ViewArgs {
             light_probe: None,
             view: level,
             distance: Distance(Some(0.5)),
+            zoom: 1.0,
+            middle: None,
+            seen_from: None,
             tilt: level,
             curl: None,
             exposure: None,
@@ -149,17 +183,43 @@ fn share(text: &str) -> Result<f32, String> {
 
 impl ViewArgs {
     /// The scene of a sheet of this size in metres, in a picture so much wider than high.
-    pub fn scene(&self, size: [f64; 2], aspect: f64, probe: Option<Probe>) -> Scene {
+    ///
+    /// # Errors
+    /// A scene that cannot be seen, or a place to look at that is not on the sheet or turned away.
+    pub fn scene(&self, size: [f64; 2], aspect: f64, probe: Option<Probe>) -> Result<Scene> {
         let lamp = |Lamp(Degrees(azimuth, elevation), distance): Lamp| {
             let towards = direction(azimuth, elevation);
             distance.map_or(Light::Far(towards), |d| Light::Near(towards.map(|c| c * d)))
         };
-        Scene {
-            camera: Camera::whole(direction(self.view.0, self.view.1), self.distance.0, size, aspect),
-            pose: Pose { turn: self.tilt.0.to_radians(), tip: self.tilt.1.to_radians(), curl: self.curl },
-            lights: self.lamps().into_iter().map(lamp).collect(),
-            probe,
+        let pose = Pose { turn: self.tilt.0.to_radians(), tip: self.tilt.1.to_radians(), curl: self.curl };
+        let whole = Camera::whole(direction(self.view.0, self.view.1), self.distance.0, size, aspect);
+        let lights = self.lamps().into_iter().map(lamp).collect();
+        let mut scene = Scene { camera: whole, pose, lights, probe };
+        scene.check(size)?;
+        scene.camera = whole.zoomed(self.zoom, self.place(size)?, &pose)?;
+        Ok(scene)
+    }
+
+    /// The place in the middle of the picture, in metres right and up of the middle of a sheet of this size.
+    fn place(&self, [width, height]: [f64; 2]) -> Result<[f64; 2]> {
+        let Some(Point(x, y)) = self.middle else { return Ok([0.0; 2]) };
+        let [x, y] = [x.0, y.0].map(|mm| mm / 1000.0);
+        if !((0.0..=width).contains(&x) && (0.0..=height).contains(&y)) {
+            let mm = [x, y, width, height].map(|length| 1000.0 * length);
+            bail!(
+                "--middle: {:.1} x {:.1} mm is not on the sheet, which is {:.1} x {:.1} mm",
+                mm[0],
+                mm[1],
+                mm[2],
+                mm[3]
+            );
         }
+        Ok([x - 0.5 * width, 0.5 * height - y])
+    }
+
+    /// Whether only a part of the sheet is asked for.
+    pub fn has_part(&self) -> bool {
+        self.zoom != 1.0 || self.middle.is_some()
     }
 
     /// What a picture shows.
@@ -171,6 +231,7 @@ impl ViewArgs {
     pub fn tone(&self, radiance: &Radiance) -> ToneCurve {
         let tone = match self.exposure {
             Some(stops) => ToneCurve::stops(f64::from(stops)),
+            None if self.light_probe.is_some() => ToneCurve::under_a_probe(std::slice::from_ref(radiance)),
             None => ToneCurve::of(std::slice::from_ref(radiance)),
         };
         ToneCurve { knee: self.tone_curve, ..tone }
@@ -195,7 +256,9 @@ impl ViewArgs {
     }
 
     /// The same scene as the page's address holds it.
-    pub fn fragment(&self, tone: ToneCurve, both: bool, probe: bool) -> String {
+    pub fn fragment(&self, camera: &Camera, tone: ToneCurve, both: bool, probe: bool) -> String {
+        // A tenth of a micrometre.
+        let [right, up] = camera.middle.map(|m| (m * 1e7).round() / 1e7);
         let lamp = |Lamp(Degrees(a, e), distance): &Lamp| format!("{a},{e},{}", distance.unwrap_or(0.0));
         let lights: Vec<String> = self.lamps().iter().map(lamp).collect();
         let name = |show| match show {
@@ -209,7 +272,8 @@ impl ViewArgs {
             _ => format!("show={}", name(self.what())),
         };
         format!(
-            "{shows}&light={}&probe={}&view={},{}&distance={}&tilt={},{}&curl={}&exposure={:.2}&knee={}",
+            "{shows}&light={}&probe={}&view={},{}&distance={}&tilt={},{}&curl={}&zoom={}&pan={right},{up}\
+             &exposure={:.2}&knee={}",
             lights.join(";"),
             u8::from(probe),
             self.view.0,
@@ -218,6 +282,7 @@ impl ViewArgs {
             self.tilt.0,
             self.tilt.1,
             self.curl.unwrap_or(0.0),
+            self.zoom,
             tone.in_stops(),
             tone.knee,
         )
@@ -227,6 +292,43 @@ impl ViewArgs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        view: ViewArgs,
+    }
+
+    /// The page reads `zoom` and `pan` as its own state: the window's height is that of the whole sheet by `zoom`, and its middle
+    /// is `pan` (`seen` in geometry.js).
+    #[test]
+    fn a_page_opens_with_the_same_part_of_the_sheet() {
+        let view = |words: &str| Command::parse_from(format!("preview {words}").split(' ')).view;
+        let at = |words: &str| {
+            let view = view(words);
+            let camera = view.scene([0.1, 0.08], 1.25, None).unwrap().camera;
+            let fragment = view.fragment(&camera, ToneCurve::PAPER, false, false);
+            let value = |key: &str| {
+                let (_, rest) = fragment.split_once(&format!("&{key}=")).unwrap();
+                rest.split('&').next().unwrap().to_owned()
+            };
+            (value("zoom"), value("pan"), camera)
+        };
+        let (zoom, pan, camera) = at("--zoom 40 --middle 20x30mm");
+        assert_eq!((zoom.as_str(), pan.as_str()), ("40", "-0.03,0.01"));
+        assert!((camera.height - 1.08 * 0.08 / 40.0).abs() < 1e-12);
+        // Farther from a tilted sheet's axis than its place in the window: cos 30 of it, and nearer to a near eye.
+        let (_, pan, _) = at("--zoom 2.5 --middle 2cm,3cm --tilt 30,0 --distance far");
+        assert_eq!(pan, format!("{},0.01", (-0.03 * 30f64.to_radians().cos() * 1e7).round() / 1e7));
+        let (zoom, pan, _) = at("--tilt 30,0");
+        assert_eq!((zoom.as_str(), pan.as_str()), ("1", "0,0"));
+        let refused = view("--middle 101x30mm").scene([0.1, 0.08], 1.25, None).unwrap_err().to_string();
+        assert!(refused.contains("not on the sheet, which is 100.0 x 80.0 mm"), "{refused}");
+        for text in ["0", "401", "NaN", "x"] {
+            assert!(super::zoom(text).unwrap_err().contains("from 0.5 to 400"), "{text}");
+        }
+    }
 
     #[test]
     fn lights_and_angles_are_read_or_refused_with_what_is_expected() {
@@ -238,6 +340,12 @@ mod tests {
         }
         for text in ["0", "-1", "inf", "near", "1,2"] {
             assert!(text.parse::<Distance>().is_err(), "{text}");
+        }
+        for text in ["0.5m", "50cm", "500mm"] {
+            assert_eq!(seen_from(text), Ok(0.5), "{text}");
+        }
+        for text in ["", "m", "0.5", "0m", "-1m", "NaNm", "infm", "200m", "1mm"] {
+            assert!(seen_from(text).unwrap_err().contains("such as 0.5m"), "{text}");
         }
         assert!(share("1.01").is_err() && share("NaN").is_err() && share("-0.1").is_err());
         assert_eq!(share("1"), Ok(1.0));
