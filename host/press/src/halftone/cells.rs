@@ -32,11 +32,14 @@ use diffuse::{Strip, Target};
 use field::Field;
 use plan::{BLOCK, Plan};
 
-/// Block rows in a strip.
-const STRIP: usize = 32;
+/// Block rows in a strip: A4 is six strips that are nearly equal.
+const STRIP: usize = 45;
 
-/// Block rows of lead-in: in these, 2 % of a stack forgets where it began.
-const LEAD: usize = 2;
+/// Block rows of lead-in: in these, half a percent of a stack far from all others forgets where it began.
+const LEAD: usize = 3;
+
+/// Block rows above the page, of which there is one strip.
+const ABOVE: usize = 4;
 
 /// Halftones a checked mixture on `width` x `height` dots: a stack of the mixture for each. `minimum` is the smallest
 /// cluster of each stack. With a point for each stack, their distances decide which may stand in for another, and `searched` exchanges cells to
@@ -69,6 +72,9 @@ pub(super) fn cells(
             #[inline(always)]
             || {
                 let mut strip = Strip::new(&field, &plan, &metric, &least);
+                if first == 0 {
+                    strip.lead_in(ABOVE);
+                }
                 for row in first.saturating_sub(LEAD)..first {
                     strip.block_row(row, &mut Target { rows: None, top: 0 });
                 }

@@ -4,10 +4,14 @@
 //! Method: in the midst of a tone rare stacks are owed something on average and common ones have had too much ([`Usual`]).
 //! Beyond the border cells would owe that too: it comes in where a tone begins and is forgotten where it ends, and only
 //! what differs from it stays inside. So a tone neither begins too light nor ends in a line of what was left over.
-//! Cost: a few operations a stack, for cells beside a border. Limits: fitted to stacks that are equally far apart;
-//! reflectance moves debts between stacks that look alike.
+//! Where stacks are not equally far apart, the means come from the metric ([`Lean`]). At the page's own border nothing is
+//! assumed: rows above the first are diffused and thrown away, and what is owed below the last is let go ([`super::diffuse`]).
+//! Cost: a few operations a stack, and a system of four unknowns, for cells beside a border. Limits: cells that may be cut into
+//! halves are taken to be among stacks that are equally far apart.
 
-use super::choose::NOISE;
+use super::choose::{Metric, NOISE};
+use crate::halftone::search::Point;
+use inks::linear::Cholesky;
 
 /// The largest difference of a debt above the first row of a tone, in cells, for a stack of share p: times root of p (1 - p).
 const SPREAD: f32 = 1.25;
@@ -48,12 +52,85 @@ pub(super) struct Usual<'a> {
     together: f32,
     /// The part and the equal share among these.
     rest: Option<(f32, f32)>,
+    lean: Option<Lean<'a>>,
+}
+
+/// The part of its debt where all decisions are equal that a stack owes on average, for what that is beyond its equal share.
+const LEAN: f32 = 0.65;
+
+/// The most that a stack is taken to owe because of what others reflect, in cells.
+const MOST: f32 = 2.0;
+
+/// How debts differ from those among stacks that are equally far apart.
+///
+/// Decisions are fastest to change where the choice of each stack would leave equally long debts. With the products P of
+/// the stacks, the debts D before the choice and the area A that is where P D - A diag(P) / 2 is the same for all stacks: the
+/// centre of the sphere through all of them. Debts vary about a point between that and nothing. P is a multiple
+/// of 1 and four coordinates, so four unknowns tell the centre, however many stacks there are.
+struct Lean<'a> {
+    metric: &'a Metric,
+    /// The mean of the stacks present, and where the centre is seen from there.
+    mean: Point,
+    centre: [f64; 4],
+    /// Mean square of the distance from the mean.
+    square: f64,
+    /// Half of the area.
+    half: f64,
+    part: f64,
+}
+
+impl<'a> Lean<'a> {
+    /// Nothing where two stacks or less are present, or all are equally far apart.
+    fn new(metric: &'a Metric, want: &[f32], area: f32) -> Option<Lean<'a>> {
+        let here = || (0..want.len()).filter(|&q| want[q] > 0.0);
+        let count = here().count();
+        if count < 3 || metric.is_even() {
+            return None;
+        }
+        let mut mean = [0.0; 4];
+        for q in here() {
+            let point = metric.point(q as u8);
+            (0..4).for_each(|c| mean[c] += point[c] / count as f32);
+        }
+        let half = 0.5 * f64::from(area);
+        let mut lean = Lean { metric, mean, centre: [0.0; 4], square: 0.0, half, part: f64::from(LEAN) };
+        let (mut system, mut right) = ([0.0; 16], [0.0; 4]);
+        for c in 0..4 {
+            system[5 * c] = f64::from(metric.own());
+        }
+        for q in here() {
+            let (from_mean, square) = lean.beside_mean(q);
+            lean.square += square / count as f64;
+            for c in 0..4 {
+                right[c] += half * square * from_mean[c];
+                (0..4).for_each(|d| system[4 * c + d] += from_mean[c] * from_mean[d]);
+            }
+        }
+        lean.centre.copy_from_slice(&Cholesky::new(&system, 4)?.solve(&right));
+        let most = here().map(|q| lean.of(q).abs()).fold(0.0, f32::max) / area;
+        lean.part *= f64::from((MOST / most.max(MOST)).min(1.0));
+        Some(lean)
+    }
+
+    fn beside_mean(&self, q: usize) -> ([f64; 4], f64) {
+        let point = self.metric.point(q as u8);
+        let from_mean: [f64; 4] = std::array::from_fn(|c| f64::from(point[c] - self.mean[c]));
+        (from_mean, from_mean.iter().map(|from| from * from).sum())
+    }
+
+    /// What stack `q` owes more than it would among stacks equally far apart.
+    fn of(&self, q: usize) -> f32 {
+        let (from_mean, square) = self.beside_mean(q);
+        let along: f64 = from_mean.iter().zip(&self.centre).map(|(from, centre)| from * centre).sum();
+        (self.part * (self.half * (square - self.square) - along) / f64::from(self.metric.own())) as f32
+    }
 }
 
 impl<'a> Usual<'a> {
     /// Of a tone of which a cell of `area` dots asks for so much of each stack. `small` is 0 for stacks that may have half of a
     /// cell, and empty where cells are whole.
-    pub(super) fn new(want: &[f32], area: usize, small: &'a [f32]) -> Usual<'a> {
+    /// Without a metric, or where cells may be cut, all stacks are taken to be equally far apart.
+    pub(super) fn new(metric: Option<&'a Metric>, want: &[f32], area: usize, small: &'a [f32]) -> Usual<'a> {
         let area = area as f32;
         let half = 0.5 * area;
         let part_of = |most: f32, area: f32| 0.45 + 0.8 * (most / area - 0.8).max(0.0);
@@ -79,7 +156,8 @@ impl<'a> Usual<'a> {
             let clear = (16.0 * (largest / area - 0.5).abs()).min(1.0);
             (clear * part_of(most, half).min(0.61), sum / halved as f32)
         });
-        Usual { part, equal, half, small, together, rest }
+        let lean = metric.filter(|_| halved == 0).and_then(|metric| Lean::new(metric, want, area));
+        Usual { part, equal, half, small, together, rest, lean }
     }
 
     /// Whether a stack may have half of a cell.
@@ -93,7 +171,7 @@ impl<'a> Usual<'a> {
             return 0.0;
         }
         if !self.halved(q) {
-            return self.part * (self.equal - want);
+            return self.part * (self.equal - want) + self.lean.as_ref().map_or(0.0, |lean| lean.of(q));
         }
         let left = if want >= self.half { want - self.half } else { want };
         self.together + self.rest.map_or(0.0, |(part, equal)| part * (equal - left))

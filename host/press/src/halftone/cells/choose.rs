@@ -110,6 +110,16 @@ impl Metric {
         [along(a), along(b), along(c), along(d)]
     }
 
+    /// Whether all stacks are equally far apart.
+    pub(super) fn is_even(&self) -> bool {
+        self.coordinates.iter().all(|coordinate| coordinate.iter().all(|&at| at == 0.0))
+    }
+
+    /// What a stack's own debt weighs.
+    pub(super) fn own(&self) -> f32 {
+        self.own
+    }
+
     /// Where a stack lies from the mean of the page.
     #[inline(always)]
     pub(super) fn point(&self, stack: u8) -> Point {

@@ -7,7 +7,9 @@
 //! where blocks of other cells begin, slots are divided anew. What comes over borders is in [`super::border`].
 //! What a whole column of the strip and a row still owe counts a little ([`LINES`]), or columns of a tint would swing by more than
 //! independent cells do.
-//! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away.
+//! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away. Above the page there are none, so
+//! there the first row of cells is taken to go on upwards ([`Strip::lead_in`]). What the last row owes is let go: rows that
+//! nobody prints would take it. So neither border of the page needs to know what cells owe on average.
 //! Cost: about two dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
 use super::arrange::Errors;
@@ -46,6 +48,8 @@ pub(super) struct Strip<'a> {
     carry: Vec<f32>,
     late: Vec<f32>,
     want: Vec<f32>,
+    /// What a cell beside this unit would ask for.
+    beside: Vec<f32>,
     debt: Vec<f32>,
     asks: Vec<f32>,
     chooser: Chooser<'a>,
@@ -54,6 +58,8 @@ pub(super) struct Strip<'a> {
     back: bool,
     /// Nothing has been diffused yet.
     fresh: bool,
+    /// Rows of dots by which this row of cells lies above the page; 0 on the page.
+    above: usize,
     /// By how much decisions are disturbed here, in cells. In the midst of a tone it is found once for a row of a block.
     disturbance: f32,
     errors: Errors,
@@ -86,6 +92,7 @@ impl<'a> Strip<'a> {
             carry: lanes(),
             late: lanes(),
             want: lanes(),
+            beside: lanes(),
             debt: lanes(),
             asks: lanes(),
             chooser: Chooser::new(metric, minimum, BLOCK),
@@ -93,15 +100,30 @@ impl<'a> Strip<'a> {
             rows: (0..=BLOCK).map(|_| Row::default()).collect(),
             back: false,
             fresh: true,
+            above: 0,
             disturbance: 0.0,
             errors: Errors::new(plan.across * BLOCK),
             textured: false,
         }
     }
 
+    /// So many rows of blocks above the page, all like its first row of cells, which are not printed.
+    #[inline(always)]
+    pub(super) fn lead_in(&mut self, rows: usize) {
+        for row in (1..=rows).rev() {
+            self.rows(0, row * BLOCK, &mut Target { rows: None, top: 0 });
+        }
+    }
+
     /// One row of blocks.
     #[inline(always)]
     pub(super) fn block_row(&mut self, row: usize, target: &mut Target) {
+        self.rows(row, 0, target);
+    }
+
+    /// One row of blocks, or one that is so many dots above the page and like its first row of cells.
+    #[inline(always)]
+    fn rows(&mut self, row: usize, above: usize, target: &mut Target) {
         let (plan, across) = (self.plan, self.plan.across);
         for column in 0..across {
             self.reformat(column, plan.blocks[row * across + column].size);
@@ -109,9 +131,11 @@ impl<'a> Strip<'a> {
         for y in 0..BLOCK {
             let begins =
                 |column: usize| y.is_multiple_of(usize::from(plan.blocks[row * across + column].size));
-            if row * BLOCK + y >= self.field.height || !(0..across).any(begins) {
+            let beyond = above == 0 && row * BLOCK + y >= self.field.height;
+            if beyond || !(0..across).any(begins) {
                 continue;
             }
+            self.above = above.saturating_sub(y);
             self.back = !self.back;
             let mut before = false;
             for step in 0..across {
@@ -141,7 +165,7 @@ impl<'a> Strip<'a> {
         let block = &plan.blocks[row * plan.across + column];
         let size = usize::from(block.size);
         let count = BLOCK / size;
-        let y = row * BLOCK + y;
+        let y = if self.above > 0 { 0 } else { row * BLOCK + y };
         self.field.row(size, y / size, &mut self.rows[size]);
         self.textured = self.chooser.cuts(size) && textured(block.varies);
         for step in 0..count {
@@ -286,33 +310,43 @@ impl<'a> Strip<'a> {
         let slot = self.slot(x) * lanes;
         let (behind, ahead) =
             if self.back { (x + size, x.wrapping_sub(1)) } else { (x.wrapping_sub(1), x + size) };
-        let hash = hash(x, y);
+        let hash = hash(x, y.wrapping_sub(self.above));
         let mut shares = disturbed(hash);
         let mut missing = if self.fresh { SHARES[1..].iter().sum() } else { 0.0 };
         let mut begins = self.fresh;
         if !calm {
-            let above = if self.fresh { usize::MAX } else { y.wrapping_sub(1) };
-            let to = [(ahead, y), (behind, y + size), (x, y + size), (ahead, y + size)];
+            // The first row of the page is below one like itself.
+            let above = if self.fresh { usize::MAX } else { y.saturating_sub(1) };
+            let below = if self.above > 0 { y } else { y + size };
+            let to = [(ahead, y), (behind, below), (x, below), (ahead, below)];
             let from = [(behind, y), (behind, above), (x, above), (ahead, above)];
-            for (share, (x, y)) in shares.iter_mut().zip(to) {
-                *share = if self.plan.decides(x, y) { *share } else { 0.0 };
+            // What goes over the lower border of the page is let go, for it was brought in at the upper one.
+            let leaves = self.above == 0 && below + size > self.field.height;
+            for (share, (x, to_y)) in shares.iter_mut().zip(to) {
+                let goes = self.plan.decides(x, to_y) || (leaves && to_y == below && x < self.field.width);
+                *share = if goes { *share } else { 0.0 };
             }
             let comes = SHARES.iter().zip(from).filter(|&(_, (x, y))| self.plan.decides(x, y));
             missing = 1.0 - comes.map(|(share, _)| share).sum::<f32>();
             begins = shares[2] > 0.0 && !self.plan.decides(x, above);
         }
+        if !calm {
+            let part = (size * size) as f32 / area as f32;
+            self.beside.iter_mut().zip(&self.want).for_each(|(beside, want)| *beside = want * part);
+        }
         // The first cell of a tone gets nothing, since the last one has nowhere to leave what it owes.
         if missing > 0.0 && missing < 1.0 {
             let slots = &mut self.slots[slot..slot + lanes];
-            let usual = Usual::new(&self.want, area, self.chooser.small(size));
-            begin(slots, &self.want, missing, &usual, begins.then_some(hash));
+            let usual =
+                Usual::new(Some(self.chooser.metric), &self.beside, size * size, self.chooser.small(size));
+            begin(slots, &self.beside, missing, &usual, begins.then_some(hash));
         }
         let disturbance = self.disturbance * area as f32;
         let lot = hash.wrapping_mul(0x9e37_79b1);
         self.owe(slot, disturbance, (lot >> 24) as u8);
         // What owns fragments is not cut, for they print like its first dot.
         let side = (whole && area == size * size).then_some(size);
-        if side.is_none() && self.chooser.cuts(size) {
+        if side.is_none() {
             self.ask_whole(size, area);
         }
         let mut cell = self.chooser.choose(&self.want, &self.asks, area as f32, side, lot >> 16);
@@ -333,8 +367,9 @@ impl<'a> Strip<'a> {
         }
         let stays: f32 = shares.iter().sum();
         if !calm && stays > 0.0 && shares.contains(&0.0) {
-            let usual = Usual::new(&self.want, area, self.chooser.small(size));
-            for (q, (debt, &want)) in self.debt.iter_mut().zip(&self.want).enumerate() {
+            let usual =
+                Usual::new(Some(self.chooser.metric), &self.beside, size * size, self.chooser.small(size));
+            for (q, (debt, &want)) in self.debt.iter_mut().zip(&self.beside).enumerate() {
                 let usual = usual.of(q, want);
                 *debt = usual + (*debt - usual) / stays;
             }
@@ -359,12 +394,25 @@ impl<'a> Strip<'a> {
         cell
     }
 
-    /// Adds to `self.asks` what a unit that is not cut would be owed more among its like, but is not among cells that may be cut.
+    /// The mean of what cells of the last row owe, in dots: all of it waits for the next row, but for what goes along the row.
+    #[cfg(test)]
+    pub(super) fn mean_debts(&self) -> Vec<f64> {
+        let lanes = self.field.lanes;
+        let cells: usize = self.format.iter().map(|&size| BLOCK / usize::from(size)).sum();
+        let waiting =
+            |q: usize| self.slots.iter().skip(q).step_by(lanes).map(|&debt| f64::from(debt)).sum::<f64>();
+        let down = f64::from(SHARES[1] + SHARES[2] + SHARES[3]);
+        (0..lanes).map(|q| waiting(q) / cells as f64 / down).collect()
+    }
+
+    /// Adds to `self.asks` what a unit of so many dots would be owed more among its like than among cells of this side, which may be cut.
     fn ask_whole(&mut self, size: usize, area: usize) {
-        let (like, cut) =
-            (Usual::new(&self.want, area, &[]), Usual::new(&self.want, area, self.chooser.small(size)));
-        for (q, (asks, &want)) in self.asks.iter_mut().zip(&self.want).enumerate() {
-            *asks += like.of(q, want) - cut.of(q, want);
+        let metric = Some(self.chooser.metric).filter(|_| !self.chooser.cuts(size));
+        let like = Usual::new(metric, &self.want, area, &[]);
+        let cells = Usual::new(metric, &self.beside, size * size, self.chooser.small(size));
+        let wants = self.want.iter().zip(&self.beside);
+        for (q, (asks, (&want, &beside))) in self.asks.iter_mut().zip(wants).enumerate() {
+            *asks += like.of(q, want) - cells.of(q, beside);
         }
     }
 
