@@ -208,8 +208,9 @@ fn named_files(
             name: ink,
         })?;
         let start = start_of(path)?;
-        if pdf::is_document(&start) || svg::is_svg(&start) {
-            let kind = if svg::is_svg(&start) { "SVG" } else { "PDF or PostScript" };
+        let is_svg = svg::is_svg(path, &start);
+        if pdf::is_document(&start) || is_svg {
+            let kind = if is_svg { "SVG" } else { "PDF or PostScript" };
             let problem = format!(
                 "it is {kind}, which is read alone and cannot be one of several layers; export it as PNG, or draw all \
                  layers in it"
