@@ -116,8 +116,7 @@ impl Grounds {
         }
         let mut border = vec![(0, [0; CHOICES]); runs.len()];
         for y in 0..rows.len() - 1 {
-            for at in rows[y]..rows[y + 1] {
-                let run = &runs[at];
+            for run in &runs[rows[y]..rows[y + 1]] {
                 let (all, stacks) = &mut border[run.parent as usize];
                 let mut count = |beside: u8| {
                     if beside != run.colour && !joined_or_none(flat, run.colour, beside) {

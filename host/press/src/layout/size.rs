@@ -198,6 +198,6 @@ mod tests {
         let layout = Layout { cut: true, ..Layout::centred(Paper::Postcard) };
         let large = |asked: &str| dots((10, 10), None, Some(asked.parse().unwrap()), &layout);
         assert_eq!(large("200mm"), Ok((4724, 4724)));
-        assert!(matches!(large("220mm"), Err(SizeError::TooLarge { .. })));
+        assert!(matches!(large("220mm"), Err(SizeError::BeyondSheets { .. })));
     }
 }
