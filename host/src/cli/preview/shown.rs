@@ -123,7 +123,10 @@ impl Shown {
             Show::Printed => self.dots.width().max(self.dots.length()).div_ceil(2).clamp(64, MOST_PLACES),
             _ => MOST_PLACES,
         };
-        (pixels.ceil() as usize).clamp(64, most)
+        // At most `most`, an integer of a few thousand.
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let places = pixels.ceil().clamp(64.0, most as f64) as usize;
+        places
     }
 
     /// The page on which light follows the hand, as it is at first with these options.
