@@ -1,7 +1,7 @@
 //! Reading and writing the factored document, a folder.
 //!
 //! `NAME.foil/` contains `document.toml` (the index), `bases.csv` (`basis,theta_h_deg,r,g,b`, reflectance in 1/sr) and one
-//! 16-bit grey PNG of weights per basis ([`grey`](crate::weights::grey)). The weights of every pixel must sum to one, up to
+//! 16-bit grey PNG of weights per basis (`weights::grey`). The weights of every pixel must sum to one, up to
 //! rounding to 16 bits. Writing fills a temporary folder and renames it at the end.
 
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! A mapped document as a folder: `mix.toml` and one 16-bit grey PNG per weight map.
 //!
 //! `mix.toml` holds the stacks and the matrix. `weights-000.png` and so on hold the weights as greys
-//! ([`grey`](crate::weights::grey)); reading restores the same weights. Reading is
+//! (`weights::grey`); reading restores the same weights. Reading is
 //! strict: wrong sizes, wrong sums and unknown keys are errors that name the file and the field. Each file is written under
 //! a temporary name and renamed; a caller that needs the whole folder to appear at once must rename it too.
 
