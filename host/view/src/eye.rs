@@ -6,7 +6,7 @@
 //! makes an angle of it. Coverage is filtered alike and divides the result (normalised convolution), so neither the ground nor what lies
 //! beyond the picture darkens edges; the coverage itself stays sharp. Where pixels are coarser than the eye, the picture is
 //! rendered finer and averaged after the filter ([`finer`]).
-//! Cost: four transforms of a number a pixel: 0.1 s for a million pixels on two cores. Memory: 8 bytes a pixel more, with a margin.
+//! Cost: four transforms of a number a pixel. Memory: 8 bytes a pixel more, with a margin.
 //! Limits: the eye's filter is 1 at 0 and falls from there, and is the same for all colours and all brightness, while real eyes
 //! lose little of coarse detail and more of colours. It spreads far, so a light beside the picture is missed. Pixels of a
 //! tilted sheet are taken to be as far away as its middle.
