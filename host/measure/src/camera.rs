@@ -88,6 +88,13 @@ impl Lens {
         Some([self.middle[0] + self.focal * bent * u, self.middle[1] + self.focal * bent * v])
     }
 
+    /// Pixels of a millimetre of the sheet, near a place of it; 0 behind the camera.
+    pub(crate) fn density(&self, pose: &Pose, [x, y]: [f64; 2]) -> f64 {
+        let seen = |dx: f64| self.project(pose, [x + dx, y, 0.0]).unwrap_or_default();
+        let (a, b) = (seen(-0.5), seen(0.5));
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    }
+
     /// The place of the sheet that a pixel shows, in mm.
     pub fn on_sheet(&self, pose: &Pose, pixel: [f64; 2]) -> Option<[f64; 2]> {
         let seen = [0, 1].map(|c| (pixel[c] - self.middle[c]) / self.focal);

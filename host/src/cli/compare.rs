@@ -7,13 +7,15 @@ use anyhow::{Context, Result, bail};
 use clap::Args as ClapArgs;
 use inks::Library;
 
+use super::laid::{DotsArgs, Laid};
 use super::output::Staged;
 use super::preset::PresetArg;
-use super::preview::shown::printed;
-use super::print::{DotsArgs, Laid};
+use super::preview::shown::{printed, printed_name};
 use super::stdio::{read_job, show};
 use appearance::factor::Factored;
-use measure::compare::{Comparison, Document, Errors, Printed, Setup, compare, page, space};
+use measure::compare::{
+    Comparison, Document, Errors, Factor, PhotoFigures, Printed, Setup, compare, page, space,
+};
 use observe::Observer;
 use press::layout::{Layout, arrange};
 use press::sheet::{Area, DotMap};
@@ -56,6 +58,9 @@ pub struct Args {
     #[arg(long)]
     json: bool,
 }
+
+/// Stacks named for a photograph.
+const STACKS: usize = 4;
 
 /// What was printed.
 struct Work {
@@ -145,8 +150,7 @@ impl Args {
         let Some(sheet) = printed(path, observer)? else {
             bail!("{}: not a job; the name of a job ends in .rgl", path.display());
         };
-        let name =
-            path.file_stem().map_or_else(|| "sheet".into(), |stem| stem.to_string_lossy().into_owned());
+        let name = printed_name(path);
         let library = self.dots.inks.library()?;
         Ok(Work { name, sheet, library, document: None })
     }
@@ -184,8 +188,30 @@ fn summary(comparison: &Comparison, output: &Path) -> String {
     let from = if comparison.document { "document" } else { "predicted print" };
     let _ = writeln!(
         text,
-        "\nerror: root mean square difference of the photograph's light from the {from}, over squares of 1 mm\n{}",
-        output.display()
+        "\nerror: root mean square difference of the photograph's light from the {from}, over spots 1 mm wide"
     );
+    for photo in &comparison.photos {
+        let _ = writeln!(text, "{}", stacks(photo));
+    }
+    let _ = writeln!(text, "{}", output.display());
     text
+}
+
+/// The stacks that are brighter or darker in a photograph than predicted.
+fn stacks(photo: &PhotoFigures) -> String {
+    let differ: Vec<&Factor> = photo.stacks.iter().filter(|factor| factor.differs).collect();
+    if differ.is_empty() {
+        return format!("{}: every stack is as predicted (within four standard errors, or 1 %)", photo.name);
+    }
+    let told = differ.iter().take(STACKS).map(|factor| {
+        let rgb = factor.factor.map(|value| format!("{value:.3}")).join(" ");
+        let error = factor.standard_error.iter().copied().fold(0.0, f64::max);
+        format!("{} {rgb} (± {error:.3})", factor.stack)
+    });
+    let more = if differ.len() > STACKS { ", and others" } else { "" };
+    format!(
+        "{}: photographed over predicted light (red, green, blue): {}{more}",
+        photo.name,
+        told.collect::<Vec<_>>().join(", ")
+    )
 }

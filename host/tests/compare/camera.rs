@@ -18,6 +18,8 @@ pub type Picture = image::ImageBuffer<image::Rgb<u16>, Vec<u16>>;
 pub const SIZE: (usize, usize) = (1200, 900);
 pub const FOCAL: f64 = 2300.0;
 pub const RADIAL: [f64; 2] = [-0.14, 0.03];
+/// Rays across and down a pixel, which sees 2.7 dots. With three, single dots are missed.
+const PARTS: u32 = 5;
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
 /// On paper the inks' strongest stack is brighter than in the library.
 pub const BRIGHTER: V = [1.3, 1.25, 1.35];
@@ -175,17 +177,22 @@ const TABLE: f64 = 0.1;
 const GREY: V = [0.9, 0.18, 0.036];
 
 impl Sheet {
-    /// A sheet on paper as the library says.
+    /// A sheet on paper as the library says, with its strongest stack brighter.
     pub fn load(folder: &Path) -> Sheet {
-        Sheet::on(folder, [1.0; 3], false)
+        Sheet::on(folder, [1.0; 3], BRIGHTER, false)
+    }
+
+    /// The same with another factor on that stack.
+    pub fn with_stack(folder: &Path, factor: V) -> Sheet {
+        Sheet::on(folder, [1.0; 3], factor, false)
     }
 
     /// A sheet on another paper, with a grey card on it: by the paper, whatever is white would be wrong.
     pub fn with_card(folder: &Path) -> Sheet {
-        Sheet::on(folder, [0.85, 0.8, 0.7], true)
+        Sheet::on(folder, [0.85, 0.8, 0.7], BRIGHTER, true)
     }
 
-    fn on(folder: &Path, paper: V, card: bool) -> Sheet {
+    fn on(folder: &Path, paper: V, brighter: V, card: bool) -> Sheet {
         let page = Arranged::load(folder).unwrap();
         let library = Library::builtin();
         let space = Space::half_angle(512);
@@ -195,7 +202,7 @@ impl Sheet {
         let bright = (1..plain.len()).max_by_key(|&i| census[i]).unwrap();
         let factor = |i: usize| match i {
             _ if page.sheet.stacks()[i].layers().is_empty() => paper,
-            _ if i == bright => BRIGHTER,
+            _ if i == bright => brighter,
             _ => [1.0; 3],
         };
         let curves = plain.iter().enumerate().map(|(i, curve)| Steps::new(curve, factor(i))).collect();
@@ -259,11 +266,12 @@ pub fn photograph(sheet: &Sheet, shot: &Shot, exposure: f64, noise: bool) -> Pic
                 let by = Shot::bent(pixel);
                 let (theta, irradiance) = lit(shot.place(&axes, pixel, by), shot.eye, shot.lamp);
                 let mut sum = [0.0; 3];
-                for k in 0..9 {
-                    let part = |k: u32| f64::from(k) / 3.0 + 1.0 / 6.0;
-                    let place = shot.place(&axes, [i as f64 + part(k % 3), j as f64 + part(k / 3)], by);
+                for k in 0..PARTS * PARTS {
+                    let part = |k: u32| (f64::from(k) + 0.5) / f64::from(PARTS);
+                    let place =
+                        shot.place(&axes, [i as f64 + part(k % PARTS), j as f64 + part(k / PARTS)], by);
                     let f = sheet.at(place, theta);
-                    (0..3).for_each(|c| sum[c] += f[c] * irradiance / 9.0);
+                    (0..3).for_each(|c| sum[c] += f[c] * irradiance / f64::from(PARTS * PARTS));
                 }
                 for c in 0..3 {
                     // White paper is about 0.85 / pi.

@@ -103,7 +103,7 @@ fn poses_and_errors_are_the_true_ones() {
             println!("  {name}: {:.3} %, truly {:.3} %", 100.0 * found, 100.0 * truth);
             worst = worst.max((found / truth - 1.0).abs());
         }
-        let seen = truth.photo.len() as f64 / truth.squares as f64;
+        let seen = truth.photo.len() as f64 / truth.spots as f64;
         println!("  {:.1} % seen, truly {:.1} %", 100.0 * number(&found["seen"]), 100.0 * seen);
         assert!((number(&found["seen"]) - seen).abs() < 0.005, "{}", shot.name);
         // What differs is one stack, so it is the inks'.
@@ -132,6 +132,59 @@ fn poses_and_errors_are_the_true_ones() {
     if let Some(keep) = std::env::var_os("FOILPRESS_KEEP") {
         fs::copy(bench.path("photos/compare.html"), Path::new(&keep).join("compare.html")).unwrap();
         fs::copy(bench.path("photos/left-2.png"), Path::new(&keep).join("left-2.png")).unwrap();
+    }
+}
+
+/// A print that is as predicted does not differ from its prediction, and one ink that is a tenth darker is found with its uncertainty.
+#[test]
+fn what_is_as_predicted_does_not_differ() {
+    let bench = bench(&[]);
+    let shots = [&SHOTS[0], &SHOTS[3]];
+    for (factor, darker) in [([1.0; 3], false), ([0.9; 3], true)] {
+        let sheet = Sheet::with_stack(&folder().join("tile.sheet"), factor);
+        for shot in shots {
+            photograph(&sheet, shot, shot.exposure, true).save(bench.path("photos").join(shot.name)).unwrap();
+        }
+        let said = bench.done(&format!("compare photos {PRINT} --job job.rgl --camera camera.toml --json"));
+        let report: Value = serde_json::from_str(&said).expect("JSON");
+        let words = bench.done("compare photos --job job.rgl --camera camera.toml -q -o page.html");
+        println!("{words}");
+        let bright = sheet.page.sheet.stacks()[sheet.bright].to_string();
+        let (mut within, mut all) = (0, 0);
+        for (i, shot) in shots.into_iter().enumerate() {
+            let found = &report["photos"][i];
+            let errors = &found["errors"];
+            println!("{}: {errors}", shot.name);
+            for row in found["stacks"].as_array().unwrap() {
+                let (value, error) = (vector(&row["factor"]), vector(&row["standard_error"]));
+                let changed = row["stack"] == bright.as_str();
+                println!("  {} {value:.4?} ± {error:.4?} of {:.4}", row["stack"], number(&row["share"]));
+                for c in 0..3 {
+                    let truth = if changed { factor[c] } else { 1.0 };
+                    let off = (value[c] - truth).abs() / error[c];
+                    assert!(off < 5.0, "{row}");
+                    within += usize::from(off < 2.0);
+                    all += 1;
+                }
+                assert_eq!(row["differs"], changed && darker, "{row}");
+            }
+            if darker {
+                let picture = image::open(bench.path("photos").join(shot.name)).unwrap().into_rgb16();
+                let truth = Truth::new(&sheet, shot, &picture, &bench.path("tile"));
+                let print = rms(&truth.photo, &truth.print) / size(&truth.document);
+                println!("  print {:.5}, truly {print:.5}", number(&errors["print"]));
+                assert!((number(&errors["print"]) / print - 1.0).abs() < 0.03, "{}", shot.name);
+            } else {
+                assert!(number(&errors["print"]) < 0.005 && number(&errors["inks"]) < 0.005, "{errors}");
+            }
+        }
+        println!("{within} of {all} factors within two standard errors");
+        assert_eq!(
+            words.matches("every stack is as predicted").count(),
+            if darker { 0 } else { 2 },
+            "{words}"
+        );
+        assert!(10 * within > 8 * all, "{within} of {all}");
     }
 }
 

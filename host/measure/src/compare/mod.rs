@@ -126,7 +126,7 @@ pub struct PhotoFigures {
     pub scale: [f64; 3],
     /// How far the paper at the marks deviates from the lamp's fall-off.
     pub paper_deviation: f64,
-    /// Share of the compared squares that were seen and not clipped.
+    /// Share of the compared spots that were seen and not clipped.
     pub seen: f64,
     /// Errors.
     pub errors: Errors,

@@ -61,7 +61,7 @@ fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut 
     write!(
         page,
         "<p>{width:.0} x {height:.0} mm, {} photographs. An error is the root mean square difference of light from {from}, over \
-         squares of 1 mm and relative to the light of {from}. ",
+         spots 1 mm wide and relative to the light of {from}. ",
         c.photos.len()
     )?;
     if c.document {
@@ -147,18 +147,18 @@ fn stacks(photo: &PhotoFigures, page: &mut String) -> std::fmt::Result {
     write!(
         page,
         "<details><summary>Stacks: photographed over predicted, half angles {least:.0} to {most:.0}°</summary>{wide}<table>\
-         <tr><th>stack<th class=n>of the dots<th class=n>red<th class=n>green<th class=n>blue"
+         <tr><th>stack<th class=n>of the dots<th class=n>red<th class=n>green<th class=n>blue<th>"
     )?;
     for factor in photo.stacks.iter().take(STACKS) {
-        let [r, g, b] = factor.factor;
-        write!(
-            page,
-            "<tr><td>{}<td class=n>{}<td class=n>{r:.2}<td class=n>{g:.2}<td class=n>{b:.2}",
-            escape(&factor.stack),
-            percent(factor.share)
-        )?;
+        write!(page, "<tr><td>{}<td class=n>{}", escape(&factor.stack), percent(factor.share))?;
+        for (value, error) in factor.factor.iter().zip(factor.standard_error) {
+            write!(page, "<td class=n>{value:.3} ± {error:.3}")?;
+        }
+        write!(page, "<td>{}", if factor.differs { "" } else { "as predicted" })?;
     }
-    page.push_str("</table></div></details>");
+    page.push_str(
+        "</table></div><p>± is one standard error. A stack is “as predicted” unless a channel differs from 1 by more than four of them and 0.01.</p></details>",
+    );
     Ok(())
 }
 

@@ -2,29 +2,30 @@
 //!
 //! Problem: a photograph has the camera's perspective, the lamp's fall-off and an exposure of its own.
 //! Method: the renderer of `view` shows document, mixture and dots from the camera's place under its lamp, prepared once for all
-//! photographs; the paper around the marks, or the middle step of a grey card, gives exposure and white balance. Both are laid flat
-//! and compared square by square.
+//! photographs; the paper around the marks, or the middle step of a grey card, gives exposure and white balance. Both are laid flat.
+//! That is for looking. Figures compare spots: what covers a spot is counted once, over all dots, and lit for each photograph.
 //! Cost: three renderings a photograph. Limits: a lamp is a point.
 
 use std::f64::consts::PI;
 
-use appearance::brdf::reflectances;
+use appearance::brdf::{Table, reflectances};
+use appearance::factor::Factored;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use inks::{Curve, Stack};
 use observe::Observer;
-use press::preview::{Radiance, Source, ToneCurve, picture as shown};
+use press::preview::{Radiance, Source, ToneCurve, picture as picture_of};
 use press::sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
-use super::figures::{self, Cover, Lighting, Squares, Steps};
+use super::figures::{self, Cover, Lighting, Scale, Spots, Steps};
 use super::flat::{Flat, Window};
 use super::picture::Picture;
 use super::{Card, PhotoFigures, Pictures, Printed, Setup, Shot, White, space};
 use crate::MeasureError;
 use crate::camera::{Camera, Lens, Pose};
 use crate::card;
-use crate::linear::median;
+use crate::linear::{median, spread};
 
 /// Quality of the pictures: differences of a percent stay visible.
 const QUALITY: u8 = 88;
@@ -34,11 +35,27 @@ const DIFFERENCE: f64 = 0.3;
 /// What is compared, prepared once for all photographs.
 pub(super) struct Scenery {
     window: Window,
-    print: Lit,
-    document: Option<(Lit, Lit)>,
-    shares: Vec<f32>,
-    stacks: Vec<(String, Curve)>,
+    print: Shown,
+    document: Option<(Shown, Shown)>,
+    stacks: Vec<String>,
     paper: Curve,
+}
+
+/// A source to look at, and to count.
+struct Shown {
+    lit: Lit,
+    cover: Cover,
+}
+
+impl Shown {
+    fn new(source: &Source<'_>, rows: &Table, window: &Window) -> Result<Shown, MeasureError> {
+        let metres = window.size.map(|side| side / 1000.0);
+        let longest = window.width.max(window.height).clamp(64, 2048);
+        let lit = Lit::new(source, metres, longest).map_err(view_error)?;
+        let shares = window.shares(source).unwrap_or_default();
+        let curves = rows.rows().map(|row| source.space().curve(row)).collect();
+        Ok(Shown { lit, cover: Cover { shares, curves } })
+    }
 }
 
 fn view_error(error: impl std::fmt::Display) -> MeasureError {
@@ -57,11 +74,7 @@ impl Scenery {
         let Printed { sheet, library, document } = printed;
         let space = &space();
         // As fine as the photographs are.
-        let seen = |mm: f64| {
-            camera.lens.project(&camera.poses[0], [middle[0] + mm, middle[1], 0.0]).unwrap_or_default()
-        };
-        let (a, b) = (seen(-0.5), seen(0.5));
-        let pixels = (a[0] - b[0]).hypot(a[1] - b[1]);
+        let pixels = camera.lens.density(&camera.poses[0], middle);
         if pixels < 1.0 {
             return Err(MeasureError::Scene(format!(
                 "{}: a millimetre of the sheet is {pixels:.1} pixels; bring the camera nearer",
@@ -69,27 +82,18 @@ impl Scenery {
             )));
         }
         let window = Window::new(middle, size, pixels);
-        let metres = size.map(|side| side / 1000.0);
         let rows = reflectances(sheet.stacks(), library, space);
-        let source = Source::Print { dots: sheet, space, stacks: &rows, area };
-        let longest = window.width.max(window.height).clamp(64, 2048);
-        let lit = |source: &Source<'_>| Lit::new(source, metres, longest).map_err(view_error);
-        let print = lit(&source)?;
-        let document = document
-            .as_ref()
-            .map(|both| Ok((lit(&Source::Factored(both.document))?, lit(&Source::Factored(both.mapped))?)))
-            .transpose()?;
-        let [across, down] = window.squares;
-        let shares = source.shares(across, down).map_err(view_error)?.unwrap_or_default();
-        let stacks = sheet
-            .stacks()
-            .iter()
-            .zip(rows.rows())
-            .map(|(stack, row)| (stack.to_string(), space.curve(row)))
-            .collect();
+        let print = Shown::new(&Source::Print { dots: sheet, space, stacks: &rows, area }, &rows, &window)?;
+        let factored =
+            |factored: &Factored| Shown::new(&Source::Factored(factored), &factored.bases, &window);
+        let document = match document {
+            Some(both) => Some((factored(both.document)?, factored(both.mapped)?)),
+            None => None,
+        };
+        let stacks = sheet.stacks().iter().map(Stack::to_string).collect();
         let bare = reflectances(&[Stack::SUBSTRATE], library, space);
         let paper = space.curve(bare.row(0));
-        Ok(Scenery { window, print, document, shares, stacks, paper })
+        Ok(Scenery { window, print, document, stacks, paper })
     }
 
     /// One photograph beside its prediction.
@@ -111,36 +115,21 @@ impl Scenery {
             White::Paper => paper,
             White::Card => card_scale(shot, &picture, &setup.card, &lighting, lens, pose)?,
         };
-        let photo = picture.flat(window, lens, pose, scale);
-        let scene = self.scene(&lighting);
-        let render = |lit: &Lit| -> Result<Radiance, MeasureError> {
-            Renderer::new(lit).laid_flat(&scene, window.width, window.height, observer).map_err(view_error)
-        };
-        let print = render(&self.print)?;
-        let document = match &self.document {
-            Some((document, mapped)) => Some((render(document)?, render(mapped)?)),
-            None => None,
-        };
-        let seen = photo.squares(window);
-        let squares = |radiance: &Radiance| -> Squares {
-            flat(radiance).squares(window).into_iter().map(Option::unwrap_or_default).collect()
-        };
-        let predicted = squares(&print);
-        let targets = document.as_ref().map(|(document, mapped)| (squares(document), squares(mapped)));
-        let steps = Steps {
-            document: targets.as_ref().map(|(document, mapped)| (document, mapped)),
-            print: &predicted,
-            photo: &seen,
-        };
-        let cover = Cover { shares: &self.shares, stacks: &self.stacks };
-        let Some((errors, stacks)) = figures::errors(&steps, &cover, window, &lighting) else {
+        let seen = picture.spots(window, lens, pose, scale.factor);
+        let lights = self.print.cover.lights(window, &lighting);
+        let predicted = lights.sums();
+        let document: Option<[Spots; 2]> = self.document.as_ref().map(|(document, mapped)| {
+            [document, mapped].map(|shown| shown.cover.lights(window, &lighting).sums())
+        });
+        let steps = Steps { document: document.as_ref(), print: &predicted, photo: &seen };
+        let Some((errors, stacks)) = figures::errors(&steps, &lights, &self.stacks, window, scale.error)
+        else {
             return Err(MeasureError::Scene(format!(
                 "{}: all of the print is clipped or outside the picture; expose shorter, or show all of it",
                 shot.name
             )));
         };
-        let half: Vec<f64> =
-            (0..seen.len()).map(|i| lighting.at(window.square(i)).0[2].to_degrees()).collect();
+        let half: Vec<f64> = (0..seen.len()).map(|i| lighting.at(window.spot(i)).0[2].to_degrees()).collect();
         let figures = PhotoFigures {
             name: shot.name.clone(),
             marks: shot.marks.len(),
@@ -154,20 +143,28 @@ impl Scenery {
                 half.iter().copied().fold(90.0, f64::min),
                 half.iter().copied().fold(0.0, f64::max),
             ],
-            scale,
+            scale: scale.factor,
             paper_deviation,
             seen: seen.iter().flatten().count() as f64 / seen.len() as f64,
             errors,
             stacks,
         };
+        let photo = picture.flat(window, lens, pose, scale.factor);
+        let scene = self.scene(&lighting);
+        let render = |shown: &Shown| -> Result<Radiance, MeasureError> {
+            Renderer::new(&shown.lit)
+                .laid_flat(&scene, window.width, window.height, observer)
+                .map_err(view_error)
+        };
+        let print = render(&self.print)?;
         let tone = ToneCurve::of(std::slice::from_ref(&print));
-        let draw = |radiance: &Radiance| jpeg(&shown(radiance, tone).map_err(view_error)?);
+        let draw = |radiance: &Radiance| jpeg(&picture_of(radiance, tone).map_err(view_error)?);
         let pictures = Pictures {
             difference: jpeg(&difference(&photo, &print, &predicted))?,
             photo: draw(&radiance(&photo))?,
             print: draw(&print)?,
-            document: match &document {
-                Some((document, mapped)) => Some((draw(document)?, draw(mapped)?)),
+            document: match &self.document {
+                Some((document, mapped)) => Some((draw(&render(document)?)?, draw(&render(mapped)?)?)),
                 None => None,
             },
         };
@@ -188,25 +185,25 @@ impl Scenery {
         }
     }
 
-    /// The factors that make the bare paper around the marks as bright as the library says, and how far single marks are
-    /// from them.
+    /// The factors that make the bare paper around the marks as bright as the library says, and how far the worst mark is
+    /// from them. Marks that differ leave the factors uncertain.
     fn paper_scale(
         &self,
         shot: &Shot,
         picture: &Picture,
         lighting: &Lighting,
-    ) -> Result<([f64; 3], f64), MeasureError> {
+    ) -> Result<(Scale, f64), MeasureError> {
         let mut ratios: [Vec<f64>; 3] = Default::default();
-        let mut single: Vec<f64> = Vec::new();
+        let mut single: [Vec<f64>; 3] = Default::default();
         for (mark, known) in &shot.marks {
             let Some(plane) = mark.plane() else { continue };
             let [left, top] = known.corners[0];
             let cell = (known.corners[1][0] - left) / 8.0;
             let mut own: [Vec<f64>; 3] = Default::default();
             // Along the middle of the bare paper on all four sides.
-            for step in 0..36 {
-                let along = f64::from(step % 9) - 0.5;
-                let [x, y] = match step / 9 {
+            for step in 0..108 {
+                let along = (f64::from(step % 27) + 0.5) / 3.0 - 0.5;
+                let [x, y] = match step / 27 {
                     0 => [along, -0.7],
                     1 => [along, 8.7],
                     2 => [-0.7, along],
@@ -224,19 +221,24 @@ impl Scenery {
                 let expected = self.paper.at(theta);
                 (0..3).for_each(|c| own[c].push(expected[c] * irradiance / light[c].max(1e-9)));
             }
-            single.push(median(&mut own[1].clone()));
-            (0..3).for_each(|c| ratios[c].append(&mut own[c]));
+            for c in 0..3 {
+                single[c].push(median(&mut own[c].clone()));
+                ratios[c].append(&mut own[c]);
+            }
         }
-        let scale = ratios.map(|mut all| median(&mut all));
-        if scale.iter().any(|k| !(k.is_finite() && *k > 0.0 && *k < 1e6)) {
+        let factor = ratios.map(|mut all| median(&mut all));
+        if factor.iter().any(|k| !(k.is_finite() && *k > 0.0 && *k < 1e6)) {
             return Err(MeasureError::Scene(format!(
                 "{}: the paper beside the camera marks is black; expose longer, and check that the lamp of the camera file is the one that \
                  was on",
                 shot.name
             )));
         }
-        let off = single.iter().map(|k| (k / scale[1] - 1.0).abs()).fold(0.0, f64::max);
-        Ok((scale, off))
+        let off = |c: usize| single[c].iter().map(move |k| k / factor[c] - 1.0);
+        let worst = off(1).map(f64::abs).fold(0.0, f64::max);
+        let freedom = ((single[0].len() - 1) * single[0].len()) as f64;
+        let error = std::array::from_fn(|c| (off(c).map(|off| off * off).sum::<f64>() / freedom).sqrt());
+        Ok((Scale { factor, error }, worst))
     }
 }
 
@@ -248,7 +250,7 @@ fn card_scale(
     lighting: &Lighting,
     lens: &Lens,
     pose: &Pose,
-) -> Result<[f64; 3], MeasureError> {
+) -> Result<Scale, MeasureError> {
     let radiance = picture.radiance();
     let named = |error: MeasureError| MeasureError::Scene(format!("{}: {error}", shot.name));
     let steps = match stated.rectangle_px {
@@ -278,14 +280,12 @@ fn card_scale(
             ratios[0].len()
         )));
     }
-    Ok(ratios.map(|mut all| median(&mut all)))
-}
-
-fn flat(radiance: &Radiance) -> Flat {
-    let mut flat = Flat::new(radiance.width, radiance.height);
-    // The edge of the sheet covers its pixels in part.
-    flat.rgb = radiance.pixels.iter().map(|p| [p[0], p[1], p[2]].map(|v| v / p[3].max(1e-3))).collect();
-    flat
+    let spreads = ratios.map(|all| (spread(&all), all.len()));
+    Ok(Scale {
+        factor: spreads.map(|((middle, _), _)| middle),
+        // A median's is a quarter more than a mean's.
+        error: spreads.map(|((middle, spread), count)| 1.25 * spread / middle / (count as f64).sqrt()),
+    })
 }
 
 fn radiance(flat: &Flat) -> Radiance {
@@ -305,7 +305,7 @@ fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, MeasureError> {
 }
 
 /// Red where the photograph is brighter than the print, blue where it is darker, white where they agree.
-fn difference(photo: &Flat, print: &Radiance, predicted: &Squares) -> RgbImage {
+fn difference(photo: &Flat, print: &Radiance, predicted: &Spots) -> RgbImage {
     let mean = predicted.iter().flatten().sum::<f64>() / (3 * predicted.len().max(1)) as f64;
     RgbImage::from_fn(photo.width as u32, photo.height as u32, |x, y| {
         let i = y as usize * photo.width + x as usize;

@@ -118,7 +118,7 @@ impl Setup {
         let place = |field: &str, p: [f64; 3]| -> Result<(), String> {
             if !p.iter().all(|v| v.is_finite() && v.abs() <= FARTHEST) {
                 return Err(format!(
-                    "{field}: {p:?} is not a place; expected three numbers of at most {FARTHEST} mm"
+                    "{field}: {p:?} is not a place; expected x, y and z in mm, each at most {FARTHEST} from 0"
                 ));
             }
             if p[2] < 1.0 {
@@ -145,18 +145,20 @@ impl Setup {
         if let Some(angle) = field_of_view_deg
             && !(1.0..=150.0).contains(&angle)
         {
-            return Err(format!("camera.field_of_view_deg: {angle} is not from 1 to 150 degrees"));
+            return Err(format!(
+                "camera.field_of_view_deg: {angle}; expected the angle across the width of a photograph, 1 to 150 degrees"
+            ));
         }
         if let Some(p) = position_mm {
             place("camera.position_mm", p)?;
         }
         if tolerance_mm.is_some() && position_mm.is_none() {
-            return Err("camera.tolerance_mm: there is no camera.position_mm that it could be of".into());
+            return Err("camera.tolerance_mm: it says how far camera.position_mm may be off, so state camera.position_mm too".into());
         }
         if let Some(tolerance) = tolerance_mm
             && !(0.01..=1000.0).contains(&tolerance)
         {
-            return Err(format!("camera.tolerance_mm: {tolerance} is not from 0.01 to 1000 mm"));
+            return Err(format!("camera.tolerance_mm: {tolerance}; expected 0.01 to 1000 mm"));
         }
         let mut steps = self.card.reflectance;
         steps.sort_by(f64::total_cmp);
