@@ -20,6 +20,9 @@ use crate::setup;
 const ACROSS: usize = 480;
 /// A step between neighbours that belongs to one even surface, as a logarithm.
 const EVEN: f32 = 0.06;
+/// A step between neighbours that is an edge, as a logarithm. Along an edge that is not quite level, pixels go from one surface to the
+/// other in steps as small as those of an even surface, so that regions do not grow from there.
+const EDGE: f32 = 0.2;
 /// The smallest side of a step in pixels of the copy.
 const SMALLEST: f64 = 5.0;
 /// The part of a step that is left out along each side.
@@ -165,7 +168,11 @@ fn regions(radiance: &Radiance, factor: usize) -> Vec<Region> {
                 i.checked_sub(width),
                 Some(i + width).filter(|&i| i < ln.len()),
             ];
-            for next in near.into_iter().flatten() {
+            let near = near.into_iter().flatten();
+            if near.clone().any(|next| (ln[next] - ln[i]).abs() > EDGE) {
+                continue;
+            }
+            for next in near {
                 if !seen[next] && (ln[next] - ln[i]).abs() < EVEN {
                     seen[next] = true;
                     open.push(next);
@@ -316,6 +323,34 @@ mod tests {
             for (step, left) in steps.iter().zip(left) {
                 assert_eq!(*step, [left, 100.0, left + 30.0, 160.0]);
             }
+        }
+    }
+
+    /// Steps of 26 pixels beside a ground that is nearly as dark as the last, turned, with every pixel the mean over its area.
+    #[test]
+    fn a_card_that_is_not_quite_level_is_found() {
+        for turn in 0..=20 {
+            let (s, c) = (f64::from(turn) * 0.25).to_radians().sin_cos();
+            let mut drawn = scene(&[], [1.0; 3]);
+            for (i, rgb) in drawn.value.chunks_exact_mut(3).enumerate() {
+                let (mut sum, parts) = (0.0, 8);
+                for k in 0..parts * parts {
+                    let part = |k: usize| (k as f64 + 0.5) / parts as f64;
+                    let (x, y) = (
+                        (i % 480) as f64 + part(k % parts) - 240.3,
+                        (i / 480) as f64 + part(k / parts) - 180.6,
+                    );
+                    let (u, v) = ((c * x + s * y) / 26.0 + 1.5, (c * y - s * x) / 26.0 + 0.5);
+                    let on = (0.0..3.0).contains(&u) && (0.0..1.0).contains(&v);
+                    sum += if on { [0.9, 0.18, 0.036][u as usize] } else { 0.1 } / (parts * parts) as f64;
+                }
+                rgb.fill(sum as f32);
+            }
+            let steps = find(&drawn, [0.9, 0.18, 0.036]).unwrap_or_else(|error| panic!("{turn}: {error}"));
+            assert!(
+                (steps[1][0] - 227.0).abs() < 3.0 && (steps[1][3] - 194.0).abs() < 3.0,
+                "{turn}: {steps:?}"
+            );
         }
     }
 
