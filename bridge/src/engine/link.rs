@@ -66,9 +66,7 @@ impl Engine<'_> {
             ToBridge::Ask { request, what: Ask::Board } => self.due.usage = Some(request),
             ToBridge::Configure(settings) => {
                 // Harmless at any time, and needed most when a job is stuck.
-                if !self.assign(Task::Configure(settings), None) {
-                    self.refuse(Refusal::Settings, 0);
-                }
+                self.unless_busy(Task::Configure(settings));
             }
             ToBridge::Initialise => {
                 // A job from before a reset whose data are gone can only be given up.
@@ -302,7 +300,15 @@ impl Engine<'_> {
     }
 
     fn between_jobs(&mut self, task: Task) {
-        if self.job.is_some() || !self.assign(task, None) {
+        match &self.job {
+            Some(job) => self.refuse(Refusal::JobOpen, job.id),
+            None => self.unless_busy(task),
+        }
+    }
+
+    /// Assigns a task. A board that has one refuses it as it would beside a job: the host may ask again later.
+    fn unless_busy(&mut self, task: Task) {
+        if !self.assign(task, None) {
             self.refuse(Refusal::JobOpen, self.job.as_ref().map_or(0, |job| job.id));
         }
     }

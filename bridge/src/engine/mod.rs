@@ -256,7 +256,7 @@ impl<'m> Engine<'m> {
         let Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past } = checkpoint;
         (engine.owes_reset, engine.at_rest, engine.one_way) = (needs_reset, at_rest, one_way);
         engine.past = past;
-        if progress.job == 0 || is_final(progress.state) {
+        if progress.job == 0 || !progress.is_open() {
             engine.last = progress;
             return engine;
         }
@@ -466,17 +466,5 @@ impl<'m> Engine<'m> {
             self.board = Board::Assigned(Assignment { task, request });
         }
         free
-    }
-}
-
-fn is_final(state: JobState) -> bool {
-    match state {
-        JobState::None
-        | JobState::Done
-        | JobState::Cancelled
-        | JobState::Broken(_)
-        | JobState::Lost
-        | JobState::Stored => true,
-        JobState::Printing | JobState::Stopped(_) | JobState::Cancelling | JobState::Storing => false,
     }
 }

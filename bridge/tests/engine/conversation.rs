@@ -150,23 +150,33 @@ fn questions_to_the_printer_are_the_boards_to_put_and_have_the_port_to_themselve
     assert!(rig.printed == stream);
 }
 
+const SETTINGS: PortSettings = PortSettings {
+    setup_ns: 1,
+    strobe_ns: 2,
+    hold_ns: 3,
+    settle_ns: 4,
+    handshake: Handshake::Busy,
+    patience_s: 5,
+    heed: Lines::ALL,
+};
+
 #[test]
 fn settings_reach_the_board_in_the_middle_of_a_job() {
     let mut rig = Rig::new();
     rig.tell(ToBridge::Begin { job: 1, kind: JobKind::Raw, length: 50 });
-    let settings = PortSettings {
-        setup_ns: 1,
-        strobe_ns: 2,
-        hold_ns: 3,
-        settle_ns: 4,
-        handshake: Handshake::Busy,
-        patience_s: 5,
-        heed: Lines::ALL,
-    };
-    rig.tell(ToBridge::Configure(settings));
-    assert_eq!(rig.engine.task(), Some(Task::Configure(settings)));
+    rig.tell(ToBridge::Configure(SETTINGS));
+    assert_eq!(rig.engine.task(), Some(Task::Configure(SETTINGS)));
     rig.engine.done(Outcome::BadSettings);
     assert_eq!(rig.said().text, refused(Refusal::Settings, 0));
+}
+
+/// Nothing is wrong with the settings then.
+#[test]
+fn settings_for_a_board_that_is_busy_are_refused_as_too_early() {
+    let mut rig = Rig::new();
+    rig.tell(ToBridge::Ask { request: 8, what: Ask::DeviceId });
+    let said = rig.tell(ToBridge::Configure(SETTINGS));
+    assert_eq!(said.text, refused(Refusal::JobOpen, 0));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use super::deliver::{are_copies, go_on};
 use super::stdio::show;
 use super::terminal::agreed;
 use device::send::journal::{Entry, Journal, JournalError};
-use device::send::query::{Query, is_open};
+use device::send::query::Query;
 use device::send::session::Phase;
 use device::send::{Address, words};
 use observe::Observer;
@@ -122,7 +122,7 @@ fn is_unknown(error: &anyhow::Error) -> bool {
 fn open_at(to: &Address) -> Result<Option<u32>> {
     let mut link = to.open()?;
     let query = Query::new(&mut *link, bridge::PATIENCE)?;
-    Ok(Some(query.progress()).filter(|progress| is_open(progress)).map(|progress| progress.job))
+    Ok(Some(query.progress()).filter(|progress| progress.is_open()).map(|progress| progress.job))
 }
 
 /// Ends what is open at a bridge and is not in this user's journal, after a question.
@@ -130,7 +130,7 @@ fn cancel_anothers(to: &Address, job: Option<u32>, yes: bool) -> Result<()> {
     let mut link = to.open()?;
     let mut query = Query::new(&mut *link, bridge::PATIENCE)?;
     let open = *query.progress();
-    if !is_open(&open) || job.is_some_and(|job| job != open.job) {
+    if !open.is_open() || job.is_some_and(|job| job != open.job) {
         bail!("the bridge does not have this job open; {}", bridge::doing(&open));
     }
     let job = open.job;
@@ -150,12 +150,12 @@ fn cancel_anothers(to: &Address, job: Option<u32>, yes: bool) -> Result<()> {
     }
     let mut progress = query.cancel(job, bridge::PATIENCE)?;
     let start = Instant::now();
-    while is_open(&progress) && progress.job == job && start.elapsed() < ENDING {
+    while progress.is_open() && progress.job == job && start.elapsed() < ENDING {
         sleep(Duration::from_millis(200));
         progress = query.ask_progress(bridge::PATIENCE)?;
     }
     show(&format!("{}\n", bridge::doing(&progress)))?;
-    if is_open(&progress) && progress.job == job {
+    if progress.is_open() && progress.job == job {
         bail!(
             "job {job:08x} ends as soon as the printer takes bytes again; if it does not, `foilpress bridge reset --to {to}` gives it up"
         );

@@ -365,7 +365,7 @@ impl<'t> Query<'t> {
     pub fn abandon(&mut self, job: u32, patience: Duration) -> Result<Progress, QueryError> {
         let messages = [ToBridge::Abandon { job }];
         exchange(self.link, &mut self.reader, &messages, patience, &mut |heard| match heard {
-            Heard::Progress(progress) if progress.job == job && !is_open(&progress) => Some(Ok(progress)),
+            Heard::Progress(progress) if progress.job == job && !progress.is_open() => Some(Ok(progress)),
             Heard::Refused(Refusal::NoSuchJob, refused) if refused == job => {
                 Some(Err(QueryError::NoSuchJob(job)))
             }
@@ -419,14 +419,6 @@ impl<'t> Query<'t> {
 const NO_PAST: [PastJob; PAST] = [PastJob::NONE; PAST];
 const NOTHING: Progress =
     Progress { job: 0, state: JobState::None, accepted: 0, limit: 0, printed: 0, pass: 0, row: 0 };
-
-/// Whether a job is open.
-pub fn is_open(progress: &Progress) -> bool {
-    matches!(
-        progress.state,
-        JobState::Printing | JobState::Stopped(_) | JobState::Cancelling | JobState::Storing
-    )
-}
 
 /// Says `messages`, again and again, until `judge` is content with what is heard.
 fn exchange<T>(

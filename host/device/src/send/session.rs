@@ -23,7 +23,6 @@ use protocol::link::message::{
 };
 use serde::Serialize;
 
-use super::query::is_open;
 pub use super::record::{Outcome, Phase, Record};
 
 /// A question that is not answered is repeated after this long.
@@ -380,7 +379,7 @@ impl<'d> Session<'d> {
     /// The bridge tells of another job.
     fn place_other(&mut self, now: Duration, progress: Progress) -> Result<(), SessionError> {
         self.followed |= progress.job != 0 && progress.printed > 0;
-        let open = is_open(&progress);
+        let open = progress.is_open();
         match self.record.phase {
             // Nothing of it has ever left, and the bridge does not have it.
             Phase::Begun if self.record.cancel => {

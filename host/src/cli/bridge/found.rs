@@ -11,7 +11,7 @@ use device::deliver::ask::{self, Negotiate};
 use device::flash::image::Firmware;
 use device::printers::Printers;
 use device::send::find::{self, Candidate};
-use device::send::query::{Query, Reply, Shelf, is_alps, is_open};
+use device::send::query::{Query, Reply, Shelf, is_alps};
 use device::send::session::Bridge;
 use device::send::status::Status;
 use device::send::transport::Transport;
@@ -124,7 +124,7 @@ impl Found {
         };
         // A job may have ended meanwhile, between two of these answers.
         found.progress = query.ask_progress(PATIENCE)?;
-        if found.status == Reply::NotNow && !is_open(&found.progress) {
+        if found.status == Reply::NotNow && !found.progress.is_open() {
             found.status = ask::status(&mut query, &printers, negotiate, PRINTER_PATIENCE)?;
         }
         Ok(found)

@@ -16,7 +16,7 @@ use crate::cli::terminal::agreed;
 use device::deliver;
 use device::printers::Printers;
 use device::send::Address;
-use device::send::query::{Query, is_open};
+use device::send::query::Query;
 
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]
@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<()> {
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
     let open = *query.progress();
-    if !is_open(&open) {
+    if !open.is_open() {
         deliver::reset(&mut query, &printers)?;
         return show("the printer has been reset; if a sheet is still in it, take it out\n");
     }

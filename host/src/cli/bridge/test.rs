@@ -12,7 +12,7 @@ use serde_json::json;
 use super::found::{PATIENCE, named_or_only};
 use crate::cli::output::say_on_interrupt;
 use device::send::Address;
-use device::send::query::{Query, QueryError, is_open};
+use device::send::query::{Query, QueryError};
 use device::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
 
 /// Time between two checks whether the plug has been moved.
@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Result<()> {
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
     let progress = *query.progress();
-    if is_open(&progress) {
+    if progress.is_open() {
         bail!(QueryError::JobOpen(progress.job));
     }
     if args.pattern { walk(&mut query) } else { test(&mut query, args.json) }

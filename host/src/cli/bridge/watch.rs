@@ -13,7 +13,7 @@ use crate::cli::stdio::chain;
 use device::deliver::ask::{self, Negotiate};
 use device::printers::Printers;
 use device::send::Address;
-use device::send::query::{Query, Reply, is_open};
+use device::send::query::{Query, Reply};
 use device::send::transport::Transport;
 
 /// Time between two questions to the bridge.
@@ -108,7 +108,7 @@ fn follow(
     *been = true;
     let mut asked: Option<Instant> = None;
     loop {
-        match (found.fault, is_open(&found.progress)) {
+        match (found.fault, found.progress.is_open()) {
             (Some(fault), _) => found.status = Reply::Stopped(fault),
             (None, true) => found.status = Reply::NotNow,
             (None, false) if asked.is_none_or(|at| at.elapsed() >= ASK) => {

@@ -36,6 +36,21 @@ pub struct Progress {
     pub row: u16,
 }
 
+impl Progress {
+    /// Whether the job is open: neither ended nor none.
+    pub const fn is_open(&self) -> bool {
+        match self.state {
+            JobState::None
+            | JobState::Done
+            | JobState::Cancelled
+            | JobState::Broken(_)
+            | JobState::Lost
+            | JobState::Stored => false,
+            JobState::Printing | JobState::Stopped(_) | JobState::Cancelling | JobState::Storing => true,
+        }
+    }
+}
+
 /// The state of a job.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -116,7 +116,7 @@ pub enum Answer<'a> {
 pub enum Refusal {
     /// Not a message of this version.
     Unknown,
-    /// Another job is open; the last progress has its number.
+    /// Another job is open, and the last progress has its number; or the board has another task at the moment.
     JobOpen,
     /// No such job.
     NoSuchJob,
