@@ -124,6 +124,7 @@ impl Lit {
                 out.iter_mut().zip(&used).for_each(|(out, &i)| *out = pixel[i]);
             },
         );
+        drop(shares);
         let levels = pyramid(Level { width, height, weights }, stride);
         let dots = match source {
             Source::Print { dots, area, .. } => Some(Dots::new(dots, area, &used, size, [width, height])),
