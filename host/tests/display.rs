@@ -78,6 +78,10 @@ fn what_cannot_be_shown_is_refused_and_nothing_is_written() {
         ("text.png", ["text.png: expected a PNG, JPEG or TIFF", ""]),
         ("missing.png", ["missing.png", ""]),
         ("one.png --pixels 30", ["--pixels 30", "give at most 24"]),
+        (
+            "one.png --shift 100,100mm",
+            ["--shift 100,100mm: the screen lies beside the print", "shift it by less"],
+        ),
         ("one.png --stacks MS", ["1 in the grid", "2 to 9"]),
         ("one.png --stacks MS,MS", ["MS is given twice", ""]),
         ("one.png --stacks MS,K --pitch 0.1mm", ["MS needs 16 dots", "--cell 2"]),

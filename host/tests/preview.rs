@@ -16,6 +16,7 @@ fn a_document_becomes_a_page_a_picture_or_radiance() {
     let page = fs::read_to_string(bench.path("tile.html")).expect("a page");
     assert_eq!(report["bytes"], page.len());
     assert!(page.starts_with("<!doctype html>") && page.contains("show=document&with=printed"));
+    assert!(page.contains("53 thousand dots"), "12 x 8 mm are 283 x 189 dots");
 
     // Twice the light is twice the radiance, and a darker exposure a darker picture.
     let red = |name: &str| {
@@ -51,6 +52,12 @@ fn dots_and_jobs_show_the_print_alone() {
     small_document(&bench.path("tile"));
     bench.done("print tile --size 12x8mm --paper postcard -q --to file:job.rgl");
     bench.done("preview job.rgl -q -o job.png --pixels 200");
+    // A job in the folder of a print has the document's name.
+    for (job, name) in [("job.rgl", "job"), ("tile.print/job.rgl", "tile")] {
+        bench.done(&format!("preview {job} -q -o page.html"));
+        let page = fs::read_to_string(bench.path("page.html")).unwrap();
+        assert!(page.contains(&format!("<title>{name}")), "{name}");
+    }
     bench.done("simulate job.rgl -q -o printed.sheet");
     bench.done("preview printed.sheet -q -o sheet.png --pixels 200");
     assert_eq!(fs::read(bench.path("job.png")).unwrap(), fs::read(bench.path("sheet.png")).unwrap());

@@ -26,8 +26,9 @@ use protocol::paper::Paper;
 
 /// Where a result goes: the place named, else the current folder under the name of what it is made from.
 fn named(output: &Option<PathBuf>, from: &Path, ending: &str) -> PathBuf {
-    let name = || from.file_stem().map_or_else(|| "document".into(), |stem| stem.to_string_lossy());
-    output.clone().unwrap_or_else(|| format!("{}.{ending}", output::file_name(&name())).into())
+    output
+        .clone()
+        .unwrap_or_else(|| format!("{}.{ending}", output::file_name(&document::name_of(from))).into())
 }
 
 /// Arguments of `factor`.

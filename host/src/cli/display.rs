@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use appearance::brdf::Space;
-use appearance::document::{Document, SAMPLES};
+use appearance::document::{Document, SAMPLES, name_of};
 use appearance::materials::{Materials, Reduced, resolution};
 use clap::Args as ClapArgs;
 use inks::{InkSet, Library, Stack};
@@ -19,7 +19,8 @@ use view::display::{
 };
 
 use super::args::{DocumentArgs, InkArgs};
-use super::job::{self, JobArgs, Places, write};
+use super::job::{self, JobArgs, Places};
+use super::output::write;
 use observe::Observer;
 
 /// Stacks of a grid where none are named.
@@ -154,7 +155,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         })
         .collect();
     let grid = args.grid(&sources, shape, (set, &library), &layout, observer)?;
-    let placed = Placed { shift_mm: [args.shift.0.0, args.shift.1.0], depth_mm: args.depth.0 };
+    let placed = args.placed(&grid)?;
     observer.begin("solving masks", sources.len() as u64);
     let mut frames = Vec::with_capacity(sources.len() + 1);
     for (source, name) in sources.iter().zip(&args.images) {
@@ -176,8 +177,7 @@ fn size(materials: &dyn Materials) -> (usize, usize) {
 
 /// An image's name without its folders, as it stands on the page.
 fn shown_name(name: &str) -> String {
-    let path = Path::new(name);
-    path.file_stem().map_or_else(|| name.to_owned(), |stem| stem.to_string_lossy().into_owned())
+    name_of(Path::new(name))
 }
 
 impl Args {
@@ -212,6 +212,23 @@ impl Args {
         }
         let side = |side: usize| ((side * wanted + longest / 2) / longest.max(1)).max(1);
         Ok((side(first.0), side(first.1)))
+    }
+
+    /// How the screen lies over the print. Beside it nothing is seen.
+    fn placed(&self, grid: &Grid) -> Result<Placed> {
+        let shift = [self.shift.0.0, self.shift.1.0];
+        let (across, down) = grid.size_dots();
+        let size = [across, down].map(|dots| Mm::of_dots(dots as i64).0);
+        if (0..2).any(|c| shift[c].abs() >= size[c]) {
+            bail!(
+                "--shift {},{}mm: the screen lies beside the print, which is {:.1} x {:.1} mm; shift it by less than that",
+                shift[0],
+                shift[1],
+                size[0],
+                size[1]
+            );
+        }
+        Ok(Placed { shift_mm: shift, depth_mm: self.depth.0 })
     }
 
     fn grid(

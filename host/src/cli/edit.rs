@@ -14,7 +14,7 @@ use super::args::{DocumentArgs, InkArgs};
 use super::output::{self, Kind, Staged};
 use super::stdio::show;
 use appearance::brdf::{Space, Table, plot};
-use appearance::document::foil;
+use appearance::document::{foil, name_of};
 use appearance::edit::{
     self, Change, Edited, Effect, FILE_NAME, Mask, Replacement, Step, Steps, Surface, Tint, fingerprint,
 };
@@ -198,9 +198,9 @@ impl Args {
     fn staged(&self) -> Result<(Staged, PathBuf)> {
         let document = Path::new(&self.document.document);
         let target = self.output.clone().unwrap_or_else(|| {
-            let stem = document.file_stem().map_or_else(|| "document".into(), |stem| stem.to_string_lossy());
-            let stem = stem.strip_prefix("sample:").unwrap_or(&stem);
-            format!("{}-edited.foil", output::file_name(stem)).into()
+            let name = name_of(document);
+            let name = name.strip_prefix("sample:").unwrap_or(&name);
+            format!("{}-edited.foil", output::file_name(name)).into()
         });
         let place = |path: &Path| path.canonicalize().ok();
         if place(document).is_some_and(|document| place(&target) == Some(document)) {

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 use super::deliver::DeliverArgs;
 use super::layout::{LayoutArgs, MediaArgs};
 use super::ledger;
-use super::output::{self, Kind, Staged};
+use super::output::{self, Kind, Staged, write};
 use super::shown;
 use observe::Observer;
 use press::job::plan::Suggestion;
@@ -95,11 +95,6 @@ impl Places {
 
 fn absolute(path: &Path) -> Result<PathBuf> {
     std::path::absolute(path).with_context(|| format!("`{}` is not a path", path.display()))
-}
-
-/// Writes a file of a print.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// A job that was proved on the simulated printer and written where it will appear.

@@ -19,6 +19,7 @@ mod generate;
 mod inks;
 mod inspect;
 mod job;
+mod laid;
 mod layers;
 mod layout;
 mod ledger;

@@ -233,6 +233,11 @@ impl Staged {
     }
 }
 
+/// Writes a file, in a folder that is staged.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
 /// A document's name as a file name, without blanks, so that it can be typed as it stands. Names come from documents, which
 /// must not decide where this program writes.
 pub fn file_name(name: &str) -> String {

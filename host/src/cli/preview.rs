@@ -19,9 +19,9 @@ use serde_json::json;
 use self::shown::{Shown, png};
 use self::view::{Show, ViewArgs};
 use self::wear::{Told, WearArgs};
+use super::laid::DotsArgs;
 use super::output::Staged;
 use super::preset::PresetArg;
-use super::print::DotsArgs;
 
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

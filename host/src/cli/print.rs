@@ -5,29 +5,26 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 use image::RgbImage;
-use inks::{InkSet, Library};
 use serde_json::{Value, json};
 
-use super::args::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
 use super::choice::name;
 use super::deliver::DeliverArgs;
 use super::inks::luminance;
 use super::job::{self, Places, ResultArgs};
-use super::layout::{LayoutArgs, MediaArgs};
+use super::laid::{DotsArgs, Laid};
+use super::layout::MediaArgs;
+use super::output;
 use super::preset::PresetArg;
 use super::preview::shown::Shown;
 use super::preview::view::ViewArgs;
 use super::progress::Beside;
 use super::report;
 use appearance::brdf::reflectances;
-use appearance::document::Document;
-use appearance::factor::{self, Factored};
-use appearance::gamut::{self, Gain, InkMix, Intent};
+use appearance::gamut::InkMix;
 use observe::Observer;
 use press::halftone;
 use press::halftone::metrics::{self, Look, Tone};
-use press::layout::{Layout, Mm, Size};
-use press::pipeline::document::{self, Halftoned, Settings};
+use press::layout::Mm;
 use press::pipeline::{self, Draft, Request};
 use press::preview::{self, EYE, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
 use press::sheet::Area;
@@ -39,27 +36,6 @@ const BALL: usize = 160;
 /// The half angle in radians at which dots are light or dark for their spectrum: beside the highlight.
 const ASIDE: f64 = 0.35;
 
-/// A document and everything that decides its dots.
-#[derive(ClapArgs, Debug)]
-pub struct DotsArgs {
-    #[command(flatten)]
-    pub document: DocumentArgs,
-    /// Size on paper, such as 120x90mm, 12cm or 5x4in; the document keeps its proportions
-    /// [default: the document's own size, else as large as the page allows]
-    #[arg(long)]
-    pub size: Option<Size>,
-    #[command(flatten)]
-    pub layout: LayoutArgs,
-    #[command(flatten)]
-    pub factor: FactorArgs,
-    #[command(flatten)]
-    pub gamut: GamutArgs,
-    #[command(flatten)]
-    pub halftone: HalftoneArg,
-    #[command(flatten)]
-    pub inks: InkArgs,
-}
-
 /// A document and everything that decides how it is printed.
 #[derive(ClapArgs, Debug)]
 pub struct Work {
@@ -69,28 +45,6 @@ pub struct Work {
     media: MediaArgs,
     #[command(flatten)]
     preset: PresetArg,
-}
-
-/// A document's dots and how they lie on the page.
-pub struct Laid {
-    pub document: Document,
-    pub library: Library,
-    pub settings: Settings,
-    pub layout: Layout,
-    pub halftoned: Halftoned,
-}
-
-/// Bases of a document whose print needs none, so that the picture of it is close.
-const BASES: usize = 12;
-
-impl Laid {
-    /// The document's bases for pictures of it.
-    pub fn bases(&self, observer: &dyn Observer) -> Result<Factored> {
-        let uses_bases = self.halftoned.mapped.report.intent.uses_bases();
-        let bases = self.settings.factor.bases.or((!uses_bases).then_some(BASES));
-        let settings = factor::Settings { bases, ..self.settings.factor };
-        Ok(document::factored(&self.document, &settings, observer)?.0.into_owned())
-    }
 }
 
 impl Work {
@@ -112,68 +66,6 @@ impl Work {
             library: &laid.library,
         }
     }
-}
-
-impl DotsArgs {
-    /// The document's dots. Nothing is written.
-    pub fn laid(&self, observer: &dyn Observer) -> Result<Laid> {
-        let (inks, library) = self.inks.at_hand()?;
-        self.halftone(self.document.open(observer)?, inks, library, observer)
-    }
-
-    fn halftone(
-        &self,
-        document: Document,
-        inks: InkSet,
-        library: Library,
-        observer: &dyn Observer,
-    ) -> Result<Laid> {
-        let layout = self.layout.layout(observer)?;
-        let settings = Settings {
-            factor: self.factor.settings(),
-            gamut: self.gamut.settings(self.factor.seed),
-            inks,
-            halftone: self.halftone.halftone,
-            size: self.size,
-        };
-        let halftoned = document::halftoned(&document, &library, &settings, &layout, observer)?;
-        let report = &halftoned.mapped.report;
-        if !report.intent.uses_bases() && self.factor.is_chosen() {
-            observer.note(match report.not_blended {
-                None => "every pixel was fitted by itself, so --bases and --factor change nothing; --intent basis uses bases",
-                Some(_) => {
-                    "every pixel was fitted by itself; --bases and --factor decided only that intent `blend` would not do \
-                     better; --intent basis uses bases"
-                }
-            });
-        }
-        if let Some(words) =
-            halftoned.foils.as_ref().and_then(|gain| foils_in_words(gain, report.intent, &settings.gamut))
-        {
-            observer.note(&words);
-        }
-        Ok(Laid { document, library, settings, layout, halftoned })
-    }
-}
-
-/// What foils would bring to what the intent maps, if that can be seen.
-fn foils_in_words(gain: &Gain, intent: Intent, settings: &gamut::Settings) -> Option<String> {
-    /// Share of the difference that is worth the trouble.
-    const WORTH: f64 = 0.1;
-    let share = 1.0 - gain.after / gain.before;
-    let names: Vec<&str> = gain.inks.iter().map(|ink| ink.name()).collect();
-    (share >= WORTH).then(|| {
-        format!(
-            "with {} the inks would come {:.0} % nearer to {} (root mean square difference{} {:.3} instead of {:.3}); \
-             --inks +foil allows foils",
-            names.join(" and "),
-            100.0 * share,
-            if intent == Intent::Basis { "the bases of this document" } else { "this document" },
-            settings.measure(),
-            gain.after,
-            gain.before
-        )
-    })
 }
 
 /// Arguments of `print`.
@@ -252,9 +144,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         tones: &halftone.tones,
         spectrum: halftone.spectrum.as_ref(),
     })?;
-    job::write(&made.folder.join("report.html"), page.as_bytes())?;
+    output::write(&made.folder.join("report.html"), page.as_bytes())?;
     let report = report(&laid, &pictures.fidelity, &halftone);
-    job::write(&made.folder.join("sheet.html"), looked_at.html.as_bytes())?;
+    output::write(&made.folder.join("sheet.html"), looked_at.html.as_bytes())?;
     made.finish(report, (&advice, "report.html"), &args.result, &args.deliver, observer)
 }
 

@@ -7,9 +7,8 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use super::job::write;
 use super::ledger;
-use super::output::Staged;
+use super::output::{Staged, write};
 use press::job::page::{self, Pictures};
 use press::job::plan::Plan;
 use press::pipeline::Draft;

@@ -84,10 +84,16 @@ impl Document {
     }
 }
 
-/// The name of a document that is stored at a path.
-pub(super) fn stem(path: &Path) -> String {
+/// Endings of the folders that this program writes.
+const ENDINGS: [&str; 6] = ["foil", "mix", "dots", "sheet", "passes", "print"];
+
+/// The name of what is stored at a path: a file's without its ending, a folder's as it is, dots included, without an ending of
+/// this program's own.
+pub fn name_of(path: &Path) -> String {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    whole.file_stem().map_or_else(|| "document".into(), |stem| stem.to_string_lossy().into_owned())
+    let own = || whole.extension().is_some_and(|ending| ENDINGS.iter().any(|own| ending == *own));
+    let name = if whole.is_dir() && !own() { whole.file_name() } else { whole.file_stem() };
+    name.map_or_else(|| "document".into(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Checks that a size on paper is plausible: from one dot to 10 metres.
@@ -97,5 +103,23 @@ pub(super) fn check_size_mm(size: [f64; 2]) -> Result<(), String> {
             Err(format!("size_mm: {mm} is not a length on paper; expected 0.04 to 10000 millimetres"))
         }
         None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_keep_their_dots_and_files_lose_their_endings() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, expected) in
+            [("leaf.v2", "leaf.v2"), ("leaf.v2.foil", "leaf.v2"), ("leaf", "leaf"), ("rust.print", "rust")]
+        {
+            let path = folder.path().join(name);
+            std::fs::create_dir(&path).unwrap();
+            assert_eq!(name_of(&path), expected);
+        }
+        assert_eq!(name_of(Path::new("of/leaf.v2.binary")), "leaf.v2");
     }
 }

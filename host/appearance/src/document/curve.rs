@@ -4,7 +4,7 @@ use std::path::Path;
 
 use inks::Curve;
 
-use super::content::{Content, Document, SWATCH_MM, stem};
+use super::content::{Content, Document, SWATCH_MM, name_of};
 use super::error::DocumentError;
 use super::source::Source;
 use crate::brdf::Space;
@@ -50,7 +50,7 @@ pub(super) fn document(
     })?;
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: stem(path),
+        name: name_of(path),
         content: Content::Uniform(uniform),
         size_mm: Some((SWATCH_MM, SWATCH_MM)),
         notes,

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use observe::Observer;
 
-use super::content::{Content, Document, check_size_mm, stem};
+use super::content::{Content, Document, check_size_mm, name_of};
 use super::error::DocumentError;
 use super::picture::{MOST_PIXELS, Picture};
 use super::source::{MOST_BYTES, Source};
@@ -196,7 +196,7 @@ pub(super) fn open(path: &Path, mut source: Source<'_>) -> Result<Document, Docu
         .map_err(|source| DocumentError::Weights { path: path.to_path_buf(), source })?;
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: if index.name.is_empty() { stem(path) } else { index.name },
+        name: if index.name.is_empty() { name_of(path) } else { index.name },
         content: Content::Factored(Factored { space, bases, maps }),
         size_mm: index.size_mm.map(|[w, h]| (w, h)),
         notes,

@@ -10,7 +10,7 @@ mod settings;
 
 use std::path::Path;
 
-use super::content::{ColourSpace, Content, Document, Options, stem};
+use super::content::{ColourSpace, Content, Document, Options, name_of};
 use super::error::DocumentError;
 use super::names::Role;
 use super::picture::Picture;
@@ -159,7 +159,7 @@ pub(super) fn open(
     source.observer.end();
     let (notes, digest) = source.finish();
     Ok(Document {
-        name: settings.name.unwrap_or_else(|| stem(folder)),
+        name: settings.name.unwrap_or_else(|| name_of(folder)),
         content: Content::Surfaces(surfaces),
         size_mm: settings.size_mm.map(|[w, h]| (w, h)),
         notes,

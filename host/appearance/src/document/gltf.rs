@@ -12,7 +12,7 @@ use std::path::Path;
 
 use ::gltf::json;
 
-use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, stem};
+use super::content::{ColourSpace, Content, Document, Options, SWATCH_MM, name_of};
 use super::error::DocumentError;
 use super::relief;
 use super::source::{MOST_BYTES, Source};
@@ -67,7 +67,7 @@ pub(super) fn open(
     let (notes, digest) = source.finish();
     let name = material.name.clone().filter(|name| !name.trim().is_empty());
     Ok(Document {
-        name: name.unwrap_or_else(|| format!("{}-{number}", stem(path))),
+        name: name.unwrap_or_else(|| format!("{}-{number}", name_of(path))),
         content: Content::Surfaces(surfaces),
         size_mm: (!textured).then_some((SWATCH_MM, SWATCH_MM)),
         notes,

@@ -27,7 +27,7 @@ mod spectrum;
 mod tensor;
 mod texture;
 
-pub use content::{ColourSpace, Content, Document, Options, SAMPLES};
+pub use content::{ColourSpace, Content, Document, Options, SAMPLES, name_of};
 pub use error::DocumentError;
 pub use open::{measured, open};
 pub use sample::write_sample;

@@ -10,7 +10,7 @@ use ::view::page::{Subject, Target, page};
 use ::view::{Lit, Renderer, mapped, proportions};
 use anyhow::{Context, Result};
 use appearance::brdf::{Space, Table, reflectances};
-use appearance::document::SAMPLES;
+use appearance::document::{SAMPLES, name_of};
 use appearance::factor::Factored;
 use appearance::gamut::InkMix;
 use image::ImageFormat;
@@ -21,7 +21,7 @@ use press::preview::{Probe, Radiance, Source, ToneCurve, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
 
-use super::super::print::{DotsArgs, Laid};
+use super::super::laid::{DotsArgs, Laid};
 use super::super::stdio::read_job;
 use super::view::{Show, ViewArgs};
 use super::wear::Told;
@@ -63,8 +63,7 @@ impl Shown {
     pub fn open(work: &DotsArgs, observer: &dyn Observer) -> Result<Shown> {
         let path = Path::new(&work.document.document);
         if let Some(dots) = printed(path, observer)? {
-            let name =
-                path.file_stem().map_or_else(|| "sheet".into(), |stem| stem.to_string_lossy().into_owned());
+            let name = printed_name(path);
             let library = work.inks.library()?;
             return Ok(Shown {
                 name,
@@ -170,8 +169,8 @@ impl Shown {
         let [width, height] = self.size().map(|side| side * 1000.0);
         let stacks = self.dots.census().iter().filter(|&&dots| dots > 0).count();
         format!(
-            "{width:.0} x {height:.0} mm, {:.1} million dots of {stacks} {}",
-            self.dots.index().len() as f64 / 1e6,
+            "{width:.0} x {height:.0} mm, {} dots of {stacks} {}",
+            counted(self.dots.index().len()),
             if stacks == 1 { "stack" } else { "stacks" }
         ) + &self.worn.as_ref().map_or_else(String::new, |worn| format!(", {}", worn.brief()))
     }
@@ -179,6 +178,15 @@ impl Shown {
     /// Says what a worn printer made of the dots.
     pub fn say(&self, out: &mut dyn std::io::Write) -> std::io::Result<()> {
         self.worn.as_ref().map_or(Ok(()), |worn| worn.write(out))
+    }
+}
+
+/// A number of dots in words.
+fn counted(dots: usize) -> String {
+    match dots {
+        0..10_000 => dots.to_string(),
+        10_000..950_000 => format!("{:.0} thousand", dots as f64 / 1e3),
+        _ => format!("{:.1} million", dots as f64 / 1e6),
     }
 }
 
@@ -197,6 +205,13 @@ pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
     let printout = simulate::print(&job, &simulate::Setup::default(), observer)
         .with_context(|| format!("{}", path.display()))?;
     Ok(Some(printout.sheet()?.dots().clone()))
+}
+
+/// The name of a job or of a folder with a sheet. `print` calls every job alike, but its folder by the document.
+pub fn printed_name(path: &Path) -> String {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let folder = whole.parent().filter(|folder| folder.join("plan.html").is_file());
+    name_of(folder.filter(|_| whole.ends_with("job.rgl")).unwrap_or(&whole))
 }
 
 /// A picture as PNG.
