@@ -201,7 +201,10 @@ fn summary(comparison: &Comparison, output: &Path) -> String {
 fn stacks(photo: &PhotoFigures) -> String {
     let differ: Vec<&Factor> = photo.stacks.iter().filter(|factor| factor.differs).collect();
     if differ.is_empty() {
-        return format!("{}: every stack is as predicted (within four standard errors, or 1 %)", photo.name);
+        return format!(
+            "{}: no stack differs from its prediction by more than four standard errors and 1 %",
+            photo.name
+        );
     }
     let told = differ.iter().take(STACKS).map(|factor| {
         let rgb = factor.factor.map(|value| format!("{value:.3}")).join(" ");

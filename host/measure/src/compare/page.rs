@@ -154,10 +154,10 @@ fn stacks(photo: &PhotoFigures, page: &mut String) -> std::fmt::Result {
         for (value, error) in factor.factor.iter().zip(factor.standard_error) {
             write!(page, "<td class=n>{value:.3} ± {error:.3}")?;
         }
-        write!(page, "<td>{}", if factor.differs { "" } else { "as predicted" })?;
+        write!(page, "<td>{}", if factor.differs { "differs" } else { "no difference found" })?;
     }
     page.push_str(
-        "</table></div><p>± is one standard error. A stack is “as predicted” unless a channel differs from 1 by more than four of them and 0.01.</p></details>",
+        "</table></div><p>± is one standard error. A stack differs if a channel is off from 1 by more than four of them and 0.01.</p></details>",
     );
     Ok(())
 }
