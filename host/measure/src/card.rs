@@ -143,11 +143,22 @@ fn regions(radiance: &Radiance, factor: usize) -> Vec<Region> {
             if sum > 10.0 * variance.sqrt() { sum.ln() } else { f32::NAN }
         })
         .collect();
+    let near = |i: usize| {
+        let x = i % width;
+        let near = [
+            (x > 0).then(|| i - 1),
+            (x + 1 < width).then_some(i + 1),
+            i.checked_sub(width),
+            Some(i + width).filter(|&i| i < ln.len()),
+        ];
+        near.into_iter().flatten()
+    };
+    let edge = |i: usize| near(i).any(|next| (ln[next] - ln[i]).abs() > EDGE);
     let mut seen = vec![false; ln.len()];
     let mut regions = Vec::new();
     let mut open = Vec::new();
     for start in 0..ln.len() {
-        if seen[start] || ln[start].is_nan() {
+        if seen[start] || ln[start].is_nan() || edge(start) {
             continue;
         }
         let (mut count, mut sum) = (0usize, 0.0f64);
@@ -162,17 +173,10 @@ fn regions(radiance: &Radiance, factor: usize) -> Vec<Region> {
             region.right = region.right.max(x + 1);
             region.top = region.top.min(y);
             region.bottom = region.bottom.max(y + 1);
-            let near = [
-                (x > 0).then(|| i - 1),
-                (x + 1 < width).then_some(i + 1),
-                i.checked_sub(width),
-                Some(i + width).filter(|&i| i < ln.len()),
-            ];
-            let near = near.into_iter().flatten();
-            if near.clone().any(|next| (ln[next] - ln[i]).abs() > EDGE) {
+            if edge(i) {
                 continue;
             }
-            for next in near {
+            for next in near(i) {
                 if !seen[next] && (ln[next] - ln[i]).abs() < EVEN {
                     seen[next] = true;
                     open.push(next);

@@ -6,8 +6,7 @@
 //! is inks that differ from the library at these angles, and the remainder is everything else: registration, lamp, noise.
 //! Factors are found by least squares over the spots. Their standard errors come from what remains, which neither needs to be alike
 //! everywhere nor independent between neighbours (White 1980; Conley 1999, with weights that fall to 0 at [`NEAR`] spots), and from how
-//! far the photograph's scale is known. Few spots make such errors small by chance, so that they are at least those of even noise (Angrist
-//! and Pischke 2009, section 8.1).
+//! far the photograph's scale is known.
 //! Limits: errors of steps may cancel, so they do not add up to the whole; a lamp in the wrong place looks like inks.
 
 use inks::Curve;
@@ -256,9 +255,7 @@ fn fitted(
             for &i in known {
                 moves[i] = along(i, &unit) * (off(i) - added[i][c]);
             }
-            let scatter = known.iter().map(|&i| (off(i) - added[i][c]).powi(2)).sum::<f64>();
-            let alike = OVERLAP * unit[s] * scatter / known.len() as f64;
-            let variance = freedom * together(&moves, window.spots()).max(alike);
+            let variance = freedom * together(&moves, window.spots());
             let error = (variance + (factor.factor[c] * scale[c]).powi(2)).sqrt();
             factor.standard_error[c] = error;
             factor.differs |= (factor.factor[c] - 1.0).abs() > (SURE * error).max(SLIGHT);
