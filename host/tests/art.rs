@@ -460,3 +460,68 @@ fn a_document_without_a_page_to_draw_says_why_in_layers_and_in_a_queue() {
         }
     }
 }
+
+#[test]
+fn a_spot_colour_that_may_be_an_ink_has_a_remedy_in_a_queue() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let filtered = |spot: &str, option: &str| {
+        let page = format!(
+            "%!PS\n<</PageSize[288 216]>>setpagedevice\n[/Separation ({spot}) /DeviceCMYK {{pop 0 1 1 0}}] setcolorspace \
+             1 setcolor 100 100 50 50 rectfill showpage\n"
+        );
+        fs::write(bench.path("spot.ps"), page).unwrap();
+        let file = bench.path("spot.ps").display().to_string();
+        let output = bench.command(&format!("cups-filter 1 me title 1 {option} {file}")).output().unwrap();
+        (output.status.success(), text(&output.stderr))
+    };
+    let (done, said) = filtered("Golden", "FoilpressSpots=Named");
+    assert!(!done && said.contains("FoilpressSpots=Off prints it in process inks"), "{said}");
+    assert!(
+        said.contains("spot colour `Golden` names no ink (did you mean `gold`?); rename the spot colour"),
+        "{said}"
+    );
+    assert!(!said.contains(".png"), "{said}");
+    for (spot, option) in [("Golden", "FoilpressSpots=Off"), ("Fold", "FoilpressSpots=Named")] {
+        let (done, said) = filtered(spot, option);
+        assert!(done, "{spot}, {option}: {said}");
+    }
+}
+
+#[test]
+fn a_page_without_the_reserved_white_is_printed_without_white() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let filtered = |greys: &[&str]| {
+        let page = |grey: &&str| {
+            format!("{grey} setgray 100 100 50 50 rectfill 0 setgray 30 100 50 50 rectfill showpage\n")
+        };
+        let pages: String = greys.iter().map(page).collect();
+        fs::write(bench.path("pages.ps"), format!("%!PS\n<</PageSize[288 216]>>setpagedevice\n{pages}"))
+            .unwrap();
+        let file = bench.path("pages.ps").display().to_string();
+        let output = bench
+            .command(&format!("cups-filter 1 me title 1 FoilpressWhite=Reserved {file}"))
+            .output()
+            .unwrap();
+        let said = text(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        let passes = press::inspect::sheets(&output.stdout).into_iter().flat_map(|sheet| {
+            let seen = press::inspect::inspect(&output.stdout[sheet], &observe::Silent);
+            seen.inspection.passes.into_iter().map(|pass| pass.ink.to_string()).collect::<Vec<String>>()
+        });
+        (passes.collect::<Vec<String>>(), said)
+    };
+    let none = "no page has the reserved white";
+    // 230 of 255, and black alone.
+    let (inks, said) = filtered(&[".902", "0"]);
+    assert_eq!(inks, ["white", "black", "black"]);
+    assert!(said.contains("page 2: nothing has the reserved white") && !said.contains(none), "{said}");
+    let (inks, said) = filtered(&["0"]);
+    assert_eq!(inks, ["black"]);
+    assert!(said.contains(none), "{said}");
+}

@@ -196,6 +196,12 @@ fn marks_of_all_inks_are_no_stack_to_warn_of() {
     };
     assert_eq!(plan("--registration-marks --crop-marks"), plan(""));
     assert!(!plan("").contains(&Value::from("three-layers")));
+    // An ink has the same names here as everywhere.
+    for name in ["gold", "MG", "Metallic Gold"] {
+        let name = name.replace(' ', "-");
+        let art = format!("plan layers white.png --crop-marks --mark-ink {name} --paper postcard");
+        assert!(bench.done(&art).contains("Metallic Gold"), "{name}");
+    }
     // What the art itself does is still said.
     let art = "plan layers white.png --order white,white,white,white --paper postcard --registration-marks";
     assert!(bench.done(art).contains("more than three layers"));

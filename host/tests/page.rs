@@ -201,7 +201,11 @@ fn a_preset_stands_for_its_options_and_gives_way_to_what_is_typed() {
     assert_eq!(json(&bench.done("plan tile --json"))["curl_correction"], false);
     bench.done("preset use none");
     assert!(bench.refused(1, "print tile --preset crad").contains("card"));
-    assert!(bench.refused(1, "preset save bad --media foo").contains("the media are paper, thick, film"));
+    assert!(
+        bench
+            .refused(1, "preset save bad --media foo")
+            .contains("expected one of the media paper, thick, film")
+    );
     assert!(bench.refused(1, "preset save ../x --mirror").contains("is not a valid name"));
     assert!(!bench.entries().contains(&"x.toml".to_string()));
 }

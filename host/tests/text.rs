@@ -341,6 +341,63 @@ fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
     }
 }
 
+/// The least changes of letters whose edge dots are all printed and of which so many dots are bare, evenly over all letters.
+/// Bare dots lie within; a row of them is no longer than the row within the letter that it lies in, and both its ends are
+/// changes, and so are those of a column. So a bare dot adds at least two by the length of its row and two by that of its column.
+fn least_changes(drawn: &Dots, bare: usize) -> f64 {
+    let length = drawn.length();
+    let inner = Dots::new(drawn.width, length, |x, y| is_inner(drawn, x, y));
+    let dots = inner.set.iter().filter(|&&inner| inner).count();
+    let begins = |count: usize, lines: usize, at: &dyn Fn(usize, usize) -> bool| -> usize {
+        (0..lines)
+            .map(|line| (0..count).filter(|&i| at(line, i) && (i == 0 || !at(line, i - 1))).count())
+            .sum()
+    };
+    let rows = begins(drawn.width, length, &|y, x| inner.at(x, y));
+    let columns = begins(length, drawn.width, &|x, y| inner.at(x, y));
+    drawn.changes() as f64 + bare as f64 / dots as f64 * 2.0 * (rows + columns) as f64
+}
+
+/// Whether a dot and its four neighbours are drawn.
+fn is_inner(drawn: &Dots, x: usize, y: usize) -> bool {
+    let beside = [(x, y), (x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+    beside.into_iter().all(|(x, y)| x < drawn.width && y < drawn.length() && drawn.at(x, y))
+}
+
+#[test]
+fn pale_letters_keep_every_dot_of_their_edge_and_that_takes_most_of_their_outline() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let text = |colour: &str| {
+        std::fs::write(bench.path("page.ps"), page(SHEET, &lines(colour))).expect("a page");
+        without_marks(&printed(&queued(&bench, "page.ps"), &Ink::ALL))
+    };
+    let drawn = text("0 setgray");
+    for colour in
+        [".85 setgray", ".93 setgray", ".8 .9 1 setrgbcolor", "1 .9 .8 setrgbcolor", "0 0 0 .3 setcmykcolor"]
+    {
+        let found = text(colour);
+        let letters = (0..drawn.set.len()).filter(|&at| drawn.set[at]).count();
+        let bare = (0..drawn.set.len()).filter(|&at| drawn.set[at] && !found.set[at]).count();
+        let beyond = (0..drawn.set.len()).filter(|&at| found.set[at] && !drawn.set[at]).count();
+        let lost = (0..drawn.set.len())
+            .filter(|&at| {
+                drawn.set[at] && !is_inner(&drawn, at % drawn.width, at / drawn.width) && !found.set[at]
+            })
+            .count();
+        let own = drawn.changes() as f64;
+        let (ratio, least) = (found.changes() as f64 / own, least_changes(&drawn, bare) / own);
+        println!(
+            "{colour}: ink {:.3}, outline {ratio:.3}, at least {least:.3}, lost {lost}, beyond {beyond}",
+            1.0 - bare as f64 / letters as f64
+        );
+        assert_eq!((lost, beyond), (0, 0), "{colour}: the edge is that of the letters");
+        assert!(least <= ratio && ratio < 1.35 * least, "{colour}: {ratio:.3} of at least {least:.3}");
+    }
+}
+
 /// Adds a patch of white between the marks, so that the page has a plate of its own beside what `drawing` draws.
 fn with_plate(drawing: &str) -> String {
     format!(

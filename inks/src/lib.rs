@@ -20,6 +20,7 @@ mod library;
 pub mod linear;
 mod lobes;
 pub mod model;
+pub mod names;
 mod open;
 pub mod predict;
 mod problem;

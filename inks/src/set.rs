@@ -1,7 +1,7 @@
 //! Sets of inks.
 //!
-//! Text form: words joined by commas, each an ink (`cyan`, `MS`) or a group (`process`, `metallic`, `clear`, `foil`,
-//! `default`, `all`); a leading `-` removes it. A text that starts with `-` or `+` modifies the default set. A set contains
+//! Text form: words joined by commas, each an ink by any of its names (`cyan`, `MS`, `gold`) or a group (`process`,
+//! `metallic`, `clear`, `foil`, `default`, `all`); a leading `-` removes it. A text that starts with `-` or `+` modifies the default set. A set contains
 //! foils only if it names them or `all`: their ink codes have never been seen in a real stream, so using them must be an
 //! explicit choice.
 
@@ -10,6 +10,8 @@ use std::str::FromStr;
 
 use protocol::ink::{Ink, Kind};
 use serde::Deserialize;
+
+use super::names;
 
 /// A set of inks. The default is every ink except the foils and white.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
@@ -112,15 +114,12 @@ impl FromStr for InkSet {
     fn from_str(text: &str) -> Result<InkSet, InkSetError> {
         let changes_default = text.trim_start().starts_with(['-', '+']);
         let mut set = if changes_default { InkSet::default() } else { InkSet::EMPTY };
-        for word in text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty()) {
-            let (take, name) = match word.strip_prefix('-') {
-                Some(name) => (true, name),
-                None => (false, word.strip_prefix('+').unwrap_or(word)),
-            };
+        for word in text.split(',').flat_map(words) {
+            let (take, name) = signed(word);
             let named = match GROUPS.iter().find(|(group, _)| group.eq_ignore_ascii_case(name)) {
                 Some((_, member)) => InkSet::EMPTY.with_all(member),
                 None => InkSet::EMPTY.with(
-                    Ink::from_name(name)
+                    names::ink(name)
                         .ok_or_else(|| InkSetError { word: name.into(), suggestion: closest(name) })?,
                 ),
             };
@@ -128,6 +127,22 @@ impl FromStr for InkSet {
         }
         Ok(set)
     }
+}
+
+/// Whether a word removes, and what.
+fn signed(word: &str) -> (bool, &str) {
+    match word.strip_prefix('-') {
+        Some(name) => (true, name),
+        None => (false, word.strip_prefix('+').unwrap_or(word)),
+    }
+}
+
+/// The words between two commas: one, if they are the name of an ink, such as `silver foil`.
+fn words(part: &str) -> Vec<&str> {
+    let part = part.trim();
+    let several = part.chars().skip(1).any(|c| "-+".contains(c));
+    let one = !several && names::ink(signed(part).1).is_some();
+    if one { vec![part] } else { part.split_whitespace().collect() }
 }
 
 impl TryFrom<String> for InkSet {
@@ -147,7 +162,7 @@ impl TryFrom<String> for InkName {
     type Error = InkSetError;
 
     fn try_from(word: String) -> Result<InkName, InkSetError> {
-        match Ink::from_name(&word) {
+        match names::ink(&word) {
             Some(ink) => Ok(InkName(ink)),
             None => Err(InkSetError { suggestion: closest(&word), word }),
         }
@@ -157,8 +172,8 @@ impl TryFrom<String> for InkName {
 /// The known name most similar to this one, if any is similar enough.
 fn closest(word: &str) -> Option<&'static str> {
     let word = word.to_ascii_lowercase();
-    let names = Ink::ALL.into_iter().map(Ink::name).chain(GROUPS.iter().map(|(name, _)| *name));
-    names
+    names::known()
+        .chain(GROUPS.iter().map(|(name, _)| *name))
         .map(|name| (strsim::normalized_damerau_levenshtein(&word, name), name))
         .filter(|(likeness, _)| *likeness >= 0.5)
         .max_by(|a, b| a.0.total_cmp(&b.0))
@@ -204,6 +219,11 @@ mod tests {
         assert_eq!(set("-metallic"), set("process clear"));
         assert_eq!(set("process,-K,k"), set("process"));
         assert_eq!(set(""), InkSet::EMPTY);
+        assert_eq!(
+            set("gold,Silver Foil, mf -key"),
+            InkSet::of([Ink::MetallicGold, Ink::SilverFoil, Ink::Primer])
+        );
+        assert_eq!(set("all,-gold foil,-C"), InkSet::ALL.without(Ink::GoldFoil).without(Ink::Cyan));
     }
 
     #[test]

@@ -63,7 +63,7 @@ impl FromStr for Stack {
         text.split('+')
             .map(|layer| {
                 let layer = layer.trim();
-                Ink::from_name(layer)
+                crate::names::ink(layer)
                     .ok_or_else(|| StackError::UnknownInk { stack: text.into(), layer: layer.into() })
             })
             .collect::<Result<Vec<_>, _>>()

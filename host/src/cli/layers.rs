@@ -97,48 +97,49 @@ pub struct LayersArgs {
 }
 
 fn dpi(text: &str) -> Result<f64, String> {
-    let dpi: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
-    if (20.0..=10_000.0).contains(&dpi) { Ok(dpi) } else { Err("expected 20 to 10000".into()) }
+    let dpi = text.parse().ok().filter(|dpi| (20.0..=10_000.0).contains(dpi));
+    dpi.ok_or_else(|| "expected pixels per inch from 20 to 10000, such as 600".into())
 }
 
 fn resolution(text: &str) -> Result<Resolution, String> {
     match text {
         "600" => Ok(Resolution::Dpi600),
         "1200" => Ok(Resolution::Dpi1200),
-        _ => Err("the printer prints at 600 or 1200 dpi; --dpi is the resolution of a picture".into()),
+        _ => Err("expected 600 or 1200 dpi, as the printer prints; --dpi states the resolution of a picture"
+            .into()),
     }
 }
 
 fn gamma(text: &str) -> Result<f64, String> {
-    let gamma: f64 = text.parse().map_err(|_| "expected a number".to_string())?;
-    if GAMMAS.contains(&gamma) {
-        Ok(gamma)
-    } else {
-        Err(format!("expected {} to {}", GAMMAS.start(), GAMMAS.end()))
-    }
+    let gamma = text.parse().ok().filter(|gamma| GAMMAS.contains(gamma));
+    gamma.ok_or_else(|| format!("expected a number from {} to {}, such as 1.2", GAMMAS.start(), GAMMAS.end()))
 }
 
 fn page(text: &str) -> Result<u32, String> {
     match text.parse() {
         Ok(page @ 1..) => Ok(page),
         _ if text.ends_with(".html") => {
-            Err("expected the number of a page of the art; the plan goes into a file with --html".into())
+            Err("expected the number of a page of the art; --html FILE writes the plan as a page".into())
         }
-        _ => Err("expected the number of a page, from 1".into()),
+        _ => Err("expected the number of a page, such as 1".into()),
     }
 }
 
 /// A length that is not negative, in dots of 600 dpi.
 fn length(text: &str) -> Result<f64, String> {
     let length: Mm = text.parse().map_err(|error: NoLength| error.to_string())?;
-    if length.0 >= 0.0 { Ok(length.0 * DOTS_PER_MM) } else { Err("expected a length of 0 or more".into()) }
+    if length.0 >= 0.0 {
+        Ok(length.0 * DOTS_PER_MM)
+    } else {
+        Err("expected a length of 0 or more, such as 0.1mm".into())
+    }
 }
 
 fn passes(text: &str) -> Result<(Ink, u8), String> {
     let (ink, times) = text.split_once('=').ok_or("expected INK=N, such as white=3")?;
     match times.trim().parse() {
         Ok(times @ 1..=9) => Ok((names::typed(ink)?, times)),
-        _ => Err(format!("`{times}`: expected 1 to 9 passes")),
+        _ => Err(format!("expected 1 to 9 passes, such as white=3, found `{times}`")),
     }
 }
 
@@ -152,12 +153,7 @@ fn order(text: &str) -> Result<Order, String> {
 
 /// Inks as typed: any of their names, or groups.
 fn set(option: &str, text: &str) -> Result<InkSet> {
-    let words = text.split(',').map(str::trim).filter(|word| !word.is_empty());
-    let known = words.map(|word| match names::typed(word) {
-        Ok(ink) => ink.name().to_owned(),
-        Err(_) => word.to_owned(),
-    });
-    known.collect::<Vec<_>>().join(",").parse().with_context(|| option.to_owned())
+    text.parse().with_context(|| option.to_owned())
 }
 
 impl LayersArgs {

@@ -78,7 +78,7 @@ fn repeat(text: &str) -> Result<Repeat, String> {
         Some(Repeat::Grid(count(columns)?, count(rows)?))
     });
     grid.ok_or_else(|| {
-        format!("expected columns x rows, such as 3x4, each up to {}, or fill", layout::MOST_REPEATS)
+        format!("expected columns and rows from 1 to {}, such as 3x4, or fill", layout::MOST_REPEATS)
     })
 }
 
@@ -88,7 +88,7 @@ fn gap(text: &str) -> Result<Point, String> {
         Err(error) => text.parse().map_err(|_| error.to_string())?,
     };
     if point.0.0 < 0.0 || point.1.0 < 0.0 {
-        return Err("copies cannot overlap; the gap is 0 or more".into());
+        return Err("expected a gap of 0 or more, such as 2mm, because copies cannot overlap".into());
     }
     Ok(point)
 }
@@ -201,7 +201,7 @@ fn handling(name: &str) -> Result<Handling, String> {
     Media::from_name(name).map(|media| Handling { media, curl_correction: true }).ok_or_else(|| {
         let names: Vec<&str> =
             STOCKS.iter().map(|(name, _)| *name).chain(Media::all().map(Media::name)).collect();
-        format!("the media are {}", names.join(", "))
+        format!("expected one of the media {}", names.join(", "))
     })
 }
 

@@ -84,7 +84,7 @@ fn queue_name(name: &str) -> Result<String, String> {
     if fits {
         Ok(name.into())
     } else {
-        Err("a queue name consists of letters, digits, -, _ and ., and does not begin with -".into())
+        Err("expected a name of letters, digits, -, _ and . that does not begin with -".into())
     }
 }
 

@@ -60,8 +60,9 @@ pub struct Cancel {
 }
 
 fn number(text: &str) -> Result<u32, String> {
-    u32::from_str_radix(text, 16)
-        .map_err(|_| "a job's number has eight digits 0-9 and a-f, as `resume --list` shows".into())
+    u32::from_str_radix(text, 16).map_err(|_| {
+        "expected a job number of eight digits 0-9 and a-f; `foilpress resume --list` shows them".into()
+    })
 }
 
 /// Runs `resume`.

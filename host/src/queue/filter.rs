@@ -101,6 +101,11 @@ pub enum FilterError {
     /// The plates of a document.
     #[error("cannot read the document's spot colours")]
     Plates(#[source] LayersError),
+    /// A spot colour of which it is not clear whether it names an ink.
+    #[error(
+        "a spot colour of the document may be meant as an ink; FoilpressSpots=Off prints it in process inks"
+    )]
+    Spot(#[source] LayersError),
     /// The art.
     #[error("page {page} cannot be printed")]
     Layers {
@@ -136,7 +141,7 @@ pub fn run(
 ) -> Result<usize, FilterError> {
     let mut head = [0; 4];
     document.read_exact(&mut head).map_err(io_error("read the document"))?;
-    let mut press = Press { choices, library, out, observer, jobs: 0 };
+    let mut press = Press { choices, library, out, observer, jobs: 0, white: 0 };
     if head == raster::SYNC {
         pictures(document, &mut press)?;
     } else if head.starts_with(b"%PDF") || head.starts_with(b"%!") {
@@ -148,6 +153,7 @@ pub fn run(
         return Err(FilterError::Kind);
     }
     press.out.flush().map_err(io_error("write the job"))?;
+    press.without_white();
     Ok(press.jobs)
 }
 
@@ -195,7 +201,10 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let spots = match press.choices.spots {
         Spots::None => Vec::new(),
         _ if !may_have_spots(path)? => Vec::new(),
-        _ => layers::pdf::spots(path).map_err(FilterError::Plates)?,
+        _ => layers::pdf::spots(path).map_err(|error| match error {
+            LayersError::UnknownInk { .. } => FilterError::Spot(error),
+            error => FilterError::Plates(error),
+        })?,
     };
     if spots.iter().all(Vec::is_empty) {
         return drawn(path, None, press);
@@ -255,7 +264,7 @@ fn picture(
     (size, dpi): ((usize, usize), u16),
     page: Page,
     mirrored: bool,
-    press: &Press<'_>,
+    press: &mut Press<'_>,
 ) -> Result<Vec<u8>, FilterError> {
     let Some(view) = press.view(number, paper, (size, dpi), page.bounds(), mirrored) else {
         return Ok(Vec::new());

@@ -24,8 +24,19 @@ pub struct DialogOption {
     pub text: &'static str,
     /// Keywords and texts of the choices; the first is the default.
     pub choices: Vec<(String, String)>,
-    /// Name and text of a custom value, if the option takes one.
-    pub custom: Option<(&'static str, &'static str)>,
+    /// A value that is not one of the choices, if the option takes one.
+    pub custom: Option<Custom>,
+}
+
+/// A value that the user types.
+#[derive(Clone, Copy)]
+pub struct Custom {
+    /// Its name in the printer description.
+    pub name: &'static str,
+    /// The text in the dialog.
+    pub text: &'static str,
+    /// What it is, in the middle of a sentence.
+    pub is: &'static str,
 }
 
 /// Which colours print in inks of their own.
@@ -156,9 +167,17 @@ fn texts<'a>(rows: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<(String, Str
 pub fn all() -> Vec<DialogOption> {
     let option = |keyword, text, choices| DialogOption { keyword, text, choices, custom: None };
     let mut place = option("FoilpressPosition", "Position", texts(PLACE.iter().map(|row| (row.0, row.1))));
-    place.custom = Some(("Corner", "Top left corner of the drawing, such as 20x30mm"));
+    place.custom = Some(Custom {
+        name: "Corner",
+        text: "Top left corner of the drawing, such as 20x30mm",
+        is: "the top left corner of the drawing, such as 20x30mm",
+    });
     let mut gamma = option("FoilpressGamma", "Brightness", texts(GAMMA.iter().map(|row| (row.0, row.1))));
-    gamma.custom = Some(("Exponent", "Gamma, 0.2 to 5, such as 1.2"));
+    gamma.custom = Some(Custom {
+        name: "Exponent",
+        text: "Gamma, 0.2 to 5, such as 1.2",
+        is: "a number from 0.2 to 5, such as 1.2",
+    });
     vec![
         option("MediaType", "Media", Media::all().map(|m| (camel(m.name()), spaced(m.name()))).collect()),
         option("FoilpressInks", "Inks for colours", texts(INKS.into_iter())),
@@ -177,13 +196,13 @@ pub fn all() -> Vec<DialogOption> {
 
 /// An option with a value that is not one of its choices.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("{option}: `{found}` is not a choice; the choices are {known}")]
+#[error("{option}={found} is not possible; choose {known}")]
 pub struct NoChoice {
     /// The option.
     pub option: &'static str,
     /// What was asked for.
     pub found: String,
-    /// The choices.
+    /// The choices, in words.
     pub known: String,
 }
 
@@ -249,8 +268,10 @@ impl Choices {
 impl DialogOption {
     fn no_choice(&self, found: &str) -> NoChoice {
         let mut known: Vec<&str> = self.choices.iter().map(|choice| choice.0.as_str()).collect();
-        known.extend(self.custom.map(|(_, words)| words));
-        NoChoice { option: self.keyword, found: found.into(), known: known.join(", ") }
+        known.extend(self.custom.map(|custom| custom.is));
+        let last = known.pop().unwrap_or_default();
+        let known = if known.is_empty() { last.into() } else { format!("{} or {last}", known.join(", ")) };
+        NoChoice { option: self.keyword, found: found.into(), known }
     }
 }
 
@@ -394,7 +415,9 @@ mod tests {
         let gamma = |value: &str| Choices::read(&[pair("FoilpressGamma", value)], None).map(|c| c.gamma);
         assert_eq!((gamma("Lighter"), gamma("1.7"), gamma("Custom.0.5")), (Ok(1.3), Ok(1.7), Ok(0.5)));
         for wrong in ["0", "NaN", "-1", "inf", "9"] {
-            assert!(gamma(wrong).unwrap_err().to_string().contains("0.2 to 5"), "{wrong}");
+            let said = gamma(wrong).unwrap_err().to_string();
+            let end = "choose Normal, Lighter, Darker or a number from 0.2 to 5, such as 1.2";
+            assert!(said.starts_with(&format!("FoilpressGamma={wrong} ")) && said.ends_with(end), "{said}");
         }
     }
 

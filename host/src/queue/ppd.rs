@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use protocol::paper::{LEFT, Paper};
 
-use super::options::{self, FEED, OFFSET};
+use super::options::{self, Custom, FEED, OFFSET};
 use press::layout::{self, Mm, Point, Profile};
 use press::simulate::Stock;
 
@@ -119,7 +119,7 @@ pub fn description(profile: &Profile) -> String {
             let _ = writeln!(text, "*{keyword} {choice}/{}: \"\"", translation(words));
         }
         let _ = writeln!(text, "*CloseUI: *{keyword}");
-        if let Some((name, words)) = option.custom {
+        if let Some(Custom { name, text: words, .. }) = option.custom {
             let _ = write!(
                 text,
                 "*Custom{keyword} True: \"\"\n*ParamCustom{keyword} {name}/{}: 1 string 0 40\n",

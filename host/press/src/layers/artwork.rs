@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::colour::Colour;
 use super::coverage::{Coverage, Scan};
+use super::error::resolution_in_words;
 use super::options::Options;
 use super::{bits, names, resample};
 use crate::separate::Plane;
@@ -143,8 +144,9 @@ fn layer(
     let tones = toned || options.tones.contains(named.ink);
     if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
         notes.push(format!(
-            "{name}: resampled from {} to {width} x {length} dots; draw at 600 dpi to keep edges exactly as drawn",
-            scan.size_at(options.dpi)
+            "{name}: resampled from {} to {width} x {length} dots; draw at {} to keep edges exactly as drawn",
+            scan.size_at(options.dpi),
+            resolution_in_words((600.0 * options.across.max(1) as f64, 600.0))
         ));
     }
     if !tones && let Some(note) = soft_edges(name, &scan.coverage) {

@@ -89,7 +89,10 @@ pub fn compose(
     beds::lay_finish(&mut slots, art, settings)?;
     slots.retain(|slot| slot.plane.dots() > 0);
     if slots.is_empty() {
-        let reason = format!("no layer of {} has a dot", art.name);
+        let reason = match &art.layers[..] {
+            [] => format!("{} is white or transparent everywhere", art.name),
+            _ => format!("no layer of {} has a dot", art.name),
+        };
         return Err(LayersError::Nothing { reason });
     }
     let mut inks: Vec<Ink> = slots.iter().map(|slot| slot.ink).collect();

@@ -1,7 +1,7 @@
 //! Decodes pictures of any format within limits.
 //!
-//! Method: the `image` crate decodes PNG, JPEG, TIFF and PNM, chosen by what the file holds. Limits: a gigabyte of file,
-//! [`MOST_PIXELS`] pixels. A damaged colour profile is no reason to refuse a picture. The decoder of JPEG makes up what a file
+//! Method: the `image` crate decodes PNG, JPEG, TIFF, PNM, BMP, GIF and WebP, chosen by what the file holds; of an animation the
+//! first picture. Limits: a gigabyte of file, [`MOST_PIXELS`] pixels. A damaged colour profile is no reason to refuse a picture. The decoder of JPEG makes up what a file
 //! that was cut short lacks, so the end of the picture is looked for first.
 
 use std::io::{Cursor, Read};
@@ -28,7 +28,8 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
     file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(io(path, "read it"))?;
     let guessed = image::guess_format(&bytes).ok();
     let format = guessed.filter(|format| {
-        matches!(format, ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Tiff | ImageFormat::Pnm)
+        use ImageFormat::{Bmp, Gif, Jpeg, Png, Pnm, Tiff, WebP};
+        matches!(format, Png | Jpeg | Tiff | Pnm | Bmp | Gif | WebP)
     });
     let Some(format) = format else {
         let found = match guessed {
@@ -38,7 +39,9 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         };
         return Err(wrong(
             path,
-            format!("expected a PNG, TIFF, JPEG, PNM, SVG, PDF or PostScript file, found {found}"),
+            format!(
+                "expected a PNG, TIFF, JPEG, PNM, BMP, GIF, WebP, SVG, PDF or PostScript file, found {found}"
+            ),
         ));
     };
     if format == ImageFormat::Jpeg && jpeg_frame(&bytes).is_some_and(|(channels, ..)| channels == 4) {

@@ -35,13 +35,14 @@ pub enum LayersError {
     },
     /// The name of a file, channel or layer is that of no ink.
     #[error(
-        "{}: `{name}` names no ink{}; name each file after its ink, such as white.png, gold.png, silver-foil.png; \
-         the inks are {}",
-        path.display(), hint(suggestion), Ink::ALL.map(Ink::name).join(", ")
+        "{}: {part} `{name}` names no ink{}; {}; the inks are {}",
+        path.display(), hint(suggestion), part.remedy(), Ink::ALL.map(Ink::name).join(", ")
     )]
     UnknownInk {
         /// The file.
         path: PathBuf,
+        /// What has the name.
+        part: NamedPart,
         /// The name.
         name: String,
         /// The nearest known name.
@@ -196,7 +197,47 @@ pub enum LayersError {
 }
 
 fn hint(suggestion: &Option<&'static str>) -> String {
-    suggestion.map_or(String::new(), |s| format!(", did you mean `{s}`?"))
+    suggestion.map_or(String::new(), |s| format!(" (did you mean `{s}`?)"))
+}
+
+/// What of art is named after an ink.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NamedPart {
+    /// A file of one layer.
+    File,
+    /// A channel of a TIFF.
+    Channel,
+    /// A layer of a drawing.
+    Layer,
+    /// A spot colour of a page.
+    Spot,
+}
+
+impl NamedPart {
+    /// What its owner can do about a name.
+    fn remedy(self) -> &'static str {
+        match self {
+            NamedPart::File => "name each file after its ink, such as white.png, gold.png, silver-foil.png",
+            NamedPart::Channel => "rename the channel: after its ink, or so that it resembles no ink",
+            NamedPart::Layer => {
+                "rename the layer in the drawing: after its ink, or so that it resembles no ink"
+            }
+            NamedPart::Spot => {
+                "rename the spot colour in the program that drew the page: after its ink, or so that it resembles no ink"
+            }
+        }
+    }
+}
+
+impl fmt::Display for NamedPart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            NamedPart::File => "file",
+            NamedPart::Channel => "channel",
+            NamedPart::Layer => "layer",
+            NamedPart::Spot => "spot colour",
+        })
+    }
 }
 
 /// Numbers in words, the first few of many.

@@ -52,7 +52,7 @@ pub use colour::Colour;
 pub use compose::{
     Accept, Composed, Finish, GAMMAS, Laid, Order, Remedy, Report, Settings, Suggestion, compose,
 };
-pub use error::{LayersError, Setting};
+pub use error::{LayersError, NamedPart, Setting};
 pub use intent::Intent;
 pub use open::{is_art, open};
 pub use options::{Options, Pages, Room};

@@ -9,43 +9,7 @@ use std::path::Path;
 
 use protocol::ink::Ink;
 
-use super::error::LayersError;
-
-/// Names in addition to [`Ink::name`] and [`Ink::short`], with words joined by `-`.
-const ALSO: [(&str, Ink); 32] = [
-    ("k", Ink::Black),
-    ("key", Ink::Black),
-    ("gold", Ink::MetallicGold),
-    ("silver", Ink::MetallicSilver),
-    ("metallic-red", Ink::MetallicMagenta),
-    ("metallic-blue", Ink::MetallicCyan),
-    ("metal-gold", Ink::MetallicGold),
-    ("metal-silver", Ink::MetallicSilver),
-    ("gold-metallic", Ink::MetallicGold),
-    ("silver-metallic", Ink::MetallicSilver),
-    ("foil-gold", Ink::GoldFoil),
-    ("foil-silver", Ink::SilverFoil),
-    ("flash-gold", Ink::GoldFoil),
-    ("flash-silver", Ink::SilverFoil),
-    ("spot-white", Ink::White),
-    ("under-white", Ink::White),
-    ("undercoat-white", Ink::White),
-    ("process-black", Ink::Black),
-    ("process-cyan", Ink::Cyan),
-    ("process-magenta", Ink::Magenta),
-    ("process-yellow", Ink::Yellow),
-    ("gloss", Ink::Finish),
-    ("glossy", Ink::Finish),
-    ("glossy-finish", Ink::Finish),
-    ("gloss-finish", Ink::Finish),
-    ("finish-ii", Ink::Finish),
-    ("clear-coat", Ink::Finish),
-    ("varnish", Ink::Finish),
-    ("vphoto-primer", Ink::Primer),
-    ("photo-primer", Ink::Primer),
-    ("mf", Ink::Primer),
-    ("mf-ink", Ink::Primer),
-];
+use super::error::{LayersError, NamedPart};
 
 /// An ink named by a file, a channel or a layer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -57,9 +21,7 @@ pub(super) struct Named {
 }
 
 fn exact(words: &[String]) -> Option<Ink> {
-    let name = words.join("-");
-    let also = || ALSO.iter().find(|(known, _)| *known == name).map(|&(_, ink)| ink);
-    Ink::from_name(&name).or_else(also)
+    inks::names::ink(&words.join("-"))
 }
 
 /// The leading number of a name, and its words in lower case.
@@ -115,26 +77,27 @@ pub(super) fn stem(path: &Path) -> String {
 pub(super) fn of_part(
     path: &Path,
     name: &str,
-    kind: &str,
+    part: NamedPart,
     notes: &mut Vec<String>,
 ) -> Result<Option<Named>, LayersError> {
     let named = ink(name);
     if named.is_none() {
         if let suggestion @ Some(_) = closest(name) {
-            return Err(LayersError::UnknownInk { path: path.to_path_buf(), name: name.into(), suggestion });
+            let path = path.to_path_buf();
+            return Err(LayersError::UnknownInk { path, part, name: name.into(), suggestion });
         }
-        notes.push(format!("{}: {kind} `{name}` names no ink: left out", path.display()));
+        notes.push(format!("{}: {part} `{name}` names no ink: left out", path.display()));
     }
     Ok(named)
 }
 
-/// The known name that is most similar to this one, if one is similar enough.
+/// The known name that is most similar to this one, if one is similar enough. Slips of the hand keep the first letter: `Fold`,
+/// as fold lines are called, is no slip of `gold`.
 pub(super) fn closest(name: &str) -> Option<&'static str> {
     let (_, words) = words(name);
     let name = words.join("-");
-    let known = Ink::ALL.into_iter().map(Ink::name).chain(ALSO.iter().map(|(name, _)| *name));
-    known
-        .filter(|known| known.len() > 2)
+    inks::names::known()
+        .filter(|known| known.chars().next() == name.chars().next())
         .map(|known| (strsim::normalized_damerau_levenshtein(&name, known), known))
         .filter(|(likeness, _)| *likeness >= 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0))
@@ -188,20 +151,9 @@ mod tests {
         }
         assert_eq!(closest("whitee"), Some("white"));
         assert_eq!(closest("01-golld"), Some("gold"));
-        assert_eq!(closest("holiday"), None);
+        assert_eq!((closest("holiday"), closest("Fold")), (None, None));
         assert!(typed("sliver").unwrap_err().contains("did you mean `silver`?"));
         assert_eq!(typed("silver foil"), Ok(Ink::SilverFoil));
-    }
-
-    #[test]
-    fn every_name_is_that_of_one_ink() {
-        for known in Ink::ALL {
-            assert_eq!(ink(known.name()).map(|named| named.ink), Some(known));
-            assert_eq!(ink(known.short()).map(|named| named.ink), Some(known));
-        }
-        for (i, (name, _)) in ALSO.iter().enumerate() {
-            assert!(ALSO[..i].iter().all(|(other, _)| other != name), "{name} is listed twice");
-        }
     }
 
     proptest! {

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use super::artwork::{Artwork, Layer};
 use super::coverage::{self, Scan};
-use super::error::{LayersError, io, wrong};
+use super::error::{LayersError, NamedPart, io, wrong};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::resolution::Dpi;
@@ -21,12 +21,11 @@ use super::size::{self, MOST_BYTES, Unstated};
 use super::{cmyk, pdf, picture, svg, tiff, tiff_pages};
 
 /// File extensions of pictures.
-const PICTURES: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm"];
+const PICTURES: [&str; 11] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm", "bmp", "gif", "webp"];
 
 /// File extensions of art that is not read as one of several layers.
-const OTHERS: [&str; 18] = [
-    "ai", "avif", "bmp", "eps", "gif", "heic", "jp2", "jxl", "kra", "pdf", "ps", "psb", "psd", "svg", "svgz",
-    "tga", "webp", "xcf",
+const OTHERS: [&str; 15] = [
+    "ai", "avif", "eps", "heic", "jp2", "jxl", "kra", "pdf", "ps", "psb", "psd", "svg", "svgz", "tga", "xcf",
 ];
 
 /// The most pictures in a folder.
@@ -110,10 +109,12 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     }
     let pixels = picture::read(file, options.page())?;
     let mut art = picture::artwork(&stem(file), pixels, options)?;
-    if let Some(known) = names::closest(&stem(file)).filter(|_| !options.reserved) {
+    if let Some(known) = names::closest(&stem(file)).filter(|_| !options.reserved && art.drawn.dots() > 0) {
         art.notes.push(format!(
-            "{}: printed as a picture in process inks; if it is a layer, name it {known}.png",
-            file.display()
+            "{}: printed as a picture in process inks, because its name is that of no ink; to print it as a layer of {known}, \
+             rename the file to {known}.{}",
+            file.display(),
+            file.extension().unwrap_or_default().display()
         ));
     }
     Ok(art)
@@ -186,7 +187,7 @@ fn left_out(folder: &Path, others: &[PathBuf]) -> Option<String> {
     }
     (!names.is_empty()).then(|| {
         format!(
-            "{}: left out {}; in a folder only PNG, TIFF, JPEG and PNM are layers",
+            "{}: left out {}; in a folder only pictures are layers: export each as PNG",
             folder.display(),
             names.join(", ")
         )
@@ -204,6 +205,7 @@ fn named_files(
         let ink = stem(path);
         let named = names::ink(&ink).ok_or_else(|| LayersError::UnknownInk {
             path: path.clone(),
+            part: NamedPart::File,
             suggestion: names::closest(&ink),
             name: ink,
         })?;

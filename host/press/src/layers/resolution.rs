@@ -1,6 +1,6 @@
 //! The resolution that a picture's file states.
 //!
-//! Method: PNG states pixels per metre; the JFIF and EXIF segments of a JPEG and the tags of a TIFF state pixels per inch or
+//! Method: PNG and BMP state pixels per metre; the JFIF and EXIF segments of a JPEG and the tags of a TIFF state pixels per inch or
 //! per centimetre. Of the two segments JFIF comes first; in EXIF, 72 dpi means that the resolution is unknown, by its
 //! standard (CIPA DC-008). Limits: resolutions below 20 or above 10000 dpi are ignored, because programs that mean none write 1.
 
@@ -22,6 +22,7 @@ pub(super) fn of_file(bytes: &[u8], format: ImageFormat) -> Option<Dpi> {
         }
         ImageFormat::Jpeg => of_jfif(bytes).filter(plausible).or_else(|| of_exif(bytes)),
         ImageFormat::Tiff => of_tiff(&mut tiff_decoder(bytes)?),
+        ImageFormat::Bmp => of_bmp(bytes),
         _ => None,
     }
     .filter(plausible)
@@ -31,6 +32,13 @@ pub(super) fn of_file(bytes: &[u8], format: ImageFormat) -> Option<Dpi> {
 pub(super) fn of_png(dims: png::PixelDimensions) -> Option<Dpi> {
     let inch = |per_metre: u32| f64::from(per_metre) * 0.0254;
     (dims.unit == png::Unit::Meter).then(|| (inch(dims.xppu), inch(dims.yppu))).filter(plausible)
+}
+
+/// The resolution in the header of a BMP, unless that is the old one of OS/2.
+fn of_bmp(bytes: &[u8]) -> Option<Dpi> {
+    let number = |at: usize| bytes.get(at..)?.first_chunk().map(|four| u32::from_le_bytes(*four));
+    let inch = |at: usize| Some(f64::from(number(at)?) * 0.0254);
+    if number(14)? < 40 { None } else { Some((inch(38)?, inch(42)?)) }
 }
 
 /// Programs that mean no resolution leave 1 and the like.

@@ -148,10 +148,11 @@ impl Drawing {
             advance();
             if rgba.as_chunks::<4>().0.iter().all(|pixel| pixel[3] == 0) {
                 let name = &layer.label;
-                notes.push(format!(
-                    "{}: layer `{name}` is hidden or empty, or nothing of it can be drawn: left out",
-                    path.display()
-                ));
+                let why = match layer.hidden {
+                    true => "is hidden: left out; show it in the drawing program to print it",
+                    false => "is empty, or nothing in it is visible: left out",
+                };
+                notes.push(format!("{}: layer `{name}` {why}", path.display()));
                 continue;
             }
             let scan = if options.tones.contains(layer.named.ink) {
@@ -164,6 +165,13 @@ impl Drawing {
                 Scan::of_layer(path, size, &rgba)
             };
             art.add(scan, &layer.label, layer.named, false, &options);
+        }
+        if art.layers.is_empty() {
+            let reason = format!(
+                "no layer of {} is visible; show its layers in the drawing program, or draw something in them",
+                path.display()
+            );
+            return Err(LayersError::Nothing { reason });
         }
         art.opaque = Some(art.drawn.clone());
         art.notes.append(&mut notes);

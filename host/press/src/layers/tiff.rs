@@ -18,7 +18,7 @@ use ::tiff::tags::Tag;
 use super::artwork::Artwork;
 use super::cmyk::{self, PLATES};
 use super::coverage::{Coverage, Scan};
-use super::error::{LayersError, io, wrong};
+use super::error::{LayersError, NamedPart, io, wrong};
 use super::names::{self, stem};
 use super::options::Options;
 use super::orientation::Turn;
@@ -232,7 +232,7 @@ fn channels(
                 ));
             }
         };
-        let ink = names::of_part(path, name, "channel", notes)?;
+        let ink = names::of_part(path, name, NamedPart::Channel, notes)?;
         if ink.is_some() && inverted {
             notes.push(format!(
                 "{}: black is ink in channel `{name}`, as Photoshop displays it",

@@ -10,11 +10,14 @@
 
 use super::colour::Fit;
 use super::flat::Flat;
-use super::intent::{Light, difference};
+use super::intent::{Light, difference, difference_in_hue};
 use super::solids::Solids;
 
-/// A flat colour is printed as a stack that differs from its mixture by at most so much in Oklab; 0.02 is barely visible.
+/// A flat colour is printed as a stack that differs from its mixture by at most so much in Oklab; 0.02 is barely visible. Two
+/// hundredths of paper in K are 0.04: specks in a black area are worse than an area that is as much too dark.
 const SAME: f64 = 0.05;
+/// At most so much of that may be hue and chroma: another hue is another colour, wherever it is on the page.
+const SAME_HUE: f64 = 0.02;
 /// Colours of sRGB that differ by more can be told apart where they touch.
 const APART: f64 = 0.02;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for.
@@ -101,7 +104,7 @@ impl Found {
             colour,
             stack: nearest as u8,
             off: from_mixture,
-            is_solid: from_mixture <= SAME,
+            is_solid: from_mixture <= SAME && difference_in_hue(bodies[nearest], mixed) <= SAME_HUE,
             shape: Some((choices, weights[0] < 0.5)),
         }
     }
@@ -198,5 +201,36 @@ mod tests {
             &same[..4.min(same.len())]
         );
         assert!(solid > 3000, "{solid}");
+    }
+
+    /// How a colour is printed where nothing else is: the stack nearest to it, how far that is from the mixture, and whether it
+    /// is printed.
+    fn alone(colour: [u8; 3], fit: &mut Fit, solids: &Solids<'_>) -> (String, f64, bool) {
+        let bodies: Vec<Light> = fit.stacks.iter().map(|stack| solids.body(stack)).collect();
+        let found = Found::of(colour, fit, &bodies, solids);
+        (fit.stacks[usize::from(found.stack)].to_string(), found.off, found.is_solid)
+    }
+
+    #[test]
+    fn a_stack_stands_for_a_colour_a_little_lighter_and_for_none_of_another_hue() {
+        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let solids = Solids::new(&printable, &space);
+        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        // M 100 Y 50 differs from M by 0.03, nearly all of it hue.
+        for (colour, stack, off) in [([255, 0, 127], "M", 0.030), ([255, 0, 64], "M+Y", 0.048)] {
+            let (nearest, found, solid) = alone(colour, &mut fit, &solids);
+            assert!(
+                nearest == stack && (found - off).abs() < 0.002 && !solid,
+                "{colour:?}: {nearest} {found:.3} {solid}"
+            );
+        }
+        // What CMYK black becomes by the usual profile, and dark greys.
+        for colour in [[35, 31, 32], [26, 26, 26], [16, 16, 16]] {
+            let (nearest, found, solid) = alone(colour, &mut fit, &solids);
+            assert!(nearest == "K" && solid, "{colour:?}: {nearest} {found:.3}");
+        }
     }
 }

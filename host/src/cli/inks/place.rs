@@ -6,7 +6,6 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use inks::{FILE_NAME, Library, Stack, archive};
-use protocol::ink::Ink;
 
 use super::super::output::{Kind, Staged};
 
@@ -32,7 +31,7 @@ pub fn dots(folder: &Path, tables: &str, names: &[&str]) -> Result<Library> {
     if let Some(here) = present(folder)? {
         for name in names {
             let paper = &here.optics().paper.minimum_cluster;
-            let known = match Ink::from_name(name) {
+            let known = match inks::names::ink(name) {
                 Some(ink) => here.cartridge(ink).is_some_and(|cartridge| cartridge.dots.is_some()),
                 None => paper.source() == inks::Source::Measured,
             };

@@ -23,6 +23,8 @@ pub(super) struct Press<'a> {
     pub observer: &'a dyn Observer,
     /// Jobs written.
     pub jobs: usize,
+    /// Pages on which something is white.
+    pub white: usize,
 }
 
 impl Press<'_> {
@@ -33,6 +35,16 @@ impl Press<'_> {
             self.jobs += 1;
         }
         Ok(())
+    }
+
+    /// Notes that no page of the document has the reserved white that was asked for.
+    pub(super) fn without_white(&self) {
+        if self.choices.white == layers::White::Reserved && self.jobs > 0 && self.white == 0 {
+            self.observer.note(
+                "FoilpressWhite=Reserved: no page has the reserved white, so none is printed; draw what is to be white in \
+                 exactly 230,230,230 without shading or smooth edges, or choose another FoilpressWhite",
+            );
+        }
     }
 
     /// How a page is read, drawn at so many pixels an inch.
@@ -63,7 +75,9 @@ impl Press<'_> {
         layers::Settings {
             inks: InkSet::of(spots),
             // What the page itself draws in white or finish is printed whatever is chosen.
-            white: Some(choices.white).filter(|&white| white != layers::White::None),
+            // Its reserved white is a layer of it, see `options`.
+            white: Some(choices.white)
+                .filter(|white| !matches!(white, layers::White::None | layers::White::Reserved)),
             finish: Some(choices.finish).filter(|&finish| finish != layers::Finish::None),
             intent: choices.intent,
             gamma: choices.gamma,
@@ -99,7 +113,7 @@ impl Press<'_> {
 
     /// The job of a page's art. `mirrored` turns it left to right.
     pub(super) fn job(
-        &self,
+        &mut self,
         number: usize,
         paper: Paper,
         art: &Artwork,
@@ -110,6 +124,13 @@ impl Press<'_> {
         let foil = art.layers.iter().map(|layer| layer.ink).find(|ink| ink.kind() == Kind::Foil);
         if let Some(ink) = foil.filter(|&ink| !settings.inks.contains(ink)) {
             return Err(FilterError::Foil { page: number, ink });
+        }
+        if art.layers.iter().any(|layer| layer.ink == Ink::White) {
+            self.white += 1;
+        } else if self.choices.white == layers::White::Reserved {
+            self.observer.note(&format!(
+                "page {number}: nothing has the reserved white 230,230,230; no white is printed"
+            ));
         }
         let composed = layers::compose(art, &settings, self.library, self.observer)
             .map_err(|source| FilterError::Layers { page: number, source })?;

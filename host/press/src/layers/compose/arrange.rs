@@ -35,13 +35,16 @@ pub(super) fn arranged(
         Order::Default if numbered => slots.sort_by_key(|slot| slot.place),
         Order::Default | Order::Rules => {
             if let Some(twice) = twice {
+                let same = slots.iter().filter(|slot| slot.ink == slots[twice].ink);
+                let same: Vec<&str> = same.map(|slot| slot.from.as_str()).collect();
                 return Err(LayersError::Setting {
                     setting: Setting::Order,
                     problem: format!(
-                        "{} layers are {}; to state the depth of each, number the files from the paper up \
-                         (01-white.png, 02-black.png, 03-white.png) or keep the given order",
-                        slots.iter().filter(|slot| slot.ink == slots[twice].ink).count(),
-                        slots[twice].ink.name()
+                        "{} layers are {} ({}); merge them, number the names of all layers from the paper up (01-white, \
+                         02-black, 03-white), or keep the given order",
+                        same.len(),
+                        slots[twice].ink.name(),
+                        same.join(", ")
                     ),
                 });
             }

@@ -47,7 +47,10 @@ fn white_bed(
         White::None => return Ok(None),
         White::Reserved => {
             if !slots.iter().any(|slot| slot.ink == Ink::White) {
-                return refused(Setting::White, "the picture has no reserved white, 230,230,230");
+                return refused(
+                    Setting::White,
+                    "the picture has no reserved white; draw what is to be white in exactly 230,230,230",
+                );
             }
             return Ok(None);
         }

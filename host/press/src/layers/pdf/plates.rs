@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::super::artwork::Artwork;
 use super::super::coverage::{self, Coverage, Scan};
-use super::super::error::{LayersError, io, wrong};
+use super::super::error::{LayersError, NamedPart, io, wrong};
 use super::super::names::{self, Named};
 use super::super::options::Options;
 use super::super::size;
@@ -41,7 +41,8 @@ fn layer(path: &Path, spot: &str, notes: &mut Vec<String>) -> Result<Option<Name
         Some(named) => Ok(Some(named).filter(|named| named.ink.kind() != Kind::Process)),
         None => match names::closest(spot) {
             suggestion @ Some(_) => {
-                Err(LayersError::UnknownInk { path: path.to_path_buf(), name: spot.into(), suggestion })
+                let (path, part) = (path.to_path_buf(), NamedPart::Spot);
+                Err(LayersError::UnknownInk { path, part, name: spot.into(), suggestion })
             }
             None => {
                 notes.push(format!(

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use resvg::usvg::roxmltree::{Document, NodeId};
 
-use super::super::error::{LayersError, wrong};
+use super::super::error::{LayersError, NamedPart, wrong};
 use super::super::names::{self, Named};
 use super::nodes::{self, Node};
 use super::write::Way;
@@ -32,6 +32,8 @@ pub(super) struct Layer {
     pub named: Named,
     /// Whether it is a group, not a single element.
     group: bool,
+    /// Whether all of it is kept from being displayed, as when an owner hides a layer.
+    pub hidden: bool,
     /// Its elements.
     roots: HashSet<NodeId>,
     /// The elements around them.
@@ -73,10 +75,11 @@ pub(super) fn layers(
             let joins = |layer: &Layer| layer.named == named && !(group && layer.group);
             let at = layers.iter().position(joins).unwrap_or_else(|| {
                 let (roots, around) = (HashSet::new(), HashSet::new());
-                layers.push(Layer { label, named, group: false, roots, around });
+                layers.push(Layer { label, named, group: false, hidden: true, roots, around });
                 layers.len() - 1
             });
             layers[at].group |= group;
+            layers[at].hidden &= node.ancestors().any(nodes::is_hidden);
             layers[at].roots.insert(node.id());
             for around in node.ancestors().skip(1) {
                 // What is around this one is known then.
@@ -98,10 +101,14 @@ pub(super) fn layers(
     if !layers.is_empty() {
         for name in slips {
             if let suggestion @ Some(_) = names::closest(&name) {
-                return Err(LayersError::UnknownInk { path: path.to_path_buf(), name, suggestion });
+                let (path, part) = (path.to_path_buf(), NamedPart::Layer);
+                return Err(LayersError::UnknownInk { path, part, name, suggestion });
             }
         }
-        notes.extend(left_out(path, document, &layers));
+        if let Some(note) = left_out(path, document, &layers) {
+            notes.push(note);
+            notes.extend(shapes_alone(path, &layers));
+        }
     }
     notes.extend(flowed(path, document, &layers));
     Ok(layers)
@@ -237,6 +244,20 @@ fn left_out(path: &Path, document: &Document<'_>, layers: &[Layer]) -> Option<St
     (!named.is_empty()).then(|| {
         format!("{}: left out, because it lies in no layer of an ink: {}", path.display(), named.join(", "))
     })
+}
+
+/// A note for the owner of a picture of which some shapes happen to have names of inks, which leaves out all others.
+fn shapes_alone(path: &Path, layers: &[Layer]) -> Option<String> {
+    if layers.iter().any(|layer| layer.group) {
+        return None;
+    }
+    let names: Vec<String> = layers.iter().map(|layer| format!("`{}`", layer.label)).collect();
+    Some(format!(
+        "{}: only the shapes named after inks are printed: {}; to print the whole drawing as a picture, rename them, or export \
+         it as PNG",
+        path.display(),
+        names.join(", ")
+    ))
 }
 
 /// Whether an element or something in it draws.

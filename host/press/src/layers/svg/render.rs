@@ -1,18 +1,22 @@
 //! A drawing, or a layer of it, rendered to dots without soft edges.
 //!
 //! Problem: the renderer leaves out what it cannot load, and says so nowhere.
-//! Method: linked pictures and fonts are loaded here, so a picture that is missing is an error, and a drawing can also be
-//! rendered without its pictures or its text. Cost: four bytes a dot. Limits: drawings within a linked drawing may hold
+//! Method: linked pictures and fonts are loaded here, so a picture that is missing or damaged is an error, and a drawing can
+//! also be rendered without its pictures or its text. Cost: four bytes a dot, and each picture is decoded once more. Limits: drawings within a linked drawing may hold
 //! pictures, but not link them, as SVG demands.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use image::{ImageError, ImageFormat};
 use percent_encoding::percent_decode_str;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, ImageHrefResolver, ImageKind, fontdb};
 
+use super::super::decode::whole_jpeg;
 use super::super::error::{LayersError, wrong};
 use super::thin;
 
@@ -29,13 +33,18 @@ pub(super) enum Without {
 #[derive(Default)]
 struct Met {
     pictures: bool,
+    /// What is wrong with the first picture that cannot be drawn, and what to do.
     missing: Option<String>,
 }
+
+/// Whether pictures are whole, by their bytes.
+type Known = Arc<Mutex<HashMap<u64, bool>>>;
 
 /// Renders drawings from one file.
 pub(super) struct Renderer {
     path: PathBuf,
     fonts: Arc<fontdb::Database>,
+    known: Known,
 }
 
 /// A drawing as the renderer understands it.
@@ -52,7 +61,7 @@ impl Renderer {
         if text {
             load_fonts(path, &mut fonts)?;
         }
-        Ok(Renderer { path: path.to_path_buf(), fonts: Arc::new(fonts) })
+        Ok(Renderer { path: path.to_path_buf(), fonts: Arc::new(fonts), known: Known::default() })
     }
 
     /// Whether text can be drawn.
@@ -68,12 +77,7 @@ impl Renderer {
         drop(options);
         let met = std::mem::take(&mut *met.lock().unwrap_or_else(PoisonError::into_inner));
         match met.missing {
-            Some(name) => Err(wrong(
-                &self.path,
-                format!(
-                    "its picture {name} cannot be read; put it where the drawing links it, or embed it as PNG"
-                ),
-            )),
+            Some(problem) => Err(wrong(&self.path, problem)),
             None => Ok(Drawn { tree, pictures: met.pictures }),
         }
     }
@@ -111,24 +115,31 @@ impl Renderer {
             shape_rendering: usvg::ShapeRendering::CrispEdges,
             text_rendering: usvg::TextRendering::OptimizeSpeed,
             fontdb: fonts,
-            image_href_resolver: pictures(without, met),
+            image_href_resolver: pictures(without, met, &self.known),
             ..usvg::Options::default()
         }
     }
 }
 
 /// Loads pictures, and takes down what it met.
-fn pictures(without: Without, met: &Arc<Mutex<Met>>) -> ImageHrefResolver<'static> {
-    let taken = move |met: &Mutex<Met>, kind: Option<ImageKind>, name: &dyn Fn() -> String| {
+fn pictures(without: Without, met: &Arc<Mutex<Met>>, known: &Known) -> ImageHrefResolver<'static> {
+    let known = known.clone();
+    let taken = move |met: &Mutex<Met>, kind: Option<ImageKind>, name: &str, remedy: &str| {
         let mut met = met.lock().unwrap_or_else(PoisonError::into_inner);
         match kind {
             Some(drawing @ ImageKind::SVG(_)) => Some(drawing),
+            Some(picture) if !is_whole(&picture, &known) => {
+                let problem =
+                    || format!("its picture {name} is damaged or was cut short; save it again and {remedy}");
+                met.missing.get_or_insert_with(problem);
+                None
+            }
             Some(picture) => {
                 met.pictures = true;
                 (without != Without::Pictures).then_some(picture)
             }
             None => {
-                met.missing.get_or_insert_with(name);
+                met.missing.get_or_insert_with(|| format!("its picture {name} cannot be read; {remedy}"));
                 None
             }
         }
@@ -136,19 +147,43 @@ fn pictures(without: Without, met: &Arc<Mutex<Met>>) -> ImageHrefResolver<'stati
     let (data, string) =
         (ImageHrefResolver::default_data_resolver(), ImageHrefResolver::default_string_resolver());
     let (of_data, of_string) = (met.clone(), met.clone());
+    let of_link = taken.clone();
     ImageHrefResolver {
         resolve_data: Box::new(move |mime, bytes, options| {
             let kind = data(mime, bytes, options);
-            taken(&of_data, kind, &|| format!("of the type `{mime}`"))
+            taken(&of_data, kind, &format!("of the type `{mime}`"), "embed it as PNG")
         }),
         resolve_string: Box::new(move |href, options| {
             // Links are addresses, so a space is written `%20`.
             let local = href.strip_prefix("file://").unwrap_or(href);
             let plain = percent_decode_str(local).decode_utf8().unwrap_or(Cow::Borrowed(local));
             let kind = string(href, options).or_else(|| string(&plain, options));
-            taken(&of_string, kind, &|| format!("`{href}`"))
+            let remedy = "put it where the drawing links it, or embed it as PNG";
+            of_link(&of_string, kind, &format!("`{href}`"), remedy)
         }),
     }
+}
+
+/// Whether a picture made of pixels can be decoded to its end; the renderer leaves it out in silence if not.
+fn is_whole(picture: &ImageKind, known: &Known) -> bool {
+    let (bytes, format) = match picture {
+        ImageKind::JPEG(bytes) => (bytes, ImageFormat::Jpeg),
+        ImageKind::PNG(bytes) => (bytes, ImageFormat::Png),
+        ImageKind::GIF(bytes) => (bytes, ImageFormat::Gif),
+        ImageKind::WEBP(bytes) => (bytes, ImageFormat::WebP),
+        ImageKind::SVG(_) => return true,
+    };
+    let mut hasher = DefaultHasher::new();
+    bytes.hash(&mut hasher);
+    let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+    *known.entry(hasher.finish()).or_insert_with(|| {
+        let ends = format != ImageFormat::Jpeg || whole_jpeg(Path::new(""), bytes).is_ok();
+        // What is too large to look at is not damaged.
+        ends && matches!(
+            image::load_from_memory_with_format(bytes, format),
+            Ok(_) | Err(ImageError::Limits(_) | ImageError::Unsupported(_))
+        )
+    })
 }
 
 /// Loads this computer's fonts. The renderer draws text of a missing family in the default family and leaves it out if that

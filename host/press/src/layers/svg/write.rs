@@ -3,8 +3,11 @@
 //! Problem: the renderer takes whole drawings, and a layer must be rendered within the clips, masks and transforms around
 //! it.
 //! Method: the parsed drawing is written without prefixes, entities and foreign elements. What is not to be drawn lies in a
-//! group that is not displayed, so clones of it and definitions in it stay valid. Cost: the size of the text. Limits: style
+//! group that is not displayed, so clones of it and definitions in it stay valid. Embedded data that cannot be decoded is
+//! written as an empty picture, because the renderer reports neither, but asks for the latter. Cost: the size of the text. Limits: style
 //! rules that ask for the parent of a hidden element (`svg > g`) do not apply to its clones.
+
+use data_url::DataUrl;
 
 use super::nodes::{self, Node};
 
@@ -72,7 +75,7 @@ pub(super) fn written<'a>(root: Node<'a, 'a>, mut way: impl FnMut(Node<'a, 'a>) 
                 _ => continue,
             };
             if !prefix.is_empty() || changed.iter().all(|(name, _)| *name != own.name()) {
-                attribute(&mut out, prefix, own.name(), own.value());
+                attribute(&mut out, prefix, own.name(), decodable(own.name(), own.value()));
             }
         }
         out.push('>');
@@ -82,6 +85,15 @@ pub(super) fn written<'a>(root: Node<'a, 'a>, mut way: impl FnMut(Node<'a, 'a>) 
         steps[first..].reverse();
     }
     out
+}
+
+/// An attribute's value, or a picture of no bytes in place of data that is damaged.
+fn decodable<'a>(name: &str, value: &'a str) -> &'a str {
+    let damaged = || {
+        DataUrl::process(value).is_ok_and(|data| data.decode_to_vec().is_err())
+            && value.starts_with("data:image")
+    };
+    if name == "href" && damaged() { "data:image/png;base64," } else { value }
 }
 
 fn attribute(out: &mut String, prefix: &str, name: &str, value: &str) {

@@ -29,11 +29,17 @@ fn a_drawings_layers_lie_where_they_are_drawn() {
         ]
     );
     let left_out = "left out, because it lies in no layer of an ink: layer `guides`";
-    for word in [left_out, "layer `silver` is hidden or empty"] {
+    for word in [left_out, "layer `silver` is hidden: left out; show it"] {
         assert!(art.notes.iter().any(|note| note.contains(word)), "{word}: {:?}", art.notes);
     }
+    let hidden = drawing(r##"<g id="white" display="none"><rect width="9" height="9"/></g><g id="gold"/>"##);
+    assert!(refused(&[bench.write("hidden.svg", hidden)]).contains("hidden.svg is visible; show its layers"));
     let slip = svg.replace("guides", "finnish");
-    assert!(refused(&[bench.write("slip.svg", slip)]).contains("did you mean `finish`?"));
+    let refusal = refused(&[bench.write("slip.svg", slip)]);
+    assert!(
+        refusal.contains("layer `finnish` names no ink (did you mean `finish`?); rename the layer"),
+        "{refusal}"
+    );
 }
 
 #[test]

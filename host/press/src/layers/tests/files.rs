@@ -95,11 +95,11 @@ fn pages_are_not_chosen_where_there_are_none() {
 fn what_a_folder_holds_beside_layers_is_told() {
     let bench = Bench::new();
     bench.grey("white.png", (2, 1), &[0, 255]);
-    for other in ["gold.svg", "black.bmp", "silver.GIF", "finish.webp", "art.psd", "notes.txt", ".k.svg"] {
+    for other in ["gold.svg", "black.TGA", "art.psd", "notes.txt", ".k.svg"] {
         bench.write(other, "x");
     }
     let art = read(&[bench.0.path().to_path_buf()], &Options::default());
-    let wanted = "left out art.psd, black.bmp, finish.webp, gold.svg, silver.GIF; in a folder";
+    let wanted = "left out art.psd, black.TGA, gold.svg; in a folder";
     assert!(art.notes.iter().any(|note| note.contains(wanted)), "{:?}", art.notes);
     fs::remove_file(bench.path("white.png")).unwrap();
     let text = refused(&[bench.0.path().to_path_buf()]);
@@ -117,6 +117,56 @@ fn a_file_that_cannot_be_one_of_several_layers_says_so() {
         let text = refused(&[white.clone(), bench.write(name, bytes)]);
         assert!(text.contains(kind) && text.contains("cannot be one of several layers"), "{text}");
     }
-    let text = refused(&[white, bench.write("gold.bmp", b"BM\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0")]);
-    assert!(text.contains("found BMP, which is not read; save it as PNG"), "{text}");
+    let text = refused(&[white, bench.write("gold.avif", b"\0\0\0\x1cftypavif\0\0\0\0")]);
+    assert!(text.contains("found AVIF, which is not read; save it as PNG"), "{text}");
+}
+
+#[test]
+fn bmp_gif_and_webp_are_layers_and_pictures_like_png() {
+    let bench = Bench::new();
+    let size = (30, 20);
+    let pixel = |x: u32, y: u32| image::Luma([if (x + y).is_multiple_of(3) { 0 } else { 255 }]);
+    let picture = image::DynamicImage::from(image::GrayImage::from_fn(size.0, size.1, pixel)).to_rgb8();
+    let options = Options { dpi: Some(600.0), ..Options::default() };
+    let wanted = extent(
+        &read(
+            &[bench.grey("white.png", size, &picture.iter().step_by(3).copied().collect::<Vec<_>>())],
+            &options,
+        )
+        .layers[0],
+    );
+    for name in ["white.bmp", "white.gif", "white.webp"] {
+        let folder = bench.path(&name[6..]);
+        fs::create_dir(&folder).unwrap();
+        picture.save(folder.join(name)).unwrap();
+        let art = read(std::slice::from_ref(&folder), &options);
+        assert_eq!((art.layers.len(), extent(&art.layers[0])), (1, wanted), "{name}");
+        // As a picture under another name, and cut short as an error that names the file.
+        let bytes = fs::read(folder.join(name)).unwrap();
+        let other = bench.write(&name.replace("white", "photo"), &bytes);
+        assert_eq!(read(&[other], &options).drawn.dots(), wanted.4, "{name}");
+        let cut = bench.write(&name.replace("white", "cut"), &bytes[..bytes.len() / 2]);
+        assert!(refused(&[cut]).contains("cut."), "{name}");
+    }
+    // A BMP states pixels per metre.
+    let mut bmp = fs::read(bench.path("bmp/white.bmp")).unwrap();
+    bmp[38..42].copy_from_slice(&23_622u32.to_le_bytes());
+    bmp[42..46].copy_from_slice(&11_811u32.to_le_bytes());
+    let art = read(&[bench.write("stated.bmp", bmp)], &Options::default());
+    assert_eq!((art.width, art.length), (30, 40));
+}
+
+#[test]
+fn a_picture_with_nothing_on_it_is_no_layer_with_a_slip_in_its_name() {
+    let bench = Bench::new();
+    let options = Options { dpi: Some(600.0), ..Options::default() };
+    let art = read(&[bench.grey("blank.png", (20, 10), &[255; 200])], &options);
+    assert!(!art.notes.iter().any(|note| note.contains("black")), "{:?}", art.notes);
+    let error =
+        compose(&art, &Settings::default(), &inks::Library::builtin(), &Silent).unwrap_err().to_string();
+    assert!(error.ends_with("blank is white or transparent everywhere"), "{error}");
+    let art = read(&[bench.grey("blakc.png", (20, 10), &[0; 200])], &options);
+    let note =
+        "because its name is that of no ink; to print it as a layer of black, rename the file to black.png";
+    assert!(art.notes.iter().any(|text| text.contains(note)), "{:?}", art.notes);
 }

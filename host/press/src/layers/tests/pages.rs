@@ -196,6 +196,11 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     // A slip is an error in both.
     let slip = bench.write("slip.ps", MIXED.replace("Dieline", "Golld"));
     for error in [pdf::spots(&slip).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()] {
-        assert!(error.to_string().contains("`Golld` names no ink, did you mean `gold`?"), "{error}");
+        assert!(
+            error
+                .to_string()
+                .contains("spot colour `Golld` names no ink (did you mean `gold`?); rename the spot colour"),
+            "{error}"
+        );
     }
 }

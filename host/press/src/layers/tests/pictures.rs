@@ -81,7 +81,10 @@ fn files_are_named_after_inks_and_slips_are_understood() {
     let named: Vec<_> = art.layers.iter().map(|layer| (layer.ink, layer.place)).collect();
     assert_eq!(named, [(Ink::Black, Some(2)), (Ink::White, Some(1)), (Ink::GoldFoil, Some(3))]);
     let text = refused(&[save("white.png"), save("golld.png")]);
-    assert!(text.contains("`golld` names no ink, did you mean `gold`?"), "{text}");
+    assert!(
+        text.contains("file `golld` names no ink (did you mean `gold`?); name each file after its ink"),
+        "{text}"
+    );
     // A folder is its pictures.
     let folder = bench.path("decal");
     fs::create_dir(&folder).unwrap();
@@ -101,7 +104,7 @@ fn one_picture_is_colour_unless_its_name_says_an_ink() {
     let art = read(&[picture], &Options::default());
     assert!(art.layers.is_empty() && art.colour.is_some() && art.drawn.dots() == 1);
     let art = read(&[bench.grey("whitee.png", (2, 1), &[0, 255])], &Options::default());
-    assert!(art.notes.iter().any(|note| note.contains("name it white.png")), "{:?}", art.notes);
+    assert!(art.notes.iter().any(|note| note.contains("rename the file to white.png")), "{:?}", art.notes);
     let layer = read(&[bench.grey("black.png", (2, 1), &[0, 255])], &Options::default());
     assert!(layer.colour.is_none() && layer.layers.len() == 1);
 }

@@ -139,6 +139,16 @@ fn art_for_1200_dpi_has_twice_as_many_dots_across_and_the_same_size() {
     let art = read(&[bench.grey("black.png", (20, 10), &columns)], &fine);
     assert_eq!((art.width, art.length), (20, 5));
     assert_eq!(extent(&art.layers[0]), (0, 0, 18, 4, 50));
+    // What is lost is half of the rows: the advice is what the printer can do, and who follows it gets none.
+    assert!(art.notes.iter().any(|note| note.contains("draw at 1200 x 600 dpi")), "{:?}", art.notes);
+    let unit = png::Unit::Meter;
+    let stated =
+        bench.png("white.png", (20, 10), png::ColorType::Grayscale, png::BitDepth::Eight, &columns, |png| {
+            png.set_pixel_dims(Some(png::PixelDimensions { xppu: 47_244, yppu: 23_622, unit }));
+        });
+    let art = read(&[stated], &Options { across: 2, ..Options::default() });
+    assert_eq!(extent(&art.layers[0]), (0, 0, 18, 9, 100));
+    assert!(!art.notes.iter().any(|note| note.contains("resampled")), "{:?}", art.notes);
     let file = bench
         .write("art.svg", drawing(r##"<g id="black"><rect x="10" y="10" width="10" height="10"/></g>"##));
     let art = read(&[file], &Options { across: 2, ..Options::default() });
