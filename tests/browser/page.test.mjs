@@ -209,7 +209,7 @@ test('materials are edited by mouse and keyboard, and the steps are there to cop
   await page.click('#copySteps');
   await page.waitForFunction(() => /Copied|Selected/.test(document.querySelector('#copySteps').textContent));
   await page.waitForFunction(() => document.querySelector('#copySteps').textContent === 'Copy steps');
-  assert.equal(await page.locator('#factor').innerText(), 'foilpress factor DOC --bases 3 -o DOC.foil');
+  assert.equal(await page.locator('#replay').textContent(), "foilpress factor 'a <b>' -o a.foil\nfoilpress edit a.foil --steps steps.toml -o edited.foil");
   const chip = () => page.locator('#basisColour').evaluate((found) => getComputedStyle(found).backgroundColor);
   const colours = [];
   for (const basis of ['0', '1', '2']) {
@@ -335,7 +335,7 @@ test('an address brings back its view, and nonsense in it does no harm', () => v
   assert.equal(after.get('show'), 'printed');
   assert.equal(after.get('zoom'), '400');
   // Whatever the program takes, the page takes; a control shows the end of its range and changes nothing.
-  const far = 'show=printed&light=150,0,0.02&probe=0&view=0,88&distance=0.02&tilt=0,5&curl=0&zoom=1&pan=0,0&exposure=9.5&knee=0.4';
+  const far = 'show=printed&light=150,0,0.02&probe=0&view=0,88&distance=0.02&tilt=0,5&curl=0&zoom=1&pan=0,0&exposure=-13.5&knee=0.4';
   for (const hash of [far, far.replace('view=0,88', 'view=120,0').replace('tilt=0,5', 'tilt=85,0')]) {
     await page.evaluate((to) => { location.hash = to; }, hash);
     assert.equal(decodeURIComponent((await rested(page)).toString()), hash);

@@ -84,12 +84,16 @@ pub struct Laid {
 const BASES: usize = 12;
 
 impl Laid {
-    /// The document's bases for pictures of it.
-    pub fn bases(&self, observer: &dyn Observer) -> Result<Factored> {
+    /// How the document's bases for pictures of it are found, unless it came with bases.
+    pub fn factoring(&self) -> factor::Settings {
         let uses_bases = self.halftoned.mapped.report.intent.uses_bases();
         let bases = self.settings.factor.bases.or((!uses_bases).then_some(BASES));
-        let settings = factor::Settings { bases, ..self.settings.factor };
-        Ok(document::factored(&self.document, &settings, observer)?.0.into_owned())
+        factor::Settings { bases, ..self.settings.factor }
+    }
+
+    /// The document's bases for pictures of it.
+    pub fn bases(&self, observer: &dyn Observer) -> Result<Factored> {
+        Ok(document::factored(&self.document, &self.factoring(), observer)?.0.into_owned())
     }
 }
 
@@ -219,7 +223,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         || {
             let rest = || {
                 let halftone = Halftone::measured(&laid, &mix, &beside)?;
-                let shown = Shown::of(&laid, &mix, laid.document.as_factored().cloned());
+                let shown = Shown::of(&laid, &mix, laid.document.as_factored().cloned(), &args.work.dots);
                 drop(mix);
                 Ok::<_, anyhow::Error>((halftone, shown.page(&ViewArgs::default(), None, &beside)?))
             };

@@ -7,7 +7,7 @@
  *   colours: number[][], passes: { name: string, colour: number[] }[], bits: number[], curves: string, dots: string }} PackedDots
  * @typedef {{ name: string, about: string, size: [number, number], start: string, white: number, steps: number,
  *   metric: { angles: number[], radiance: number[], weight: number[] },
- *   edits: { fingerprint: string, bases: number, samples: number, surfaces: import('./edit.js').Surface[] } | null,
+ *   edits: { fingerprint: string, replay: string, surfaces: import('./edit.js').Surface[] } | null,
  *   document: PackedLayer | null, mapped: PackedLayer | null, printed: PackedDots,
  *   difference: { width: number, height: number, most: number, bytes: string } | null,
  *   probe: { width: number, height: number, texels: string } }} Packed
