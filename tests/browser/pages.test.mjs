@@ -1,4 +1,4 @@
-// The other pages that the program writes: the display's, the report and a comparison.
+// The other pages that the program writes. With `FOILPRESS_KEEP` a picture of each stays in that folder.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
@@ -11,15 +11,22 @@ const folder = resolve(process.env.FOILPRESS_PAGE ?? '.');
 const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const desk = { width: 1000, height: 760, webgl: false, beside: true };
 
-/** Runs in a page, and fails if the page complained or axe-core finds something serious. */
+/** Runs in a page, and fails if the page complained, or if axe-core finds anything on a desk or a phone. */
 async function visit(name, how, run) {
   const { browser, page, complaints } = await open(`${folder}/${name}`, how);
   try {
     await run(page);
     await page.evaluate(axe);
-    const { violations } = await page.evaluate(() => window.axe.run());
-    const serious = violations.filter(({ impact }) => impact === 'serious' || impact === 'critical');
-    assert.deepEqual(serious.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), []);
+    for (const width of [1280, 390]) {
+      await page.setViewportSize({ width, height: 844 });
+      const { violations } = await page.evaluate(() => window.axe.run());
+      assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), [], `${width} pixels`);
+      // Nothing is wider than a phone, but tables that scroll for themselves.
+      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `wider than ${width} pixels`);
+      if (process.env.FOILPRESS_KEEP) {
+        await page.screenshot({ path: `${process.env.FOILPRESS_KEEP}/${name.replaceAll('/', '-')}-${how.colorScheme}-${width}.png`, fullPage: true });
+      }
+    }
     assert.deepEqual(complaints, []);
   } finally {
     await browser.close();
@@ -140,8 +147,25 @@ for (const colorScheme of ['light', 'dark']) {
     }
     // Figures for both photographs, and all together.
     assert.equal(await page.locator('h2:has-text("Figures") + div tr').count(), 4);
-    // Nothing is wider than a phone, but tables that scroll for themselves.
-    await page.setViewportSize({ width: 380, height: 740 });
-    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
   }));
+
+  for (const [what, name, pictures] of [
+    ['plan', 'print/plan.html', 'img'], ['measurement', 'mine/report.html', 'img, figure svg'], ['two libraries', 'diff.html', 'figure svg'],
+    ['gamut', 'gamut.html', 'figure svg'],
+  ]) {
+    test(`the page of the ${what} has the colours that were asked for, ${colorScheme}`, () => visit(name, { ...desk, colorScheme }, async (page) => {
+      assert.ok((await page.locator(pictures).count()) > 0);
+      /** How light text and ground are. */
+      const lightness = () => page.evaluate(() => {
+        const { color, backgroundColor } = getComputedStyle(document.documentElement);
+        return [color, backgroundColor].map((rgb) => Number(/\d+/.exec(rgb)[0]));
+      });
+      const [text, ground] = await lightness();
+      assert.equal(text > ground, colorScheme === 'dark', `${text} on ${ground}`);
+      // Paper is white, whatever the screen was.
+      await page.emulateMedia({ media: 'print' });
+      assert.deepEqual((await lightness())[1], 255);
+      await page.emulateMedia({ media: null });
+    }));
+  }
 }
