@@ -183,6 +183,21 @@ test('the keyboard reaches and does everything', () => visit(desk, async (page) 
   for (const id of ['picture', 'handle', 'lamp', 'with', 'probe', 'share', 'reset']) assert.ok(reached.has(id), id);
 }));
 
+test('a key never comes to what the picture covers', () => visit({ width: 640, height: 430 }, async (page) => {
+  for (const key of ['Tab', 'Shift+Tab']) {
+    for (let i = 0; i < 45; i++) {
+      await page.keyboard.press(key);
+      const covered = await page.evaluate(() => {
+        const found = document.activeElement;
+        if (!found || found === document.body || found.closest('#stage')) return '';
+        const [{ top, bottom }, stage] = [found, document.querySelector('#stage')].map((element) => element.getBoundingClientRect());
+        return top >= stage.bottom && bottom <= innerHeight ? '' : found.outerHTML;
+      });
+      assert.equal(covered, '', `${key} ${i}`);
+    }
+  }
+}));
+
 test('materials are edited by mouse and keyboard, and the steps are there to copy', () => visit(desk, async (page) => {
   const picture = () => page.evaluate(() => document.querySelector('canvas').toDataURL());
   const steps = () => page.inputValue('#steps');
@@ -324,6 +339,61 @@ test('fingers drag, pinch and tap', () => visit(phone, async (page) => {
     return said.top >= picture.bottom && said.bottom < innerHeight;
   });
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), true, 'nothing is cut off');
+}));
+
+test('a finger works every control', () => visit(phone, async (page) => {
+  const session = await page.context().newCDPSession(page);
+  /** @param {string} what @param {number} dx @param {number} dy @param {[number, number]} at */
+  const swipe = async (what, dx, dy, [across, down] = [0.5, 0.5]) => {
+    const found = page.locator(what).first();
+    await found.evaluate((control) => control.closest('#stage') ?? control.scrollIntoView({ block: 'center' }));
+    const box = await found.boundingBox();
+    const [x, y] = [box.x + across * box.width, box.y + down * box.height];
+    const touch = (/** @type {string} */ type, /** @type {number[][]} */ ...points) =>
+      session.send('Input.dispatchTouchEvent', { type, touchPoints: points.map(([px, py], id) => ({ x: px, y: py, id })) });
+    await touch('touchStart', [x, y]);
+    for (let i = 1; i <= 4; i++) await touch('touchMove', [x + (dx * i) / 4, y + (dy * i) / 4]);
+    await touch('touchEnd');
+    return rested(page);
+  };
+  const before = await rested(page);
+  const scrolled = await page.evaluate(() => scrollY);
+  let after = await swipe('.lamp', 60, 0);
+  assert.ok(numbers(after.get('light'))[0] > numbers(before.get('light'))[0] + 10, after.get('light'));
+  after = await swipe('#handle', 90, 0, [0.5, 0.2]);
+  assert.ok(Number(after.get('split')) > 0.6, after.get('split'));
+  await page.tap('[data-tool=sheet]');
+  after = await swipe('#picture', 40, 20, [0.3, 0.7]);
+  assert.ok(numbers(after.get('tilt'))[0] > 5, after.get('tilt'));
+  await page.tap('[data-tool=move]');
+  after = await swipe('#picture', 40, 20, [0.3, 0.7]);
+  assert.notEqual(after.get('pan'), before.get('pan'));
+  assert.equal(await page.evaluate(() => scrollY), scrolled, 'a finger on the picture does not scroll the page');
+  await page.tap('#nearer');
+  assert.ok(Number((await rested(page)).get('zoom')) > 1.2);
+  await page.tap('#whole');
+  assert.equal((await rested(page)).get('zoom'), '1');
+  for (const show of ['mapped', 'printed', 'passes', 'document']) {
+    await page.tap(`[data-show=${show}]`);
+    assert.equal((await rested(page)).get('show'), show);
+  }
+  await page.tap('#more');
+  assert.equal((await rested(page)).get('light').split(';').length, 2);
+  await page.tap('#probe');
+  assert.equal((await rested(page)).get('probe'), '1');
+  for (const [slider, key] of [['#sliders-light label:nth-child(4) input', 'exposure'], ['#sliders-sheet label:nth-child(3) input', 'curl'], ['#sliders-edits input', 'edit']]) {
+    const old = (await rested(page)).get(key);
+    assert.notEqual((await swipe(slider, 40, 0)).get(key), old, key);
+  }
+  await page.tap('#unedit');
+  assert.equal((await rested(page)).get('edit'), null);
+  await page.tap('#reset');
+  assert.equal((await rested(page)).get('light'), before.get('light'));
+  // Large enough for a finger, by WCAG 2.2.
+  for (const control of await page.locator('button:visible, input:visible, select:visible, [role=slider]:visible').all()) {
+    const box = await control.boundingBox();
+    assert.ok(Math.min(box.width, box.height) >= 18, await control.evaluate((found) => found.outerHTML));
+  }
 }));
 
 test('an address brings back its view, and nonsense in it does no harm', () => visit(desk, async (page) => {

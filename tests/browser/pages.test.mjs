@@ -34,7 +34,7 @@ async function visit(name, how, run) {
 }
 
 for (const colorScheme of ['light', 'dark']) {
-  test(`the display follows mouse and keyboard, ${colorScheme}`, () => visit('wall/display.html', { ...desk, colorScheme }, async (page) => {
+  test(`the display follows mouse and keyboard, ${colorScheme}`, () => visit('wall/display.html', { ...desk, touch: true, colorScheme }, async (page) => {
     const drawn = () => page.evaluate(() => ['seen', 'mask'].map((id) => document.getElementById(id).toDataURL()).join());
     await page.waitForSelector('#frames [aria-checked="true"]');
     await page.waitForFunction(() => document.getElementById('seen').width > 1);
@@ -52,6 +52,7 @@ for (const colorScheme of ['light', 'dark']) {
       await page.mouse.move(box.x + 0.9 * box.width, box.y + 0.3 * box.height);
       await page.mouse.up();
     });
+    await changes('finger', () => page.touchscreen.tap(box.x + 0.2 * box.width, box.y + 0.6 * box.height));
     await page.focus('#seen');
     await changes('arrows', async () => { for (let i = 0; i < 5; i++) await page.keyboard.press('ArrowLeft'); });
     await changes('eye used to it', () => page.click('#adapted'));
@@ -83,6 +84,17 @@ for (const colorScheme of ['light', 'dark']) {
     await page.waitForTimeout(600);
     assert.equal(await chosen(), still);
     assert.equal(await page.isVisible('#message'), false);
+    // On a phone what is seen stays in sight, and a key comes to nothing beneath it.
+    await page.setViewportSize({ width: 390, height: 700 });
+    for (let i = 0; i < 30; i++) {
+      await page.keyboard.press('Tab');
+      const covered = await page.evaluate(() => {
+        const [found, figure] = [document.activeElement, document.querySelector('#seenFigure').getBoundingClientRect()];
+        if (figure.top < 0 || figure.bottom > innerHeight) return 'out of sight';
+        return !found.closest('aside') || found.getBoundingClientRect().top >= figure.bottom ? '' : found.outerHTML;
+      });
+      assert.equal(covered, '');
+    }
   }));
 
   test(`the report shows every picture, ${colorScheme}`, () => visit('print/report.html', { ...desk, colorScheme }, async (page) => {

@@ -54,11 +54,18 @@ pub fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{escape, head};
+    use super::{escape, head, read};
 
     #[test]
     fn names_from_files_stay_text() {
         assert_eq!(escape("<b>\"a\" & 'c'\u{7}"), "&lt;b&gt;&quot;a&quot; &amp; &#39;c&#39; ");
         assert!(head("</title><script>", &[]).contains("<title>&lt;/title&gt;&lt;script&gt;</title>"));
+    }
+
+    #[test]
+    fn pages_that_are_read_have_a_language_and_a_main_part() {
+        let page = read("a title", "p{}", "<h1>A title</h1>\n");
+        assert!(page.contains("<html lang=\"en\">") && page.contains("prefers-color-scheme: dark"), "{page}");
+        assert!(page.ends_with("<body>\n<main>\n<h1>A title</h1>\n</main>\n</body>\n</html>\n"), "{page}");
     }
 }

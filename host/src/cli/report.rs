@@ -323,6 +323,16 @@ mod tests {
             assert!(text.contains(part), "{part}");
         }
         assert!(!text.contains("NaN") && !text.contains("inf"));
+        // The label stands above the curve, wherever that goes.
+        let (before, drawing) = text.split_once(" fill=\"#8a4b12\" text-anchor").unwrap();
+        let label: f64 = before.rsplit('"').nth(1).unwrap().parse().unwrap();
+        let (curve, _) = drawing.split_once("fill=\"none\" stroke=\"#1b63a5\"").unwrap();
+        let (_, curve) = curve.rsplit_once("d=\"M").unwrap();
+        let highest = curve
+            .trim_end_matches("\" ")
+            .split('L')
+            .map(|at| at.split_once(' ').unwrap().1.parse::<f64>().unwrap());
+        assert!(label + 5.0 < highest.fold(f64::MAX, f64::min), "{label}");
         let even = page(&Subject { spectrum: None, ..subject }).unwrap();
         assert!(even.contains("too small or too even") && even.matches("<svg").count() == DRAWN);
     }
