@@ -96,6 +96,41 @@ fn a_job_with_copies_shows_them_all() {
     assert!(printed(middle - 5, middle + 5) == 0.0);
 }
 
+/// The commands on the page replay its steps, whatever options the page was made with.
+#[test]
+fn the_page_names_the_commands_that_replay_its_edits() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    for (options, bases) in [
+        ("", "--bases 12"),
+        ("--intent basis", "-o"),
+        (
+            "--intent basis --bases 3 --factor kmeans --seed 7 --samples 40",
+            "--samples 40 --bases 3 --factor kmeans --seed 7",
+        ),
+        ("--intent clamp --bases 2 --colour-space linear", "--colour-space linear --bases 2"),
+    ] {
+        bench.done(&format!("preview tile {SMALL} {options} -o tile.html"));
+        let page = fs::read_to_string(bench.path("tile.html")).expect("a page");
+        let (_, rest) = page.split_once("\"edits\":").expect("edits");
+        let edits = serde_json::Deserializer::from_str(rest).into_iter::<Value>().next().unwrap().unwrap();
+        let (fingerprint, replay) =
+            (edits["fingerprint"].as_str().unwrap(), edits["replay"].as_str().unwrap());
+        let text =
+            format!("format = 1\nfingerprint = \"{fingerprint}\"\n\n[[step]]\nbasis = 1\nrougher = 2.0\n");
+        fs::write(bench.path("steps.toml"), text).unwrap();
+        let lines: Vec<&str> = replay.lines().collect();
+        assert!(lines[0].starts_with(&format!("foilpress factor tile {bases}")), "{options}: {replay}");
+        assert_eq!(lines[1..], ["foilpress edit tile.foil --steps steps.toml -o edited.foil"]);
+        for line in lines {
+            bench.done(line.strip_prefix("foilpress ").unwrap());
+        }
+        for folder in ["tile.foil", "edited.foil"] {
+            fs::remove_dir_all(bench.path(folder)).unwrap();
+        }
+    }
+}
+
 /// Steps copied from the page of a factored document are for that document.
 #[test]
 fn the_page_names_the_document_whose_bases_it_edits() {

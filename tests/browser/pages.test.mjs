@@ -1,4 +1,4 @@
-// The other pages that the program writes: the display's, the report and a comparison.
+// The other pages that the program writes. With `FOILPRESS_KEEP` a picture of each stays in that folder.
 
 import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
@@ -11,15 +11,22 @@ const folder = resolve(process.env.FOILPRESS_PAGE ?? '.');
 const axe = await readFile(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 const desk = { width: 1000, height: 760, webgl: false, beside: true };
 
-/** Runs in a page, and fails if the page complained or axe-core finds something serious. */
+/** Runs in a page, and fails if the page complained, or if axe-core finds anything on a desk or a phone. */
 async function visit(name, how, run) {
   const { browser, page, complaints } = await open(`${folder}/${name}`, how);
   try {
     await run(page);
     await page.evaluate(axe);
-    const { violations } = await page.evaluate(() => window.axe.run());
-    const serious = violations.filter(({ impact }) => impact === 'serious' || impact === 'critical');
-    assert.deepEqual(serious.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), []);
+    for (const width of [1280, 390]) {
+      await page.setViewportSize({ width, height: 844 });
+      const { violations } = await page.evaluate(() => window.axe.run());
+      assert.deepEqual(violations.map(({ id, nodes }) => [id, nodes.map((node) => node.html)]), [], `${width} pixels`);
+      // Nothing is wider than a phone, but tables that scroll for themselves.
+      assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `wider than ${width} pixels`);
+      if (process.env.FOILPRESS_KEEP) {
+        await page.screenshot({ path: `${process.env.FOILPRESS_KEEP}/${name.replaceAll('/', '-')}-${how.colorScheme}-${width}.png`, fullPage: true });
+      }
+    }
     assert.deepEqual(complaints, []);
   } finally {
     await browser.close();
@@ -27,7 +34,7 @@ async function visit(name, how, run) {
 }
 
 for (const colorScheme of ['light', 'dark']) {
-  test(`the display follows mouse and keyboard, ${colorScheme}`, () => visit('wall/display.html', { ...desk, colorScheme }, async (page) => {
+  test(`the display follows mouse and keyboard, ${colorScheme}`, () => visit('wall/display.html', { ...desk, touch: true, colorScheme }, async (page) => {
     const drawn = () => page.evaluate(() => ['seen', 'mask'].map((id) => document.getElementById(id).toDataURL()).join());
     await page.waitForSelector('#frames [aria-checked="true"]');
     await page.waitForFunction(() => document.getElementById('seen').width > 1);
@@ -45,6 +52,7 @@ for (const colorScheme of ['light', 'dark']) {
       await page.mouse.move(box.x + 0.9 * box.width, box.y + 0.3 * box.height);
       await page.mouse.up();
     });
+    await changes('finger', () => page.touchscreen.tap(box.x + 0.2 * box.width, box.y + 0.6 * box.height));
     await page.focus('#seen');
     await changes('arrows', async () => { for (let i = 0; i < 5; i++) await page.keyboard.press('ArrowLeft'); });
     await changes('eye used to it', () => page.click('#adapted'));
@@ -76,6 +84,17 @@ for (const colorScheme of ['light', 'dark']) {
     await page.waitForTimeout(600);
     assert.equal(await chosen(), still);
     assert.equal(await page.isVisible('#message'), false);
+    // On a phone what is seen stays in sight, and a key comes to nothing beneath it.
+    await page.setViewportSize({ width: 390, height: 700 });
+    for (let i = 0; i < 30; i++) {
+      await page.keyboard.press('Tab');
+      const covered = await page.evaluate(() => {
+        const [found, figure] = [document.activeElement, document.querySelector('#seenFigure').getBoundingClientRect()];
+        if (figure.top < 0 || figure.bottom > innerHeight) return 'out of sight';
+        return !found.closest('aside') || found.getBoundingClientRect().top >= figure.bottom ? '' : found.outerHTML;
+      });
+      assert.equal(covered, '');
+    }
   }));
 
   test(`the report shows every picture, ${colorScheme}`, () => visit('print/report.html', { ...desk, colorScheme }, async (page) => {
@@ -140,8 +159,25 @@ for (const colorScheme of ['light', 'dark']) {
     }
     // Figures for both photographs, and all together.
     assert.equal(await page.locator('h2:has-text("Figures") + div tr').count(), 4);
-    // Nothing is wider than a phone, but tables that scroll for themselves.
-    await page.setViewportSize({ width: 380, height: 740 });
-    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
   }));
+
+  for (const [what, name, pictures] of [
+    ['plan', 'print/plan.html', 'img'], ['measurement', 'mine/report.html', 'img, figure svg'], ['two libraries', 'diff.html', 'figure svg'],
+    ['gamut', 'gamut.html', 'figure svg'],
+  ]) {
+    test(`the page of the ${what} has the colours that were asked for, ${colorScheme}`, () => visit(name, { ...desk, colorScheme }, async (page) => {
+      assert.ok((await page.locator(pictures).count()) > 0);
+      /** How light text and ground are. */
+      const lightness = () => page.evaluate(() => {
+        const { color, backgroundColor } = getComputedStyle(document.documentElement);
+        return [color, backgroundColor].map((rgb) => Number(/\d+/.exec(rgb)[0]));
+      });
+      const [text, ground] = await lightness();
+      assert.equal(text > ground, colorScheme === 'dark', `${text} on ${ground}`);
+      // Paper is white, whatever the screen was.
+      await page.emulateMedia({ media: 'print' });
+      assert.deepEqual((await lightness())[1], 255);
+      await page.emulateMedia({ media: null });
+    }));
+  }
 }

@@ -17,28 +17,25 @@ const COLOURS: [(u8, u8, u8); 3] = [(208, 48, 48), (32, 140, 64), (48, 88, 220)]
 /// The largest picture that is put into a page, in bytes.
 const MOST_PICTURE: u64 = 16 << 20;
 
-const STYLE: &str = "img{border:1px solid #999}.again{background:#fff4d0;padding:.5em 1em}.clean{background:#e4f5e4;padding:.5em 1em}";
-
 /// The page of a measurement's folder: a single HTML file that loads nothing else.
 ///
 /// # Errors
 /// A folder that holds no measurement.
 pub fn html(folder: &Path) -> Result<String, MeasureError> {
     let measurement = library::read(folder)?;
-    let mut page = String::new();
+    let title = format!("Measurement by {}, {}", measurement.by, measurement.when);
+    let mut body = String::new();
     // Writing to a string does not fail.
-    let _ = write_page(&measurement, folder, &mut page);
-    Ok(page)
+    let _ = write_body(&title, &measurement, folder, &mut body);
+    Ok(html::read(&title, "img{border:1px solid #999}", &body))
 }
 
-fn write_page(m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Result {
-    let title = format!("Measurement by {}, {}", m.by, m.when);
-    let head = html::head(&title, &[html::READ, STYLE]);
-    write!(page, "{head}<body><h1>{}</h1><p>{}.</p>", escape(&title), escape(&m.setup))?;
+fn write_body(title: &str, m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Result {
+    write!(page, "<h1>{}</h1><p>{}.</p>", escape(title), escape(&m.setup))?;
     if m.again.is_empty() {
-        page.push_str("<p class=\"clean\">Nothing needs to be photographed again.</p>");
+        page.push_str("<p class=\"good\">Nothing needs to be photographed again.</p>");
     } else {
-        page.push_str("<div class=\"again\"><h2>What to photograph again</h2><ul>");
+        page.push_str("<div class=\"doubtful\"><h2>What to photograph again</h2><ul>");
         m.again.iter().try_for_each(|line| write!(page, "<li>{}", escape(line)))?;
         page.push_str("</ul></div>");
     }
@@ -47,7 +44,11 @@ fn write_page(m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Re
     for stack in &m.stacks {
         write!(page, "<h3>{}</h3>", escape(&stack.stack))?;
         match (curves(stack), coverage(stack)) {
-            (Ok(curves), Ok(coverage)) => write!(page, "{curves}{coverage}")?,
+            (Ok(curves), Ok(coverage)) => {
+                let name = &stack.stack;
+                page.push_str(&html::drawing(&format!("curves of {name}"), &curves));
+                page.push_str(&html::drawing(&format!("pixels for each sample of {name}"), &coverage));
+            }
             _ => page.push_str("<p>No plot: the curve has no values.</p>"),
         }
     }
@@ -68,7 +69,6 @@ fn write_page(m: &Measurement, folder: &Path, page: &mut String) -> std::fmt::Re
             }
         }
     }
-    page.push_str("</body></html>\n");
     Ok(())
 }
 
@@ -118,14 +118,14 @@ fn geometry(m: &Measurement, page: &mut String) -> std::fmt::Result {
     write!(
         page,
         "<h2>Geometry</h2><p>{used} Pixels of the same half angle differ by {:.1} % (by {:.1} % with the measures of the setup \
-         file).</p>{wide}<table><tr><th>measure<th class=n>correction<th class=n>tolerance<th class=n>uncertain by<th>",
+         file).</p>{wide}<table><tr><th>measure<th class=n>correction<th class=n>tolerance<th class=n>uncertain by<th>unit",
         100.0 * g.misfit,
         100.0 * g.misfit_before
     )?;
     for row in &g.measures {
         write!(
             page,
-            "<tr><td>{}<td class=n>{:+.2}<td class=n>{:.2}<td class=n>{:.2}<td>{}",
+            "<tr><td class=words>{}<td class=n>{:+.2}<td class=n>{:.2}<td class=n>{:.2}<td>{}",
             escape(&row.name),
             row.by,
             row.tolerance,

@@ -2,10 +2,16 @@
 //!
 //! Problem: pages hold names from files of unknown origin, open from a disk, and should look like one program's.
 //! Method: one head, which says language, width and what the page may load: nothing but pictures beside it and within it; text is
-//! escaped. [`READ`] is the style of pages that are read; pages that work bring their own.
+//! escaped. Pages that are read ([`read`]) share a style: text and tables in the light or dark colours that the reader's system asks
+//! for, pictures on their own ground, and always light on paper. Pages that work bring their own style to [`head`].
 
-/// The style of pages that are read: text, tables and plots on light paper.
-pub const READ: &str = include_str!("read.css");
+/// The style of pages that are read.
+const READ: &str = include_str!("read.css");
+
+/// A page that is read: `title` as plain text, `style` as CSS for this kind of page, `body` as HTML that begins with the heading.
+pub fn read(title: &str, style: &str, body: &str) -> String {
+    format!("{}<body>\n<main>\n{body}</main>\n</body>\n</html>\n", head(title, &[READ, style]))
+}
 
 /// A page up to its body: `title` as plain text, `styles` as CSS, one after the other.
 pub fn head(title: &str, styles: &[&str]) -> String {
@@ -22,6 +28,11 @@ pub fn head(title: &str, styles: &[&str]) -> String {
 /// `what` says what it is to who cannot see it, and keys reach it.
 pub fn wide(what: &str) -> String {
     format!("<div class=\"wide\" role=\"region\" tabindex=\"0\" aria-label=\"{}\">", escape(what))
+}
+
+/// A drawing in SVG, which is one picture to who cannot see it; `what` says what it shows.
+pub fn drawing(what: &str, svg: &str) -> String {
+    format!("<figure role=\"img\" aria-label=\"{}\">{svg}</figure>", escape(what))
 }
 
 /// Text as it stands in HTML, between tags and in quoted attributes. Control characters become spaces.
@@ -43,11 +54,18 @@ pub fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{escape, head};
+    use super::{escape, head, read};
 
     #[test]
     fn names_from_files_stay_text() {
         assert_eq!(escape("<b>\"a\" & 'c'\u{7}"), "&lt;b&gt;&quot;a&quot; &amp; &#39;c&#39; ");
         assert!(head("</title><script>", &[]).contains("<title>&lt;/title&gt;&lt;script&gt;</title>"));
+    }
+
+    #[test]
+    fn pages_that_are_read_have_a_language_and_a_main_part() {
+        let page = read("a title", "p{}", "<h1>A title</h1>\n");
+        assert!(page.contains("<html lang=\"en\">") && page.contains("prefers-color-scheme: dark"), "{page}");
+        assert!(page.ends_with("<body>\n<main>\n<h1>A title</h1>\n</main>\n</body>\n</html>\n"), "{page}");
     }
 }

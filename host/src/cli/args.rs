@@ -71,11 +71,14 @@ pub struct FactorArgs {
     #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes", value_parser = choice::<Method>())]
     pub method: Method,
     /// Seed of all random choices; equal seeds give equal prints
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = FactorArgs::SEED)]
     pub seed: u64,
 }
 
 impl FactorArgs {
+    /// The seed unless another is given.
+    pub const SEED: u64 = 1;
+
     /// Whether something about the bases was chosen.
     pub fn is_chosen(&self) -> bool {
         self.bases.is_some() || self.method != Method::default()

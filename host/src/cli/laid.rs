@@ -47,12 +47,16 @@ pub struct Laid {
 }
 
 impl Laid {
-    /// The document's bases for pictures of it.
-    pub fn bases(&self, observer: &dyn Observer) -> Result<Factored> {
+    /// How the document's bases for pictures of it are found, unless it came with bases.
+    pub fn factoring(&self) -> factor::Settings {
         let uses_bases = self.halftoned.mapped.report.intent.uses_bases();
         let bases = self.settings.factor.bases.or((!uses_bases).then_some(BASES));
-        let settings = factor::Settings { bases, ..self.settings.factor };
-        Ok(document::factored(&self.document, &settings, observer)?.0.into_owned())
+        factor::Settings { bases, ..self.settings.factor }
+    }
+
+    /// The document's bases for pictures of it.
+    pub fn bases(&self, observer: &dyn Observer) -> Result<Factored> {
+        Ok(document::factored(&self.document, &self.factoring(), observer)?.0.into_owned())
     }
 }
 

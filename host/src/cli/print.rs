@@ -111,7 +111,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         || {
             let rest = || {
                 let halftone = Halftone::measured(&laid, &mix, &beside)?;
-                let shown = Shown::of(&laid, &mix, laid.document.as_factored().cloned());
+                let shown = Shown::of(&laid, &mix, laid.document.as_factored().cloned(), &args.work.dots);
                 drop(mix);
                 Ok::<_, anyhow::Error>((halftone, shown.page(&ViewArgs::default(), None, &beside)?))
             };

@@ -20,10 +20,10 @@ const DRAWN: usize = 8;
 /// The finest pattern that an eye resolves, in cycles a degree.
 const RESOLVED: f64 = 30.0;
 
-const STYLE: &str = "img,svg{display:block}nav{display:flex;flex-wrap:wrap;gap:.3rem 1rem}\
+const STYLE: &str = "img{display:block}nav{display:flex;flex-wrap:wrap;gap:.3rem 1rem}\
     .many{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,22rem),1fr));gap:1rem;\
     margin-top:1rem}\
-    .passes{grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}figure{background:#fff;padding:.6rem;\
+    .passes{grid-template-columns:repeat(auto-fill,minmax(9rem,1fr))}figure{background:var(--card);padding:.6rem;\
     border-radius:8px}figure>svg{max-width:min(100%,720px);margin:0 auto}";
 
 /// What the page shows.
@@ -64,19 +64,18 @@ pub fn page(subject: &Subject) -> Result<String> {
             plot::compared(&format!("{} {number}: d = {:.3}", subject.kind, material.distance), &lines)
         })
         .collect::<Result<Vec<String>, _>>()?;
-    let mut page = String::new();
-    write(subject, &plots, &mut page)?;
-    Ok(page)
+    let mut body = String::new();
+    write(subject, &plots, &mut body)?;
+    Ok(html::read(&format!("{}: report of the print", subject.plan.document), STYLE, &body))
 }
 
 fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result {
     let plan = subject.plan;
     let (name, (width, height)) = (escape(&plan.document), plan.size_mm);
     let (fidelity, eye) = subject.fidelity;
-    let head = html::head(&format!("{}: report of the print", plan.document), &[html::READ, STYLE]);
     write!(
         page,
-        "{head}<body>\n<h1>{name}</h1>\n<p>{width:.1} &times; {height:.1} mm on {}, {} passes. Seen from {eye} m, print and document \
+        "<h1>{name}</h1>\n<p>{width:.1} &times; {height:.1} mm on {}, {} passes. Seen from {eye} m, print and document \
          differ by d = {:.3} on average <span class=\"faint\">(0.01: barely visible; 0.05: obvious)</span>.</p>\n\
          <nav aria-label=\"Files\"><a href=\"plan.html\">The plan: cartridges, passes, ribbon, cautions</a>\
          <a href=\"preview.png\">All inks, dot for dot</a><a href=\"separation.png\">Stacks in false colours</a>\
@@ -106,7 +105,7 @@ fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result 
             grouped(pass.dots)
         )?;
     }
-    writeln!(page, "</div>\n</body></html>")
+    writeln!(page, "</div>")
 }
 
 /// Curves of the materials against what is printable.
@@ -120,7 +119,7 @@ fn write_gamut(subject: &Subject, plots: &[String], page: &mut String) -> fmt::R
     for (material, number) in subject.materials.iter().zip(1..) {
         write!(
             page,
-            "<tr><td class=\"n\">{number}<td class=\"n\">{:.1} %<td class=\"n\">{:.3}<td class=\"n\">{:.3}<td>{}",
+            "<tr><td class=\"n\">{number}<td class=\"n\">{:.1} %<td class=\"n\">{:.3}<td class=\"n\">{:.3}<td class=\"words\">{}",
             100.0 * material.share,
             material.unscaled_distance,
             material.light,
@@ -129,13 +128,13 @@ fn write_gamut(subject: &Subject, plots: &[String], page: &mut String) -> fmt::R
     }
     writeln!(page, "</table></div>\n<div class=\"many\">")?;
     for (svg, number) in plots.iter().zip(1..) {
-        writeln!(page, "<figure aria-label=\"curves of {kind} {number}\">{svg}</figure>")?;
+        writeln!(page, "{}", html::drawing(&format!("curves of {kind} {number}"), svg))?;
     }
     writeln!(page, "</div>")
 }
 
 fn write_errors(fidelity: &Fidelity, eye: f64, doubt: Option<Doubt>, page: &mut String) -> fmt::Result {
-    let row = |name: &str, value: f64| format!("<tr><td>{name}<td class=\"n\">{value:.3}");
+    let row = |name: &str, value: f64| format!("<tr><th>{name}<td class=\"n\">{value:.3}");
     writeln!(
         page,
         "<h2>Errors</h2>\n<p>Differences between print and document, seen from {eye} m.</p>\n<table>{}{}{}{}{}</table>",
@@ -189,9 +188,9 @@ fn write_halftone(subject: &Subject, page: &mut String) -> fmt::Result {
 /// The spectrum as a drawing of 720 x 260, with the frequency an eye at this distance resolves.
 fn draw_spectrum(spectrum: &Spectrum, eye: f64, page: &mut String) -> fmt::Result {
     const LEFT: f64 = 44.0;
-    const TOP: f64 = 14.0;
+    const TOP: f64 = 28.0;
     const WIDE: f64 = 660.0;
-    const HIGH: f64 = 196.0;
+    const HIGH: f64 = 182.0;
     // Slower than this, the document's own content prevails.
     let fast = spectrum.rings.iter().filter(|ring| ring.0 >= 0.5);
     let most = fast.map(|ring| ring.1).fold(1.5, f64::max);
@@ -224,13 +223,15 @@ fn draw_spectrum(spectrum: &Spectrum, eye: f64, page: &mut String) -> fmt::Resul
     // A degree covers so many millimetres.
     let resolved = RESOLVED / (1000.0 * eye * 1f64.to_radians().tan());
     if resolved < last {
+        // Above the curve, and no farther to the side than the drawing reaches.
         write!(
             page,
             "<path d=\"M{0:.1} {TOP}V{1:.1}\" stroke=\"#8a4b12\" stroke-dasharray=\"4 3\"/>\
-             <text x=\"{2:.1}\" y=\"202\" fill=\"#8a4b12\">finest an eye resolves</text>",
+             <text x=\"{2:.1}\" y=\"{3}\" fill=\"#8a4b12\" text-anchor=\"middle\">finest an eye resolves</text>",
             x(resolved),
             TOP + HIGH,
-            x(resolved) + 6.0
+            x(resolved).clamp(LEFT + 40.0, LEFT + WIDE - 60.0),
+            TOP - 8.0
         )?;
     }
     let points: Vec<String> =
@@ -322,6 +323,16 @@ mod tests {
             assert!(text.contains(part), "{part}");
         }
         assert!(!text.contains("NaN") && !text.contains("inf"));
+        // The label stands above the curve, wherever that goes.
+        let (before, drawing) = text.split_once(" fill=\"#8a4b12\" text-anchor").unwrap();
+        let label: f64 = before.rsplit('"').nth(1).unwrap().parse().unwrap();
+        let (curve, _) = drawing.split_once("fill=\"none\" stroke=\"#1b63a5\"").unwrap();
+        let (_, curve) = curve.rsplit_once("d=\"M").unwrap();
+        let highest = curve
+            .trim_end_matches("\" ")
+            .split('L')
+            .map(|at| at.split_once(' ').unwrap().1.parse::<f64>().unwrap());
+        assert!(label + 5.0 < highest.fold(f64::MAX, f64::min), "{label}");
         let even = page(&Subject { spectrum: None, ..subject }).unwrap();
         assert!(even.contains("too small or too even") && even.matches("<svg").count() == DRAWN);
     }

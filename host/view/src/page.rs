@@ -106,6 +106,8 @@ pub struct Target<'a> {
     pub mapped: &'a Factored,
     /// What each basis of `mapped` is mixed of.
     pub mixtures: &'a [String],
+    /// The commands that replay `steps.toml` on the document, one a line.
+    pub replay: &'a str,
 }
 
 /// Weights over curves.
@@ -164,7 +166,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
         "name": subject.name, "about": subject.about, "size": subject.size, "start": subject.start,
         "white": ToneCurve::PAPER.exposure, "steps": STEPS,
         "metric": { "angles": space.angles(), "radiance": every_third(space.radiance()), "weight": every_third(space.weight()) },
-        "edits": target.map(|t| edits(t.document)),
+        "edits": target.map(edits),
         "document": document, "mapped": mapped, "printed": printed, "difference": difference,
         "probe": { "width": probe.width(), "height": probe.height(), "texels": packed(&texels)? },
     });
@@ -268,8 +270,8 @@ fn layer(factored: &Factored, name: &dyn Fn(usize) -> String) -> Result<Layer, V
 }
 
 /// What edits of the bases need: each as a body and one lobe, and what the document is known by. Bases are those of its [`layer`].
-fn edits(document: &Factored) -> serde_json::Value {
-    let Factored { space, bases, maps } = document;
+fn edits(target: &Target) -> serde_json::Value {
+    let Factored { space, bases, maps } = target.document;
     let totals = maps.totals();
     let surface = |i: &usize| {
         let row = bases.row(*i);
@@ -281,10 +283,7 @@ fn edits(document: &Factored) -> serde_json::Value {
     };
     let used: Vec<usize> = (0..bases.len()).filter(|&i| totals[i] > 0).collect();
     let surfaces: Vec<serde_json::Value> = used.par_iter().map(surface).collect();
-    // `factor` with as many bases and angles makes the same document: so the page can say how.
-    json!({
-        "fingerprint": fingerprint(document), "bases": bases.len(), "samples": space.angles().len(), "surfaces": surfaces,
-    })
+    json!({ "fingerprint": fingerprint(target.document), "replay": target.replay, "surfaces": surfaces })
 }
 
 /// The distance d between document and print at every place of a coarse map.
@@ -356,7 +355,7 @@ mod tests {
                 name,
                 about: "60 x 40 dots",
                 size: [0.00254, 0.00169],
-                target: Some(Target { document: &document, mapped: &document, mixtures: &[] }),
+                target: Some(Target { document: &document, mapped: &document, mixtures: &[], replay: "" }),
                 dots: &dots,
                 stacks: &rows,
                 space: &space,

@@ -2,7 +2,10 @@
 
 import { clamp } from './geometry.js';
 import { element } from './spot.js';
-import { redraw } from './stage.js';
+import { byId, redraw } from './stage.js';
+
+/** How long keys rest before what they did is read aloud, in milliseconds: none interrupts the one before. */
+const READ = 600;
 
 /** How long a button says what it did, in milliseconds. */
 const ANSWERED = 2500;
@@ -63,6 +66,18 @@ export const arrows = (event) =>
 
 export const inDegrees = (/** @type {number} */ v, /** @type {string} */ more, /** @type {string} */ less) =>
   `${Math.abs(Math.round(v))}° ${v < -0.5 ? less : more}`;
+
+/** @type {number | undefined} */
+let told;
+
+/**
+ * Says to who cannot see the picture what keys made of it, once they rest.
+ * @param {() => string} words
+ */
+export function tell(words) {
+  clearTimeout(told);
+  told = setTimeout(() => (byId('said').textContent = words()), READ);
+}
 
 /**
  * What a drag or an arrow may make of a value: as far as `limit`, and from beyond it only back.

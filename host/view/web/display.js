@@ -218,7 +218,7 @@ function put(id, picture, most) {
   const canvas = /** @type {HTMLCanvasElement} */ (byId(id));
   if (canvas.width !== picture.width || canvas.height !== picture.height) {
     [canvas.width, canvas.height] = [picture.width, picture.height];
-    canvas.style.width = `min(100%, ${most}px, ${((70 * picture.width) / picture.height).toFixed(2)}dvh)`;
+    canvas.style.width = `min(100%, ${most}px, calc(${(picture.width / picture.height).toFixed(4)} * var(--tall)))`;
   }
   canvas.getContext('2d')?.putImageData(picture, 0, 0);
 }

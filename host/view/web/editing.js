@@ -6,9 +6,6 @@ import { clamp } from './geometry.js';
 import { element } from './spot.js';
 import { byId, data, drawn, eachFrame, held, redraw, state } from './stage.js';
 
-/** Angles of a document unless `--samples` says otherwise. */
-const SAMPLES = 32;
-
 let applied = '';
 /** The curves as they were. @type {Float32Array} */
 let original = new Float32Array();
@@ -37,8 +34,8 @@ const editOf = () => (state.edits[held.basis] ??= unedited());
 
 export function buildEdits() {
   if (!data.edits || !data.document) return;
-  const { bases, samples, surfaces } = data.edits;
-  byId('factor').textContent = `foilpress factor DOC --bases ${bases}${samples === SAMPLES ? '' : ` --samples ${samples}`} -o DOC.foil`;
+  const { replay, surfaces } = data.edits;
+  byId('replay').textContent = replay;
   const which = /** @type {HTMLSelectElement} */ (byId('basis'));
   which.append(...surfaces.map(({ number }, k) => element('option', { value: k }, `basis ${number}`)));
   which.addEventListener('change', () => {

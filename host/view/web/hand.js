@@ -1,10 +1,10 @@
 // The picture under the hand: mouse, touch, wheel and keys move light, sheet and picture, and a tap looks at a spot.
 
-import { arrows, mark, sync, within } from './controls.js';
+import { arrows, inDegrees, mark, sync, tell, within } from './controls.js';
 import { clamp } from './geometry.js';
-import { hemisphere, place } from './lamps.js';
+import { hemisphere, lampInWords, place } from './lamps.js';
 import { look } from './look.js';
-import { byId, canvas, faceTheEye, held, metresPerPixel, redraw, state } from './stage.js';
+import { byId, canvas, faceTheEye, held, metresPerPixel, redraw, stage, state } from './stage.js';
 import { MOST_ZOOM } from './state.js';
 
 /** @type {(x: number, y: number, by: string) => void} */
@@ -83,25 +83,42 @@ const lift = (/** @type {PointerEvent} */ event) => {
 };
 canvas.addEventListener('pointerup', lift);
 canvas.addEventListener('pointercancel', lift);
+// A hand that another window takes over lifts nothing here.
+canvas.addEventListener('lostpointercapture', lift);
 canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-canvas.addEventListener('wheel', (event) => {
+// Lamps and the handle lie over the picture.
+stage.addEventListener('wheel', (event) => {
   event.preventDefault();
   const box = canvas.getBoundingClientRect();
   const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 16 : 1;
-  zoom(Math.exp(clamp(-event.deltaY * lines, -300, 300) / 400), event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2);
+  // Two fingers on a touchpad are a wheel with Ctrl, in small steps.
+  const by = event.ctrlKey ? clamp(-event.deltaY, -40, 40) / 100 : clamp(-event.deltaY * lines, -300, 300) / 400;
+  zoom(Math.exp(by), event.clientX - box.left - box.width / 2, event.clientY - box.top - box.height / 2);
 }, { passive: false });
 canvas.addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.metaKey) return;
   const arrow = arrows(event);
+  const zoomed = () => `Zoom ${Number(state.zoom.toFixed(1))}`;
   if (arrow) {
     const [x, y] = arrow;
     if (event.altKey) drag(-40 * x, 40 * y, 'move');
-    else if (event.shiftKey) drag(12 * x, -12 * y, 'sheet');
-    else if (state.lights[held.lamp]) place(held.lamp, state.lights[held.lamp].azimuth + 3 * x, state.lights[held.lamp].elevation + 3 * y);
-  } else if (event.key === '+' || event.key === '=') zoom(1.25);
-  else if (event.key === '-') zoom(0.8);
-  else if (event.key === '0') whole();
-  else if (event.key === 'Enter') look(canvas.clientWidth / 2, canvas.clientHeight / 2);
+    else if (event.shiftKey) {
+      drag(12 * x, -12 * y, 'sheet');
+      tell(() => `Sheet turned ${inDegrees(state.turn, 'right', 'left')}, tipped ${inDegrees(state.tip, 'back', 'front')}`);
+    } else if (state.lights[held.lamp]) {
+      place(held.lamp, state.lights[held.lamp].azimuth + 3 * x, state.lights[held.lamp].elevation + 3 * y);
+      tell(() => (state.lights[held.lamp] ? lampInWords(held.lamp) : ''));
+    }
+  } else if (event.key === '+' || event.key === '=') {
+    zoom(1.25);
+    tell(zoomed);
+  } else if (event.key === '-') {
+    zoom(0.8);
+    tell(zoomed);
+  } else if (event.key === '0') {
+    whole();
+    tell(zoomed);
+  } else if (event.key === 'Enter') look(canvas.clientWidth / 2, canvas.clientHeight / 2);
   else if (event.key.toLowerCase() === 'l') choose('light');
   else if (event.key.toLowerCase() === 't') choose('sheet');
   else if (event.key.toLowerCase() === 'm') choose('move');

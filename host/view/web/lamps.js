@@ -1,9 +1,9 @@
 // What lies over the picture: a lamp for each light, the handle of a split picture, and the scale.
 
-import { arrows, inDegrees, rechoose, sync, within } from './controls.js';
+import { arrows, inDegrees, rechoose, sync, tell, within } from './controls.js';
 import { clamp } from './geometry.js';
 import { element } from './spot.js';
-import { byId, canvas, drawn, eachFrame, held, metresPerPixel, redraw, state } from './stage.js';
+import { byId, canvas, drawn, eachFrame, held, metresPerPixel, redraw, stage, state } from './stage.js';
 import { TITLES } from './state.js';
 
 const lampButtons = byId('lamps');
@@ -22,7 +22,7 @@ function layOver() {
     button.style.left = `${clamp(width / 2 + azimuth * r, 8, width - 8)}px`;
     button.style.top = `${clamp(height / 2 - elevation * r, 8, height - 8)}px`;
     button.setAttribute('aria-pressed', String(i === held.lamp));
-    button.setAttribute('aria-label', `Light ${i + 1}: ${inDegrees(azimuth, 'right', 'left')}, ${inDegrees(elevation, 'up', 'down')}`);
+    button.setAttribute('aria-label', lampInWords(i));
     button.hidden = !lit();
   });
   handle.hidden = !state.with;
@@ -31,7 +31,14 @@ function layOver() {
   const [left, right] = handle.querySelectorAll('.tag');
   left.textContent = TITLES[state.show];
   right.textContent = TITLES[state.with] ?? '';
+  stage.dataset.shows = [state.show, state.with].filter(Boolean).map((show) => TITLES[show]).join(', ');
   scaleBar();
+}
+
+/** @param {number} i */
+export function lampInWords(i) {
+  const { azimuth, elevation } = state.lights[i];
+  return `Light ${i + 1}: ${inDegrees(azimuth, 'right', 'left')}, ${inDegrees(elevation, 'up', 'down')}`;
 }
 
 const lit = () => [state.show, state.with].some((show) => show in drawn.layers);
@@ -71,6 +78,7 @@ function addLampButton(i) {
     if (x || y) {
       event.preventDefault();
       place(i, state.lights[i].azimuth + 3 * x, state.lights[i].elevation + 3 * y);
+      tell(() => lampInWords(i));
     }
   });
   lampButtons.append(button);
@@ -97,7 +105,8 @@ handle.addEventListener('pointermove', (event) => {
   redraw(true);
 });
 handle.addEventListener('keydown', (event) => {
-  const [x] = arrows(event) ?? [0];
+  const [across, up] = arrows(event) ?? [0, 0];
+  const x = across || up;
   const end = event.key === 'Home' ? 0 : event.key === 'End' ? 1 : null;
   if (x === 0 && end === null) return;
   event.preventDefault();

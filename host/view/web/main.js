@@ -11,6 +11,13 @@ import { read } from './state.js';
 /** How near to its edge an address may show the sheet: the program's limit. */
 const EDGE = 1e-3;
 
+/** @param {string} text */
+function tellOver(text) {
+  const message = byId('message');
+  message.textContent = text;
+  message.hidden = false;
+}
+
 /**
  * Says why nothing can be moved, and takes away what would do nothing.
  * @param {string} text
@@ -18,9 +25,7 @@ const EDGE = 1e-3;
 function say(text) {
   document.body.classList.add('still');
   stage.classList.remove('ready');
-  const message = byId('message');
-  message.textContent = text;
-  message.hidden = false;
+  tellOver(text);
 }
 
 async function start() {
@@ -46,9 +51,12 @@ async function start() {
   canvas.addEventListener('webglcontextlost', (event) => {
     event.preventDefault();
     drawn.drawing = null;
+    stage.classList.remove('ready');
+    tellOver('The graphics card is gone for a while. Until it is back, the picture shows the sheet under one light.');
   });
   canvas.addEventListener('webglcontextrestored', () => {
     drawn.drawing = make();
+    byId('message').hidden = true;
     redraw(false);
   });
   eachFrame.after.push(() => stage.classList.add('ready'));

@@ -151,7 +151,7 @@ export function build() {
   const metres = (/** @type {number} */ v) => (v > 1.02 ? 0 : 0.1 * 30 ** v);
   const inMetres = (/** @type {number} */ d) => (d ? `${d.toFixed(2)} m` : 'far');
   slider(light, 'distance', { min: 0, max: 1.04, step: 0.01, shown: hasLight, get: () => near(chosen().distance), set: (v) => (chosen().distance = metres(v)), words: () => inMetres(chosen().distance) });
-  slider(light, 'exposure', { min: -5, max: 5, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v >= 0.05 ? '+' : ''}${Math.abs(v) < 0.05 ? '0' : v.toFixed(1)} EV` });
+  slider(light, 'exposure', { min: -10, max: 10, step: 0.1, get: () => state.exposure, set: (v) => (state.exposure = v), words: (v) => `${v >= 0.05 ? '+' : ''}${Math.abs(v) < 0.05 ? '0' : v.toFixed(1)} EV` });
   slider(light, 'tone curve', { min: 0, max: 1, step: 0.05, get: () => state.knee, set: (v) => (state.knee = v), words: (v) => (v < 1 ? `from ${Math.round(100 * v)} %` : 'cut off') });
   const turned = (/** @type {'turn' | 'tip'} */ which) => (/** @type {number} */ v) => {
     state[which] = v;

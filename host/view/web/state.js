@@ -13,6 +13,8 @@ import { clamp } from './geometry.js';
 
 export const MOST_LIGHTS = 4;
 export const MOST_ZOOM = 400;
+/** Beyond what `--exposure` takes: a panorama in other units may need more, and the program chooses it. */
+const MOST_STOPS = 40;
 /** Eye and lights come no nearer, in metres. These limits and those of angles are the program's. */
 const NEAREST = 0.01;
 /** What can be shown, and its name. @type {Record<string, string>} */
@@ -96,7 +98,7 @@ export function read(text, state, limits) {
   state.zoom = one('zoom', 0.5, MOST_ZOOM, state.zoom);
   const pan = numbers('pan', 2);
   if (pan) state.pan = [clamp(pan[0], -5, 5), clamp(pan[1], -5, 5)];
-  state.exposure = one('exposure', -10, 10, state.exposure);
+  state.exposure = one('exposure', -MOST_STOPS, MOST_STOPS, state.exposure);
   state.knee = one('knee', 0, 1, state.knee);
   const edit = given.get('edit');
   if (edit !== null) state.edits = editsRead(edit, limits.bases);

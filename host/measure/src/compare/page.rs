@@ -15,12 +15,12 @@ const STACKS: usize = 12;
 
 /// The page. `name` says what was printed.
 pub fn html(name: &str, comparison: &Comparison, pictures: &[Pictures]) -> String {
-    let mut page = String::new();
+    let mut body = String::new();
     let title = format!("{name} beside its photographs");
     let pictures: Vec<[String; 5]> = pictures.iter().map(encoded).collect();
     // Writing to a string does not fail.
-    let _ = write_page(&title, comparison, &pictures, &mut page);
-    page
+    let _ = write_body(&title, comparison, &pictures, &mut body);
+    html::read(&title, include_str!("page.css"), &body)
 }
 
 fn encoded(pictures: &Pictures) -> [String; 5] {
@@ -53,9 +53,8 @@ fn cells(errors: &Errors, page: &mut String) -> std::fmt::Result {
     write!(page, "<td class=n>{}<td class=n>{}", percent(errors.inks), percent(errors.rest))
 }
 
-fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut String) -> std::fmt::Result {
-    let head = html::head(title, &[html::READ, include_str!("page.css")]);
-    write!(page, "{head}<body><main><h1>{}</h1>", escape(title))?;
+fn write_body(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut String) -> std::fmt::Result {
+    write!(page, "<h1>{}</h1>", escape(title))?;
     let [width, height] = c.size_mm;
     let from = if c.document { "the document" } else { "the predicted print" };
     write!(
@@ -76,7 +75,7 @@ fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut 
     }
     page.push_str("</p>");
     if !c.warnings.is_empty() {
-        page.push_str("<div class=\"warn\"><strong>Doubtful</strong><ul>");
+        page.push_str("<div class=\"doubtful\"><strong>Doubtful</strong><ul>");
         c.warnings.iter().try_for_each(|line| write!(page, "<li>{}", escape(line)))?;
         page.push_str("</ul></div>");
     }
@@ -105,7 +104,7 @@ fn write_page(title: &str, c: &Comparison, pictures: &[[String; 5]], page: &mut 
         stacks(photo, page)?;
     }
     camera(c, page)?;
-    writeln!(page, "</main><script>{}</script></body></html>", include_str!("page.js"))
+    writeln!(page, "<script>{}</script>", include_str!("page.js"))
 }
 
 fn pair(

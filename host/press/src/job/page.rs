@@ -31,26 +31,24 @@ pub fn html(plan: &Plan, pictures: &Pictures) -> Result<String, image::ImageErro
     };
     let sheet = encoded(&pictures.sheet)?;
     let passes: Vec<String> = pictures.passes.iter().map(encoded).collect::<Result<_, _>>()?;
-    let mut page = String::new();
+    let mut body = String::new();
     // Writing to a string does not fail.
-    let _ = write(plan, &sheet, &passes, &mut page);
-    Ok(page)
+    let _ = write(plan, &sheet, &passes, &mut body);
+    Ok(html::read(&format!("{}: job plan", plan.document), STYLE, &body))
 }
 
-const STYLE: &str = "@page{margin:15mm}:root{background:#fff;color:#111;font:10.5pt/1.35 sans-serif}body{max-width:180mm;padding:0}\
+const STYLE: &str = "@page{margin:15mm}:root{font:10.5pt/1.35 sans-serif}body{max-width:calc(180mm + 2.4rem)}@media print{body{padding:0}}\
     h1{font-size:16pt;margin:0 0 1mm}h2{font-size:11.5pt;margin:4mm 0 1mm}h2:first-of-type{clear:both}p{margin:1mm 0;max-width:none}\
-    table{width:100%}th,td{padding:.6mm 2mm;border-bottom:.2mm solid #bbb}th{font-weight:600}img{border:.2mm solid #999}\
+    table{width:100%}th,td{padding:.6mm 2mm;border-bottom-width:.2mm}th{font-weight:600}img{border:.2mm solid #999}\
     .sheet{float:right;width:52mm;margin:0 0 3mm 5mm}.passes{display:flex;flex-wrap:wrap;gap:3mm}\
     figure{break-inside:avoid}figure img{max-width:41mm;max-height:41mm}figcaption{font-size:8.5pt}\
-    .box{display:inline-block;width:3.4mm;height:3.4mm;border:.3mm solid #111;vertical-align:-.5mm}small{color:#555}";
+    .box{display:inline-block;width:3.4mm;height:3.4mm;border:.3mm solid;vertical-align:-.5mm}";
 
 fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std::fmt::Result {
     let name = escape(&plan.document);
-    let head = html::head(&format!("{}: job plan", plan.document), &[html::READ, STYLE]);
     write!(
         page,
-        "{head}<body>\n\
-         <img class=\"sheet\" alt=\"the sheet as it is printed\" src=\"data:image/png;base64,{sheet}\">\n<h1>{name}</h1>\n"
+        "<img class=\"sheet\" alt=\"the sheet as it is printed\" src=\"data:image/png;base64,{sheet}\">\n<h1>{name}</h1>\n"
     )?;
     let (width, height) = plan.size_mm;
     write!(page, "<p>{width:.1} &times; {height:.1} mm on {}", plan.paper)?;
@@ -75,16 +73,16 @@ fn write(plan: &Plan, sheet: &str, passes: &[String], page: &mut String) -> std:
     )?;
     write_cartridges(plan, page)?;
     write_passes(plan, passes, page)?;
-    write_checks(plan, page)?;
-    writeln!(page, "</body></html>")
+    write_checks(plan, page)
 }
 
 /// What to load, and what to replace on the way.
 fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
     writeln!(
         page,
-        "<h2>Load</h2>\n<table><tr><th></th><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
-         <th class=\"n\">From pass</th><th class=\"n\">Ribbon*</th></tr>"
+        "<h2>Load</h2>\n{}<table><tr><td></td><th>Cartridge</th><th>Part</th><th class=\"n\">Barcode</th>\
+         <th class=\"n\">From pass</th><th class=\"n\">Ribbon*</th></tr>",
+        html::wide("cartridges")
     )?;
     let (now, later) = plan.loaded();
     for (place, cartridge) in now.iter().chain(later).enumerate() {
@@ -105,7 +103,7 @@ fn write_cartridges(plan: &Plan, page: &mut String) -> std::fmt::Result {
             ribbon::length(cartridge.ribbon_mm_estimated)
         )?;
     }
-    writeln!(page, "</table>")?;
+    writeln!(page, "</table></div>")?;
     if !plan.changes.is_empty() {
         writeln!(page, "<p>The printer would stop in the middle of the sheet:</p>\n<ul>")?;
         for change in &plan.changes {
@@ -125,8 +123,9 @@ fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt
     writeln!(
         page,
         "<p><small>If a cartridge is missing, the printer pauses before that pass and continues once it is \
-         loaded.</small></p>\n<h2>Passes</h2>\n<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
-         <th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>"
+         loaded.</small></p>\n<h2>Passes</h2>\n{}<table><tr><th class=\"n\">#</th><th>Ink</th><th class=\"n\">Dots</th>\
+         <th class=\"n\">Cover</th><th class=\"n\">Ribbon*</th></tr>",
+        html::wide("passes")
     )?;
     for pass in &plan.passes {
         writeln!(
@@ -140,7 +139,7 @@ fn write_passes(plan: &Plan, pictures: &[String], page: &mut String) -> std::fmt
             ribbon::length(pass.estimate.ribbon_mm)
         )?;
     }
-    writeln!(page, "</table>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
+    writeln!(page, "</table></div>\n<p><small>* {}.</small></p>", Plan::RIBBON_NOTE)?;
     for cost in plan.costs() {
         writeln!(page, "<p>Cost: {}.</p>", escape(&cost))?;
     }

@@ -168,16 +168,20 @@ fn words(report: &Report<'_>) -> Result<String> {
 }
 
 fn write_page(target: &Path, report: &Report<'_>) -> Result<()> {
-    let wide = html::wide("differences");
     let mut body = format!(
-        "<p>Lines: {} ({}). Dashed: {} ({}). Bands are two standard deviations.</p>{wide}<table><tr><th>stack<th class=n>d\
-         <th class=n>light<th class=n>band<th>largest difference<th>verdict",
+        "<p>Lines: {} ({}). Dashed: {} ({}). Bands are two standard deviations.</p>",
         escape(report.first),
         report.origins[0],
         escape(report.second),
         report.origins[1]
     );
     let differ = || report.stacks.iter().filter(|row| !row.is_equal());
+    if differ().next().is_some() {
+        body.push_str(&html::wide("differences"));
+        body.push_str(
+            "<table><tr><th>stack<th class=n>d<th class=n>light<th class=n>band<th>largest difference<th>verdict",
+        );
+    }
     for row in differ() {
         write!(
             body,
@@ -190,8 +194,11 @@ fn write_page(target: &Path, report: &Report<'_>) -> Result<()> {
             row.verdict()
         )?;
     }
+    if differ().next().is_some() {
+        body.push_str("</table></div>");
+    }
     let equal = report.stacks.len() - differ().count();
-    write!(body, "</table></div><p>{equal} stacks are equal.")?;
+    write!(body, "<p>{equal} stacks are equal.")?;
     for (stacks, name) in [(&report.only_first, report.first), (&report.only_second, report.second)] {
         if !stacks.is_empty() {
             write!(body, " Only in {}: {}.", escape(name), listed(stacks))?;
@@ -203,7 +210,7 @@ fn write_page(target: &Path, report: &Report<'_>) -> Result<()> {
             .entries
             .map(|entry| plot::Line { curve: &entry.curve, uncertainty: entry.uncertainty.as_ref() });
         let title = format!("{}: d = {:.4}", row.stack, row.difference.distance);
-        let plot = plot::compared(&title, &lines)?;
+        let plot = html::drawing(&format!("curves of {}", row.stack), &plot::compared(&title, &lines)?);
         write!(body, "<h2 id=\"{0}\">{0} {1}</h2>{plot}", row.stack, row.verdict())?;
     }
     page::write(target, "Two ink libraries", &body)

@@ -160,7 +160,7 @@ fn write_page(target: &Path, document: &str, library: &str, space: &Space, found
         let m = &basis.mapped;
         write!(
             body,
-            "<tr><td>{i}<td class=n>{:.1} %<td>{}<td class=n>{:.4}<td class=n>{:.4}<td class=n>{:.4}<td>{}",
+            "<tr><td>{i}<td class=n>{:.1} %<td>{}<td class=n>{:.4}<td class=n>{:.4}<td class=n>{:.4}<td class=words>{}",
             100.0 * m.share,
             basis.nearest,
             basis.alone,
@@ -178,7 +178,7 @@ fn write_page(target: &Path, document: &str, library: &str, space: &Space, found
             body,
             "<h2>Basis {i}: {}</h2>{}",
             mixture(&basis.mapped.weights),
-            plot::compared(&title, &lines)?
+            html::drawing(&format!("curves of basis {i}"), &plot::compared(&title, &lines)?)
         )?;
     }
     page::write(target, &format!("{document} in the gamut of a library"), &body)

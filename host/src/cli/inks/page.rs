@@ -15,8 +15,7 @@ pub fn file_name_of(path: &Path) -> String {
 
 /// Writes a page with this title and body; the body is HTML already.
 pub fn write(target: &Path, title: &str, body: &str) -> Result<()> {
-    let head = html::head(title, &[html::READ]);
-    let page = format!("{head}<body><h1>{}</h1>{body}</body></html>\n", escape(title));
+    let page = html::read(title, "", &format!("<h1>{}</h1>\n{body}\n", escape(title)));
     let staged = Staged::file(target)?;
     std::fs::write(staged.path(), page).with_context(|| format!("cannot write {}", target.display()))?;
     staged.commit()

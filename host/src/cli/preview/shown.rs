@@ -11,7 +11,7 @@ use ::view::{Lit, Renderer, mapped, proportions};
 use anyhow::{Context, Result};
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::{SAMPLES, name_of};
-use appearance::factor::Factored;
+use appearance::factor::{Factored, Method};
 use appearance::gamut::InkMix;
 use image::ImageFormat;
 use inks::Library;
@@ -21,8 +21,10 @@ use press::preview::{Probe, Radiance, Source, ToneCurve, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
 use press::simulate;
 
+use super::super::args::FactorArgs;
 use super::super::laid::{DotsArgs, Laid};
 use super::super::stdio::read_job;
+use super::super::{choice, output};
 use super::view::{Show, ViewArgs};
 use super::wear::Told;
 
@@ -48,6 +50,8 @@ pub struct Both {
     pub document: Factored,
     pub mapped: Factored,
     pub mixtures: Vec<String>,
+    /// The commands that replay edits of the document, one a line.
+    pub replay: String,
 }
 
 /// A page.
@@ -79,11 +83,11 @@ impl Shown {
             observer.note("one copy of the document is shown; `foilpress print` it and preview its job to see the whole sheet");
         }
         let bases = laid.bases(observer)?;
-        Ok(Shown::of(&laid, &laid.halftoned.mapped.mix, Some(bases)))
+        Ok(Shown::of(&laid, &laid.halftoned.mapped.mix, Some(bases), work))
     }
 
-    /// A document's dots, with the document and its mixture beside them where it has bases.
-    pub fn of(laid: &Laid, mix: &InkMix, bases: Option<Factored>) -> Shown {
+    /// A document's dots, with the document and its mixture beside them where it has bases. `work` is what was asked for.
+    pub fn of(laid: &Laid, mix: &InkMix, bases: Option<Factored>, work: &DotsArgs) -> Shown {
         let Laid { document, library, halftoned, .. } = laid;
         let space = document.materials().space().clone();
         let words = |row: &Vec<u16>| {
@@ -94,6 +98,7 @@ impl Shown {
             document,
             mapped: mapped(mix, library, &space),
             mixtures: mix.matrix.iter().map(words).collect(),
+            replay: replay(laid, work),
         });
         let (name, library, dots) = (document.name.clone(), library.clone(), halftoned.dots.clone());
         Shown { name, space, library, dots, target, worn: None }
@@ -149,6 +154,7 @@ impl Shown {
                 document: &both.document,
                 mapped: &both.mapped,
                 mixtures: &both.mixtures,
+                replay: &both.replay,
             }),
             dots: &self.dots,
             stacks: &stacks,
@@ -190,6 +196,43 @@ fn counted(dots: usize) -> String {
     }
 }
 
+/// The commands that replay edits of the document's bases: `edit`, after the `factor` that finds the same bases if the document
+/// came without any. Pages are shown to others, so a path is only its last part.
+fn replay(laid: &Laid, work: &DotsArgs) -> String {
+    let asked = &work.document;
+    let last = Path::new(&asked.document).file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = last.unwrap_or_else(|| asked.document.clone());
+    let edit = |foil: &str| format!("foilpress edit {} --steps steps.toml -o edited.foil", word(foil));
+    if laid.document.as_factored().is_some() {
+        return edit(&name);
+    }
+    let found = laid.factoring();
+    let mut line = format!("foilpress factor {}", word(&name));
+    let mut option = |name: &str, value: Option<String>| {
+        if let Some(value) = value {
+            line.push_str(&format!(" --{name} {}", word(&value)));
+        }
+    };
+    option("material", asked.material.clone());
+    option("colour-space", asked.colour_space.map(|space| choice::name(space).into()));
+    option("samples", (asked.samples != SAMPLES).then(|| asked.samples.to_string()));
+    option("bases", found.bases.map(|bases| bases.to_string()));
+    option("factor", (found.method != Method::default()).then(|| choice::name(found.method).into()));
+    option("seed", (found.seed != FactorArgs::SEED).then(|| found.seed.to_string()));
+    let foil = format!("{}.foil", output::file_name(&laid.document.name));
+    format!("{line} -o {}\n{}", word(&foil), edit(&foil))
+}
+
+/// A word as shells read it.
+fn word(text: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "._-/:+,".contains(c);
+    match text {
+        _ if text.starts_with('-') => word(&format!("./{text}")),
+        _ if !text.is_empty() && text.chars().all(plain) => text.into(),
+        _ => format!("'{}'", text.replace('\'', "'\\''")),
+    }
+}
+
 /// The dots of a job or of a folder with a sheet; nothing for a document.
 pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
     if path.join("dots.toml").is_file() {
@@ -219,4 +262,25 @@ pub fn png(radiance: &Radiance, tone: ToneCurve) -> Result<Vec<u8>> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture(radiance, tone)?.write_to(&mut bytes, ImageFormat::Png)?;
     Ok(bytes.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::word;
+
+    #[test]
+    fn names_are_one_word_of_a_shell() {
+        for (name, expected) in [
+            ("my-material.glb", "my-material.glb"),
+            ("sample:leaf", "sample:leaf"),
+            ("été", "été"),
+            ("a b", "'a b'"),
+            ("it's", "'it'\\''s'"),
+            ("$(reboot)", "'$(reboot)'"),
+            ("-o", "./-o"),
+            ("", "''"),
+        ] {
+            assert_eq!(word(name), expected);
+        }
+    }
 }
