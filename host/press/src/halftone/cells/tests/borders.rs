@@ -150,6 +150,62 @@ fn usual_debts_are_those_in_the_midst_of_a_tone() {
     }
 }
 
+/// The first and last columns of a narrow sheet print what is asked from the first rows of a strip on: rows go on beyond the page.
+#[test]
+fn faint_tones_are_kept_in_the_first_and_last_columns() {
+    const ACROSS: usize = 33;
+    let (width, strips) = (3 * ACROSS, 200);
+    let strip = super::super::STRIP * super::super::plan::BLOCK;
+    let (_, rare, points) = MATERIALS[0];
+    let faint: (&[f64], Option<&[Point]>) = (&[0.03, 0.97], None);
+    for (shares, points) in [faint, (rare, Some(points))] {
+        let mix = plain(1, 1, shares.len(), |_, _| shares.to_vec());
+        let size = (width, strip * strips);
+        let solids = Solids::new(&mix, size.0, size.1, None);
+        let dots = super::super::cells(&mix, size, &vec![9; shares.len()], &solids, points, false, &Silent);
+        // 96 rows of dots of each strip, of columns of cells as far from either side.
+        let count = |column: usize| {
+            let near = |x: usize| x / 3 == column || x / 3 == ACROSS - 1 - column;
+            let rows = (0..strips).flat_map(|i| strip * i..strip * i + 96);
+            let inked = rows.map(|y| (0..width).filter(|&x| near(x) && dots[y * width + x] == 0).count());
+            inked.sum::<usize>() as f64 / (strips * 96 * 6) as f64 / shares[0]
+        };
+        let parts: Vec<f64> = (0..6).map(count).collect();
+        assert!(parts.iter().all(|part| (part - 1.0).abs() < 0.3), "{shares:?}: {parts:.2?}");
+    }
+}
+
+/// Cells that own what the border of the page cuts off are cut into halves like all others: the last rows and columns change as often along
+/// the border as those in the midst.
+#[test]
+fn the_rim_is_as_fine_as_the_rest() {
+    const LONG: usize = 6000;
+    for rest in 0..4 {
+        let short = 120 + rest;
+        let asked = |along: usize| {
+            let t = 0.05 * (along as f64 / 3.0).sin();
+            vec![0.4 + t, 0.35 - t, 0.25]
+        };
+        let below = plain(LONG / 6, 1, 3, |x, _| asked(x));
+        let dots = cells(&below, (LONG, short), &[8; 3], None, &Silent);
+        let changes = |y: usize| (1..LONG).filter(|&x| dots[y * LONG + x] != dots[y * LONG + x - 1]).count();
+        let inside = (40..80).map(changes).sum::<usize>() as f64 / 40.0;
+        assert!(changes(short - 1) as f64 > 0.9 * inside, "below {rest}: {} of {inside}", changes(short - 1));
+        assert_eq!(thin(LONG, &dots, |_| 8, |_| false), 0);
+        let beside = plain(1, LONG / 6, 3, |_, y| asked(y));
+        let dots = cells(&beside, (short, LONG), &[8; 3], None, &Silent);
+        let changes =
+            |x: usize| (1..LONG).filter(|&y| dots[y * short + x] != dots[(y - 1) * short + x]).count();
+        let inside = (40..80).map(changes).sum::<usize>() as f64 / 40.0;
+        assert!(
+            changes(short - 1) as f64 > 0.9 * inside,
+            "beside {rest}: {} of {inside}",
+            changes(short - 1)
+        );
+        assert_eq!(thin(short, &dots, |_| 8, |_| false), 0);
+    }
+}
+
 /// Where cells may be cut into halves, the first and last rows of cells have the ink of the tone, all stacks equally far apart: in
 /// a document that varies, and beside foil, which takes whole cells.
 #[test]
