@@ -5,7 +5,8 @@
 //! Beyond the border cells would owe that too: it comes in where a tone begins and is forgotten where it ends, and only
 //! what differs from it stays inside. So a tone neither begins too light nor ends in a line of what was left over.
 //! Where stacks are not equally far apart, the means come from the metric ([`Lean`]). At the page's own border nothing is
-//! assumed: rows above the first are diffused and thrown away, and what is owed below the last is let go ([`super::diffuse`]).
+//! assumed: rows above the first and cells beyond the ends of rows are diffused and thrown away, and what is owed below the last
+//! row is let go ([`super::diffuse`]).
 //! Cost: a few operations a stack, and a system of four unknowns, for cells beside a border. Limits: cells that may be cut into
 //! halves are taken to be among stacks that are equally far apart.
 

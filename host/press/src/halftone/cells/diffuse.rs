@@ -8,8 +8,9 @@
 //! What a whole column of the strip and a row still owe counts a little ([`LINES`]), or columns of a tint would swing by more than
 //! independent cells do.
 //! A strip is diffused by itself, after block rows of lead-in whose dots are thrown away. Above the page there are none, so
-//! there the first row of cells is taken to go on upwards ([`Strip::lead_in`]). What the last row owes is let go: rows that
-//! nobody prints would take it. So neither border of the page needs to know what cells owe on average.
+//! there the first row of cells is taken to go on upwards ([`Strip::lead_in`]), and rows go on beyond both ends of the page like the
+//! cells there ([`BESIDE`]). What the last row owes is let go: rows that nobody prints would take it. So no border of the page
+//! needs to know what cells owe on average.
 //! Cost: about two dozen operations a stack and cell. Memory: 24 x stacks numbers for each block across.
 
 use super::arrange::Errors;
@@ -17,7 +18,7 @@ use super::border::{Usual, begin};
 use super::cell::Cell;
 use super::choose::{Chooser, Metric, NOISE, disturbing, textured};
 use super::field::{Field, LANES, Row};
-use super::plan::{BLOCK, Plan};
+use super::plan::{BLOCK, Block, Plan};
 
 /// Part of an absent stack's debt that each cell hands to the stacks present.
 const FORGET: f32 = 1.0 / 512.0;
@@ -28,6 +29,13 @@ type Shares = [f32; 4];
 /// What part of all that a column and a row of cells have been asked for and have not printed counts in a decision: enough
 /// to keep whole columns and rows even. Twice as much adds 1 to 2 % to the error seen.
 const LINES: f32 = 1.0 / 256.0;
+
+/// Blocks beyond either end of a row, which are diffused and not printed: without them nothing comes from one side to the first
+/// cells, and a tint of 3 % has half of its ink in the first column of a strip's first rows and twice as much in the second.
+const BESIDE: usize = 2;
+
+/// Dots from where a row begins to the page.
+const MARGIN: usize = BESIDE * BLOCK;
 
 /// The weights of Floyd and Steinberg.
 const SHARES: Shares = [7.0 / 16.0, 3.0 / 16.0, 5.0 / 16.0, 1.0 / 16.0];
@@ -81,14 +89,15 @@ impl<'a> Strip<'a> {
         minimum: &'a [u16],
     ) -> Strip<'a> {
         let lanes = || vec![0.0; field.lanes];
+        let across = plan.across + 2 * BESIDE;
         Strip {
             field,
             plan,
             minimum,
-            slots: vec![0.0; plan.across * BLOCK * field.lanes],
-            columns: vec![0.0; plan.across * BLOCK * field.lanes],
+            slots: vec![0.0; across * BLOCK * field.lanes],
+            columns: vec![0.0; across * BLOCK * field.lanes],
             line: lanes(),
-            format: vec![BLOCK as u8; plan.across],
+            format: vec![BLOCK as u8; across],
             carry: lanes(),
             late: lanes(),
             want: lanes(),
@@ -102,7 +111,7 @@ impl<'a> Strip<'a> {
             fresh: true,
             above: 0,
             disturbance: 0.0,
-            errors: Errors::new(plan.across * BLOCK),
+            errors: Errors::new(across * BLOCK),
             textured: false,
         }
     }
@@ -124,13 +133,12 @@ impl<'a> Strip<'a> {
     /// One row of blocks, or one that is so many dots above the page and like its first row of cells.
     #[inline(always)]
     fn rows(&mut self, row: usize, above: usize, target: &mut Target) {
-        let (plan, across) = (self.plan, self.plan.across);
+        let across = self.format.len();
         for column in 0..across {
-            self.reformat(column, plan.blocks[row * across + column].size);
+            self.reformat(column, self.block(row, column).size);
         }
         for y in 0..BLOCK {
-            let begins =
-                |column: usize| y.is_multiple_of(usize::from(plan.blocks[row * across + column].size));
+            let begins = |column: usize| y.is_multiple_of(usize::from(self.format[column]));
             let beyond = above == 0 && row * BLOCK + y >= self.field.height;
             if beyond || !(0..across).any(begins) {
                 continue;
@@ -140,7 +148,7 @@ impl<'a> Strip<'a> {
             let mut before = false;
             for step in 0..across {
                 let column = if self.back { across - 1 - step } else { step };
-                let here = begins(column);
+                let here = y.is_multiple_of(usize::from(self.format[column]));
                 if !before {
                     self.carry.fill(0.0);
                     self.late.fill(0.0);
@@ -162,7 +170,9 @@ impl<'a> Strip<'a> {
     #[inline(always)]
     fn cells(&mut self, row: usize, column: usize, y: usize, target: &mut Target) {
         let plan = self.plan;
-        let block = &plan.blocks[row * plan.across + column];
+        let block = self.block(row, column);
+        // Where a row ends on either side, the law of borders holds.
+        let calm = block.calm && column > 0 && column + 1 < self.format.len();
         let size = usize::from(block.size);
         let count = BLOCK / size;
         let y = if self.above > 0 { 0 } else { row * BLOCK + y };
@@ -171,28 +181,39 @@ impl<'a> Strip<'a> {
         for step in 0..count {
             let cell = if self.back { count - 1 - step } else { step };
             let x = column * BLOCK + cell * size;
-            if x >= self.field.width {
-                continue;
-            }
-            let whole = block.calm || plan.is_whole(x, y);
-            if whole {
-                self.field.cell(size, x / size, &mut self.rows[size], &mut self.want);
+            let page = x.checked_sub(MARGIN).filter(|x| x + size <= self.field.width);
+            let like = match page {
+                Some(x) => (calm || plan.is_whole(x, y)).then_some(x),
+                None => plan.goes_on(x < MARGIN, y),
+            };
+            if let Some(like) = like {
+                self.field.cell(size, like / size, &mut self.rows[size], &mut self.want);
                 let mut area = size * size;
-                if block.owns {
-                    area += self.add_owned((y * self.field.width + x) as u32);
+                if block.owns && page.is_some() {
+                    let owner = (y * self.field.width + like) as u32;
+                    area += self.add_owned(owner);
+                    // Larger than its like, but one of them to all around it.
+                    if plan.owns_rims_alone(owner) {
+                        let part = (size * size) as f32 / area as f32;
+                        self.want.iter_mut().for_each(|want| *want *= part);
+                        area = size * size;
+                    }
                 }
-                if step == 0 || !block.calm {
+                if step == 0 || !calm {
                     self.disturbance = disturbing(&self.want, self.chooser.cuts(size), block.varies);
                 }
-                let cell = self.decide((x, y), size, area, true, block.calm);
-                if let Some(rows) = target.rows.as_deref_mut() {
+                let cell = self.decide((x, y), size, area, true, calm);
+                if let (Some(x), Some(rows)) = (page, target.rows.as_deref_mut()) {
                     let start = (y - target.top) * self.field.width + x;
                     cell.print(&mut rows[start..], self.field.width, size, &self.field.stacks);
                 }
                 continue;
             }
             self.interrupt_lines(x);
-            let heads: Vec<u32> = plan.heads(x, y).collect();
+            let heads: Vec<u32> = match x.checked_sub(MARGIN).filter(|&x| x < self.field.width) {
+                Some(x) => plan.heads(x, y).collect(),
+                None => Vec::new(),
+            };
             if heads.is_empty() {
                 self.leave(x);
             }
@@ -209,6 +230,23 @@ impl<'a> Strip<'a> {
                     }
                 }
             }
+        }
+    }
+
+    /// A block of a row, or the one at the end of the page that those beyond are like.
+    fn block(&self, row: usize, column: usize) -> &'a Block {
+        &self.plan.blocks[row * self.plan.across + column.saturating_sub(BESIDE).min(self.plan.across - 1)]
+    }
+
+    /// Whether a unit that decides begins in the cell of this dot, which may be beyond the ends of the page.
+    fn decides(&self, x: usize, y: usize) -> bool {
+        if x >= self.format.len() * BLOCK || y >= self.field.height {
+            return false;
+        }
+        match x.checked_sub(MARGIN) {
+            Some(page) if page < self.field.width && self.plan.decides(page, y) => true,
+            Some(page) => self.plan.goes_on(false, y).is_some_and(|last| page > last),
+            None => self.plan.goes_on(true, y).is_some(),
         }
     }
 
@@ -310,7 +348,7 @@ impl<'a> Strip<'a> {
         let slot = self.slot(x) * lanes;
         let (behind, ahead) =
             if self.back { (x + size, x.wrapping_sub(1)) } else { (x.wrapping_sub(1), x + size) };
-        let hash = hash(x, y.wrapping_sub(self.above));
+        let hash = hash(x.wrapping_sub(MARGIN), y.wrapping_sub(self.above));
         let mut shares = disturbed(hash);
         let mut missing = if self.fresh { SHARES[1..].iter().sum() } else { 0.0 };
         let mut begins = self.fresh;
@@ -323,12 +361,13 @@ impl<'a> Strip<'a> {
             // What goes over the lower border of the page is let go, for it was brought in at the upper one.
             let leaves = self.above == 0 && below + size > self.field.height;
             for (share, (x, to_y)) in shares.iter_mut().zip(to) {
-                let goes = self.plan.decides(x, to_y) || (leaves && to_y == below && x < self.field.width);
+                let goes =
+                    self.decides(x, to_y) || (leaves && to_y == below && x < self.format.len() * BLOCK);
                 *share = if goes { *share } else { 0.0 };
             }
-            let comes = SHARES.iter().zip(from).filter(|&(_, (x, y))| self.plan.decides(x, y));
+            let comes = SHARES.iter().zip(from).filter(|&(_, (x, y))| self.decides(x, y));
             missing = 1.0 - comes.map(|(share, _)| share).sum::<f32>();
-            begins = shares[2] > 0.0 && !self.plan.decides(x, above);
+            begins = shares[2] > 0.0 && !self.decides(x, above);
         }
         if !calm {
             let part = (size * size) as f32 / area as f32;

@@ -9,7 +9,8 @@
 //! Cost: one look at each pixel of the document, and at each dot of the blocks that hold solids. Memory: a bit a dot
 //! and 12 bytes a fragment.
 //! Guarantee: within a region of tones, every dot lies in a square or half square of its stack's minimum or more that holds
-//! no other tone. A cell that owns fragments is not halved.
+//! no other tone. A cell that owns fragments is not halved, unless they are no more than what the page's border cuts off of its
+//! neighbours: then it and its halves go on to the border.
 
 use std::collections::HashMap;
 
@@ -70,6 +71,8 @@ pub(super) struct Fragment {
     /// The dot whose stack it prints: its own seed if it decides for itself.
     pub(super) owner: u32,
     area: u16,
+    /// Whether it is all that the page's border leaves of a cell, and the whole cell beside it owns it.
+    rim: bool,
 }
 
 /// The cells of a page.
@@ -183,6 +186,28 @@ impl Plan {
         self.whole(x, y).is_some() || self.heads(x, y).next().is_some()
     }
 
+    /// The first column of the cell at the left or right end of a row of cells that goes on beyond the page: it is whole, and the border
+    /// of the page cuts nothing but tone beside it.
+    pub(super) fn goes_on(&self, left: bool, y: usize) -> Option<usize> {
+        if left {
+            return (self.whole(0, y).is_some()).then_some(0);
+        }
+        let (block, _, in_y) = self.block(self.width - 1, y);
+        let size = usize::from(block.size);
+        let last = (self.width / size).checked_sub(1)? * size;
+        if usize::from(self.block(last, y).0.size) != size {
+            return None;
+        }
+        self.whole(last, y)?;
+        let rest = self.width - last - size;
+        let cut = rest > 0 && {
+            let top = in_y - in_y % size;
+            let row = span((last + size) % BLOCK, rest);
+            block.tone[top..top + size].iter().any(|bits| bits & row != row)
+        };
+        (!cut).then_some(last)
+    }
+
     /// Fragments in the cell of this dot that decide for themselves.
     pub(super) fn heads(&self, x: usize, y: usize) -> impl Iterator<Item = u32> {
         let at = y / BLOCK * self.across + x / BLOCK;
@@ -205,6 +230,11 @@ impl Plan {
             .map(|&(_, fragment)| fragment)
     }
 
+    /// Whether a dot owns nothing but rims: the cell then prints up to the border.
+    pub(super) fn owns_rims_alone(&self, owner: u32) -> bool {
+        self.owned(owner).all(|fragment| self.fragments[fragment as usize].rim)
+    }
+
     /// The dots of a fragment.
     pub(super) fn dots(&self, fragment: u32) -> impl Iterator<Item = (usize, usize)> {
         let seed = self.fragments[fragment as usize].seed as usize;
@@ -215,12 +245,14 @@ impl Plan {
         (0..BLOCK).flat_map(move |row| bits(mask[row]).map(move |column| (left + column, top + row)))
     }
 
-    /// Prints each fragment like the dot that owns it.
+    /// Prints each dot of a fragment like the nearest dot of the cell that owns it, which is cut only if it owns rims alone.
     pub(super) fn print_fragments(&self, index: &mut [u8]) {
         for &(owner, fragment) in &self.owned {
-            let stack = index[owner as usize];
+            let (left, top) = (owner as usize % self.width, owner as usize / self.width);
+            let end = if self.is_whole(left, top) { usize::from(self.size_at(owner)) - 1 } else { 0 };
             for (x, y) in self.dots(fragment) {
-                index[y * self.width + x] = stack;
+                let nearest = y.clamp(top, top + end) * self.width + x.clamp(left, left + end);
+                index[y * self.width + x] = index[nearest];
             }
         }
     }
@@ -254,7 +286,7 @@ impl Plan {
                             area += found.count_ones() as u16;
                         }
                         let seed = ((top + y) * self.width + left + x) as u32;
-                        self.fragments.push(Fragment { seed, owner: seed, area });
+                        self.fragments.push(Fragment { seed, owner: seed, area, rim: false });
                     }
                 }
             }
@@ -298,6 +330,9 @@ impl Plan {
             }
         }
         self.join(&orphans);
+        for i in 0..self.fragments.len() {
+            self.fragments[i].rim = self.is_rim(&self.fragments[i]);
+        }
         for (i, fragment) in self.fragments.iter().enumerate() {
             if fragment.owner != fragment.seed {
                 self.owned.push((fragment.owner, i as u32));
@@ -306,6 +341,21 @@ impl Plan {
             }
         }
         self.owned.sort_unstable();
+    }
+
+    /// Whether a fragment is all that the page's border leaves of a cell, and the cell before it owns it.
+    fn is_rim(&self, fragment: &Fragment) -> bool {
+        let size = usize::from(self.size_at(fragment.seed));
+        let (x, y) = (fragment.seed as usize % self.width, fragment.seed as usize / self.width);
+        let (left, top) = (x - x % size, y - y % size);
+        let (wide, high) = (size.min(self.width - left), size.min(self.height - top));
+        let before = |at: usize, dots: usize| if dots < size { at.checked_sub(size) } else { Some(at) };
+        let (Some(x), Some(y)) = (before(left, wide), before(top, high)) else { return false };
+        let owner = (y * self.width + x) as u32;
+        usize::from(fragment.area) == wide * high
+            && fragment.owner == owner
+            && usize::from(self.size_at(owner)) == size
+            && owner != fragment.seed
     }
 
     /// Fragments without a whole cell beside them: joined until they are as large as one.
@@ -358,13 +408,15 @@ impl Plan {
     }
 
     fn find_calm(&mut self) {
-        let down = self.down();
+        let (down, across) = (self.down(), self.across);
         for row in 1..down.saturating_sub(1) {
-            for column in 1..self.across.saturating_sub(1) {
-                let around = |y: usize| &self.blocks[y * self.across + column - 1..][..3];
+            for column in 0..across {
+                // Beyond either end rows go on as they end.
+                let near = column.saturating_sub(1)..(column + 2).min(across);
+                let around = |y: usize| &self.blocks[y * across..][near.clone()];
                 let calm =
                     (row - 1..row + 2).all(|y| around(y).iter().all(|block| block.tone == [FULL; BLOCK]));
-                self.blocks[row * self.across + column].calm = calm;
+                self.blocks[row * across + column].calm = calm;
             }
         }
     }
