@@ -450,12 +450,14 @@ mod tests {
 
     #[test]
     fn a_tint_of_an_ink_is_that_ink_alone() {
-        // As CMYK arrives: 30 % cyan, 80 % magenta, 50 % yellow, and 40 % of magenta and yellow.
+        // As CMYK arrives: 30 % cyan, 80 % magenta, 50 % yellow, 40 % of magenta and yellow, and 50 % yellow on magenta.
         let tints = [
-            ([179, 255, 255], "C", 0.3),
-            ([255, 51, 255], "M", 0.8),
-            ([255, 255, 127], "Y", 0.5),
-            ([255, 153, 153], "M+Y", 0.4),
+            ([179, 255, 255], "C", "substrate", 0.3),
+            ([255, 51, 255], "M", "substrate", 0.8),
+            ([255, 255, 127], "Y", "substrate", 0.5),
+            ([255, 153, 153], "M+Y", "substrate", 0.4),
+            ([255, 0, 127], "M+Y", "M", 0.5),
+            ([0, 204, 255], "C+M", "C", 0.2),
         ];
         let pixels: Vec<[u8; 4]> =
             tints.iter().flat_map(|&([r, g, b], ..)| [[Kind::DRAWING, r, g, b]; 4]).collect();
@@ -464,11 +466,11 @@ mod tests {
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
         let fit = colour.fit((&printable, &solids), space, &Settings::default(), &Silent).unwrap();
-        for (rgb, name, share) in tints {
+        for (rgb, name, ground, share) in tints {
             let weights = fit.weights(rgb);
             let of = |name: &str| weights[fit.stacks.iter().position(|s| s.to_string() == name).unwrap()];
             assert!((of(name) - share).abs() < 0.005, "{name}: {} of {share}", of(name));
-            assert!((of(name) + of("substrate") - 1.0).abs() < 0.002, "{name}: {weights:?}");
+            assert!((of(name) + of(ground) - 1.0).abs() < 0.002, "{name}: {weights:?}");
         }
     }
 

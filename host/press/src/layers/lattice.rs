@@ -4,7 +4,8 @@
 //! Method: 17 x 17 x 17 colours are fitted, once for each intent in use. A pixel is interpolated among the four corners of the
 //! tetrahedron around it. An interpolated mixture is a mixture, so every pixel is printable.
 //! Text and drawings name inks by the primaries of sRGB, none of which is printable as it looks. So that a tint does not differ
-//! from its solid in hue, the lines from white to the primaries are tints of those stacks ([`with_tints`]).
+//! from its solid in hue, the lines from white to the primaries, and between neighbouring primaries, are tints of those stacks
+//! ([`with_tints`]).
 //! Cost: 60 ms for the fit, 20 ns a pixel. Limits: colours between nodes are as exact as the interpolation.
 
 use inks::Stack;
@@ -98,8 +99,9 @@ impl Nodes {
     }
 }
 
-/// Prints the lines from white to the six primaries of a lattice as paper and the stack that each primary names, in shares that
-/// fall evenly along the line: 30 % cyan is cyan on 30 % of the dots.
+/// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
+/// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change
+/// evenly: 30 % cyan is cyan on 30 % of the dots, M 100 Y 50 is magenta, with yellow on half of its dots.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
@@ -122,24 +124,33 @@ pub(super) fn with_tints(
             matrix.len() - 1
         })
     };
-    let paper = channel(&Stack::SUBSTRATE);
-    let primaries = (1..7u8).map(|bits| [4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 }));
-    let lines: Vec<([u8; 3], usize)> =
-        primaries.filter_map(|colour| Some((colour, channel(&named(colour)?)))).collect();
+    // The corners without black: red, green and blue are a bit each.
+    let corners: [Option<usize>; 8] = std::array::from_fn(|bits| {
+        let colour = [4, 2, 1].map(|bit| if bits & bit > 0 { 255 } else { 0 });
+        (bits > 0).then(|| named(colour)).flatten().map(|stack| channel(&stack))
+    });
     let channels = matrix.len();
     let mut data = vec![0; maps.data().len() / old * channels];
     for (out, weights) in data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old)) {
         out[..old].copy_from_slice(weights);
     }
-    for (colour, stack) in lines {
+    for (light, dark) in (1..8).flat_map(|light| (1..light).map(move |dark| (light, dark))) {
+        let (Some(from), Some(to), true) = (corners[light], corners[dark], dark & !light == 0) else {
+            continue;
+        };
         for level in 0..NODES {
-            let along = colour.map(|v| if v > 0 { NODES - 1 } else { level });
+            let along = [4, 2, 1].map(|bit| match (light & bit > 0, dark & bit > 0) {
+                (true, true) => NODES - 1,
+                (true, false) => level,
+                _ => 0,
+            });
             let node = lattice * ALL + along.into_iter().fold(0, |node, at| node * NODES + at);
-            let light = (level as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
+            let left = (level as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
+            let share = (f64::from(ONE) * (1.0 - left)).round() as u16;
             let out = &mut data[node * channels..(node + 1) * channels];
             out.fill(0);
-            out[stack] = (f64::from(ONE) * (1.0 - light)).round() as u16;
-            out[paper] = ONE - out[stack];
+            out[to] += share;
+            out[from] += ONE - share;
         }
     }
     let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
