@@ -11,10 +11,11 @@ use rayon::prelude::*;
 
 use super::colour::Colour;
 use super::flat::{BLACK, Flat, TONE, WHITE};
+use super::kinds::Kind;
 
-/// The colours of pixels averaged to at most one pixel for two dots along each side.
+/// The colours of pixels averaged to at most one pixel for two dots along each side; `pixel` says what drew one, in which colour.
 pub(super) fn averaged(
-    colour: impl Fn(usize) -> [u8; 3] + Sync,
+    pixel: impl Fn(usize) -> (Kind, [u8; 3]) + Sync,
     flat: &Flat,
     size: (usize, usize),
     dots: (usize, usize),
@@ -54,10 +55,13 @@ pub(super) fn averaged(
             let at = || rows.clone().flat_map(|y| columns.clone().map(move |x| y * size.0 + x));
             let toned = at().find(|&at| flat.index[at] > BLACK);
             plain[x] = toned.is_none();
-            drawn[x] = toned.is_some_and(|at| flat.index[at] != TONE);
+            // Flat colours are drawn wherever they come from, and so are shadings.
+            drawn[x] = toned.is_some_and(|at| flat.index[at] != TONE || pixel(at).0 != Kind::Picture);
             let (mut sum, mut count) = ([0u64; 3], 0);
             for at in at().filter(|&at| toned.is_none() || flat.index[at] > BLACK) {
-                sum.iter_mut().zip(colour(at)).for_each(|(sum, v)| *sum += u64::from(linear[usize::from(v)]));
+                sum.iter_mut()
+                    .zip(pixel(at).1)
+                    .for_each(|(sum, v)| *sum += u64::from(linear[usize::from(v)]));
                 count += 1;
             }
             *out = sum.map(|sum| coded[((sum + count / 2) / count) as usize]);

@@ -73,7 +73,7 @@ impl Colour {
             let flat = flat.at_dots(size, dots);
             return Some(Colour::black(bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
         }
-        let colour = averaged(|at| split(&pixels[at]).1, &flat, (size.0 as usize, size.1 as usize), dots);
+        let colour = averaged(|at| split(&pixels[at]), &flat, (size.0 as usize, size.1 as usize), dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
@@ -91,8 +91,8 @@ impl Colour {
         if !self.rgb.is_empty() || self.flat.index.is_empty() {
             return Cow::Borrowed(self);
         }
-        let colour = |at: usize| self.flat.colours[usize::from(self.flat.index[at])].1;
-        Cow::Owned(averaged(colour, &self.flat, dots, dots))
+        let pixel = |at: usize| self.flat.colours[usize::from(self.flat.index[at])];
+        Cow::Owned(averaged(pixel, &self.flat, dots, dots))
     }
 
     /// Black dots on white.

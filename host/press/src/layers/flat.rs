@@ -3,7 +3,7 @@
 //! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
 //! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
 //! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are left out first: the ones with a
-//! similar colour on the page. White and black dots of a picture count only in lines and areas; a lone one beside tones is
+//! similar colour on the page that has nearly as many dots. White and black dots of a picture count only in lines and areas; a lone one beside tones is
 //! noise.
 //! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
 
@@ -23,6 +23,8 @@ pub(super) const WHITE: u8 = 0;
 pub(super) const BLACK: u8 = 1;
 /// The most colours besides white and black.
 const MOST: usize = TONE as usize - 2;
+/// A colour with so many times the dots of any similar one is an area, though a shading passes through it.
+const AREA: u64 = 16;
 /// Colours gathered before the palette is chosen.
 const GATHERED: usize = 4096;
 /// Neighbours in a shading differ by at most this much in each of red, green and blue.
@@ -232,10 +234,12 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> V
     }
     let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
     if colours.len() > MOST {
-        let all: Vec<(Kind, [u8; 3])> = colours.iter().map(|(key, _)| *key).collect();
-        colours.retain(|&((kind, colour), _)| {
+        let all = colours.clone();
+        colours.retain(|&((kind, colour), dots)| {
             kind == Kind::Text
-                || !all.iter().any(|&(other, near)| other == kind && near != colour && similar(near, colour))
+                || !all.iter().any(|&((other, near), as_many)| {
+                    other == kind && near != colour && similar(near, colour) && dots < AREA * as_many
+                })
         });
     }
     sort(&mut colours);
@@ -276,6 +280,19 @@ mod tests {
         let flat = Flat::of(&field, 8);
         let white: Vec<usize> = (0..64).filter(|&at| flat.index[at] == WHITE).collect();
         assert_eq!(white, [36, 37, 44, 45]);
+    }
+
+    #[test]
+    fn an_area_is_flat_though_a_shading_passes_through_its_colour() {
+        let shading = |at: usize| [4, (at / 8) as u8, (at % 8) as u8 * 3, 77];
+        let mut pixels: Vec<[u8; 4]> = (0..2000).map(shading).collect();
+        pixels.extend([shading(1000); 20]);
+        let flat = Flat::of(&pixels, pixels.len());
+        let [_, colour @ ..] = shading(1000);
+        assert_eq!(flat.colours[2..], [(Kind::Drawing, colour)]);
+        // The shading itself is a drawing's tone, mixed like the area.
+        let drawn = super::super::colour::Colour::of(&pixels, (2020, 1), (4040, 2)).unwrap();
+        assert!(drawn.drawn.iter().all(|&drawn| drawn) && drawn.drawn.len() == drawn.width);
     }
 
     #[test]
