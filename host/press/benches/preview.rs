@@ -1,7 +1,7 @@
 //! Lighting a full A4 page and material balls, and comparing print and document.
 //!
 //! Run `cargo bench --bench preview`. The page has eight stacks in clusters of 4 x 4 dots, every stack everywhere;
-//! balls are 112 pixels across under a probe of 256 x 128 texels.
+//! balls are 112 pixels across under a probe of 256 x 128 texels, and 256 under one of 1024 x 512.
 
 use appearance::brdf::{Space, Table};
 use appearance::factor::Factored;
@@ -62,6 +62,14 @@ fn balls_under_a_probe(bencher: Bencher, count: usize) {
     let (space, probe) = (Space::half_angle(32), Probe::studio(128));
     let rows = materials(&space, count);
     bencher.bench_local(|| sphere::under_probe(&space, &rows, &probe, 112, &Silent).unwrap());
+}
+
+/// A large ball under a large probe, and eight more: what each after the first takes is an eighth of the difference.
+#[divan::bench(args = [1, 9], sample_count = 5)]
+fn large_balls_under_a_large_probe(bencher: Bencher, count: usize) {
+    let (space, probe) = (Space::half_angle(32), Probe::studio(512));
+    let rows = materials(&space, count);
+    bencher.bench_local(|| sphere::under_probe(&space, &rows, &probe, 256, &Silent).unwrap());
 }
 
 /// A4 from half a metre, against a document of 1024 x 1024 pixels and eight bases.
