@@ -473,7 +473,8 @@ mod tests {
         let error = |text: &str| find(&library, text).unwrap_err().to_string();
         assert!(error("C+MS").contains("but MS+C is"), "{}", error("C+MS"));
         assert!(error("MS+C+K").contains("nearest is"), "{}", error("MS+C+K"));
-        assert!(error("gold").contains("metallic-gold"), "{}", error("gold"));
+        assert!(error("metalic-gold").contains("metallic-gold"), "{}", error("metalic-gold"));
+        assert_eq!(find(&library, "gold").unwrap().stack.to_string(), "MG");
     }
 
     #[test]
