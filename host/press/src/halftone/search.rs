@@ -9,7 +9,7 @@
 //! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
 //! Parts of [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
-//! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with, and a third for each change, of which there
+//! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with, and two fifths of that for each change, of which there
 //! is about one for four cells. Memory: 45 bytes a cell of the parts at work, 13 MB a thread for A4.
 //! Limits: four coordinates, those in which stacks differ most, about the page's mean mixture; cells beside edges stay
 //! as they are, and so do all stacks after the 64th. What is seen from a half is interpolated between cells.
@@ -34,14 +34,14 @@ use lines::Lines;
 /// Where a stack lies among all others.
 pub(super) type Point = [f32; 4];
 
-/// Rounds over a part; more change less than 1 %.
-const ROUNDS: usize = 3;
+/// Rounds over a part; three more change less than 1 %.
+const ROUNDS: usize = 5;
 
 /// How far an error reaches, in dots to each side: less leaves means unseen, and the search makes worse of them.
-const REACH: usize = 30;
+const REACH: usize = 47;
 
 /// How far an exchange reaches. Its two errors cancel from afar.
-const NEAR: usize = 20;
+const NEAR: usize = 30;
 
 /// Block rows in a part, and how many at each end belong to its neighbours: more than an error reaches.
 const PART: usize = 24;

@@ -1,14 +1,19 @@
 //! What errors in two cells have in common for the eye: the autocorrelation of its response, in tables.
 //!
 //! Problem: a search asks for it some thousand times a cell.
-//! Method: for the response exp(-f/k) it is (1 + (r/a)^2)^(-3/2), a = 1 / (pi k). Centres of cells and halves lie on half dots.
-//! Memory: 600 kB for a side of 3 dots, 1 MB for 4.
+//! Method: for the response exp(-f/k) it is (1 + (r/a)^2)^(-3/2) / a^2 but for a constant, a = 1 / (pi k). The sum of two such
+//! looks from two distances at once. Centres of cells and halves lie on half dots.
+//! Memory: 400 kB for each side of cells.
 
 use super::{Point, REACH, lines};
 use crate::halftone::cells::plan::BLOCK;
 
-/// From how far the eye looks, in dots: 0.3 m. What is even from near is even from afar.
-const SCALE: f32 = 7.62;
+/// From how far the eye looks, `a` in dots: 0.3 m and 0.5 m.
+const SCALES: [f32; 2] = [7.62, 12.7];
+
+/// What the far eye's term is at distance 0, where the near one's is 1. Equal eyes have (7.62 / 12.7)^2 = 0.36. With more of the far
+/// one as much is seen from 0.5 m, and more from 0.3 m.
+const FAR: f32 = 0.5;
 
 /// The autocorrelation of the eye's response, in rows as vectors can take them: for cells of one side, its values at
 /// distances of `phase`, `phase` + 2 sides and so on, in half dots, four times each.
@@ -46,10 +51,13 @@ impl Kernel {
 
     /// The value at a distance in half dots.
     fn value(x: isize, y: isize) -> f32 {
-        let square = |half_dots: isize| (half_dots as f32 / 2.0 / SCALE).powi(2);
-        let sum = 1.0 + square(x) + square(y);
-        // Roots are rounded once on every machine; powers of 3/2 are not.
-        1.0 / (sum * sum.sqrt())
+        let eye = |scale: f32| {
+            let square = |half_dots: isize| (half_dots as f32 / 2.0 / scale).powi(2);
+            let sum = 1.0 + square(x) + square(y);
+            // Roots are rounded once on every machine; powers of 3/2 are not.
+            1.0 / (sum * sum.sqrt())
+        };
+        (eye(SCALES[0]) + FAR * eye(SCALES[1])) / (1.0 + FAR)
     }
 
     fn table(size: usize) -> Vec<Point> {
