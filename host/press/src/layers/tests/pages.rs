@@ -188,14 +188,16 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let note = "spot colour `Dieline` names no ink: printed by its process colours";
     assert!(art.notes.iter().any(|said| said.contains(note)), "{:?}", art.notes);
     // The queue's way.
-    assert_eq!(pdf::spots(&file).unwrap(), [["White"]]);
+    assert_eq!(pdf::spots(&file, &Silent).unwrap(), [["White"]]);
     let page = pdf::separated(&file, 1, 600.0).unwrap();
     let window = Window { left: 0, top: 0, width: page.size.0, height: page.size.1 };
     let queued = page.art("page", &window, &Options::default()).unwrap();
     assert_eq!((amounts(&queued), &queued.colour), (amounts(&art), &art.colour));
     // A slip is an error in both.
     let slip = bench.write("slip.ps", MIXED.replace("Dieline", "Golld"));
-    for error in [pdf::spots(&slip).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()] {
+    for error in
+        [pdf::spots(&slip, &Silent).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()]
+    {
         assert!(
             error
                 .to_string()
