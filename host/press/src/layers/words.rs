@@ -3,11 +3,11 @@
 //! Problem: a letter is thin or wide by its widest stroke ([`outline`](super::outline)). Where strokes are about as wide as the
 //! limit, an O is wider than it and the letters after it are not, and one word is printed in two colours.
 //! Method: letters belong together if they are of one colour, near each other, and alike in the width of their strokes. Letters
-//! that belong together are thin if most of their dots are of thin letters. Only letters with strokes from half to twice the limit take part:
-//! all others are far from it, and so is everything of their fonts.
-//! Cost: each letter is compared with those that begin at most a word's space left of its right end; 1 ms for a page of such letters.
-//! Limits: a page as Ghostscript tags it knows letters but no words, so near lines of one size are decided together, too, and letters
-//! that are spaced wider than a word is are decided by themselves.
+//! that belong together are thin if most of their dots are of thin letters. Only letters with strokes from half to twice the
+//! limit take part: all others are far from it, and so is everything of their fonts.
+//! Cost: each such letter is compared with those that end at most a word's space left of it; nothing on pages without them.
+//! Limits: a page as Ghostscript tags it knows letters but no words, so near lines of one size are decided together, too, and
+//! letters that are spaced more widely than words are decided by themselves.
 
 /// A letter whose strokes are near the limit.
 #[derive(Clone, Copy, Debug)]
