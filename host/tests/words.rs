@@ -95,6 +95,8 @@ fn the_commonest_errors() {
         "layers white.png gold.png",
         "layers notes.txt",
         "layers white.png --choke 20mm",
+        "layers white.png --choke -1mm",
+        "layers white.png --gap -2mm --json -3",
         "inspect notes.txt",
         "inspect half.rgl",
         "plan half.rgl",

@@ -40,10 +40,12 @@ mod shown;
 mod stdio;
 mod terminal;
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use anyhow::Result;
+use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser, Subcommand};
 
 use progress::Progress;
@@ -169,7 +171,12 @@ pub fn main() -> ExitCode {
         }
     }));
     let args = match preset::expand(std::env::args_os().collect(), &Args::command()) {
-        Ok(args) => Args::parse_from(args),
+        Ok(args) => match Args::try_parse_from(&args) {
+            Err(error) if error.kind() == ErrorKind::UnknownArgument => {
+                Args::parse_from(negative_values(args))
+            }
+            parsed => parsed.unwrap_or_else(|error| error.exit()),
+        },
         Err(error) => {
             let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
             return ExitCode::FAILURE;
@@ -194,6 +201,26 @@ pub fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The arguments with each negative number joined to the option before it, so that the option says what it expects instead.
+fn negative_values(args: Vec<OsString>) -> Vec<OsString> {
+    let mut joined: Vec<OsString> = Vec::with_capacity(args.len());
+    for arg in args {
+        let is_number = |text: &str| {
+            text.strip_prefix('-')
+                .is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.'))
+        };
+        let is_option = |text: &str| text.starts_with("--") && text.len() > 2 && !text.contains('=');
+        match joined.last_mut() {
+            Some(option) if arg.to_str().is_some_and(is_number) && option.to_str().is_some_and(is_option) => {
+                option.push("=");
+                option.push(arg);
+            }
+            _ => joined.push(arg),
+        }
+    }
+    joined
 }
 
 fn run(args: Args) -> Result<()> {

@@ -201,7 +201,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let spots = match press.choices.spots {
         Spots::None => Vec::new(),
         _ if !may_have_spots(path)? => Vec::new(),
-        _ => layers::pdf::spots(path).map_err(|error| match error {
+        _ => layers::pdf::spots(path, press.observer).map_err(|error| match error {
             LayersError::UnknownInk { .. } => FilterError::Spot(error),
             error => FilterError::Plates(error),
         })?,

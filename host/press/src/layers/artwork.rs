@@ -9,7 +9,6 @@ use rayon::prelude::*;
 
 use super::colour::Colour;
 use super::coverage::{Coverage, Scan};
-use super::error::resolution_in_words;
 use super::options::Options;
 use super::{bits, names, resample};
 use crate::separate::Plane;
@@ -90,8 +89,8 @@ impl Artwork {
         }
     }
 
-    /// Adds a layer. `plate` marks the coverage as that of a printing plate: process inks keep their tones there, and a
-    /// blank plate adds nothing.
+    /// Adds a layer. `plate` marks the coverage as that of a printing plate, which keeps its tones, and adds nothing if it is
+    /// blank.
     pub(super) fn add(
         &mut self,
         scan: Scan,
@@ -137,22 +136,24 @@ fn layer(
             notes.push(format!("{name}: drawn in one colour and white; the colour is ink, white is not"))
         }
     }
-    let toned = plate && named.ink.kind() == Kind::Process && has_tones(&scan.coverage);
+    let toned = plate
+        && match named.ink.kind() {
+            Kind::Process => has_tones(&scan.coverage),
+            // A solid ink with tones in its edges would be ragged.
+            _ => has_areas_of_tone(&scan.coverage, scan.width as usize),
+        };
     if toned {
         notes.push(format!("{name}: the plate has tones, so it is halftoned"));
     }
     let tones = toned || options.tones.contains(named.ink);
     if !tones && (width, length) != (scan.width as usize, scan.height as usize) {
-        notes.push(format!(
-            "{name}: resampled from {} to {width} x {length} dots; draw at {} to keep edges exactly as drawn",
-            scan.size_at(options.dpi),
-            resolution_in_words((600.0 * options.across.max(1) as f64, 600.0))
-        ));
+        notes.push(resample::note(name, scan.size_at(options.dpi), (width, length), options));
     }
-    if !tones && let Some(note) = soft_edges(name, &scan.coverage) {
+    if !tones && let Some(note) = soft_edges(name, &scan.coverage, scan.width as usize) {
         notes.push(note);
     }
-    let coverage = resample::average(scan.coverage, (scan.width, scan.height), (width, length));
+    let resampled = if tones { resample::tones } else { resample::solid };
+    let coverage = resampled(scan.coverage, (scan.width, scan.height), (width, length));
     let layer =
         Layer { ink: named.ink, name: name.into(), place: named.place, shape: shape(width, coverage, tones) };
     if let Shape::Solid(plane) = &layer.shape
@@ -173,11 +174,11 @@ fn shape(width: usize, coverage: Vec<u8>, tones: bool) -> Shape {
 }
 
 /// A note on pixels that are neither plainly ink nor plainly paper, if there are any.
-fn soft_edges(name: &str, coverage: &[u8]) -> Option<String> {
-    let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
+fn soft_edges(name: &str, coverage: &[u8], width: usize) -> Option<String> {
+    let between = coverage.par_iter().filter(|&&c| is_between(c)).count();
     let inked = coverage.par_iter().filter(|c| (THRESHOLD..255 - PLAIN).contains(c)).count();
     let share = 100.0 * between as f64 / coverage.len().max(1) as f64;
-    let advice = if share > 5.0 {
+    let advice = if has_areas_of_tone(coverage, width) {
         "; if they are tones rather than edges, have this layer keep its tones"
     } else {
         ""
@@ -190,9 +191,33 @@ fn soft_edges(name: &str, coverage: &[u8]) -> Option<String> {
     })
 }
 
+/// Whether a pixel is neither plainly ink nor plainly paper.
+fn is_between(coverage: u8) -> bool {
+    coverage > PLAIN && coverage < 255 - PLAIN
+}
+
 /// Whether coverage has tones rather than soft edges: more than a twentieth of all pixels with ink are partly covered.
 fn has_tones(coverage: &[u8]) -> bool {
     let inked = coverage.par_iter().filter(|&&c| c > PLAIN).count();
-    let between = coverage.par_iter().filter(|&&c| c > PLAIN && c < 255 - PLAIN).count();
+    let between = coverage.par_iter().filter(|&&c| is_between(c)).count();
     20 * between > inked
+}
+
+/// Whether coverage has areas of tone: a quarter of the partly covered pixels have only such pixels beside them. Softened edges
+/// are too narrow for that.
+fn has_areas_of_tone(coverage: &[u8], width: usize) -> bool {
+    let beside = |at: Option<usize>| at.and_then(|at| coverage.get(at)).is_none_or(|&c| is_between(c));
+    let count = |(y, row): (usize, &[u8])| {
+        let between = || (0..row.len()).filter(|&x| is_between(row[x]));
+        let inside = between().filter(|&x| {
+            let at = y * width + x;
+            let left = x.checked_sub(1).map(|_| at - 1);
+            let right = (x + 1 < width).then_some(at + 1);
+            [left, right, at.checked_sub(width), Some(at + width)].into_iter().all(beside)
+        });
+        (between().count(), inside.count())
+    };
+    let rows = coverage.par_chunks(width.max(1)).enumerate();
+    let (between, inside) = rows.map(count).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    between > 0 && 4 * inside >= between
 }

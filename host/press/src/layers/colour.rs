@@ -77,6 +77,12 @@ impl Colour {
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
+    /// Whether there are no tones: every dot is in a flat colour.
+    pub(super) fn is_line_art(&self) -> bool {
+        self.black.is_some()
+            || !self.flat.index.is_empty() && !self.flat.index.par_iter().any(|&dot| dot == TONE)
+    }
+
     /// Flat colours alone; `None` if all are white.
     pub(super) fn of_flat(flat: Flat, dots: (usize, usize)) -> Option<Colour> {
         if flat.is_black_and_white() {

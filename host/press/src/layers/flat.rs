@@ -159,7 +159,7 @@ impl Flat {
 
     /// The same at the dots: the colour of the pixel under the middle of each.
     pub(super) fn at_dots(self, size: (u32, u32), dots: (usize, usize)) -> Flat {
-        Flat { index: resample::nearest(self.index, size, dots), ..self }
+        Flat { index: resample::classes(self.index, size, dots), ..self }
     }
 
     /// Which colours touch.

@@ -46,6 +46,7 @@ mod tiff_pages;
 mod treatments;
 mod white;
 mod window;
+mod words;
 
 pub use artwork::{Artwork, Layer, Shape};
 pub use colour::Colour;

@@ -8,6 +8,7 @@
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
 //! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
 //! solid or in paper; such a wide one has its rim in the next solid or none.
+//! Letters of a word are all thin or all wide ([`words`](super::words)).
 //! Cost: 3 ns a dot of such shapes, 0.3 ns of others. Memory: 16 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
 //! widths are measured with squares, so a slanting stroke counts as thinner than it is.
 
@@ -16,6 +17,7 @@ use rayon::prelude::*;
 use super::flat::{Flat, TONE, similar};
 use super::kinds::Kind;
 use super::treatments::{CHOICES, Shape, Treatment};
+use super::words::{self, Letter};
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.
 const STROKE: u8 = 9;
@@ -51,12 +53,14 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     }
     let (runs, rows) = shapes(flat, width, &shaped);
     let grounds = Grounds::of(flat, width, treatments, (&runs, &rows));
+    let words = Words::of(flat, (&runs, &rows));
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for at in rows[y]..rows[y + 1] {
             let (run, root) = (&runs[at], root(&runs, at as u32));
             let (kind, _) = flat.colours[usize::from(run.colour)];
             let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
-            let (thin, first) = (runs[root as usize].side < most(kind), shape.solids[0]);
+            let thin = words.thin(root).unwrap_or(runs[root as usize].side < most(kind));
+            let first = shape.solids[0];
             let solid = grounds.as_ref().map_or(Some(first), |grounds| grounds.solid(root, &shape));
             let (start, end) = (run.start as usize, run.end as usize);
             match solid {
@@ -149,6 +153,54 @@ impl Grounds {
         let (all, stacks) = self.border[root as usize];
         let free = |&(_, dots): &(u8, u32)| 2 * dots < all.max(1);
         shape.solids.into_iter().zip(stacks).find(free).map(|(solid, _)| solid)
+    }
+}
+
+/// Letters that are decided by the word they belong to.
+struct Words {
+    /// For each run, the number of the letter it is the root of, or [`NO_LETTER`]. Empty if there is none.
+    letter: Vec<u32>,
+    /// For each letter, whether it is thin.
+    thin: Vec<bool>,
+}
+
+const NO_LETTER: u32 = u32::MAX;
+
+impl Words {
+    fn of(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Words {
+        let takes_part = |root: &Run| {
+            flat.colours[usize::from(root.colour)].0 == Kind::Text && words::takes_part(root.side, LETTER)
+        };
+        let (mut letter, mut letters) = (Vec::new(), Vec::<Letter>::new());
+        for (y, row) in rows.windows(2).enumerate() {
+            for run in &runs[row[0]..row[1]] {
+                let root = &runs[run.parent as usize];
+                if !takes_part(root) {
+                    continue;
+                }
+                if letter.is_empty() {
+                    letter = vec![NO_LETTER; runs.len()];
+                }
+                let number = &mut letter[run.parent as usize];
+                let y = y as u32;
+                if *number == NO_LETTER {
+                    *number = letters.len() as u32;
+                    let bounds = [run.start, y, run.end, y + 1];
+                    letters.push(Letter { colour: root.colour, bounds, side: root.side, dots: 0 });
+                }
+                let found = &mut letters[*number as usize];
+                let [left, _, right, bottom] = &mut found.bounds;
+                (*left, *right, *bottom) = ((*left).min(run.start), (*right).max(run.end), y + 1);
+                found.dots += run.end - run.start;
+            }
+        }
+        let thin = words::thin(&letters, LETTER, |a, b| joined(flat, a, b));
+        Words { letter, thin }
+    }
+
+    /// Whether the word of the shape with this root is thin; `None` for a shape that is decided by itself.
+    fn thin(&self, root: u32) -> Option<bool> {
+        self.letter.get(root as usize).and_then(|&number| self.thin.get(number as usize)).copied()
     }
 }
 
@@ -311,6 +363,27 @@ mod tests {
                     assert_eq!(stack, wanted, "{kind:?}, {wide} wide, at {x}, {y}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn letters_of_a_word_are_printed_alike() {
+        let limit = usize::from(LETTER);
+        // An O as wide as the limit, and letters that are a little thinner; then a word of which most is wide.
+        for (widths, solid) in [
+            ([limit, limit - 1, limit - 2, limit - 3], true),
+            ([limit - 1, limit, limit + 1, limit + 2], false),
+        ] {
+            let stroke = |x: usize| (x % 60 < widths[x / 60 % 4]).then_some(x / 60);
+            let fixed = drawn((240, 60), Kind::Text, DARK, |x, _| stroke(x).is_some());
+            for x in (0..240).filter(|&x| stroke(x).is_some()) {
+                let rim = x % 60 == 0 || x % 60 + 1 == widths[x / 60];
+                assert_eq!(fixed[30 * 240 + x], if solid || rim { 7 } else { TONE }, "{widths:?} at {x}");
+            }
+            // Lines are decided by themselves.
+            let lines =
+                drawn((240, 60), Kind::Drawing, DARK, |x, _| x % 60 < usize::from(STROKE) - x / 60 % 2);
+            assert_eq!((lines[30 * 240 + 4], lines[30 * 240 + 64]), (TONE, 7));
         }
     }
 

@@ -114,7 +114,7 @@ impl Document<'_> {
         let name = stem(self.path);
         let mut notes = Vec::new();
         let dpi = self.dpi(leaf, &mut notes)?;
-        if !plates::layers(self.path, &leaf.spots, &mut notes)?.is_empty() {
+        if !plates::layers(self.path, &self.path.display(), &leaf.spots, &mut notes)?.is_empty() {
             // The plates tell of the other spots themselves.
             let mut art = plates::separated_part(self.path, leaf.number, Part::CropBox, dpi)?
                 .whole(&name, self.options);

@@ -177,6 +177,10 @@ pub(super) fn opaque_artwork<const N: usize>(
         both.for_each(|(pixel, rgb)| pixel[N - 3..].copy_from_slice(rgb));
     }
     let colour = Colour::of::<N>(pixels.as_chunks().0, size, dots);
+    let finer = size.0 as usize > dots.0 || size.1 as usize > dots.1;
+    if finer && colour.as_ref().is_some_and(Colour::is_line_art) {
+        notes.push(resample::note(file, format!("{} x {} pixels", size.0, size.1), dots, options));
+    }
     Artwork { layers, colour, drawn, notes, ..Artwork::blank(name, dots) }
 }
 
@@ -192,5 +196,5 @@ pub(super) fn plane_of<const N: usize>(
         return bits::from(dots.0, pixels, is);
     }
     let bytes: Vec<u8> = pixels.par_iter().map(|pixel| u8::from(is(pixel))).collect();
-    bits::from_bytes(dots.0, &resample::nearest(bytes, size, dots), |byte| byte > 0)
+    bits::from_bytes(dots.0, &resample::classes(bytes, size, dots), |byte| byte > 0)
 }

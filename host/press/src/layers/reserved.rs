@@ -104,7 +104,7 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
     let mut class = classes.of;
     let pixels_of = blank(rgb.as_chunks_mut::<3>().0, &mut class);
     counts.iter_mut().zip(pixels_of).for_each(|(count, pixels)| count.0 = pixels);
-    let class = resample::nearest(class, size, dots);
+    let class = resample::classes(class, size, dots);
     let layers = (1..).zip(&table).filter(|&(at, _)| counts[usize::from(at)].0 > 0).map(|(at, entry)| {
         let plane = bits::from_bytes(dots.0, &class, |class| class == at);
         let colour = entry.colour.map(|v| v.to_string()).join(",");

@@ -12,6 +12,7 @@
 //! program.
 
 mod find;
+mod fonts;
 mod nodes;
 mod render;
 mod source;
@@ -120,6 +121,12 @@ impl Drawing {
         let renderer = Renderer::new(path, text || links_drawing(root))?;
         let whole = write::written(root, |_| Way::Keep);
         let size = renderer.size(&whole)?;
+        if let Some(missing) = renderer.missing_fonts() {
+            notes.push(format!(
+                "{}: this computer has no font {missing}; install it, or convert the text to paths",
+                path.display()
+            ));
+        }
         let (across, down) = (f64::from(size.width()), f64::from(size.height()));
         let unstated = Unstated::Drawing { rounded_mm: 0.0 };
         let dots = size::dots(path, (across, down), Some((UNITS, UNITS)), unstated, &options, &mut notes)?;

@@ -92,9 +92,14 @@ pub fn read(text: &str) -> Result<Paper, String> {
     if let Some(paper) = Paper::from_name(text) {
         return Ok(paper);
     }
-    let names: Vec<&str> = Paper::named().map(Paper::name).collect();
     let Ok(Point(width, length)) = text.parse() else {
-        return Err(format!("the papers are {}, or the size of a sheet such as 120x180mm", names.join(", ")));
+        let names: Vec<&str> = TABLE.iter().map(|(paper, ..)| paper.name()).collect();
+        let ((most, _), (_, longest)) = (sheet_mm(Paper::Letter), sheet_mm(Paper::Legal));
+        return Err(format!(
+            "`{text}` is not a paper that the printer takes; write {}, or the size of a sheet such as 120x180mm, at most \
+             {most} x {longest} mm",
+            names.join(", ")
+        ));
     };
     custom(width, length)
 }
@@ -186,7 +191,12 @@ mod tests {
         assert!(read("300x200mm").unwrap_err().contains("215.9 x 355.6"));
         assert!(read("15x30mm").unwrap_err().contains("at least 10 x 10"));
         assert!(read("-5x30mm").is_err() && read("0x0mm").is_err());
-        assert!(read("a3").unwrap_err().contains("postcard"));
+        let named = read("a3").unwrap_err();
+        assert!(
+            named.starts_with("`a3` is not a paper that the printer takes; write a4, letter,"),
+            "{named}"
+        );
+        assert!(named.ends_with("such as 120x180mm, at most 215.9 x 355.6 mm"), "{named}");
         // The largest that goes in does.
         assert!(read("215.9x355.6mm").is_ok());
     }

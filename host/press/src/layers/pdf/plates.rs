@@ -11,6 +11,7 @@
 //! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
 //! proportional.
 
+use std::fmt::Display;
 use std::path::Path;
 
 use palette::{LinSrgb, Srgb};
@@ -27,16 +28,22 @@ use super::super::window::Window;
 use super::super::{kinds, picture};
 use super::draw::{PROCESS, Part, Program, Tagged, plates_beside, separate, tagged};
 use crate::scratch::Scratch;
+use observe::Observer;
 
 /// Full ink in what Ghostscript says of a spot.
 const FULL: f64 = 32760.0;
 
 /// Whether a spot is a layer, and of which ink. One that names a process ink is printed by its process colours, like one
-/// that names no ink; of the latter there is a note.
+/// that names no ink; of the latter there is a note, which begins with `place`.
 ///
 /// # Errors
 /// A name that resembles that of an ink.
-fn layer(path: &Path, spot: &str, notes: &mut Vec<String>) -> Result<Option<Named>, LayersError> {
+fn layer(
+    path: &Path,
+    place: &dyn Display,
+    spot: &str,
+    notes: &mut Vec<String>,
+) -> Result<Option<Named>, LayersError> {
     match names::ink(spot) {
         Some(named) => Ok(Some(named).filter(|named| named.ink.kind() != Kind::Process)),
         None => match names::closest(spot) {
@@ -46,8 +53,7 @@ fn layer(path: &Path, spot: &str, notes: &mut Vec<String>) -> Result<Option<Name
             }
             None => {
                 notes.push(format!(
-                    "{}: spot colour `{spot}` names no ink: printed by its process colours",
-                    path.display()
+                    "{place}: spot colour `{spot}` names no ink: printed by its process colours"
                 ));
                 Ok(None)
             }
@@ -58,26 +64,34 @@ fn layer(path: &Path, spot: &str, notes: &mut Vec<String>) -> Result<Option<Name
 /// Of these spots, those that are layers of ink.
 pub(super) fn layers(
     path: &Path,
+    place: &dyn Display,
     spots: &[String],
     notes: &mut Vec<String>,
 ) -> Result<Vec<String>, LayersError> {
     let mut found = Vec::new();
     for spot in spots {
-        if layer(path, spot, notes)?.is_some() {
+        if layer(path, place, spot, notes)?.is_some() {
             found.push(spot.clone());
         }
     }
     Ok(found)
 }
 
-/// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages.
+/// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages. Notes name the
+/// page of a spot colour that names no ink.
 ///
 /// # Errors
 /// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
-pub fn spots(path: &Path) -> Result<Vec<Vec<String>>, LayersError> {
+pub fn spots(path: &Path, observer: &dyn Observer) -> Result<Vec<Vec<String>>, LayersError> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
     let leaves = Program::Ghostscript.leaves(path, None, Part::Sheet, &folder)?.leaves;
-    leaves.iter().map(|leaf| layers(path, &leaf.spots, &mut Vec::new())).collect()
+    let mut notes = Vec::new();
+    let found = leaves
+        .iter()
+        .map(|leaf| layers(path, &format_args!("page {}", leaf.number), &leaf.spots, &mut notes))
+        .collect::<Result<_, _>>()?;
+    notes.iter().for_each(|note| observer.note(note));
+    Ok(found)
 }
 
 /// A page as plates: one for each spot colour that is a layer of ink, and the process plates for the rest.
@@ -121,7 +135,7 @@ pub(super) fn separated_part(
         if PROCESS.contains(&plate.as_str()) {
             process.push((plate, scan.coverage));
         } else if scan.coverage.iter().any(|&c| c > 0) {
-            match layer(path, &plate, &mut notes)? {
+            match layer(path, &path.display(), &plate, &mut notes)? {
                 Some(named) => plates.push((plate, named, scan.coverage)),
                 None => others.push((plate, scan.coverage)),
             }

@@ -14,10 +14,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use image::{ImageError, ImageFormat};
 use percent_encoding::percent_decode_str;
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::{self, ImageHrefResolver, ImageKind, fontdb};
+use resvg::usvg::{self, ImageHrefResolver, ImageKind};
 
 use super::super::decode::whole_jpeg;
 use super::super::error::{LayersError, wrong};
+use super::fonts::{DEFAULT, Fonts};
 use super::thin;
 
 /// What is left out of a rendering.
@@ -43,7 +44,7 @@ type Known = Arc<Mutex<HashMap<u64, bool>>>;
 /// Renders drawings from one file.
 pub(super) struct Renderer {
     path: PathBuf,
-    fonts: Arc<fontdb::Database>,
+    fonts: Fonts,
     known: Known,
 }
 
@@ -57,16 +58,18 @@ pub(super) struct Drawn {
 impl Renderer {
     /// `text` says whether the drawing needs fonts.
     pub fn new(path: &Path, text: bool) -> Result<Renderer, LayersError> {
-        let mut fonts = fontdb::Database::new();
-        if text {
-            load_fonts(path, &mut fonts)?;
-        }
-        Ok(Renderer { path: path.to_path_buf(), fonts: Arc::new(fonts), known: Known::default() })
+        let fonts = if text { Fonts::load(path)? } else { Fonts::none() };
+        Ok(Renderer { path: path.to_path_buf(), fonts, known: Known::default() })
     }
 
     /// Whether text can be drawn.
     pub fn has_fonts(&self) -> bool {
         !self.fonts.is_empty()
+    }
+
+    /// The families that are not installed of the drawings that were read, each with what is drawn instead, in words.
+    pub fn missing_fonts(&self) -> Option<String> {
+        self.fonts.missing()
     }
 
     /// Reads a drawing.
@@ -109,12 +112,14 @@ impl Renderer {
     }
 
     fn options(&self, without: Without, met: &Arc<Mutex<Met>>) -> usvg::Options<'static> {
-        let fonts = if without == Without::Text { Arc::default() } else { self.fonts.clone() };
+        let fonts = if without == Without::Text { Arc::default() } else { self.fonts.database() };
         usvg::Options {
             resources_dir: self.path.parent().map(Path::to_path_buf),
             shape_rendering: usvg::ShapeRendering::CrispEdges,
             text_rendering: usvg::TextRendering::OptimizeSpeed,
             fontdb: fonts,
+            font_family: DEFAULT.into(),
+            font_resolver: self.fonts.resolver(),
             image_href_resolver: pictures(without, met, &self.known),
             ..usvg::Options::default()
         }
@@ -184,28 +189,6 @@ fn is_whole(picture: &ImageKind, known: &Known) -> bool {
             Ok(_) | Err(ImageError::Limits(_) | ImageError::Unsupported(_))
         )
     })
-}
-
-/// Loads this computer's fonts. The renderer draws text of a missing family in the default family and leaves it out if that
-/// is missing too, so one is chosen here.
-fn load_fonts(path: &Path, fonts: &mut fontdb::Database) -> Result<(), LayersError> {
-    fonts.load_system_fonts();
-    let default = fontdb::Query { families: &[fontdb::Family::Serif], ..fontdb::Query::default() };
-    if fonts.query(&default).is_some() {
-        return Ok(());
-    }
-    // A regular upright face replaces any other best; the least name makes the choice the same every time.
-    let plain = |face: &fontdb::FaceInfo| {
-        face.style == fontdb::Style::Normal && face.weight == fontdb::Weight::NORMAL && !face.monospaced
-    };
-    let named = |face: &fontdb::FaceInfo| Some((!plain(face), face.families.first()?.0.clone()));
-    match fonts.faces().filter_map(named).min() {
-        Some((_, family)) => {
-            fonts.set_serif_family(family);
-            Ok(())
-        }
-        None => Err(wrong(path, "it has text, but this computer has no fonts; convert the text to paths")),
-    }
 }
 
 /// Straight alpha from the renderer's premultiplied alpha.

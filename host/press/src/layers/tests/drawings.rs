@@ -62,6 +62,54 @@ fn text_is_drawn_even_if_its_font_is_missing_and_refused_without_any() {
 }
 
 #[test]
+fn text_is_drawn_in_the_font_that_stands_for_its_own_in_drawing_programs() {
+    let matched = |family: &str| {
+        let output = std::process::Command::new("fc-match").args(["--format=%{family[0]}", family]).output();
+        output
+            .ok()
+            .filter(|output| output.status.success())
+            .map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    // Without fontconfig there is no such font.
+    let Some(missing) = matched("No Such Family").filter(|family| !family.is_empty()) else { return };
+    let bench = Bench::new();
+    let read_as = |family: &str| {
+        let svg = format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="25.4mm" height="12.7mm" viewBox="0 0 600 300">
+            <g id="black"><text x="9" y="200" font-family="{family}" font-size="150">Ragi</text></g></svg>"##
+        );
+        let art = read(&[bench.write("art.svg", svg)], &Options::default());
+        let said = art
+            .notes
+            .iter()
+            .filter(|note| note.contains("this computer has no font"))
+            .cloned()
+            .collect::<Vec<String>>();
+        (art.layers[0].shape.clone(), said)
+    };
+    for generic in ["sans-serif", "serif", "monospace"] {
+        let family = matched(generic).unwrap();
+        let ((shape, said), (wanted, _)) = (read_as(generic), read_as(&format!("'{family}'")));
+        assert!(shape == wanted, "{generic} is not drawn in {family}");
+        assert!(said.is_empty(), "{said:?}");
+    }
+    let (shape, said) = read_as("No Such Family");
+    assert!(shape == read_as(&format!("'{missing}'")).0, "not drawn in {missing}");
+    let [note] = &said[..] else { panic!("{said:?}") };
+    assert!(
+        note.contains(&format!(
+            "no font No Such Family (drawn in {missing}); install it, or convert the text to paths"
+        )),
+        "{note}"
+    );
+    // What ends a name in fontconfig's patterns is part of the name here, and an option is none.
+    for family in ["No-Such:Family", "--version"] {
+        let (_, said) = read_as(&format!("'{family}'"));
+        assert!(said.len() == 1 && said[0].contains(&format!("no font {family} (drawn in ")), "{said:?}");
+    }
+}
+
+#[test]
 fn a_drawing_without_layers_is_a_picture_with_exact_edges() {
     let bench = Bench::new();
     let svg = r##"<svg xmlns="http://www.w3.org/2000/svg" width="2.54mm" height="2.54mm" viewBox="0 0 60 60">

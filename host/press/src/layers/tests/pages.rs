@@ -188,14 +188,16 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let note = "spot colour `Dieline` names no ink: printed by its process colours";
     assert!(art.notes.iter().any(|said| said.contains(note)), "{:?}", art.notes);
     // The queue's way.
-    assert_eq!(pdf::spots(&file).unwrap(), [["White"]]);
+    assert_eq!(pdf::spots(&file, &Silent).unwrap(), [["White"]]);
     let page = pdf::separated(&file, 1, 600.0).unwrap();
     let window = Window { left: 0, top: 0, width: page.size.0, height: page.size.1 };
     let queued = page.art("page", &window, &Options::default()).unwrap();
     assert_eq!((amounts(&queued), &queued.colour), (amounts(&art), &art.colour));
     // A slip is an error in both.
     let slip = bench.write("slip.ps", MIXED.replace("Dieline", "Golld"));
-    for error in [pdf::spots(&slip).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()] {
+    for error in
+        [pdf::spots(&slip, &Silent).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()]
+    {
         assert!(
             error
                 .to_string()
@@ -203,4 +205,23 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
             "{error}"
         );
     }
+}
+
+#[test]
+fn a_page_keeps_tints_of_its_spot_colours_in_layers_and_queue_alike() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let page = "%!PS\n<</PageSize [144 72]>> setpagedevice [/Separation (Gold) /DeviceCMYK {pop 0 0 1 0}] setcolorspace
+        1 setcolor 12 12 48 48 rectfill 0.3 setcolor 72 12 48 48 rectfill showpage\n";
+    let file = bench.write("tint.ps", page);
+    let art = read(std::slice::from_ref(&file), &Options::default());
+    let separated = pdf::separated(&file, 1, 600.0).unwrap();
+    let window = Window { left: 0, top: 0, width: separated.size.0, height: separated.size.1 };
+    let queued = separated.art("page", &window, &Options::default()).unwrap();
+    assert_eq!(amounts(&queued), amounts(&art));
+    // Both squares are 400 dots a side.
+    let [(Ink::MetallicGold, gold)] = amounts(&art)[..] else { panic!("{:?}", art.notes) };
+    assert!((gold / (1.3 * 400.0 * 400.0) - 1.0).abs() < 0.01, "{gold}");
 }

@@ -117,6 +117,34 @@ fn plates_with_tones_keep_them() {
     assert_eq!((art.layers[1].ink, extent(&art.layers[1])), (Ink::Black, (3, 3, 6, 6, 16)));
 }
 
+#[test]
+fn tints_of_a_spot_colour_are_printed_and_softened_edges_of_a_solid_one_are_cut() {
+    let bench = Bench::new();
+    let names = (333, 2, b"white\0".to_vec());
+    let read_as = |coverage: Vec<u8>| {
+        let file = tiff_file((20, 10), &[coverage], 5, &[(332, 3, vec![2, 0]), names.clone()]);
+        read(&[bench.write("spot.tif", file)], &Options::default())
+    };
+    // A tint of a third beside a solid.
+    let tint: Vec<u8> = (0..200).map(|at| if at % 20 < 12 { 255 } else { 85 }).collect();
+    let art = read_as(tint.clone());
+    assert_eq!(art.layers[0].shape, Shape::Tone(tint));
+    assert!(!art.notes.iter().any(|note| note.contains("left out")), "{:?}", art.notes);
+    // A disc with edges as programs soften them: by the share of each pixel that lies in it, in parts of an eighth.
+    let inside = |x: f64, y: f64| (x - 10.0).hypot(y - 5.0) < 4.3;
+    let parts = |at: usize| {
+        (0..64).map(move |part| {
+            ((at % 20) as f64 + f64::from(part % 8) / 8.0, (at / 20) as f64 + f64::from(part / 8) / 8.0)
+        })
+    };
+    let disc: Vec<u8> =
+        (0..200).map(|at| (parts(at).filter(|&(x, y)| inside(x, y)).count() * 255 / 64) as u8).collect();
+    let wanted = disc.iter().filter(|&&cover| cover >= 128).count();
+    let art = read_as(disc);
+    assert!(matches!(art.layers[0].shape, Shape::Solid(_)), "{:?}", art.notes);
+    assert_eq!(extent(&art.layers[0]).4 as usize, wanted);
+}
+
 /// A file's Photoshop resource with the names of its extra channels.
 fn photoshop(names: &[&str]) -> (u16, u16, Vec<u8>) {
     let mut names: Vec<u8> =

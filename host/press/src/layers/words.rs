@@ -1,0 +1,133 @@
+//! Letters of one word are printed alike: all solid, or all screened.
+//!
+//! Problem: a letter is thin or wide by its widest stroke ([`outline`](super::outline)). Where strokes are about as wide as the
+//! limit, an O is wider than it and the letters after it are not, and one word is printed in two colours.
+//! Method: letters belong together if they are of one colour, near each other, and alike in the width of their strokes. Letters
+//! that belong together are thin if most of their dots are of thin letters. Only letters with strokes from half to twice the
+//! limit take part: all others are far from it, and so is everything of their fonts.
+//! Cost: each such letter is compared with those that end at most a word's space left of it; nothing on pages without them.
+//! Limits: a page as Ghostscript tags it knows letters but no words, so near lines of one size are decided together, too, and
+//! letters that are spaced more widely than words are decided by themselves.
+
+/// A letter whose strokes are near the limit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Letter {
+    /// The number of its colour.
+    pub colour: u8,
+    /// Left, top, right and bottom in dots; right and bottom are beyond it.
+    pub bounds: [u32; 4],
+    /// Side of the largest square that fits in its strokes.
+    pub side: u8,
+    /// How many dots it has.
+    pub dots: u32,
+}
+
+/// Letters with strokes from `limit / RANGE` to `limit * RANGE` can be in words that have letters on both sides of the limit: within a
+/// font, the largest squares in strokes differ by less.
+const RANGE: u8 = 2;
+/// The space between two words is at most so many strokes of a letter: 4.2 in regular Helvetica, 3 in Times, 2 in bold text.
+const SPACE: u32 = 5;
+
+/// Whether a letter with such strokes is decided together with others.
+pub(super) fn takes_part(side: u8, limit: u8) -> bool {
+    (limit / RANGE..limit.saturating_mul(RANGE)).contains(&side)
+}
+
+/// For each letter, whether it is printed as a thin one, under `limit` dots wide. `joined` says whether two colours may be one.
+pub(super) fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..letters.len()).collect();
+    order.sort_by_key(|&at| letters[at].bounds[0]);
+    let mut parent: Vec<usize> = (0..letters.len()).collect();
+    let mut open: Vec<usize> = Vec::new();
+    for &at in &order {
+        let letter = &letters[at];
+        let most = SPACE * 2 * u32::from(limit);
+        open.retain(|&other| letters[other].bounds[2] + most > letter.bounds[0]);
+        for &other in &open {
+            if joined(letter.colour, letters[other].colour) && belong_together(letter, &letters[other]) {
+                let (a, b) = (root(&mut parent, at), root(&mut parent, other));
+                parent[a.max(b)] = a.min(b);
+            }
+        }
+        open.push(at);
+    }
+    let mut thin_dots = vec![0i64; letters.len()];
+    let roots: Vec<usize> = (0..letters.len()).map(|at| root(&mut parent, at)).collect();
+    for (letter, &root) in letters.iter().zip(&roots) {
+        thin_dots[root] += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
+    }
+    roots.into_iter().map(|root| thin_dots[root] > 0).collect()
+}
+
+/// Whether two letters are near each other, and their strokes alike: within a half.
+fn belong_together(a: &Letter, b: &Letter) -> bool {
+    let (thinner, wider) = (u32::from(a.side.min(b.side)), u32::from(a.side.max(b.side)));
+    let gap = |low: usize, high: usize| {
+        a.bounds[low].max(b.bounds[low]).saturating_sub(a.bounds[high].min(b.bounds[high]))
+    };
+    2 * wider <= 3 * thinner && gap(0, 2).max(gap(1, 3)) <= SPACE * wider
+}
+
+/// The root of a group. Halves the path to it.
+fn root(parent: &mut [usize], mut at: usize) -> usize {
+    while parent[at] != at {
+        parent[at] = parent[parent[at]];
+        at = parent[at];
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMIT: u8 = 24;
+
+    fn letter(left: u32, top: u32, side: u8) -> Letter {
+        Letter { colour: 2, bounds: [left, top, left + 100, top + 140], side, dots: 6000 }
+    }
+
+    fn decided(letters: &[Letter]) -> Vec<bool> {
+        thin(letters, LIMIT, |a, b| a == b)
+    }
+
+    #[test]
+    fn a_word_is_what_most_of_its_dots_are() {
+        let word = |sides: [u8; 4]| {
+            let letters = (0..4).map(|at| letter(120 * at, 0, sides[at as usize]));
+            decided(&letters.collect::<Vec<_>>())
+        };
+        assert_eq!(word([25, 22, 21, 23]), [true; 4]);
+        assert_eq!(word([25, 26, 21, 25]), [false; 4]);
+        assert_eq!(word([20, 21, 22, 23]), [true; 4]);
+        assert_eq!(word([24, 25, 26, 27]), [false; 4]);
+        // The order in which they are found does not matter.
+        let backwards: Vec<Letter> =
+            (0..4).rev().map(|at| letter(120 * at, 0, [25, 22, 21, 23][at as usize])).collect();
+        assert_eq!(decided(&backwards), [true; 4]);
+    }
+
+    #[test]
+    fn a_word_ends_at_a_wide_space_another_colour_and_another_size() {
+        // A word's space apart, on one line and on two, and a dot more.
+        let apart = |across: u32, down: u32| {
+            decided(&[letter(0, 0, 24), letter(100 + across, 0, 20), letter(0, 140 + down, 20)])
+        };
+        assert_eq!(apart(120, 120), [true; 3]);
+        assert_eq!(apart(121, 120), [false, true, false]);
+        assert_eq!(apart(120, 121), [false, false, true]);
+        let mut other = letter(110, 0, 20);
+        other.colour = 3;
+        assert_eq!(decided(&[letter(0, 0, 25), other]), [false, true]);
+        // An initial beside text of half its size.
+        let mut initial = letter(0, 0, 40);
+        initial.dots = 60_000;
+        assert_eq!(decided(&[initial, letter(110, 0, 20)]), [false, true]);
+        assert!(
+            takes_part(12, LIMIT)
+                && takes_part(47, LIMIT)
+                && !takes_part(11, LIMIT)
+                && !takes_part(48, LIMIT)
+        );
+    }
+}
