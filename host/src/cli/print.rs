@@ -175,8 +175,10 @@ impl Pictures {
         let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
         let mapped = &halftoned.mapped.report;
         let kind = kind(laid);
-        let swatches: Vec<Swatch> = (1..)
-            .zip(&mapped.materials)
+        let swatches: Vec<Swatch> = mapped
+            .materials
+            .iter()
+            .enumerate()
             .map(|(number, material)| Swatch {
                 name: format!("{kind} {number}, {:.0} %", 100.0 * material.share),
                 target: &material.target,
