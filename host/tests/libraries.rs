@@ -213,7 +213,7 @@ fn shown_figures_give_the_listed_reflectance() {
     let numbers =
         |text: &str| -> Vec<f64> { text.split([' ', ',']).filter_map(|word| word.parse().ok()).collect() };
     let list: Value = serde_json::from_str(&bench.done("inks list --json")).expect("JSON");
-    for stack in ["substrate", "M+Y", "W", "P+MS", "MS+C+F"] {
+    for stack in ["substrate", "M+Y", "K", "P+MS", "MS+C+F"] {
         let shown = bench.done(&format!("inks show {stack}"));
         let degrees = 30f64.to_radians();
         let (cos2, tan2) = (degrees.cos().powi(2), degrees.tan().powi(2));
