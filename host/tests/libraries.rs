@@ -205,3 +205,44 @@ fn a_gamut_and_redundant_stacks_are_shown() {
     let said = text(&output.stdout);
     assert!(output.status.success() && said.contains("can be left out together"), "{said}");
 }
+
+/// The figures that are shown of a stack give what the list says it reflects: the lobe is written again here.
+#[test]
+fn shown_figures_give_the_listed_reflectance() {
+    let bench = Bench::new();
+    let numbers =
+        |text: &str| -> Vec<f64> { text.split([' ', ',']).filter_map(|word| word.parse().ok()).collect() };
+    let list: Value = serde_json::from_str(&bench.done("inks list --json")).expect("JSON");
+    for stack in ["substrate", "M+Y", "K", "P+MS", "MS+C+F"] {
+        let shown = bench.done(&format!("inks show {stack}"));
+        let degrees = 30f64.to_radians();
+        let (cos2, tan2) = (degrees.cos().powi(2), degrees.tan().powi(2));
+        let mut f = [0.0; 3];
+        for line in shown.lines() {
+            if line.starts_with("diffuse   albedo") {
+                (0..3).for_each(|c| f[c] += numbers(line)[c] / std::f64::consts::PI);
+            } else if line.starts_with("lobe") {
+                let [r, g, b, alpha] = numbers(line)[..] else { panic!("{line}") };
+                let a2 = alpha * alpha;
+                let d = 1.0 / (std::f64::consts::PI * a2 * (cos2 * (1.0 + tan2 / a2)).powi(2));
+                let lobe = d / (1.0 + a2 * tan2).sqrt() / (4.0 * cos2);
+                [r, g, b].into_iter().zip(&mut f).for_each(|(f0, f)| *f += f0 * lobe);
+            }
+        }
+        let rows = list.as_array().expect("rows");
+        let row = rows.iter().find(|row| row["stack"] == stack).expect("it is listed");
+        for (c, found) in f.into_iter().enumerate() {
+            let listed = row["reflectance"][2][c].as_f64().expect("a number");
+            assert!(
+                (found - listed).abs() < 0.01 * listed + 3e-4,
+                "{stack} {c}: {found}, not {listed}\n{shown}"
+            );
+        }
+    }
+    // A stack that prints use although it is not on the list.
+    let shown = bench.done("inks show MS+K+F");
+    assert!(
+        shown.contains("not on the list of the library") && shown.contains("diffuse   albedo"),
+        "{shown}"
+    );
+}

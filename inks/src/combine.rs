@@ -14,7 +14,8 @@ use protocol::ink::Ink;
 use crate::curve::Curve;
 use crate::library::{Entry, Library};
 use crate::lobes::Lobes;
-use crate::provenance::Trust;
+use crate::provenance::{Provenance, Trust};
+use crate::read::grid;
 use crate::set::InkSet;
 use crate::stack::Stack;
 
@@ -52,6 +53,32 @@ impl Library {
             None if self.is_modelled() => self.optics().lobes(stack).ok().map(|lobes| lobes.curve(theta)),
             None => None,
         }
+    }
+
+    /// What is known of a stack that is not on the list but may be printed, because the model describes it and no rule forbids it.
+    pub fn beyond_list(&self, stack: &Stack) -> Option<Entry> {
+        let new = self.entry(stack).is_none() && stack.layers().len() <= MOST_LAYERS;
+        let in_order = stack.layers().is_sorted_by(|below, above| is_above(*above, *below));
+        if !(new
+            && in_order
+            && self.is_modelled()
+            && self.trust() == Trust::All
+            && self.broken_rules(stack).is_empty())
+        {
+            return None;
+        }
+        let lobes = self.optics().lobes(stack).ok()?;
+        Some(Entry {
+            number: self.entries().len(),
+            stack: stack.clone(),
+            curve: lobes.curve(&grid()),
+            uncertainty: None,
+            lobes: Some(lobes),
+            provenance: Provenance::Modelled {
+                model: self.optics().model.name.clone(),
+                parameters: self.optics().parameters(stack),
+            },
+        })
     }
 
     /// Stacks of these inks that are not on the list and look like none that is: empty if a stack was measured, or if only
@@ -138,6 +165,22 @@ mod tests {
                 entry.stack
             );
         }
+    }
+
+    /// What prints may use can be looked up, with the curve that prints are predicted with; the rest cannot.
+    #[test]
+    fn stacks_beyond_the_list_are_those_that_are_offered() {
+        let library = Library::builtin();
+        let theta = [0.0, 0.2, 0.9];
+        for stack in library.combinations(&InkSet::ALL) {
+            let entry = library.beyond_list(&stack).unwrap_or_else(|| panic!("{stack}"));
+            assert_eq!(library.curve_of(&stack, &theta).unwrap(), entry.curve_at(&theta), "{stack}");
+        }
+        for other in ["MS+C", "C+MS", "K+C", "substrate", "C+M+Y+K", "MS+SF"] {
+            assert!(library.beyond_list(&other.parse().unwrap()).is_none(), "{other}");
+        }
+        let measured = library.trusting(Trust::Measured);
+        assert!(measured.beyond_list(&"MS+K+F".parse().unwrap()).is_none());
     }
 
     #[test]

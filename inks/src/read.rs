@@ -455,7 +455,7 @@ fn is_date(text: &str) -> bool {
 
 /// Angles at which a modelled curve is tabulated: the square-root grid from 0 to 89.6 degrees. Lobes grow as 1 / cos toward
 /// 90 degrees, so beyond the grid the last value is used.
-fn grid() -> Vec<f64> {
+pub(crate) fn grid() -> Vec<f64> {
     const STEPS: u32 = 512;
     (0..STEPS).map(|n| FRAC_PI_2 * (f64::from(n) / f64::from(STEPS)).powi(2)).collect()
 }

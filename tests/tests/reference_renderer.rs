@@ -118,7 +118,7 @@ fn balls_under_a_probe_are_the_references_balls() {
     let space = Space::half_angle(SAMPLES);
     let mut cases = vec![(Probe::studio(64), PAPER)];
     match needs::data() {
-        Some(data) => cases.push((Probe::read_hdr(&data.join("env/studio.hdr")).unwrap().shrunk(64), FOIL)),
+        Some(data) => cases.push((Probe::read(&data.join("env/studio.hdr")).unwrap().resized(64), FOIL)),
         None => cases.push((Probe::studio(64), FOIL)),
     }
     for (probe, material) in &cases {

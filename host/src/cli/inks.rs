@@ -10,6 +10,7 @@ pub(super) mod place;
 mod predict;
 mod share;
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -159,7 +160,7 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
         What::Show { stack, library, figures, plot } => {
             let colour = std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none();
             let library = libraries::given(library.as_deref())?;
-            let entry = find(&library, &stack)?;
+            let entry = &*find(&library, &stack)?;
             let mut text = describe(&library, entry, figures);
             text.push_str(&plot::terminal(&entry.curve, colour));
             if let Some(file) = &plot {
@@ -194,11 +195,14 @@ pub fn run(args: Args, observer: &dyn Observer) -> anyhow::Result<()> {
     }
 }
 
-/// The entry of a stack given as text. Suggests another when the library lacks it.
-fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<&'a Entry> {
+/// The entry of a stack given as text, on the list or beyond it, as prints use both. Suggests another when there is none.
+fn find<'a>(library: &'a Library, text: &str) -> anyhow::Result<Cow<'a, Entry>> {
     let stack: Stack = text.parse()?;
     if let Some(entry) = library.entry(&stack) {
-        return Ok(entry);
+        return Ok(Cow::Borrowed(entry));
+    }
+    if let Some(entry) = library.beyond_list(&stack) {
+        return Ok(Cow::Owned(entry));
     }
     let sorted = |stack: &Stack| {
         let mut layers = stack.layers().to_vec();
@@ -290,6 +294,11 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
 fn describe(library: &Library, entry: &Entry, figures: bool) -> String {
     let stack = &entry.stack;
     let mut lines = vec![format!("{stack}: {}", library.words(stack))];
+    if library.entry(stack).is_none() {
+        lines.push(
+            "list      not on the list of the library, but its rules allow it, so prints may use it".into(),
+        );
+    }
     lines.extend(curve_lines(entry));
     lines.push(format!("cluster   at least {} dots of 1/600 inch", library.minimum_cluster(stack)));
     for (place, &ink) in stack.layers().iter().enumerate() {
@@ -340,7 +349,8 @@ fn curve_lines(entry: &Entry) -> Vec<String> {
     }
     if let Some(lobes) = &entry.lobes {
         let rgb = |v: [f64; 3]| format!("{:.3} {:.3} {:.3}", v[0], v[1], v[2]);
-        lines.push(format!("diffuse   albedo {}", rgb(lobes.kd)));
+        // As the curve has it: the share that the surface turns back never reaches the body.
+        lines.push(format!("diffuse   albedo {}", rgb(lobes.kd.map(|kd| lobes.entering * kd))));
         for lobe in &lobes.lobes {
             lines.push(format!("lobe      F0 {}, alpha {:.3}", rgb(lobe.f0), lobe.alpha));
         }
@@ -452,7 +462,7 @@ mod tests {
     #[test]
     fn a_foil_stack_is_shown_with_its_cartridges_and_its_trouble() {
         let library = Library::builtin();
-        let text = describe(&library, find(&library, "SF+C").unwrap(), true);
+        let text = describe(&library, &find(&library, "SF+C").unwrap(), true);
         for word in [
             "Flash Silver",
             "MDC-FMES",
@@ -472,7 +482,7 @@ mod tests {
         let library = Library::builtin();
         let error = |text: &str| find(&library, text).unwrap_err().to_string();
         assert!(error("C+MS").contains("but MS+C is"), "{}", error("C+MS"));
-        assert!(error("MS+C+K").contains("nearest is"), "{}", error("MS+C+K"));
+        assert!(error("C+M+Y+K").contains("nearest is"), "{}", error("C+M+Y+K"));
         assert!(error("metalic-gold").contains("metallic-gold"), "{}", error("metalic-gold"));
         assert_eq!(find(&library, "gold").unwrap().stack.to_string(), "MG");
     }

@@ -92,7 +92,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     if format == Format::Exr && args.view.has_tone() {
         bail!("{}: an .exr holds radiance; leave --exposure and --tone-curve out", args.output.display());
     }
-    let probe = args.view.light_probe.as_deref().map(Probe::read_hdr).transpose()?;
+    let probe = args.view.light_probe.as_deref().map(Probe::read).transpose()?;
     let staged = Staged::file(&args.output)?;
     let (what, is_page) = (args.view.what(), format == Format::Page);
     args.wear.check(what == Show::Printed || is_page, is_page)?;

@@ -82,7 +82,7 @@ impl Work {
 pub struct Args {
     #[command(flatten)]
     work: Work,
-    /// Light probe (.hdr) that lights the spheres in materials.png [default: a soft studio]
+    /// Light probe (.hdr or .exr) that lights the spheres in materials.png [default: a soft studio]
     #[arg(long, value_name = "FILE")]
     probe: Option<PathBuf>,
     #[command(flatten)]
@@ -95,7 +95,7 @@ pub struct Args {
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let (inks, library) = args.work.dots.inks.at_hand()?;
     let probe = match &args.probe {
-        Some(path) => Probe::read_hdr(path)?,
+        Some(path) => Probe::read(path)?,
         None => Probe::studio(128),
     };
     let document = args.work.dots.document.open(observer)?;
@@ -175,8 +175,10 @@ impl Pictures {
         let fidelity = preview::fidelity(&target, &printed, (area.width, area.length), EYE, observer)?;
         let mapped = &halftoned.mapped.report;
         let kind = kind(laid);
-        let swatches: Vec<Swatch> = (1..)
-            .zip(&mapped.materials)
+        let swatches: Vec<Swatch> = mapped
+            .materials
+            .iter()
+            .enumerate()
             .map(|(number, material)| Swatch {
                 name: format!("{kind} {number}, {:.0} %", 100.0 * material.share),
                 target: &material.target,

@@ -53,23 +53,22 @@ pub struct Subject<'a> {
 /// # Errors
 /// A plot that cannot be drawn: a bug if it is ever seen.
 pub fn page(subject: &Subject) -> Result<String> {
-    let plots = subject
-        .materials
-        .iter()
-        .take(DRAWN)
-        .zip(1..)
-        .map(|(material, number)| {
+    let plots = drawn(subject.materials)
+        .into_iter()
+        .map(|i| {
+            let material = &subject.materials[i];
             let curves = [&material.target, &material.printed].map(|row| subject.space.curve(row));
             let lines = [0, 1].map(|k: usize| plot::Line { curve: &curves[k], uncertainty: None });
-            plot::compared(&format!("{} {number}: d = {:.3}", subject.kind, material.distance), &lines)
+            let title = format!("{} {i}: d = {:.3}", subject.kind, material.distance);
+            Ok((i, plot::compared(&title, &lines)?))
         })
-        .collect::<Result<Vec<String>, _>>()?;
+        .collect::<Result<Vec<(usize, String)>>>()?;
     let mut body = String::new();
     write(subject, &plots, &mut body)?;
     Ok(html::read(&format!("{}: report of the print", subject.plan.document), STYLE, &body))
 }
 
-fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result {
+fn write(subject: &Subject, plots: &[(usize, String)], page: &mut String) -> fmt::Result {
     let plan = subject.plan;
     let (name, (width, height)) = (escape(&plan.document), plan.size_mm);
     let (fidelity, eye) = subject.fidelity;
@@ -108,15 +107,29 @@ fn write(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result 
     writeln!(page, "</div>")
 }
 
+/// The materials whose curves are drawn, in their order. They count from 0, as bases do everywhere.
+fn drawn(materials: &[MaterialReport]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..materials.len()).collect();
+    order.sort_by(|&a, &b| materials[b].share.total_cmp(&materials[a].share));
+    order.truncate(DRAWN);
+    order.sort_unstable();
+    order
+}
+
 /// Curves of the materials against what is printable.
-fn write_gamut(subject: &Subject, plots: &[String], page: &mut String) -> fmt::Result {
+fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) -> fmt::Result {
     let (kind, wide) = (subject.kind, html::wide("mixtures"));
+    let some = if plots.len() < subject.materials.len() {
+        format!(" Drawn are the {} that stand for most of the document.", plots.len())
+    } else {
+        String::new()
+    };
     write!(
         page,
-        "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.</p>\n{wide}<table>\
+        "<h2>Gamut</h2>\n<p>Lines: the {kind}. Dashed: the best mixture of the stacks in use.{some}</p>\n{wide}<table>\
          <tr><th class=\"n\">{kind}<th class=\"n\">share<th class=\"n\">d<th class=\"n\">light<th>mixture"
     )?;
-    for (material, number) in subject.materials.iter().zip(1..) {
+    for (number, material) in subject.materials.iter().enumerate() {
         write!(
             page,
             "<tr><td class=\"n\">{number}<td class=\"n\">{:.1} %<td class=\"n\">{:.3}<td class=\"n\">{:.3}<td class=\"words\">{}",
@@ -127,7 +140,7 @@ fn write_gamut(subject: &Subject, plots: &[String], page: &mut String) -> fmt::R
         )?;
     }
     writeln!(page, "</table></div>\n<div class=\"many\">")?;
-    for (svg, number) in plots.iter().zip(1..) {
+    for (number, svg) in plots {
         writeln!(page, "{}", html::drawing(&format!("curves of {kind} {number}"), svg))?;
     }
     writeln!(page, "</div>")
@@ -290,7 +303,8 @@ mod tests {
             agreeing: 1,
             pruning_cost: 0.0,
         };
-        let materials: Vec<MaterialReport> = (0..DRAWN + 3).map(|i| material(i % 2)).collect();
+        let mut materials: Vec<MaterialReport> = (0..DRAWN + 3).map(|i| material(i % 2)).collect();
+        materials[..3].iter_mut().for_each(|material| material.share = 0.01);
         let (rmse, p95, max, light_rmse) = (0.02, 0.03, 0.4, 0.05);
         let fidelity =
             Fidelity { mean: 0.0171, rmse, p95, max, light_rmse, width: 1, height: 1, map: vec![0.0] };
@@ -311,6 +325,13 @@ mod tests {
         assert!(text.contains("&lt;script&gt;alert(1)"));
         assert!(!text.contains("<script") && !text.contains("<img src=x"));
         assert_eq!(text.matches("<svg").count(), DRAWN + 1);
+        // The first three stand for less than the last.
+        let drawn = |number: usize| text.contains(&format!("curves of basis {number}\""));
+        assert_eq!(
+            (0..DRAWN + 3).filter(|&number| drawn(number)).collect::<Vec<_>>(),
+            (3..DRAWN + 3).collect::<Vec<_>>()
+        );
+        assert!(text.contains("Drawn are the 8 that stand for most"), "{text}");
         for part in [
             "0.017",
             "0.456",

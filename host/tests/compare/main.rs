@@ -295,3 +295,34 @@ fn photographs_and_camera_files_that_do_not_serve_are_named() {
     let said = testing::program::text(&output.stderr);
     assert!(output.status.success() && said.contains("fall-off of lamp 1"), "{said}");
 }
+
+/// Eight bits went through a camera's tone curve, and nobody knows which.
+#[test]
+fn photographs_of_eight_bits_are_said_to_be_rough() {
+    let bench = bench(&["left-1.png", "left-2.png"]);
+    let warned = |camera: &str| -> Vec<String> {
+        fs::write(bench.path("some.toml"), camera).unwrap();
+        let said = bench.done("compare photos --job job.rgl --camera some.toml -q --json -o alone.html");
+        let report: Value = serde_json::from_str(&said).expect("JSON");
+        let warnings = report["warnings"].as_array().unwrap();
+        warnings
+            .iter()
+            .map(|warning| warning.as_str().unwrap().to_owned())
+            .filter(|w| w.contains("8 bits"))
+            .collect()
+    };
+    assert!(warned(CAMERA).is_empty());
+    let photo = bench.path("photos/left-1.png");
+    let coded = image::open(&photo).unwrap().into_rgb16();
+    let coded = image::RgbImage::from_fn(coded.width(), coded.height(), |x, y| {
+        image::Rgb(coded.get_pixel(x, y).0.map(|value| {
+            let v = f64::from(value) / 65_535.0;
+            let v = if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+            (255.0 * v).round() as u8
+        }))
+    });
+    coded.save(&photo).unwrap();
+    let [ref said] = warned(CAMERA)[..] else { panic!("one warning") };
+    assert!(said.starts_with("1 of 2 photographs"), "{said}");
+    assert!(warned(&format!("linear = true\n{CAMERA}")).is_empty());
+}

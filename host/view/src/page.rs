@@ -159,7 +159,7 @@ pub fn page(subject: &Subject, observer: &dyn Observer) -> Result<String, ViewEr
     let area = Area::whole(dots);
     let print = Source::Print { dots, space, stacks, area };
     let difference = target.map(|t| difference(&Source::Factored(t.document), &print)).transpose()?;
-    let probe = subject.probe.shrunk(PROBE_ROWS);
+    let probe = subject.probe.resized(PROBE_ROWS);
     let texels: Vec<u8> = probe.rgb().iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
     let every_third = |values: &[f64]| values.iter().step_by(3).copied().collect::<Vec<f64>>();
     let data = json!({

@@ -141,7 +141,9 @@ impl Scene {
             && d * eye[2] < 1e-3
         {
             return camera(format!(
-                "the eye is {d} m from the sheet, inside it for all that matters; go farther away"
+                "the eye is {:.2} mm above the plane of the sheet, as good as in it; turn the view or the sheet so that they face each \
+                 other, or go farther away",
+                1000.0 * d * eye[2]
             ));
         }
         for (i, light) in self.lights.iter().enumerate() {
@@ -245,6 +247,7 @@ mod tests {
             (refused(|s| s.camera.towards = [f64::NAN, 0.0, 1.0]), "view: its direction"),
             (refused(|s| s.camera.distance = Some(0.0)), "more than 0"),
             (refused(|s| s.camera.distance = Some(1e-4)), "go farther away"),
+            (refused(|s| s.camera.towards = direction(0.0, 89.9)), "0.87 mm above the plane"),
             (refused(|s| s.camera.height = f64::INFINITY), "window"),
             (refused(|s| s.pose.curl = Some(0.01)), "from 0.038 to 1000 m"),
             (refused(|s| s.pose.curl = Some(f64::NAN)), "cannot be bent"),

@@ -45,7 +45,7 @@ pub(crate) struct Field {
 impl Field {
     /// Gathers light on the grid.
     pub fn new(probe: &Probe, scene: &Scene, lit: &Lit, curves: &Curves, observer: &dyn Observer) -> Field {
-        let probe = probe.shrunk(ROWS);
+        let probe = probe.resized(ROWS);
         let frame = Frame::new(&scene.pose);
         let tree = Tree::new(&probe, &frame);
         let towards = frame.in_sheet(unit(scene.camera.towards));

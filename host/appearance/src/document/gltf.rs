@@ -113,9 +113,16 @@ fn choose<'r>(
         None => return Err(fail(format!("the file has {} materials", root.materials.len()))),
         Some(asked) => match asked.parse::<usize>() {
             Ok(number) if number < root.materials.len() => number,
-            _ => (0..root.materials.len())
-                .find(|&i| name(i) == asked)
-                .ok_or_else(|| fail(format!("there is no material `{asked}`")))?,
+            _ => {
+                let alike: Vec<usize> = (0..root.materials.len()).filter(|&i| name(i) == asked).collect();
+                match alike[..] {
+                    [one] => one,
+                    [] => return Err(fail(format!("there is no material `{asked}`"))),
+                    _ => {
+                        return Err(fail(format!("{} materials have the name `{asked}`", alike.len())));
+                    }
+                }
+            }
         },
     };
     Ok((found, &root.materials[found]))

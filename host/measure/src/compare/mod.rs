@@ -152,6 +152,7 @@ struct Shot {
     name: String,
     light: usize,
     size: (usize, usize),
+    bent: bool,
     marks: Vec<(Mark, sheet::Printed)>,
 }
 
@@ -201,6 +202,14 @@ pub fn compare(
         warnings.push(format!(
             "the camera's place is uncertain by {worst:.0} mm; tilt the sheet or the camera in some photographs, or give \
              camera.field_of_view_deg"
+        ));
+    }
+    let bent = shots.iter().filter(|shot| shot.bent).count();
+    if bent > 0 {
+        warnings.push(format!(
+            "{bent} of {} photographs have 8 bits, whose tones are taken for sRGB; cameras bend them further, so errors of some per cent \
+             and the factors of dark stacks may be the camera's; photograph in RAW or 16 bits, or state linear in the camera file",
+            shots.len()
         ));
     }
     let scenery = Scenery::new(printed, area, middle, size, &shots[0], &camera)?;
@@ -277,7 +286,14 @@ fn read(path: &Path, setup: &Setup, sheet: &Marks) -> Result<Shot, MeasureError>
     };
     let picture = Picture::read(path, setup.linear)?;
     let marks = sheet.seen(path, &picture.grey())?;
-    Ok(Shot { path: path.to_path_buf(), name, light, size: (picture.width, picture.height), marks })
+    Ok(Shot {
+        path: path.to_path_buf(),
+        name,
+        light,
+        size: (picture.width, picture.height),
+        bent: picture.bent,
+        marks,
+    })
 }
 
 /// Solves for the camera.

@@ -24,6 +24,8 @@ pub(crate) struct Picture {
     values: Vec<f32>,
     /// The value from which a channel is full.
     full: f32,
+    /// Whether a camera's tone curve had to be undone, which is not known exactly.
+    pub(crate) bent: bool,
 }
 
 impl Picture {
@@ -50,7 +52,7 @@ impl Picture {
             let problem = format!("{} x {} pixels; too small to find marks in", photo.width, photo.height);
             return Err(MeasureError::photo(path, problem));
         }
-        Ok(Picture { width: photo.width, height: photo.height, values, full })
+        Ok(Picture { width: photo.width, height: photo.height, values, full, bent })
     }
 
     /// The picture as marks are found in it.

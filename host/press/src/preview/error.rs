@@ -56,7 +56,7 @@ pub enum PreviewError {
         problem: &'static str,
     },
     /// The file is not a usable light probe.
-    #[error("{}: {problem}; expected a Radiance .hdr of a latitude-longitude panorama, twice as wide as high", path.display())]
+    #[error("{}: {problem}; expected a Radiance .hdr or an OpenEXR file of a latitude-longitude panorama, twice as wide as high", path.display())]
     Probe {
         /// The file.
         path: PathBuf,

@@ -108,7 +108,7 @@ fn documents(data: &Path, space: &Space) -> Vec<(String, Table)> {
 
 /// Two measured light probes and the built-in one.
 pub(super) fn probes(data: &Path) -> [Probe; 3] {
-    let measured = |name: &str| Probe::read_hdr(&data.join("env").join(name)).unwrap().shrunk(64);
+    let measured = |name: &str| Probe::read(&data.join("env").join(name)).unwrap().resized(64);
     [measured("studio.hdr"), measured("venice.hdr"), Probe::studio(64)]
 }
 

@@ -61,7 +61,7 @@ pub fn materials_picture(
     }
     // White paper is rendered only to set the exposure under the probe.
     rows.push(&vec![0.85 / std::f64::consts::PI; space.columns()]);
-    let mut around = under_probe(space, &rows, &probe.shrunk(PROBE_ROWS), ball, observer)?;
+    let mut around = under_probe(space, &rows, &probe.resized(PROBE_ROWS), ball, observer)?;
     let paper = around.pop().map_or(ToneCurve::PAPER, |p| ToneCurve::of(&[p]));
     let near: Vec<Radiance> = (0..2 * swatches.len())
         .into_par_iter()

@@ -3,19 +3,25 @@
 //! Conventions: row 0 is up (+y). At column u and row v, both from 0 to 1, the direction is
 //! `(sin phi sin t, cos t, -cos phi sin t)` with phi = 2 pi u and t = pi v. The eye looks along -z, so the middle of the
 //! panorama is behind the eye and its left edge is behind the ball. Texels are weighted by their exact solid angle.
-//! Source of files: Radiance `.hdr` (RGBE), decoded within limits.
+//! Renderers take each texel for a point of light in its middle, so they cut a panorama of few rows finer ([`Probe::resized`]).
+//! Source of files: Radiance `.hdr` (RGBE) and OpenEXR, decoded within limits.
 
 use std::f64::consts::PI;
 use std::io::{BufRead, BufReader, Seek};
 use std::path::Path;
 
 use image::codecs::hdr::HdrDecoder;
+use image::codecs::openexr::OpenExrDecoder;
 use image::{DynamicImage, ImageDecoder, Limits};
 
 use super::error::PreviewError;
 
 /// The widest panorama that can be read.
 const WIDEST: usize = 8192;
+/// The fewest rows that a panorama is rendered with: texels of 2.8 degrees.
+const FEWEST: usize = 64;
+/// The first bytes of an OpenEXR file.
+const OPEN_EXR: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Radiance from every direction. See the module text for its layout.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +42,7 @@ impl Probe {
         if width == 0 || width * height != rgb.len() {
             return Err(shape("texels of a light probe", width.max(1) * height.max(1), rgb.len()));
         }
-        let good = |t: &&[f32; 3]| t.iter().all(|v| v.is_finite() && *v >= 0.0);
+        let good = |t: &&[f32; 3]| t.iter().all(lightens);
         let count = rgb.iter().filter(good).count();
         if count != rgb.len() {
             return Err(shape("texels of a light probe that are finite and not negative", rgb.len(), count));
@@ -65,39 +71,56 @@ impl Probe {
         Probe { width, height, rgb: (0..width * height).map(texel).collect() }
     }
 
-    /// Reads a Radiance `.hdr` file.
+    /// Reads a Radiance `.hdr` or an OpenEXR file; its first bytes decide which.
     ///
     /// # Errors
     /// A file that cannot be read, or is not a panorama twice as wide as high.
-    pub fn read_hdr(path: &Path) -> Result<Probe, PreviewError> {
+    pub fn read(path: &Path) -> Result<Probe, PreviewError> {
         let file = std::fs::File::open(path)
             .map_err(|e| PreviewError::Probe { path: path.to_path_buf(), problem: e.to_string() })?;
-        Probe::from_hdr(BufReader::new(file), path)
+        Probe::from_file(BufReader::new(file), path)
     }
 
-    /// Reads a Radiance `.hdr` from any input; errors name `path`.
-    fn from_hdr(input: impl BufRead + Seek, path: &Path) -> Result<Probe, PreviewError> {
+    /// Reads a panorama from any input; errors name `path`.
+    fn from_file(mut input: impl BufRead + Seek, path: &Path) -> Result<Probe, PreviewError> {
         let wrong = |problem: String| PreviewError::Probe { path: path.to_path_buf(), problem };
-        let mut decoder = HdrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
-        let (width, height) = decoder.dimensions();
-        let (width, height) = (width as usize, height as usize);
-        if width == 0 || height == 0 || width > WIDEST || width != 2 * height {
-            return Err(wrong(format!(
-                "{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide"
-            )));
+        if input.fill_buf().map_err(|e| wrong(e.to_string()))?.starts_with(&OPEN_EXR) {
+            let decoder = OpenExrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
+            return Probe::decoded(decoder, 1.0).map_err(wrong);
         }
-        let mut limits = Limits::default();
-        limits.max_image_width = Some(WIDEST as u32);
-        limits.max_image_height = Some(WIDEST as u32);
-        decoder.set_limits(limits).map_err(|e| wrong(e.to_string()))?;
+        let decoder = HdrDecoder::new(input).map_err(|e| wrong(e.to_string()))?;
         // The program that wrote the file multiplied the pixels by the exposure in the header.
         let exposure = decoder.metadata().exposure.unwrap_or(1.0);
         if !(exposure.is_finite() && exposure > 0.0) {
             return Err(wrong(format!("EXPOSURE={exposure} must be above 0")));
         }
-        let image = DynamicImage::from_decoder(decoder).map_err(|e| wrong(e.to_string()))?.into_rgb32f();
-        let rgb = image.pixels().map(|p| p.0.map(|v| v / exposure)).collect();
-        Probe::new(height, rgb).map_err(|e| wrong(e.to_string()))
+        Probe::decoded(decoder, exposure).map_err(wrong)
+    }
+
+    /// The panorama of a picture whose values were multiplied by `exposure`; or what is wrong with it.
+    fn decoded(mut decoder: impl ImageDecoder, exposure: f32) -> Result<Probe, String> {
+        let (width, height) = decoder.dimensions();
+        let (width, height) = (width as usize, height as usize);
+        if width == 0 || height == 0 || width > WIDEST || width != 2 * height {
+            return Err(format!(
+                "{width} x {height} pixels; it must be twice as wide as high and at most {WIDEST} wide"
+            ));
+        }
+        let mut limits = Limits::default();
+        limits.max_image_width = Some(WIDEST as u32);
+        limits.max_image_height = Some(WIDEST as u32);
+        decoder.set_limits(limits).map_err(|e| e.to_string())?;
+        let image = DynamicImage::from_decoder(decoder).map_err(|e| e.to_string())?.into_rgb32f();
+        let rgb: Vec<[f32; 3]> = image.pixels().map(|p| p.0.map(|v| v / exposure)).collect();
+        if let Some(i) = rgb.iter().position(|texel| !texel.iter().all(lightens)) {
+            return Err(format!(
+                "pixel ({}, {}) is {:?}; radiance must be a number and at least 0",
+                i % width,
+                i / width,
+                rgb[i]
+            ));
+        }
+        Ok(Probe { width, height, rgb })
     }
 
     /// Texels across.
@@ -126,30 +149,56 @@ impl Probe {
         (edge(y) - edge(y + 1)) * 2.0 * PI / self.width as f64
     }
 
-    /// The probe averaged by solid angle to at most `height` rows, by the least whole factor that divides both sides; unchanged
-    /// if there is none.
-    pub fn shrunk(&self, height: usize) -> Probe {
-        let k = (1..=self.height)
-            .find(|k| {
-                self.height / k <= height && self.height.is_multiple_of(*k) && self.width.is_multiple_of(*k)
-            })
-            .unwrap_or(1);
-        let (w, h) = (self.width / k, self.height / k);
-        let mut rgb = Vec::with_capacity(w * h);
-        for i in 0..w * h {
-            let mut sum = [0.0f64; 3];
-            let mut solid = 0.0;
-            for y in (i / w) * k..(i / w + 1) * k {
-                let omega = self.solid_angle(y);
-                for texel in &self.rgb[y * self.width + (i % w) * k..][..k] {
-                    solid += omega;
-                    (0..3).for_each(|c| sum[c] += omega * f64::from(texel[c]));
+    /// The probe as it is rendered: averaged by solid angle to at most `height` rows, and cut into at least 64 where that is no more.
+    pub fn resized(&self, height: usize) -> Probe {
+        let height = height.max(1);
+        let cut = self.height * FEWEST.div_ceil(self.height);
+        let rows = if self.height < FEWEST { cut } else { self.height }.min(height);
+        if rows == self.height { self.clone() } else { self.resampled(rows) }
+    }
+
+    /// The mean radiance over each texel of a panorama of `height` rows. Texels that lie in several new ones are cut, so that all
+    /// light stays where it was, whatever the two sizes are.
+    fn resampled(&self, height: usize) -> Probe {
+        let width = (self.width * height / self.height).max(1);
+        let rows = overlaps(self.height, height, |from, to| (PI * from).cos() - (PI * to).cos());
+        let columns = overlaps(self.width, width, |from, to| to - from);
+        let mut rgb = Vec::with_capacity(width * height);
+        for row in &rows {
+            let mut line = vec![[0.0f64; 3]; self.width];
+            for &(y, part) in row {
+                for (sum, texel) in line.iter_mut().zip(&self.rgb[y * self.width..]) {
+                    (0..3).for_each(|c| sum[c] += part * f64::from(texel[c]));
                 }
             }
-            rgb.push(sum.map(|s| (s / solid) as f32));
+            rgb.extend(columns.iter().map(|column| -> [f32; 3] {
+                std::array::from_fn(|c| column.iter().map(|&(x, part)| part * line[x][c]).sum::<f64>() as f32)
+            }));
         }
-        Probe { width: w, height: h, rgb }
+        Probe { width, height, rgb }
     }
+}
+
+/// Whether this is radiance.
+fn lightens(value: &f32) -> bool {
+    value.is_finite() && *value >= 0.0
+}
+
+/// For each of `new` equal parts of a side the parts of `old` equal ones that lie in it, by their size between two places from 0
+/// to 1; together 1.
+fn overlaps(old: usize, new: usize, size: impl Fn(f64, f64) -> f64) -> Vec<Vec<(usize, f64)>> {
+    // Places in whole numbers, so that parts that end together do.
+    let place = |at: usize| at as f64 / (old * new) as f64;
+    (0..new)
+        .map(|j| {
+            let (start, end) = (j * old, (j + 1) * old);
+            let whole = size(place(start), place(end));
+            let within = start / new..end.div_ceil(new);
+            within
+                .map(|i| (i, size(place(start.max(i * new)), place(end.min((i + 1) * new))) / whole))
+                .collect()
+        })
+        .collect()
 }
 
 /// The direction at column `u` and row `v`, both 0 to 1.
@@ -268,7 +317,7 @@ mod tests {
     }
 
     fn read(bytes: Vec<u8>) -> Result<Probe, PreviewError> {
-        Probe::from_hdr(Cursor::new(bytes), Path::new("env.hdr"))
+        Probe::from_file(Cursor::new(bytes), Path::new("env.hdr"))
     }
 
     #[test]
@@ -322,18 +371,76 @@ mod tests {
         }
 
         #[test]
-        fn shrinking_keeps_all_light(height in 1usize..5, k in 1usize..4, seed in any::<u32>()) {
-            let (h, w) = (height * k, 2 * height * k);
+        fn all_light_is_kept_at_any_size(height in 1usize..40, rows in 1usize..90, seed in any::<u32>()) {
+            let (h, w) = (height, 2 * height);
             let value = |i: usize| ((i as u32).wrapping_mul(2_654_435_761).wrapping_add(seed) >> 16) as f32;
             let probe = Probe::new(h, (0..w * h).map(|i| [value(i), value(i + 7), 1.0]).collect()).unwrap();
-            let small = probe.shrunk(height);
-            prop_assert!(small.height() <= height);
+            let other = probe.resized(rows);
+            prop_assert!(other.height() <= rows && other.height() >= rows.min(FEWEST));
             let light = |p: &Probe, c: usize| -> f64 {
                 (0..p.rgb().len()).map(|i| f64::from(p.rgb()[i][c]) * p.solid_angle(i / p.width())).sum()
             };
             for c in 0..3 {
-                prop_assert!((light(&small, c) / light(&probe, c) - 1.0).abs() < 1e-5);
+                prop_assert!((light(&other, c) / light(&probe, c) - 1.0).abs() < 1e-5);
             }
+        }
+    }
+
+    /// Light that falls on a surface that faces `n`, each texel a point of light in its middle.
+    fn falls(probe: &Probe, n: [f64; 3]) -> f64 {
+        let texel = |i: usize| {
+            let (x, y) = (i % probe.width(), i / probe.width());
+            let d = probe.direction(x, y);
+            let cos = (0..3).map(|c| n[c] * d[c]).sum::<f64>().max(0.0);
+            f64::from(probe.rgb()[i][0]) * cos * probe.solid_angle(y)
+        };
+        (0..probe.rgb().len()).map(texel).sum()
+    }
+
+    /// Sizes that have no small factor, or few rows, are as good as others. A hemisphere of radiance 1 lights what faces it with pi,
+    /// and what stands across it with pi / 2.
+    #[test]
+    fn a_hemisphere_lights_alike_at_any_size() {
+        for height in [2, 6, 50, 129, 254, 509, 514, 1000, 1024] {
+            let width = 2 * height;
+            let texel = |i: usize| [if i / width < height / 2 { 1.0 } else { 0.0 }; 3];
+            let above = Probe::new(height, (0..width * height).map(texel).collect()).unwrap();
+            // Of an odd number of rows the middle one is dark, and half of it is above the horizon.
+            let low = if height % 2 == 1 { 0.5 * PI / height as f64 } else { 0.0 };
+            let (top, side) = (PI * low.cos().powi(2), 0.5 * PI - low - low.sin() * low.cos());
+            for rows in [64, 128] {
+                let small = above.resized(rows);
+                for (n, expected) in
+                    [([0.0, 1.0, 0.0], top), ([1.0, 0.0, 0.0], side), ([0.0, 0.0, 1.0], side)]
+                {
+                    let found = falls(&small, n);
+                    assert!(
+                        (found / expected - 1.0).abs() < 0.01,
+                        "{height} rows as {}: {found}, not {expected}",
+                        small.height()
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn open_exr_is_read_and_what_is_no_radiance_is_refused_with_its_place() {
+        let written = |odd: f32| {
+            let picture = image::Rgb32FImage::from_fn(8, 4, |x, y| {
+                image::Rgb([x as f32, 0.25 * y as f32, if (x, y) == (5, 2) { odd } else { 1e5 }])
+            });
+            let mut bytes = Cursor::new(Vec::new());
+            picture.write_to(&mut bytes, image::ImageFormat::OpenExr).unwrap();
+            read(bytes.into_inner())
+        };
+        let probe = written(0.5).unwrap();
+        assert_eq!((probe.width(), probe.height()), (8, 4));
+        assert_eq!(probe.rgb()[2 * 8 + 5], [5.0, 0.5, 0.5]);
+        assert_eq!(probe.rgb()[8 + 7], [7.0, 0.25, 1e5]);
+        for odd in [f32::NAN, f32::INFINITY, -1.0] {
+            let error = written(odd).unwrap_err().to_string();
+            assert!(error.contains("env.hdr") && error.contains("pixel (5, 2)"), "{error}");
         }
     }
 
@@ -357,9 +464,9 @@ mod tests {
     fn real_panoramas_open() {
         let Some(data) = testing::needs::data() else { return };
         for name in ["studio.hdr", "venice.hdr"] {
-            let probe = Probe::read_hdr(&data.join("env").join(name)).unwrap();
+            let probe = Probe::read(&data.join("env").join(name)).unwrap();
             assert_eq!((probe.width(), probe.height()), (1024, 512));
-            let small = probe.shrunk(128);
+            let small = probe.resized(128);
             assert_eq!((small.width(), small.height()), (256, 128));
             assert!(small.rgb().iter().flatten().any(|v| *v > 1.0));
         }

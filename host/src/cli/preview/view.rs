@@ -113,7 +113,7 @@ pub struct ViewArgs {
     /// Direction of a light, with its distance in metres if it is near; up to four times [default: -25,30,0.6]
     #[arg(long, value_name = "AZ,EL[,M]", allow_hyphen_values = true)]
     pub light: Vec<Lamp>,
-    /// Light from everywhere: a latitude-longitude panorama (.hdr) [default: none; a page has a soft studio to switch on]
+    /// Light from everywhere: a latitude-longitude panorama (.hdr or .exr) [default: none; a page has a soft studio to switch on]
     #[arg(long, value_name = "FILE")]
     pub light_probe: Option<PathBuf>,
     /// Direction from the sheet to the eye

@@ -89,6 +89,25 @@ impl<'a> Loader<'a, '_> {
             return Err(self.wrong(field, format!("texture {index} does not exist")));
         };
         let number = texture.source.value();
+        // What the parser puts where there is no number. Texture extensions name another image then, of a kind that is not read.
+        if number == u32::MAX as usize {
+            let kinds: Vec<&str> = self
+                .root
+                .extensions_used
+                .iter()
+                .map(String::as_str)
+                .filter(|name| is_of_images(name))
+                .collect();
+            let other = if kinds.is_empty() {
+                String::new()
+            } else {
+                format!("; the file uses {}", kinds.join(", "))
+            };
+            let problem = format!(
+                "texture {index} has no image that can be read{other}; export the file with PNG or JPEG textures"
+            );
+            return Err(self.wrong(field, problem));
+        }
         let Some(image) = self.root.images.get(number) else {
             return Err(self.wrong(field, format!("image {number} does not exist")));
         };
@@ -187,6 +206,11 @@ impl<'a> Loader<'a, '_> {
         }
         Ok(coloured(&picture, factor, space))
     }
+}
+
+/// Whether an extension stores the images of textures in another format.
+fn is_of_images(extension: &str) -> bool {
+    extension.contains("_texture_") && extension != "KHR_texture_transform"
 }
 
 pub(super) fn coloured(picture: &Picture, factor: [f32; 3], space: ColourSpace) -> [Field; 3] {

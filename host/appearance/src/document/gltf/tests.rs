@@ -142,6 +142,15 @@ fn files_outside_the_folder_and_damage_are_errors() {
         (image(r#"{"uri":"data:image/png;base64,@@"}"#), "damaged"),
         (image(r#"{"bufferView":7,"mimeType":"image/png"}"#), "bufferView 7 does not exist"),
         (image("{}"), "neither uri nor bufferView"),
+        (
+            image(r#"{"uri":"missing.png"}"#)
+                .replace(r#"{"source":0}"#, r#"{"extensions":{"KHR_texture_basisu":{"source":0}}}"#)
+                .replace(
+                    r#""images""#,
+                    r#""extensionsUsed":["KHR_texture_basisu","KHR_texture_transform"],"images""#,
+                ),
+            "texture 0 has no image that can be read; the file uses KHR_texture_basisu; export the file with PNG",
+        ),
         (image("").replace(r#""index":0"#, r#""index":4"#), "texture 4 does not exist"),
         (r#"{"asset":{"version":"2.0"}}"#.into(), "no material"),
         ("{".into(), "glTF"),
@@ -162,4 +171,10 @@ fn several_materials_need_a_choice() {
     assert!(error.contains("0 (tin), 1 (without a name)"), "{error}");
     assert!(surfaces(&path, Some("1")).is_ok() && surfaces(&path, Some("tin")).is_ok());
     assert!(surfaces(&path, Some("2")).is_err() && surfaces(&path, Some("lead")).is_err());
+    // Two of one name are no choice, either; their numbers are.
+    std::fs::write(&path, r#"{"asset":{"version":"2.0"},"materials":[{"name":"tin"},{"name":"tin"}]}"#)
+        .unwrap();
+    let error = surfaces(&path, Some("tin")).unwrap_err().to_string();
+    assert!(error.contains("2 materials have the name `tin`") && error.contains("1 (tin)"), "{error}");
+    assert!(surfaces(&path, Some("1")).is_ok());
 }
