@@ -2,13 +2,13 @@
 //!
 //! Problem: text on a coloured ground, saved as pixels, is no photograph; screened as one it loses its edges.
 //! Method: what hangs together is looked at as a whole. Its main colours are those that cover most of it in stretches of two
-//! pixels or more; of colours that could follow each other in a shading only one counts. A pixel of another colour is the
-//! softened edge between two main colours, white and black among them, if both, or what is like them, lie within [`REACH`] pixels
-//! of it and its colour lies on the line between them: it becomes the nearer one. The whole is flat art if hardly any pixel is neither.
+//! pixels or more; of colours that follow each other in a shading (they touch) only one counts. A pixel of another colour is the
+//! softened edge between two main colours, white and black among them, if both lie within [`REACH`] pixels of it and its colour
+//! lies on the line between them: it becomes the nearer one. The whole is flat art if hardly any pixel is neither.
 //! Cost: 3 ns a pixel of such art, 100 ns a pixel of its softened edges; photographs are given up after some thousand colours.
 //! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use super::flat::{similar, split};
@@ -28,6 +28,9 @@ const REACH: usize = 2;
 /// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
 const OFF: f32 = 24.0;
 
+/// The first two main colours.
+const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
+
 /// A stretch of pixels, and the colour that it becomes.
 pub(super) type Span = (Range<usize>, [u8; 3]);
 
@@ -38,7 +41,7 @@ pub(super) fn spans<const N: usize>(
     stretches: &[Range<usize>],
 ) -> Option<Vec<Span>> {
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
-    let colours = main_colours(pixels, stretches, total)?;
+    let colours = main_colours(pixels, width, stretches, total)?;
     let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
     let most = (STRAY * total as f64) as u64;
     for stretch in stretches {
@@ -67,6 +70,7 @@ pub(super) fn spans<const N: usize>(
 /// The main colours, white and black first.
 fn main_colours<const N: usize>(
     pixels: &[[u8; N]],
+    width: usize,
     stretches: &[Range<usize>],
     total: u64,
 ) -> Option<Vec<[u8; 3]>> {
@@ -81,18 +85,52 @@ fn main_colours<const N: usize>(
     }
     let mut found: Vec<([u8; 3], u64)> = found.into_iter().filter(|&(_, dots)| dots >= LEAST).collect();
     found.sort_unstable_by_key(|&(colour, dots)| (std::cmp::Reverse(dots), colour));
-    let (mut colours, mut covered) = (vec![[255; 3], [0; 3]], 0);
+    let (mut colours, mut covered) = (WHITE_AND_BLACK.to_vec(), 0);
     // White and black may be beside the art without being of it. Nearly white and nearly black are main colours in their place.
     let mut own = [false; 2];
-    for (colour, dots) in found {
+    let mut shading = None;
+    for &(colour, dots) in &found {
         match colours.iter().position(|&known| similar(known, colour)) {
             None => colours.push(colour),
             Some(at) if own.get(at) == Some(&false) => (colours[at], own[at]) = (colour, true),
-            Some(_) => continue,
+            Some(_) => {
+                if shading.get_or_insert_with(|| shades(pixels, width, stretches, &found)).contains(&colour) {
+                    continue;
+                }
+                colours.push(colour);
+            }
         }
         covered += dots;
     }
     (colours.len() <= MOST + 2 && covered as f64 >= COVERED * total as f64).then_some(colours)
+}
+
+/// Of these colours, those of a shading: by half of their border or more they touch pixels that are like them.
+fn shades<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    stretches: &[Range<usize>],
+    found: &[([u8; 3], u64)],
+) -> HashSet<[u8; 3]> {
+    let mut borders: HashMap<[u8; 3], [u64; 2]> = found.iter().map(|&(colour, _)| (colour, [0; 2])).collect();
+    for stretch in stretches {
+        let mut at = stretch.start;
+        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
+            let all = at..at + run.len();
+            at = all.end;
+            let own = split(&run[0]).1;
+            let Some([border, like]) = borders.get_mut(&own) else { continue };
+            let left = (all.start % width > 0).then(|| all.start - 1);
+            let right = (all.end % width > 0).then_some(all.end);
+            let beneath = all.flat_map(|at| [at.checked_sub(width), Some(at + width)]);
+            for beside in [left, right].into_iter().chain(beneath).flatten().filter_map(|at| pixels.get(at)) {
+                let other = split(beside).1;
+                *border += u64::from(other != own);
+                *like += u64::from(other != own && similar(other, own));
+            }
+        }
+    }
+    borders.into_iter().filter(|&(_, [border, like])| 2 * like >= border).map(|(colour, _)| colour).collect()
 }
 
 /// The main colour that a pixel of a softened edge belongs to.
@@ -108,7 +146,11 @@ fn between<const N: usize>(
     for row in rows {
         for pixel in &pixels[row * width + x.saturating_sub(REACH)..row * width + (x + REACH + 1).min(width)]
         {
-            if let Some(known) = colours.iter().position(|&colour| similar(colour, split(pixel).1)) {
+            let pixel = split(pixel).1;
+            let known = colours.iter().position(|&colour| colour == pixel);
+            // What is nearly white or black stands for white or black beside the art, too.
+            let beside = || WHITE_AND_BLACK.iter().position(|&colour| colour == pixel);
+            if let Some(known) = known.or_else(beside) {
                 near[known] = true;
             }
         }
@@ -197,6 +239,45 @@ mod tests {
             for light in white.into_iter().chain([[200, 30, 30], [0, 0, 62], [255, 255, 0]]) {
                 is_cut(dark, light);
                 is_cut(light, dark);
+            }
+        }
+    }
+
+    /// Discs on panels on a ground, in colours of which several are hardly apart but do not touch.
+    #[test]
+    fn flat_colours_that_are_nearly_alike_are_told_apart() {
+        let ground = [252; 3];
+        let parts = [
+            ([20; 3], [255; 3]),
+            ([0, 60, 140], [250; 3]),
+            ([255, 220, 0], [3; 3]),
+            (ground, [8; 3]),
+            ([235, 235, 230], [40; 3]),
+            ([200, 30, 30], [30, 30, 36]),
+        ];
+        let at_part = |at: usize| {
+            let (x, y) = (at % SIDE, at / SIDE);
+            let (panel, disc) = parts[x / 32 + y / 48 * 3];
+            let place = |v: usize, cell: usize, i: usize| {
+                (v % cell) as f64 + (i as f64 + 0.5) / 8.0 - cell as f64 / 2.0
+            };
+            let inside = |i: usize| place(x, 32, i % 8).hypot(place(y, 48, i / 8)) < 9.3;
+            let share = (0..64).filter(|&i| inside(i)).count() as f64 / 64.0;
+            let on_panel = (3..29).contains(&(x % 32)) && (3..45).contains(&(y % 48));
+            (if on_panel { panel } else { ground }, disc, share)
+        };
+        let pixels: Vec<[u8; 3]> = (0..SIDE * SIDE)
+            .map(|at| {
+                let (panel, disc, share) = at_part(at);
+                std::array::from_fn(|c| {
+                    (f64::from(disc[c]) * share + f64::from(panel[c]) * (1.0 - share)).round() as u8
+                })
+            })
+            .collect();
+        for (at, colour) in all(&pixels).expect("flat art").into_iter().enumerate() {
+            let (panel, disc, share) = at_part(at);
+            if (share - 0.5).abs() > 0.05 {
+                assert_eq!(colour, if share > 0.5 { disc } else { panel }, "at {} {}", at % SIDE, at / SIDE);
             }
         }
     }
