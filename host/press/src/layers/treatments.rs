@@ -18,6 +18,8 @@ use super::solids::Solids;
 const SAME: f64 = 0.05;
 /// At most so much of that may be hue and chroma: another hue is another colour, wherever it is on the page.
 const SAME_HUE: f64 = 0.02;
+/// A colour that differs from paper by at most so much is paper: nobody sees the difference, but everybody the specks.
+const BARE: f64 = 0.01;
 /// Colours of sRGB that differ by more can be told apart where they touch.
 const APART: f64 = 0.02;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for.
@@ -86,6 +88,9 @@ impl Found {
         let weights = &fit.weights(colour)[..bodies.len()];
         let wanted = solids.wanted(colour);
         let mixed = std::array::from_fn(|c| weights.iter().zip(bodies).map(|(w, body)| w * body[c]).sum());
+        if difference(bodies[0], wanted) <= BARE {
+            return Found { colour, stack: 0, off: 0.0, is_solid: true, shape: None };
+        }
         let off = |stack: usize| difference(bodies[stack], wanted);
         let inked = || (1..weights.len()).filter(|&stack| weights[stack] > 0.0);
         let mut near: Vec<usize> = inked().filter(|&stack| weights[stack] >= NEARLY).collect();
@@ -228,6 +233,16 @@ mod tests {
         for colour in [[35, 31, 32], [26, 26, 26], [16, 16, 16]] {
             let (nearest, found, solid) = alone(colour, &mut fit, &solids);
             assert!(nearest == "K" && solid, "{colour:?}: {nearest} {found:.3}");
+        }
+        // A ground that is nearly white has no specks, and a tint of five hundredths of a stack is one.
+        for (colour, bare) in [
+            ([252, 252, 252], true),
+            ([253, 253, 251], true),
+            ([243, 243, 243], false),
+            ([255, 255, 240], false),
+        ] {
+            let (nearest, found, solid) = alone(colour, &mut fit, &solids);
+            assert_eq!(nearest == "substrate" && solid, bare, "{colour:?}: {nearest} {found:.3}");
         }
     }
 }
