@@ -204,6 +204,7 @@ pub fn main() -> ExitCode {
 }
 
 /// The arguments with each negative number joined to the option before it, so that the option says what it expects instead.
+/// Clap's own way knows plain numbers, and lengths have units.
 fn negative_values(args: Vec<OsString>) -> Vec<OsString> {
     let mut joined: Vec<OsString> = Vec::with_capacity(args.len());
     for arg in args {

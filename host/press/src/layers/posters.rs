@@ -5,8 +5,10 @@
 //! pixels or more; of colours that follow each other in a shading (they touch) only one counts. A pixel of another colour is the
 //! softened edge between two main colours, white and black among them, if both lie within [`REACH`] pixels of it and its colour
 //! lies on the line between them: it becomes the nearer one. The whole is flat art if hardly any pixel is neither.
-//! Cost: 3 ns a pixel of such art, 100 ns a pixel of its softened edges; photographs are given up after some thousand colours.
-//! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture.
+//! Cost: 3 ns a pixel of such art, 100 ns a pixel of its softened edges; photographs are given up after some thousand colours. Colours
+//! that are nearly alike cost another pass.
+//! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
+//! text on a ground that is hardly apart from it.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
