@@ -16,6 +16,7 @@
 
 pub mod chart;
 pub mod files;
+mod forest;
 pub mod halftone;
 pub mod html;
 pub mod inspect;

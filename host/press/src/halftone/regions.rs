@@ -25,6 +25,7 @@ use super::TONE;
 use super::mix::Lattice;
 use super::rule::{self, LANES, Lanes, Rule, Source, UNIT, blocks};
 use super::solids::Solids;
+use crate::forest::Forest;
 
 /// No segment.
 const NONE: u32 = u32::MAX;
@@ -72,15 +73,6 @@ pub(super) fn band(
         tones.print_rests(&region, rows);
     }
     observer.advance(u64::from(band.len()));
-}
-
-/// Sets of segments that belong together: a forest of parents, the root the first of its set.
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        parent[i as usize] = parent[parent[i as usize] as usize];
-        i = parent[i as usize];
-    }
-    i
 }
 
 impl<'a> Tones<'a> {
@@ -168,14 +160,13 @@ impl<'a> Tones<'a> {
 
     /// The first segment of the set of each, where those that touch are joined if `may` says so.
     fn joined(&self, may: impl Fn(u32, u32) -> bool) -> Vec<u32> {
-        let mut parent: Vec<u32> = (0..self.segments.len() as u32).collect();
+        let mut sets = Forest::new(self.segments.len());
         self.touching(|a, b, _, _| {
             if may(a, b) {
-                let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-                parent[a.max(b) as usize] = a.min(b);
+                sets.join(a, b);
             }
         });
-        (0..parent.len() as u32).map(|i| root(&mut parent, i)).collect()
+        sets.roots()
     }
 
     /// The rule along the segments that are no rests, region by region.
@@ -296,20 +287,20 @@ impl<'a> Tones<'a> {
     /// Segments that touch, joined while one of them is less than the largest minimum cluster: each clump with its dots.
     fn clumps(&self, mine: impl Fn(u32) -> bool) -> Vec<(Vec<u32>, usize)> {
         let enough = usize::from(self.minimum.iter().copied().max().unwrap_or(1));
-        let mut parent: Vec<u32> = (0..self.segments.len() as u32).collect();
+        let mut sets = Forest::new(self.segments.len());
         let mut dots: Vec<usize> = self.segments.iter().map(|segment| segment.end - segment.from).collect();
         self.touching(|a, b, _, _| {
-            if mine(a) && mine(b) {
-                let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-                if a != b && dots[a as usize].min(dots[b as usize]) < enough {
-                    parent[a.max(b) as usize] = a.min(b);
-                    dots[a.min(b) as usize] += dots[a.max(b) as usize];
-                }
+            if mine(a)
+                && mine(b)
+                && dots[sets.root(a) as usize].min(dots[sets.root(b) as usize]) < enough
+                && let Some((stays, goes)) = sets.join(a, b)
+            {
+                dots[stays as usize] += dots[goes as usize];
             }
         });
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); self.segments.len()];
         for i in (0..self.segments.len() as u32).filter(|&i| mine(i)) {
-            members[root(&mut parent, i) as usize].push(i);
+            members[sets.root(i) as usize].push(i);
         }
         members.into_iter().zip(dots).filter(|(members, _)| !members.is_empty()).collect()
     }

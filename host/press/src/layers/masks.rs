@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use super::flat::split;
 use super::kinds::Kind;
 use super::posters::{self, Span};
+use crate::forest::Forest;
 
 /// The least dots of a colour in shapes of its own: a square of eight dots.
 const LEAST: u64 = 64;
@@ -27,8 +28,6 @@ pub(super) struct Stretch {
     pub end: usize,
     /// Its colour; of its shape, once the shape is whole. None for several.
     colour: Option<[u8; 3]>,
-    /// Another stretch of the same shape; at the root, this one.
-    parent: usize,
 }
 
 /// The shapes in one colour, stretch by stretch, and the dots of each of their colours.
@@ -49,33 +48,37 @@ impl Masks {
             .map(|(y, row)| stretches_of(row).map(|stretch| stretch.moved(y * width)).collect())
             .collect();
         let (mut all, mut above): (Vec<Stretch>, usize) = (Vec::new(), 0);
+        let mut shapes = Forest::default();
         for row in rows {
             let first = all.len();
-            for mut stretch in row {
-                stretch.parent = all.len();
+            for stretch in row {
+                let (start, end, number) = (stretch.start, stretch.end, shapes.add());
                 all.push(stretch);
-                let (start, end) = (all[all.len() - 1].start, all[all.len() - 1].end);
                 while above < first && all[above].end + width <= start {
                     above += 1;
                 }
-                let beneath =
-                    (above..first).take_while(|&at| all[at].start + width < end).collect::<Vec<_>>();
-                for other in beneath {
-                    join(&mut all, other);
+                for other in (above..first).take_while(|&at| all[at].start + width < end) {
+                    shapes.join(number, other as u32);
                 }
             }
             above = first;
         }
+        let roots = shapes.roots();
+        for at in 0..all.len() {
+            let root = roots[at] as usize;
+            if all[at].colour != all[root].colour {
+                all[root].colour = None;
+            }
+        }
         let mut colours = HashMap::new();
         for at in 0..all.len() {
-            let root = root(&mut all, at);
-            (all[at].parent, all[at].colour) = (root, all[root].colour);
+            all[at].colour = all[roots[at] as usize].colour;
             if let Some(colour) = all[at].colour {
                 *colours.entry(colour).or_default() += (all[at].end - all[at].start) as u64;
             }
         }
         colours.retain(|_, dots| *dots >= LEAST);
-        let spans = flat_art(pixels, width, &all);
+        let spans = flat_art(pixels, width, (&all, &roots));
         for (span, colour) in &spans {
             *colours.entry(*colour).or_default() += span.len() as u64;
         }
@@ -93,11 +96,15 @@ impl Masks {
     }
 }
 
-/// The spans of shapes in several colours that are flat art. Every stretch knows its root.
-fn flat_art<const N: usize>(pixels: &[[u8; N]], width: usize, all: &[Stretch]) -> Vec<Span> {
-    let mut shapes: HashMap<usize, Vec<Range<usize>>> = HashMap::new();
-    for stretch in all.iter().filter(|stretch| stretch.colour.is_none()) {
-        shapes.entry(stretch.parent).or_default().push(stretch.start..stretch.end);
+/// The spans of shapes in several colours that are flat art, from all stretches and the root of each.
+fn flat_art<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    (all, roots): (&[Stretch], &[u32]),
+) -> Vec<Span> {
+    let mut shapes: HashMap<u32, Vec<Range<usize>>> = HashMap::new();
+    for (stretch, &root) in all.iter().zip(roots).filter(|(stretch, _)| stretch.colour.is_none()) {
+        shapes.entry(root).or_default().push(stretch.start..stretch.end);
     }
     let mut shapes: Vec<Vec<Range<usize>>> = shapes.into_values().collect();
     shapes.sort_unstable_by_key(|shape| shape[0].start);
@@ -124,27 +131,8 @@ fn stretches_of<const N: usize>(row: &[[u8; N]]) -> impl Iterator<Item = Stretch
         at += row[at..].iter().position(|pixel| !drawn(pixel)).unwrap_or(row.len() - at);
         let (_, colour) = split(&row[start]);
         let alike = row[start..at].iter().all(|pixel| split(pixel).1 == colour);
-        Some(Stretch { start, end: at, colour: alike.then_some(colour), parent: 0 })
+        Some(Stretch { start, end: at, colour: alike.then_some(colour) })
     })
-}
-
-/// Makes one shape of that of the last stretch and that of another.
-fn join(all: &mut [Stretch], other: usize) {
-    let (a, b) = (root(all, all.len() - 1), root(all, other));
-    let (old, young) = (a.min(b), a.max(b));
-    all[young].parent = old;
-    if all[young].colour != all[old].colour {
-        all[old].colour = None;
-    }
-}
-
-/// The root of a shape. Halves the path to it.
-fn root(all: &mut [Stretch], mut at: usize) -> usize {
-    while all[at].parent != at {
-        all[at].parent = all[all[at].parent].parent;
-        at = all[at].parent;
-    }
-    at
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ use super::flat::{Flat, TONE, similar};
 use super::kinds::Kind;
 use super::treatments::{CHOICES, Shape, Treatment};
 use super::words::{self, Letter};
+use crate::forest::Forest;
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.
 const STROKE: u8 = 9;
@@ -28,8 +29,8 @@ const LETTER: u8 = 24;
 struct Run {
     start: u32,
     end: u32,
-    /// Another run of the same shape; at the shape's root, this run itself.
-    parent: u32,
+    /// The root of its shape, another run or this.
+    root: u32,
     colour: u8,
     /// Side of the largest square that ends in the run; at the root, of the shape.
     side: u8,
@@ -56,7 +57,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let words = Words::of(flat, (&runs, &rows));
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for at in rows[y]..rows[y + 1] {
-            let (run, root) = (&runs[at], root(&runs, at as u32));
+            let (run, root) = (&runs[at], runs[at].root);
             let (kind, _) = flat.colours[usize::from(run.colour)];
             let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
             let thin = words.thin(root).unwrap_or(runs[root as usize].side < most(kind));
@@ -121,7 +122,7 @@ impl Grounds {
         let mut border = vec![(0, [0; CHOICES]); runs.len()];
         for y in 0..rows.len() - 1 {
             for run in &runs[rows[y]..rows[y + 1]] {
-                let (all, stacks) = &mut border[run.parent as usize];
+                let (all, stacks) = &mut border[run.root as usize];
                 let mut count = |beside: u8| {
                     if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
                         *all += 1;
@@ -174,14 +175,14 @@ impl Words {
         let (mut letter, mut letters) = (Vec::new(), Vec::<Letter>::new());
         for (y, row) in rows.windows(2).enumerate() {
             for run in &runs[row[0]..row[1]] {
-                let root = &runs[run.parent as usize];
+                let root = &runs[run.root as usize];
                 if !takes_part(root) {
                     continue;
                 }
                 if letter.is_empty() {
                     letter = vec![NO_LETTER; runs.len()];
                 }
-                let number = &mut letter[run.parent as usize];
+                let number = &mut letter[run.root as usize];
                 let y = y as u32;
                 if *number == NO_LETTER {
                     *number = letters.len() as u32;
@@ -236,14 +237,6 @@ fn at_the_rim(flat: &Flat, width: usize, (x, y): (usize, usize)) -> bool {
         || other(row.get(x + 1))
 }
 
-/// The root of a shape.
-fn root(runs: &[Run], mut at: u32) -> u32 {
-    while runs[at as usize].parent != at {
-        at = runs[at as usize].parent;
-    }
-    at
-}
-
 /// The runs of all shapes, joined, and the number of the first run of each row.
 fn shapes(flat: &Flat, width: usize, shaped: &[bool; 256]) -> (Vec<Run>, Vec<usize>) {
     let pairs: Vec<bool> = (0..=255u8)
@@ -252,6 +245,7 @@ fn shapes(flat: &Flat, width: usize, shaped: &[bool; 256]) -> (Vec<Run>, Vec<usi
         .collect();
     let alike = |a: u8, b: u8| pairs[256 * usize::from(a) + usize::from(b)];
     let (mut runs, mut rows): (Vec<Run>, Vec<usize>) = (Vec::new(), vec![0]);
+    let mut shapes = Forest::default();
     // Sides of the largest squares whose lower right corner is a dot of this row and of the one above.
     let (mut here, mut above) = (vec![0u8; width], vec![0u8; width]);
     let blank = vec![TONE; width];
@@ -267,7 +261,7 @@ fn shapes(flat: &Flat, width: usize, shaped: &[bool; 256]) -> (Vec<Run>, Vec<usi
                 x += 1;
                 continue;
             }
-            let number = runs.len() as u32;
+            let number = shapes.add();
             let start = x;
             let mut side = 0;
             while x < width && row[x] == colour {
@@ -280,47 +274,28 @@ fn shapes(flat: &Flat, width: usize, shaped: &[bool; 256]) -> (Vec<Run>, Vec<usi
                 side = side.max(here[x]);
                 x += 1;
             }
-            runs.push(Run { start: start as u32, end: x as u32, parent: number, colour, side });
+            runs.push(Run { start: start as u32, end: x as u32, root: number, colour, side });
             if start > 0 && number as usize > first && alike(colour, row[start - 1]) {
-                join(&mut runs, number, number - 1);
+                shapes.join(number, number - 1);
             }
             while up < first && runs[up].end as usize <= start {
                 up += 1;
             }
-            let beneath = (up..first).take_while(|&at| (runs[at].start as usize) < x);
-            let beneath: Vec<u32> = beneath.map(|at| at as u32).collect();
-            for other in beneath {
-                if alike(colour, runs[other as usize].colour) {
-                    join(&mut runs, number, other);
+            for other in (up..first).take_while(|&at| (runs[at].start as usize) < x) {
+                if alike(colour, runs[other].colour) {
+                    shapes.join(number, other as u32);
                 }
             }
         }
         rows.push(runs.len());
         std::mem::swap(&mut here, &mut above);
     }
-    // Paths to the root are one step long from here on.
-    for at in 0..runs.len() {
-        runs[at].parent = root(&runs, at as u32);
+    for (at, root) in shapes.roots().into_iter().enumerate() {
+        runs[at].root = root;
+        let side = runs[at].side;
+        runs[root as usize].side = runs[root as usize].side.max(side);
     }
     (runs, rows)
-}
-
-/// Makes one shape of those of two runs; the older root takes the younger.
-fn join(runs: &mut [Run], a: u32, b: u32) {
-    let (a, b) = (halved(runs, a), halved(runs, b));
-    let (old, young) = (a.min(b) as usize, a.max(b) as usize);
-    runs[young].parent = old as u32;
-    runs[old].side = runs[old].side.max(runs[young].side);
-}
-
-/// The root of a shape. Halves the path to it.
-fn halved(runs: &mut [Run], mut at: u32) -> u32 {
-    while runs[at as usize].parent != at {
-        let up = runs[runs[at as usize].parent as usize].parent;
-        runs[at as usize].parent = up;
-        at = up;
-    }
-    at
 }
 
 #[cfg(test)]
@@ -495,12 +470,12 @@ mod tests {
             }
             for y in 0..length {
                 for at in rows[y]..rows[y + 1] {
-                    let shape = root(&runs, at as u32);
+                    let shape = runs[at].root;
                     let dot = y * width + runs[at].start as usize;
                     prop_assert_eq!(usize::from(runs[shape as usize].side), sides[number[dot]]);
                     for (v, other) in (0..length).flat_map(|v| (rows[v]..rows[v + 1]).map(move |other| (v, other))) {
                         let beside = v * width + runs[other].start as usize;
-                        prop_assert_eq!(root(&runs, other as u32) == shape, number[beside] == number[dot]);
+                        prop_assert_eq!(runs[other].root == shape, number[beside] == number[dot]);
                     }
                 }
             }

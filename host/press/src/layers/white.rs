@@ -12,6 +12,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::bits;
+use crate::forest::Forest;
 use crate::separate::Plane;
 
 /// Where white goes beneath the art.
@@ -49,25 +50,13 @@ impl fmt::Display for White {
 struct Run {
     from: usize,
     to: usize,
-    /// Another run of the same region; at the region's root, this run itself.
-    parent: u32,
-}
-
-/// The root of a region. Halves the path to it.
-fn root(runs: &mut [Run], mut at: u32) -> u32 {
-    while runs[at as usize].parent != at {
-        let up = runs[runs[at as usize].parent as usize].parent;
-        runs[at as usize].parent = up;
-        at = up;
-    }
-    at
 }
 
 /// The plane with everything inside its outlines filled.
 pub(super) fn silhouette(drawn: &Plane) -> Plane {
     let (width, length) = (drawn.width, drawn.length);
     // Run 0 is outside.
-    let mut runs = vec![Run { from: 0, to: 0, parent: 0 }];
+    let (mut runs, mut regions) = (vec![Run { from: 0, to: 0 }], Forest::new(1));
     let mut rows = Vec::with_capacity(length + 1);
     for y in 0..length {
         rows.push(runs.len());
@@ -94,9 +83,11 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
                 }
             }
             let to = x.min(width);
-            let number = runs.len() as u32;
-            let border = y == 0 || y + 1 == length || from == 0 || to == width;
-            runs.push(Run { from, to, parent: if border { 0 } else { number } });
+            runs.push(Run { from, to });
+            let number = regions.add();
+            if y == 0 || y + 1 == length || from == 0 || to == width {
+                regions.join(0, number);
+            }
         }
     }
     rows.push(runs.len());
@@ -104,18 +95,17 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
         let (mut a, mut b) = (rows[y - 1], rows[y]);
         while a < rows[y] && b < rows[y + 1] {
             if runs[a].from < runs[b].to && runs[b].from < runs[a].to {
-                let (p, q) = (root(&mut runs, a as u32), root(&mut runs, b as u32));
-                runs[p.max(q) as usize].parent = p.min(q);
+                regions.join(a as u32, b as u32);
             }
             if runs[a].to < runs[b].to { a += 1 } else { b += 1 }
         }
     }
+    let regions = regions.roots();
     let mut filled = bits::full(width, length);
-    for y in 0..length {
-        for run in rows[y]..rows[y + 1] {
-            if root(&mut runs, run as u32) == 0 {
-                clear(&mut filled.bits[y * drawn.stride..][..drawn.stride], runs[run].from, runs[run].to);
-            }
+    for (y, row) in filled.bits.chunks_exact_mut(drawn.stride.max(1)).take(length).enumerate() {
+        let here = rows[y]..rows[y + 1];
+        for (run, _) in runs[here.clone()].iter().zip(&regions[here]).filter(|(_, root)| **root == 0) {
+            clear(row, run.from, run.to);
         }
     }
     filled

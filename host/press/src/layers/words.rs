@@ -9,6 +9,8 @@
 //! Limits: a page as Ghostscript tags it knows letters but no words, so near lines of one size are decided together, too, and
 //! letters that are spaced more widely than words are decided by themselves.
 
+use crate::forest::Forest;
+
 /// A letter whose strokes are near the limit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Letter {
@@ -37,7 +39,7 @@ pub(super) fn takes_part(side: u8, limit: u8) -> bool {
 pub(super) fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<bool> {
     let mut order: Vec<usize> = (0..letters.len()).collect();
     order.sort_by_key(|&at| letters[at].bounds[0]);
-    let mut parent: Vec<usize> = (0..letters.len()).collect();
+    let mut words = Forest::new(letters.len());
     let mut open: Vec<usize> = Vec::new();
     for &at in &order {
         let letter = &letters[at];
@@ -45,18 +47,17 @@ pub(super) fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> boo
         open.retain(|&other| letters[other].bounds[2] + most > letter.bounds[0]);
         for &other in &open {
             if joined(letter.colour, letters[other].colour) && belong_together(letter, &letters[other]) {
-                let (a, b) = (root(&mut parent, at), root(&mut parent, other));
-                parent[a.max(b)] = a.min(b);
+                words.join(at as u32, other as u32);
             }
         }
         open.push(at);
     }
     let mut thin_dots = vec![0i64; letters.len()];
-    let roots: Vec<usize> = (0..letters.len()).map(|at| root(&mut parent, at)).collect();
+    let roots = words.roots();
     for (letter, &root) in letters.iter().zip(&roots) {
-        thin_dots[root] += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
+        thin_dots[root as usize] += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
     }
-    roots.into_iter().map(|root| thin_dots[root] > 0).collect()
+    roots.into_iter().map(|root| thin_dots[root as usize] > 0).collect()
 }
 
 /// Whether two letters are near each other, and their strokes alike: within a half.
@@ -66,15 +67,6 @@ fn belong_together(a: &Letter, b: &Letter) -> bool {
         a.bounds[low].max(b.bounds[low]).saturating_sub(a.bounds[high].min(b.bounds[high]))
     };
     2 * wider <= 3 * thinner && gap(0, 2).max(gap(1, 3)) <= SPACE * wider
-}
-
-/// The root of a group. Halves the path to it.
-fn root(parent: &mut [usize], mut at: usize) -> usize {
-    while parent[at] != at {
-        parent[at] = parent[parent[at]];
-        at = parent[at];
-    }
-    at
 }
 
 #[cfg(test)]

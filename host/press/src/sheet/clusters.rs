@@ -4,6 +4,8 @@
 //! Method: clusters are 4-connected components, found by joining the runs of neighbouring rows (union-find).
 //! Cost: 20 ns a run. Memory: 12 bytes a run of a row, 12 bytes a cluster.
 
+use crate::forest::Forest;
+
 /// How many dots are like the first; `row` is not empty. Eight at a time, as most runs are about that long.
 fn run(row: &[u8]) -> usize {
     let first = u64::from_ne_bytes([row[0]; 8]);
@@ -17,51 +19,38 @@ fn run(row: &[u8]) -> usize {
     8 * words.len() + rest.iter().take_while(|&&dot| dot == row[0]).count()
 }
 
-/// Clusters that may turn out to be one: a forest of parents.
+/// Clusters that may turn out to be one.
 #[derive(Default)]
 struct Clusters {
-    parent: Vec<u32>,
-    /// Dots, counted at the root of a tree.
+    sets: Forest,
+    /// Dots, counted at the root of a set.
     size: Vec<u32>,
     label: Vec<u8>,
 }
 
 impl Clusters {
     fn new_one(&mut self, label: u8) -> u32 {
-        // Fewer clusters than dots, whose number fits.
-        let number = self.parent.len() as u32;
-        self.parent.push(number);
         self.size.push(0);
         self.label.push(label);
-        number
+        self.sets.add()
     }
 
-    fn root(&mut self, mut i: u32) -> u32 {
-        while self.parent[i as usize] != i {
-            // Halving the path keeps the trees flat.
-            self.parent[i as usize] = self.parent[self.parent[i as usize] as usize];
-            i = self.parent[i as usize];
-        }
-        i
-    }
-
-    /// Makes one cluster of two roots; the older takes the younger.
+    /// Makes one cluster of two roots; returns what is its root.
     fn join(&mut self, a: u32, b: u32) -> u32 {
-        let (old, young) = (a.min(b), a.max(b));
-        if old != young {
-            self.parent[young as usize] = old;
-            self.size[old as usize] += std::mem::take(&mut self.size[young as usize]);
+        if let Some((stays, goes)) = self.sets.join(a, b) {
+            self.size[stays as usize] += std::mem::take(&mut self.size[goes as usize]);
         }
-        old
+        a.min(b)
     }
 
     /// The smallest cluster of each label, 0 for a label without one.
     fn smallest(&self) -> [u32; 256] {
         let mut least = [0; 256];
-        for (i, &label) in self.label.iter().enumerate() {
+        // Roots alone have a size.
+        for (&label, &size) in self.label.iter().zip(&self.size).filter(|(_, size)| **size > 0) {
             let least = &mut least[usize::from(label)];
-            if self.parent[i] as usize == i && (*least == 0 || self.size[i] < *least) {
-                *least = self.size[i];
+            if *least == 0 || size < *least {
+                *least = size;
             }
         }
         least
@@ -96,7 +85,7 @@ pub(crate) fn smallest_clusters(width: usize, index: &[u8], label: &[u8; 256]) -
             }
             for run in &above[over..] {
                 if run.label == own {
-                    let other = clusters.root(run.cluster);
+                    let other = clusters.sets.root(run.cluster);
                     cluster = Some(cluster.map_or(other, |mine| clusters.join(mine, other)));
                 }
                 if run.end as usize >= end {
