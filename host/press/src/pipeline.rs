@@ -80,8 +80,13 @@ pub enum JobError {
     #[error(transparent)]
     Separate(#[from] SeparateError),
     /// The rules on stacks and pages forbid the job.
-    #[error("this must not be printed: {0}")]
-    Refused(String),
+    #[error("this must not be printed: {text}")]
+    Refused {
+        /// The rule.
+        rule: String,
+        /// What it says, with its stacks.
+        text: String,
+    },
     /// Writing the job.
     #[error(transparent)]
     Stream(#[from] StreamError),
@@ -172,7 +177,7 @@ pub fn separate_page(
 /// [`JobError::Refused`] with the rule and its stacks.
 pub fn permit(separation: &Separation) -> Result<(), JobError> {
     match separation.checks.iter().find(|check| check.severity == Severity::Error) {
-        Some(check) => Err(JobError::Refused(check.with_stacks())),
+        Some(check) => Err(JobError::Refused { rule: check.rule.clone(), text: check.with_stacks() }),
         None => Ok(()),
     }
 }

@@ -114,6 +114,17 @@ pub enum FilterError {
         /// What is the matter.
         source: LayersError,
     },
+    /// A page with more inks than the printer holds.
+    #[error(
+        "page {page} cannot be printed: {text}; FoilpressSpots=Off prints spot colours in process inks, and \
+         FoilpressInks=NoBlack mixes other colours without black"
+    )]
+    Cartridges {
+        /// Page, from 1.
+        page: usize,
+        /// What the rule says.
+        text: String,
+    },
     /// Its job.
     #[error("page {page} cannot be printed")]
     Job {

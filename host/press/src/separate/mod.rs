@@ -22,7 +22,7 @@ use observe::Observer;
 
 pub use passes::{MOST_CARTRIDGES, Pass, Plan, Plane, Planned};
 pub(crate) use passes::{MOST_LAYERS, MOST_PASSES};
-pub use rules::Check;
+pub use rules::{CARTRIDGES, Check};
 
 /// A sheet ready for the printer's language.
 #[derive(Clone, Debug, PartialEq)]

@@ -251,6 +251,9 @@ pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, rules: &[Rule]) 
     checks
 }
 
+/// The rule on how many cartridges the printer holds.
+pub const CARTRIDGES: &str = "cartridges";
+
 /// More cartridges than the printer holds are an error.
 fn too_many_cartridges(plan: &Plan) -> Option<Check> {
     if plan.cartridges.len() <= MOST_CARTRIDGES {
@@ -266,7 +269,7 @@ fn too_many_cartridges(plan: &Plan) -> Option<Check> {
         _ => format!(", for example one of {}, which have the fewest dots ({least} each)", rarest.join(", ")),
     };
     Some(Check {
-        rule: "cartridges".into(),
+        rule: CARTRIDGES.into(),
         severity: Severity::Error,
         certainty: Certainty::Vendor,
         text: format!(

@@ -13,7 +13,8 @@ use observe::Observer;
 use press::job::Handling;
 use press::layers::{self, Artwork, Window};
 use press::layout::{Cut, Layout, Mm, Point, Position};
-use press::pipeline::{self, Request};
+use press::pipeline::{self, JobError, Request};
+use press::separate::CARTRIDGES;
 
 /// What makes jobs of pages.
 pub(super) struct Press<'a> {
@@ -153,8 +154,7 @@ impl Press<'_> {
             allowed: settings.inks,
             library: self.library,
         };
-        let job = pipeline::job(&request, self.observer)
-            .map_err(|source| FilterError::Job { page: number, source })?;
+        let job = pipeline::job(&request, self.observer).map_err(|error| unprintable(number, error))?;
         // What a page has on its margins was left out before; what is moved there is cut off now.
         let moved = !matches!(self.choices.place, Place::Page);
         if let Some(cut) = view.beyond.or(job.draft.laid.cut.filter(|_| moved)) {
@@ -162,6 +162,14 @@ impl Press<'_> {
                 .note(&format!("page {number}: {cut} lies on the margins, where the printer cannot print"));
         }
         Ok(job.bytes)
+    }
+}
+
+/// Why a page cannot be printed. Which options leave inks out is said where there are too many.
+fn unprintable(page: usize, error: JobError) -> FilterError {
+    match error {
+        JobError::Refused { rule, text } if rule == CARTRIDGES => FilterError::Cartridges { page, text },
+        source => FilterError::Job { page, source },
     }
 }
 
