@@ -99,7 +99,7 @@ pub(super) fn closest(name: &str) -> Option<&'static str> {
     inks::names::known()
         .filter(|known| known.chars().next() == name.chars().next())
         .map(|known| (strsim::normalized_damerau_levenshtein(&name, known), known))
-        .filter(|(likeness, _)| *likeness >= 0.6)
+        .filter(|(likeness, _)| *likeness > 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, known)| known)
 }
@@ -151,7 +151,7 @@ mod tests {
         }
         assert_eq!(closest("whitee"), Some("white"));
         assert_eq!(closest("01-golld"), Some("gold"));
-        assert_eq!((closest("holiday"), closest("Fold")), (None, None));
+        assert_eq!((closest("holiday"), closest("Fold"), closest("Blanc")), (None, None, None));
         assert!(typed("sliver").unwrap_err().contains("did you mean `silver`?"));
         assert_eq!(typed("silver foil"), Ok(Ink::SilverFoil));
     }
