@@ -166,6 +166,9 @@ fn layers(
     let extensions = material.extensions.as_ref();
     let (base, kind) = match extensions.and_then(|e| e.pbr_specular_glossiness.as_ref()) {
         Some(old) => {
+            note_clamped(loader, "diffuseFactor", &old.diffuse_factor.0);
+            note_clamped(loader, "specularFactor", &old.specular_factor.0);
+            note_clamped(loader, "glossinessFactor", &[old.glossiness_factor.0]);
             let [r, g, b, _] = old.diffuse_factor.0;
             let base = loader.colour(old.diffuse_texture.as_ref(), [r, g, b], space, "diffuseTexture")?;
             let (f0, gloss) = match &old.specular_glossiness_texture {
@@ -183,6 +186,9 @@ fn layers(
         }
         None => {
             let pbr = &material.pbr_metallic_roughness;
+            note_clamped(loader, "baseColorFactor", &pbr.base_color_factor.0);
+            note_clamped(loader, "roughnessFactor", &[pbr.roughness_factor.0]);
+            note_clamped(loader, "metallicFactor", &[pbr.metallic_factor.0]);
             let [r, g, b, _] = pbr.base_color_factor.0;
             let base =
                 loader.colour(pbr.base_color_texture.as_ref(), [r, g, b], space, "baseColorTexture")?;
@@ -230,6 +236,13 @@ fn layers(
         Some(normal) => normal_variance(loader, normal, base[0].size())?,
     };
     Ok(Layers { base, kind, variance })
+}
+
+/// Says which factors are not from 0 to 1, as glTF has them: what they make is cut off there.
+fn note_clamped(loader: &mut Loader<'_, '_>, name: &str, factors: &[f32]) {
+    if let Some(factor) = factors.iter().find(|factor| !(0.0..=1.0).contains(*factor)) {
+        loader.source.note(format!("{name}: {factor} is not from 0 to 1; what it makes is cut off there"));
+    }
 }
 
 /// The slope variance of the normal map, or nothing if it has its own coordinates, as detail that repeats at another

@@ -178,3 +178,24 @@ fn several_materials_need_a_choice() {
     assert!(error.contains("2 materials have the name `tin`") && error.contains("1 (tin)"), "{error}");
     assert!(surfaces(&path, Some("1")).is_ok());
 }
+
+/// A factor beyond 1 is legal to write and of no use to a printer: it is cut off, and said.
+#[test]
+fn factors_that_are_cut_off_are_noted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bright.gltf");
+    let notes = |factors: &str| {
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"materials":[{{"pbrMetallicRoughness":{{{factors}}}}}]}}"#
+        );
+        std::fs::write(&path, json).unwrap();
+        surfaces(&path, None).unwrap().1.notes
+    };
+    let said =
+        notes(r#""baseColorFactor":[1.7,0.5,1,1],"roughnessFactor":-0.5,"metallicFactor":1"#).join("\n");
+    assert!(said.contains("baseColorFactor: 1.7 is not from 0 to 1"), "{said}");
+    assert!(said.contains("roughnessFactor: -0.5"), "{said}");
+    assert!(
+        !notes(r#""baseColorFactor":[1,0.5,0,1],"roughnessFactor":0.5"#).join("\n").contains("from 0 to 1")
+    );
+}
