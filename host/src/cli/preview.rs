@@ -19,6 +19,7 @@ use serde_json::json;
 use self::shown::{Shown, png};
 use self::view::{Show, ViewArgs};
 use self::wear::{Told, WearArgs};
+use super::choice::whole;
 use super::laid::DotsArgs;
 use super::output::Staged;
 use super::preset::PresetArg;
@@ -59,7 +60,7 @@ pub struct Args {
     #[command(flatten)]
     view: ViewArgs,
     /// Pixels of the longer side of a picture or texture
-    #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = clap::value_parser!(u16).range(16..=8192))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1024, value_parser = whole(16..=8192u16))]
     pixels: u16,
     #[command(flatten)]
     wear: WearArgs,
@@ -148,6 +149,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             }
             None => Renderer::new(&lit(pixels)?).render(&scene, width, height, observer)?,
         };
+        if radiance.pixels.iter().all(|[light @ .., _]| *light == [0.0; 3]) {
+            observer.note("no light falls on what is seen of the sheet, so all of it is black; --light 0,0 is straight above it");
+        }
         let tone = args.view.tone(&radiance);
         match format {
             Format::Exr => write_exr(&radiance, staged.path())?,

@@ -17,7 +17,7 @@ use observe::Observer;
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {
     /// No pass has a dot.
-    #[error("there is nothing to print: no pass has a dot")]
+    #[error("there is nothing to print: no pass has a dot, all of it is bare paper")]
     NothingToPrint,
     /// A plane is not the page's size.
     #[error("pass {pass} ({ink}) has {width} x {length} dots, but the page has {page_width} x {page_length}")]
