@@ -11,7 +11,7 @@ use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
-use super::choice::{Metric, choice, name};
+use super::choice::{Metric, choice, name, whole};
 use crate::libraries;
 use observe::Observer;
 
@@ -29,7 +29,7 @@ pub struct DocumentArgs {
     #[arg(long, value_name = "SPACE", value_parser = choice::<ColourSpace>())]
     pub colour_space: Option<ColourSpace>,
     /// Number of angles at which each reflectance curve is sampled, 32 to 512; 32 is enough for anything printable
-    #[arg(long, default_value_t = document::SAMPLES, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(32..=512))]
+    #[arg(long, default_value_t = document::SAMPLES, value_parser = whole(32..=512usize))]
     pub samples: usize,
 }
 
@@ -65,7 +65,7 @@ impl DocumentArgs {
 #[derive(Args, Debug)]
 pub struct FactorArgs {
     /// Number of bases, where the intent uses them [default: as many as the document needs]
-    #[arg(long, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=factor::MOST_BASES as u64))]
+    #[arg(long, value_parser = whole(1..=factor::MOST_BASES))]
     pub bases: Option<usize>,
     /// Method that finds the bases: archetypes, or the paper's kmeans (convex hull) and sacls
     #[arg(long = "factor", value_name = "METHOD", default_value = "archetypes", value_parser = choice::<Method>())]

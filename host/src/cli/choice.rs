@@ -1,4 +1,8 @@
-//! Named values on the command line for enums of the library crates, which know no command line.
+//! Values of options: names for enums of the library crates, which know no command line, and whole numbers in a range.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 use appearance::document::ColourSpace;
 use appearance::factor::Method;
@@ -27,6 +31,17 @@ pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(names).try_map(|name| {
         T::ALL.iter().find(|(_, known, _)| *known == name).map(|(value, ..)| *value).ok_or("unknown name")
     })
+}
+
+/// Reads a whole number in a range, both ends included.
+pub fn whole<T>(range: RangeInclusive<T>) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr + PartialOrd + fmt::Display + Clone + Send + Sync + 'static,
+{
+    move |text: &str| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("expected a whole number from {} to {}", range.start(), range.end()))
+    }
 }
 
 impl Choice for ColourSpace {

@@ -7,6 +7,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Args;
 
 use super::bridge::shelf_text;
+use super::choice::whole;
 use super::output::{self, Staged};
 use super::terminal::{Terminal, cartridges_needed, cartridges_text, size_text};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
@@ -27,7 +28,7 @@ pub struct DeliverArgs {
     #[arg(long, value_name = "WHERE")]
     pub to: Option<Destination>,
     /// Number of sheets to print; the program waits for Enter between them
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "to", value_parser = clap::value_parser!(u16).range(1..=99))]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "to", value_parser = whole(1..=99u16))]
     pub copies: u16,
     /// Send even if the device does not identify itself as an ALPS printer
     #[arg(long, requires = "to")]

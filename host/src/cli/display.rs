@@ -19,6 +19,7 @@ use view::display::{
 };
 
 use super::args::{DocumentArgs, InkArgs};
+use super::choice::whole;
 use super::job::{self, JobArgs, Places};
 use super::output::write;
 use observe::Observer;
@@ -59,10 +60,10 @@ pub struct Args {
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = pixels)]
     mask_size: (u32, u32),
     /// Pixels along the longer side of the display; larger images are averaged [default: those of the images]
-    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(LONGEST)))]
+    #[arg(long, value_name = "PIXELS", value_parser = whole(1..=LONGEST))]
     pixels: Option<u32>,
     /// Screen pixels along each side of a printed cell
-    #[arg(long, value_name = "PIXELS", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(LONGEST)))]
+    #[arg(long, value_name = "PIXELS", default_value_t = 1, value_parser = whole(1..=LONGEST))]
     cell: u32,
     /// Stacks of the grid, 2 to 9 separated by commas, such as MS+F,MS,K,W [default: the four that show the images best]
     #[arg(long, value_name = "STACKS", value_delimiter = ',')]

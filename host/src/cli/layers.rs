@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::advice;
 use super::args::HalftoneArg;
-use super::choice::choice;
+use super::choice::{choice, whole};
 use super::deliver::DeliverArgs;
 use super::job::{Artwork, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
@@ -37,7 +37,7 @@ pub struct LayersArgs {
     pub reserved: bool,
     /// Largest difference of red, green and blue from a reserved colour, 0 to 60 [default: 8 for white and black, 12
     /// for metals]
-    #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = clap::value_parser!(u8).range(0..=60))]
+    #[arg(long, value_name = "STEPS", requires = "reserved", value_parser = whole(0..=60u8))]
     pub tolerance: Option<u8>,
     /// Resolution of the pictures in pixels per inch, if a file states none or a wrong one
     #[arg(long, value_name = "DPI", value_parser = dpi)]

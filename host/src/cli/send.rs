@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args as ClapArgs;
 
+use super::choice::whole;
 use super::deliver::{Order, deliver, store};
 use device::deliver::Job;
 use device::send::{self, Destination};
@@ -31,7 +32,7 @@ pub struct Args {
     #[arg(long)]
     force: bool,
     /// Number of sheets to print; the program waits for Enter between them
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole(1..=99u16))]
     copies: u16,
     /// Store the job in the bridge, whose button prints it without a computer
     #[arg(long, conflicts_with_all = ["copies", "force"])]

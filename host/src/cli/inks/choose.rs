@@ -9,6 +9,7 @@ use protocol::ink::Ink;
 use serde_json::{Value, json};
 
 use super::super::args::{DocumentArgs, InkArgs};
+use super::super::choice::whole;
 
 /// Arguments of `inks choose`.
 #[derive(clap::Args, Debug)]
@@ -19,8 +20,7 @@ pub struct Args {
     #[command(flatten)]
     document: DocumentArgs,
     /// Number of cartridges
-    #[arg(long, value_name = "NUMBER", default_value_t = 7,
-        value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=Ink::ALL.len() as u64))]
+    #[arg(long, value_name = "NUMBER", default_value_t = 7, value_parser = whole(1..=Ink::ALL.len()))]
     cartridges: usize,
     #[command(flatten)]
     inks: InkArgs,
