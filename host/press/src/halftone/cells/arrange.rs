@@ -2,7 +2,8 @@
 //!
 //! Problem: the halves of a cell lean to one side: a place there looks darker, and one opposite lighter, than the cell.
 //! Method: they lean away from the errors of the cells that were decided before: beside it, above, and at both upper corners.
-//! Limits: only where the document varies by itself; flat tones would lock into patterns, so there a hash decides.
+//! Limits: only where the document varies by itself; flat tones would lock into patterns, so there a hash decides, as it does where all
+//! cells have the same halves: a ramp had solid columns where it passed 50 %.
 //! Cost: as many operations a cell as one pass over its stacks. Memory: a point for each cell across.
 
 use super::cell::Cell;

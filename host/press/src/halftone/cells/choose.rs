@@ -36,6 +36,9 @@ const HALF: f32 = 0.16;
 /// The least of these where cells may be cut and a second stack has a tenth of them or more.
 const CUT: f32 = 0.2;
 
+/// The largest share of a stack in cells that lock.
+const LOCKED: f32 = 0.55;
+
 /// By how much a weight differs over a block whose cells, if they may be cut, need hardly any disturbance.
 const TEXTURED: f32 = 0.015 * ONE as f32;
 
@@ -235,6 +238,17 @@ fn largest(gains: &[f32]) -> (u8, f32) {
     }
     let most = most.into_iter().fold(f32::NEG_INFINITY, f32::max);
     (gains.iter().position(|&gain| gain == most).unwrap_or_default() as u8, most)
+}
+
+/// Whether two stacks ask for about half of a cell each, and hardly any other for some: where all cells are cut into the same halves,
+/// halves arranged by their neighbours would be columns and rows.
+pub(super) fn halves_lock(want: &[f32]) -> bool {
+    let (mut first, mut second) = (0.0f32, 0.0f32);
+    for &want in want {
+        (first, second) = if want > first { (want, first) } else { (first, second.max(want)) };
+    }
+    let all: f32 = want.iter().sum();
+    first < LOCKED * all && first + second > 2.0 * (1.0 - LOCKED) * all
 }
 
 /// Whether a document varies by itself where a weight differs by so much over a block.

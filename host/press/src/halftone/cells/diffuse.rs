@@ -16,7 +16,7 @@
 use super::arrange::Errors;
 use super::border::{Usual, begin};
 use super::cell::Cell;
-use super::choose::{Chooser, Metric, NOISE, disturbing, textured};
+use super::choose::{Chooser, Metric, NOISE, disturbing, halves_lock, textured};
 use super::field::{Field, LANES, Row};
 use super::plan::{BLOCK, Block, Plan};
 
@@ -393,7 +393,7 @@ impl<'a> Strip<'a> {
             cell = Cell::whole(self.holding(cell.halves[0].into(), area) as u8);
         }
         let place = slot / lanes;
-        if self.textured && side.is_some() {
+        if self.textured && side.is_some() && !(cell.is_split() && halves_lock(&self.want)) {
             let own = (&self.want[..], area as f32);
             cell = self.errors.arrange(self.chooser.metric, (place, self.back), own, cell);
         } else {

@@ -6,8 +6,11 @@
 //! Cost: pixels x channels a row of cells, then channels x stacks a cell. Memory: tables of a few bytes a dot of either side. Arithmetic is that of `f32`, each operation rounded once and in a
 //! fixed order: equal on any machine.
 
+use std::ops::Range;
+
 use super::super::mix::Axis;
 use super::super::solids::Solids;
+use super::plan::{BLOCK, FLAT, Mask, bits};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 
@@ -127,16 +130,25 @@ impl<'a> Field<'a> {
         shares
     }
 
-    /// For the pixels under a square of one of the sizes, by its place among such squares: marks the stacks that have
-    /// weight there. Returns by how much the weight of a channel differs at most.
-    pub(super) fn survey(&self, size: usize, column: usize, row: usize, present: &mut [bool]) -> u16 {
-        let (left, right) = Field::spans(&self.across, size).pixels(column);
-        let (top, bottom) = Field::spans(&self.down, size).pixels(row);
-        let (maps, count) = (&self.mix.maps, self.mix.maps.channels());
+    /// For the pixels that dots of a block read, all of them without a mask: marks the stacks that have weight there. Returns by how
+    /// much the weight of a channel differs at most; 0 where nearly all neighbours are alike, as beside the edge of a flat tone.
+    pub(super) fn survey(
+        &self,
+        (column, row): (usize, usize),
+        dots: Option<&Mask>,
+        present: &mut [bool],
+    ) -> u16 {
+        let (left, right) = Field::spans(&self.across, BLOCK).pixels(column);
+        let (top, bottom) = Field::spans(&self.down, BLOCK).pixels(row);
+        let (maps, count, across) = (&self.mix.maps, self.mix.maps.channels(), right - left);
+        let read = dots.map(|dots| self.read((column, row), dots, (left..right, top..bottom)));
+        let is_read = |x: usize, y: usize| read.as_ref().is_none_or(|read| read[y * across + x]);
+        let row = |y: usize| {
+            maps.data()[((top + y) * maps.width() + left) * count..][..across * count].chunks_exact(count)
+        };
         let (mut least, mut most) = (vec![u16::MAX; count], vec![0u16; count]);
-        for y in top..bottom {
-            let row = y * maps.width();
-            for pixel in maps.data()[(row + left) * count..(row + right) * count].chunks_exact(count) {
+        for y in 0..bottom - top {
+            for (_, pixel) in row(y).enumerate().filter(|&(x, _)| is_read(x, y)) {
                 for ((least, most), &weight) in least.iter_mut().zip(&mut most).zip(pixel) {
                     (*least, *most) = ((*least).min(weight), (*most).max(weight));
                 }
@@ -147,7 +159,41 @@ impl<'a> Field<'a> {
                 *present |= self.mix.matrix[channel][usize::from(q)] > 0;
             }
         }
-        most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max().unwrap_or(0)
+        let varies = most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max();
+        let (mut pairs, mut alike) = (0, 0);
+        let mut count_pair = |a: (usize, usize), b: (usize, usize)| {
+            if is_read(a.0, a.1) && is_read(b.0, b.1) {
+                let at = |(x, y): (usize, usize)| maps.at((top + y) * maps.width() + left + x);
+                (pairs, alike) = (pairs + 1, alike + u32::from(at(a) == at(b)));
+            }
+        };
+        for y in (0..bottom - top).filter(|_| varies > Some(FLAT)) {
+            (1..across).for_each(|x| count_pair((x - 1, y), (x, y)));
+            if y > 0 {
+                (0..across).for_each(|x| count_pair((x, y - 1), (x, y)));
+            }
+        }
+        if 4 * alike > 3 * pairs { 0 } else { varies.unwrap_or(0) }
+    }
+
+    /// Which pixels of a rectangle dots of a block read, row by row.
+    fn read(
+        &self,
+        (column, row): (usize, usize),
+        dots: &Mask,
+        (columns, rows): (Range<usize>, Range<usize>),
+    ) -> Vec<bool> {
+        let mut read = vec![false; columns.len() * rows.len()];
+        for (y, &dots) in dots.iter().enumerate().filter(|(_, dots)| **dots != 0) {
+            let (above, below) = self.down[0].1.pixels(row * BLOCK + y);
+            for x in bits(dots) {
+                let (from, to) = self.across[0].1.pixels(column * BLOCK + x);
+                for y in above..below {
+                    read[(y - rows.start) * columns.len() + from - columns.start..][..to - from].fill(true);
+                }
+            }
+        }
+        read
     }
 
     /// On each dot of a window, row by row: the mean of `points` over its mixture, of which there is one for each stack of the

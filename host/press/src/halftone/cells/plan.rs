@@ -55,14 +55,14 @@ pub(super) struct Block {
     pub(super) owns: bool,
     /// Whether this block and the eight around it consist of whole cells.
     pub(super) calm: bool,
-    /// By how much a weight of the document differs over the block.
+    /// By how much a weight of the document differs over the block; 0 if it does only at edges between flat tones.
     pub(super) varies: u16,
     /// Dots that are tones.
     pub(super) tone: Mask,
 }
 
 /// By how much a weight may differ over a flat block. In flat tones squares look more even than halves, in all others less.
-const FLAT: u16 = ONE / 512;
+pub(super) const FLAT: u16 = ONE / 512;
 
 /// Connected tones that are less than a cell.
 pub(super) struct Fragment {
@@ -104,18 +104,19 @@ impl Plan {
                 let blocks: Vec<Block> = (0..across)
                     .map(|column| {
                         present.fill(false);
-                        let varies = field.survey(BLOCK, column, row, &mut present);
                         let (left, top) = (column * BLOCK, row * BLOCK);
                         let solid =
                             field.solids.any(left..(left + BLOCK).min(width), top..(top + BLOCK).min(height));
+                        let tone =
+                            if solid { cut(field, column, row, dots) } else { inside(field, column, row) };
+                        let some = Some(&tone).filter(|tone| solid && **tone != [0; BLOCK]);
+                        let varies = field.survey((column, row), some, &mut present);
                         let needed = sizes
                             .iter()
                             .zip(&present)
                             .filter(|&(_, &present)| present)
                             .map(|(size, _)| size[usize::from(varies > FLAT)]);
                         let size = needed.max().unwrap_or(1) as u8;
-                        let tone =
-                            if solid { cut(field, column, row, dots) } else { inside(field, column, row) };
                         Block { size, owns: false, calm: false, varies, tone }
                     })
                     .collect();
@@ -427,7 +428,7 @@ fn span(left: usize, dots: usize) -> u32 {
     (FULL >> (BLOCK - dots)) << left
 }
 
-fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+pub(super) fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = mask.trailing_zeros();
         mask &= mask.wrapping_sub(1);

@@ -52,6 +52,59 @@ proptest! {
     }
 }
 
+/// Beside a solid, another tone and a softened edge a flat tone has the cells that it has in its midst.
+#[test]
+fn flat_tones_have_the_same_cells_at_their_edges() {
+    let (width, height) = (300, 200);
+    for edge in [[0.0, 0.0, 1.0], [0.8, 0.2, 0.0]] {
+        let mix = plain(width, height, 3, |x, y| match (x, y) {
+            (10..=280, 10..=180) => vec![0.55, 0.45, 0.0],
+            (9..=281, 9..=181) => vec![0.3, 0.2, 0.5],
+            _ => edge.to_vec(),
+        });
+        let dots = cells(&mix, (width, height), &[8; 3], None, &Silent);
+        let inside = |x: usize, y: usize| (18..272).contains(&x) && (18..172).contains(&y);
+        let mut changes = 0;
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| inside(x, y))
+        {
+            for (at, before) in [(x, y * width + x - 1), (y, (y - 1) * width + x)] {
+                if dots[y * width + x] != dots[before] {
+                    changes += 1;
+                    assert_eq!(at % 3, 0, "{edge:?}: a part ends at {x}, {y}");
+                }
+            }
+        }
+        assert!(changes > 1000, "{changes}");
+    }
+}
+
+/// A ramp has no solid columns or rows where it passes a tone that locks: all lines of dots have about what is asked of them.
+#[test]
+fn ramps_have_no_lines() {
+    let (long, short) = (1200, 400);
+    let ramp = |at: usize| {
+        let ink = 0.02 + 0.96 * (at as f64 + 0.5) / (long / 2) as f64;
+        vec![1.0 - ink, ink]
+    };
+    for (levels, across) in [(1, true), (1, false), (6, true), (6, false)] {
+        let step = |at: usize| ramp(at / levels * levels);
+        let (mix, size) = match across {
+            true => (plain(long / 2, 1, 2, |x, _| step(x)), (long, short)),
+            false => (plain(1, long / 2, 2, |_, y| step(y)), (short, long)),
+        };
+        let dots = cells(&mix, size, &[8; 2], None, &Silent);
+        for line in 4..long - 4 {
+            let at = |i: usize| if across { i * long + line } else { line * short + i };
+            let ink = (0..short).filter(|&i| dots[at(i)] == 1).count() as f64 / short as f64;
+            let asked = ramp(line / 2)[1];
+            assert!(
+                (ink - asked).abs() < 0.22,
+                "line {line} across {across}, {levels}: {ink:.2} of {asked:.2}"
+            );
+        }
+    }
+}
+
 /// A disc and slanted bars of solid in a tone: every connected part of the tone keeps its minimum, and what is thin
 /// lies beside a solid that makes it so.
 #[test]
