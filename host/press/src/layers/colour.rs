@@ -24,6 +24,7 @@ use super::flat::{BLACK, Flat, TONE, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
 use super::outline;
+use super::scans;
 use super::solids::Solids;
 use super::treatments::treatments;
 use crate::halftone::{self, halftone};
@@ -68,12 +69,18 @@ impl Colour {
         if pixels.par_chunks(1 << 12).all(white) {
             return None;
         }
+        let clean = scans::cleaned(pixels);
+        let pixels = clean.as_deref().unwrap_or(pixels);
         let flat = Flat::of(pixels, size.0 as usize);
         if flat.is_black_and_white() {
             let flat = flat.at_dots(size, dots);
             return Some(Colour::black(bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
         }
-        let colour = averaged(|at| split(&pixels[at]), &flat, (size.0 as usize, size.1 as usize), dots);
+        if !flat.index.par_chunks(1 << 16).any(|dots| dots.contains(&TONE)) {
+            return Colour::of_flat(flat.at_dots(size, dots), dots);
+        }
+        let pixel = |at: usize| split(&pixels[at]);
+        let colour = averaged(pixel, |_| false, &flat, (size.0 as usize, size.1 as usize), dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
@@ -92,13 +99,15 @@ impl Colour {
         Some(Colour { flat, ..Colour::default() })
     }
 
-    /// The colours between which dots are halftoned, without the flat ones: those of flat colours alone are averaged only now.
-    pub(super) fn averages(&self, dots: (usize, usize)) -> Cow<'_, Colour> {
+    /// The colours between which dots are halftoned, without the flat ones: those of flat colours alone are averaged only now, when
+    /// it may be known which dots are `fixed`.
+    pub(super) fn averages(&self, dots: (usize, usize), fixed: Option<&[u8]>) -> Cow<'_, Colour> {
         if !self.rgb.is_empty() || self.flat.index.is_empty() {
             return Cow::Borrowed(self);
         }
         let pixel = |at: usize| self.flat.colours[usize::from(self.flat.index[at])];
-        Cow::Owned(averaged(pixel, &self.flat, dots, dots))
+        let is_fixed = |at: usize| fixed.is_some_and(|fixed| fixed[at] != TONE);
+        Cow::Owned(averaged(pixel, is_fixed, &self.flat, dots, dots))
     }
 
     /// Black dots on white.
@@ -155,7 +164,7 @@ impl Colour {
             }
             fixed => fixed,
         };
-        let mix = self.averages(dots).mix(fit)?;
+        let mix = self.averages(dots, fixed.as_deref()).mix(fit)?;
         // Larger art was refused when its size was decided.
         let size = (dots.0 as u16, dots.1 as u16);
         let toning = halftone::Settings {

@@ -258,8 +258,8 @@ mod tests {
 
     #[test]
     fn a_dot_of_a_drawing_has_its_colour_and_a_photograph_has_tones() {
-        let (blue, grey) = ([4, 0, 0, 200], [2, 90, 90, 90]);
-        let row = [[0, 255, 255, 255], blue, [1, 0, 0, 200], [1, 0, 0, 0], grey, grey, [1, 255, 255, 255]];
+        let (blue, photo) = ([4, 0, 0, 200], [2, 90, 20, 160]);
+        let row = [[0, 255, 255, 255], blue, [1, 0, 0, 200], [1, 0, 0, 0], photo, photo, [1, 255, 255, 255]];
         let flat = Flat::of(&row, 7);
         assert_eq!(flat.colours[2..], [(Kind::Text, [0, 0, 200]), (Kind::Drawing, [0, 0, 200])]);
         assert_eq!(flat.index, [WHITE, 3, 2, BLACK, TONE, TONE, WHITE]);

@@ -70,18 +70,25 @@ impl Masks {
                 all[root].colour = None;
             }
         }
-        let mut colours = HashMap::new();
         for at in 0..all.len() {
             all[at].colour = all[roots[at] as usize].colour;
-            if let Some(colour) = all[at].colour {
-                *colours.entry(colour).or_default() += (all[at].end - all[at].start) as u64;
+        }
+        let found = flat_art(pixels, width, (&all, roots));
+        let mut colours = HashMap::new();
+        for (stretches, spans) in &found {
+            stretches.iter().for_each(|&at| all[at as usize].colour = None);
+            for (span, colour) in spans {
+                *colours.entry(*colour).or_default() += span.len() as u64;
             }
         }
-        colours.retain(|_, dots| *dots >= LEAST);
-        let spans = flat_art(pixels, width, (&all, &roots));
-        for (span, colour) in &spans {
-            *colours.entry(*colour).or_default() += span.len() as u64;
+        let drawn: Vec<[u8; 3]> = colours.keys().copied().collect();
+        for stretch in &all {
+            if let Some(colour) = stretch.colour {
+                *colours.entry(colour).or_default() += (stretch.end - stretch.start) as u64;
+            }
         }
+        colours.retain(|colour, dots| *dots >= LEAST || drawn.contains(colour));
+        let spans = found.into_iter().flat_map(|(_, spans)| spans).collect();
         all.retain(|stretch| stretch.colour.is_some_and(|colour| colours.contains_key(&colour)));
         Masks { stretches: all, spans, colours }
     }
@@ -96,20 +103,52 @@ impl Masks {
     }
 }
 
-/// The spans of shapes in several colours that are flat art, from all stretches and the root of each.
+/// The shapes that are flat art in several colours, or softened edges in one: their stretches, and the spans that these become. From
+/// all stretches and the root of each.
 fn flat_art<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
-    (all, roots): (&[Stretch], &[u32]),
-) -> Vec<Span> {
-    let mut shapes: HashMap<u32, Vec<Range<usize>>> = HashMap::new();
-    for (stretch, &root) in all.iter().zip(roots).filter(|(stretch, _)| stretch.colour.is_none()) {
-        shapes.entry(root).or_default().push(stretch.start..stretch.end);
+    (all, roots): (&[Stretch], Vec<u32>),
+) -> Vec<(Vec<u32>, Vec<Span>)> {
+    let mut order: Vec<u32> = (0..all.len() as u32).collect();
+    order.sort_by_key(|&at| roots[at as usize]);
+    let shapes: Vec<&[u32]> = order.chunk_by(|&a, &b| roots[a as usize] == roots[b as usize]).collect();
+    let pixels_of = |shape: &[u32]| -> usize {
+        shape.iter().map(|&at| all[at as usize].end - all[at as usize].start).sum()
+    };
+    let mut counts = HashMap::new();
+    for shape in shapes.iter().filter(|shape| pixels_of(shape) <= posters::SMALL) {
+        shape.iter().for_each(|&at| count_squares(pixels, width, &all[at as usize], &mut counts));
     }
-    let mut shapes: Vec<Vec<Range<usize>>> = shapes.into_values().collect();
-    shapes.sort_unstable_by_key(|shape| shape[0].start);
-    let spans = shapes.par_iter().map(|shape| posters::spans(pixels, width, shape).unwrap_or_default());
-    spans.collect::<Vec<_>>().concat()
+    let common = posters::common(counts);
+    let found = shapes.into_par_iter().filter_map(|shape| {
+        let colour = all[shape[0] as usize].colour;
+        if colour.is_some_and(|colour| common.contains(&colour) || pixels_of(shape) > posters::SMALL) {
+            return None;
+        }
+        let stretches: Vec<Range<usize>> =
+            shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect();
+        let spans = posters::spans(pixels, width, &stretches, &common)?;
+        // In one colour it is line art by itself.
+        let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
+        (!itself).then(|| (shape.to_vec(), spans))
+    });
+    found.collect()
+}
+
+/// Counts the pixels of a stretch that are alike in squares of four.
+fn count_squares<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    stretch: &Stretch,
+    counts: &mut HashMap<[u8; 3], u64>,
+) {
+    for at in (stretch.start + 1..stretch.end).filter(|&at| at >= width) {
+        let own = pixels[at];
+        if own == pixels[at - 1] && own == pixels[at - width] && own == pixels[at - width - 1] {
+            *counts.entry(split(&own).1).or_default() += 1;
+        }
+    }
 }
 
 impl Stretch {

@@ -37,6 +37,7 @@ mod posters;
 mod resample;
 mod reserved;
 mod resolution;
+mod scans;
 mod size;
 mod solids;
 mod svg;

@@ -2,14 +2,14 @@
 //!
 //! Problem: a halftone of clusters is coarser than a letter's strokes, so a screened letter loses its outline.
 //! Method: by colour, kind and width. A shape is a 4-connected set of dots of one kind whose colours follow each other as in
-//! a shading. It is thin if no square of [`STROKE`] dots a side ([`LETTER`] for text) fits in it. Thin shapes that have more ink
+//! a shading. It is thin if no square of [`STROKE`] dots a side ([`LETTER`] for text and for what is as small as a letter) fits in it. Thin shapes that have more ink
 //! than paper are printed in the nearest solid. Wide ones keep their rim, all dots beside another shape, in that solid
 //! and are screened inside; so do thin letters with more paper than ink, which a solid would make too dark. All other
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
 //! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
 //! solid or in paper; such a wide one has its rim in the next solid or none.
-//! Letters of a word are all thin or all wide ([`words`](super::words)).
-//! Cost: 3 ns a dot of such shapes, 0.3 ns of others. Memory: 16 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
+//! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines.
+//! Cost: 3 ns a dot of such shapes, 0.3 ns of others. Memory: 32 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
 //! widths are measured with squares, so a slanting stroke counts as thinner than it is.
 
 use rayon::prelude::*;
@@ -24,6 +24,9 @@ use crate::forest::Forest;
 const STROKE: u8 = 9;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 const LETTER: u8 = 24;
+
+/// A drawing at most so many dots wide and high, 5 mm, is as small as a letter: text that was made outlines, a module of a QR code.
+const SMALL: u32 = 118;
 
 /// A stretch of a row that belongs to one shape.
 struct Run {
@@ -54,13 +57,15 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     }
     let (runs, rows) = shapes(flat, width, &shaped);
     let grounds = Grounds::of(flat, width, treatments, (&runs, &rows));
-    let words = Words::of(flat, (&runs, &rows));
+    let is_letter = letters(flat, (&runs, &rows));
+    let words = Words::of(flat, (&runs, &rows), &is_letter);
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for at in rows[y]..rows[y + 1] {
             let (run, root) = (&runs[at], runs[at].root);
             let (kind, _) = flat.colours[usize::from(run.colour)];
             let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
-            let thin = words.thin(root).unwrap_or(runs[root as usize].side < most(kind));
+            let most = if is_letter[root as usize] { LETTER } else { STROKE };
+            let thin = words.thin(root).unwrap_or(runs[root as usize].side < most);
             let first = shape.solids[0];
             let solid = grounds.as_ref().map_or(Some(first), |grounds| grounds.solid(root, &shape));
             let (start, end) = (run.start as usize, run.end as usize);
@@ -168,17 +173,16 @@ struct Words {
 const NO_LETTER: u32 = u32::MAX;
 
 impl Words {
-    fn of(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Words {
-        let takes_part = |root: &Run| {
-            flat.colours[usize::from(root.colour)].0 == Kind::Text && words::takes_part(root.side, LETTER)
-        };
+    fn of(flat: &Flat, (runs, rows): (&[Run], &[usize]), is_letter: &[bool]) -> Words {
+        let takes_part =
+            |root: u32| is_letter[root as usize] && words::takes_part(runs[root as usize].side, LETTER);
         let (mut letter, mut letters) = (Vec::new(), Vec::<Letter>::new());
         for (y, row) in rows.windows(2).enumerate() {
             for run in &runs[row[0]..row[1]] {
-                let root = &runs[run.root as usize];
-                if !takes_part(root) {
+                if !takes_part(run.root) {
                     continue;
                 }
+                let root = &runs[run.root as usize];
                 if letter.is_empty() {
                     letter = vec![NO_LETTER; runs.len()];
                 }
@@ -210,8 +214,21 @@ fn joined_or_none(flat: &Flat, own: u8, beside: u8) -> bool {
     usize::from(beside) < flat.colours.len() && joined(flat, own, beside)
 }
 
-fn most(kind: Kind) -> u8 {
-    if kind == Kind::Text { LETTER } else { STROKE }
+/// For each run that is the root of a shape, whether the shape is text or as small as a letter.
+fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Vec<bool> {
+    let is_text = |run: &Run| flat.colours[usize::from(run.colour)].0 == Kind::Text;
+    let mut bounds = vec![[u32::MAX, 0, u32::MAX, 0]; runs.len()];
+    for (y, row) in (0u32..).zip(rows.windows(2)) {
+        for run in &runs[row[0]..row[1]] {
+            let [left, right, top, bottom] = &mut bounds[run.root as usize];
+            (*left, *right) = ((*left).min(run.start), (*right).max(run.end));
+            (*top, *bottom) = ((*top).min(y), y + 1);
+        }
+    }
+    let is_small = |[left, right, top, bottom]: [u32; 4]| {
+        right - left.min(right) <= SMALL && bottom - top.min(bottom) <= SMALL
+    };
+    runs.iter().zip(bounds).map(|(run, bounds)| is_text(run) || is_small(bounds)).collect()
 }
 
 /// Whether two colours of the palette can belong to one shape.
@@ -320,14 +337,21 @@ mod tests {
 
     #[test]
     fn a_thin_stroke_is_solid_and_a_wide_one_keeps_its_rim() {
-        for (kind, most) in [(Kind::Text, LETTER), (Kind::Drawing, STROKE)] {
+        // A drawing no larger than a letter is one.
+        let small = SMALL as usize;
+        for (kind, most, long) in [
+            (Kind::Text, LETTER, 50),
+            (Kind::Drawing, LETTER, small),
+            (Kind::Text, LETTER, small + 1),
+            (Kind::Drawing, STROKE, small + 1),
+        ] {
             let most = usize::from(most);
             for (wide, solid) in [(most - 1, true), (most, false)] {
                 let inside = |x: usize| (5..5 + wide).contains(&x);
-                let fixed = drawn((60, 50), kind, DARK, |x, _| inside(x));
+                let fixed = drawn((60, long), kind, DARK, |x, _| inside(x));
                 for (at, &stack) in fixed.iter().enumerate() {
                     let (x, y) = (at % 60, at / 60);
-                    let rim = x == 5 || x == 4 + wide || y == 0 || y == 49;
+                    let rim = x == 5 || x == 4 + wide || y == 0 || y + 1 == long;
                     let wanted = if !inside(x) {
                         0
                     } else if solid || rim {
@@ -356,8 +380,9 @@ mod tests {
                 assert_eq!(fixed[30 * 240 + x], if solid || rim { 7 } else { TONE }, "{widths:?} at {x}");
             }
             // Lines are decided by themselves.
-            let lines =
-                drawn((240, 60), Kind::Drawing, DARK, |x, _| x % 60 < usize::from(STROKE) - x / 60 % 2);
+            let lines = drawn((240, SMALL as usize + 1), Kind::Drawing, DARK, |x, _| {
+                x % 60 < usize::from(STROKE) - x / 60 % 2
+            });
             assert_eq!((lines[30 * 240 + 4], lines[30 * 240 + 64]), (TONE, 7));
         }
     }

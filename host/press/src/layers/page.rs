@@ -243,9 +243,9 @@ mod tests {
                 let averaged = |colour: Colour| Colour {
                     flat: colour.flat.clone(),
                     black: colour.black.clone(),
-                    ..colour.averages(dots).into_owned()
+                    ..colour.averages(dots, None).into_owned()
                 };
-                prop_assert_eq!(found.colour.map(averaged), whole.colour);
+                prop_assert_eq!(found.colour.map(averaged), whole.colour.map(averaged));
             }
         }
     }

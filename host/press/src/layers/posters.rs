@@ -4,7 +4,8 @@
 //! Method: what hangs together is looked at as a whole. Its main colours are those that cover most of it in stretches of two
 //! pixels or more; of colours that follow each other in a shading (they touch) only one counts. A pixel of another colour is the
 //! softened edge between two main colours, white and black among them, if both lie within [`REACH`] pixels of it and its colour
-//! lies on the line between them: it becomes the nearer one. The whole is flat art if hardly any pixel is neither.
+//! lies on the line between them: it becomes the nearer one. The whole is flat art if hardly any pixel is neither. What is small, a
+//! letter or what is softened between black and white, may have the colours that small shapes have in common.
 //! Cost: 3 ns a pixel of such art, 100 ns a pixel of its softened edges; photographs are given up after some thousand colours. Colours
 //! that are nearly alike cost another pass.
 //! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
@@ -21,6 +22,8 @@ const MOST: usize = 16;
 const MOST_FOUND: usize = 4096;
 /// The least pixels of a main colour: a square of eight.
 const LEAST: u64 = 64;
+/// What has so many pixels or less is small: a letter, or what is softened between black and white.
+pub(super) const SMALL: usize = 64 * 64;
 /// Main colours cover at least this part of the art: thin letters are mostly softened edge.
 const COVERED: f64 = 0.3;
 /// At most this part of the pixels is neither a main colour nor between two.
@@ -36,14 +39,24 @@ const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
 /// A stretch of pixels, and the colour that it becomes.
 pub(super) type Span = (Range<usize>, [u8; 3]);
 
-/// The spans of what hangs together, if it is flat art. `stretches` are the pixels of it, in order.
+/// The spans of what hangs together, if it is flat art. `stretches` are the pixels of it, in order; what is small may have colours
+/// that are `common` on the page, and what is in one colour has no others.
 pub(super) fn spans<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
+    common: &[[u8; 3]],
 ) -> Option<Vec<Span>> {
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
-    let colours = main_colours(pixels, width, stretches, total)?;
+    let first = &pixels[stretches.first()?.start];
+    let one = stretches.iter().all(|stretch| pixels[stretch.clone()].iter().all(|pixel| pixel == first));
+    let mut colours = main_colours(pixels, width, stretches, total).filter(|_| !one);
+    if total as usize <= SMALL {
+        let colours = colours.get_or_insert(WHITE_AND_BLACK.to_vec());
+        let more: Vec<[u8; 3]> = common.iter().copied().filter(|colour| !colours.contains(colour)).collect();
+        colours.extend(more);
+    }
+    let colours = colours?;
     let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
     let most = (STRAY * total as f64) as u64;
     for stretch in stretches {
@@ -67,6 +80,19 @@ pub(super) fn spans<const N: usize>(
         }
     }
     Some(spans)
+}
+
+/// The colours that small shapes have in common, of which these are the counts of pixels: at most [`MOST`] that are not alike.
+pub(super) fn common(counts: HashMap<[u8; 3], u64>) -> Vec<[u8; 3]> {
+    let mut found: Vec<([u8; 3], u64)> = counts.into_iter().filter(|&(_, dots)| dots >= LEAST).collect();
+    found.sort_unstable_by_key(|&(colour, dots)| (std::cmp::Reverse(dots), colour));
+    let mut colours: Vec<[u8; 3]> = Vec::new();
+    for (colour, _) in found {
+        if colours.len() < MOST && !colours.iter().any(|&known| similar(known, colour)) {
+            colours.push(colour);
+        }
+    }
+    colours
 }
 
 /// The main colours, white and black first.
@@ -143,7 +169,7 @@ fn between<const N: usize>(
     colours: &[[u8; 3]],
 ) -> Option<[u8; 3]> {
     let (x, y) = (at % width, at / width);
-    let mut near = [false; MOST + 2];
+    let mut near = [false; 2 * MOST + 2];
     let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(pixels.len() / width);
     for row in rows {
         for pixel in &pixels[row * width + x.saturating_sub(REACH)..row * width + (x + REACH + 1).min(width)]
@@ -191,7 +217,7 @@ mod tests {
     fn all(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows)? {
+        for (span, colour) in spans(pixels, SIDE, &rows, &[])? {
             out[span].fill(colour);
         }
         Some(out)

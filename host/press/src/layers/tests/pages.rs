@@ -178,7 +178,7 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     assert!((white / (800.0 * 250.0) - 1.0).abs() < 0.03, "{white}");
     // In pixels of 300 dpi: the line, half of it on white, and white alone. Half of an ink leaves half of the light, which is
     // 188 in sRGB.
-    let colour = art.colour.as_ref().unwrap();
+    let colour = art.colour.as_ref().unwrap().averages((art.width, art.length), None);
     for ((x, y), wanted) in
         [((250, 237), [255, 0, 188]), ((175, 125), [255, 188, 225]), ((350, 125), [255; 3])]
     {
