@@ -209,6 +209,9 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
 /// The pages of a PDF or PostScript file.
 fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
+    if let Some(doubt) = layers::pdf::doubt(path, "") {
+        press.observer.note(&doubt);
+    }
     let spots = match press.choices.spots {
         Spots::None => Vec::new(),
         _ if !may_have_spots(path)? => Vec::new(),
@@ -262,8 +265,8 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
         let page = only.and_then(|page| u32::try_from(page).ok());
         return Err(FilterError::NoPage(layers::pdf::no_page(&said, page)));
     }
-    if let Some(doubt) = layers::pdf::doubt(&said) {
-        press.observer.note(&doubt);
+    if let Some(complaint) = layers::pdf::complaint(&said) {
+        press.observer.note(&layers::pdf::damaged(&complaint));
     }
     Ok(())
 }

@@ -4,6 +4,14 @@
 //! Method: a few of its sentences have a meaning of their own; of the others the first complaint is quoted.
 //! Limits: the sentences are those of versions 9.5 to 10; of other versions the quote alone remains.
 
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
+use std::path::Path;
+
+/// How far from its end a document says where the table of its objects is: readers look in the last 1024 bytes, and forgive some
+/// more.
+const END: u64 = 4096;
+
 /// The longest quote, in characters.
 const LONGEST: usize = 120;
 
@@ -31,11 +39,33 @@ pub fn complaint(said: &str) -> Option<String> {
     Some(quote.trim().trim_end_matches('.').to_owned())
 }
 
-/// A note on a document that was drawn with complaints, if there are any.
+/// A note on a document that was drawn with complaints, if there are any, or that has no end.
 #[must_use]
-pub fn doubt(said: &str) -> Option<String> {
-    let complaint = complaint(said)?;
-    Some(format!("the document is damaged (Ghostscript says `{complaint}`), so some of it may be missing"))
+pub fn doubt(path: &Path, said: &str) -> Option<String> {
+    let cut_short =
+        || is_cut_short(path).then(|| "the document is cut short, so some of it may be missing".into());
+    complaint(said).map(|complaint| damaged(&complaint)).or_else(cut_short)
+}
+
+/// A note on a document that was drawn with a complaint.
+#[must_use]
+pub fn damaged(complaint: &str) -> String {
+    format!("the document is damaged (Ghostscript says `{complaint}`), so some of it may be missing")
+}
+
+/// Whether a file begins as PDF and has no table of its objects at its end: Ghostscript then draws what it finds, in silence.
+fn is_cut_short(path: &Path) -> bool {
+    let ends = || {
+        let mut file = File::open(path)?;
+        let mut start = [0; 4];
+        file.read_exact(&mut start)?;
+        let length = file.seek(SeekFrom::End(0))?;
+        file.seek(SeekFrom::Start(length.saturating_sub(END)))?;
+        let mut end = Vec::new();
+        file.read_to_end(&mut end)?;
+        Ok::<_, std::io::Error>((start, end))
+    };
+    ends().is_ok_and(|(start, end)| &start == b"%PDF" && !end.windows(9).any(|word| word == b"startxref"))
 }
 
 #[cfg(test)]
@@ -53,8 +83,23 @@ mod tests {
         assert!(no_page(&[locked, damaged].concat(), None).contains("needs a password"));
         assert_eq!(no_page(&[damaged, beyond].concat(), Some(7)), "there is no page 7");
         assert_eq!(no_page("noise", None), "it has no page");
-        assert_eq!((complaint("noise"), doubt("")), (None, None));
+        assert_eq!((complaint("noise"), doubt(Path::new("none"), "")), (None, None));
         let long = complaint(&format!("**** Error: \x1b{}", "x".repeat(500))).unwrap();
         assert_eq!(long, "x".repeat(120));
+    }
+
+    #[test]
+    fn a_document_without_an_end_is_cut_short() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.pdf");
+        let body = "1 0 obj <<>> endobj\n".repeat(400);
+        for (text, cut) in [
+            (format!("%PDF-1.4\n{body}xref\ntrailer\nstartxref\n9\n%%EOF\n"), false),
+            (format!("%PDF-1.4\n{body}"), true),
+            (format!("%!PS\n{body}"), false),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            assert_eq!(doubt(&path, "").is_some_and(|said| said.contains("cut short")), cut);
+        }
     }
 }
