@@ -38,6 +38,12 @@ const MOST_FILES: usize = 64;
 /// Damaged files, unknown inks, layers of different sizes, art without a size, art without a dot. Each error names the
 /// file and what to do.
 pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {
+    for path in paths {
+        // A pipe would be waited for.
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            return Err(wrong(path, "it is a pipe or a device; save the art as an ordinary file"));
+        }
+    }
     let mut art = match paths {
         [] => {
             let reason = "no file was given".into();
@@ -223,7 +229,7 @@ fn named_files(
         Ok(Source { path: path.clone(), page: options.page(), label, named })
     };
     let sources: Vec<Source> = files.iter().map(source).collect::<Result<_, _>>()?;
-    layers(name, &sources, options, observer)
+    layers(name, &sources, None, options, observer)
 }
 
 /// One layer for each page of a TIFF.
@@ -249,7 +255,7 @@ fn pages_of_inks(
         named: names::of_page(inks, page, ink),
     };
     let sources: Vec<Source> = (1..).zip(inks).map(source).collect();
-    layers(&stem(file), &sources, options, observer)
+    layers(&stem(file), &sources, None, options, observer)
 }
 
 /// An error about a page that has art, of which the ink that is named for it gets nothing.
@@ -272,10 +278,11 @@ struct Source {
     named: names::Named,
 }
 
-/// One layer for each source, all of one size.
+/// One layer for each source, all of one size. The resolution that any of them states is `stated` where it is known.
 fn layers(
     name: &str,
     sources: &[Source],
+    stated: Option<Dpi>,
     options: &Options,
     observer: &dyn Observer,
 ) -> Result<Artwork, LayersError> {
@@ -287,7 +294,12 @@ fn layers(
         let scans: Vec<_> =
             sources.par_iter().map(|source| coverage::scan(&source.path, source.page)).collect();
         for (scan, source) in scans.into_iter().zip(sources) {
-            let scan = scan?;
+            let mut scan = scan?;
+            if first.as_ref().is_some_and(|first| first.dpi.is_none()) && scan.dpi.is_some() {
+                observer.end();
+                return layers(name, sources, scan.dpi, options, observer);
+            }
+            scan.dpi = scan.dpi.or(stated);
             let dots = match &first {
                 Some(first) => first.check(&scan, options)?,
                 None => first.insert(First::new(&scan, options, &mut notes)?).dots,
@@ -331,7 +343,7 @@ impl First {
 
     /// Checks that another layer has the same size, and returns that size in dots.
     fn check(&self, other: &Scan, options: &Options) -> Result<(usize, usize), LayersError> {
-        // A layer without a resolution takes that of the first. If two state different ones, one of them is wrong.
+        // A layer without a resolution has that of another. If two state different ones, one of them is wrong.
         let overridden = options.dpi.is_some() || options.size.is_some();
         let apart = self
             .dpi
