@@ -98,7 +98,19 @@ pub(super) fn layers(
         }
         waiting.extend(nodes::drawn(node).into_iter().rev().map(|child| (child, within)));
     }
-    if !layers.is_empty() {
+    if layers.is_empty() {
+        // A drawing may have layers that mean nothing; the name of an ink with a slip of the hand is worth a note.
+        let meant =
+            |name: &String| names::closest(name).map(|ink| format!("`{name}` (did you mean `{ink}`?)"));
+        let found: Vec<String> = slips.iter().filter_map(meant).collect();
+        if !found.is_empty() {
+            let found = found.join(", ");
+            notes.push(format!(
+                "{}: printed as a picture, since no layer names an ink: {found}",
+                path.display()
+            ));
+        }
+    } else {
         for name in slips {
             if let suggestion @ Some(_) = names::closest(&name) {
                 let (path, part) = (path.to_path_buf(), NamedPart::Layer);
