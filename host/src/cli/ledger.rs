@@ -151,7 +151,13 @@ pub fn run(args: &Args) -> Result<()> {
         writeln!(text, "Lengths are estimates, rather too low; `foilpress ledger new INK` starts again.")?;
     }
     if damaged > 0 {
-        writeln!(text, "{damaged} lines beside {} cannot be read", ledger.path().display())?;
+        let lines = if damaged == 1 {
+            "1 line cannot be read".into()
+        } else {
+            format!("{damaged} lines cannot be read")
+        };
+        let folder = ledger.path().parent().unwrap_or(ledger.path());
+        writeln!(text, "{lines} in {}", folder.display())?;
     }
     super::show(&text)
 }

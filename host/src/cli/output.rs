@@ -1,11 +1,11 @@
 //! Outputs appear whole or not at all.
 //!
 //! Everything is written to a hidden staging folder beside its destination and moved there at the end. The folder is removed
-//! when the program fails, and by [`remove_on_interrupt`] when it is stopped. Existing output is replaced only if this program
-//! wrote all of it: a file by a file, a folder by a folder of the same [`Kind`].
+//! when the program fails, and by [`remove_on_interrupt`] when it is stopped. A folder is replaced only by a folder of the same
+//! [`Kind`] and if this program wrote all of it, a file only by a file in the same format.
 
 use std::fs;
-use std::io::{self, Write as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -13,6 +13,8 @@ use anyhow::{Context, Result, bail};
 use appearance::edit;
 use press::process;
 use press::scratch::{self, Scratch};
+use press::separate::files;
+use protocol::ink::Ink;
 
 /// What the user is told when the program is interrupted.
 static FAREWELL: Mutex<Option<String>> = Mutex::new(None);
@@ -65,30 +67,34 @@ impl Kind {
 
     /// Whether this program writes files of that name.
     fn writes(self, name: &str) -> bool {
-        let picture = |name: &str| name.ends_with(".png");
+        let between = |start: &str, end: &str| name.strip_prefix(start)?.strip_suffix(end);
+        let number = |start: &str, end: &str| {
+            between(start, end)
+                .is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
+        };
         self.marker() == Some(name)
             || match self {
                 Kind::Print => {
                     ["job.rgl", "plan.html", "sheet.png", "materials.png", "separation.png", "passes"].contains(&name)
-                        || name == "preview.png"
-                        || ["report.html", "sheet.html", "display.html"].contains(&name)
-                        || (["preview-", "mask-", "seen-"].iter().any(|start| name.starts_with(start)) && picture(name))
+                        || ["report.html", "sheet.html", "display.html", "preview.png"].contains(&name)
+                        || name.strip_prefix("preview-").is_some_and(is_pass)
+                        || ["mask-", "seen-"].iter().any(|start| number(start, ".png") || between(start, ".png") == Some("align"))
                 }
                 Kind::Foil => {
                     ["bases.csv", edit::FILE_NAME].contains(&name)
-                        || (["weights-", "mask-"].iter().any(|start| name.starts_with(start)) && picture(name))
-                        || (name.starts_with("curve-") && name.ends_with(".csv"))
+                        || number("weights-", ".png")
+                        || number("mask-", ".png")
+                        || number("curve-", ".csv")
                 }
-                Kind::Mix => name.starts_with("weights-") && picture(name),
+                Kind::Mix => number("weights-", ".png"),
                 Kind::Dots => name == "separation.png",
                 Kind::Sheet => ["separation.png", "layout.toml"].contains(&name),
-                Kind::Passes | Kind::Pictures => {
-                    name.starts_with(|c: char| c.is_ascii_digit()) && name.contains('-') && picture(name)
-                }
+                Kind::Passes | Kind::Pictures => is_pass(name),
                 Kind::Measured => {
                     [inks::FILE_NAME, "report.html"].contains(&name)
                         || name.ends_with(".csv")
-                        || (["mask-", "residuals-"].iter().any(|start| name.starts_with(start)) && picture(name))
+                        || number("mask-", ".png")
+                        || number("residuals-", ".png")
                 }
                 Kind::Predicted => {
                     name == inks::FILE_NAME || inks::archive::BESIDE.contains(&name) || name.ends_with(".csv")
@@ -107,7 +113,11 @@ impl Kind {
             let name = entry.file_name();
             let known = name.to_str().is_some_and(|name| self.writes(name));
             let passes = self == Kind::Print && name == "passes";
-            if !known || entry.file_type()?.is_dir() != passes {
+            // Without a description beside them, pictures of passes are told from art by what is written in them.
+            let signed = self != Kind::Pictures
+                || !is_pass(&name.to_string_lossy())
+                || files::is_signed(&entry.path());
+            if !known || !signed || entry.file_type()?.is_dir() != passes {
                 return Ok(Some(entry.path()));
             }
             if passes && let Some(foreign) = Kind::Passes.foreign_entry(&entry.path())? {
@@ -118,6 +128,32 @@ impl Kind {
         }
         Ok((entries > 0 && !marked).then(|| folder.to_path_buf()))
     }
+}
+
+/// Whether a file has the name of a pass, as in `01-cyan.png`.
+fn is_pass(name: &str) -> bool {
+    let parts = name.strip_suffix(".png").and_then(|name| name.split_once('-'));
+    parts.is_some_and(|(number, ink)| {
+        number.len() >= 2 && number.bytes().all(|b| b.is_ascii_digit()) && Ink::from_name(ink).is_some()
+    })
+}
+
+/// What a file is by its first bytes, if that can be told.
+fn format_of(path: &Path) -> Option<&'static str> {
+    let mut start = Vec::new();
+    fs::File::open(path).ok()?.take(16).read_to_end(&mut start).ok()?;
+    let formats: [(&[u8], &str); 9] = [
+        (b"\x89PNG", "a PNG picture"),
+        (b"\xff\xd8", "a JPEG picture"),
+        (b"II*\0", "a TIFF picture"),
+        (b"MM\0*", "a TIFF picture"),
+        (b"%PDF", "a PDF document"),
+        (b"%!", "a PostScript document"),
+        (b"<!", "a page in HTML"),
+        (b"<", "a drawing or another XML file"),
+        (b"\x1b", "a print job"),
+    ];
+    formats.into_iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| name)
 }
 
 /// A place to write a file or a folder before it appears under its own name.
@@ -207,6 +243,12 @@ impl Staged {
 
     /// Moves what was written to its own name, replacing what was there.
     pub fn commit(self) -> Result<()> {
+        if let Some(old) = format_of(&self.target)
+            && let Some(new) = format_of(&self.inside)
+            && old != new
+        {
+            bail!("{} exists and is {old}, not {new}; choose another name", self.target.display());
+        }
         // Held to the end, so that an interruption waits until the new output has replaced the old.
         let mut folders = scratch::folders();
         let mut old = self.inside.clone().into_os_string();
@@ -323,9 +365,16 @@ mod tests {
             assert_eq!(fs::read_to_string(target.join("report.json")).unwrap(), round);
             assert_eq!(entries(folder.path()), ["out.print"]);
         }
-        // Of another kind, and with something of the user's at any depth.
+        // Of another kind, and with something of the user's at any depth, however like ours it is called.
         assert!(Staged::folder(&target, Kind::Foil).is_err());
-        for mine in ["passes/thesis", "passes/thesis.png", "thesis"] {
+        for mine in [
+            "passes/thesis",
+            "passes/thesis.png",
+            "thesis",
+            "preview-mine.png",
+            "mask-rim.png",
+            "passes/2024-holiday.png",
+        ] {
             fs::write(target.join(mine), "x").unwrap();
             let said = Staged::folder(&target, Kind::Print).err().unwrap().to_string();
             assert!(said.contains(mine), "{said}");
@@ -335,6 +384,38 @@ mod tests {
         // A report alone does not make a folder ours.
         fs::write(folder.path().join("report.json"), "{}").unwrap();
         assert!(Staged::folder(folder.path(), Kind::Print).is_err());
+    }
+
+    /// Art is called like the passes that `inspect` writes.
+    #[test]
+    fn pictures_of_passes_do_not_take_the_place_of_art() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("art");
+        let plane = press::separate::Plane { width: 8, length: 8, stride: 1, bits: vec![0; 8] };
+        for _ in 0..2 {
+            let staged = Staged::folder(&target, Kind::Pictures).unwrap();
+            files::save_plane(&plane, &staged.create().unwrap().join("01-white.png")).unwrap();
+            staged.commit().unwrap();
+        }
+        image::GrayImage::new(8, 8).save(target.join("02-gold.png")).unwrap();
+        let said = Staged::folder(&target, Kind::Pictures).err().unwrap().to_string();
+        assert!(said.contains("02-gold.png, which this command did not write"), "{said}");
+    }
+
+    #[test]
+    fn a_file_never_takes_the_place_of_one_in_another_format() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("art.svg");
+        fs::write(&target, "<svg/>").unwrap();
+        let staged = Staged::file(&target).unwrap();
+        fs::write(staged.path(), b"\x1b\x65job").unwrap();
+        let said = staged.commit().unwrap_err().to_string();
+        assert!(
+            said.ends_with("is a drawing or another XML file, not a print job; choose another name"),
+            "{said}"
+        );
+        assert_eq!(fs::read_to_string(&target).unwrap(), "<svg/>");
+        assert_eq!(entries(folder.path()), ["art.svg"]);
     }
 
     #[test]

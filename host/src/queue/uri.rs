@@ -53,7 +53,11 @@ pub fn of(destination: &str) -> Result<String, UriError> {
         // The one destination that needs no kind.
         None if destination.starts_with("/dev/usb/lp") => ("raw", destination),
         Some(parts) => parts,
-        None => return Err(UriError::Form(destination.into())),
+        None => {
+            return Err(destination
+                .parse::<Destination>()
+                .map_or_else(UriError::from, |_| UriError::Form(destination.into())));
+        }
     };
     let place = if is_path(kind) { place.strip_prefix('/').unwrap_or(place) } else { place };
     let uri = format!("{SCHEME}:/{kind}/{}", utf8_percent_encode(place, UNSAFE));

@@ -1,5 +1,6 @@
 //! Passes on disk: `passes.toml` and one PNG a pass, one bit a dot, ink shown black.
 
+use std::io::Read as _;
 use std::path::Path;
 
 use inks::Stack;
@@ -11,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::{MOST_PASSES, Pass, Plane, Separation};
 use crate::files::{FileError, read_toml, write_toml};
 use crate::sheet::files::{PaperText, check_format};
-use crate::sheet::picture::{Kind, read_png, write_png};
+use crate::sheet::picture::{Kind, SIGNATURE, read_png, write_png};
 
 /// The text beside the pictures.
 pub(super) const TEXT: &str = "passes.toml";
@@ -57,6 +58,15 @@ pub fn name(pass: usize, ink: Ink) -> String {
 pub fn save_plane(plane: &Plane, path: &Path) -> Result<(), FileError> {
     let bits: Vec<u8> = plane.bits.iter().map(|byte| !byte).collect();
     write_png(path, (plane.width, plane.length), Kind::Bits, &bits)
+}
+
+/// Whether this program wrote a picture, as the picture says.
+#[must_use]
+pub fn is_signed(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(1 << 10).read_to_end(&mut start));
+    let signature = [SIGNATURE.0, "\0", SIGNATURE.1].concat();
+    read.is_ok() && start.windows(signature.len()).any(|found| found == signature.as_bytes())
 }
 
 /// Writes `passes.toml` and a picture of each pass into a folder that exists, the text last.

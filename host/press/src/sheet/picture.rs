@@ -40,6 +40,9 @@ impl<'a> Kind<'a> {
     }
 }
 
+/// What every picture says of the program that wrote it.
+pub(crate) const SIGNATURE: (&str, &str) = ("Software", "Foilpress");
+
 /// Writes a picture.
 pub(crate) fn write_png(
     path: &Path,
@@ -59,6 +62,7 @@ pub(crate) fn write_png(
             yppu: DENSITY,
             unit: png::Unit::Meter,
         }));
+        encoder.add_text_chunk(SIGNATURE.0.into(), SIGNATURE.1.into())?;
         if colour == png::ColorType::Indexed {
             encoder.set_palette(kind.colours().concat());
         }
