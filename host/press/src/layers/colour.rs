@@ -24,7 +24,6 @@ use super::flat::{BLACK, Flat, TONE, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
 use super::outline;
-use super::scans;
 use super::solids::Solids;
 use super::treatments::treatments;
 use crate::halftone::{self, halftone};
@@ -69,8 +68,6 @@ impl Colour {
         if pixels.par_chunks(1 << 12).all(white) {
             return None;
         }
-        let clean = scans::cleaned(pixels);
-        let pixels = clean.as_deref().unwrap_or(pixels);
         let flat = Flat::of(pixels, size.0 as usize);
         if flat.is_black_and_white() {
             let flat = flat.at_dots(size, dots);

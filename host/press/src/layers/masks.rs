@@ -8,7 +8,7 @@
 //! may be the softened edge of black on white.
 //! Cost: 1 ns a pixel of pictures, 20 ns a stretch. Limits: a speck of another colour makes a picture of a mask, unless both are flat art.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -20,6 +20,9 @@ use crate::forest::Forest;
 
 /// The least dots of a colour in shapes of its own: a square of eight dots.
 const LEAST: u64 = 64;
+
+/// Softened edges have at least so many colours on a page.
+const SOFTENED: usize = 32;
 
 /// A stretch of a row that is a picture and neither white nor black.
 pub(super) struct Stretch {
@@ -117,9 +120,10 @@ fn flat_art<const N: usize>(
     let pixels_of = |shape: &[u32]| -> usize {
         shape.iter().map(|&at| all[at as usize].end - all[at as usize].start).sum()
     };
+    let enlarged = enlarged(pixels, all);
     let mut counts = HashMap::new();
     for shape in shapes.iter().filter(|shape| pixels_of(shape) <= posters::SMALL) {
-        shape.iter().for_each(|&at| count_squares(pixels, width, &all[at as usize], &mut counts));
+        shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
     let common = posters::common(counts);
     let found = shapes.into_par_iter().filter_map(|shape| {
@@ -129,7 +133,7 @@ fn flat_art<const N: usize>(
         }
         let stretches: Vec<Range<usize>> =
             shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect();
-        let spans = posters::spans(pixels, width, &stretches, &common)?;
+        let spans = posters::spans(pixels, width, &stretches, (&common, enlarged))?;
         // In one colour it is line art by itself.
         let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
         (!itself).then(|| (shape.to_vec(), spans))
@@ -137,16 +141,35 @@ fn flat_art<const N: usize>(
     found.collect()
 }
 
-/// Counts the pixels of a stretch that are alike in squares of four.
+/// How many times pictures have been enlarged, as a page of 300 dpi is to be drawn at 600: nearly all runs of one colour are then at
+/// least so long. Drawings in a few colours have long runs by themselves.
+fn enlarged<const N: usize>(pixels: &[[u8; N]], all: &[Stretch]) -> usize {
+    let (mut runs, mut colours) = ([0usize; posters::MOST_ENLARGED], HashSet::new());
+    for run in all.iter().flat_map(|stretch| pixels[stretch.start..stretch.end].chunk_by(|a, b| a == b)) {
+        runs[run.len().min(posters::MOST_ENLARGED) - 1] += 1;
+        if colours.len() < SOFTENED {
+            colours.insert(split(&run[0]).1);
+        }
+    }
+    if colours.len() < SOFTENED {
+        return 1;
+    }
+    let total: usize = runs.iter().sum();
+    let shorter = |length: usize| runs[..length - 1].iter().sum::<usize>();
+    (1..=posters::MOST_ENLARGED).rev().find(|&length| 50 * shorter(length) <= total).unwrap_or(1)
+}
+
+/// Counts the pixels of a stretch that are alike in squares of four as they were drawn.
 fn count_squares<const N: usize>(
     pixels: &[[u8; N]],
-    width: usize,
+    (width, enlarged): (usize, usize),
     stretch: &Stretch,
     counts: &mut HashMap<[u8; 3], u64>,
 ) {
-    for at in (stretch.start + 1..stretch.end).filter(|&at| at >= width) {
+    let over = width * enlarged;
+    for at in (stretch.start + enlarged..stretch.end).filter(|&at| at >= over) {
         let own = pixels[at];
-        if own == pixels[at - 1] && own == pixels[at - width] && own == pixels[at - width - 1] {
+        if own == pixels[at - enlarged] && own == pixels[at - over] && own == pixels[at - over - enlarged] {
             *counts.entry(split(&own).1).or_default() += 1;
         }
     }

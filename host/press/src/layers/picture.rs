@@ -19,7 +19,7 @@ use super::error::{LayersError, io, wrong};
 use super::options::Options;
 use super::resolution::Dpi;
 use super::size::{self, Unstated};
-use super::{bits, kinds, resample, reserved};
+use super::{bits, kinds, resample, reserved, scans};
 use crate::separate::Plane;
 
 /// A picture in sRGB with straight alpha.
@@ -165,6 +165,10 @@ pub(super) fn opaque_artwork<const N: usize>(
     mut pixels: Vec<u8>,
     options: &Options,
 ) -> Artwork {
+    // Reserved colours may be nearly white.
+    if !options.reserved {
+        scans::clean::<N>(pixels.as_chunks_mut().0);
+    }
     let drawn = plane_of::<N>(&pixels, size, dots, |p| p[N - 3..] != [255; 3]);
     let (mut layers, mut notes) = (Vec::new(), Vec::new());
     if options.reserved {

@@ -28,8 +28,10 @@ pub(super) const SMALL: usize = 64 * 64;
 const COVERED: f64 = 0.3;
 /// At most this part of the pixels is neither a main colour nor between two.
 const STRAY: f64 = 0.01;
-/// How far a softened edge reaches, in pixels.
+/// How far a softened edge reaches, in pixels as they were drawn.
 const REACH: usize = 2;
+/// The most times that pictures are enlarged where edges are looked for.
+pub(super) const MOST_ENLARGED: usize = 4;
 /// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
 const OFF: f32 = 24.0;
 
@@ -40,17 +42,17 @@ const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
 pub(super) type Span = (Range<usize>, [u8; 3]);
 
 /// The spans of what hangs together, if it is flat art. `stretches` are the pixels of it, in order; what is small may have colours
-/// that are `common` on the page, and what is in one colour has no others.
+/// that are `common` on the page, and what is in one colour has no others. Pixels may have been `enlarged` so many times.
 pub(super) fn spans<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
-    common: &[[u8; 3]],
+    (common, enlarged): (&[[u8; 3]], usize),
 ) -> Option<Vec<Span>> {
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
     let first = &pixels[stretches.first()?.start];
     let one = stretches.iter().all(|stretch| pixels[stretch.clone()].iter().all(|pixel| pixel == first));
-    let mut colours = main_colours(pixels, width, stretches, total).filter(|_| !one);
+    let mut colours = main_colours(pixels, width, stretches, (total, enlarged)).filter(|_| !one);
     if total as usize <= SMALL {
         let colours = colours.get_or_insert(WHITE_AND_BLACK.to_vec());
         let more: Vec<[u8; 3]> = common.iter().copied().filter(|colour| !colours.contains(colour)).collect();
@@ -70,7 +72,7 @@ pub(super) fn spans<const N: usize>(
                 continue;
             }
             for at in all {
-                let colour = between(pixels, width, at, &colours);
+                let colour = between(pixels, width, at, &colours, REACH * enlarged);
                 stray += u64::from(colour.is_none());
                 push(&mut spans, at..at + 1, colour.unwrap_or(own));
             }
@@ -100,11 +102,11 @@ fn main_colours<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
-    total: u64,
+    (total, enlarged): (u64, usize),
 ) -> Option<Vec<[u8; 3]>> {
     let mut found: HashMap<[u8; 3], u64> = HashMap::new();
     for stretch in stretches {
-        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b).filter(|run| run.len() > 1) {
+        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b).filter(|run| run.len() > enlarged) {
             *found.entry(split(&run[0]).1).or_default() += run.len() as u64;
         }
         if found.len() > MOST_FOUND {
@@ -167,12 +169,13 @@ fn between<const N: usize>(
     width: usize,
     at: usize,
     colours: &[[u8; 3]],
+    reach: usize,
 ) -> Option<[u8; 3]> {
     let (x, y) = (at % width, at / width);
     let mut near = [false; 2 * MOST + 2];
-    let rows = y.saturating_sub(REACH)..(y + REACH + 1).min(pixels.len() / width);
+    let rows = y.saturating_sub(reach)..(y + reach + 1).min(pixels.len() / width);
     for row in rows {
-        for pixel in &pixels[row * width + x.saturating_sub(REACH)..row * width + (x + REACH + 1).min(width)]
+        for pixel in &pixels[row * width + x.saturating_sub(reach)..row * width + (x + reach + 1).min(width)]
         {
             let pixel = split(pixel).1;
             let known = colours.iter().position(|&colour| colour == pixel);
@@ -217,7 +220,7 @@ mod tests {
     fn all(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, &[])? {
+        for (span, colour) in spans(pixels, SIDE, &rows, (&[], 1))? {
             out[span].fill(colour);
         }
         Some(out)
