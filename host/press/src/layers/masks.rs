@@ -121,14 +121,15 @@ fn flat_art<const N: usize>(
         shape.iter().map(|&at| all[at as usize].end - all[at as usize].start).sum()
     };
     let enlarged = enlarged(pixels, all);
+    let small = posters::SMALL * enlarged * enlarged;
     let mut counts = HashMap::new();
-    for shape in shapes.iter().filter(|shape| pixels_of(shape) <= posters::SMALL) {
+    for shape in shapes.iter().filter(|shape| pixels_of(shape) <= small) {
         shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
     let common = posters::common(counts);
     let found = shapes.into_par_iter().filter_map(|shape| {
         let colour = all[shape[0] as usize].colour;
-        if colour.is_some_and(|colour| common.contains(&colour) || pixels_of(shape) > posters::SMALL) {
+        if colour.is_some_and(|colour| common.contains(&colour) || pixels_of(shape) > small) {
             return None;
         }
         let stretches: Vec<Range<usize>> =

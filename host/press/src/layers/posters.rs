@@ -53,12 +53,15 @@ pub(super) fn spans<const N: usize>(
     let first = &pixels[stretches.first()?.start];
     let one = stretches.iter().all(|stretch| pixels[stretch.clone()].iter().all(|pixel| pixel == first));
     let mut colours = main_colours(pixels, width, stretches, (total, enlarged)).filter(|_| !one);
-    if total as usize <= SMALL {
+    let mut of_shape = usize::MAX;
+    if total as usize <= SMALL * enlarged * enlarged {
         let colours = colours.get_or_insert(WHITE_AND_BLACK.to_vec());
+        of_shape = colours.len();
         let more: Vec<[u8; 3]> = common.iter().copied().filter(|colour| !colours.contains(colour)).collect();
         colours.extend(more);
     }
     let colours = colours?;
+    let of_shape = of_shape.min(colours.len());
     let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
     let most = (STRAY * total as f64) as u64;
     for stretch in stretches {
@@ -72,7 +75,7 @@ pub(super) fn spans<const N: usize>(
                 continue;
             }
             for at in all {
-                let colour = between(pixels, width, at, &colours, REACH * enlarged);
+                let colour = between(pixels, width, at, (&colours, of_shape), REACH * enlarged);
                 stray += u64::from(colour.is_none());
                 push(&mut spans, at..at + 1, colour.unwrap_or(own));
             }
@@ -163,12 +166,13 @@ fn shades<const N: usize>(
     borders.into_iter().filter(|&(_, [border, like])| 2 * like >= border).map(|(colour, _)| colour).collect()
 }
 
-/// The main colour that a pixel of a softened edge belongs to.
+/// The main colour that a pixel of a softened edge belongs to. The first `of_shape` colours are of its shape, and must be near; of the others one
+/// may be out of sight, as in strokes that cover no pixel wholly.
 fn between<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     at: usize,
-    colours: &[[u8; 3]],
+    (colours, of_shape): (&[[u8; 3]], usize),
     reach: usize,
 ) -> Option<[u8; 3]> {
     let (x, y) = (at % width, at / width);
@@ -187,8 +191,9 @@ fn between<const N: usize>(
         }
     }
     let own = split(&pixels[at]).1.map(f32::from);
-    let present = || (0..colours.len()).filter(|&known| near[known]);
+    let present = || (0..colours.len()).filter(|&known| near[known] || known >= of_shape);
     let pairs = present().flat_map(|a| present().filter(move |&b| b > a).map(move |b| (a, b)));
+    let pairs = pairs.filter(|&(a, b)| near[a] || near[b]);
     let lines = pairs.filter_map(|(a, b)| {
         let (from, to) = (colours[a].map(f32::from), colours[b].map(f32::from));
         let line: [f32; 3] = std::array::from_fn(|c| to[c] - from[c]);
@@ -310,6 +315,30 @@ mod tests {
             if (share - 0.5).abs() > 0.05 {
                 assert_eq!(colour, if share > 0.5 { disc } else { panel }, "at {} {}", at % SIDE, at / SIDE);
             }
+        }
+    }
+
+    /// Strokes that cover at most seven tenths of any pixel, in a colour that other shapes have.
+    #[test]
+    fn thin_strokes_in_a_common_colour_are_cut() {
+        let (blue, white) = ([0, 0, 200], [255; 3]);
+        let share = |x: usize| [0.0, 0.1, 0.6, 0.7, 0.3, 0.0, 0.45, 0.0][x % 8];
+        let pixels: Vec<[u8; 3]> = (0..SIDE * SIDE)
+            .map(|at| {
+                let share = share(at % SIDE);
+                std::array::from_fn(|c| {
+                    (f64::from(blue[c]) * share + f64::from(white[c]) * (1.0 - share)).round() as u8
+                })
+            })
+            .collect();
+        let strokes: Vec<Range<usize>> = (0..16).map(|y| y * SIDE + 1..y * SIDE + 5).collect();
+        assert_eq!(spans(&pixels, SIDE, &strokes, (&[], 1)), None, "nobody knows the colour");
+        let mut found = vec![white; pixels.len()];
+        for (span, colour) in spans(&pixels, SIDE, &strokes, (&[[200, 0, 0], blue], 1)).expect("flat art") {
+            found[span].fill(colour);
+        }
+        for at in strokes.into_iter().flatten() {
+            assert_eq!(found[at], if share(at % SIDE) > 0.5 { blue } else { white }, "at {}", at % SIDE);
         }
     }
 
