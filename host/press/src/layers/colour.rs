@@ -76,7 +76,11 @@ impl Colour {
         if !flat.index.par_chunks(1 << 16).any(|dots| dots.contains(&TONE)) {
             return Colour::of_flat(flat.at_dots(size, dots), dots);
         }
-        let pixel = |at: usize| split(&pixels[at]);
+        // A softened edge is no darker tone of its ground.
+        let pixel = |at: usize| match flat.index[at] {
+            dot if (2..TONE).contains(&dot) => (split(&pixels[at]).0, flat.colours[usize::from(dot)].1),
+            _ => split(&pixels[at]),
+        };
         let colour = averaged(pixel, |_| false, &flat, (size.0 as usize, size.1 as usize), dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }

@@ -3,17 +3,19 @@
 //! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
 //! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
 //! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are left out first: the ones with a
-//! similar colour on the page that has nearly as many dots. White and black dots of a picture count only in lines and areas; a lone one beside tones is
+//! similar colour on the page that has nearly as many dots; an area stays, but not the band of a shading in its colour. White and black dots of a picture count only in lines and areas; a lone one beside tones is
 //! noise.
 //! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::kinds::{K_OF_PICTURES, Kind};
 use super::masks::Masks;
 use super::resample;
+use crate::forest::Forest;
 
 /// A dot that is a tone.
 pub(super) const TONE: u8 = u8::MAX;
@@ -86,7 +88,8 @@ impl Flat {
     pub(super) fn of<const N: usize>(pixels: &[[u8; N]], width: usize) -> Flat {
         let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
         let masks = Masks::of(pixels, width);
-        colours.extend(palette(pixels, width, &masks));
+        let (palette, shaded) = palette(pixels, width, &masks);
+        colours.extend(palette);
         let numbers: HashMap<(Kind, [u8; 3]), u8> = colours.iter().copied().zip(0..).skip(2).collect();
         let number = |pixel: &[u8; N]| match split(pixel) {
             (_, [255, 255, 255]) => WHITE,
@@ -115,6 +118,7 @@ impl Flat {
         }
         let mut flat = Flat { colours, index };
         flat.forget_noise(pixels, width);
+        flat.forget_bands(pixels, width, &shaded);
         flat
     }
 
@@ -155,6 +159,48 @@ impl Flat {
             .map(|(x, y)| y * width + x)
             .collect();
         noise.into_iter().for_each(|at| self.index[at] = TONE);
+    }
+
+    /// Makes tones of what is `shaded` where it is a band of a shading: by half of its border or more it lies beside tones like it.
+    fn forget_bands<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize, shaded: &[(Kind, [u8; 3])]) {
+        let is_shaded: Vec<bool> = self.colours.iter().map(|colour| shaded.contains(colour)).collect();
+        let number = |dot: u8| is_shaded.get(usize::from(dot)) == Some(&true);
+        let (mut bands, mut at): (Vec<Range<usize>>, usize) = (Vec::new(), 0);
+        for row in self.index.chunks(width).filter(|_| !shaded.is_empty()) {
+            for run in row.chunk_by(|a, b| a == b) {
+                if number(run[0]) {
+                    bands.push(at..at + run.len());
+                }
+                at += run.len();
+            }
+        }
+        let of = |at: usize| self.index[bands[at].start];
+        let roots = Forest::of_stretches(&bands, width, |a, b| of(a) == of(b)).roots();
+        let mut borders = vec![[0u64; 2]; bands.len()];
+        for (band, &root) in bands.iter().zip(&roots) {
+            let own = self.index[band.start];
+            let ends = [
+                (!band.start.is_multiple_of(width)).then(|| band.start - 1),
+                (!band.end.is_multiple_of(width)).then_some(band.end),
+            ];
+            let beside = band.clone().flat_map(|at| [at.checked_sub(width), Some(at + width)]).chain(ends);
+            for other in
+                beside.flatten().filter(|&other| self.index.get(other).is_some_and(|&dot| dot != own))
+            {
+                let (kind, colour) = split(&pixels[other]);
+                let (own_kind, own_colour) = self.colours[usize::from(own)];
+                let [border, like] = &mut borders[root as usize];
+                *border += 1;
+                *like +=
+                    u64::from(self.index[other] == TONE && kind == own_kind && similar(colour, own_colour));
+            }
+        }
+        for (band, root) in bands.into_iter().zip(roots) {
+            let [border, like] = borders[root as usize];
+            if border > 0 && 2 * like >= border {
+                self.index[band].fill(TONE);
+            }
+        }
     }
 
     /// The same at the dots: the colour of the pixel under the middle of each.
@@ -198,8 +244,12 @@ fn is_noise(index: &[u8], width: usize, (x, y): (usize, usize)) -> bool {
     tones > 0 && like < 2
 }
 
-/// The colours of text and drawings, text first, then the most frequent.
-fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> Vec<(Kind, [u8; 3])> {
+/// The colours of text and drawings, text first, then the most frequent; and those of them through which a shading passes.
+fn palette<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    masks: &Masks,
+) -> (Vec<(Kind, [u8; 3])>, Vec<(Kind, [u8; 3])>) {
     type Counts = HashMap<(Kind, [u8; 3]), u64>;
     let add = |counts: &mut Counts, key, dots| {
         if counts.len() < GATHERED || counts.contains_key(&key) {
@@ -233,18 +283,25 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> V
         part.into_iter().for_each(|(key, dots)| add(&mut counts, key, dots));
     }
     let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
+    let mut shaded = Vec::new();
     if colours.len() > MOST {
         let all = colours.clone();
         colours.retain(|&((kind, colour), dots)| {
-            kind == Kind::Text
-                || !all.iter().any(|&((other, near), as_many)| {
-                    other == kind && near != colour && similar(near, colour) && dots < AREA * as_many
-                })
+            let mut similar = all
+                .iter()
+                .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
+                .peekable();
+            let is_shaded = kind != Kind::Text && similar.peek().is_some();
+            let stays = !is_shaded || similar.all(|&(_, as_many)| dots >= AREA * as_many);
+            if is_shaded && stays {
+                shaded.push((kind, colour));
+            }
+            stays
         });
     }
     sort(&mut colours);
     colours.truncate(MOST);
-    colours.into_iter().map(|(key, _)| key).collect()
+    (colours.into_iter().map(|(key, _)| key).collect(), shaded)
 }
 
 /// Text first, then the most frequent.
@@ -293,6 +350,33 @@ mod tests {
         // The shading itself is a drawing's tone, mixed like the area.
         let drawn = super::super::colour::Colour::of(&pixels, (2020, 1), (4040, 2)).unwrap();
         assert!(drawn.drawn.iter().all(|&drawn| drawn) && drawn.drawn.len() == drawn.width);
+    }
+
+    /// A shading downwards and, in one of its colours, a panel beside it.
+    #[test]
+    fn the_band_of_a_shading_is_no_area() {
+        let shading = |y: usize| [4, (y / 2) as u8, 40 + (y / 8) as u8, 77];
+        let pixels: Vec<[u8; 4]> = (0..300 * 600)
+            .map(|at| match (at % 300, at / 300) {
+                (200.., y) if y < 400 => shading(301),
+                (190.., _) => [0, 255, 255, 255],
+                (x, y) => [4, shading(y)[1], shading(y)[2], 77 + (x % 3) as u8],
+            })
+            .collect();
+        let flat = Flat::of(&pixels, 300);
+        let panel = flat.index[250];
+        assert_eq!(flat.colours[usize::from(panel)], (Kind::Drawing, [150, 77, 77]));
+        for (at, &dot) in flat.index.iter().enumerate() {
+            let (x, y) = (at % 300, at / 300);
+            let wanted = if x >= 200 && y < 400 {
+                panel
+            } else if x >= 190 {
+                WHITE
+            } else {
+                TONE
+            };
+            assert_eq!(dot, wanted, "at {x}, {y}");
+        }
     }
 
     #[test]

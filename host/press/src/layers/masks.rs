@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::flat::split;
 use super::kinds::Kind;
 use super::posters::{self, Span};
+use super::softened::is_between;
 use crate::forest::Forest;
 
 /// The least dots of a colour in shapes of its own: a square of eight dots.
@@ -51,23 +52,9 @@ impl Masks {
             .enumerate()
             .map(|(y, row)| stretches_of(row).map(|stretch| stretch.moved(y * width)).collect())
             .collect();
-        let (mut all, mut above): (Vec<Stretch>, usize) = (Vec::new(), 0);
-        let mut shapes = Forest::default();
-        for row in rows {
-            let first = all.len();
-            for stretch in row {
-                let (start, end, number) = (stretch.start, stretch.end, shapes.add());
-                all.push(stretch);
-                while above < first && all[above].end + width <= start {
-                    above += 1;
-                }
-                for other in (above..first).take_while(|&at| all[at].start + width < end) {
-                    shapes.join(number, other as u32);
-                }
-            }
-            above = first;
-        }
-        let roots = shapes.roots();
+        let mut all: Vec<Stretch> = rows.into_iter().flatten().collect();
+        let places: Vec<Range<usize>> = all.iter().map(|stretch| stretch.start..stretch.end).collect();
+        let roots = Forest::of_stretches(&places, width, |_, _| true).roots();
         for at in 0..all.len() {
             let root = roots[at] as usize;
             if all[at].colour != all[root].colour {
@@ -126,20 +113,40 @@ fn flat_art<const N: usize>(
     for shape in shapes.iter().filter(|shape| pixels_of(shape) <= small) {
         shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
-    let common = posters::common(counts);
-    let found = shapes.into_par_iter().filter_map(|shape| {
-        let colour = all[shape[0] as usize].colour;
-        if colour.is_some_and(|colour| common.contains(&colour) || pixels_of(shape) > small) {
-            return None;
+    let find = |shapes: &[&[u32]], common: &[[u8; 3]]| -> Vec<(Vec<u32>, Vec<Span>)> {
+        let palette = [&posters::WHITE_AND_BLACK[..], common].concat();
+        let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette);
+        let found = shapes.par_iter().filter_map(|shape| {
+            let colour = all[shape[0] as usize].colour;
+            if colour.is_some_and(is_itself) {
+                return None;
+            }
+            let stretches: Vec<Range<usize>> =
+                shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect();
+            let spans = posters::spans(pixels, width, &stretches, (common, enlarged))?;
+            // In one colour it is line art by itself.
+            let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
+            (!itself).then(|| (shape.to_vec(), spans))
+        });
+        found.collect()
+    };
+    let (of_letters, large): (Vec<&[u32]>, Vec<&[u32]>) =
+        shapes.into_iter().partition(|shape| pixels_of(shape) <= small);
+    let (in_one, in_several): (Vec<&[u32]>, Vec<&[u32]>) =
+        large.into_iter().partition(|shape| all[shape[0] as usize].colour.is_some());
+    let mut found = find(&in_several, &[]);
+    // What a letter encloses of its ground is small, too.
+    let mut areas: HashMap<[u8; 3], u64> = HashMap::new();
+    for (span, colour) in found.iter().flat_map(|(_, spans)| spans) {
+        *areas.entry(*colour).or_default() += span.len() as u64;
+    }
+    for shape in in_one {
+        if let Some(colour) = all[shape[0] as usize].colour {
+            *areas.entry(colour).or_default() += pixels_of(shape) as u64;
         }
-        let stretches: Vec<Range<usize>> =
-            shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect();
-        let spans = posters::spans(pixels, width, &stretches, (&common, enlarged))?;
-        // In one colour it is line art by itself.
-        let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
-        (!itself).then(|| (shape.to_vec(), spans))
-    });
-    found.collect()
+    }
+    found.extend(find(&of_letters, &posters::common(counts, areas)));
+    found
 }
 
 /// How many times pictures have been enlarged, as a page of 300 dpi is to be drawn at 600: nearly all runs of one colour are then at

@@ -75,16 +75,15 @@ pub fn open(paths: &[PathBuf], options: &Options, observer: &dyn Observer) -> Re
     Ok(art)
 }
 
-/// Whether a path is plainly art for [`open`], judged by its name: a drawing or a page, a picture named after an ink, or
-/// a folder of such pictures. Serves commands that expect something else and want to point here.
+/// Whether a path is plainly art for [`open`], judged by its name: a drawing, a page, a picture, or a folder of pictures named after
+/// inks. Serves commands that expect something else and want to point here.
 pub fn is_art(path: &Path) -> bool {
     if path.is_dir() {
         return listing(path)
             .is_ok_and(|listing| listing.pictures.iter().all(|file| names::ink(&stem(file)).is_some()));
     }
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    ["svg", "pdf", "ps", "eps"].contains(&extension.as_str())
-        || PICTURES.contains(&extension.as_str()) && names::ink(&stem(path)).is_some()
+    ["svg", "pdf", "ps", "eps"].contains(&extension.as_str()) || PICTURES.contains(&extension.as_str())
 }
 
 fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<Artwork, LayersError> {

@@ -2,10 +2,10 @@
 //!
 //! Problem: text on a coloured ground, saved as pixels, is no photograph; screened as one it loses its edges.
 //! Method: what hangs together is looked at as a whole. Its main colours are those that cover most of it in stretches of two
-//! pixels or more; of colours that follow each other in a shading (they touch) only one counts. A pixel of another colour is the
-//! softened edge between two main colours, white and black among them, if both lie within [`REACH`] pixels of it and its colour
-//! lies on the line between them: it becomes the nearer one. The whole is flat art if hardly any pixel is neither. What is small, a
-//! letter or what is softened between black and white, may have the colours that small shapes have in common.
+//! pixels or more; of colours that follow each other in a shading (they touch) only one counts. A pixel of another colour is a
+//! [softened](super::softened) edge between two main colours, white and black among them: it becomes the nearer one. The whole is flat
+//! art if hardly any pixel is neither. What is small, a letter or what is softened between black and white, may have the colours that
+//! small shapes have in common. A colour that is nowhere three pixels wide and lies between two others may be an edge itself.
 //! Cost: 3 ns a pixel of such art, 100 ns a pixel of its softened edges; photographs are given up after some thousand colours. Colours
 //! that are nearly alike cost another pass.
 //! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
@@ -15,9 +15,12 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use super::flat::{similar, split};
+use super::softened::{Edges, thin_between};
 
-/// The most main colours.
+/// The most main colours, and the most colours that small shapes have in common.
 const MOST: usize = 16;
+/// The most colours that a shape may have: white and black, its own, those of its edges, and those in common.
+pub(super) const MOST_KNOWN: usize = 3 * MOST + 2;
 /// Colours in stretches of two pixels or more; photographs have more.
 const MOST_FOUND: usize = 4096;
 /// The least pixels of a main colour: a square of eight.
@@ -28,15 +31,12 @@ pub(super) const SMALL: usize = 64 * 64;
 const COVERED: f64 = 0.3;
 /// At most this part of the pixels is neither a main colour nor between two.
 const STRAY: f64 = 0.01;
-/// How far a softened edge reaches, in pixels as they were drawn.
-const REACH: usize = 2;
+/// The strokes of a small shape are black, and not grey, if at least one in so many pixels is nearly so.
+const DARK: u64 = 20;
 /// The most times that pictures are enlarged where edges are looked for.
 pub(super) const MOST_ENLARGED: usize = 4;
-/// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
-const OFF: f32 = 24.0;
-
 /// The first two main colours.
-const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
+pub(super) const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
 
 /// A stretch of pixels, and the colour that it becomes.
 pub(super) type Span = (Range<usize>, [u8; 3]);
@@ -55,13 +55,17 @@ pub(super) fn spans<const N: usize>(
     let mut colours = main_colours(pixels, width, stretches, (total, enlarged)).filter(|_| !one);
     let mut of_shape = usize::MAX;
     if total as usize <= SMALL * enlarged * enlarged {
+        let is_bare = colours.is_none();
         let colours = colours.get_or_insert(WHITE_AND_BLACK.to_vec());
-        of_shape = colours.len();
+        // Strokes may be so thin that none of their pixels is black.
+        of_shape = if is_bare && is_dark(pixels, stretches, total) { 1 } else { colours.len() };
         let more: Vec<[u8; 3]> = common.iter().copied().filter(|colour| !colours.contains(colour)).collect();
         colours.extend(more);
     }
     let colours = colours?;
     let of_shape = of_shape.min(colours.len());
+    let thin = thin_between(pixels, width, stretches, (&colours, enlarged));
+    let edges = Edges { pixels, width, colours: &colours, of_shape, thin: &thin, enlarged };
     let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
     let most = (STRAY * total as f64) as u64;
     for stretch in stretches {
@@ -70,12 +74,13 @@ pub(super) fn spans<const N: usize>(
             let own = split(&run[0]).1;
             let all = at..at + run.len();
             at = all.end;
-            if colours.contains(&own) {
+            let known = colours.iter().position(|&colour| colour == own);
+            if known.is_some_and(|known| !thin[known]) {
                 push(&mut spans, all, own);
                 continue;
             }
             for at in all {
-                let colour = between(pixels, width, at, (&colours, of_shape), REACH * enlarged);
+                let colour = edges.colour(at, known);
                 stray += u64::from(colour.is_none());
                 push(&mut spans, at..at + 1, colour.unwrap_or(own));
             }
@@ -84,17 +89,31 @@ pub(super) fn spans<const N: usize>(
             }
         }
     }
+    edges.decide_strokes(&mut spans);
     Some(spans)
 }
 
-/// The colours that small shapes have in common, of which these are the counts of pixels: at most [`MOST`] that are not alike.
-pub(super) fn common(counts: HashMap<[u8; 3], u64>) -> Vec<[u8; 3]> {
-    let mut found: Vec<([u8; 3], u64)> = counts.into_iter().filter(|&(_, dots)| dots >= LEAST).collect();
-    found.sort_unstable_by_key(|&(colour, dots)| (std::cmp::Reverse(dots), colour));
+/// Whether one in [`DARK`] pixels is more black than white.
+fn is_dark<const N: usize>(pixels: &[[u8; N]], stretches: &[Range<usize>], total: u64) -> bool {
+    let dark = |pixel: &&[u8; N]| split(*pixel).1.iter().all(|&v| v < 110);
+    let found = stretches.iter().map(|stretch| pixels[stretch.clone()].iter().filter(dark).count() as u64);
+    found.sum::<u64>() * DARK >= total
+}
+
+/// The colours that small shapes have in common, and those of large `areas`, half as many at most: [`MOST`] that are not alike. Of both
+/// the counts of pixels.
+pub(super) fn common(counts: HashMap<[u8; 3], u64>, areas: HashMap<[u8; 3], u64>) -> Vec<[u8; 3]> {
     let mut colours: Vec<[u8; 3]> = Vec::new();
-    for (colour, _) in found {
-        if colours.len() < MOST && !colours.iter().any(|&known| similar(known, colour)) {
-            colours.push(colour);
+    for (counts, most) in [(areas, MOST / 2), (counts, MOST)] {
+        let mut found: Vec<([u8; 3], u64)> = counts
+            .into_iter()
+            .filter(|(colour, dots)| *dots >= LEAST && !WHITE_AND_BLACK.contains(colour))
+            .collect();
+        found.sort_unstable_by_key(|&(colour, dots)| (std::cmp::Reverse(dots), colour));
+        for (colour, _) in found {
+            if colours.len() < most && !colours.iter().any(|&known| similar(known, colour)) {
+                colours.push(colour);
+            }
         }
     }
     colours
@@ -108,9 +127,19 @@ fn main_colours<const N: usize>(
     (total, enlarged): (u64, usize),
 ) -> Option<Vec<[u8; 3]>> {
     let mut found: HashMap<[u8; 3], u64> = HashMap::new();
+    let over = width * enlarged;
     for stretch in stretches {
-        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b).filter(|run| run.len() > enlarged) {
-            *found.entry(split(&run[0]).1).or_default() += run.len() as u64;
+        let mut at = stretch.start;
+        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
+            let (start, length) = (at, run.len());
+            at += length;
+            // Upright lines are stretches, too.
+            let beside = [start.checked_sub(over), Some(start + over)].into_iter().flatten();
+            if length > enlarged
+                || beside.filter_map(|beside| pixels.get(beside)).any(|pixel| *pixel == run[0])
+            {
+                *found.entry(split(&run[0]).1).or_default() += length as u64;
+            }
         }
         if found.len() > MOST_FOUND {
             return None;
@@ -135,7 +164,20 @@ fn main_colours<const N: usize>(
         }
         covered += dots;
     }
-    (colours.len() <= MOST + 2 && covered as f64 >= COVERED * total as f64).then_some(colours)
+    if colours.len() > MOST + 2 {
+        // Edges are not counted as colours; the most frequent of them are enough to know strokes by.
+        let mut thin = thin_between(pixels, width, stretches, (&colours, enlarged)).into_iter();
+        let mut edges = 0;
+        colours.retain(|_| {
+            let is_edge = thin.next() == Some(true);
+            edges += usize::from(is_edge);
+            !is_edge || edges <= MOST
+        });
+        if colours.len() - edges.min(MOST) > MOST + 2 {
+            return None;
+        }
+    }
+    (covered as f64 >= COVERED * total as f64).then_some(colours)
 }
 
 /// Of these colours, those of a shading: by half of their border or more they touch pixels that are like them.
@@ -166,48 +208,8 @@ fn shades<const N: usize>(
     borders.into_iter().filter(|&(_, [border, like])| 2 * like >= border).map(|(colour, _)| colour).collect()
 }
 
-/// The main colour that a pixel of a softened edge belongs to. The first `of_shape` colours are of its shape, and must be near; of the others one
-/// may be out of sight, as in strokes that cover no pixel wholly.
-fn between<const N: usize>(
-    pixels: &[[u8; N]],
-    width: usize,
-    at: usize,
-    (colours, of_shape): (&[[u8; 3]], usize),
-    reach: usize,
-) -> Option<[u8; 3]> {
-    let (x, y) = (at % width, at / width);
-    let mut near = [false; 2 * MOST + 2];
-    let rows = y.saturating_sub(reach)..(y + reach + 1).min(pixels.len() / width);
-    for row in rows {
-        for pixel in &pixels[row * width + x.saturating_sub(reach)..row * width + (x + reach + 1).min(width)]
-        {
-            let pixel = split(pixel).1;
-            let known = colours.iter().position(|&colour| colour == pixel);
-            // What is nearly white or black stands for white or black beside the art, too.
-            let beside = || WHITE_AND_BLACK.iter().position(|&colour| colour == pixel);
-            if let Some(known) = known.or_else(beside) {
-                near[known] = true;
-            }
-        }
-    }
-    let own = split(&pixels[at]).1.map(f32::from);
-    let present = || (0..colours.len()).filter(|&known| near[known] || known >= of_shape);
-    let pairs = present().flat_map(|a| present().filter(move |&b| b > a).map(move |b| (a, b)));
-    let pairs = pairs.filter(|&(a, b)| near[a] || near[b]);
-    let lines = pairs.filter_map(|(a, b)| {
-        let (from, to) = (colours[a].map(f32::from), colours[b].map(f32::from));
-        let line: [f32; 3] = std::array::from_fn(|c| to[c] - from[c]);
-        let length: f32 = line.iter().map(|v| v * v).sum();
-        let along = (0..3).map(|c| (own[c] - from[c]) * line[c]).sum::<f32>() / length;
-        let off = (0..3).map(|c| (own[c] - from[c] - along * line[c]).powi(2)).sum::<f32>();
-        ((-0.05..=1.05).contains(&along) && off <= OFF * OFF)
-            .then_some((off, if along < 0.5 { colours[a] } else { colours[b] }))
-    });
-    lines.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, colour)| colour)
-}
-
 /// Adds a span, or lengthens the last.
-fn push(spans: &mut Vec<Span>, pixels: Range<usize>, colour: [u8; 3]) {
+pub(super) fn push(spans: &mut Vec<Span>, pixels: Range<usize>, colour: [u8; 3]) {
     match spans.last_mut() {
         Some((last, known)) if *known == colour && last.end == pixels.start => last.end = pixels.end,
         _ => spans.push((pixels, colour)),

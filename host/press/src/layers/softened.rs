@@ -1,0 +1,366 @@
+//! Softened edges: which colour of flat art a pixel belongs to that lies between two of them.
+//!
+//! Problem: programs soften what they draw, so that a pixel half covered by a letter has half of its colour. Such a colour may be as
+//! frequent as any other: along a straight edge, or where a stem covers half of two pixels each and is a pale line.
+//! Method: a pixel belongs to the nearer one of two colours if both lie within [`REACH`] pixels of it and its colour lies on the line
+//! between them; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies between two others and is nowhere three pixels wide is *thin*: its pixels are edges, too, where
+//! both others are near. Where they are not, its strokes are decided as wholes: what is amid letters in the colour
+//! behind it, as the stem of an l is amid its word, has that colour; what is amid its like keeps its own.
+//! Cost: 100 ns a softened pixel; a few microseconds a stroke in a thin colour.
+//! Limits: a line one pixel wide between two areas, in a colour between theirs, is taken for their edge.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::flat::split;
+use super::posters::{MOST_KNOWN, Span, WHITE_AND_BLACK, push};
+use crate::forest::Forest;
+
+/// How far a softened edge reaches, in pixels as they were drawn.
+const REACH: usize = 2;
+/// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
+const OFF: f32 = 24.0;
+/// A colour is thin if at most one in so many of its pixels ends a square of three.
+const THIN: u64 = 100;
+/// The least part of a pixel that a line covers.
+const FAINTEST: f32 = 0.25;
+/// Along a line, neighbouring pixels are covered by nearly as much.
+const ALIKE: f32 = 0.2;
+/// Strokes longer than so many pixels as they were drawn are lines, not of letters.
+const LONGEST: usize = 48;
+
+/// Flat art whose edges are looked at.
+pub(super) struct Edges<'a, const N: usize> {
+    pub pixels: &'a [[u8; N]],
+    pub width: usize,
+    /// Its colours. Of those behind the first `of_shape` one may be out of sight, as in strokes that cover no pixel wholly.
+    pub colours: &'a [[u8; 3]],
+    pub of_shape: usize,
+    /// For each colour whether it is [thin](thin_between).
+    pub thin: &'a [bool],
+    /// How many times the pixels were enlarged after they were drawn.
+    pub enlarged: usize,
+}
+
+/// For each colour whether it may be that of an edge alone: it lies between two others, and is nowhere three pixels wide.
+pub(super) fn thin_between<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    stretches: &[Range<usize>],
+    (colours, enlarged): (&[[u8; 3]], usize),
+) -> Vec<bool> {
+    let is_between: Vec<bool> = colours.iter().map(|&colour| is_between(colour, colours)).collect();
+    if !is_between.contains(&true) {
+        return is_between;
+    }
+    let mut counts: HashMap<[u8; 3], [u64; 2]> = HashMap::new();
+    let side = 2 * enlarged;
+    for stretch in stretches {
+        let mut at = stretch.start;
+        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
+            let all = at..at + run.len();
+            at = all.end;
+            let [dots, squares] = counts.entry(split(&run[0]).1).or_default();
+            *dots += run.len() as u64;
+            let ends = (all.start + side..all.end).filter(|&at| at >= side * width);
+            *squares += ends
+                .filter(|&at| {
+                    (1..=side).all(|up| {
+                        [at, at - enlarged, at - side].into_iter().all(|at| pixels[at - up * width] == run[0])
+                    })
+                })
+                .count() as u64;
+        }
+    }
+    let is_thin = |colour: &[u8; 3]| counts.get(colour).is_none_or(|&[dots, squares]| squares * THIN <= dots);
+    colours.iter().zip(is_between).map(|(colour, between)| between && is_thin(colour)).collect()
+}
+
+/// Whether a colour, not white or black, lies between two others.
+pub(super) fn is_between(own: [u8; 3], colours: &[[u8; 3]]) -> bool {
+    let inner = |&a: &[u8; 3], &b: &[u8; 3]| {
+        a != own && b != own && along(own, a, b).is_some_and(|(along, _)| (0.1..=0.9).contains(&along))
+    };
+    !WHITE_AND_BLACK.contains(&own)
+        && colours.iter().enumerate().any(|(at, a)| colours[..at].iter().any(|b| inner(a, b)))
+}
+
+/// Where a colour lies on the way from one colour to another, 0 to 1, and the square of its distance from it; `None` if it does not.
+fn along(own: [u8; 3], from: [u8; 3], to: [u8; 3]) -> Option<(f32, f32)> {
+    let (own, from, to) = (own.map(f32::from), from.map(f32::from), to.map(f32::from));
+    let line: [f32; 3] = std::array::from_fn(|c| to[c] - from[c]);
+    let length: f32 = line.iter().map(|v| v * v).sum();
+    let along = (0..3).map(|c| (own[c] - from[c]) * line[c]).sum::<f32>() / length;
+    let off = (0..3).map(|c| (own[c] - from[c] - along * line[c]).powi(2)).sum::<f32>();
+    ((-0.05..=1.05).contains(&along) && off <= OFF * OFF).then_some((along, off))
+}
+
+impl<const N: usize> Edges<'_, N> {
+    /// The colour that a pixel belongs to; `known` is the number of its own, if that is a thin one.
+    pub fn colour(&self, at: usize, known: Option<usize>) -> Option<[u8; 3]> {
+        let own = split(&self.pixels[at]).1;
+        if known.is_some() && self.is_in_a_square(at) {
+            return Some(own);
+        }
+        let near = self.near(at);
+        let present = |colour: usize| near[colour] || colour >= self.of_shape && known.is_none();
+        let ends = || (0..self.colours.len()).filter(|&end| present(end) && Some(end) != known);
+        let pairs = ends().flat_map(|a| ends().filter(move |&b| b > a).map(move |b| (a, b)));
+        let pairs = pairs.filter(|&(a, b)| near[a] || near[b]);
+        let pairs = pairs.filter(|&(a, b)| known.is_none() || !self.thin[a] && !self.thin[b]);
+        let lines = pairs.filter_map(|(a, b)| {
+            let (along, off) = along(own, self.colours[a], self.colours[b])?;
+            let doubt = usize::from(!near[a] || !near[b]) * 2 + usize::from(self.thin[a] || self.thin[b]);
+            let (more, less) = if along < 0.5 { (a, b) } else { (b, a) };
+            Some((doubt, off, more, less, along.min(1.0 - along)))
+        });
+        let nearest = lines.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let Some((_, _, more, less, share)) = nearest else { return known.map(|_| own) };
+        let is_line =
+            share >= FAINTEST && self.is_on_a_line(at, share, (self.colours[more], self.colours[less]));
+        Some(self.colours[if is_line { less } else { more }])
+    }
+
+    /// Whether a pixel that is covered by a `share` of less than half is on a line that is no wider than it: more covered than
+    /// what lies on both sides of it, and about as much as the next one along the line.
+    fn is_on_a_line(&self, at: usize, share: f32, (ground, line): ([u8; 3], [u8; 3])) -> bool {
+        let (x, e) = (at % self.width, self.enlarged);
+        let (right, down) = (e as isize, (e * self.width) as isize);
+        let covered = |step: isize, times: isize| {
+            let column = if step == right { x as isize + times * step } else { x as isize };
+            let pixel = at.checked_add_signed(times * step).and_then(|at| self.pixels.get(at));
+            let pixel = pixel.filter(|_| (0..self.width as isize).contains(&column));
+            // Beyond the page is ground; a third colour is no line.
+            pixel.map_or(0.0, |pixel| along(split(pixel).1, ground, line).map_or(1.0, |(along, _)| along))
+        };
+        let is_over = |step: isize| {
+            let [far, before, after, beyond] = [-2, -1, 1, 2].map(|times| covered(step, times));
+            before < share
+                && after <= share
+                && before.min(far) < share / 2.0
+                && after.min(beyond) < share / 2.0
+        };
+        let goes_on =
+            |step: isize| [-1, 1].into_iter().any(|times| (covered(step, times) - share).abs() <= ALIKE);
+        is_over(right) && goes_on(down) || is_over(down) && goes_on(right)
+    }
+
+    /// The number of a pixel's colour. What is nearly white or black stands for white or black beside the art, too.
+    fn number(&self, pixel: &[u8; N]) -> Option<usize> {
+        let pixel = split(pixel).1;
+        let known = self.colours.iter().position(|&colour| colour == pixel);
+        known.or_else(|| WHITE_AND_BLACK.iter().position(|&colour| colour == pixel))
+    }
+
+    /// Which of the colours are near a pixel.
+    fn near(&self, at: usize) -> [bool; MOST_KNOWN] {
+        let (x, y, reach) = (at % self.width, at / self.width, REACH * self.enlarged);
+        let mut near = [false; MOST_KNOWN];
+        for row in y.saturating_sub(reach)..(y + reach + 1).min(self.pixels.len() / self.width) {
+            let row = &self.pixels[row * self.width..(row + 1) * self.width];
+            for pixel in &row[x.saturating_sub(reach)..(x + reach + 1).min(self.width)] {
+                if let Some(known) = self.number(pixel) {
+                    near[known] = true;
+                }
+            }
+        }
+        near
+    }
+
+    /// Whether a pixel is in a square of two, as they were drawn, in its colour: between two areas no edge is so wide.
+    fn is_in_a_square(&self, at: usize) -> bool {
+        let (x, over, step) = (at % self.width, self.width * self.enlarged, self.enlarged);
+        let alike = |other: usize| self.pixels.get(other) == Some(&self.pixels[at]);
+        let beside = [(x >= step).then(|| at - step), (x + step < self.width).then_some(at + step)];
+        let rows = [at.checked_sub(over), Some(at + over)];
+        beside
+            .into_iter()
+            .flatten()
+            .filter(|&beside| alike(beside))
+            .any(|beside| rows.into_iter().flatten().any(|row| alike(row) && alike(row + beside - at)))
+    }
+
+    /// Gives strokes in a thin colour the colour of the letters that they are amid.
+    pub fn decide_strokes(&self, spans: &mut Vec<Span>) {
+        if !self.thin.contains(&true) {
+            return;
+        }
+        let is_thin = |colour: [u8; 3]| {
+            self.colours.iter().position(|&known| known == colour).is_some_and(|known| self.thin[known])
+        };
+        let edges: Vec<usize> = (0..spans.len()).filter(|&at| is_thin(spans[at].1)).collect();
+        let places: Vec<Range<usize>> = edges.iter().map(|&at| spans[at].0.clone()).collect();
+        let roots = Forest::of_stretches(&places, self.width, |_, _| true).roots();
+        let mut order: Vec<usize> = (0..edges.len()).collect();
+        order.sort_by_key(|&at| roots[at]);
+        let strokes: Vec<Vec<usize>> = order
+            .chunk_by(|&a, &b| roots[a] == roots[b])
+            .map(|stroke| stroke.iter().map(|&at| edges[at]).collect())
+            .collect();
+        let decided: Vec<(usize, Vec<Span>)> = strokes
+            .par_iter()
+            .filter_map(|stroke| {
+                let colours = self.behind(&stroke.iter().map(|&at| &spans[at]).collect::<Vec<_>>())?;
+                Some(stroke.iter().map(|&at| (at, self.split(&spans[at].0, colours))).collect::<Vec<_>>())
+            })
+            .flatten()
+            .collect();
+        let mut decided: HashMap<usize, Vec<Span>> = decided.into_iter().collect();
+        let all = std::mem::take(spans);
+        for (at, span) in all.into_iter().enumerate() {
+            match decided.remove(&at) {
+                Some(parts) => spans.extend(parts),
+                None => spans.push(span),
+            }
+        }
+    }
+
+    /// The pixels of a stroke, each in the colour that it belongs to: of what it lies on, or that of letters.
+    fn split(&self, span: &Range<usize>, (ground, ink): ([u8; 3], [u8; 3])) -> Vec<Span> {
+        let mut parts = Vec::new();
+        for at in span.clone() {
+            let share = along(split(&self.pixels[at]).1, ground, ink).map_or(1.0, |(along, _)| along);
+            let is_ink = share >= 0.5 || self.is_on_a_line(at, share, (ground, ink));
+            push(&mut parts, at..at + 1, if is_ink { ink } else { ground });
+        }
+        parts
+    }
+
+    /// What a stroke in a thin colour lies on, and the colour behind it: a third one, beyond that of the stroke, if more beside the stroke
+    /// is covered by it than is like the stroke.
+    fn behind(&self, stroke: &[&Span]) -> Option<([u8; 3], [u8; 3])> {
+        let width = self.width;
+        let left = stroke.iter().map(|span| span.0.start % width).min()?;
+        let right = stroke.iter().map(|span| (span.0.end - 1) % width + 1).max()?;
+        let (top, bottom) = (stroke.first()?.0.start / width, stroke.last()?.0.start / width + 1);
+        let side = (right - left).max(bottom - top);
+        if side > LONGEST * self.enlarged {
+            return None;
+        }
+        let mut dots = [0usize; MOST_KNOWN];
+        let mut border = [0usize; MOST_KNOWN];
+        for (span, colour) in stroke {
+            let known = self.colours.iter().position(|known| known == colour)?;
+            dots[known] += span.len();
+            let ends = [span.start.checked_sub(1), Some(span.end)];
+            let beside = span.clone().flat_map(|at| [at.checked_sub(width), Some(at + width)]).chain(ends);
+            let beside = beside.flatten().filter_map(|at| self.pixels.get(at)).filter_map(|p| self.number(p));
+            beside.filter(|&beside| beside != known).for_each(|beside| border[beside] += 1);
+        }
+        let most = |counts: &[usize]| (0..self.colours.len()).rev().max_by_key(|&colour| counts[colour]);
+        let (own, ground) = (most(&dots)?, most(&border)?);
+        // Letters of a word are beside each other; what is above a stem is another line.
+        let over = right - left;
+        let rows = top.saturating_sub(over)..(bottom + over).min(self.pixels.len() / width);
+        let around = rows.step_by(self.enlarged).flat_map(|y| {
+            let row = &self.pixels[y * width..(y + 1) * width];
+            row[left.saturating_sub(side)..(right + side).min(width)].iter().step_by(self.enlarged)
+        });
+        let mut counts = [0usize; MOST_KNOWN];
+        around.clone().filter_map(|pixel| self.number(pixel)).for_each(|colour| counts[colour] += 1);
+        let all: usize = border.iter().sum();
+        let share = |colour: [u8; 3], behind: usize| {
+            along(colour, self.colours[ground], self.colours[behind]).map(|(along, _)| along)
+        };
+        let behind = (0..self.colours.len()).filter(|&colour| {
+            counts[colour] > 0
+                && 4 * border[colour] <= all
+                && colour != ground
+                && share(self.colours[own], colour).is_some_and(|share| (FAINTEST..=0.9).contains(&share))
+        });
+        let behind = behind.max_by_key(|&colour| counts[colour])?;
+        // Its like, against what is more covered than it.
+        let covered = share(self.colours[own], behind)? + 0.1;
+        let like = counts[own].saturating_sub(dots[own] / self.enlarged.pow(2));
+        let deeper = around
+            .filter(|pixel| share(split(*pixel).1, behind).is_some_and(|share| share > covered))
+            .count();
+        (2 * deeper > 3 * like).then(|| (self.colours[ground], self.colours[behind]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layers::posters::spans;
+
+    const SIDE: usize = 120;
+
+    /// The colours that a picture of flat art becomes, if it is such. A `ground` other than white makes one shape of it.
+    fn cut(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
+        let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
+        let mut out = vec![[0; 3]; pixels.len()];
+        for (span, colour) in spans(pixels, SIDE, &rows, (&[], 1))? {
+            out[span].fill(colour);
+        }
+        Some(out)
+    }
+
+    fn mixed(ground: [u8; 3], ink: [u8; 3], share: f64) -> [u8; 3] {
+        std::array::from_fn(|c| {
+            (f64::from(ground[c]) * (1.0 - share) + f64::from(ink[c]) * share).round() as u8
+        })
+    }
+
+    /// Words of upright stems 30 pixels high, ten pixels apart, each covering its columns by these shares.
+    fn words(ground: [u8; 3], ink: [u8; 3], stems: &[&[f64]]) -> Vec<[u8; 3]> {
+        let share = |x: usize, y: usize| {
+            let (stem, row) = (stems[(x / 10 + y / 40 * 5) % stems.len()], y % 40);
+            if (5..35).contains(&row) { stem.get(x % 10).copied().unwrap_or(0.0) } else { 0.0 }
+        };
+        (0..SIDE * SIDE).map(|at| mixed(ground, ink, share(at % SIDE, at / SIDE))).collect()
+    }
+
+    #[test]
+    fn a_stem_that_covers_half_of_two_pixels_is_a_letter_like_others() {
+        let stems: [&[f64]; 5] =
+            [&[0.0, 1.0, 1.0], &[0.6, 1.0, 0.4], &[0.0, 0.55, 0.55], &[0.2, 1.0, 0.8], &[1.0, 1.0]];
+        for (ground, ink) in [
+            ([235, 240, 210], [0, 0, 160]),
+            ([235, 240, 210], [0; 3]),
+            ([0, 40, 160], [255; 3]),
+            ([190, 20, 30], [250, 230, 0]),
+        ] {
+            let found = cut(&words(ground, ink, &stems)).expect("flat art");
+            for (at, &colour) in found.iter().enumerate() {
+                let (x, y) = (at % SIDE, at / SIDE);
+                let stem = stems[(x / 10 + y / 40 * 5) % 5];
+                let share = stem.get(x % 10).copied().filter(|_| (5..35).contains(&(y % 40))).unwrap_or(0.0);
+                assert_eq!(colour, if share > 0.5 { ink } else { ground }, "{ink:?} at {x}, {y}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn pale_letters_amid_their_like_stay_pale() {
+        let (ground, dark) = ([235, 240, 210], [0, 0, 160]);
+        let pale = mixed(ground, dark, 0.5);
+        // Three rows of words: dark, pale, dark.
+        let of_row = [words(ground, dark, &[&[1.0, 1.0, 1.0]]), words(ground, pale, &[&[0.0, 1.0, 1.0]])];
+        let pixels: Vec<[u8; 3]> =
+            (0..SIDE * SIDE).map(|at| of_row[usize::from(at / SIDE / 40 == 1)][at]).collect();
+        assert!(cut(&pixels).is_some_and(|found| found == pixels));
+    }
+
+    #[test]
+    fn a_line_that_covers_less_than_half_of_any_pixel_stays_whole() {
+        let (ground, ink) = ([250, 240, 200], [150, 0, 20]);
+        let bold: &[f64] = &[0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+        for (line, at_column) in
+            [(&[0.0, 0.4][..], 1), (&[0.3, 0.35], 1), (&[0.35, 0.35], 0), (&[0.45, 0.1], 0)]
+        {
+            let found = cut(&words(ground, ink, &[line, bold])).expect("flat art");
+            for (at, &colour) in found.iter().enumerate() {
+                let (x, y) = (at % SIDE, at / SIDE);
+                let inked = match (x / 10 + y / 40 * 5) % 2 {
+                    0 => x % 10 == at_column,
+                    _ => (4..7).contains(&(x % 10)),
+                };
+                let inked = inked && (5..35).contains(&(y % 40));
+                assert_eq!(colour, if inked { ink } else { ground }, "{line:?} at {x}, {y}");
+            }
+        }
+    }
+}
