@@ -203,11 +203,58 @@ fn a_preset_stands_for_its_options_and_gives_way_to_what_is_typed() {
     assert!(bench.refused(1, "print tile --preset crad").contains("card"));
     assert!(
         bench
-            .refused(1, "preset save bad --media foo")
+            .refused(2, "preset save bad --media foo")
             .contains("expected one of the media paper, thick, film")
     );
-    assert!(bench.refused(1, "preset save ../x --mirror").contains("is not a valid name"));
+    assert!(bench.refused(2, "preset save ../x --mirror").contains("is not a valid name"));
+    assert!(bench.refused(2, "preset save none --mirror").contains("no preset is used"));
     assert!(!bench.entries().contains(&"x.toml".to_string()));
+}
+
+#[test]
+fn a_preset_or_a_profile_that_cannot_be_used_is_named_and_hides_no_other() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    bench.done("preset save card --paper postcard");
+    bench.done("preset save white --white under");
+    bench.done("profile set desk --cross 20.4x29.7mm");
+    let config = |args: &str| {
+        let mut command = bench.command(args);
+        command.env("FOILPRESS_CONFIG", bench.path("config"));
+        command
+    };
+    for folder in ["presets", "profiles"] {
+        fs::create_dir_all(bench.path("config").join(folder)).unwrap();
+        fs::write(bench.path("config").join(folder).join("bad.toml"), "format=").unwrap();
+    }
+    for (save, list, good) in [
+        ("preset save card --paper postcard", "preset list", "card             --paper=postcard"),
+        ("profile set desk --cross 20.4x29.7mm", "profile list", "desk             offset 0.40"),
+    ] {
+        assert!(config(save).output().unwrap().status.success());
+        let listed = config(list).output().unwrap();
+        let said = text(&listed.stdout);
+        assert!(listed.status.success() && said.contains(good), "{said}");
+        assert!(said.contains("bad.toml: TOML parse error at line 1"), "{said}");
+        let rows = json(&text(&config(&format!("{list} --json")).output().unwrap().stdout));
+        let row = rows.as_array().unwrap().iter().find(|row| row["name"] == "bad").unwrap();
+        assert!(row["error"].as_str().unwrap().contains("bad.toml: TOML parse error"), "{row}");
+    }
+    let said = text(&config("plan tile --preset bad").output().unwrap().stderr);
+    assert!(said.contains("preset `bad` cannot be used") && said.contains("bad.toml: TOML"), "{said}");
+    // A preset for art alone.
+    let said = bench.refused(2, "plan tile --preset white");
+    assert!(said.contains("white.toml) does not fit this command") && said.contains("--white"), "{said}");
+    bench.done("preset use card");
+    let paper = |args: &str| json(&bench.done(&format!("plan tile -q --json {args}")))["paper"].clone();
+    assert_eq!((paper(""), paper("--preset none")), ("postcard".into(), "a4".into()));
+    // A command that needs the name of a file to write takes it, too.
+    let output = bench.run("preview tile --pixels 32 -o tile.png");
+    assert!(
+        text(&output.stderr).contains("note: preset `card`: --paper=postcard"),
+        "{}",
+        text(&output.stderr)
+    );
 }
 
 #[test]

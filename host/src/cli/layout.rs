@@ -8,6 +8,7 @@ use inks::InkSet;
 use protocol::paper::Paper;
 use protocol::rgl::{Media, Resolution};
 
+use super::stdio::{chain, show};
 use crate::folders;
 use observe::Observer;
 use press::job::Handling;
@@ -218,7 +219,7 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
     use std::fmt::Write as _;
     let table: Vec<_> = layout::paper::table().collect();
     if args.json {
-        return super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
+        return show(&format!("{}\n", serde_json::to_string_pretty(&table)?));
     }
     let mut text =
         String::from("            sheet, mm        printable, mm    margins: left, top, right, bottom\n");
@@ -233,7 +234,7 @@ pub fn papers(args: &PapersArgs) -> Result<()> {
         )?;
     }
     text.push_str("Any other size: --paper 120x180mm, for example, with the margins of a4.\n");
-    super::stdio::show(&text)
+    show(&text)
 }
 
 /// Arguments of `profile`.
@@ -275,42 +276,46 @@ struct SetProfile {
 
 /// Runs `profile`.
 pub fn profile_command(args: &ProfileArgs) -> Result<()> {
-    use std::fmt::Write as _;
-    let folder = profiles()?;
     match &args.command {
-        ProfileCommand::List { json: true } => {
-            let names =
-                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
-            let profile = |name: String| {
-                let mut json = serde_json::to_value(Profile::load(&folders::file(&folder, &name)?)?)?;
-                json["name"] = name.into();
-                anyhow::Ok(json)
-            };
-            let profiles = names.into_iter().map(profile).collect::<Result<Vec<_>>>()?;
-            super::stdio::show(&format!("{}\n", serde_json::to_string_pretty(&profiles)?))
-        }
-        ProfileCommand::List { json: false } => {
-            let mut text = String::new();
-            for name in
-                folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?
-            {
-                let profile = Profile::load(&folders::file(&folder, &name)?)?;
-                writeln!(text, "{name:<16} {}", in_words(&profile))?;
-            }
-            if text.is_empty() {
-                text = format!(
-                    "no profiles in {}; print `foilpress chart calibration` to make one\n",
-                    folder.display()
-                );
-            }
-            super::stdio::show(&text)
-        }
+        ProfileCommand::List { json } => list_profiles(*json),
         ProfileCommand::Set(set) => {
             let profile = press::chart::calibration::profile(set.cross, set.distance);
             let path = save_profile(&set.name, &profile)?;
-            super::stdio::show(&format!("{}: {}\n", path.display(), in_words(&profile)))
+            show(&format!("{}: {}\n", path.display(), in_words(&profile)))
         }
     }
+}
+
+/// Lists the profiles, a line each. One that cannot be used says so.
+fn list_profiles(json: bool) -> Result<()> {
+    let folder = profiles()?;
+    let names = folders::names(&folder).with_context(|| format!("cannot read {}", folder.display()))?;
+    let load = |name: &str| anyhow::Ok(Profile::load(&folders::file(&folder, name)?)?);
+    let profiles = names.iter().map(|name| (name, load(name)));
+    if json {
+        let row = |(name, profile): (&String, Result<Profile>)| {
+            let mut row = match profile {
+                Ok(profile) => serde_json::to_value(profile)?,
+                Err(error) => serde_json::json!({ "error": chain(&error) }),
+            };
+            row["name"] = name.as_str().into();
+            anyhow::Ok(row)
+        };
+        let rows = profiles.map(row).collect::<Result<Vec<_>>>()?;
+        return show(&format!("{}\n", serde_json::to_string_pretty(&rows)?));
+    }
+    let line = |(name, profile): (&String, Result<Profile>)| {
+        let words = profile.map_or_else(|error| chain(&error), |profile| in_words(&profile));
+        format!("{name:<16} {words}\n")
+    };
+    let text: String = profiles.map(line).collect();
+    if text.is_empty() {
+        return show(&format!(
+            "no profiles in {}; print `foilpress chart calibration` to make one\n",
+            folder.display()
+        ));
+    }
+    show(&text)
 }
 
 /// Saves a profile under a name; nothing is written if it is none of a printer.

@@ -177,10 +177,7 @@ pub fn main() -> ExitCode {
             }
             parsed => parsed.unwrap_or_else(|error| error.exit()),
         },
-        Err(error) => {
-            let _ = writeln!(io::stderr(), "foilpress: {}", chain(&error));
-            return ExitCode::FAILURE;
-        }
+        Err(error) => return failed(&error),
     };
     match &args.command {
         // They speak the print system's language, signals and exit codes included.
@@ -193,14 +190,25 @@ pub fn main() -> ExitCode {
         Err(error) if closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             output::yield_to_interrupt();
-            let advice = advice::of(&error).map_or_else(String::new, |advice| format!("; {advice}"));
-            let _ = writeln!(io::stderr(), "foilpress: {}{advice}", chain(&error));
-            if permission::is_missing(&error) {
-                let _ = write!(io::stderr(), "\n{}", permission::how_to_give());
-            }
-            ExitCode::FAILURE
+            failed(&error)
         }
     }
+}
+
+/// Says why the program fails.
+fn failed(error: &anyhow::Error) -> ExitCode {
+    const USAGE: u8 = 2;
+    if let Some(usage) = error.downcast_ref::<clap::Error>() {
+        // Standard error is all there is to say it on.
+        let _ = usage.print();
+        return ExitCode::from(USAGE);
+    }
+    let advice = advice::of(error).map_or_else(String::new, |advice| format!("; {advice}"));
+    let _ = writeln!(io::stderr(), "foilpress: {}{advice}", chain(error));
+    if permission::is_missing(error) {
+        let _ = write!(io::stderr(), "\n{}", permission::how_to_give());
+    }
+    ExitCode::FAILURE
 }
 
 /// The arguments with each negative number joined to the option before it, so that the option says what it expects instead.

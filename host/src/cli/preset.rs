@@ -5,13 +5,13 @@
 
 use std::ffi::OsString;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::{Args as ClapArgs, Subcommand};
 use serde::{Deserialize, Serialize};
 
-use super::stdio::show;
+use super::stdio::{chain, show, usage};
 use crate::folders;
 use press::files::{read_toml, write_toml};
 
@@ -20,8 +20,9 @@ use press::files::{read_toml, write_toml};
 pub struct PresetArg {
     /// Load a preset; options given here override it
     ///
-    /// `foilpress preset save` makes a preset; `paper` is there from the start, the chain of the 2009 paper. Without --preset the one chosen by `foilpress preset use` applies, if there is
-    /// one and its options fit the command.
+    /// `foilpress preset save` makes a preset; `paper` is there from the start, the chain of the 2009 paper. Without --preset the
+    /// one chosen by `foilpress preset use` applies, if there is one and its options fit the command; `none` stops that for this
+    /// command.
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
 }
@@ -29,6 +30,9 @@ pub struct PresetArg {
 /// Presets that are always there, unless one of the same name is saved: the chain of the 2009 paper.
 const BUILT_IN: [(&str, &[(&str, &str)]); 1] =
     [("paper", &[("factor", "sacls"), ("halftone", "walk"), ("intent", "basis"), ("metric", "paper")])];
+
+/// Where the name of a preset is expected, it means that none is to be used.
+const NONE: &str = "none";
 
 /// Arguments of `preset`.
 #[derive(ClapArgs, Debug)]
@@ -48,6 +52,7 @@ enum Command {
     /// Save options under a name, replacing any preset of that name
     Save {
         /// Name of the preset
+        #[arg(value_parser = new_name)]
         name: String,
         /// Options to save, by their long names, as they would be typed
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, required = true, value_name = "OPTIONS")]
@@ -64,6 +69,14 @@ enum Command {
         /// Name of the preset, or none
         name: String,
     },
+}
+
+/// The name of a preset to save.
+fn new_name(name: &str) -> Result<String, String> {
+    if name == NONE {
+        return Err("`none` means that no preset is used; choose another name".into());
+    }
+    folders::file(Path::new(""), name).map(|_| name.to_owned()).map_err(|error| error.to_string())
 }
 
 /// A preset as it is saved.
@@ -112,15 +125,21 @@ impl Preset {
         Ok(words)
     }
 
-    fn load(name: &str) -> Result<Preset> {
+    /// The preset of this name, and its options as words.
+    fn load(name: &str) -> Result<(Preset, Vec<String>)> {
         let path = folders::file(&presets()?, name)?;
         if path.is_file() {
-            return Ok(read_toml(&path)?);
+            let bad = || format!("preset `{name}` cannot be used; correct its file, or save it again");
+            let preset: Preset = read_toml(&path).with_context(bad)?;
+            let words = preset.words().with_context(|| path.display().to_string()).with_context(bad)?;
+            return Ok((preset, words));
         }
         match BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((_, options)) => {
                 let option = |(name, value): &(&str, &str)| (name.to_string(), value.to_string().into());
-                Ok(Preset { options: options.iter().map(option).collect() })
+                let preset = Preset { options: options.iter().map(option).collect() };
+                let words = preset.words()?;
+                Ok((preset, words))
             }
             None => bail!(
                 "there is no preset `{name}` (there are: {}); `foilpress preset save {name} OPTIONS` creates it",
@@ -161,15 +180,21 @@ fn takes_preset(command: &clap::Command) -> bool {
     command.get_arguments().any(|arg| arg.get_id() == "preset")
 }
 
-/// Why a command would not take these options, in clap's words; `None` if it would.
-fn refusal(program: &clap::Command, command: &[&str], words: &[String]) -> Option<String> {
-    let typed = ["foilpress"].iter().chain(command).map(|&name| name.to_owned()).chain(words.iter().cloned());
-    // A preset holds no file names, so any name of a document will do.
-    match program.clone().try_get_matches_from(typed.chain(["document".to_owned()])) {
-        Ok(_) => None,
-        // The first line says what is wrong, the others how to get help.
-        Err(error) => Some(error.to_string().lines().next().unwrap_or_default().to_owned()),
-    }
+/// Why these arguments would not be taken, in clap's words; `None` if they would.
+fn refusal(program: &clap::Command, args: &[OsString]) -> Option<String> {
+    // The first line says what is wrong, the others how to get help.
+    let said = program.clone().try_get_matches_from(args).err()?.to_string();
+    Some(said.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned())
+}
+
+/// Why a command would not take these options alone.
+fn refused_by(command: &clap::Command, program: &clap::Command, words: &[String]) -> Option<String> {
+    // A preset holds no file names, so any name will do for those that the command needs.
+    let needed = command.get_arguments().filter(|arg| arg.is_required_set());
+    let needed = needed.map(|arg| arg.get_long().map_or("name".into(), |long| format!("--{long}=name")));
+    let start = ["foilpress".to_owned(), command.get_name().to_owned()];
+    let args = start.into_iter().chain(words.iter().cloned()).chain(needed).map(OsString::from);
+    refusal(program, &args.collect::<Vec<_>>())
 }
 
 /// Runs `preset`. `program` is the whole command line, whose commands decide which options fit.
@@ -182,20 +207,17 @@ pub fn run(args: &Args, program: &clap::Command) -> Result<()> {
 }
 
 fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
-    let preset = Preset::of_words(options)?;
+    let preset = Preset::of_words(options).map_err(usage)?;
     let words = preset.words()?;
-    let able: Vec<&str> = program
-        .get_subcommands()
-        .filter(|command| takes_preset(command))
-        .map(clap::Command::get_name)
-        .collect();
+    let able: Vec<&clap::Command> =
+        program.get_subcommands().filter(|command| takes_preset(command)).collect();
     let refusals: Vec<Option<String>> =
-        able.iter().map(|&command| refusal(program, &[command], &words)).collect();
+        able.iter().map(|command| refused_by(command, program, &words)).collect();
     if words.iter().any(|word| word.starts_with("--preset")) {
-        bail!("a preset cannot load another preset");
+        return Err(usage("a preset cannot load another preset"));
     }
     if let (true, Some(Some(first))) = (refusals.iter().all(Option::is_some), refusals.first()) {
-        bail!("no command accepts these options together: {}", first.trim_start_matches("error: "));
+        return Err(usage(format!("no command accepts these options together: {first}")));
     }
     let folder = presets()?;
     let path = folders::file(&folder, name)?;
@@ -205,37 +227,40 @@ fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
         .into_iter()
         .zip(&refusals)
         .filter(|(_, refusal)| refusal.is_none())
-        .map(|(name, _)| name)
+        .map(|(command, _)| command.get_name())
         .collect();
     show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
 }
 
+/// Lists the presets, a line each. One that cannot be used says so.
 fn list(json: bool) -> Result<()> {
-    let names = names()?;
     let used = in_use();
+    let names = names()?;
+    let presets = names.iter().map(|name| (name, used.as_ref() == Some(name), Preset::load(name)));
     if json {
-        let preset = |name: &String| {
-            let preset = Preset::load(name)?;
-            let in_use = used.as_ref() == Some(name);
-            let options = serde_json::to_value(&preset.options)?;
-            anyhow::Ok(serde_json::json!({ "name": name, "options": options, "in_use": in_use }))
+        let row = |(name, in_use, preset): (&String, bool, Result<(Preset, Vec<String>)>)| {
+            Ok(match preset {
+                Ok((Preset { options }, _)) => {
+                    serde_json::json!({ "name": name, "options": serde_json::to_value(options)?, "in_use": in_use })
+                }
+                Err(error) => serde_json::json!({ "name": name, "error": chain(&error), "in_use": in_use }),
+            })
         };
-        let presets = names.iter().map(preset).collect::<Result<Vec<_>>>()?;
-        return show(&format!("{}\n", serde_json::to_string_pretty(&presets)?));
+        let rows = presets.map(row).collect::<Result<Vec<_>>>()?;
+        return show(&format!("{}\n", serde_json::to_string_pretty(&rows)?));
     }
-    let mut text = String::new();
-    for name in &names {
-        let words = Preset::load(name)?.words()?.join(" ");
-        let used = if used.as_deref() == Some(name) { "  (in use)" } else { "" };
-        text.push_str(&format!("{name:<16} {words}{used}\n"));
-    }
-    show(&text)
+    let line = |(name, in_use, preset): (&String, bool, Result<(Preset, Vec<String>)>)| {
+        let used = if in_use { "  (in use)" } else { "" };
+        let words = preset.map_or_else(|error| chain(&error), |(_, words)| words.join(" "));
+        format!("{name:<16} {words}{used}\n")
+    };
+    show(&presets.map(line).collect::<String>())
 }
 
 /// Applies a preset from now on, or none.
 fn apply(name: &str) -> Result<()> {
     let path = marker()?;
-    if name == "none" {
+    if name == NONE {
         return match std::fs::remove_file(&path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
                 Err(error).with_context(|| format!("cannot remove {}", path.display()))
@@ -243,7 +268,7 @@ fn apply(name: &str) -> Result<()> {
             _ => show("no preset is in use\n"),
         };
     }
-    let words = Preset::load(name)?.words()?.join(" ");
+    let words = Preset::load(name)?.1.join(" ");
     std::fs::write(&path, format!("{name}\n")).with_context(|| format!("cannot write {}", path.display()))?;
     show(&format!("applied from now on: {words}\n"))
 }
@@ -253,11 +278,9 @@ pub fn expand(args: Vec<OsString>, program: &clap::Command) -> Result<Vec<OsStri
     let place = args.iter().skip(1).position(|arg| !arg.to_string_lossy().starts_with('-')).map(|at| at + 1);
     let Some(mut place) = place else { return Ok(args) };
     let Some(mut command) = program.find_subcommand(&args[place]) else { return Ok(args) };
-    let mut path = vec![command.get_name()];
     // `plan layers` takes the options of the inner command.
     while let Some(inner) = args.get(place + 1).and_then(|word| command.find_subcommand(word)) {
         (command, place) = (inner, place + 1);
-        path.push(command.get_name());
     }
     if !takes_preset(command) {
         return Ok(args);
@@ -272,30 +295,35 @@ pub fn expand(args: Vec<OsString>, program: &clap::Command) -> Result<Vec<OsStri
             None => None,
         }
     });
-    let words = match (&named, in_use()) {
-        (Some(name), _) => Preset::load(name)?.words().with_context(|| format!("preset `{name}`"))?,
+    let (name, words) = match (&named, in_use()) {
+        (Some(name), _) if name == NONE => return Ok(args),
+        (Some(name), _) => (name.clone(), Preset::load(name)?.1),
         (None, Some(name)) => {
-            let words = Preset::load(&name).and_then(|preset| preset.words()).with_context(|| {
-                format!("preset `{name}` is in use (`foilpress preset use none` stops that)")
-            })?;
-            let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
-            let fits = refusal(program, &path, &words).is_none();
-            if !quiet {
-                let what =
-                    if fits { words.join(" ") } else { "does not fit this command and is ignored".into() };
-                let _ = writeln!(std::io::stderr(), "note: preset `{name}`: {what}");
-            }
-            if !fits {
-                return Ok(args);
-            }
-            words
+            let loaded =
+                Preset::load(&name).context("a preset is in use (`foilpress preset use none` stops that)")?;
+            (name, loaded.1)
         }
         (None, None) => return Ok(args),
     };
     let mut all = args[..=place].to_vec();
-    all.extend(words.into_iter().map(OsString::from));
+    all.extend(words.iter().map(OsString::from));
     all.extend_from_slice(typed);
-    Ok(all)
+    // What is wrong without the preset as well is told of the arguments alone.
+    let refused = refusal(program, &all).filter(|_| refusal(program, &args).is_none());
+    if let (Some(why), Some(_)) = (&refused, &named) {
+        let path = folders::file(&presets()?, &name)?;
+        let place = if path.is_file() { format!(" ({})", path.display()) } else { String::new() };
+        return Err(usage(format!("preset `{name}`{place} does not fit this command: {why}")));
+    }
+    let quiet = args.iter().any(|arg| arg == "-q" || arg == "--quiet");
+    if named.is_none() && !quiet {
+        let what = match &refused {
+            None => words.join(" "),
+            Some(_) => "does not fit this command and is ignored".into(),
+        };
+        let _ = writeln!(std::io::stderr(), "note: preset `{name}`: {what}");
+    }
+    Ok(if refused.is_none() { all } else { args })
 }
 
 #[cfg(test)]
@@ -324,7 +352,22 @@ mod tests {
         let words: Vec<String> =
             ["--media=film", "--media=thick", "--mirror", "--mirror"].map(str::to_owned).to_vec();
         let program = crate::cli::Args::command();
-        assert_eq!(refusal(&program, &["print"], &words), None);
-        assert!(refusal(&program, &["print"], &["--meda=film".to_owned()]).is_some());
+        // `preview` needs the name of a file to write, too.
+        for command in ["print", "layers", "plan", "preview"] {
+            let command = program.find_subcommand(command).unwrap();
+            assert!(refused_by(command, &program, &["--meda=film".to_owned()]).unwrap().contains("--meda"));
+            let words: &[String] = if command.get_name() == "preview" { &[] } else { &words };
+            assert_eq!(refused_by(command, &program, words), None);
+        }
+    }
+    #[test]
+    fn no_preset_is_saved_under_a_name_that_stands_for_none() {
+        let saved = |name: &str| {
+            let typed = ["foilpress", "preset", "save", name, "--mirror"];
+            crate::cli::Args::command().try_get_matches_from(typed).map(|_| ()).map_err(|e| e.to_string())
+        };
+        assert_eq!(saved("decal"), Ok(()));
+        assert!(saved(NONE).unwrap_err().contains("no preset is used"));
+        assert!(saved("../x").unwrap_err().contains("is not a valid name"));
     }
 }

@@ -1,10 +1,12 @@
 //! What every command does the same way: results to standard output, jobs from files, errors as text.
 
+use std::fmt;
 use std::fs::File;
 use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Error, Result, bail};
+use clap::error::ErrorKind;
 
 use device::deliver::Failure;
 use device::flash::FlashError;
@@ -18,6 +20,11 @@ const LARGEST_JOB: u64 = 256 << 20;
 /// An error with its causes.
 pub fn chain(error: &anyhow::Error) -> String {
     with_causes(error.as_ref())
+}
+
+/// A mistake in the arguments that clap does not see by itself. It ends like those that clap sees, with exit code 2.
+pub fn usage(said: impl fmt::Display) -> Error {
+    clap::Error::raw(ErrorKind::ValueValidation, format!("{said}\n")).into()
 }
 
 /// Writes a result to standard output.
