@@ -22,6 +22,11 @@ pub(crate) use dots::{census, check_stacks};
 /// Dots in a millimetre at 600 dpi, the resolution of every dot map and sheet.
 pub const DOTS_PER_MM: f64 = 600.0 / 25.4;
 
+/// A number of dots in words.
+pub fn dots_in_words(count: u32) -> String {
+    format!("{count} dot{}", if count == 1 { "" } else { "s" })
+}
+
 /// One stack for every dot of the printable area of a sheet of paper.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sheet {

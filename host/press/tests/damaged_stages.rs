@@ -31,7 +31,7 @@ fn folders() -> tempfile::TempDir {
     gamut::files::save(&mix, &gamut::files::Provenance::default(), &folder.path().join("mix")).unwrap();
     dots.save(&folder.path().join("dots")).unwrap();
     page.save(&folder.path().join("sheet")).unwrap();
-    separate::files::save(&passes, &folder.path().join("passes")).unwrap();
+    separate::files::save(&passes, (600, 600), &folder.path().join("passes")).unwrap();
     folder
 }
 

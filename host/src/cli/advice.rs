@@ -2,10 +2,12 @@
 
 use inks::InkSet;
 use press::chart::ChartError;
+use press::halftone::HalftoneError;
 use press::layers::{Accept, LayersError, Remedy, Setting, Settings};
 use press::layout::{LayoutError, SizeError};
 use press::pipeline::JobError;
 use press::pipeline::document::StageError;
+use press::simulate::PrintoutError;
 use protocol::ink::Ink;
 
 use super::choice::Choice;
@@ -30,6 +32,16 @@ pub fn of(error: &anyhow::Error) -> Option<String> {
         if let Some(advice) = cause.downcast_ref().and_then(of_layers) {
             return Some(advice);
         }
+        if let Some(StageError::Halftone(HalftoneError::NotProcess { .. })) = cause.downcast_ref() {
+            return Some("--inks process leaves the others out".into());
+        }
+        if let Some(PrintoutError::Resolution { .. }) = cause.downcast_ref() {
+            return Some(
+                "`foilpress plan JOB --html FILE` shows it on a page, and `foilpress inspect JOB --passes DIR` writes its \
+                 passes as pictures"
+                    .into(),
+            );
+        }
         let advice = match (layout, size, cause.downcast_ref()) {
             (Some(LayoutError::Beyond { .. }), ..) => {
                 Some("change --at or --size, take a larger --paper, or cut with --crop")
@@ -40,20 +52,38 @@ pub fn of(error: &anyhow::Error) -> Option<String> {
             }
             (_, Some(SizeError::BeyondSheets { .. }), _) => Some("give a smaller --size"),
             (_, Some(SizeError::TooSmall { .. }), _) => Some("give a larger --size"),
-            (.., Some(ChartError::TooMany { .. })) => Some("name the inks with --inks"),
+            (.., Some(ChartError::TooMany { .. })) => Some("the options are --inks and --paper"),
+            (.., Some(ChartError::Beyond { .. })) => {
+                Some("change --at, --repeat or --gap, take a larger --paper, or cut with --crop")
+            }
+            (.., Some(ChartError::Layout(LayoutError::FillsNothing { .. }))) => {
+                Some("change --at or take a larger --paper")
+            }
             _ => None,
         };
         advice.map(str::to_owned)
     })
 }
 
+/// What Ghostscript says of a file that it does not find.
+const NOT_FOUND: &str = "/undefinedfilename";
+
 /// The options that help against an error of layers.
 fn of_layers(error: &LayersError) -> Option<String> {
     Some(match error {
         LayersError::Setting { setting, .. } => format!("the option is {}", option_of(*setting)),
         LayersError::Foil { ink, .. } => format!("add --inks +{}", ink.name()),
+        LayersError::NoSize { fits_mm, .. } | LayersError::Beyond { fits_mm, .. }
+            if below(*fits_mm) <= 0.0 =>
+        {
+            "nothing fits there: print fewer copies (--repeat) with a smaller --gap, or take a larger --paper"
+                .into()
+        }
         LayersError::NoSize { fits_mm, .. } => {
             format!("such as --dpi 1200, or --size {}mm for the largest that fits", below(*fits_mm))
+        }
+        LayersError::File { path, problem } if path.to_str().is_none() && problem.contains(NOT_FOUND) => {
+            "the name of the file is not UTF-8, so Ghostscript does not find it; rename the file".into()
         }
         LayersError::Beyond { fits_mm, says, .. } => format!(
             "the options are --size ({}mm is the largest that fits), {}--paper and --crop",
@@ -141,6 +171,15 @@ mod tests {
         let setting =
             LayersError::Setting { setting: Setting::Finish, problem: "finish is not allowed".into() };
         assert!(said(setting).ends_with("the option is --finish"));
+        let none = LayersError::Beyond {
+            path: "art.svg".into(),
+            says: None,
+            size_mm: (20.0, 10.0),
+            room_mm: (0.0, 269.7),
+            fits_mm: 0.0,
+        };
+        let text = said(none);
+        assert!(text.contains("--repeat") && !text.contains("--size"), "{text}");
         let large = LayersError::TooLarge {
             width_mm: 300.0,
             height_mm: 200.0,

@@ -9,20 +9,22 @@ use anyhow::{Context, Result};
 use clap::Args as ClapArgs;
 
 use super::args::{DocumentArgs, FactorArgs, GamutArgs, HalftoneArg, InkArgs};
-use super::choice::choice;
+use super::choice::{choice, utf8};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::output::{self, Kind, Staged};
+use super::stdio::print_job;
 use appearance::document::{self, ColourSpace, foil};
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, GamutError, Printable};
 use observe::Observer;
+use press::halftone;
 use press::halftone::metrics;
 use press::layout::{self, Size};
 use press::pipeline::{self, document as stages};
 use press::separate;
 use press::sheet::DotMap;
-use press::{halftone, simulate};
 use protocol::paper::Paper;
+use protocol::rgl::Resolution;
 
 /// Where a result goes: the place named, else the current folder under the name of what it is made from.
 fn named(output: &Option<PathBuf>, from: &Path, ending: &str) -> PathBuf {
@@ -69,7 +71,7 @@ pub struct Map {
     #[arg(value_name = "DOC.foil")]
     factored: PathBuf,
     /// Document that was factored, so that clamp and blend use its own pixels instead of mixtures of the bases
-    #[arg(long, value_name = "DOC")]
+    #[arg(long, value_name = "DOC", value_parser = utf8())]
     document: Option<String>,
     /// Material of that document, as given to `factor`
     #[arg(long, value_name = "NUMBER|NAME", requires = "document")]
@@ -228,7 +230,7 @@ impl Separate {
                 inks::Severity::Warning | inks::Severity::Error => observer.note(&check.to_string()),
             }
         }
-        separate::files::save(&separation, staged.create()?)?;
+        separate::files::save(&separation, Resolution::Dpi600.dpi(), staged.create()?)?;
         staged.commit()
     }
 }
@@ -278,11 +280,8 @@ pub struct Simulate {
 impl Simulate {
     /// The printer's language → the sheet that comes out.
     pub fn run(&self, observer: &dyn Observer) -> Result<()> {
-        let job = super::stdio::read_job(&self.job)?;
         let staged = Staged::folder(&self.output, Kind::Sheet)?;
-        let printout = simulate::print(&job, &simulate::Setup::default(), observer)
-            .with_context(|| format!("{}", self.job.display()))?;
-        printout.sheet()?.save(staged.create()?)?;
+        print_job(&self.job, observer)?.save(staged.create()?)?;
         staged.commit()
     }
 }

@@ -13,7 +13,7 @@ use super::layout::MediaArgs;
 use observe::Observer;
 use press::chart;
 use press::layers::names::typed;
-use press::layout::{self, Layout};
+use press::layout::{Layout, paper};
 use press::separate::MOST_CARTRIDGES;
 use press::sheet::DotMap;
 
@@ -133,7 +133,7 @@ struct Calibration {
 #[derive(ClapArgs, Debug)]
 struct WholePage {
     /// Paper size: a4, letter, legal, executive, b5, postcard, or the size of the sheet such as 120x180mm
-    #[arg(long, default_value = "a4", value_parser = layout::paper::read)]
+    #[arg(long, default_value = "a4", value_parser = paper::read)]
     paper: protocol::paper::Paper,
     #[command(flatten)]
     media: MediaArgs,
@@ -151,15 +151,15 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     match &args.chart {
         Chart::Ramp(Ramp { first, second, halftone, step }) => {
             let make = |library: &Library| chart::ramp(first, second, halftone.halftone, library, observer);
-            step.run("ramp", make, [first, second], observer)
+            step.run("ramp", chart::ramp::parts().size, make, [first, second], observer)
         }
         Chart::Ladder(Ladder { glossy, dull, halftone, step }) => {
             let make = |library: &Library| chart::ladder(glossy, dull, halftone.halftone, library, observer);
-            step.run("ladder", make, [glossy, dull], observer)
+            step.run("ladder", chart::size_of_ladder(), make, [glossy, dull], observer)
         }
         Chart::Halftone(Halftone { first, second, step }) => {
             let make = |library: &Library| chart::halftones(first, second, library, observer);
-            step.run("halftone", make, [first, second], observer)
+            step.run("halftone", chart::size_of_halftones(first, second), make, [first, second], observer)
         }
         Chart::Stacks(stacks) => {
             let usual = InkArgs { inks: Some(USUAL.into()), ..stacks.inks.clone() };
@@ -173,8 +173,10 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
             }
             let all: Vec<Stack> = library.at_hand(&set).iter().map(|entry| entry.stack.clone()).collect();
             let dots = chart::stacks(&all, stacks.job.layout.paper, stacks.strips)?;
+            let layout = layout(&stacks.job, observer)?;
+            chart::check_room("stacks", (dots.width(), dots.length()), &layout)?;
             let artwork = artwork("stacks", &dots, set, &library);
-            print(&artwork, &stacks.job, observer)
+            print(&artwork, &layout, &stacks.job, observer)
         }
         Chart::Registration(registration) => {
             let inks = &registration.inks;
@@ -208,26 +210,32 @@ fn artwork<'a>(name: &'a str, dots: &'a DotMap, allowed: InkSet, library: &'a Li
     }
 }
 
-fn print(artwork: &Artwork<'_>, args: &JobArgs, observer: &dyn Observer) -> Result<()> {
-    // Charts are there to be photographed.
-    let layout = Layout { camera_marks: true, ..args.layout.layout(observer)? };
-    artwork.print(&layout, &args.media, &args.result, &args.deliver, observer)
+/// The page. Charts are there to be photographed.
+fn layout(args: &JobArgs, observer: &dyn Observer) -> Result<Layout> {
+    Ok(Layout { camera_marks: true, ..args.layout.layout(observer)? })
+}
+
+fn print(artwork: &Artwork<'_>, layout: &Layout, args: &JobArgs, observer: &dyn Observer) -> Result<()> {
+    artwork.print(layout, &args.media, &args.result, &args.deliver, observer)
 }
 
 impl StepArgs {
     fn run(
         &self,
-        name: &str,
+        name: &'static str,
+        size: (usize, usize),
         make: impl FnOnce(&Library) -> Result<DotMap, chart::ChartError>,
         [first, second]: [&Stack; 2],
         observer: &dyn Observer,
     ) -> Result<()> {
         let library = InkArgs::of(None, self.library.clone()).library()?;
+        let layout = layout(&self.job, observer)?;
+        chart::check_room(name, size, &layout)?;
         let dots = make(&library)?;
         let name = format!("{name} {first} {second}");
         // Who names a foil wants it.
         let artwork = artwork(&name, &dots, InkSet::ALL, &library);
-        print(&artwork, &self.job, observer).with_context(|| name.clone())
+        print(&artwork, &layout, &self.job, observer).with_context(|| name.clone())
     }
 }
 

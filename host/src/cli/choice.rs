@@ -7,7 +7,7 @@ use std::str::FromStr;
 use appearance::document::ColourSpace;
 use appearance::factor::Method;
 use appearance::gamut::{self, Intent};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use inks::Trust;
 use press::layers::{Accept, Finish, White};
 
@@ -30,6 +30,13 @@ pub fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     });
     PossibleValuesParser::new(names).try_map(|name| {
         T::ALL.iter().find(|(_, known, _)| *known == name).map(|(value, ..)| *value).ok_or("unknown name")
+    })
+}
+
+/// Reads the name of a document, which is part of texts in UTF-8: of reports, and of edits to replay.
+pub fn utf8() -> impl TypedValueParser<Value = String> {
+    OsStringValueParser::new().try_map(|name| {
+        name.into_string().map_err(|_| "expected a name in UTF-8; rename the file or the folder")
     })
 }
 

@@ -11,7 +11,7 @@ use super::laid::{DotsArgs, Laid};
 use super::output::Staged;
 use super::preset::PresetArg;
 use super::preview::shown::{printed, printed_name};
-use super::stdio::{read_job, show};
+use super::stdio::{print_job, show};
 use appearance::factor::Factored;
 use measure::compare::{
     Comparison, Document, Errors, Factor, PhotoFigures, Printed, Setup, compare, page, space,
@@ -123,17 +123,15 @@ impl Args {
         let laid = self.dots.laid(observer)?;
         let layout = Layout { camera_marks: true, ..laid.layout.clone() };
         let page = arrange(&laid.halftoned.dots, &layout, observer)?;
-        if let Some(job) = &self.job {
-            let printout = simulate::print(&read_job(job)?, &simulate::Setup::default(), observer)
-                .with_context(|| format!("{}", job.display()))?;
-            if let Some(difference) = simulate::difference(&page.sheet, &printout.sheet()?) {
-                bail!(
-                    "{}: not the job of {} with these options ({difference}); give the options that it was printed with, \
+        if let Some(job) = &self.job
+            && let Some(difference) = simulate::difference(&page.sheet, &print_job(job, observer)?)
+        {
+            bail!(
+                "{}: not the job of {} with these options ({difference}); give the options that it was printed with, \
                      --camera-marks included, or leave DOC out",
-                    job.display(),
-                    self.dots.document.document
-                );
-            }
+                job.display(),
+                self.dots.document.document
+            );
         }
         let Some(&area) = page.laid.copies.first() else {
             bail!("nothing of the document lies on the sheet")

@@ -62,7 +62,9 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
         let summary = Summary { inspection, pass_streams };
         if let Some(inside) = inside {
             for pass in &passes {
-                save_plane(&pass.plane, &inside.join(files::name(written, pass.ink)))?;
+                // There is no pass before a resolution.
+                let dpi = summary.inspection.setup.resolution.unwrap_or_default();
+                save_plane(&pass.plane, dpi, &inside.join(files::name(written, pass.ink)))?;
                 written += 1;
             }
         }

@@ -127,12 +127,12 @@ pub fn make(
     write(&folder.join("job.rgl"), &job.bytes)?;
     let passes = folder.join("passes");
     fs::create_dir(&passes).with_context(|| format!("cannot write {}", passes.display()))?;
-    let across = shown::across(plan);
+    let (across, dpi) = (shown::across(plan), plan.resolution_dpi);
     // One thread compresses a picture, so they are written beside each other, the largest first.
     let pictures: [&(dyn Fn() -> Result<()> + Sync); 5] = [
         // The page is the simulated sheet, dot for dot.
         &|| Ok(save_sheet(sheet, laid.area, across, ground, &folder.join("preview.png"))?),
-        &|| Ok(sheet.save_colours(laid.area, &folder.join("separation.png"))?),
+        &|| Ok(sheet.save_colours(laid.area, dpi, &folder.join("separation.png"))?),
         &|| {
             let html = shown::page(plan, sheet, &separation.passes, laid.area, ground)?;
             write(&folder.join("plan.html"), html.as_bytes())
@@ -143,7 +143,7 @@ pub fn make(
                 Ok(save_pass(pass, laid.area, across, ground, &folder.join(name))?)
             })
         },
-        &|| Ok(separate::files::save(separation, &passes)?),
+        &|| Ok(separate::files::save(separation, dpi, &passes)?),
     ];
     pictures.par_iter().with_max_len(1).try_for_each(|picture| picture())?;
     Ok(Made { job, folder, places })

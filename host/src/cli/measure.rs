@@ -12,13 +12,12 @@ use clap::{Args as ClapArgs, Subcommand};
 use inks::Library;
 
 use super::output::{Kind, Staged};
-use super::stdio::{read_job, show};
+use super::stdio::{print_job, show};
 use measure::Measurement;
 use measure::reduce::Kind as Origin;
 use measure::setup::Setup;
 use observe::Observer;
 use press::sheet::Sheet;
-use press::simulate;
 
 /// Arguments of `measure`.
 #[derive(ClapArgs, Debug)]
@@ -146,7 +145,5 @@ fn chart(path: &Path, observer: &dyn Observer) -> Result<Sheet> {
             path.display()
         );
     }
-    let printout = simulate::print(&read_job(path)?, &simulate::Setup::default(), observer)
-        .with_context(|| format!("{}", path.display()))?;
-    Ok(printout.sheet()?)
+    print_job(path, observer)
 }

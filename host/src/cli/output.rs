@@ -187,6 +187,10 @@ impl Staged {
                 kind.foreign_entry(target).with_context(|| format!("cannot read {}", target.display()))?;
             match foreign {
                 None => Ok(()),
+                Some(_) if kind == Kind::Maps => bail!(
+                    "{} exists; maps that may have been edited are never replaced, so choose another folder (-o)",
+                    target.display()
+                ),
                 Some(foreign) if foreign == target => bail!(
                     "{} exists and was not written by this command; choose another folder",
                     target.display()
@@ -386,6 +390,17 @@ mod tests {
         assert!(Staged::folder(folder.path(), Kind::Print).is_err());
     }
 
+    #[test]
+    fn maps_are_never_replaced_and_the_message_says_why() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("leaf");
+        let staged = Staged::folder(&target, Kind::Maps).unwrap();
+        fs::write(staged.create().unwrap().join("metallic.png"), "x").unwrap();
+        staged.commit().unwrap();
+        let said = Staged::folder(&target, Kind::Maps).err().unwrap().to_string();
+        assert!(said.contains("may have been edited") && !said.contains("did not write"), "{said}");
+    }
+
     /// Art is called like the passes that `inspect` writes.
     #[test]
     fn pictures_of_passes_do_not_take_the_place_of_art() {
@@ -394,7 +409,7 @@ mod tests {
         let plane = press::separate::Plane { width: 8, length: 8, stride: 1, bits: vec![0; 8] };
         for _ in 0..2 {
             let staged = Staged::folder(&target, Kind::Pictures).unwrap();
-            files::save_plane(&plane, &staged.create().unwrap().join("01-white.png")).unwrap();
+            files::save_plane(&plane, (600, 600), &staged.create().unwrap().join("01-white.png")).unwrap();
             staged.commit().unwrap();
         }
         image::GrayImage::new(8, 8).save(target.join("02-gold.png")).unwrap();

@@ -12,7 +12,9 @@ use device::deliver::Failure;
 use device::flash::FlashError;
 use device::send::OpenError;
 use device::send::query::QueryError;
-use observe::with_causes;
+use observe::{Observer, with_causes};
+use press::sheet::Sheet;
+use press::simulate;
 
 /// The largest stream that is read: several times a page of noise in seven passes.
 const LARGEST_JOB: u64 = 256 << 20;
@@ -42,6 +44,14 @@ pub fn read_job(path: &Path) -> Result<Vec<u8>> {
         bail!("{} is larger than {} MB, too large for a job", path.display(), LARGEST_JOB >> 20);
     }
     Ok(job)
+}
+
+/// The sheet that the simulated printer makes of a job in a file.
+pub fn print_job(path: &Path, observer: &dyn Observer) -> Result<Sheet> {
+    let about = || path.display().to_string();
+    let printout =
+        simulate::print(&read_job(path)?, &simulate::Setup::default(), observer).with_context(about)?;
+    printout.sheet().with_context(about)
 }
 
 /// Whether the reader of our output went away, as in `foilpress inspect job.rgl | head`. A printer or a bridge that went

@@ -3,11 +3,12 @@
 use inks::Stack;
 
 use crate::halftone::HalftoneError;
+use crate::layout::{Cut, LayoutError};
 use crate::sheet::SheetError;
 use appearance::weights::WeightError;
 
 /// Why a chart cannot be made.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ChartError {
     /// Nothing to show a difference of.
     #[error("a {chart} needs two different stacks; both are `{stack}`")]
@@ -21,7 +22,7 @@ pub enum ChartError {
     #[error("registration compares passes, so at least two inks are needed")]
     OneInk,
     /// More than a chart shows.
-    #[error("{found} {what}: this paper has room for {most}; choose fewer inks")]
+    #[error("{found} {what}, but this paper has room for {most}; choose fewer inks or a larger paper")]
     TooMany {
         /// What.
         what: &'static str,
@@ -44,6 +45,28 @@ pub enum ChartError {
         /// Name of the paper.
         paper: &'static str,
     },
+    /// It does not lie wholly on its page, though the paper is large enough.
+    #[error(
+        "{cut} of {width:.1} x {length:.1} mm would be cut off; the printable area of {paper} is {most_width:.1} x \
+         {most_length:.1} mm"
+    )]
+    Beyond {
+        /// What would be cut.
+        cut: Cut,
+        /// Width of all copies together in mm.
+        width: f64,
+        /// Their length.
+        length: f64,
+        /// Name of the paper.
+        paper: &'static str,
+        /// Width that can be printed in mm.
+        most_width: f64,
+        /// Length that can be printed.
+        most_length: f64,
+    },
+    /// It cannot be laid on its page.
+    #[error(transparent)]
+    Layout(LayoutError),
     /// A ramp without places. A bug if it is ever seen.
     #[error(transparent)]
     Weights(#[from] WeightError),

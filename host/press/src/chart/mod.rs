@@ -9,15 +9,17 @@ mod error;
 mod methods;
 pub mod ramp;
 mod registration;
+mod room;
 mod sketch;
 mod steps;
 
 pub use calibration::calibration;
 pub use error::ChartError;
-pub use methods::halftones;
+pub use methods::{halftones, size_of_halftones};
 pub use ramp::ramp;
 pub use registration::registration;
-pub use steps::{ladder, stacks};
+pub use room::check_room;
+pub use steps::{ladder, size_of_ladder, stacks};
 
 #[cfg(test)]
 mod tests;

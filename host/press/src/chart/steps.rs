@@ -47,6 +47,27 @@ fn ladder_shares(gloss: f64) -> [f64; 2] {
     [clamped, (gloss - least) / (GLOSS[0] - least)]
 }
 
+/// Lengths of the ladder in dots.
+struct Rungs {
+    patch: usize,
+    line: usize,
+    step: usize,
+    block: usize,
+    size: (usize, usize),
+}
+
+fn rungs() -> Rungs {
+    let (patch, gap, line) = (mm(30.0), mm(4.0), LINE * LABEL);
+    let step = patch + gap;
+    let block = line + mm(1.0) + patch + mm(1.0) + line + mm(4.0);
+    Rungs { patch, line, step, block, size: (GLOSS.len() * step - gap, 2 * block) }
+}
+
+/// Width and length of [`ladder`] in dots.
+pub fn size_of_ladder() -> (usize, usize) {
+    rungs().size
+}
+
 /// Figure 5: four levels of gloss between a glossier stack and a duller one, clamped above, mapped below. Above, three of
 /// the four are the same.
 pub fn ladder(
@@ -57,11 +78,9 @@ pub fn ladder(
     observer: &dyn Observer,
 ) -> Result<DotMap, ChartError> {
     two("ladder", glossy, dull)?;
-    let (patch, gap, line) = (mm(30.0), mm(4.0), LINE * LABEL);
+    let Rungs { patch, line, step, block, size } = rungs();
     let pen = pen(&[glossy, dull]);
-    let step = patch + gap;
-    let block = line + mm(1.0) + patch + mm(1.0) + line + mm(4.0);
-    let mut sketch = Sketch::new(4 * step - gap, 2 * block);
+    let mut sketch = Sketch::new(size.0, size.1);
     for (row, name) in ["clamped", "mapped"].into_iter().enumerate() {
         let top = row * block;
         sketch.text(0, top, LABEL, &pen, name);

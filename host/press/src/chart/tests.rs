@@ -1,6 +1,6 @@
 use super::*;
 use crate::halftone::Method;
-use crate::layout::{Layout, Mm, Point, Profile, arrange};
+use crate::layout::{Layout, Mm, Point, Position, Profile, arrange};
 use crate::sheet::DotMap;
 use inks::{Library, Stack};
 use observe::Silent;
@@ -127,6 +127,27 @@ fn every_stack_has_a_patch_of_its_own_that_is_solid() {
     }
     let many: Vec<Stack> = (1..200).map(|n| Stack::new(vec![Ink::White; n])).collect();
     assert!(stacks(&many, Paper::A4, false).unwrap_err().to_string().contains("choose fewer inks"));
+}
+
+#[test]
+fn a_page_without_room_is_refused_before_a_chart_is_made() {
+    let (k, paper) = (stack("K"), stack("substrate"));
+    let library = Library::builtin();
+    let sizes = [
+        (super::ramp::parts().size, ramp(&k, &paper, Method::Cells, &library, &Silent).unwrap()),
+        (size_of_ladder(), ladder(&k, &paper, Method::Cells, &library, &Silent).unwrap()),
+        (size_of_halftones(&k, &paper), halftones(&k, &paper, &library, &Silent).unwrap()),
+    ];
+    for (size, chart) in sizes {
+        assert_eq!(size, (chart.width(), chart.length()));
+        let a4 = Layout::centred(Paper::A4);
+        assert_eq!(check_room("ramp", size, &a4), Ok(()));
+        let postcard = Layout::centred(Paper::Custom { width: 900, length: 900 });
+        assert!(matches!(check_room("ramp", size, &postcard), Err(ChartError::Paper { .. })));
+        assert_eq!(check_room("ramp", size, &Layout { cut: true, ..postcard }), Ok(()));
+        let beside = Layout { position: Position::FromEdge("190x9mm".parse().unwrap()), ..a4 };
+        assert!(matches!(check_room("ramp", size, &beside), Err(ChartError::Beyond { .. })));
+    }
 }
 
 #[test]

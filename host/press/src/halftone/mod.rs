@@ -219,10 +219,8 @@ fn check(mix: &InkMix, (width, length): (u16, u16), settings: &Settings) -> Resu
             return Err(HalftoneError::Sum { row, sum });
         }
     }
-    if settings.method == Method::Blue
-        && let Some(q) = (0..stacks).find(|&q| has_weight(mix, q) && !is_process(&mix.stacks[q]))
-    {
-        return Err(HalftoneError::NotProcess { stack: mix.stacks[q].clone() });
+    if settings.method == Method::Blue {
+        check_single_dots((0..stacks).filter(|&q| has_weight(mix, q)).map(|q| &mix.stacks[q]))?;
     }
     if settings.minimum.len() != stacks {
         return Err(HalftoneError::Minima { found: settings.minimum.len(), stacks });
@@ -251,6 +249,16 @@ fn has_weight(mix: &InkMix, q: usize) -> bool {
 
 fn is_process(stack: &Stack) -> bool {
     stack.layers().iter().all(|ink| ink.kind() == Kind::Process)
+}
+
+/// Checks that single dots of all these stacks hold.
+pub(crate) fn check_single_dots<'a>(
+    stacks: impl IntoIterator<Item = &'a Stack>,
+) -> Result<(), HalftoneError> {
+    match stacks.into_iter().find(|stack| !is_process(stack)) {
+        None => Ok(()),
+        Some(stack) => Err(HalftoneError::NotProcess { stack: stack.clone() }),
+    }
 }
 
 fn check_fixed(fixed: &[u8], (width, length): (u16, u16), stacks: usize) -> Result<(), HalftoneError> {

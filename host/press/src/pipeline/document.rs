@@ -76,7 +76,8 @@ pub enum StageError {
 /// before anything is fitted to it.
 ///
 /// # Errors
-/// Those of the stages; a size or a layout without room is refused before the long work.
+/// Those of the stages; a size or a layout without room, and inks that the halftone cannot print, are refused before the long
+/// work.
 pub fn halftoned(
     document: &Document,
     library: &Library,
@@ -84,6 +85,10 @@ pub fn halftoned(
     layout: &Layout,
     observer: &dyn Observer,
 ) -> Result<Halftoned, StageError> {
+    if settings.halftone == halftone::Method::Blue {
+        let entries = library.at_hand(&settings.inks);
+        halftone::check_single_dots(entries.into_iter().map(|entry| &entry.stack))?;
+    }
     let materials = document.materials();
     let pixels = (materials.width(), materials.height());
     let (width, height) = size::dots(pixels, document.size_mm, settings.size, layout)?;

@@ -71,7 +71,13 @@ pub fn save_sheet(
     let rows = sheet.index().chunks_exact(sheet.width()).skip(area.top).take(area.length);
     let rows = rows.flat_map(|row| std::iter::repeat_n(row, across));
     let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-    write_png(path, (area.width, area.length * across), Kind::Indexed(&palette), &dots)
+    write_png(path, (area.width, area.length * across), square(across), Kind::Indexed(&palette), &dots)
+}
+
+/// Pixels per inch of a picture in the sheet's shape.
+fn square(across: usize) -> (u16, u16) {
+    let dpi = u16::try_from(600 * across).unwrap_or(u16::MAX);
+    (dpi, dpi)
 }
 
 /// Writes a picture of an area of one pass in its ink, as [`save_sheet`] does.
@@ -91,7 +97,7 @@ pub fn save_pass(
     let palette = [ground.0, label(pass.ink, ground.0)];
     let rows = pass.plane.rows_in(area).map(Iterator::collect::<Vec<u8>>);
     let bits: Vec<u8> = rows.flat_map(|row| row.repeat(across)).collect();
-    write_png(path, (area.width, area.length * across), Kind::Two(&palette), &bits)
+    write_png(path, (area.width, area.length * across), square(across), Kind::Two(&palette), &bits)
 }
 
 /// A picture of the whole sheet, which has `across` dots in 1/600 inch; at most `longest` pixels on its longer side. Each

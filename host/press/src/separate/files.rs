@@ -54,10 +54,10 @@ pub fn name(pass: usize, ink: Ink) -> String {
     format!("{:02}-{}.png", pass + 1, ink.name())
 }
 
-/// Writes a plane as a one-bit picture, ink black.
-pub fn save_plane(plane: &Plane, path: &Path) -> Result<(), FileError> {
+/// Writes a plane of `dpi` dots per inch across and along as a one-bit picture, ink black.
+pub fn save_plane(plane: &Plane, dpi: (u16, u16), path: &Path) -> Result<(), FileError> {
     let bits: Vec<u8> = plane.bits.iter().map(|byte| !byte).collect();
-    write_png(path, (plane.width, plane.length), Kind::Bits, &bits)
+    write_png(path, (plane.width, plane.length), dpi, Kind::Bits, &bits)
 }
 
 /// Whether this program wrote a picture, as the picture says.
@@ -69,13 +69,14 @@ pub fn is_signed(path: &Path) -> bool {
     read.is_ok() && start.windows(signature.len()).any(|found| found == signature.as_bytes())
 }
 
-/// Writes `passes.toml` and a picture of each pass into a folder that exists, the text last.
-pub fn save(separation: &Separation, folder: &Path) -> Result<(), FileError> {
+/// Writes `passes.toml` and a picture of each pass, of `dpi` dots per inch across and along, into a folder that exists, the text
+/// last.
+pub fn save(separation: &Separation, dpi: (u16, u16), folder: &Path) -> Result<(), FileError> {
     separation
         .passes
         .par_iter()
         .enumerate()
-        .try_for_each(|(i, pass)| save_plane(&pass.plane, &folder.join(name(i, pass.ink))))?;
+        .try_for_each(|(i, pass)| save_plane(&pass.plane, dpi, &folder.join(name(i, pass.ink))))?;
     let pass = |(i, pass): (usize, &Pass)| PassText {
         ink: pass.ink.name().to_string(),
         file: name(i, pass.ink),

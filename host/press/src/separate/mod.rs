@@ -284,7 +284,7 @@ mod tests {
         fn saved_passes_come_back_bit_by_bit(sheet in sheets()) {
             let separation = separate(&sheet, &[], &Silent).unwrap();
             let folder = tempfile::tempdir().unwrap();
-            files::save(&separation, folder.path()).unwrap();
+            files::save(&separation, (600, 600), folder.path()).unwrap();
             let saved = files::load(folder.path()).unwrap();
             prop_assert_eq!((&saved.passes, &saved.stacks), (&separation.passes, &separation.stacks));
             prop_assert_eq!(saved.paper, sheet.paper());
@@ -366,7 +366,7 @@ mod tests {
     fn a_changed_folder_is_refused_with_file_and_field() {
         let folder = tempfile::tempdir().unwrap();
         let separation = separate(&page(&["substrate", "C", "MS+C"]), &[], &Silent).unwrap();
-        files::save(&separation, folder.path()).unwrap();
+        files::save(&separation, (600, 600), folder.path()).unwrap();
         let path = folder.path().join(files::TEXT);
         let good = std::fs::read_to_string(&path).unwrap();
         for (from, to, words) in [

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use inks::Stack;
 use protocol::paper::{LARGEST, Paper};
+use protocol::rgl::Resolution;
 use serde::{Deserialize, Serialize};
 
 use super::colours::colours;
@@ -103,7 +104,8 @@ impl DotMap {
     fn save_picture(&self, folder: &Path) -> Result<(), FileError> {
         let colours = colours(self.stacks());
         let size = (self.width(), self.length());
-        write_png(&folder.join(PICTURE), size, Kind::Indexed(&colours), self.index())
+        let dpi = Resolution::Dpi600.dpi();
+        write_png(&folder.join(PICTURE), size, dpi, Kind::Indexed(&colours), self.index())
     }
 
     fn load_picture(
@@ -181,17 +183,18 @@ impl Sheet {
         write_toml(&folder.join(SHEET), &text)
     }
 
-    /// Writes an area of the sheet in false colours, one for each stack, a pixel a dot.
+    /// Writes an area of the sheet in false colours, one for each stack, a pixel a dot. The sheet has `dpi` dots per inch across
+    /// and along.
     ///
     /// # Errors
     /// What the system refuses.
     ///
     /// # Panics
     /// When the area leaves the sheet: a bug of the caller, never a matter of input.
-    pub fn save_colours(&self, area: Area, path: &Path) -> Result<(), FileError> {
+    pub fn save_colours(&self, area: Area, dpi: (u16, u16), path: &Path) -> Result<(), FileError> {
         let rows = self.index().chunks_exact(self.width()).skip(area.top).take(area.length);
         let dots: Vec<u8> = rows.flat_map(|row| &row[area.left..][..area.width]).copied().collect();
-        write_png(path, (area.width, area.length), Kind::Indexed(&colours(self.stacks())), &dots)
+        write_png(path, (area.width, area.length), dpi, Kind::Indexed(&colours(self.stacks())), &dots)
     }
 
     /// Reads what [`Sheet::save`] wrote. Anything that does not fit is an error with the file and the field.
@@ -309,14 +312,14 @@ mod tests {
             std::fs::write(&picture, &bytes[..length]).unwrap();
             assert!(Sheet::load(folder.path()).is_err(), "{length} of {} bytes", bytes.len());
         }
-        super::write_png(&picture, (9, 7), Kind::Bits, &[0; 14]).unwrap();
+        super::write_png(&picture, (9, 7), (600, 600), Kind::Bits, &[0; 14]).unwrap();
         assert!(
             Sheet::load(folder.path())
                 .unwrap_err()
                 .to_string()
                 .contains("found 9 x 7 dots, One bits Grayscale")
         );
-        super::write_png(&picture, (9, 7), Kind::Indexed(&[[0; 3]; 3]), &[3; 63]).unwrap();
+        super::write_png(&picture, (9, 7), (600, 600), Kind::Indexed(&[[0; 3]; 3]), &[3; 63]).unwrap();
         assert!(
             Sheet::load(folder.path()).unwrap_err().to_string().contains("dot (0, 0) has stack number 3")
         );

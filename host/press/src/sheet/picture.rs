@@ -8,9 +8,6 @@ use std::path::Path;
 
 use crate::files::{FileError, io, write};
 
-/// Dots per metre at 600 dpi.
-const DENSITY: u32 = 23_622;
-
 /// What a picture must be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind<'a> {
@@ -43,10 +40,11 @@ impl<'a> Kind<'a> {
 /// What every picture says of the program that wrote it.
 pub(crate) const SIGNATURE: (&str, &str) = ("Software", "Foilpress");
 
-/// Writes a picture.
+/// Writes a picture with so many pixels per inch across and down.
 pub(crate) fn write_png(
     path: &Path,
     (width, length): (usize, usize),
+    dpi: (u16, u16),
     kind: Kind,
     data: &[u8],
 ) -> Result<(), FileError> {
@@ -57,9 +55,10 @@ pub(crate) fn write_png(
         encoder.set_color(colour);
         encoder.set_depth(depth);
         encoder.set_compression(png::Compression::Fast);
+        let per_metre = |dpi: u16| (f64::from(dpi) / 0.0254).round() as u32;
         encoder.set_pixel_dims(Some(png::PixelDimensions {
-            xppu: DENSITY,
-            yppu: DENSITY,
+            xppu: per_metre(dpi.0),
+            yppu: per_metre(dpi.1),
             unit: png::Unit::Meter,
         }));
         encoder.add_text_chunk(SIGNATURE.0.into(), SIGNATURE.1.into())?;

@@ -21,7 +21,9 @@ use crate::sheet::{Sheet, SheetError};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PrintoutError {
     /// Sheets have 600 dpi.
-    #[error("a sheet has 600 x 600 dpi, but this printout has {across} x {along}; use its passes instead")]
+    #[error(
+        "the job prints at {across} x {along} dpi, but only a job of 600 x 600 dpi can be read as a sheet"
+    )]
     Resolution {
         /// Dots per inch across.
         across: u16,

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use ::view::page::{Subject, Target, page};
 use ::view::{Lit, Renderer, mapped, proportions};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::{SAMPLES, name_of};
 use appearance::factor::{Factored, Method};
@@ -19,11 +19,10 @@ use observe::Observer;
 use press::layout::{Mm, Repeat};
 use press::preview::{Probe, Radiance, Source, ToneCurve, mix_in_words, picture};
 use press::sheet::{Area, DotMap, Sheet};
-use press::simulate;
 
 use super::super::args::FactorArgs;
 use super::super::laid::{DotsArgs, Laid};
-use super::super::stdio::read_job;
+use super::super::stdio::print_job;
 use super::super::{choice, output};
 use super::view::{Show, ViewArgs};
 use super::wear::Told;
@@ -244,10 +243,7 @@ pub fn printed(path: &Path, observer: &dyn Observer) -> Result<Option<DotMap>> {
     if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("rgl")) {
         return Ok(None);
     }
-    let job = read_job(path)?;
-    let printout = simulate::print(&job, &simulate::Setup::default(), observer)
-        .with_context(|| format!("{}", path.display()))?;
-    Ok(Some(printout.sheet()?.dots().clone()))
+    Ok(Some(print_job(path, observer)?.dots().clone()))
 }
 
 /// The name of a job or of a folder with a sheet. `print` calls every job alike, but its folder by the document.
