@@ -215,8 +215,8 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let spots = match press.choices.spots {
         Spots::None => Vec::new(),
         _ if !may_have_spots(path)? => Vec::new(),
-        _ => layers::pdf::spots(path, press.observer).map_err(|error| match error {
-            LayersError::UnknownInk { .. } => FilterError::Spot(error),
+        _ => layers::pdf::spots(path, press.observer).map_err(|error| match of_document(error) {
+            error @ LayersError::UnknownInk { .. } => FilterError::Spot(error),
             error => FilterError::Plates(error),
         })?,
     };
@@ -229,7 +229,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
             continue;
         }
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
-        let in_page = |source| FilterError::Layers { page: number, source };
+        let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
         let page = layers::pdf::separated(path, number, dpi.into()).map_err(in_page)?;
         let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
@@ -240,6 +240,17 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         }
     }
     Ok(())
+}
+
+/// An error without the name of the file where the document is kept, which its owner never sees.
+fn of_document(mut error: LayersError) -> LayersError {
+    if let LayersError::Io { path, .. }
+    | LayersError::File { path, .. }
+    | LayersError::UnknownInk { path, .. } = &mut error
+    {
+        *path = "this document".into();
+    }
+    error
 }
 
 /// Refuses a document that shows pages for ever.
@@ -265,8 +276,8 @@ fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), 
         let page = only.and_then(|page| u32::try_from(page).ok());
         return Err(FilterError::NoPage(layers::pdf::no_page(&said, page)));
     }
-    if let Some(complaint) = layers::pdf::complaint(&said) {
-        press.observer.note(&layers::pdf::damaged(&complaint));
+    if let Some(damage) = layers::pdf::damaged(&said) {
+        press.observer.note(&damage);
     }
     Ok(())
 }

@@ -49,16 +49,10 @@ pub fn parse(uri: &str) -> Result<Destination, UriError> {
 
 /// The URI of a destination as it is typed, such as `serial:/dev/ttyACM0`.
 pub fn of(destination: &str) -> Result<String, UriError> {
-    let (kind, place) = match destination.split_once(':') {
-        // The one destination that needs no kind.
-        None if destination.starts_with("/dev/usb/lp") => ("raw", destination),
-        Some(parts) => parts,
-        None => {
-            return Err(destination
-                .parse::<Destination>()
-                .map_or_else(UriError::from, |_| UriError::Form(destination.into())));
-        }
-    };
+    // What is no destination says so itself, in the words of every other command.
+    destination.parse::<Destination>()?;
+    // The one destination that needs no kind is a device of the kernel.
+    let (kind, place) = destination.split_once(':').unwrap_or(("raw", destination));
     let place = if is_path(kind) { place.strip_prefix('/').unwrap_or(place) } else { place };
     let uri = format!("{SCHEME}:/{kind}/{}", utf8_percent_encode(place, UNSAFE));
     // An address is valid if its URI can be read back.

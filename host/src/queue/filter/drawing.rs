@@ -60,16 +60,10 @@ impl Drawing {
         Ok(Drawing { process, pages, _conversions: conversions, _scratch: scratch })
     }
 
-    /// Width and height of the next page in pixels.
+    /// Width and height of the next page in pixels, whatever they are.
     pub(super) fn next_page(&mut self) -> Result<Option<(usize, usize)>, FilterError> {
         self.process.advance();
-        match kinds::header(&mut self.pages).map_err(|source| self.cut_short(source))? {
-            // The same bound as for raster pages.
-            Some((w, h)) if !(1..=9000).contains(&w) || !(1..=9000).contains(&h) => {
-                Err(FilterError::Ghostscript(format!("a page of {w} x {h} pixels is larger than any sheet")))
-            }
-            size => Ok(size),
-        }
+        kinds::header(&mut self.pages).map_err(|source| self.cut_short(source))
     }
 
     /// The page.

@@ -42,15 +42,20 @@ pub fn complaint(said: &str) -> Option<String> {
 /// A note on a document that was drawn with complaints, if there are any, or that has no end.
 #[must_use]
 pub fn doubt(path: &Path, said: &str) -> Option<String> {
-    let cut_short =
-        || is_cut_short(path).then(|| "the document is cut short, so some of it may be missing".into());
-    complaint(said).map(|complaint| damaged(&complaint)).or_else(cut_short)
+    damaged(said).or_else(|| cut_short(path))
 }
 
-/// A note on a document that was drawn with a complaint.
+/// A note on a document that was drawn with complaints, if there are any.
 #[must_use]
-pub fn damaged(complaint: &str) -> String {
-    format!("the document is damaged (Ghostscript says `{complaint}`), so some of it may be missing")
+pub fn damaged(said: &str) -> Option<String> {
+    complaint(said).map(|complaint| {
+        format!("the document is damaged (Ghostscript says `{complaint}`), so some of it may be missing")
+    })
+}
+
+/// A note on a document that has no end.
+fn cut_short(path: &Path) -> Option<String> {
+    is_cut_short(path).then(|| "the document is cut short, so some of it may be missing".into())
 }
 
 /// Whether a file begins as PDF and has no table of its objects at its end: Ghostscript then draws what it finds, in silence.
@@ -74,16 +79,16 @@ mod tests {
 
     #[test]
     fn each_reason_has_words_of_its_own() {
-        let damaged = "   **** Error: Couldn't initialise file.\n               Output may be incorrect.\n";
+        let broken = "   **** Error: Couldn't initialise file.\n               Output may be incorrect.\n";
         let locked = "GPL Ghostscript 10.00.0: \n   **** This file requires a password for access.\n";
         let beyond = "   Requested FirstPage is greater than the number of pages in the file: 1\n";
         assert!(
-            no_page(damaged, Some(1)).contains("is damaged (Ghostscript says `Couldn't initialise file`)")
+            no_page(broken, Some(1)).contains("is damaged (Ghostscript says `Couldn't initialise file`)")
         );
-        assert!(no_page(&[locked, damaged].concat(), None).contains("needs a password"));
-        assert_eq!(no_page(&[damaged, beyond].concat(), Some(7)), "there is no page 7");
+        assert!(no_page(&[locked, broken].concat(), None).contains("needs a password"));
+        assert_eq!(no_page(&[broken, beyond].concat(), Some(7)), "there is no page 7");
         assert_eq!(no_page("noise", None), "it has no page");
-        assert_eq!((complaint("noise"), doubt(Path::new("none"), "")), (None, None));
+        assert_eq!((damaged("noise"), cut_short(Path::new("none"))), (None, None));
         let long = complaint(&format!("**** Error: \x1b{}", "x".repeat(500))).unwrap();
         assert_eq!(long, "x".repeat(120));
     }
@@ -99,7 +104,7 @@ mod tests {
             (format!("%!PS\n{body}"), false),
         ] {
             std::fs::write(&path, text).unwrap();
-            assert_eq!(doubt(&path, "").is_some_and(|said| said.contains("cut short")), cut);
+            assert_eq!(cut_short(&path).is_some(), cut);
         }
     }
 }
