@@ -376,6 +376,30 @@ fn line_art_prints_at_1200_dpi_in_process_inks_and_in_no_other() {
         (&again["resolution_dpi"], &again["passes"][0]["dots"])
     );
     assert_eq!(image::image_dimensions(bench.path("fine.print/preview.png")).unwrap(), (120, 60));
+    // Pixels per metre: a pass has the printer's dots, the preview the sheet's shape.
+    bench.done("inspect fine.print/job.rgl --passes seen");
+    for (picture, expected) in [
+        ("seen/01-black.png", (47244, 23622)),
+        ("fine.print/passes/01-black.png", (47244, 23622)),
+        ("fine.print/separation.png", (47244, 23622)),
+        ("fine.print/preview.png", (47244, 47244)),
+        ("fine.print/preview-01-black.png", (47244, 47244)),
+    ] {
+        let file = std::io::BufReader::new(fs::File::open(bench.path(picture)).unwrap());
+        let dims = png::Decoder::new(file).read_info().unwrap().info().pixel_dims.unwrap();
+        assert_eq!((dims.xppu, dims.yppu), expected, "{picture}");
+    }
+    for command in ["simulate fine.print/job.rgl -o fine.sheet", "preview fine.print/job.rgl -o fine.html"] {
+        let said = bench.refused(1, command);
+        assert!(
+            said.contains("fine.print/job.rgl") && said.contains("`foilpress plan JOB --html FILE`"),
+            "{said}"
+        );
+    }
+    // A job is as it is.
+    let note = "a job is planned as it is, so --size, --mirror have no effect";
+    let plan = json(&bench.done("plan fine.print/job.rgl --size 3mm --mirror --json"));
+    assert_eq!(plan["notes"], serde_json::json!([note]));
     let said = bench.refused(1, "layers white.png --resolution 1200 --paper postcard");
     assert!(said.contains("print at 600 dpi, or without white"), "{said}");
     assert!(
@@ -407,6 +431,8 @@ fn lists_are_there_for_programs() {
         "{profile}"
     );
     bench.refused(2, "resume --json");
+    let said = bench.refused(2, "doctor --to file:job.rgl");
+    assert!(said.contains("is not the address of a bridge") && !said.contains("or file:"), "{said}");
     // A print system of scripts: one queue of ours, one of another maker.
     let path = script(
         &bench,
@@ -483,7 +509,8 @@ fn a_spot_colour_that_may_be_an_ink_has_a_remedy_in_a_queue() {
         said.contains("spot colour `Golden` names no ink (did you mean `gold`?); rename the spot colour"),
         "{said}"
     );
-    assert!(!said.contains(".png"), "{said}");
+    // The print system keeps the document under a name of its own.
+    assert!(said.contains("this document: spot colour") && !said.contains("spot.ps"), "{said}");
     // What names no ink is said, unless nobody asked for inks; what names a process ink is no surprise.
     let note = "page 1: spot colour `Fold` names no ink: printed by its process colours";
     for (spot, option, noted) in [
@@ -533,4 +560,19 @@ fn a_page_without_the_reserved_white_is_printed_without_white() {
     let (inks, said) = filtered(&["0"]);
     assert_eq!(inks, ["black"]);
     assert!(said.contains(none), "{said}");
+}
+
+#[test]
+fn a_page_larger_than_any_sheet_is_told_in_millimetres_with_what_to_do() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let page = "%!PS\n<</PageSize[3000 3000]>>setpagedevice\n9 9 99 99 rectfill showpage\n";
+    fs::write(bench.path("large.ps"), page).unwrap();
+    let file = bench.path("large.ps").display().to_string();
+    let output =
+        bench.command(&format!("cups-filter 1 me title 1 FoilpressSpots=Off {file}")).output().unwrap();
+    let said = text(&output.stderr);
+    assert!(said.contains("page 1 is 1058 x 1058 mm") && said.contains("choose a paper"), "{said}");
 }

@@ -114,6 +114,38 @@ fn wrong_usage_is_exit_code_2() {
     assert!(said.contains("120x90mm"), "{said}");
     let said = bench.refused(2, "print sample:leaf --paper a3");
     assert!(said.contains("a4"), "{said}");
+    let said = bench.refused(2, "inks choose sample:leaf --cartridges 8");
+    assert!(said.contains("from 1 to 7"), "{said}");
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_the_long_work() {
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let said = bench.refused(1, "plan tile --size 12x8mm --halftone blue");
+    assert!(said.contains("in single dots") && said.contains("--inks process"), "{said}");
+    assert!(!said.contains("cartridges are left out") && !said.contains("fitting"), "{said}");
+    bench.done("plan tile --size 12x8mm --halftone blue --inks process");
+    let said = bench.refused(1, "chart ramp MS MG --paper 60x60mm");
+    assert!(said.contains("needs a printable area of 150 x 152 mm") && said.contains("choose a4"), "{said}");
+    let said = bench.refused(1, "chart ladder --at 150x10mm");
+    assert!(said.contains("mm at the right") && said.contains("change --at, --repeat"), "{said}");
+    assert!(!said.contains("--size") && !said.contains("make it smaller"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_name_that_is_not_utf8_works_or_is_said_to_be_the_trouble() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let bench = Bench::new();
+    small_document(&bench.path("tile"));
+    let name = std::ffi::OsStr::from_bytes(b"t\xeele");
+    fs::rename(bench.path("tile"), bench.path("").join(name)).expect("a file system of bytes");
+    let mut command = bench.command("plan");
+    let output = command.arg(name).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("<DOC>") && said.contains("rename the file"), "{said}");
 }
 
 #[test]

@@ -136,6 +136,28 @@ fn art_given_as_a_document_is_answered_with_the_right_command() {
 }
 
 #[test]
+fn options_without_effect_on_the_art_are_noted() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 5..55, 5..35);
+    let notes = |options: &str| {
+        let plan = bench.done(&format!("plan layers white.png --paper postcard --json {options}"));
+        serde_json::from_str::<Value>(&plan).unwrap()["notes"].to_string()
+    };
+    let said = notes("--tones gold --knockout silver --gamma 2 --intent perceptual");
+    for part in [
+        "no layer of gold, so --tones has",
+        "no layer of silver, so --knockout has",
+        "so --gamma has",
+        "so --intent has",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let said = notes("--tones white --knockout white");
+    assert!(!said.contains("no effect"), "{said}");
+    assert!(!notes("--knockout none").contains("no effect"));
+}
+
+#[test]
 fn presets_reach_the_plan_of_art() {
     let bench = Bench::new();
     layer(&bench, "white.png", 5..55, 5..35);

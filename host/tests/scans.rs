@@ -66,7 +66,7 @@ fn a_ramp_tells_a_library_how_small_clusters_may_be() {
     assert!(bench.done("inks check mine").contains("0 errors, 0 warnings"));
     let shown = bench.done("inks show K --library mine");
     assert!(
-        shown.contains("minimum cluster 1 dots") && shown.contains("dots measured by A. Owner, 2026-11-02"),
+        shown.contains("minimum cluster 1 dot\n") && shown.contains("dots measured by A. Owner, 2026-11-02"),
         "{shown}"
     );
     // What was measured is not replaced unasked, and the library stays as it was.

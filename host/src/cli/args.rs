@@ -11,7 +11,7 @@ use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
-use super::choice::{Metric, choice, name, whole};
+use super::choice::{Metric, choice, name, utf8, whole};
 use crate::libraries;
 use observe::Observer;
 
@@ -20,7 +20,7 @@ use observe::Observer;
 pub struct DocumentArgs {
     /// Document: a folder of texture maps, a .gltf or .glb file, a measured BRDF (.binary, .bsdf, .brdf, .csv), a
     /// .foil folder, or sample:NAME
-    #[arg(value_name = "DOC")]
+    #[arg(value_name = "DOC", value_parser = utf8())]
     pub document: String,
     /// Material of a glTF file, by number (from 0) or name [default: the only one]
     #[arg(long, value_name = "NUMBER|NAME")]

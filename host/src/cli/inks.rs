@@ -25,6 +25,7 @@ use super::stdio::{closed_pipe, show};
 use crate::libraries;
 use appearance::brdf::plot;
 use observe::Observer;
+use press::sheet::dots_in_words;
 
 /// The library of inks and stacks.
 #[derive(clap::Args, Debug)]
@@ -300,7 +301,10 @@ fn describe(library: &Library, entry: &Entry, figures: bool) -> String {
         );
     }
     lines.extend(curve_lines(entry));
-    lines.push(format!("cluster   at least {} dots of 1/600 inch", library.minimum_cluster(stack)));
+    lines.push(format!(
+        "cluster   at least {} of 1/600 inch",
+        dots_in_words(library.minimum_cluster(stack).into())
+    ));
     for (place, &ink) in stack.layers().iter().enumerate() {
         lines.push(String::new());
         lines.extend(layer_lines(library, ink, if place == 0 { "bottom" } else { "above" }));
@@ -370,11 +374,11 @@ fn layer_lines(library: &Library, ink: Ink, place: &str) -> Vec<String> {
     let mut lines = vec![
         format!("{place}: {} ({}), sold by ALPS as {}", cartridge.okidata, ink.short(), cartridge.alps),
         format!(
-            "  cartridge {}, barcode {}, ink code {:02x}, minimum cluster {} dots",
+            "  cartridge {}, barcode {}, ink code {:02x}, minimum cluster {}",
             ink.part(),
             ink.barcode(),
             ink.code(),
-            cartridge.minimum_cluster.get()
+            dots_in_words(cartridge.minimum_cluster.get().into())
         ),
     ];
     if let Some(dots) = &cartridge.dots {

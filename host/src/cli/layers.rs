@@ -218,6 +218,41 @@ impl LayersArgs {
     }
 }
 
+impl LayersArgs {
+    /// Notes on options that have no effect on this art.
+    fn idle(
+        &self,
+        art: &layers::Artwork,
+        options: &layers::Options,
+        settings: &layers::Settings,
+        composed: &Composed,
+    ) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut lacks = |option: &str, value: &Option<String>, idle: bool| {
+            if let Some(value) = value.as_deref().filter(|_| idle) {
+                notes.push(format!("the art has no layer of {value}, so {option} has no effect"));
+            }
+        };
+        let tones = art.layers.iter().any(|layer| options.tones.contains(layer.ink));
+        lacks("--tones", &self.tones, !tones);
+        let laid = &composed.report.laid;
+        let knocks = laid.iter().any(|laid| settings.knockout.iter().any(|ink| ink.name() == laid.ink));
+        lacks("--knockout", &self.knockout, !knocks && !settings.knockout.is_empty());
+        if art.colour.is_none() {
+            let mut plain = |option: &str| {
+                notes.push(format!("the art has layers alone and no colours, so {option} has no effect"));
+            };
+            if settings.gamma != layers::Settings::default().gamma {
+                plain("--gamma");
+            }
+            if settings.intent != layers::Settings::default().intent {
+                plain("--intent");
+            }
+        }
+        notes
+    }
+}
+
 /// Art and everything that decides what comes of it on paper.
 #[derive(ClapArgs, Debug)]
 pub struct Work {
@@ -294,7 +329,11 @@ impl Work {
         let options = self.layers.options(self.size, &layout)?;
         let settings = self.layers.settings()?;
         let art = layers::open(&self.layers.art, &options, observer)?;
-        let composed = layers::compose(&art, &settings, &library, observer)?;
+        let mut composed = layers::compose(&art, &settings, &library, observer)?;
+        for note in self.layers.idle(&art, &options, &settings, &composed) {
+            observer.note(&note);
+            composed.report.notes.push(note);
+        }
         let artwork = Artwork {
             name: &art.name,
             dots: &composed.dots,

@@ -5,6 +5,7 @@ use std::io::Read as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
+use clap::parser::ValueSource;
 use clap::{ArgMatches, Args as ClapArgs, Command, FromArgMatches};
 use inks::Library;
 use protocol::rgl::Page;
@@ -34,7 +35,11 @@ impl FromArgMatches for Args {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Args, clap::Error> {
         match matches.subcommand() {
             Some((LAYERS, matches)) => layers::PlanArgs::from_arg_matches(matches).map(Args::Layers),
-            _ => Document::from_arg_matches(matches).map(Args::Document),
+            _ => {
+                let mut document = Document::from_arg_matches(matches)?;
+                document.of_documents = of_documents(matches);
+                Ok(Args::Document(document))
+            }
         }
     }
 
@@ -60,6 +65,19 @@ impl ClapArgs for Args {
     }
 }
 
+/// Options that also say how a job is planned or shown.
+const OF_JOBS: [&str; 5] = ["library", "preset", "html", "background", "json"];
+
+/// The options given that decide what becomes of a document, by their long names.
+fn of_documents(matches: &ArgMatches) -> Vec<String> {
+    let command = Document::augment_args(Command::new(""));
+    let given = command
+        .get_arguments()
+        .filter(|arg| matches.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine));
+    let long = given.filter_map(|arg| arg.get_long()).filter(|long| !OF_JOBS.contains(long));
+    long.map(|long| format!("--{long}")).collect()
+}
+
 /// The sub-command for art.
 const LAYERS: &str = "layers";
 
@@ -80,6 +98,9 @@ pub struct Document {
     work: Work,
     #[command(flatten)]
     shown: Shown,
+    /// Of the options given, those that have no effect on a job.
+    #[arg(skip)]
+    of_documents: Vec<String>,
 }
 
 /// Runs `plan`.
@@ -91,7 +112,18 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     let page = args.shown.stage()?;
     let path = Path::new(&args.work.dots.document.document);
     let drawn = if is_job(path) {
-        of_job(path, &args.work.dots.inks.library()?, observer)?
+        let mut drawn = of_job(path, &args.work.dots.inks.library()?, observer)?;
+        if !args.of_documents.is_empty() {
+            // A preset in use may have given them, so they are no mistake.
+            let note = format!(
+                "a job is planned as it is, so {} {} no effect",
+                args.of_documents.join(", "),
+                if args.of_documents.len() == 1 { "has" } else { "have" }
+            );
+            observer.note(&note);
+            drawn.plan.notes.push(note);
+        }
+        drawn
     } else {
         args.work.draft(observer)?.into()
     };

@@ -42,6 +42,13 @@ pub enum Address {
 )]
 pub struct NoDestination(String);
 
+/// A text that is no address of a bridge.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error(
+    "`{0}` is not the address of a bridge; write usb:, serial:/dev/ttyACM0 or tcp:HOST:PORT (`foilpress bridge list` finds it)"
+)]
+pub struct NoAddress(String);
+
 impl FromStr for Destination {
     type Err = NoDestination;
 
@@ -65,12 +72,12 @@ impl FromStr for Destination {
 }
 
 impl FromStr for Address {
-    type Err = NoDestination;
+    type Err = NoAddress;
 
-    fn from_str(text: &str) -> Result<Address, NoDestination> {
+    fn from_str(text: &str) -> Result<Address, NoAddress> {
         match text.parse() {
             Ok(Destination::Bridge(address)) => Ok(address),
-            _ => Err(NoDestination(text.into())),
+            _ => Err(NoAddress(text.into())),
         }
     }
 }

@@ -26,6 +26,6 @@ pub mod usb;
 pub mod wiring;
 pub mod words;
 
-pub use address::{Address, Destination, NoDestination, OpenError};
+pub use address::{Address, Destination, NoAddress, NoDestination, OpenError};
 pub use check::{Checked, Unsendable, check};
 pub use run::{Event, RunError, Wish, run, run_at, run_while};

@@ -7,7 +7,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::{ImageFormat, RgbImage};
 
-use super::plan::{Plan, Suggestion, grouped};
+use super::plan::{Plan, Suggestion, grouped, plural};
 use super::ribbon;
 use crate::html::{self, escape};
 
@@ -179,8 +179,8 @@ fn write_checks(plan: &Plan, page: &mut String) -> std::fmt::Result {
     if !plan.suggestions.is_empty() {
         writeln!(page, "<h2>Suggestions, followed only when you say so</h2>\n<ul>")?;
         for Suggestion { text, how, dots } in &plan.suggestions {
-            let (text, how, dots) = (escape(text), escape(how), grouped(*dots));
-            writeln!(page, "<li><b>{how}</b>: {text} ({dots} dots)</li>")?;
+            let (text, how, count, s) = (escape(text), escape(how), grouped(*dots), plural(*dots));
+            writeln!(page, "<li><b>{how}</b>: {text} ({count} dot{s})</li>")?;
         }
         writeln!(page, "</ul>")?;
     }

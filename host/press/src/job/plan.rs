@@ -510,15 +510,15 @@ impl fmt::Display for Plan {
         if !self.suggestions.is_empty() {
             writeln!(f, "\nSuggestions, followed only when you say so:")?;
             for Suggestion { text, how, dots } in &self.suggestions {
-                writeln!(f, "    {how:<26} {text} ({} dots)", grouped(*dots))?;
+                writeln!(f, "    {how:<26} {text} ({} dot{})", grouped(*dots), plural(*dots))?;
             }
         }
         Ok(())
     }
 }
 
-fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
+pub(super) fn plural(count: impl PartialEq + From<u8>) -> &'static str {
+    if count == 1.into() { "" } else { "s" }
 }
 
 /// A number with its thousands apart.

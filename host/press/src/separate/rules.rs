@@ -17,8 +17,8 @@ use protocol::ink::Kind;
 use serde::Serialize;
 
 use super::passes::{MOST_CARTRIDGES, Plan};
-use crate::sheet::Sheet;
 use crate::sheet::clusters::smallest_clusters;
+use crate::sheet::{Sheet, dots_in_words};
 
 /// A rule that a sheet touches.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -239,7 +239,8 @@ pub(super) fn check(sheet: &Sheet, census: &[u64], plan: &Plan, rules: &[Rule]) 
         let Some(stacks) = page.touched(&rule.when).filter(|_| !told) else { continue };
         let text = match rule.when {
             When::Finer(kind, _) => {
-                format!("{} (smallest cluster: {} dots)", rule.text, page.least(kind).unwrap_or_default())
+                let least = page.least(kind).unwrap_or_default();
+                format!("{} (smallest cluster: {})", rule.text, dots_in_words(least))
             }
             _ => rule.text.to_string(),
         };

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use appearance::gamut::{self, Choice, GivenUp, Printable, Settings};
 use observe::Observer;
-use protocol::ink::Ink;
+use press::separate::MOST_CARTRIDGES;
 use serde_json::{Value, json};
 
 use super::super::args::{DocumentArgs, InkArgs};
@@ -19,8 +19,8 @@ use super::super::choice::whole;
 pub struct Args {
     #[command(flatten)]
     document: DocumentArgs,
-    /// Number of cartridges
-    #[arg(long, value_name = "NUMBER", default_value_t = 7, value_parser = whole(1..=Ink::ALL.len()))]
+    /// Number of cartridges; the printer holds seven
+    #[arg(long, value_name = "NUMBER", default_value_t = MOST_CARTRIDGES, value_parser = whole(1..=MOST_CARTRIDGES))]
     cartridges: usize,
     #[command(flatten)]
     inks: InkArgs,

@@ -18,6 +18,7 @@ use protocol::ink::Ink;
 use serde_json::{Value, json};
 
 use super::super::args::{DocumentArgs, FactorArgs, InkArgs};
+use super::super::choice::utf8;
 use super::page;
 use crate::libraries;
 
@@ -33,7 +34,7 @@ pub struct Args {
     /// Library: a folder, the name of a library that was added, or `builtin`
     library: PathBuf,
     /// Document whose bases are compared with what the library can print
-    #[arg(long, value_name = "DOC")]
+    #[arg(long, value_name = "DOC", value_parser = utf8())]
     document: String,
     /// Inks to print with, as in `print` [default: all but the foils]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]

@@ -25,7 +25,7 @@ fn installed(name: &str, members: &[archive::Member], from: &Path) -> Result<Str
         libraries::install(name, members).with_context(|| format!("{}", from.display()))?;
     let licence = library.licence().map_or_else(String::new, |licence| format!(", licence {licence}"));
     Ok(format!(
-        "{name}: {}{licence}\nin {}\nUse it with --library {name}\n",
+        "{name}: {}{licence}\nin {}\nUse it with --library {name}; `foilpress inks remove {name}` removes it\n",
         library.origins(),
         folder.display()
     ))

@@ -8,6 +8,7 @@ use inks::Library;
 use measure::library::quoted;
 use measure::ramp::{self, Dots, LINEAR, Owner, Ramp, Series};
 use observe::Observer;
+use press::sheet::dots_in_words;
 
 use super::super::inks::place;
 use super::super::stdio::show;
@@ -100,7 +101,7 @@ fn table(dots: &Dots, by: &str, when: &str, setup: &str) -> String {
 fn summary(ramp: &Ramp) -> String {
     let mut text = format!("{:<22} {:>16} {:>18}\n", "clusters", "smallest to hold", "dot gain");
     for series in &ramp.series {
-        let least = series.minimum_cluster.map_or("none".to_owned(), |dots| format!("{dots} dots"));
+        let least = series.minimum_cluster.map_or("none".to_owned(), |dots| dots_in_words(dots.into()));
         let gain = series.minimum_cluster.map_or("unknown".to_owned(), |_| {
             format!("{:.1} um +- {:.1}", series.dot_gain_um, 2.0 * series.dot_gain_error_um)
         });
@@ -130,7 +131,8 @@ fn advice(series: &Series, least: u32) -> String {
         ),
         Some(dots) if least > 0 && least < u32::from(dots) => {
             format!(
-                "{stack}: the ramp has clusters of {least} dots, and {dots} are needed; print with the library that is written\n"
+                "{stack}: the ramp has clusters of {}, and {dots} are needed; print with the library that is written\n",
+                dots_in_words(least)
             )
         }
         Some(_) if series.owner.is_none() => {
