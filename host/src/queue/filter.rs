@@ -209,7 +209,7 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
 /// The pages of a PDF or PostScript file.
 fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
-    if let Some(doubt) = layers::pdf::doubt(path, "") {
+    if let Some(doubt) = layers::pdf::cut_short(path) {
         press.observer.note(&doubt);
     }
     let spots = match press.choices.spots {

@@ -29,7 +29,7 @@ use crate::scratch::Scratch;
 use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
-pub use complaint::{complaint, damaged, doubt, no_page};
+pub use complaint::{cut_short, damaged, no_page};
 pub use plates::{Separated, separated, spots};
 
 /// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.
@@ -61,7 +61,9 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         Pages::Inks(inks) => document.pages_of_inks(&leaves, inks, observer)?,
     };
     observer.end();
-    art.notes.extend(doubt(path, &said).map(|doubt| format!("{}: {doubt}", path.display())));
+    art.notes.extend(
+        damaged(&said).or_else(|| cut_short(path)).map(|doubt| format!("{}: {doubt}", path.display())),
+    );
     if program == Program::Poppler {
         art.notes.push(format!(
             "{}: read by Poppler, without spot plates; install Ghostscript to print them in their inks",

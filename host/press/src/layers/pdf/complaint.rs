@@ -32,17 +32,10 @@ pub fn no_page(said: &str, number: Option<u32>) -> String {
 }
 
 /// The first thing that Ghostscript complains of.
-#[must_use]
-pub fn complaint(said: &str) -> Option<String> {
+fn complaint(said: &str) -> Option<String> {
     let line = said.lines().find_map(|line| Some(line.split_once("**** Error: ")?.1))?;
     let quote: String = line.chars().filter(|c| !c.is_control()).take(LONGEST).collect();
     Some(quote.trim().trim_end_matches('.').to_owned())
-}
-
-/// A note on a document that was drawn with complaints, if there are any, or that has no end.
-#[must_use]
-pub fn doubt(path: &Path, said: &str) -> Option<String> {
-    damaged(said).or_else(|| cut_short(path))
 }
 
 /// A note on a document that was drawn with complaints, if there are any.
@@ -54,7 +47,8 @@ pub fn damaged(said: &str) -> Option<String> {
 }
 
 /// A note on a document that has no end.
-fn cut_short(path: &Path) -> Option<String> {
+#[must_use]
+pub fn cut_short(path: &Path) -> Option<String> {
     is_cut_short(path).then(|| "the document is cut short, so some of it may be missing".into())
 }
 
