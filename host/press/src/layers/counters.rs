@@ -56,11 +56,9 @@ mod tests {
         let is_counter =
             counters(&flat, (&all.runs, &all.rows), reach, |root| all.runs[root as usize].side < 4);
         let mut letters: Vec<char> = Vec::new();
-        for y in 0..rows.len() {
-            for run in &all.runs[all.rows[y]..all.rows[y + 1]] {
-                if is_counter[run.root as usize] {
-                    letters.extend(rows[y][run.start as usize..run.end as usize].chars());
-                }
+        for (row, ends) in rows.iter().zip(all.rows.windows(2)) {
+            for run in all.runs[ends[0]..ends[1]].iter().filter(|run| is_counter[run.root as usize]) {
+                letters.extend(row[run.start as usize..run.end as usize].chars());
             }
         }
         letters.sort_unstable();

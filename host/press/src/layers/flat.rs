@@ -34,11 +34,14 @@ const SIMILAR: u8 = 12;
 /// Rows that are gathered at once.
 const ROWS: usize = 64;
 
+/// What draws in a colour, and its sRGB.
+type Drawn = (Kind, [u8; 3]);
+
 /// Flat colours and where they are.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Flat {
     /// What draws in each colour, and its sRGB. White and black come first.
-    pub(super) colours: Vec<(Kind, [u8; 3])>,
+    pub(super) colours: Vec<Drawn>,
     /// For each dot the number of its colour, or [`TONE`].
     pub(super) index: Vec<u8>,
 }
@@ -245,11 +248,7 @@ fn is_noise(index: &[u8], width: usize, (x, y): (usize, usize)) -> bool {
 }
 
 /// The colours of text and drawings, text first, then the most frequent; and those of them through which a shading passes.
-fn palette<const N: usize>(
-    pixels: &[[u8; N]],
-    width: usize,
-    masks: &Masks,
-) -> (Vec<(Kind, [u8; 3])>, Vec<(Kind, [u8; 3])>) {
+fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> (Vec<Drawn>, Vec<Drawn>) {
     type Counts = HashMap<(Kind, [u8; 3]), u64>;
     let add = |counts: &mut Counts, key, dots| {
         if counts.len() < GATHERED || counts.contains_key(&key) {

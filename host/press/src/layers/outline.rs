@@ -61,8 +61,8 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape))
     };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
-        for at in rows[y]..rows[y + 1] {
-            let (run, root) = (&runs[at], runs[at].root);
+        for run in &runs[rows[y]..rows[y + 1]] {
+            let root = run.root;
             let (kind, _) = flat.colours[usize::from(run.colour)];
             let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
             let (thin, first) = (is_thin(root), shape.solids[0]);

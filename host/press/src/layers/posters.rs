@@ -95,7 +95,7 @@ pub(super) fn spans<const N: usize>(
 
 /// Whether one in [`DARK`] pixels is more black than white.
 fn is_dark<const N: usize>(pixels: &[[u8; N]], stretches: &[Range<usize>], total: u64) -> bool {
-    let dark = |pixel: &&[u8; N]| split(*pixel).1.iter().all(|&v| v < 110);
+    let dark = |pixel: &&[u8; N]| split(pixel).1.iter().all(|&v| v < 110);
     let found = stretches.iter().map(|stretch| pixels[stretch.clone()].iter().filter(dark).count() as u64);
     found.sum::<u64>() * DARK >= total
 }

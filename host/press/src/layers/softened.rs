@@ -3,10 +3,11 @@
 //! Problem: programs soften what they draw, so that a pixel half covered by a letter has half of its colour. Such a colour may be as
 //! frequent as any other: along a straight edge, or where a stem covers half of two pixels each and is a pale line.
 //! Method: a pixel belongs to the nearer one of two colours if both lie within [`REACH`] pixels of it and its colour lies on the line
-//! between them; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies between two others and is nowhere three pixels wide is *thin*: its pixels are edges, too, where
-//! both others are near. Where they are not, its strokes are decided as wholes: what is amid letters in the colour
-//! behind it, as the stem of an l is amid its word, has that colour; what is amid its like keeps its own.
-//! Cost: 100 ns a softened pixel; a few microseconds a stroke in a thin colour.
+//! between them; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies between two others and is
+//! nowhere three pixels wide is *thin*: its pixels are edges, too, where both others are near. Where they are not, its strokes are decided
+//! as wholes: what is amid letters in the colour behind it, as the stem of an l is amid its word, is of that colour; what is amid its
+//! like keeps its own.
+//! Cost: 200 ns a softened pixel; a few microseconds a stroke in a thin colour.
 //! Limits: a line one pixel wide between two areas, in a colour between theirs, is taken for their edge.
 
 use std::collections::HashMap;
@@ -14,7 +15,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::flat::split;
+use super::flat::{similar, split};
 use super::posters::{MOST_KNOWN, Span, WHITE_AND_BLACK, push};
 use crate::forest::Forest;
 
@@ -22,8 +23,12 @@ use crate::forest::Forest;
 const REACH: usize = 2;
 /// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
 const OFF: f32 = 24.0;
+/// How far beyond the colours a softened edge may lie: filters that sharpen draw edges stronger than they are.
+const BEYOND: f32 = 0.15;
 /// A colour is thin if at most one in so many of its pixels ends a square of three.
 const THIN: u64 = 100;
+/// One in so many pixels near a ripple are of the flat colour itself.
+const RIPPLE: usize = 3;
 /// The least part of a pixel that a line covers.
 const FAINTEST: f32 = 0.25;
 /// Along a line, neighbouring pixels are covered by nearly as much.
@@ -51,7 +56,9 @@ pub(super) fn thin_between<const N: usize>(
     stretches: &[Range<usize>],
     (colours, enlarged): (&[[u8; 3]], usize),
 ) -> Vec<bool> {
-    let is_between: Vec<bool> = colours.iter().map(|&colour| is_between(colour, colours)).collect();
+    // The most frequent come first.
+    let ends = &colours[..colours.len().min(MOST_KNOWN)];
+    let is_between: Vec<bool> = colours.iter().map(|&colour| is_between(colour, ends)).collect();
     if !is_between.contains(&true) {
         return is_between;
     }
@@ -94,7 +101,7 @@ fn along(own: [u8; 3], from: [u8; 3], to: [u8; 3]) -> Option<(f32, f32)> {
     let length: f32 = line.iter().map(|v| v * v).sum();
     let along = (0..3).map(|c| (own[c] - from[c]) * line[c]).sum::<f32>() / length;
     let off = (0..3).map(|c| (own[c] - from[c] - along * line[c]).powi(2)).sum::<f32>();
-    ((-0.05..=1.05).contains(&along) && off <= OFF * OFF).then_some((along, off))
+    ((-BEYOND..=1.0 + BEYOND).contains(&along) && off <= OFF * OFF).then_some((along, off))
 }
 
 impl<const N: usize> Edges<'_, N> {
@@ -105,19 +112,22 @@ impl<const N: usize> Edges<'_, N> {
             return Some(own);
         }
         let near = self.near(at);
-        let present = |colour: usize| near[colour] || colour >= self.of_shape && known.is_none();
+        let present = |colour: usize| near[colour] > 0 || colour >= self.of_shape && known.is_none();
         let ends = || (0..self.colours.len()).filter(|&end| present(end) && Some(end) != known);
         let pairs = ends().flat_map(|a| ends().filter(move |&b| b > a).map(move |b| (a, b)));
-        let pairs = pairs.filter(|&(a, b)| near[a] || near[b]);
+        let pairs = pairs.filter(|&(a, b)| near[a] + near[b] > 0);
         let pairs = pairs.filter(|&(a, b)| known.is_none() || !self.thin[a] && !self.thin[b]);
         let lines = pairs.filter_map(|(a, b)| {
             let (along, off) = along(own, self.colours[a], self.colours[b])?;
-            let doubt = usize::from(!near[a] || !near[b]) * 2 + usize::from(self.thin[a] || self.thin[b]);
+            let doubt =
+                usize::from(near[a].min(near[b]) == 0) * 2 + usize::from(self.thin[a] || self.thin[b]);
             let (more, less) = if along < 0.5 { (a, b) } else { (b, a) };
             Some((doubt, off, more, less, along.min(1.0 - along)))
         });
         let nearest = lines.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let Some((_, _, more, less, share)) = nearest else { return known.map(|_| own) };
+        let Some((_, _, more, less, share)) = nearest else {
+            return known.map(|_| own).or_else(|| self.ripple(own, &near));
+        };
         let is_line =
             share >= FAINTEST && self.is_on_a_line(at, share, (self.colours[more], self.colours[less]));
         Some(self.colours[if is_line { less } else { more }])
@@ -154,15 +164,23 @@ impl<const N: usize> Edges<'_, N> {
         known.or_else(|| WHITE_AND_BLACK.iter().position(|&colour| colour == pixel))
     }
 
-    /// Which of the colours are near a pixel.
-    fn near(&self, at: usize) -> [bool; MOST_KNOWN] {
+    /// The flat colour that a pixel is a ripple of: filters that sharpen leave such beside edges.
+    fn ripple(&self, own: [u8; 3], near: &[u16; MOST_KNOWN]) -> Option<[u8; 3]> {
+        let side = 2 * REACH * self.enlarged + 1;
+        let alike = (0..self.colours.len()).filter(|&colour| similar(self.colours[colour], own));
+        let most = alike.max_by_key(|&colour| near[colour])?;
+        (RIPPLE * usize::from(near[most]) >= side * side).then(|| self.colours[most])
+    }
+
+    /// How many pixels of each colour are near one.
+    fn near(&self, at: usize) -> [u16; MOST_KNOWN] {
         let (x, y, reach) = (at % self.width, at / self.width, REACH * self.enlarged);
-        let mut near = [false; MOST_KNOWN];
+        let mut near = [0; MOST_KNOWN];
         for row in y.saturating_sub(reach)..(y + reach + 1).min(self.pixels.len() / self.width) {
             let row = &self.pixels[row * self.width..(row + 1) * self.width];
             for pixel in &row[x.saturating_sub(reach)..(x + reach + 1).min(self.width)] {
                 if let Some(known) = self.number(pixel) {
-                    near[known] = true;
+                    near[known] += 1;
                 }
             }
         }
@@ -250,7 +268,7 @@ impl<const N: usize> Edges<'_, N> {
             beside.filter(|&beside| beside != known).for_each(|beside| border[beside] += 1);
         }
         let most = |counts: &[usize]| (0..self.colours.len()).rev().max_by_key(|&colour| counts[colour]);
-        let (own, ground) = (most(&dots)?, most(&border)?);
+        let own = most(&dots)?;
         // Letters of a word are beside each other; what is above a stem is another line.
         let over = right - left;
         let rows = top.saturating_sub(over)..(bottom + over).min(self.pixels.len() / width);
@@ -260,6 +278,8 @@ impl<const N: usize> Edges<'_, N> {
         });
         let mut counts = [0usize; MOST_KNOWN];
         around.clone().filter_map(|pixel| self.number(pixel)).for_each(|colour| counts[colour] += 1);
+        let flat = |colour: usize| if self.thin[colour] { 0 } else { counts[colour] };
+        let ground = (0..self.colours.len()).rev().max_by_key(|&colour| flat(colour))?;
         let all: usize = border.iter().sum();
         let share = |colour: [u8; 3], behind: usize| {
             along(colour, self.colours[ground], self.colours[behind]).map(|(along, _)| along)
@@ -268,15 +288,14 @@ impl<const N: usize> Edges<'_, N> {
             counts[colour] > 0
                 && 4 * border[colour] <= all
                 && colour != ground
-                && share(self.colours[own], colour).is_some_and(|share| (FAINTEST..=0.9).contains(&share))
+                && share(self.colours[own], colour).is_some_and(|share| (0.05..=0.9).contains(&share))
         });
         let behind = behind.max_by_key(|&colour| counts[colour])?;
         // Its like, against what is more covered than it.
         let covered = share(self.colours[own], behind)? + 0.1;
         let like = counts[own].saturating_sub(dots[own] / self.enlarged.pow(2));
-        let deeper = around
-            .filter(|pixel| share(split(*pixel).1, behind).is_some_and(|share| share > covered))
-            .count();
+        let deeper =
+            around.filter(|pixel| share(split(pixel).1, behind).is_some_and(|share| share > covered)).count();
         (2 * deeper > 3 * like).then(|| (self.colours[ground], self.colours[behind]))
     }
 }
@@ -351,10 +370,10 @@ mod tests {
         for (line, at_column) in
             [(&[0.0, 0.4][..], 1), (&[0.3, 0.35], 1), (&[0.35, 0.35], 0), (&[0.45, 0.1], 0)]
         {
-            let found = cut(&words(ground, ink, &[line, bold])).expect("flat art");
+            let found = cut(&words(ground, ink, &[line, bold, bold])).expect("flat art");
             for (at, &colour) in found.iter().enumerate() {
                 let (x, y) = (at % SIDE, at / SIDE);
-                let inked = match (x / 10 + y / 40 * 5) % 2 {
+                let inked = match (x / 10 + y / 40 * 5) % 3 {
                     0 => x % 10 == at_column,
                     _ => (4..7).contains(&(x % 10)),
                 };
