@@ -115,7 +115,7 @@ fn flat_art<const N: usize>(
     }
     let find = |shapes: &[&[u32]], common: &[[u8; 3]]| -> Vec<(Vec<u32>, Vec<Span>)> {
         let palette = [&posters::WHITE_AND_BLACK[..], common].concat();
-        let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette);
+        let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette, |_| true);
         let found = shapes.par_iter().filter_map(|shape| {
             let colour = all[shape[0] as usize].colour;
             if colour.is_some_and(is_itself) {

@@ -11,11 +11,12 @@
 //! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
 //! text on a ground that is hardly apart from it.
 
+use std::cell::LazyCell;
 use std::collections::{HashMap, HashSet};
-use std::ops::Range;
+use std::ops::{Deref, Range};
 
 use super::flat::{similar, split};
-use super::softened::{Edges, thin_between};
+use super::softened::{Edges, Widths, meant, thin_colours};
 
 /// The most main colours, and the most colours that small shapes have in common.
 const MOST: usize = 16;
@@ -52,7 +53,8 @@ pub(super) fn spans<const N: usize>(
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
     let first = &pixels[stretches.first()?.start];
     let one = stretches.iter().all(|stretch| pixels[stretch.clone()].iter().all(|pixel| pixel == first));
-    let mut colours = main_colours(pixels, width, stretches, (total, enlarged)).filter(|_| !one);
+    let widths = LazyCell::new(|| Widths::of(pixels, width, stretches, enlarged));
+    let mut colours = main_colours(pixels, width, stretches, (total, enlarged), &widths).filter(|_| !one);
     let mut of_shape = usize::MAX;
     if total as usize <= SMALL * enlarged * enlarged {
         let is_bare = colours.is_none();
@@ -64,8 +66,9 @@ pub(super) fn spans<const N: usize>(
     }
     let colours = colours?;
     let of_shape = of_shape.min(colours.len());
-    let thin = thin_between(pixels, width, stretches, (&colours, enlarged));
-    let edges = Edges { pixels, width, colours: &colours, of_shape, thin: &thin, enlarged };
+    let thin = thin_colours(&colours, &widths);
+    let meant = meant(&colours, &thin);
+    let edges = Edges { pixels, width, colours: &colours, of_shape, thin: &thin, meant: &meant, enlarged };
     let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
     let most = (STRAY * total as f64) as u64;
     for stretch in stretches {
@@ -125,6 +128,7 @@ fn main_colours<const N: usize>(
     width: usize,
     stretches: &[Range<usize>],
     (total, enlarged): (u64, usize),
+    widths: &impl Deref<Target = Widths>,
 ) -> Option<Vec<[u8; 3]>> {
     let mut found: HashMap<[u8; 3], u64> = HashMap::new();
     let over = width * enlarged;
@@ -166,7 +170,7 @@ fn main_colours<const N: usize>(
     }
     if colours.len() > MOST + 2 {
         // Edges are not counted as colours; the most frequent of them are enough to know strokes by.
-        let mut thin = thin_between(pixels, width, stretches, (&colours, enlarged)).into_iter();
+        let mut thin = thin_colours(&colours, widths).into_iter();
         let mut edges = 0;
         colours.retain(|_| {
             let is_edge = thin.next() == Some(true);

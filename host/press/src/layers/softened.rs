@@ -3,15 +3,15 @@
 //! Problem: programs soften what they draw, so that a pixel half covered by a letter has half of its colour. Such a colour may be as
 //! frequent as any other: along a straight edge, or where a stem covers half of two pixels each and is a pale line.
 //! Method: a pixel belongs to the nearer one of two colours if both lie within [`REACH`] pixels of it and its colour lies on the line
-//! between them; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies between two others and is
-//! nowhere three pixels wide is *thin*: its pixels are edges, too, where both others are near. Where they are not, its strokes are decided
+//! between them; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies between two others, or is
+//! like a more frequent one, and is nowhere three pixels wide is *thin*: its pixels are edges, too, where both others are near. Where they are not, its strokes are decided
 //! as wholes: what is amid letters in the colour behind it, as the stem of an l is amid its word, is of that colour; what is amid its
 //! like keeps its own.
 //! Cost: 200 ns a softened pixel; a few microseconds a stroke in a thin colour.
 //! Limits: a line one pixel wide between two areas, in a colour between theirs, is taken for their edge.
 
 use std::collections::HashMap;
-use std::ops::Range;
+use std::ops::{Deref, Range};
 
 use rayon::prelude::*;
 
@@ -25,10 +25,12 @@ const REACH: usize = 2;
 const OFF: f32 = 24.0;
 /// How far beyond the colours a softened edge may lie: filters that sharpen draw edges stronger than they are.
 const BEYOND: f32 = 0.15;
+/// Edges lie between colours that differ by at least this much in red, green or blue.
+const CONTRAST: u8 = 64;
 /// A colour is thin if at most one in so many of its pixels ends a square of three.
 const THIN: u64 = 100;
-/// One in so many pixels near a ripple are of the flat colour itself.
-const RIPPLE: usize = 3;
+/// How far from edges such filters leave ripples, which differ as little from the colour beside the edge.
+const RIPPLES: usize = 8;
 /// The least part of a pixel that a line covers.
 const FAINTEST: f32 = 0.25;
 /// Along a line, neighbouring pixels are covered by nearly as much.
@@ -43,55 +45,81 @@ pub(super) struct Edges<'a, const N: usize> {
     /// Its colours. Of those behind the first `of_shape` one may be out of sight, as in strokes that cover no pixel wholly.
     pub colours: &'a [[u8; 3]],
     pub of_shape: usize,
-    /// For each colour whether it is [thin](thin_between).
+    /// For each colour whether it is [thin](thin_colours).
     pub thin: &'a [bool],
+    /// For each colour the one that it [stands for](meant).
+    pub meant: &'a [usize],
     /// How many times the pixels were enlarged after they were drawn.
     pub enlarged: usize,
 }
 
-/// For each colour whether it may be that of an edge alone: it lies between two others, and is nowhere three pixels wide.
-pub(super) fn thin_between<const N: usize>(
-    pixels: &[[u8; N]],
-    width: usize,
-    stretches: &[Range<usize>],
-    (colours, enlarged): (&[[u8; 3]], usize),
-) -> Vec<bool> {
-    // The most frequent come first.
-    let ends = &colours[..colours.len().min(MOST_KNOWN)];
-    let is_between: Vec<bool> = colours.iter().map(|&colour| is_between(colour, ends)).collect();
-    if !is_between.contains(&true) {
-        return is_between;
-    }
-    let mut counts: HashMap<[u8; 3], [u64; 2]> = HashMap::new();
-    let side = 2 * enlarged;
-    for stretch in stretches {
-        let mut at = stretch.start;
-        for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
-            let all = at..at + run.len();
-            at = all.end;
-            let [dots, squares] = counts.entry(split(&run[0]).1).or_default();
-            *dots += run.len() as u64;
-            let ends = (all.start + side..all.end).filter(|&at| at >= side * width);
-            *squares += ends
-                .filter(|&at| {
+/// How wide what is drawn in each colour is: its pixels, and those that end a square of three of them as they were drawn.
+pub(super) struct Widths(HashMap<[u8; 3], [u64; 2]>);
+
+impl Widths {
+    pub fn of<const N: usize>(
+        pixels: &[[u8; N]],
+        width: usize,
+        stretches: &[Range<usize>],
+        enlarged: usize,
+    ) -> Widths {
+        let mut counts: HashMap<[u8; 3], [u64; 2]> = HashMap::new();
+        let side = 2 * enlarged;
+        for stretch in stretches {
+            let mut at = stretch.start;
+            for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
+                let all = at..at + run.len();
+                at = all.end;
+                let [dots, squares] = counts.entry(split(&run[0]).1).or_default();
+                *dots += run.len() as u64;
+                let ends = (all.start + side..all.end).filter(|&at| at >= side * width);
+                let is_square = |&at: &usize| {
                     (1..=side).all(|up| {
                         [at, at - enlarged, at - side].into_iter().all(|at| pixels[at - up * width] == run[0])
                     })
-                })
-                .count() as u64;
+                };
+                *squares += ends.filter(is_square).count() as u64;
+            }
         }
+        Widths(counts)
     }
-    let is_thin = |colour: &[u8; 3]| counts.get(colour).is_none_or(|&[dots, squares]| squares * THIN <= dots);
-    colours.iter().zip(is_between).map(|(colour, between)| between && is_thin(colour)).collect()
+
+    /// Whether a colour is nowhere three pixels wide.
+    pub fn is_thin(&self, colour: [u8; 3]) -> bool {
+        self.0.get(&colour).is_none_or(|&[dots, squares]| squares * THIN <= dots)
+    }
 }
 
-/// Whether a colour, not white or black, lies between two others.
-pub(super) fn is_between(own: [u8; 3], colours: &[[u8; 3]]) -> bool {
-    let inner = |&a: &[u8; 3], &b: &[u8; 3]| {
-        a != own && b != own && along(own, a, b).is_some_and(|(along, _)| (0.1..=0.9).contains(&along))
+/// For each colour whether it may be that of an edge alone: it is thin, and lies between two others or is like a more frequent one,
+/// of which colours come first.
+pub(super) fn thin_colours(colours: &[[u8; 3]], widths: &impl Deref<Target = Widths>) -> Vec<bool> {
+    let ends = &colours[..colours.len().min(MOST_KNOWN)];
+    let is_between =
+        |own| is_between(own, ends, |end| WHITE_AND_BLACK.contains(&end) || !widths.is_thin(end));
+    let is_like = |at: usize| colours[..at].iter().any(|&more| similar(more, colours[at]));
+    (0..colours.len())
+        .map(|at| (is_like(at) || is_between(colours[at])) && widths.is_thin(colours[at]))
+        .collect()
+}
+
+/// For each colour the number of the one that it stands for where others look for what is near: a thin colour for the most frequent
+/// that is like it.
+pub(super) fn meant(colours: &[[u8; 3]], thin: &[bool]) -> Vec<usize> {
+    let like = |at: usize| colours.iter().position(|&more| similar(more, colours[at]));
+    (0..colours.len()).map(|at| like(at).filter(|_| thin[at]).unwrap_or(at)).collect()
+}
+
+/// Whether a colour, not white or black, lies between two others that are far from each other and not like it, of which one `is_ground`.
+pub(super) fn is_between(own: [u8; 3], colours: &[[u8; 3]], is_ground: impl Fn([u8; 3]) -> bool) -> bool {
+    let inner = |a: [u8; 3], b: [u8; 3]| {
+        (0..3).any(|c| a[c].abs_diff(b[c]) >= CONTRAST)
+            && !similar(a, own)
+            && !similar(b, own)
+            && along(own, a, b).is_some_and(|(along, _)| (0.05..=0.95).contains(&along))
+            && (is_ground(a) || is_ground(b))
     };
     !WHITE_AND_BLACK.contains(&own)
-        && colours.iter().enumerate().any(|(at, a)| colours[..at].iter().any(|b| inner(a, b)))
+        && colours.iter().enumerate().any(|(at, &a)| colours[..at].iter().any(|&b| inner(a, b)))
 }
 
 /// Where a colour lies on the way from one colour to another, 0 to 1, and the square of its distance from it; `None` if it does not.
@@ -111,26 +139,42 @@ impl<const N: usize> Edges<'_, N> {
         if known.is_some() && self.is_in_a_square(at) {
             return Some(own);
         }
-        let near = self.near(at);
-        let present = |colour: usize| near[colour] > 0 || colour >= self.of_shape && known.is_none();
-        let ends = || (0..self.colours.len()).filter(|&end| present(end) && Some(end) != known);
-        let pairs = ends().flat_map(|a| ends().filter(move |&b| b > a).map(move |b| (a, b)));
-        let pairs = pairs.filter(|&(a, b)| near[a] + near[b] > 0);
-        let pairs = pairs.filter(|&(a, b)| known.is_none() || !self.thin[a] && !self.thin[b]);
-        let lines = pairs.filter_map(|(a, b)| {
-            let (along, off) = along(own, self.colours[a], self.colours[b])?;
-            let doubt =
-                usize::from(near[a].min(near[b]) == 0) * 2 + usize::from(self.thin[a] || self.thin[b]);
-            let (more, less) = if along < 0.5 { (a, b) } else { (b, a) };
-            Some((doubt, off, more, less, along.min(1.0 - along)))
-        });
-        let nearest = lines.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        let Some((_, _, more, less, share)) = nearest else {
-            return known.map(|_| own).or_else(|| self.ripple(own, &near));
+        let near = self.near(at, REACH);
+        // Filters that sharpen leave ripples farther from edges, and hardly a pixel beside an edge in the very colour of the ground.
+        // The ground is more frequent.
+        let beyond = || {
+            let found = self.between(own, &self.near(at, RIPPLES), known)?;
+            let (more, less, share) = found;
+            let of_ink = near[more.max(less)] && !near[more.min(less)];
+            (of_ink || known.is_none() && share <= BEYOND).then_some(found)
+        };
+        let Some((more, less, share)) = self.between(own, &near, known).or_else(beyond) else {
+            return known.map(|_| own);
         };
         let is_line =
             share >= FAINTEST && self.is_on_a_line(at, share, (self.colours[more], self.colours[less]));
         Some(self.colours[if is_line { less } else { more }])
+    }
+
+    /// Two colours between which a colour lies, the nearer one first, and how large the share of the other is.
+    fn between(
+        &self,
+        own: [u8; 3],
+        near: &[bool; MOST_KNOWN],
+        known: Option<usize>,
+    ) -> Option<(usize, usize, f32)> {
+        let present = |colour: usize| near[colour] || colour >= self.of_shape && known.is_none();
+        let ends = || (0..self.colours.len()).filter(|&end| present(end) && Some(end) != known);
+        let pairs = ends().flat_map(|a| ends().filter(move |&b| b > a).map(move |b| (a, b)));
+        let pairs = pairs.filter(|&(a, b)| near[a] || near[b]);
+        let pairs = pairs.filter(|&(a, b)| known.is_none() || !self.thin[a] && !self.thin[b]);
+        let lines = pairs.filter_map(|(a, b)| {
+            let (along, off) = along(own, self.colours[a], self.colours[b])?;
+            let doubt = usize::from(!near[a] || !near[b]) * 2 + usize::from(self.thin[a] || self.thin[b]);
+            let (more, less) = if along < 0.5 { (a, b) } else { (b, a) };
+            Some((doubt, off, (more, less, along.min(1.0 - along))))
+        });
+        lines.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, _, found)| found)
     }
 
     /// Whether a pixel that is covered by a `share` of less than half is on a line that is no wider than it: more covered than
@@ -160,27 +204,19 @@ impl<const N: usize> Edges<'_, N> {
     /// The number of a pixel's colour. What is nearly white or black stands for white or black beside the art, too.
     fn number(&self, pixel: &[u8; N]) -> Option<usize> {
         let pixel = split(pixel).1;
-        let known = self.colours.iter().position(|&colour| colour == pixel);
+        let known = self.colours.iter().position(|&colour| colour == pixel).map(|known| self.meant[known]);
         known.or_else(|| WHITE_AND_BLACK.iter().position(|&colour| colour == pixel))
     }
 
-    /// The flat colour that a pixel is a ripple of: filters that sharpen leave such beside edges.
-    fn ripple(&self, own: [u8; 3], near: &[u16; MOST_KNOWN]) -> Option<[u8; 3]> {
-        let side = 2 * REACH * self.enlarged + 1;
-        let alike = (0..self.colours.len()).filter(|&colour| similar(self.colours[colour], own));
-        let most = alike.max_by_key(|&colour| near[colour])?;
-        (RIPPLE * usize::from(near[most]) >= side * side).then(|| self.colours[most])
-    }
-
-    /// How many pixels of each colour are near one.
-    fn near(&self, at: usize) -> [u16; MOST_KNOWN] {
-        let (x, y, reach) = (at % self.width, at / self.width, REACH * self.enlarged);
-        let mut near = [0; MOST_KNOWN];
+    /// Which of the colours are so near a pixel.
+    fn near(&self, at: usize, reach: usize) -> [bool; MOST_KNOWN] {
+        let (x, y, reach) = (at % self.width, at / self.width, reach * self.enlarged);
+        let mut near = [false; MOST_KNOWN];
         for row in y.saturating_sub(reach)..(y + reach + 1).min(self.pixels.len() / self.width) {
             let row = &self.pixels[row * self.width..(row + 1) * self.width];
             for pixel in &row[x.saturating_sub(reach)..(x + reach + 1).min(self.width)] {
                 if let Some(known) = self.number(pixel) {
-                    near[known] += 1;
+                    near[known] = true;
                 }
             }
         }
@@ -361,6 +397,47 @@ mod tests {
         let pixels: Vec<[u8; 3]> =
             (0..SIDE * SIDE).map(|at| of_row[usize::from(at / SIDE / 40 == 1)][at]).collect();
         assert!(cut(&pixels).is_some_and(|found| found == pixels));
+    }
+
+    /// A filter that sharpens (cubic, a = -1/2) and its ripples, on stems of three pixels at every phase.
+    #[test]
+    fn sharpened_edges_and_their_ripples_are_cut() {
+        let cubic = |t: f64| match t.abs() {
+            t if t < 1.0 => 1.5 * t.powi(3) - 2.5 * t.powi(2) + 1.0,
+            t if t < 2.0 => -0.5 * t.powi(3) + 2.5 * t.powi(2) - 4.0 * t + 2.0,
+            _ => 0.0,
+        };
+        // Each third stem at the same phase.
+        let stem = |x: f64| {
+            let from = 3.0 + (x / 10.0).floor() % 3.0 * 0.3;
+            (from..from + 3.2).contains(&(x % 10.0))
+        };
+        let share = |x: usize| {
+            let taps = (-64..64).map(|tap| (f64::from(tap) + 0.5) / 32.0);
+            taps.map(|t| cubic(t) / 32.0 * f64::from(stem((x as f64 + 0.5 + t).max(0.0)))).sum::<f64>()
+        };
+        let shares: Vec<f64> = (0..SIDE).map(share).collect();
+        for (ground, ink) in
+            [([225, 230, 200], [30, 40, 160]), ([190, 40, 50], [240, 220, 40]), ([255; 3], [0, 0, 160])]
+        {
+            let tone = |at: usize| {
+                let share = if at / SIDE % 40 < 36 { shares[at % SIDE] } else { 0.0 };
+                std::array::from_fn(|c| {
+                    let (ground, ink): ([u8; 3], [u8; 3]) = (ground, ink);
+                    (f64::from(ground[c]) * (1.0 - share) + f64::from(ink[c]) * share).round() as u8
+                })
+            };
+            let pixels: Vec<[u8; 3]> = (0..SIDE * SIDE).map(tone).collect();
+            let found = cut(&pixels).expect("flat art");
+            for (at, colour) in found.into_iter().enumerate() {
+                let share = if at / SIDE % 40 < 36 { shares[at % SIDE] } else { 0.0 };
+                if (share - 0.5).abs() > 0.05 {
+                    let wanted = if share > 0.5 { ink } else { ground };
+                    let alike = (0..3).all(|c| colour[c].abs_diff(wanted[c]) <= 20);
+                    assert!(alike, "{colour:?} of {wanted:?} at {}: {share}", at % SIDE);
+                }
+            }
+        }
     }
 
     #[test]
