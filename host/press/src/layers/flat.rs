@@ -2,9 +2,9 @@
 //!
 //! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
 //! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
-//! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are left out first: the ones with a
-//! similar colour on the page that has nearly as many dots; an area stays, but not the band of a shading in its colour. White and black dots of a picture count only in lines and areas; a lone one beside tones is
-//! noise.
+//! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are
+//! left out first: the ones with a similar colour on the page that has nearly as many dots; an area stays, but not the band of a shading
+//! in its colour. White and black dots of a picture count only in lines and areas; a lone one beside tones is noise.
 //! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
 
 use std::collections::HashMap;
@@ -165,7 +165,7 @@ impl Flat {
     }
 
     /// Makes tones of what is `shaded` where it is a band of a shading: by half of its border or more it lies beside tones like it.
-    fn forget_bands<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize, shaded: &[(Kind, [u8; 3])]) {
+    fn forget_bands<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize, shaded: &[Drawn]) {
         let is_shaded: Vec<bool> = self.colours.iter().map(|colour| shaded.contains(colour)).collect();
         let number = |dot: u8| is_shaded.get(usize::from(dot)) == Some(&true);
         let (mut bands, mut at): (Vec<Range<usize>>, usize) = (Vec::new(), 0);

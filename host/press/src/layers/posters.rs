@@ -6,7 +6,7 @@
 //! [softened](super::softened) edge between two main colours, white and black among them: it becomes the nearer one. The whole is flat
 //! art if hardly any pixel is neither. What is small, a letter or what is softened between black and white, may have the colours that
 //! small shapes have in common. A colour that is nowhere three pixels wide and lies between two others may be an edge itself.
-//! Cost: 3 ns a pixel of such art, 100 ns a pixel of its softened edges; photographs are given up after some thousand colours. Colours
+//! Cost: 3 ns a pixel of such art, more for its softened edges; photographs are given up after some thousand colours. Colours
 //! that are nearly alike cost another pass.
 //! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
 //! text on a ground that is hardly apart from it.
