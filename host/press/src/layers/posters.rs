@@ -160,7 +160,10 @@ fn main_colours<const N: usize>(
             None => colours.push(colour),
             Some(at) if own.get(at) == Some(&false) => (colours[at], own[at]) = (colour, true),
             Some(_) => {
-                if shading.get_or_insert_with(|| shades(pixels, width, stretches, &found)).contains(&colour) {
+                if shading
+                    .get_or_insert_with(|| shades(pixels, width, stretches, &found, widths))
+                    .contains(&colour)
+                {
                     continue;
                 }
                 colours.push(colour);
@@ -184,12 +187,14 @@ fn main_colours<const N: usize>(
     (covered as f64 >= COVERED * total as f64).then_some(colours)
 }
 
-/// Of these colours, those of a shading: by half of their border or more they touch pixels that are like them.
+/// Of these colours, those of a shading: by half of their border or more they touch pixels that are like them, which are as wide where
+/// they are: what a filter that sharpens leaves along edges is not.
 fn shades<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
     found: &[([u8; 3], u64)],
+    widths: &Widths,
 ) -> HashSet<[u8; 3]> {
     let mut borders: HashMap<[u8; 3], [u64; 2]> = found.iter().map(|&(colour, _)| (colour, [0; 2])).collect();
     for stretch in stretches {
@@ -199,13 +204,15 @@ fn shades<const N: usize>(
             at = all.end;
             let own = split(&run[0]).1;
             let Some([border, like]) = borders.get_mut(&own) else { continue };
+            let is_thin = widths.is_thin(own);
             let left = (all.start % width > 0).then(|| all.start - 1);
             let right = (all.end % width > 0).then_some(all.end);
             let beneath = all.flat_map(|at| [at.checked_sub(width), Some(at + width)]);
             for beside in [left, right].into_iter().chain(beneath).flatten().filter_map(|at| pixels.get(at)) {
                 let other = split(beside).1;
                 *border += u64::from(other != own);
-                *like += u64::from(other != own && similar(other, own));
+                let is_like = other != own && similar(other, own) && (is_thin || !widths.is_thin(other));
+                *like += u64::from(is_like);
             }
         }
     }
@@ -346,6 +353,25 @@ mod tests {
         for at in strokes.into_iter().flatten() {
             assert_eq!(found[at], if share(at % SIDE) > 0.5 { blue } else { white }, "at {}", at % SIDE);
         }
+    }
+
+    /// A panel that is hardly apart from its ground, with a rim as a filter that sharpens leaves it: no shading.
+    #[test]
+    fn a_sharpened_rim_makes_no_shading_of_a_panel() {
+        let (ground, panel) = ([250, 248, 240], [238; 3]);
+        let rim = [[251, 249, 240], [252, 250, 241], [246, 245, 239], [236, 236, 237], [237; 3], [238; 3]];
+        let pixels: Vec<[u8; 3]> = (0..SIDE * SIDE)
+            .map(|at| {
+                let far = |v: usize| (v as f64 - 47.5).abs();
+                match far(at % SIDE).max(far(at / SIDE)) - 27.0 {
+                    out if out >= 3.0 => ground,
+                    out if out < -3.0 => panel,
+                    out => rim[(2.5 - out).round() as usize],
+                }
+            })
+            .collect();
+        let found = all(&pixels).expect("flat art");
+        assert_eq!((found[0], found[SIDE * SIDE / 2 + SIDE / 2]), (ground, panel));
     }
 
     #[test]

@@ -10,6 +10,7 @@
 //! Cost: 200 ns a softened pixel; a few microseconds a stroke in a thin colour.
 //! Limits: a line one pixel wide between two areas, in a colour between theirs, is taken for their edge.
 
+use std::cell::LazyCell;
 use std::collections::HashMap;
 use std::ops::{Deref, Range};
 
@@ -23,7 +24,8 @@ use crate::forest::Forest;
 const REACH: usize = 2;
 /// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
 const OFF: f32 = 24.0;
-/// How far beyond the colours a softened edge may lie: filters that sharpen draw edges stronger than they are.
+/// How far beyond the colours a softened edge may lie: filters that sharpen draw edges stronger than they are. Twice as far where two
+/// edges add up.
 const BEYOND: f32 = 0.15;
 /// Edges lie between colours that differ by at least this much in red, green or blue.
 const CONTRAST: u8 = 64;
@@ -91,15 +93,17 @@ impl Widths {
 }
 
 /// For each colour whether it may be that of an edge alone: it is thin, and lies between two others or is like a more frequent one,
-/// of which colours come first.
+/// of which colours come first. Colours that are found to be edges are no ends of others.
 pub(super) fn thin_colours(colours: &[[u8; 3]], widths: &impl Deref<Target = Widths>) -> Vec<bool> {
-    let ends = &colours[..colours.len().min(MOST_KNOWN)];
-    let is_between =
-        |own| is_between(own, ends, |end| WHITE_AND_BLACK.contains(&end) || !widths.is_thin(end));
-    let is_like = |at: usize| colours[..at].iter().any(|&more| similar(more, colours[at]));
-    (0..colours.len())
-        .map(|at| (is_like(at) || is_between(colours[at])) && widths.is_thin(colours[at]))
-        .collect()
+    let mut thin = vec![false; colours.len()];
+    for at in 0..colours.len() {
+        let ends: Vec<[u8; 3]> =
+            (0..colours.len().min(MOST_KNOWN)).filter(|&end| !thin[end]).map(|end| colours[end]).collect();
+        let is_ground = |end| WHITE_AND_BLACK.contains(&end) || !widths.is_thin(end);
+        let is_like = || colours[..at].iter().any(|&more| similar(more, colours[at]));
+        thin[at] = (is_like() || is_between(colours[at], &ends, is_ground)) && widths.is_thin(colours[at]);
+    }
+    thin
 }
 
 /// For each colour the number of the one that it stands for where others look for what is near: a thin colour for the most frequent
@@ -110,16 +114,22 @@ pub(super) fn meant(colours: &[[u8; 3]], thin: &[bool]) -> Vec<usize> {
 }
 
 /// Whether a colour, not white or black, lies between two others that are far from each other and not like it, of which one `is_ground`.
+/// Sharpened edges lie a little beyond. The most frequent colours come first: what is near an end or beyond it is rarer than that.
 pub(super) fn is_between(own: [u8; 3], colours: &[[u8; 3]], is_ground: impl Fn([u8; 3]) -> bool) -> bool {
-    let inner = |a: [u8; 3], b: [u8; 3]| {
+    let at_own = colours.iter().position(|&colour| colour == own).unwrap_or(colours.len());
+    let inner = |(at_a, a): (usize, [u8; 3]), (at_b, b): (usize, [u8; 3])| {
         (0..3).any(|c| a[c].abs_diff(b[c]) >= CONTRAST)
             && !similar(a, own)
             && !similar(b, own)
-            && along(own, a, b).is_some_and(|(along, _)| (0.05..=0.95).contains(&along))
             && (is_ground(a) || is_ground(b))
+            && along(own, a, b).is_some_and(|(along, _)| {
+                let end = if along < 0.5 { at_a } else { at_b };
+                let beyond = (along - 0.5).abs() - 0.5;
+                beyond < -0.1 || beyond <= BEYOND && end < at_own
+            })
     };
-    !WHITE_AND_BLACK.contains(&own)
-        && colours.iter().enumerate().any(|(at, &a)| colours[..at].iter().any(|&b| inner(a, b)))
+    let ends = || colours.iter().copied().enumerate();
+    !WHITE_AND_BLACK.contains(&own) && ends().any(|a| ends().take(a.0).any(|b| inner(a, b)))
 }
 
 /// Where a colour lies on the way from one colour to another, 0 to 1, and the square of its distance from it; `None` if it does not.
@@ -129,7 +139,7 @@ fn along(own: [u8; 3], from: [u8; 3], to: [u8; 3]) -> Option<(f32, f32)> {
     let length: f32 = line.iter().map(|v| v * v).sum();
     let along = (0..3).map(|c| (own[c] - from[c]) * line[c]).sum::<f32>() / length;
     let off = (0..3).map(|c| (own[c] - from[c] - along * line[c]).powi(2)).sum::<f32>();
-    ((-BEYOND..=1.0 + BEYOND).contains(&along) && off <= OFF * OFF).then_some((along, off))
+    ((-2.0 * BEYOND..=1.0 + 2.0 * BEYOND).contains(&along) && off <= OFF * OFF).then_some((along, off))
 }
 
 impl<const N: usize> Edges<'_, N> {
@@ -137,18 +147,21 @@ impl<const N: usize> Edges<'_, N> {
     pub fn colour(&self, at: usize, known: Option<usize>) -> Option<[u8; 3]> {
         let own = split(&self.pixels[at]).1;
         if known.is_some() && self.is_in_a_square(at) {
-            return Some(own);
+            return Some(self.colours[self.meant[known?]]);
         }
-        let near = self.near(at, REACH);
-        // Filters that sharpen leave ripples farther from edges, and hardly a pixel beside an edge in the very colour of the ground.
-        // The ground is more frequent.
-        let beyond = || {
-            let found = self.between(own, &self.near(at, RIPPLES), known)?;
+        let (near, far) = (self.near(at, REACH), LazyCell::new(|| self.near(at, RIPPLES)));
+        // Filters that sharpen leave ripples farther from edges. The ground is more frequent.
+        let beyond = |wide: bool| {
+            let found = self.between(own, &far, (wide, known))?;
             let (more, less, share) = found;
             let of_ink = near[more.max(less)] && !near[more.min(less)];
             (of_ink || known.is_none() && share <= BEYOND).then_some(found)
         };
-        let Some((more, less, share)) = self.between(own, &near, known).or_else(beyond) else {
+        let found = [true, false]
+            .into_iter()
+            .filter(|&wide| wide || known.is_none())
+            .find_map(|wide| self.between(own, &near, (wide, known)).or_else(|| beyond(wide)));
+        let Some((more, less, share)) = found else {
             return known.map(|_| own);
         };
         let is_line =
@@ -156,21 +169,24 @@ impl<const N: usize> Edges<'_, N> {
         Some(self.colours[if is_line { less } else { more }])
     }
 
-    /// Two colours between which a colour lies, the nearer one first, and how large the share of the other is.
+    /// Two colours between which a colour lies, the nearer one first, and how large the share of the other is. Of `wide` ones, that are
+    /// not thin, both are near, or one and the colour out of sight.
     fn between(
         &self,
         own: [u8; 3],
         near: &[bool; MOST_KNOWN],
-        known: Option<usize>,
+        (wide, known): (bool, Option<usize>),
     ) -> Option<(usize, usize, f32)> {
         let present = |colour: usize| near[colour] || colour >= self.of_shape && known.is_none();
-        let ends = || (0..self.colours.len()).filter(|&end| present(end) && Some(end) != known);
+        let ends = || (0..self.colours.len()).filter(|&end| present(end) && !(wide && self.thin[end]));
         let pairs = ends().flat_map(|a| ends().filter(move |&b| b > a).map(move |b| (a, b)));
         let pairs = pairs.filter(|&(a, b)| near[a] || near[b]);
-        let pairs = pairs.filter(|&(a, b)| known.is_none() || !self.thin[a] && !self.thin[b]);
         let lines = pairs.filter_map(|(a, b)| {
             let (along, off) = along(own, self.colours[a], self.colours[b])?;
-            let doubt = usize::from(!near[a] || !near[b]) * 2 + usize::from(self.thin[a] || self.thin[b]);
+            if known.is_some() && (along - 0.5).abs() > 0.5 + BEYOND {
+                return None;
+            }
+            let doubt = !near[a] || !near[b];
             let (more, less) = if along < 0.5 { (a, b) } else { (b, a) };
             Some((doubt, off, (more, less, along.min(1.0 - along))))
         });
@@ -202,24 +218,33 @@ impl<const N: usize> Edges<'_, N> {
     }
 
     /// The number of a pixel's colour. What is nearly white or black stands for white or black beside the art, too.
-    fn number(&self, pixel: &[u8; N]) -> Option<usize> {
-        let pixel = split(pixel).1;
+    fn number(&self, pixel: [u8; 3]) -> Option<usize> {
         let known = self.colours.iter().position(|&colour| colour == pixel).map(|known| self.meant[known]);
         known.or_else(|| WHITE_AND_BLACK.iter().position(|&colour| colour == pixel))
     }
 
-    /// Which of the colours are so near a pixel.
+    /// Which of the colours are so near a pixel. Filters that sharpen leave hardly a pixel beside an edge in the very colour of what is
+    /// there: what is like a wide colour stands for it, unless another that it is like is near.
     fn near(&self, at: usize, reach: usize) -> [bool; MOST_KNOWN] {
         let (x, y, reach) = (at % self.width, at / self.width, reach * self.enlarged);
-        let mut near = [false; MOST_KNOWN];
+        let (mut near, mut unknown) = ([false; MOST_KNOWN], Vec::new());
         let rows = y.saturating_sub(reach)..(y + reach + 1).min(self.pixels.len() / self.width);
         for row in rows.step_by(self.enlarged) {
             let row = &self.pixels[row * self.width..(row + 1) * self.width];
             let beside = &row[x.saturating_sub(reach)..(x + reach + 1).min(self.width)];
             for pixel in beside.iter().step_by(self.enlarged) {
-                if let Some(known) = self.number(pixel) {
-                    near[known] = true;
+                let pixel = split(pixel).1;
+                match self.number(pixel) {
+                    Some(known) => near[known] = true,
+                    None => unknown.push(pixel),
                 }
+            }
+        }
+        let wide: Vec<usize> = (0..self.colours.len()).filter(|&at| !self.thin[at]).collect();
+        for pixel in unknown {
+            let like = || wide.iter().copied().filter(|&at| similar(self.colours[at], pixel));
+            if let Some(first) = like().next().filter(|_| !like().any(|known| near[known])) {
+                near[first] = true;
             }
         }
         near
@@ -302,7 +327,8 @@ impl<const N: usize> Edges<'_, N> {
             dots[known] += span.len();
             let ends = [span.start.checked_sub(1), Some(span.end)];
             let beside = span.clone().flat_map(|at| [at.checked_sub(width), Some(at + width)]).chain(ends);
-            let beside = beside.flatten().filter_map(|at| self.pixels.get(at)).filter_map(|p| self.number(p));
+            let beside =
+                beside.flatten().filter_map(|at| self.pixels.get(at)).filter_map(|p| self.number(split(p).1));
             beside.filter(|&beside| beside != known).for_each(|beside| border[beside] += 1);
         }
         let most = |counts: &[usize]| (0..self.colours.len()).rev().max_by_key(|&colour| counts[colour]);
@@ -315,7 +341,7 @@ impl<const N: usize> Edges<'_, N> {
             row[left.saturating_sub(side)..(right + side).min(width)].iter().step_by(self.enlarged)
         });
         let mut counts = [0usize; MOST_KNOWN];
-        around.clone().filter_map(|pixel| self.number(pixel)).for_each(|colour| counts[colour] += 1);
+        around.clone().filter_map(|pixel| self.number(split(pixel).1)).for_each(|colour| counts[colour] += 1);
         let flat = |colour: usize| if self.thin[colour] { 0 } else { counts[colour] };
         let ground = (0..self.colours.len()).rev().max_by_key(|&colour| flat(colour))?;
         let all: usize = border.iter().sum();
@@ -419,9 +445,12 @@ mod tests {
             taps.map(|t| cubic(t) / 32.0 * f64::from(stem((x as f64 + 0.5 + t).max(0.0)))).sum::<f64>()
         };
         let shares: Vec<f64> = (0..SIDE).map(share).collect();
-        for (ground, ink) in
-            [([225, 230, 200], [30, 40, 160]), ([190, 40, 50], [240, 220, 40]), ([255; 3], [0, 0, 160])]
-        {
+        for (ground, ink) in [
+            ([225, 230, 200], [30, 40, 160]),
+            ([190, 40, 50], [240, 220, 40]),
+            ([255; 3], [0, 0, 160]),
+            ([235, 240, 210], [0; 3]),
+        ] {
             let tone = |at: usize| {
                 let share = if at / SIDE % 40 < 36 { shares[at % SIDE] } else { 0.0 };
                 std::array::from_fn(|c| {

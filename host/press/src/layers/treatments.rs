@@ -20,8 +20,10 @@ const SAME: f64 = 0.05;
 const SAME_HUE: f64 = 0.02;
 /// A colour that differs from paper by at most so much is paper: nobody sees the difference, but everybody the specks.
 const BARE: f64 = 0.01;
-/// Colours of sRGB that differ by more can be told apart where they touch.
+/// Colours of sRGB that differ by more can be told apart where they touch, in light of which the screen reflects so much by itself: the
+/// viewing flare of IEC 61966-2-1. Without it 2 of 255 is as far from black as light grey is from white.
 const APART: f64 = 0.02;
+const FLARE: f64 = 0.01;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for.
 const NEARLY: f64 = 1.0 / 8.0;
 /// Stacks that may stand for a colour; the last is repeated where there are fewer.
@@ -118,7 +120,9 @@ impl Found {
 /// The colours that may not be printed as their stack, because a colour that can be told from them is printed as it beside
 /// them.
 fn parted(flat: &Flat, width: usize, found: &[Found], rank: &[u8]) -> Vec<bool> {
-    let light = |colour: [u8; 3]| colour.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
+    let light = |colour: [u8; 3]| {
+        colour.map(|v| (f64::from(appearance::srgb::decode(f32::from(v) / 255.0)) + FLARE) / (1.0 + FLARE))
+    };
     let share = |a: usize, b: usize| {
         found[a].stack == found[b].stack
             && found[a].is_solid
@@ -233,6 +237,14 @@ mod tests {
         for colour in [[35, 31, 32], [26, 26, 26], [16, 16, 16]] {
             let (nearest, found, solid) = alone(colour, &mut fit, &solids);
             assert!(nearest == "K" && solid, "{colour:?}: {nearest} {found:.3}");
+        }
+        // A screen shows no difference between black and what is nearly black: it is no white letter in it.
+        let black = fit.stacks.iter().position(|stack| stack.to_string() == "K").map(|at| at as u8);
+        for nearly in [2, 5, 10] {
+            for kind in [Kind::Text, Kind::Drawing] {
+                let printed = printed(&mut fit, &solids, kind, [[0; 3], [nearly; 3]]);
+                assert_eq!(printed.map(Some), [black; 2], "{nearly} on black");
+            }
         }
         // A ground that is nearly white has no specks, and a tint of five hundredths of a stack is one.
         for (colour, bare) in [
