@@ -4,12 +4,23 @@
 //! Method: every change moves one or two errors from one place to another ([`Shift`]): a whole cell, a half of a cell, or both
 //! halves of one. Cells change places with cells, and halves with halves, a half of a whole cell of a small stack among them;
 //! a cell of two stacks may also turn.
-//! Where a half may lie in four places, that is taken where the error that leaves or comes is seen most or least.
-//! Cost: for each neighbour up to four pairs of halves.
+//! Where a half may lie in four places, that is taken where the error that leaves or comes is seen most or least. What is seen from all four
+//! is one vector for each coordinate. A change costs what its errors have in common, which is never negative: what does not gain
+//! enough by what is seen alone is not weighed.
+//! Cost: for each neighbour up to four pairs of halves, of which one in twenty is weighed.
 
 use super::lines::Around;
 use super::{FIXED, NEAR, Part, Place, Point};
 use crate::halftone::cells::cell::Cell;
+
+/// No cell.
+const NONE: usize = usize::MAX;
+
+/// What rounding, and halves that share a part of a line, may make of a gain: a part of what is seen and of the error itself.
+const COARSE: f32 = 1.0 / 128.0;
+
+/// The numbers of the cells of one side around a place, two to each side of it, or [`NONE`].
+type Numbers = [[usize; 5]; 5];
 
 /// A place in a cell, in half dots from the centre of the cell at work, and the error seen from there.
 #[derive(Clone, Copy)]
@@ -29,40 +40,56 @@ struct Shift {
 /// A cell as the search sees it.
 #[derive(Clone, Copy)]
 struct View {
-    place: Place,
+    number: usize,
     cell: Cell,
-    /// Halves side by side, then one above the other.
-    halves: [[End; 2]; 2],
+    /// Its centre in half dots from that of the cell at work.
+    at: (i32, i32),
+    /// Of each coordinate what is seen from its halves: the left, the right, the upper and the lower one.
+    seen: [Point; 4],
 }
 
 /// The best change so far: what it makes of the error, its errors, and the cells after it.
 struct Best {
     change: f32,
     shifts: [Option<Shift>; 2],
-    cells: [Option<(Place, Cell)>; 2],
+    cells: [Option<(usize, Cell)>; 2],
 }
 
 impl View {
-    /// Places of a half that may be changed: its own, or all four if the cell is whole.
+    /// The place of a half that may be changed and of which most is seen: its own, or one of all four if the cell is whole.
     #[inline(always)]
-    fn places(&self, half: usize) -> impl Iterator<Item = (bool, usize)> + use<> {
-        let (split, stacked) = (self.cell.is_split(), self.cell.stacked);
-        let all = [(false, 0), (false, 1), (true, 0), (true, 1)];
-        all.into_iter().filter(move |&place| !split || place == (stacked, half))
+    fn most(&self, half: usize, seen: Point) -> usize {
+        if self.cell.is_split() {
+            return 2 * usize::from(self.cell.stacked) + half;
+        }
+        (1..4).fold(0, |most, at| if seen[at] > seen[most] { at } else { most })
     }
 
-    /// The place of a half where most of an error is seen.
+    /// How much of an error is seen from each half.
     #[inline(always)]
-    fn most(&self, half: usize, error: Point) -> (bool, usize) {
-        let seen = |(stacked, half): (bool, usize)| dot(error, self.halves[usize::from(stacked)][half].seen);
-        let most = |a: (bool, usize), b| if seen(b) > seen(a) { b } else { a };
-        self.places(half).reduce(most).unwrap_or_default()
+    fn dots(&self, error: Point) -> Point {
+        let [a, b, c, d] = &self.seen;
+        let mut dots = [0.0; 4];
+        for at in 0..4 {
+            dots[at] = (error[0] * a[at] + error[1] * b[at]) + (error[2] * c[at] + error[3] * d[at]);
+        }
+        dots
+    }
+
+    /// A half of a cell of this side.
+    #[inline(always)]
+    fn end(&self, size: usize, half: usize) -> End {
+        let quarter = size as i32 / 2;
+        let (dx, dy) = [(-quarter, 0), (quarter, 0), (0, -quarter), (0, quarter)][half];
+        let [a, b, c, d] = &self.seen;
+        End { at: (self.at.0 + dx, self.at.1 + dy), seen: [a[half], b[half], c[half], d[half]] }
     }
 
     /// The cell with another stack in a half.
-    fn with(&self, (stacked, half): (bool, usize), stack: u8) -> Cell {
-        let mut cell = Cell { stacked, ..self.cell };
-        cell.halves[half] = stack;
+    #[inline(always)]
+    fn with(&self, half: usize, stack: u8) -> Cell {
+        let mut cell = Cell { stacked: half > 1, ..self.cell };
+        cell.halves[half % 2] = stack;
         cell
     }
 }
@@ -74,12 +101,17 @@ fn dot(a: Point, b: Point) -> f32 {
 
 #[inline(always)]
 fn minus(a: Point, b: Point) -> Point {
-    std::array::from_fn(|c| a[c] - b[c])
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]]
 }
 
 #[inline(always)]
 fn plus(a: Point, b: Point) -> Point {
-    std::array::from_fn(|c| a[c] + b[c])
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+}
+
+#[inline(always)]
+fn times(a: f32, b: Point) -> Point {
+    [a * b[0], a * b[1], a * b[2], a * b[3]]
 }
 
 impl Part<'_> {
@@ -88,38 +120,37 @@ impl Part<'_> {
     pub(super) fn improve(&mut self, place: Place) {
         let size = place.zone.size;
         let area = (size * size) as f32;
-        let inner = place.i > 1
-            && place.i + 2 < place.zone.columns
-            && place.j > 1
-            && (place.j + 2) * size < super::BLOCK;
         let cell = self.cells[place.number()];
+        let numbers = self.numbers(place);
         let lines = self.lines.around(place);
-        let own = (self.small[size] != 0).then(|| self.view(place, (0, 0), inner, &lines.halves((0, 0))));
+        let may_split = self.small[size] != 0;
+        let own = may_split.then(|| self.view(&numbers, (0, 0), size, &lines));
         // Differences below what rounding makes of the sums would go round in circles.
         let mut best = Best { change: -1e-5 * area, shifts: [None; 2], cells: [None; 2] };
         if let Some(own) = own.as_ref().filter(|own| own.cell.is_split()) {
-            self.arrange(own, &mut best);
+            self.arrange(own, size, &mut best);
         }
-        let step = 2 * size as i32;
         for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
-            let Some(there) = self.next_to(place, dx, dy, inner) else { continue };
-            let other = self.cells[there.number()];
+            let there = numbers[(dy + 2) as usize][(dx + 2) as usize];
+            if there == NONE {
+                continue;
+            }
+            let other = self.cells[there];
             if other == FIXED || other == cell {
                 continue;
             }
-            let at = (dx as i32 * step, dy as i32 * step);
             if !cell.is_split() && !other.is_split() {
-                self.exchange(place, (there, at, (dx, dy)), &lines, &mut best);
+                self.exchange(place.number(), (there, (dx, dy)), size, &lines, &mut best);
             }
             let Some(own) = &own else { continue };
-            let there = self.view(there, at, inner, &lines.halves((dx, dy)));
+            let there = self.view(&numbers, (dx, dy), size, &lines);
             if cell.is_split() != other.is_split() {
-                self.exchange_split(own, &there, &mut best);
+                self.exchange_split(own, &there, size, &mut best);
             }
-            self.exchange_halves(own, &there, &mut best);
+            self.exchange_halves(own, &there, size, &mut best);
         }
         for shift in best.shifts.into_iter().flatten() {
-            self.lines.add(place, shift.from.at, shift.error.map(|error| -error));
+            self.lines.add(place, shift.from.at, times(-1.0, shift.error));
             self.lines.add(place, shift.to.at, shift.error);
             self.around(
                 place,
@@ -135,57 +166,77 @@ impl Part<'_> {
                 },
             );
         }
-        for (place, cell) in best.cells.into_iter().flatten() {
-            self.cells[place.number()] = cell;
+        for (number, cell) in best.cells.into_iter().flatten() {
+            self.cells[number] = cell;
         }
     }
 
-    /// The place one cell to a side; `inner` says that it is in the same zone.
+    /// The cells around a place.
     #[inline(always)]
-    fn next_to(&self, place: Place, dx: isize, dy: isize, inner: bool) -> Option<Place> {
-        if !inner {
-            return self.beside(place, dx, dy);
-        }
-        let (i, j) = (place.i.wrapping_add_signed(dx), place.j.wrapping_add_signed(dy));
-        Some(Place { i, j, ..place })
-    }
-
-    /// A cell `at` so many half dots from the one at work. From its halves an error is seen as the parabola through the
-    /// neighbours has it; `lines` adds what the columns and rows of its halves owe.
-    #[inline(always)]
-    fn view(&self, place: Place, at: (i32, i32), inner: bool, lines: &[[Point; 2]; 2]) -> View {
-        let cell = self.cells[place.number()];
-        let seen = self.seen[place.number()];
-        let mut halves = [[End { at, seen }; 2]; 2];
-        for (stacked, (dx, dy)) in [(false, (1, 0)), (true, (0, 1))] {
-            let near = |dx, dy| self.next_to(place, dx, dy, inner).map(|place| self.seen[place.number()]);
-            let (before, after) = match (near(-dx, -dy), near(dx, dy)) {
-                (Some(before), Some(after)) => (before, after),
-                (Some(before), None) => (before, std::array::from_fn(|c| 2.0 * seen[c] - before[c])),
-                (None, Some(after)) => (std::array::from_fn(|c| 2.0 * seen[c] - after[c]), after),
-                (None, None) => (seen, seen),
+    fn numbers(&self, place: Place) -> Numbers {
+        let (zone, mut numbers) = (place.zone, [[NONE; 5]; 5]);
+        let across = place.i > 1 && place.i + 2 < zone.columns;
+        for (dy, row) in (-2..).zip(&mut numbers) {
+            let j = place.j.wrapping_add_signed(dy);
+            let middle = if j < super::BLOCK / zone.size {
+                Some(Place { j, ..place })
+            } else {
+                self.beside(place, 0, dy)
             };
-            let ends = place.halves(stacked);
-            for (half, sign) in [(0, -0.125), (1, 0.125)] {
-                let seen = std::array::from_fn(|c| {
-                    let (slope, bend) = (after[c] - before[c], after[c] + before[c] - 2.0 * seen[c]);
-                    seen[c] + sign * slope + bend / 32.0 + lines[usize::from(stacked)][half][c]
-                });
-                let at = (at.0 + ends[half].0, at.1 + ends[half].1);
-                halves[usize::from(stacked)][half] = End { at, seen };
+            match middle {
+                Some(middle) if across && middle.i > 1 && middle.i + 2 < middle.zone.columns => {
+                    let first = middle.number() - 2;
+                    for (dx, number) in row.iter_mut().enumerate() {
+                        *number = first + dx;
+                    }
+                }
+                _ => {
+                    for (dx, number) in (-2..).zip(row) {
+                        *number = self.beside(place, dx, dy).map_or(NONE, |place| place.number());
+                    }
+                }
             }
         }
-        View { place, cell, halves }
+        numbers
     }
 
+    /// A cell so many cells from the one at work. From its halves an error is seen as the parabola through the
+    /// neighbours has it; `lines` adds what the columns and rows of its halves owe.
+    #[inline(always)]
+    fn view(&self, numbers: &Numbers, (dx, dy): (isize, isize), size: usize, lines: &Around) -> View {
+        let at = |x: isize, y: isize| numbers[(dy + y + 2) as usize][(dx + x + 2) as usize];
+        let number = at(0, 0);
+        let seen = self.seen[number];
+        let owed = lines.halves((dx, dy));
+        let mut halves = [[0.0; 4]; 4];
+        for (first, before, after) in [(0, at(-1, 0), at(1, 0)), (2, at(0, -1), at(0, 1))] {
+            let (before, after) = match (before, after) {
+                (NONE, NONE) => (seen, seen),
+                (before, NONE) => (self.seen[before], minus(times(2.0, seen), self.seen[before])),
+                (NONE, after) => (minus(times(2.0, seen), self.seen[after]), self.seen[after]),
+                (before, after) => (self.seen[before], self.seen[after]),
+            };
+            for c in 0..4 {
+                let (slope, bend) = (after[c] - before[c], after[c] + before[c] - 2.0 * seen[c]);
+                halves[c][first] = seen[c] + -0.125 * slope + bend / 32.0 + owed[first / 2][0][c];
+                halves[c][first + 1] = seen[c] + 0.125 * slope + bend / 32.0 + owed[first / 2][1][c];
+            }
+        }
+        let step = 2 * size as i32;
+        View { number, cell: self.cells[number], at: (dx as i32 * step, dy as i32 * step), seen: halves }
+    }
+
+    #[inline(always)]
     fn point(&self, stack: u8, dots: f32) -> Point {
-        self.points[usize::from(stack)].map(|coordinate| dots * coordinate)
+        times(dots, self.points[usize::from(stack)])
     }
 
-    fn allows(&self, view: &View, stack: u8) -> bool {
-        self.allowed[view.place.number()] >> stack & 1 == 1
+    #[inline(always)]
+    fn allows(&self, number: usize, stack: u8) -> bool {
+        self.allowed[number] >> stack & 1 == 1
     }
 
+    #[inline(always)]
     fn is_small(&self, size: usize, stack: u8) -> bool {
         self.small[size] >> stack & 1 == 1
     }
@@ -196,7 +247,7 @@ impl Part<'_> {
         &self,
         size: usize,
         shifts: [Option<Shift>; 2],
-        cells: [Option<(Place, Cell)>; 2],
+        cells: [Option<(usize, Cell)>; 2],
         best: &mut Best,
     ) {
         let near = |a: End, b: End| self.kernel.near(size, (a.at.0 - b.at.0, a.at.1 - b.at.1));
@@ -216,23 +267,23 @@ impl Part<'_> {
 
     /// Other arrangements of a cell's halves.
     #[inline(always)]
-    fn arrange(&self, own: &View, best: &mut Best) {
-        let size = own.place.zone.size;
+    fn arrange(&self, own: &View, size: usize, best: &mut Best) {
         let half = 0.5 * (size * size) as f32;
         let [a, b] = own.cell.halves;
-        let [from_a, from_b] = own.halves[usize::from(own.cell.stacked)];
+        let is_at = 2 * usize::from(own.cell.stacked);
+        let [from_a, from_b] = [own.end(size, is_at), own.end(size, is_at + 1)];
         let (first, second) = (self.point(a, half), self.point(b, half));
         let swapped = Cell { halves: [b, a], ..own.cell };
         let shift = Shift { error: minus(first, second), from: from_a, to: from_b };
-        self.weigh(size, [Some(shift), None], [Some((own.place, swapped)), None], best);
+        self.weigh(size, [Some(shift), None], [Some((own.number, swapped)), None], best);
         let stacked = !own.cell.stacked;
-        let [one, other] = own.halves[usize::from(stacked)];
+        let [one, other] = [own.end(size, 2 - is_at), own.end(size, 3 - is_at)];
         for (halves, to_a, to_b) in [([a, b], one, other), ([b, a], other, one)] {
             let shifts = [
                 Some(Shift { error: first, from: from_a, to: to_a }),
                 Some(Shift { error: second, from: from_b, to: to_b }),
             ];
-            self.weigh(size, shifts, [Some((own.place, Cell { halves, stacked })), None], best);
+            self.weigh(size, shifts, [Some((own.number, Cell { halves, stacked })), None], best);
         }
     }
 
@@ -240,69 +291,83 @@ impl Part<'_> {
     #[inline(always)]
     fn exchange(
         &self,
-        place: Place,
-        (there, at, beside): (Place, (i32, i32), (isize, isize)),
+        number: usize,
+        (there, beside): (usize, (isize, isize)),
+        size: usize,
         lines: &Around,
         best: &mut Best,
     ) {
-        let size = place.zone.size;
         let area = (size * size) as f32;
-        let (a, b) = (place.number(), there.number());
-        let (own, other) = (self.cells[a], self.cells[b]);
-        if self.allowed[a] >> other.halves[0] & self.allowed[b] >> own.halves[0] & 1 == 0 {
+        let (own, other) = (self.cells[number], self.cells[there]);
+        if !self.allows(number, other.halves[0]) || !self.allows(there, own.halves[0]) {
             return;
         }
+        let step = 2 * size as i32;
         let error = minus(self.point(own.halves[0], area), self.point(other.halves[0], area));
-        let from = End { at: (0, 0), seen: plus(self.seen[a], lines.whole((0, 0))) };
-        let to = End { at, seen: plus(self.seen[b], lines.whole(beside)) };
-        let cells = [Some((place, other)), Some((there, own))];
+        let from = End { at: (0, 0), seen: plus(self.seen[number], lines.whole((0, 0))) };
+        let at = (beside.0 as i32 * step, beside.1 as i32 * step);
+        let to = End { at, seen: plus(self.seen[there], lines.whole(beside)) };
+        let cells = [Some((number, other)), Some((there, own))];
         self.weigh(size, [Some(Shift { error, from, to }), None], cells, best);
     }
 
     /// A whole cell and one that is not change places.
     #[inline(always)]
-    fn exchange_split(&self, own: &View, there: &View, best: &mut Best) {
-        let size = own.place.zone.size;
+    fn exchange_split(&self, own: &View, there: &View, size: usize, best: &mut Best) {
         let half = 0.5 * (size * size) as f32;
-        let stays = own.cell.halves.iter().all(|&stack| self.allows(there, stack));
-        if !stays || !there.cell.halves.iter().all(|&stack| self.allows(own, stack)) {
+        let [a, b] = own.cell.halves;
+        let [c, d] = there.cell.halves;
+        let own_allows = self.allows(own.number, c) && self.allows(own.number, d);
+        if !own_allows || !self.allows(there.number, a) || !self.allows(there.number, b) {
             return;
         }
-        let stacked = usize::from(own.cell.stacked || there.cell.stacked);
-        let shifts = [0, 1].map(|i| {
-            let (leaves, comes) = (own.cell.halves[i], there.cell.halves[i]);
-            let error = minus(self.point(leaves, half), self.point(comes, half));
-            Some(Shift { error, from: own.halves[stacked][i], to: there.halves[stacked][i] })
-        });
-        let cells = [Some((own.place, there.cell)), Some((there.place, own.cell))];
-        self.weigh(size, shifts, cells, best);
+        let first = 2 * usize::from(own.cell.stacked || there.cell.stacked);
+        let errors = [
+            minus(self.point(a, half), self.point(c, half)),
+            minus(self.point(b, half), self.point(d, half)),
+        ];
+        let gain = |i: usize| {
+            let (from, to) = (own.dots(errors[i])[first + i], there.dots(errors[i])[first + i]);
+            to - from - COARSE * (from.abs() + to.abs() + dot(errors[i], errors[i]))
+        };
+        if 2.0 * (gain(0) + gain(1)) > best.change {
+            return;
+        }
+        let shift = |i: usize| {
+            Some(Shift { error: errors[i], from: own.end(size, first + i), to: there.end(size, first + i) })
+        };
+        let cells = [Some((own.number, there.cell)), Some((there.number, own.cell))];
+        self.weigh(size, [shift(0), shift(1)], cells, best);
     }
 
     /// A half changes places with a half of another cell.
     #[inline(always)]
-    fn exchange_halves(&self, own: &View, there: &View, best: &mut Best) {
-        let size = own.place.zone.size;
+    fn exchange_halves(&self, own: &View, there: &View, size: usize, best: &mut Best) {
         let half = 0.5 * (size * size) as f32;
         for i in 0..=usize::from(own.cell.is_split()) {
             let leaves = own.cell.halves[i];
-            if !self.is_small(size, leaves) || !self.allows(there, leaves) {
+            if !self.is_small(size, leaves) || !self.allows(there.number, leaves) {
                 continue;
             }
             for j in 0..=usize::from(there.cell.is_split()) {
                 let comes = there.cell.halves[j];
-                if comes == leaves || !self.is_small(size, comes) || !self.allows(own, comes) {
+                if comes == leaves || !self.is_small(size, comes) || !self.allows(own.number, comes) {
                     continue;
                 }
                 let error = minus(self.point(leaves, half), self.point(comes, half));
-                let leaving = own.most(i, error);
-                let coming = there.most(j, error.map(|coordinate| -coordinate));
-                let from = own.halves[usize::from(leaving.0)][leaving.1];
-                let to = there.halves[usize::from(coming.0)][coming.1];
+                let (here, beyond) = (own.dots(error), there.dots(times(-1.0, error)));
+                let leaving = own.most(i, here);
+                let coming = there.most(j, beyond);
+                let (from, to) = (here[leaving], -beyond[coming]);
+                if 2.0 * (to - from - COARSE * (from.abs() + to.abs())) > best.change {
+                    continue;
+                }
                 let cells = [
-                    Some((own.place, own.with(leaving, comes))),
-                    Some((there.place, there.with(coming, leaves))),
+                    Some((own.number, own.with(leaving, comes))),
+                    Some((there.number, there.with(coming, leaves))),
                 ];
-                self.weigh(size, [Some(Shift { error, from, to }), None], cells, best);
+                let shift = Shift { error, from: own.end(size, leaving), to: there.end(size, coming) };
+                self.weigh(size, [Some(shift), None], cells, best);
             }
         }
     }
