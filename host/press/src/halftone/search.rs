@@ -5,12 +5,12 @@
 //! cells, convolved with the autocorrelation of the eye's response ([`Kernel`]), gives what a change would make of it in a
 //! few products (Analoui and Allebach 1992). The best change of a cell is made if it lessens the error: it or a half of it
 //! changes places with one of its eight neighbours or a half of that, or its own halves are arranged in another way
-//! ([`moves`]). Nothing else: every stack keeps its dots, so tones need no term of their own.
+//! ([`moves`]); each pair is looked at once a round. Nothing else: every stack keeps its dots, so tones need no term of their own.
 //! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
-//! Parts of [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
+//! Parts of at most [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
 //! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with, and two fifths of that for each change, of which there
-//! is about one for four cells. Memory: 45 bytes a cell of the parts at work, 13 MB a thread for A4.
+//! is about one for four cells. Memory: 63 bytes a cell of the parts at work, 37 MB a thread for A4 in cells of 3 x 3.
 //! Limits: four coordinates, those in which stacks differ most, about the page's mean mixture; cells beside edges stay
 //! as they are, and so do all stacks after the 64th. What is seen from a half is interpolated between cells.
 
@@ -43,8 +43,12 @@ const REACH: usize = 47;
 /// How far an exchange reaches. Its two errors cancel from afar.
 const NEAR: usize = 30;
 
-/// Block rows in a part, and how many at each end belong to its neighbours: more than an error reaches.
-const PART: usize = 24;
+/// How far the halves of a cell are two errors; beyond they are one at its centre. A half of a cell of 4 x 4 is seen there as its centre
+/// is, but for two hundredths of itself.
+const CLOSE: usize = 16;
+
+/// The most block rows in a part, and how many at each end belong to its neighbours: more than an error reaches.
+const PART: usize = 48;
 const MARGIN: usize = 2;
 
 /// No stack that is searched.
@@ -119,8 +123,10 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], minimum: &[u1
         minimum.iter().take(64).enumerate().filter(small).fold(0, |all, (q, _)| all | 1u64 << q)
     });
     let down = plan.down();
-    let whole = (0..down).step_by(PART).map(|top| top..(top + PART).min(down));
-    let ends = (PART..down).step_by(PART).map(|cut| cut - 3 * MARGIN..(cut + 3 * MARGIN).min(down));
+    // As many for each of two threads.
+    let part = down.div_ceil(down.div_ceil(PART).next_multiple_of(2)).max(6 * MARGIN);
+    let whole = (0..down).step_by(part).map(|top| top..(top + part).min(down));
+    let ends = (part..down).step_by(part).map(|cut| cut - 3 * MARGIN..(cut + 3 * MARGIN).min(down));
     for (parts, again) in [(whole.collect::<Vec<_>>(), false), (ends.collect(), true)] {
         let (mut rest, mut top, mut tasks) = (&mut *index, 0, Vec::new());
         for rows in parts {
@@ -198,35 +204,37 @@ impl<'a> Part<'a> {
                 if errors == [[0.0; 4]; 2] {
                     return;
                 }
-                if !cell.is_split() {
-                    let error: Point = std::array::from_fn(|c| errors[0][c] + errors[1][c]);
-                    part.lines.add(place, (0, 0), error);
-                    return part.around(
-                        place,
-                        REACH,
-                        [(0, 0); 2],
-                        #[inline(always)]
-                        |seen, own, _| {
-                            for (seen, own) in seen.iter_mut().zip(own) {
-                                for c in 0..4 {
-                                    seen[c] += own[c] * error[c];
-                                }
-                            }
-                        },
-                    );
-                }
-                for (at, error) in place.halves(cell.stacked).into_iter().zip(errors) {
-                    part.lines.add(place, at, error);
-                }
+                let [first, second] = errors;
+                let error: Point = std::array::from_fn(|c| first[c] + second[c]);
                 part.around(
                     place,
                     REACH,
-                    place.halves(cell.stacked),
+                    [(0, 0)],
                     #[inline(always)]
-                    |seen, first, second| {
-                        for (seen, (first, second)) in seen.iter_mut().zip(first.iter().zip(second)) {
+                    |seen, [centre]| {
+                        for (seen, centre) in seen.iter_mut().zip(centre) {
                             for c in 0..4 {
-                                seen[c] += first[c] * errors[0][c] + second[c] * errors[1][c];
+                                seen[c] += centre * error[c];
+                            }
+                        }
+                    },
+                );
+                if !cell.is_split() {
+                    return part.lines.add(place, (0, 0), error);
+                }
+                let [one, other] = place.halves(cell.stacked);
+                part.lines.add(place, one, first);
+                part.lines.add(place, other, second);
+                part.around(
+                    place,
+                    CLOSE,
+                    [one, other, (0, 0)],
+                    #[inline(always)]
+                    |seen, [one, other, centre]| {
+                        let kernels = one.iter().zip(other).zip(centre);
+                        for (seen, ((one, other), centre)) in seen.iter_mut().zip(kernels) {
+                            for c in 0..4 {
+                                seen[c] += (one - centre) * first[c] + (other - centre) * second[c];
                             }
                         }
                     },
@@ -297,15 +305,15 @@ impl<'a> Part<'a> {
         errors
     }
 
-    /// Calls `with` for each row of cells up to `reach` dots from a place: what they see, and the kernel about two points,
+    /// Calls `with` for each row of cells up to `reach` dots from a place: what they see, and the kernel about some points,
     /// which are so many half dots to the right of the place and below.
     #[inline(always)]
-    fn around(
+    fn around<const N: usize>(
         &mut self,
         place: Place,
         reach: usize,
-        ends: [(i32, i32); 2],
-        mut with: impl FnMut(&mut [Point], &[Point], &[Point]),
+        ends: [(i32, i32); N],
+        mut with: impl FnMut(&mut [Point], [&[f32]; N]),
     ) {
         let (cx, cy) = place.centre();
         let (blocks, reach) = (reach.div_ceil(BLOCK), 2 * reach as i32);
@@ -329,7 +337,7 @@ impl<'a> Part<'a> {
                         let seen = &mut self.seen[line + from as usize..line + end as usize];
                         let count = seen.len();
                         let row = |end: usize| self.kernel.row(columns[end], y - ends[end].1, count);
-                        with(seen, row(0), row(1));
+                        with(seen, std::array::from_fn(row));
                     }
                 }
             }

@@ -3,9 +3,9 @@
 //! Problem: a search asks for it some thousand times a cell.
 //! Method: for the response exp(-f/k) it is (1 + (r/a)^2)^(-3/2) / a^2 but for a constant, a = 1 / (pi k). The sum of two such
 //! looks from two distances at once. Centres of cells and halves lie on half dots.
-//! Memory: 400 kB for each side of cells.
+//! Memory: 100 kB for each side of cells, of which a search in cells of one side reads a quarter.
 
-use super::{Point, REACH, lines};
+use super::{REACH, lines};
 use crate::halftone::cells::plan::BLOCK;
 
 /// From how far the eye looks, `a` in dots: 0.3 m and 0.5 m.
@@ -15,11 +15,11 @@ const SCALES: [f32; 2] = [7.62, 12.7];
 /// one as much is seen from 0.5 m, and more from 0.3 m.
 const FAR: f32 = 0.5;
 
-/// The autocorrelation of the eye's response, in rows as vectors can take them: for cells of one side, its values at
-/// distances of `phase`, `phase` + 2 sides and so on, in half dots, four times each.
+/// The autocorrelation of the eye's response in rows: for cells of one side, its values at
+/// distances of `phase`, `phase` + 2 sides and so on, in half dots.
 pub(super) struct Kernel {
     /// By side of the cells that see.
-    tables: Vec<Vec<Point>>,
+    tables: Vec<Vec<f32>>,
     /// By side, values at distances up to three sides across and down, in half dots, with what columns and rows add.
     near: Vec<Vec<f32>>,
 }
@@ -60,13 +60,13 @@ impl Kernel {
         (eye(SCALES[0]) + FAR * eye(SCALES[1])) / (1.0 + FAR)
     }
 
-    fn table(size: usize) -> Vec<Point> {
+    fn table(size: usize) -> Vec<f32> {
         let (half, step) = (Kernel::half(size) as isize, 2 * size as isize);
         let mut table = Vec::with_capacity(2 * size * (Kernel::DOWN + 1) * (2 * Kernel::half(size) + 1));
         for phase in 0..step {
             for down in 0..=Kernel::DOWN as isize {
                 for i in -half..=half {
-                    table.push([Kernel::value(phase + i * step, down); 4]);
+                    table.push(Kernel::value(phase + i * step, down));
                 }
             }
         }
@@ -84,7 +84,7 @@ impl Kernel {
 
     /// Values for `count` cells from there, all `y` half dots below.
     #[inline(always)]
-    pub(super) fn row(&self, column: Column, y: i32, count: usize) -> &[Point] {
+    pub(super) fn row(&self, column: Column, y: i32, count: usize) -> &[f32] {
         let first = column.first + y.unsigned_abs() as usize * column.length;
         &self.tables[column.size][first..first + count]
     }

@@ -2,7 +2,7 @@
 //!
 //! Problem: the eye's response ends after thirty dots. An exchange that lessens what is seen leaves the ink of a column of
 //! hundreds of dots to chance, or worse: columns of a tint of 10 % swung by 1.23 of what independent cells do.
-//! Method: what is printed beyond what is asked is summed for each column of a part over its height, and for each row over the
+//! Method: what is printed beyond what is asked is summed for each column over [`HEIGHT`] block rows, and for each row over the
 //! page's width. The squares of these sums have a [`PRICE`]. It adds hardly any error, because it asks one thing of hundreds
 //! of cells.
 //! Cost: six sums to look at for a cell, twelve if it may be cut, and four lines to change with each exchange. Memory: 16 bytes for each column and row of dots of a part.
@@ -21,10 +21,15 @@ pub(super) fn common(size: usize, apart: isize) -> f32 {
     if 2 * apart.unsigned_abs() <= size { PRICE / size as f32 } else { 0.0 }
 }
 
+/// Columns are summed over so many block rows.
+const HEIGHT: usize = 24;
+
 /// The sums of a part, times [`PRICE`].
 pub(super) struct Lines {
+    /// Of [`HEIGHT`] block rows, of the next ones and so on.
     columns: Vec<Point>,
     rows: Vec<Point>,
+    width: usize,
 }
 
 /// What the sums add to the error seen from a cell and its eight neighbours: for three columns and three rows of cells that of
@@ -58,7 +63,9 @@ impl Around {
 impl Lines {
     /// For a page of so many dots across, and so many rows of blocks.
     pub(super) fn new(width: usize, rows: usize) -> Lines {
-        Lines { columns: vec![[0.0; 4]; width.next_multiple_of(BLOCK)], rows: vec![[0.0; 4]; rows * BLOCK] }
+        let width = width.next_multiple_of(BLOCK);
+        let columns = vec![[0.0; 4]; rows.div_ceil(HEIGHT) * width];
+        Lines { columns, rows: vec![[0.0; 4]; rows * BLOCK], width }
     }
 
     /// Takes the columns as they are for even.
@@ -71,7 +78,9 @@ impl Lines {
     pub(super) fn add(&mut self, place: Place, at: (i32, i32), error: Point) {
         let size = place.zone.size as i32;
         let (x, y) = place.centre();
-        for (sums, at, centre) in [(&mut self.columns, at.0, x), (&mut self.rows, at.1, y)] {
+        let from = (y + at.1) as usize / (2 * BLOCK * HEIGHT) * self.width;
+        let columns = &mut self.columns[from..from + self.width];
+        for (sums, at, centre) in [(columns, at.0, x), (&mut self.rows[..], at.1, y)] {
             // Halves lie a quarter of a cell beside its centre, and are half as wide.
             let dots = if at % (2 * size) == 0 { size } else { size / 2 };
             let first = (centre + at - dots) / 2;
@@ -86,8 +95,9 @@ impl Lines {
     #[inline(always)]
     pub(super) fn around(&self, place: Place) -> Around {
         let size = place.zone.size;
+        let from = place.row / HEIGHT * self.width;
         Around {
-            columns: three(&self.columns, place.zone.left + place.i * size, size),
+            columns: three(&self.columns[from..from + self.width], place.zone.left + place.i * size, size),
             rows: three(&self.rows, place.row * BLOCK + place.j * size, size),
         }
     }

@@ -7,7 +7,7 @@
 //! Where a half may lie in four places, that is taken where the error that leaves or comes is seen most or least. What is seen from all four
 //! is one vector for each coordinate. A change costs what its errors have in common, which is never negative: what does not gain
 //! enough by what is seen alone is not weighed.
-//! Cost: for each neighbour up to four pairs of halves, of which one in twenty is weighed.
+//! Cost: for each of four neighbours up to four pairs of halves.
 
 use super::lines::Around;
 use super::{FIXED, NEAR, Part, Place, Point};
@@ -37,6 +37,15 @@ struct Shift {
     to: End,
 }
 
+impl Shift {
+    /// The least that half of what it makes of the error may be.
+    #[inline(always)]
+    fn least(&self) -> f32 {
+        let (from, to) = (dot(self.error, self.from.seen), dot(self.error, self.to.seen));
+        to - from - COARSE * (from.abs() + to.abs() + dot(self.error, self.error))
+    }
+}
+
 /// A cell as the search sees it.
 #[derive(Clone, Copy)]
 struct View {
@@ -56,24 +65,20 @@ struct Best {
 }
 
 impl View {
-    /// The place of a half that may be changed and of which most is seen: its own, or one of all four if the cell is whole.
+    /// The place of a half that may be changed and from which most of an error is seen: its own, or one of all four if the cell is whole.
     #[inline(always)]
-    fn most(&self, half: usize, seen: Point) -> usize {
+    fn most(&self, half: usize, error: Point) -> usize {
         if self.cell.is_split() {
             return 2 * usize::from(self.cell.stacked) + half;
         }
-        (1..4).fold(0, |most, at| if seen[at] > seen[most] { at } else { most })
-    }
-
-    /// How much of an error is seen from each half.
-    #[inline(always)]
-    fn dots(&self, error: Point) -> Point {
         let [a, b, c, d] = &self.seen;
         let mut dots = [0.0; 4];
         for at in 0..4 {
             dots[at] = (error[0] * a[at] + error[1] * b[at]) + (error[2] * c[at] + error[3] * d[at]);
         }
-        dots
+        let first = if dots[1] > dots[0] { 1 } else { 0 };
+        let last = if dots[3] > dots[2] { 3 } else { 2 };
+        if dots[last] > dots[first] { last } else { first }
     }
 
     /// A half of a cell of this side.
@@ -115,7 +120,8 @@ fn times(a: f32, b: Point) -> Point {
 }
 
 impl Part<'_> {
-    /// Makes the change of a cell that lessens the error most, if any does.
+    /// Makes the change of a cell that lessens the error most, if any does: by itself, or with one of the neighbours that come after
+    /// it, so that each pair is looked at once a round.
     #[inline(always)]
     pub(super) fn improve(&mut self, place: Place) {
         let size = place.zone.size;
@@ -130,7 +136,7 @@ impl Part<'_> {
         if let Some(own) = own.as_ref().filter(|own| own.cell.is_split()) {
             self.arrange(own, size, &mut best);
         }
-        for (dx, dy) in [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)] {
+        for (dx, dy) in [(1, 0), (-1, 1), (0, 1), (1, 1)] {
             let there = numbers[(dy + 2) as usize][(dx + 2) as usize];
             if there == NONE {
                 continue;
@@ -157,11 +163,9 @@ impl Part<'_> {
                 NEAR,
                 [shift.from.at, shift.to.at],
                 #[inline(always)]
-                |seen, from, to| {
+                |seen, [from, to]| {
                     for (seen, (from, to)) in seen.iter_mut().zip(from.iter().zip(to)) {
-                        for c in 0..4 {
-                            seen[c] += (to[c] - from[c]) * shift.error[c];
-                        }
+                        *seen = plus(*seen, times(to - from, shift.error));
                     }
                 },
             );
@@ -326,18 +330,14 @@ impl Part<'_> {
             minus(self.point(a, half), self.point(c, half)),
             minus(self.point(b, half), self.point(d, half)),
         ];
-        let gain = |i: usize| {
-            let (from, to) = (own.dots(errors[i])[first + i], there.dots(errors[i])[first + i]);
-            to - from - COARSE * (from.abs() + to.abs() + dot(errors[i], errors[i]))
-        };
-        if 2.0 * (gain(0) + gain(1)) > best.change {
+        let one = Shift { error: errors[0], from: own.end(size, first), to: there.end(size, first) };
+        let other =
+            Shift { error: errors[1], from: own.end(size, first + 1), to: there.end(size, first + 1) };
+        if 2.0 * (one.least() + other.least()) > best.change {
             return;
         }
-        let shift = |i: usize| {
-            Some(Shift { error: errors[i], from: own.end(size, first + i), to: there.end(size, first + i) })
-        };
         let cells = [Some((own.number, there.cell)), Some((there.number, own.cell))];
-        self.weigh(size, [shift(0), shift(1)], cells, best);
+        self.weigh(size, [Some(one), Some(other)], cells, best);
     }
 
     /// A half changes places with a half of another cell.
@@ -355,18 +355,18 @@ impl Part<'_> {
                     continue;
                 }
                 let error = minus(self.point(leaves, half), self.point(comes, half));
-                let (here, beyond) = (own.dots(error), there.dots(times(-1.0, error)));
-                let leaving = own.most(i, here);
-                let coming = there.most(j, beyond);
-                let (from, to) = (here[leaving], -beyond[coming]);
-                if 2.0 * (to - from - COARSE * (from.abs() + to.abs())) > best.change {
+                let leaving = own.most(i, error);
+                let coming = there.most(j, times(-1.0, error));
+                let shift = Shift { error, from: own.end(size, leaving), to: there.end(size, coming) };
+                let apart = (shift.from.at.0 - shift.to.at.0, shift.from.at.1 - shift.to.at.1);
+                let costs = self.kernel.near(size, (0, 0)) - self.kernel.near(size, apart);
+                if 2.0 * (shift.least() + costs * dot(error, error)) > best.change {
                     continue;
                 }
                 let cells = [
                     Some((own.number, own.with(leaving, comes))),
                     Some((there.number, there.with(coming, leaves))),
                 ];
-                let shift = Shift { error, from: own.end(size, leaving), to: there.end(size, coming) };
                 self.weigh(size, [Some(shift), None], cells, best);
             }
         }

@@ -22,7 +22,7 @@ const PATCHES: [Patch; 10] = [
     ("foil of 16", ["substrate", "SF", "K", "C", "M"], [8, 16, 8, 8, 8], |_, _| [0.5, 0.3, 0.2, 0.0, 0.0]),
 ];
 
-/// Prints how each method does on each patch, and how long A4 takes. With a folder in `FOILPRESS_LOOK` it writes
+/// Prints how each method does on each patch. With a folder in `FOILPRESS_LOOK` it writes
 /// the patches there as pictures of one pixel a dot.
 #[test]
 #[ignore = "a table for docs/decisions/cells.md; takes minutes"]
@@ -86,25 +86,34 @@ fn table_of_methods() {
             }
         }
     }
-    for count in [8, 57] {
+}
+
+/// Prints how long A4 takes, with stacks that print by cells of 3 x 3 dots and by cells of 4 x 4 in halves.
+#[test]
+#[ignore = "figures for docs/decisions/cells.md; takes minutes"]
+fn table_of_times() {
+    let (library, space) = (Library::builtin(), Space::half_angle(32));
+    for (count, minimum) in [(8, 9), (8, 8), (57, 9)] {
         let mix = a4(count);
         for method in [Method::Walk, Method::Cells, Method::Best] {
             let settings = Settings {
                 method,
-                minimum: vec![9; count],
+                minimum: vec![minimum; count],
                 reflectance: Some(reflectances(&mix.stacks, &library, &space)),
             };
             let size = (Paper::A4.width(), Paper::A4.length());
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-            let took = (0..3)
-                .map(|_| {
-                    let start = std::time::Instant::now();
-                    pool.install(|| halftone(&mix, size, None, &settings, &Silent).unwrap());
-                    start.elapsed()
-                })
-                .min()
-                .unwrap();
-            println!("A4, {count} stacks, {method:?}: {took:.2?} on one thread");
+            for threads in [1, 2] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let took = (0..2)
+                    .map(|_| {
+                        let start = std::time::Instant::now();
+                        pool.install(|| halftone(&mix, size, None, &settings, &Silent).unwrap());
+                        start.elapsed()
+                    })
+                    .min()
+                    .unwrap();
+                println!("A4, {count} stacks of {minimum}, {method:?}: {took:.2?} on {threads} threads");
+            }
         }
     }
 }
