@@ -44,6 +44,7 @@ mod shapes;
 mod size;
 mod softened;
 mod solids;
+mod strokes;
 mod svg;
 mod svg_kinds;
 mod tiff;

@@ -1,24 +1,21 @@
 //! Softened edges: which colour of flat art a pixel belongs to that lies between two of them.
 //!
 //! Problem: programs soften what they draw, so that a pixel half covered by a letter has half of its colour. Such a colour may be as
-//! frequent as any other: along a straight edge, or where a stem covers half of two pixels each and is a pale line.
+//! frequent as any other: along a straight edge, or where a stem covers half of two pixels each and is a pale line. Filters that sharpen
+//! draw edges beyond both colours, and ripples beside them.
 //! Method: a pixel belongs to the nearer one of two colours if both lie within [`REACH`] pixels of it and its colour lies on the line
-//! between them; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies between two others, or is
-//! like a more frequent one, and is nowhere three pixels wide is *thin*: its pixels are edges, too, where both others are near. Where they
-//! are not, its strokes are decided as wholes: what is amid letters in the colour behind it, as the stem of an l is amid its word, is of
-//! that colour; what is amid its like keeps its own.
-//! Cost: 200 ns a softened pixel; a few microseconds a stroke in a thin colour.
+//! between them, or a little beyond; of a line that covers less than half of any pixel, the ridge is kept. A main colour that lies so of two
+//! others, or is like a more frequent one, and is nowhere three pixels wide is *thin*: its pixels are edges, too, where both others are near.
+//! Where they are not, its [`strokes`](super::strokes) are decided as wholes.
+//! Cost: 200 ns a softened pixel.
 //! Limits: a line one pixel wide between two areas, in a colour between theirs, is taken for their edge.
 
 use std::cell::LazyCell;
 use std::collections::HashMap;
 use std::ops::{Deref, Range};
 
-use rayon::prelude::*;
-
 use super::flat::{similar, split};
-use super::posters::{MOST_KNOWN, Span, WHITE_AND_BLACK, push};
-use crate::forest::Forest;
+use super::posters::{MOST_KNOWN, WHITE_AND_BLACK};
 
 /// How far a softened edge reaches, in pixels as they were drawn.
 const REACH: usize = 2;
@@ -37,8 +34,6 @@ const RIPPLES: usize = 8;
 const FAINTEST: f32 = 0.25;
 /// Along a line, neighbouring pixels are covered by nearly as much.
 const ALIKE: f32 = 0.2;
-/// Strokes longer than so many pixels as they were drawn are lines, not of letters.
-const LONGEST: usize = 48;
 
 /// Flat art whose edges are looked at.
 pub(super) struct Edges<'a, const N: usize> {
@@ -133,7 +128,7 @@ pub(super) fn is_between(own: [u8; 3], colours: &[[u8; 3]], is_ground: impl Fn([
 }
 
 /// Where a colour lies on the way from one colour to another, 0 to 1, and the square of its distance from it; `None` if it does not.
-fn along(own: [u8; 3], from: [u8; 3], to: [u8; 3]) -> Option<(f32, f32)> {
+pub(super) fn along(own: [u8; 3], from: [u8; 3], to: [u8; 3]) -> Option<(f32, f32)> {
     let (own, from, to) = (own.map(f32::from), from.map(f32::from), to.map(f32::from));
     let line: [f32; 3] = std::array::from_fn(|c| to[c] - from[c]);
     let length: f32 = line.iter().map(|v| v * v).sum();
@@ -146,8 +141,8 @@ impl<const N: usize> Edges<'_, N> {
     /// The colour that a pixel belongs to; `known` is the number of its own, if that is a thin one.
     pub fn colour(&self, at: usize, known: Option<usize>) -> Option<[u8; 3]> {
         let own = split(&self.pixels[at]).1;
-        if known.is_some() && self.is_in_a_square(at) {
-            return Some(self.colours[self.meant[known?]]);
+        if let Some(known) = known.filter(|_| self.is_in_a_square(at)) {
+            return Some(self.colours[self.meant[known]]);
         }
         let (near, far) = (self.near(at, REACH), LazyCell::new(|| self.near(at, RIPPLES)));
         // Filters that sharpen leave ripples farther from edges. The ground is more frequent.
@@ -195,7 +190,7 @@ impl<const N: usize> Edges<'_, N> {
 
     /// Whether a pixel that is covered by a `share` of less than half is on a line that is no wider than it: more covered than
     /// what lies on both sides of it, and about as much as the next one along the line.
-    fn is_on_a_line(&self, at: usize, share: f32, (ground, line): ([u8; 3], [u8; 3])) -> bool {
+    pub(super) fn is_on_a_line(&self, at: usize, share: f32, (ground, line): ([u8; 3], [u8; 3])) -> bool {
         let (x, e) = (at % self.width, self.enlarged);
         let (right, down) = (e as isize, (e * self.width) as isize);
         let covered = |step: isize, times: isize| {
@@ -218,16 +213,24 @@ impl<const N: usize> Edges<'_, N> {
     }
 
     /// The number of a pixel's colour. What is nearly white or black stands for white or black beside the art, too.
-    fn number(&self, pixel: [u8; 3]) -> Option<usize> {
+    pub(super) fn number(&self, pixel: [u8; 3]) -> Option<usize> {
         let known = self.colours.iter().position(|&colour| colour == pixel).map(|known| self.meant[known]);
         known.or_else(|| WHITE_AND_BLACK.iter().position(|&colour| colour == pixel))
+    }
+
+    /// The wide colours that a colour is like, one bit each.
+    fn like(&self, pixel: [u8; 3]) -> u64 {
+        let wide = self.colours.iter().zip(self.thin).enumerate().filter(|(_, (_, thin))| !**thin);
+        wide.filter(|(_, (colour, _))| similar(**colour, pixel)).fold(0, |all, (at, _)| all | 1 << at)
     }
 
     /// Which of the colours are so near a pixel. Filters that sharpen leave hardly a pixel beside an edge in the very colour of what is
     /// there: what is like a wide colour stands for it, unless another that it is like is near.
     fn near(&self, at: usize, reach: usize) -> [bool; MOST_KNOWN] {
         let (x, y, reach) = (at % self.width, at / self.width, reach * self.enlarged);
-        let (mut near, mut unknown) = ([false; MOST_KNOWN], Vec::new());
+        let mut near = [false; MOST_KNOWN];
+        // The colours that a pixel is like, a bit each.
+        let mut alike: Vec<u64> = Vec::new();
         let rows = y.saturating_sub(reach)..(y + reach + 1).min(self.pixels.len() / self.width);
         for row in rows.step_by(self.enlarged) {
             let row = &self.pixels[row * self.width..(row + 1) * self.width];
@@ -236,16 +239,13 @@ impl<const N: usize> Edges<'_, N> {
                 let pixel = split(pixel).1;
                 match self.number(pixel) {
                     Some(known) => near[known] = true,
-                    None => unknown.push(pixel),
+                    None => alike.extend(Some(self.like(pixel)).filter(|&like| like != 0)),
                 }
             }
         }
-        let wide: Vec<usize> = (0..self.colours.len()).filter(|&at| !self.thin[at]).collect();
-        for pixel in unknown {
-            let like = || wide.iter().copied().filter(|&at| similar(self.colours[at], pixel));
-            if let Some(first) = like().next().filter(|_| !like().any(|known| near[known])) {
-                near[first] = true;
-            }
+        let exact = (0..MOST_KNOWN).filter(|&at| near[at]).fold(0, |all, at| all | 1u64 << at);
+        for like in alike.into_iter().filter(|like| like & exact == 0) {
+            near[like.trailing_zeros() as usize] = true;
         }
         near
     }
@@ -261,106 +261,6 @@ impl<const N: usize> Edges<'_, N> {
             .flatten()
             .filter(|&beside| alike(beside))
             .any(|beside| rows.into_iter().flatten().any(|row| alike(row) && alike(row + beside - at)))
-    }
-
-    /// Gives strokes in a thin colour the colour of the letters that they are amid.
-    pub fn decide_strokes(&self, spans: &mut Vec<Span>) {
-        if !self.thin.contains(&true) {
-            return;
-        }
-        let is_thin = |colour: [u8; 3]| {
-            self.colours.iter().position(|&known| known == colour).is_some_and(|known| self.thin[known])
-        };
-        let edges: Vec<usize> = (0..spans.len()).filter(|&at| is_thin(spans[at].1)).collect();
-        let places: Vec<Range<usize>> = edges.iter().map(|&at| spans[at].0.clone()).collect();
-        let roots = Forest::of_stretches(&places, self.width, |_, _| true).roots();
-        let mut order: Vec<usize> = (0..edges.len()).collect();
-        order.sort_by_key(|&at| roots[at]);
-        let strokes: Vec<Vec<usize>> = order
-            .chunk_by(|&a, &b| roots[a] == roots[b])
-            .map(|stroke| stroke.iter().map(|&at| edges[at]).collect())
-            .collect();
-        let decided: Vec<(usize, Vec<Span>)> = strokes
-            .par_iter()
-            .filter_map(|stroke| {
-                let colours = self.behind(&stroke.iter().map(|&at| &spans[at]).collect::<Vec<_>>())?;
-                Some(stroke.iter().map(|&at| (at, self.split(&spans[at].0, colours))).collect::<Vec<_>>())
-            })
-            .flatten()
-            .collect();
-        let mut decided: HashMap<usize, Vec<Span>> = decided.into_iter().collect();
-        let all = std::mem::take(spans);
-        for (at, span) in all.into_iter().enumerate() {
-            match decided.remove(&at) {
-                Some(parts) => spans.extend(parts),
-                None => spans.push(span),
-            }
-        }
-    }
-
-    /// The pixels of a stroke, each in the colour that it belongs to: of what it lies on, or that of letters.
-    fn split(&self, span: &Range<usize>, (ground, ink): ([u8; 3], [u8; 3])) -> Vec<Span> {
-        let mut parts = Vec::new();
-        for at in span.clone() {
-            let share = along(split(&self.pixels[at]).1, ground, ink).map_or(1.0, |(along, _)| along);
-            let is_ink = share >= 0.5 || self.is_on_a_line(at, share, (ground, ink));
-            push(&mut parts, at..at + 1, if is_ink { ink } else { ground });
-        }
-        parts
-    }
-
-    /// What a stroke in a thin colour lies on, and the colour behind it: a third one, beyond that of the stroke, if more beside the stroke
-    /// is covered by it than is like the stroke.
-    fn behind(&self, stroke: &[&Span]) -> Option<([u8; 3], [u8; 3])> {
-        let width = self.width;
-        let left = stroke.iter().map(|span| span.0.start % width).min()?;
-        let right = stroke.iter().map(|span| (span.0.end - 1) % width + 1).max()?;
-        let (top, bottom) = (stroke.first()?.0.start / width, stroke.last()?.0.start / width + 1);
-        let side = (right - left).max(bottom - top);
-        if side > LONGEST * self.enlarged {
-            return None;
-        }
-        let mut dots = [0usize; MOST_KNOWN];
-        let mut border = [0usize; MOST_KNOWN];
-        for (span, colour) in stroke {
-            let known = self.colours.iter().position(|known| known == colour)?;
-            dots[known] += span.len();
-            let ends = [span.start.checked_sub(1), Some(span.end)];
-            let beside = span.clone().flat_map(|at| [at.checked_sub(width), Some(at + width)]).chain(ends);
-            let beside =
-                beside.flatten().filter_map(|at| self.pixels.get(at)).filter_map(|p| self.number(split(p).1));
-            beside.filter(|&beside| beside != known).for_each(|beside| border[beside] += 1);
-        }
-        let most = |counts: &[usize]| (0..self.colours.len()).rev().max_by_key(|&colour| counts[colour]);
-        let own = most(&dots)?;
-        // Letters of a word are beside each other; what is above a stem is another line.
-        let over = right - left;
-        let rows = top.saturating_sub(over)..(bottom + over).min(self.pixels.len() / width);
-        let around = rows.step_by(self.enlarged).flat_map(|y| {
-            let row = &self.pixels[y * width..(y + 1) * width];
-            row[left.saturating_sub(side)..(right + side).min(width)].iter().step_by(self.enlarged)
-        });
-        let mut counts = [0usize; MOST_KNOWN];
-        around.clone().filter_map(|pixel| self.number(split(pixel).1)).for_each(|colour| counts[colour] += 1);
-        let flat = |colour: usize| if self.thin[colour] { 0 } else { counts[colour] };
-        let ground = (0..self.colours.len()).rev().max_by_key(|&colour| flat(colour))?;
-        let all: usize = border.iter().sum();
-        let share = |colour: [u8; 3], behind: usize| {
-            along(colour, self.colours[ground], self.colours[behind]).map(|(along, _)| along)
-        };
-        let behind = (0..self.colours.len()).filter(|&colour| {
-            counts[colour] > 0
-                && 4 * border[colour] <= all
-                && colour != ground
-                && share(self.colours[own], colour).is_some_and(|share| (0.05..=0.9).contains(&share))
-        });
-        let behind = behind.max_by_key(|&colour| counts[colour])?;
-        // Its like, against what is more covered than it.
-        let covered = share(self.colours[own], behind)? + 0.1;
-        let like = counts[own].saturating_sub(dots[own] / self.enlarged.pow(2));
-        let deeper =
-            around.filter(|pixel| share(split(pixel).1, behind).is_some_and(|share| share > covered)).count();
-        (2 * deeper > 3 * like).then(|| (self.colours[ground], self.colours[behind]))
     }
 }
 
