@@ -9,11 +9,12 @@
 //! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
 //! Parts of at most [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
-//! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with, and two fifths of that for each change, of which there
-//! is about one for four cells. Memory: 63 bytes a cell of the parts at work, 37 MB a thread for A4 in cells of 3 x 3.
+//! Cost: (2 REACH / 3)^2 vectors of four a cell of 3 x 3 dots to begin with ([`convolve`]), and two fifths of that for each change, of which
+//! there is about one for four cells. Memory: 63 bytes a cell of the parts at work, 37 MB a thread for A4 in cells of 3 x 3.
 //! Limits: four coordinates, those in which stacks differ most, about the page's mean mixture; cells beside edges stay
 //! as they are, and so do all stacks after the 64th. What is seen from a half is interpolated between cells.
 
+mod convolve;
 mod kernel;
 mod lines;
 mod moves;
@@ -196,6 +197,8 @@ impl<'a> Part<'a> {
         (part.cells, part.allowed) = (vec![FIXED; start], vec![0; start]);
         let errors = part.errors(field, plan, rows.start, dots);
         part.seen = vec![[0.0; 4]; start];
+        part.convolve(&errors);
+        let mixed = part.zones.iter().flatten().any(|zone| zone.size != part.zones[0][0].size);
         part.each_place(
             0..rows.len(),
             #[inline(always)]
@@ -206,19 +209,21 @@ impl<'a> Part<'a> {
                 }
                 let [first, second] = errors;
                 let error: Point = std::array::from_fn(|c| first[c] + second[c]);
-                part.around(
-                    place,
-                    REACH,
-                    [(0, 0)],
-                    #[inline(always)]
-                    |seen, [centre]| {
-                        for (seen, centre) in seen.iter_mut().zip(centre) {
-                            for c in 0..4 {
-                                seen[c] += centre * error[c];
+                if mixed {
+                    part.around(
+                        place,
+                        (REACH, place.zone.size),
+                        [(0, 0)],
+                        #[inline(always)]
+                        |seen, [centre]| {
+                            for (seen, centre) in seen.iter_mut().zip(centre) {
+                                for c in 0..4 {
+                                    seen[c] += centre * error[c];
+                                }
                             }
-                        }
-                    },
-                );
+                        },
+                    );
+                }
                 if !cell.is_split() {
                     return part.lines.add(place, (0, 0), error);
                 }
@@ -227,7 +232,7 @@ impl<'a> Part<'a> {
                 part.lines.add(place, other, second);
                 part.around(
                     place,
-                    CLOSE,
+                    (CLOSE, 0),
                     [one, other, (0, 0)],
                     #[inline(always)]
                     |seen, [one, other, centre]| {
@@ -306,12 +311,12 @@ impl<'a> Part<'a> {
     }
 
     /// Calls `with` for each row of cells up to `reach` dots from a place: what they see, and the kernel about some points,
-    /// which are so many half dots to the right of the place and below.
+    /// which are so many half dots to the right of the place and below. Cells of the side `but` are left out.
     #[inline(always)]
     fn around<const N: usize>(
         &mut self,
         place: Place,
-        reach: usize,
+        (reach, but): (usize, usize),
         ends: [(i32, i32); N],
         mut with: impl FnMut(&mut [Point], [&[f32]; N]),
     ) {
@@ -319,7 +324,7 @@ impl<'a> Part<'a> {
         let (blocks, reach) = (reach.div_ceil(BLOCK), 2 * reach as i32);
         let rows = place.row.saturating_sub(blocks)..(place.row + blocks + 1).min(self.zones.len());
         for row in rows {
-            for &zone in &self.zones[row] {
+            for &zone in self.zones[row].iter().filter(|zone| zone.size != but) {
                 // The cells whose centre is within reach on either side.
                 let (left, step) = ((2 * zone.left + zone.size) as i32 - cx, 2 * zone.size as i32);
                 let from = (-reach - left + step - 1).div_euclid(step).clamp(0, zone.columns as i32);

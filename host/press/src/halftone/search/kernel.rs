@@ -50,7 +50,7 @@ impl Kernel {
     }
 
     /// The value at a distance in half dots.
-    fn value(x: isize, y: isize) -> f32 {
+    pub(super) fn value(x: isize, y: isize) -> f32 {
         let eye = |scale: f32| {
             let square = |half_dots: isize| (half_dots as f32 / 2.0 / scale).powi(2);
             let sum = 1.0 + square(x) + square(y);

@@ -160,7 +160,7 @@ impl Part<'_> {
             self.lines.add(place, shift.to.at, shift.error);
             self.around(
                 place,
-                NEAR,
+                (NEAR, 0),
                 [shift.from.at, shift.to.at],
                 #[inline(always)]
                 |seen, [from, to]| {
