@@ -2,7 +2,7 @@
 //!
 //! Problem: each of a million errors is seen from five hundred cells.
 //! Method: among cells of one side it is a convolution. Each row of errors, with zeros around it, is added to each row of cells within
-//! reach, [`BESIDE`] cells at a time: their sums stay in registers for all taps, and each value of the kernel is read once for them.
+//! reach, [`BESIDE`] cells at a time, which stay in the first cache for all taps.
 //! Cost: (2 REACH / side)^2 products of four a cell, two of them at once.
 //! Limits: the halves of a cell are one error at its centre; cells of different sides are left to [`Part::around`].
 
@@ -10,8 +10,8 @@ use super::kernel::Kernel;
 use super::{BLOCK, Part, Point, REACH, Zone};
 use crate::halftone::cells::cell::Cell;
 
-/// Cells whose sums fill half of the registers.
-const BESIDE: usize = 8;
+/// Cells of which sums and errors take 8 kB. The loop over them is long enough to be compiled to vectors.
+const BESIDE: usize = 256;
 
 impl Part<'_> {
     /// Adds to what each cell sees the errors of all cells of its side.
@@ -28,7 +28,7 @@ impl Part<'_> {
                     for (_, [one, other]) in &errors[first..first + zone.columns] {
                         padded.extend((0..4).map(|c| one[c] + other[c]));
                     }
-                    padded.resize(4 * (zone.columns + 2 * zeros + BESIDE), 0.0);
+                    padded.resize(4 * (zone.columns + 2 * zeros), 0.0);
                     let y = row * BLOCK + j * zone.size;
                     add_row((self.kernel, &self.zones, &mut self.seen), (zone, y), &padded);
                 }
@@ -64,16 +64,10 @@ fn add_row(
                 let cells = seen[line + from..line + end as usize].chunks_mut(BESIDE);
                 for (at, cells) in cells.enumerate() {
                     let first = (from + at * BESIDE) as isize + apart + reach as isize;
-                    let errors = &padded[4 * first as usize..];
-                    let mut sums = [0.0; 4 * BESIDE];
-                    for (tap, errors) in taps.iter().zip(errors.windows(4 * BESIDE).step_by(4)) {
-                        for (sum, error) in sums.iter_mut().zip(errors) {
-                            *sum += tap * error;
-                        }
-                    }
-                    for (seen, sum) in cells.iter_mut().zip(sums.as_chunks::<4>().0) {
-                        for c in 0..4 {
-                            seen[c] += sum[c];
+                    let errors = padded[4 * first as usize..].windows(4 * cells.len()).step_by(4);
+                    for (tap, errors) in taps.iter().zip(errors) {
+                        for (seen, error) in cells.as_flattened_mut().iter_mut().zip(errors) {
+                            *seen += tap * error;
                         }
                     }
                 }
@@ -136,7 +130,7 @@ mod tests {
                     for [one, other] in &errors[first..first + zone.columns] {
                         padded.extend((0..4).map(|c| one[c] + other[c]));
                     }
-                    padded.extend(zeros.iter().chain(&[0.0; 4 * BESIDE]));
+                    padded.extend(zeros);
                     add_row((&kernel, &zones, &mut seen), (zone, row * BLOCK + j * zone.size), &padded);
                 }
             }
