@@ -197,7 +197,7 @@ impl<'a> Part<'a> {
         (part.cells, part.allowed) = (vec![FIXED; start], vec![0; start]);
         let errors = part.errors(field, plan, rows.start, dots);
         part.seen = vec![[0.0; 4]; start];
-        part.convolve(&errors);
+        convolve::convolve(kernel, &part.zones, &errors, &mut part.seen);
         let mixed = part.zones.iter().flatten().any(|zone| zone.size != part.zones[0][0].size);
         part.each_place(
             0..rows.len(),

@@ -4,34 +4,36 @@
 //! Method: among cells of one side it is a convolution. Each row of errors, with zeros around it, is added to each row of cells within
 //! reach, [`BESIDE`] cells at a time, which stay in the first cache for all taps.
 //! Cost: (2 REACH / side)^2 products of four a cell, two of them at once.
-//! Limits: the halves of a cell are one error at its centre; cells of different sides are left to [`Part::around`].
+//! Limits: the halves of a cell are one error at its centre; cells of different sides are left to [`Part::around`](super::Part::around).
 
 use super::kernel::Kernel;
-use super::{BLOCK, Part, Point, REACH, Zone};
+use super::{BLOCK, Point, REACH, Zone};
 use crate::halftone::cells::cell::Cell;
 
 /// Cells of which sums and errors take 8 kB. The loop over them is long enough to be compiled to vectors.
 const BESIDE: usize = 256;
 
-impl Part<'_> {
-    /// Adds to what each cell sees the errors of all cells of its side.
-    #[inline(always)]
-    pub(super) fn convolve(&mut self, errors: &[(Cell, [Point; 2])]) {
-        let mut padded: Vec<f32> = Vec::new();
-        for (row, zones) in self.zones.iter().enumerate() {
-            for &zone in zones {
-                for j in 0..BLOCK / zone.size {
-                    let first = zone.start + j * zone.columns;
-                    let zeros = 2 * (REACH / zone.size);
-                    padded.clear();
-                    padded.resize(4 * zeros, 0.0);
-                    for (_, [one, other]) in &errors[first..first + zone.columns] {
-                        padded.extend((0..4).map(|c| one[c] + other[c]));
-                    }
-                    padded.resize(4 * (zone.columns + 2 * zeros), 0.0);
-                    let y = row * BLOCK + j * zone.size;
-                    add_row((self.kernel, &self.zones, &mut self.seen), (zone, y), &padded);
+/// Adds to what each cell sees the errors of all cells of its side.
+#[inline(always)]
+pub(super) fn convolve(
+    kernel: &Kernel,
+    zones: &[Vec<Zone>],
+    errors: &[(Cell, [Point; 2])],
+    seen: &mut [Point],
+) {
+    let mut padded: Vec<f32> = Vec::new();
+    for (row, here) in zones.iter().enumerate() {
+        for &zone in here {
+            for j in 0..BLOCK / zone.size {
+                let first = zone.start + j * zone.columns;
+                let zeros = 2 * (REACH / zone.size);
+                padded.clear();
+                padded.resize(4 * zeros, 0.0);
+                for (_, [one, other]) in &errors[first..first + zone.columns] {
+                    padded.extend((0..4).map(|c| one[c] + other[c]));
                 }
+                padded.resize(4 * (zone.columns + 2 * zeros), 0.0);
+                add_row((kernel, zones, seen), (zone, row * BLOCK + j * zone.size), &padded);
             }
         }
     }
@@ -107,8 +109,8 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1 << 23) as f32 - 1.0
         };
-        let errors: Vec<[Point; 2]> =
-            (0..start).map(|_| [[0; 4], [0; 4]].map(|e| e.map(|_| random()))).collect();
+        let mut error = || [[0; 4], [0; 4]].map(|half| half.map(|_| random()));
+        let errors: Vec<(Cell, [Point; 2])> = (0..start).map(|_| (Cell::whole(0), error())).collect();
         // Side, centre in half dots.
         let mut places = vec![(0, 0, 0); start];
         for (row, zone) in
@@ -121,27 +123,14 @@ mod tests {
             }
         }
         let mut seen = vec![[0.0; 4]; start];
-        for (row, all) in zones.iter().enumerate() {
-            for &zone in all {
-                for j in 0..BLOCK / zone.size {
-                    let first = zone.start + j * zone.columns;
-                    let zeros = vec![0.0; 8 * (REACH / zone.size)];
-                    let mut padded = zeros.clone();
-                    for [one, other] in &errors[first..first + zone.columns] {
-                        padded.extend((0..4).map(|c| one[c] + other[c]));
-                    }
-                    padded.extend(zeros);
-                    add_row((&kernel, &zones, &mut seen), (zone, row * BLOCK + j * zone.size), &padded);
-                }
-            }
-        }
+        convolve(&kernel, &zones, &errors, &mut seen);
         for (at, &(size, x, y)) in places.iter().enumerate() {
             let mut wanted = [0.0f64; 4];
             for (from, &(other, u, v)) in places.iter().enumerate() {
                 let (across, down) = ((x - u).abs(), (y - v).abs());
                 if other == size && across.max(down) <= 2 * REACH as isize {
                     for c in 0..4 {
-                        let error = f64::from(errors[from][0][c]) + f64::from(errors[from][1][c]);
+                        let error = errors[from].1.iter().map(|half| f64::from(half[c])).sum::<f64>();
                         wanted[c] += error * f64::from(Kernel::value(across, down));
                     }
                 }
