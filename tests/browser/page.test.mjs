@@ -254,6 +254,8 @@ test('materials are edited by mouse and keyboard, and the steps are there to cop
 }));
 
 test('a spot tells its curve, its mixture and the inks of its dot', () => visit(desk, async (page) => {
+  // The description scrolls into sight: at once, lest a click comes while the picture is on its way.
+  await page.emulateMedia({ reducedMotion: 'reduce' });
   const [x, y] = await place(page);
   await page.mouse.click(x - 60, y + 40);
   assert.equal(await page.locator('#spot svg path').count(), 2);
@@ -273,7 +275,6 @@ test('a spot tells its curve, its mixture and the inks of its dot', () => visit(
   // Looking may have scrolled the page; the picture stays in sight.
   const [px, py] = [mx + 80, my + 50];
   await page.mouse.click(px, py);
-  await page.waitForTimeout(600);
   const [nx, ny] = await centre('#picture');
   near(await centre('#ring'), [px + nx - mx, py + ny - my]);
   await page.click('#nearer');
