@@ -86,10 +86,10 @@ pub(super) fn cells(
             },
         );
     });
+    plan.print_fragments(&mut index);
     if let Some(points) = points.filter(|_| searched) {
         search::search(&field, &plan, &points, &least, &mut index);
     }
-    plan.print_fragments(&mut index);
     observer.end();
     index
 }

@@ -5,7 +5,8 @@
 //! cells, convolved with the autocorrelation of the eye's response ([`Kernel`]), gives what a change would make of it in a
 //! few products (Analoui and Allebach 1992). The best change of a cell is made if it lessens the error: it or a half of it
 //! changes places with one of its eight neighbours or a half of that, or its own halves are arranged in another way
-//! ([`moves`]); each pair is looked at once a round. Nothing else: every stack keeps its dots, so tones need no term of their own.
+//! ([`moves`]); each pair is looked at once a round. So every stack keeps its dots, and tones need no term of their own: after the first
+//! round they are made as exact as cells allow ([`settle`]).
 //! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
 //! Parts of at most [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
@@ -18,6 +19,7 @@ mod convolve;
 mod kernel;
 mod lines;
 mod moves;
+mod settle;
 
 use std::ops::Range;
 
@@ -112,6 +114,8 @@ struct Part<'a> {
     cells: Vec<Cell>,
     /// Stacks with weight on each, one bit each.
     allowed: Vec<u64>,
+    /// Dots of tones that each stack prints beyond what is asked.
+    beyond: Vec<f64>,
     lines: Lines,
 }
 
@@ -148,9 +152,12 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], minimum: &[u1
                         // They are even over the whole parts, of which these rows are a piece.
                         part.lines.accept_columns();
                     }
-                    for _ in 0..ROUNDS {
+                    for round in 0..ROUNDS {
                         for row in first..end {
                             part.block_row(row);
+                        }
+                        if round == 0 && !again {
+                            part.settle(first..end);
                         }
                     }
                     part.print(field, dots);
@@ -179,6 +186,7 @@ impl<'a> Part<'a> {
             seen: Vec::new(),
             cells: Vec::new(),
             allowed: Vec::new(),
+            beyond: vec![0.0; field.lanes],
             lines: Lines::new(field.width, rows.len()),
         };
         let mut start = 0;
@@ -273,20 +281,34 @@ impl<'a> Part<'a> {
         }
         let mut errors = vec![(FIXED, [[0.0; 4]; 2]); self.cells.len()];
         let mut lines: Vec<Row> = (0..=BLOCK).map(|_| Row::default()).collect();
-        let mut want = vec![0.0; field.lanes];
+        let (mut want, mut scratch) = (vec![0.0; field.lanes], Vec::new());
         self.each_place(
             0..self.zones.len(),
             #[inline(always)]
             |part, place| {
                 let Zone { size, left, .. } = place.zone;
                 let (x, y) = (left + place.i * size, (top + place.row) * BLOCK + place.j * size);
-                if x >= field.width || y >= field.height || !plan.is_whole(x, y) {
+                if x >= field.width || y >= field.height {
                     return;
+                }
+                if !plan.is_whole(x, y) {
+                    want.fill(0.0);
+                    for y in y..(y + size).min(field.height) {
+                        for x in (x..(x + size).min(field.width)).filter(|&x| plan.is_tone(x, y)) {
+                            field.add_dot(x, y, &mut scratch, &mut want);
+                            part.count(number[usize::from(dots[(y - top * BLOCK) * field.width + x])], 1.0);
+                        }
+                    }
+                    return part.ask(&want);
                 }
                 field.row(size, y / size, &mut lines[size]);
                 field.cell(size, x / size, &mut lines[size], &mut want);
                 let corner = (y - top * BLOCK) * field.width + x;
                 let cell = Cell::read(&dots[corner..], field.width, size, &number);
+                for stack in cell.halves {
+                    part.count(stack, 0.5 * (size * size) as f64);
+                }
+                part.ask(&want);
                 let mut halves = cell.halves.map(|q| {
                     part.points[usize::from(q)].map(|coordinate| 0.5 * (size * size) as f32 * coordinate)
                 });
@@ -308,6 +330,22 @@ impl<'a> Part<'a> {
             },
         );
         errors
+    }
+
+    /// Counts dots that a stack prints.
+    #[inline(always)]
+    fn count(&mut self, stack: u8, dots: f64) {
+        if let Some(beyond) = self.beyond.get_mut(usize::from(stack)) {
+            *beyond += dots;
+        }
+    }
+
+    /// Takes what is asked off what is printed.
+    #[inline(always)]
+    fn ask(&mut self, want: &[f32]) {
+        for (beyond, &want) in self.beyond.iter_mut().zip(want) {
+            *beyond -= f64::from(want);
+        }
     }
 
     /// Calls `with` for each row of cells up to `reach` dots from a place: what they see, and the kernel about some points,

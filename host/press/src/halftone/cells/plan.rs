@@ -159,7 +159,7 @@ impl Plan {
         (&self.blocks[y / BLOCK * self.across + x / BLOCK], x % BLOCK, y % BLOCK)
     }
 
-    fn is_tone(&self, x: usize, y: usize) -> bool {
+    pub(in crate::halftone) fn is_tone(&self, x: usize, y: usize) -> bool {
         let (block, x, y) = self.block(x, y);
         block.tone[y] >> x & 1 == 1
     }

@@ -81,6 +81,35 @@ fn tones_are_kept_at_any_ratio_of_pixels_to_dots() {
     }
 }
 
+/// A document of as many pixels as dots says itself how many dots each stack has. Smooth, with a solid disc and sides that cut cells.
+#[test]
+fn the_search_settles_tones_to_a_cell_a_part() {
+    let points: [Point; 4] = [[0.0; 4], [1.0, 0.0, 0.0, 0.0], [0.3, 0.8, 0.0, 0.0], [0.9, 0.4, 0.3, 0.0]];
+    for (seed, (width, height)) in [(472, 472), (301, 530), (203, 640), (97, 77)].into_iter().enumerate() {
+        let disc = |x: usize, y: usize| x.abs_diff(width / 3).pow(2) + y.abs_diff(height / 2).pow(2) < 900;
+        let mix = plain(width, height, 4, |x, y| {
+            let wave = |q: usize| {
+                1.05 + (x as f64 / (60.0 + 9.0 * q as f64)
+                    + y as f64 / (70.0 - 8.0 * q as f64)
+                    + (seed * q) as f64)
+                    .sin()
+            };
+            if disc(x, y) { vec![0.0, 0.0, 1.0, 0.0] } else { (0..4).map(wave).collect() }
+        });
+        let sheet = cells(&mix, (width, height), &[8, 8, 16, 8], Some(&points), &Silent);
+        // Such a page has two parts, each of which may be off by a cell of 16 dots.
+        for q in 0..4 {
+            let weights = mix.maps.data().iter().skip(q).step_by(4);
+            let asked = weights.map(|&weight| f64::from(weight)).sum::<f64>() / f64::from(ONE);
+            let printed = sheet.iter().filter(|&&dot| usize::from(dot) == q).count() as f64;
+            assert!(
+                (printed - asked).abs() <= 32.0,
+                "stack {q} of {width} x {height}: {printed}, {asked} asked"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_cell_is_read_as_it_is_printed() {
     let (width, stacks) = (11, [7u8, 5, 250]);

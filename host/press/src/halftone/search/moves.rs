@@ -100,22 +100,22 @@ impl View {
 }
 
 #[inline(always)]
-fn dot(a: Point, b: Point) -> f32 {
+pub(super) fn dot(a: Point, b: Point) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
 }
 
 #[inline(always)]
-fn minus(a: Point, b: Point) -> Point {
+pub(super) fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]]
 }
 
 #[inline(always)]
-fn plus(a: Point, b: Point) -> Point {
+pub(super) fn plus(a: Point, b: Point) -> Point {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }
 
 #[inline(always)]
-fn times(a: f32, b: Point) -> Point {
+pub(super) fn times(a: f32, b: Point) -> Point {
     [a * b[0], a * b[1], a * b[2], a * b[3]]
 }
 
@@ -231,17 +231,17 @@ impl Part<'_> {
     }
 
     #[inline(always)]
-    fn point(&self, stack: u8, dots: f32) -> Point {
+    pub(super) fn point(&self, stack: u8, dots: f32) -> Point {
         times(dots, self.points[usize::from(stack)])
     }
 
     #[inline(always)]
-    fn allows(&self, number: usize, stack: u8) -> bool {
+    pub(super) fn allows(&self, number: usize, stack: u8) -> bool {
         self.allowed[number] >> stack & 1 == 1
     }
 
     #[inline(always)]
-    fn is_small(&self, size: usize, stack: u8) -> bool {
+    pub(super) fn is_small(&self, size: usize, stack: u8) -> bool {
         self.small[size] >> stack & 1 == 1
     }
 

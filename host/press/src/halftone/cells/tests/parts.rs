@@ -177,7 +177,7 @@ fn boxes_of_a_tint_have_its_tone() {
     }
 }
 
-/// The search moves dots and takes none away; the error it judges by falls.
+/// The search moves dots, and changes tones for the better alone; the error it judges by falls.
 #[test]
 fn the_search_keeps_tones_and_sees_less() {
     let side = 512;
@@ -189,9 +189,10 @@ fn the_search_keeps_tones_and_sees_less() {
         super::super::cells(&mix, (side, side), &[9; 4], &solids, Some(&points), searched, &Silent)
     };
     let (plain, best) = (print(false), print(true));
-    for q in 0..4 {
-        let count = |dots: &[u8]| dots.iter().filter(|&&dot| dot == q).count();
-        assert_eq!(count(&plain), count(&best), "stack {q}");
+    for (q, share) in shares.iter().enumerate() {
+        let count = |dots: &[u8]| dots.iter().filter(|&&dot| usize::from(dot) == q).count();
+        let off = |dots: &[u8]| (count(dots) as f64 - share * (side * side) as f64).abs();
+        assert!(off(&best) <= off(&plain).max(18.0), "stack {q}: off by {} and {}", off(&plain), off(&best));
     }
     let seen = |dots: &[u8]| {
         let error = |c: usize| {
@@ -205,7 +206,7 @@ fn the_search_keeps_tones_and_sees_less() {
 }
 
 /// Stacks of which half a cell holds the minimum, beside one that takes whole cells: each keeps its tone, where stacks may stand
-/// in for each other and where not, and the search changes none.
+/// in for each other and where not, and the search brings each within a cell of it in each of two parts.
 #[test]
 fn halves_keep_tones_and_the_search_sees_less() {
     let side = 600;
@@ -230,7 +231,8 @@ fn halves_keep_tones_and_the_search_sees_less() {
             let printed = count(dots, q) as f64 / (side * side) as f64;
             assert!((printed - asked).abs() < 1.5e-3, "stack {q}: {printed}, {asked} asked");
         }
-        assert_eq!(count(&cells, q), count(&best, q), "stack {q}");
+        let off = (count(&best, q) as f64 - asked * (side * side) as f64).abs();
+        assert!(off <= 32.0, "stack {q}: off by {off}");
     }
     let solids = Solids::new(&mix, side, side, None);
     let field = super::super::field::Field::new(&mix, side, side, &[], &solids);

@@ -141,9 +141,11 @@ fn a4(count: usize) -> InkMix {
 #[test]
 #[ignore = "a table for docs/decisions/cells.md; needs mapped documents"]
 fn table_of_documents() {
-    const SIDE: u16 = 2835;
+    // 120 and 20 mm.
+    const SIDES: [u16; 2] = [2835, 472];
     let Some(folders) = std::env::var_os("FOILPRESS_MIXES") else { return };
-    for folder in std::env::split_paths(&folders) {
+    let all = std::env::split_paths(&folders).flat_map(|folder| SIDES.map(|side| (folder.clone(), side)));
+    for (folder, side) in all {
         let name = folder.file_stem().unwrap().to_string_lossy().into_owned();
         let (mix, _) = appearance::gamut::files::load(&folder).unwrap();
         let settings = Settings::from_library(&mix.stacks, &Library::builtin());
@@ -151,7 +153,7 @@ fn table_of_documents() {
         for method in [Method::Walk, Method::Cells, Method::Best] {
             let settings = Settings { method, ..settings.clone() };
             let start = std::time::Instant::now();
-            let sheet = halftone(&mix, (SIDE, SIDE), None, &settings, &Silent).unwrap();
+            let sheet = halftone(&mix, (side, side), None, &settings, &Silent).unwrap();
             let took = start.elapsed();
             let look = crate::halftone::metrics::look(&mix, &sheet, &settings).unwrap().unwrap();
             let tones = crate::halftone::metrics::tones(&mix, &sheet, &Silent).unwrap();
@@ -160,13 +162,13 @@ fn table_of_documents() {
             walked = if walked.is_empty() { seen.clone() } else { walked };
             if let Some(folder) = std::env::var_os("FOILPRESS_LOOK") {
                 std::fs::write(
-                    std::path::Path::new(&folder).join(format!("{name}.{method:?}")),
+                    std::path::Path::new(&folder).join(format!("{name}.{side}.{method:?}")),
                     sheet.index(),
                 )
                 .unwrap();
             }
             println!(
-                "{name:16} {:6} {:.5} {:.5}, {:.3} {:.3} of the walk; thin {:.2} %, tones within {:.3} %, {took:.2?}",
+                "{name:16} {side:5} {:6} {:.5} {:.5}, {:.3} {:.3} of the walk; thin {:.2} %, tones within {:.3} %, {took:.2?}",
                 format!("{method:?}"),
                 seen[0],
                 seen[1],
