@@ -4,8 +4,8 @@
 //! a photograph, both lose their outline.
 //! Method: a stretch of a row is what lies between white, black and what is no picture. Stretches that touch are one shape. A
 //! shape in exactly one colour is line art: photographs have no such shapes beyond specks, so a colour counts only if its
-//! shapes have [`LEAST`] dots. Shapes in several colours may be flat art ([`posters`](super::posters)), and small ones in a single colour
-//! may be the softened edge of black on white.
+//! shapes have [`LEAST`] dots. Shapes in several colours may be flat art ([`posters`](super::posters)), in colours of [`pens`](super::pens) if they are thin, and
+//! small ones in a single colour may be the softened edge of black on white.
 //! Cost: 1 ns a pixel of pictures, 20 ns a stretch. Limits: a speck of another colour makes a picture of a mask, unless both are flat art.
 
 use std::collections::{HashMap, HashSet};
@@ -15,7 +15,8 @@ use rayon::prelude::*;
 
 use super::flat::split;
 use super::kinds::Kind;
-use super::posters::{self, Span};
+use super::pens::Page;
+use super::posters::{self, Known, Span};
 use super::softened::is_between;
 use crate::forest::Forest;
 
@@ -107,13 +108,16 @@ fn flat_art<const N: usize>(
     let pixels_of = |shape: &[u32]| -> usize {
         shape.iter().map(|&at| all[at as usize].end - all[at as usize].start).sum()
     };
+    let places = |shape: &[u32]| -> Vec<Range<usize>> {
+        shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect()
+    };
     let enlarged = enlarged(pixels, all);
     let small = posters::SMALL * enlarged * enlarged;
     let mut counts = HashMap::new();
     for shape in shapes.iter().filter(|shape| pixels_of(shape) <= small) {
         shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
-    let find = |shapes: &[&[u32]], common: &[[u8; 3]]| -> Vec<(Vec<u32>, Vec<Span>)> {
+    let find = |shapes: &[&[u32]], common: &[[u8; 3]], thin: bool| -> Vec<(Vec<u32>, Vec<Span>)> {
         let palette = [&posters::WHITE_AND_BLACK[..], common].concat();
         let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette, |_| true);
         let found = shapes.par_iter().filter_map(|shape| {
@@ -121,9 +125,8 @@ fn flat_art<const N: usize>(
             if colour.is_some_and(is_itself) {
                 return None;
             }
-            let stretches: Vec<Range<usize>> =
-                shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect();
-            let spans = posters::spans(pixels, width, &stretches, (common, enlarged))?;
+            let known = Known { common, thin, enlarged };
+            let spans = posters::spans(pixels, width, &places(shape), known)?;
             // In one colour it is line art by itself.
             let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
             (!itself).then(|| (shape.to_vec(), spans))
@@ -134,7 +137,7 @@ fn flat_art<const N: usize>(
         shapes.into_iter().partition(|shape| pixels_of(shape) <= small);
     let (in_one, in_several): (Vec<&[u32]>, Vec<&[u32]>) =
         large.into_iter().partition(|shape| all[shape[0] as usize].colour.is_some());
-    let mut found = find(&in_several, &[]);
+    let mut found = find(&in_several, &[], false);
     // What a letter encloses of its ground is small, too.
     let mut areas: HashMap<[u8; 3], u64> = HashMap::new();
     for (span, colour) in found.iter().flat_map(|(_, spans)| spans) {
@@ -145,7 +148,15 @@ fn flat_art<const N: usize>(
             *areas.entry(colour).or_default() += pixels_of(shape) as u64;
         }
     }
-    found.extend(find(&of_letters, &posters::common(counts, areas)));
+    let common = posters::common(counts, &areas);
+    found.extend(find(&of_letters, &common, false));
+    let flat: HashSet<u32> = found.iter().filter_map(|(shape, _)| shape.first().copied()).collect();
+    let is_left = |shape: &&&[u32]| all[shape[0] as usize].colour.is_none() && !flat.contains(&shape[0]);
+    let left: Vec<&[u32]> = in_several.iter().chain(&of_letters).filter(is_left).copied().collect();
+    let shapes: Vec<Vec<Range<usize>>> = left.iter().map(|shape| places(shape)).collect();
+    let (thin, pens) = Page { pixels, width, enlarged }.pens(&shapes, areas, &common);
+    let thin: Vec<&[u32]> = thin.into_iter().map(|at| left[at]).collect();
+    found.extend(find(&thin, &[&pens[..], &common].concat(), true));
     found
 }
 
@@ -242,8 +253,12 @@ mod tests {
             let whole: Vec<bool> = (0..pages.len()).map(|at| picture(at) && !mixed.contains(&number[at])).collect();
             let dots = |colour: [u8; 4]| (0..pages.len()).filter(|&at| whole[at] && pages[at] == colour).count() as u64;
             let enough = kinds.map(|colour| dots(colour) >= LEAST);
-            let is_enough = |pixel: &[u8; 4]| kinds.iter().zip(enough).any(|(kind, enough)| enough && kind == pixel);
             let masks = Masks::of(&pages, width);
+            // Specks in both colours, all alike, are drawn by pens: such colours are enough, too.
+            let drawn = |pixel: &[u8; 4]| masks.spans.iter().any(|(_, colour)| *colour == split(pixel).1);
+            let is_enough = |pixel: &[u8; 4]| {
+                drawn(pixel) || kinds.iter().zip(enough).any(|(kind, enough)| enough && kind == pixel)
+            };
             let mut found = vec![false; pages.len()];
             for (stretch, colour) in masks.in_one_colour() {
                 for at in stretch {

@@ -34,6 +34,7 @@ mod orientation;
 mod outline;
 mod page;
 pub mod pdf;
+mod pens;
 mod picture;
 mod posters;
 mod resample;

@@ -7,11 +7,14 @@
 //! and are screened inside; so do thin letters with more paper than ink, which a solid would make too dark. All other
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
 //! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
-//! solid or in paper; such a wide one has its rim in the next solid or none.
+//! solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies on ink, by nearly
+//! all of its border, is printed in paper: a rim of ink would be drawn within white letters, and screened they are ragged.
 //! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines. What of the ground lies
 //! inside letters is as wide as the ground ([`counters`](super::counters)).
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
 //! widths are measured with squares, so a slanting stroke counts as thinner than it is.
+
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -27,6 +30,9 @@ use super::words::{self, Letter};
 const STROKE: u8 = 9;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 const LETTER: u8 = 24;
+
+/// The stack without ink.
+const PAPER: u8 = 0;
 
 /// A drawing at most so many dots wide and high, 5 mm, is as small as a letter: text that was made outlines, a module of a QR code.
 const SMALL: u32 = 118;
@@ -57,7 +63,13 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let takes_part = |root: u32| is_letter[root as usize] && !is_counter[root as usize];
     let words = Words::of(flat, (runs, rows), takes_part);
     let is_thin = |root: u32| !is_counter[root as usize] && words.thin(root).unwrap_or_else(|| is_thin(root));
+    let is_pale = |colour: u8| matches!(of(colour), Some(Treatment::Shape(shape)) if !shape.dark);
+    let on_ink =
+        on_ink(flat, width, treatments, (runs, rows), |run| is_pale(run.colour) && is_thin(run.root));
     let solid = |root: u32, shape: &Shape| {
+        if on_ink.contains(&root) {
+            return Some(PAPER);
+        }
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape))
     };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
@@ -90,6 +102,42 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         }
     }
     fixed
+}
+
+/// The shapes, by their roots, of which nearly all of the border has more ink than paper. Only runs that take part are looked at.
+fn on_ink(
+    flat: &Flat,
+    width: usize,
+    treatments: &[Treatment],
+    (runs, rows): (&[Run], &[usize]),
+    takes_part: impl Fn(&Run) -> bool,
+) -> HashSet<u32> {
+    let has_ink: [bool; 256] = std::array::from_fn(|colour| match treatments.get(colour) {
+        Some(Treatment::Solid(stack)) => *stack != PAPER,
+        Some(Treatment::Shape(shape)) => shape.dark,
+        None => false,
+    });
+    let mut borders: HashMap<u32, [u32; 2]> = HashMap::new();
+    for (y, row) in rows.windows(2).enumerate() {
+        for run in runs[row[0]..row[1]].iter().filter(|run| takes_part(run)) {
+            let [all, inked] = borders.entry(run.root).or_default();
+            let (start, end) = (run.start as usize, run.end as usize);
+            let line = y * width;
+            let left = start.checked_sub(1).map(|x| line + x);
+            let right = (end < width).then_some(line + end);
+            let above = y.checked_sub(1).map(|y| y * width);
+            let below = (y + 2 < rows.len()).then_some(line + width);
+            let upright = [above, below].into_iter().flatten().flat_map(|line| line + start..line + end);
+            for beside in left.into_iter().chain(right).chain(upright).map(|at| flat.index[at]) {
+                if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
+                    *all += 1;
+                    *inked += u32::from(has_ink[usize::from(beside)]);
+                }
+            }
+        }
+    }
+    borders.retain(|_, [all, inked]| *inked > 0 && 8 * *inked >= 7 * *all);
+    borders.into_keys().collect()
 }
 
 /// What shapes lie on, where one of them may lie on its own solid.
@@ -271,6 +319,37 @@ mod tests {
         let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (kind, [128; 3])];
         let index = (0..width * length).map(|at| 2 * u8::from(is(at % width, at / width))).collect();
         fixed(&Flat { colours, index }, width, &[Treatment::Solid(0), Treatment::Solid(1), treatment])
+    }
+
+    /// White letters in a dark bar would have rims of ink, and beside paper they would vanish without.
+    #[test]
+    fn a_pale_stroke_on_ink_is_paper_and_beside_paper_keeps_its_rim() {
+        let colours = vec![
+            (Kind::Picture, [255; 3]),
+            (Kind::Picture, [0; 3]),
+            (Kind::Text, [235; 3]),
+            (Kind::Drawing, [60; 3]),
+        ];
+        for (bar, fill) in [(0..60, Some(PAPER)), (10..60, None), (0..0, None)] {
+            let index = (0..60 * 50).map(|at| match (at % 60, at / 60) {
+                (20..27, 4..40) => 2,
+                (x, _) if bar.contains(&x) || bar.start == 10 && x > 23 => 3,
+                _ => 0,
+            });
+            let index: Vec<u8> = if bar.start == 10 {
+                // The left half of the stroke's border is paper.
+                index
+                    .enumerate()
+                    .map(|(at, colour)| if colour == 3 && at % 60 < 23 { 0 } else { colour })
+                    .collect()
+            } else {
+                index.collect()
+            };
+            let flat = Flat { colours: colours.clone(), index };
+            let fixed = fixed(&flat, 60, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, DARK]);
+            let (middle, rim) = (fixed[20 * 60 + 23], fixed[20 * 60 + 20]);
+            assert_eq!((middle, rim), fill.map_or((TONE, 7), |stack| (stack, stack)), "{bar:?}");
+        }
     }
 
     #[test]

@@ -16,12 +16,13 @@ use std::collections::{HashMap, HashSet};
 use std::ops::{Deref, Range};
 
 use super::flat::{similar, split};
+use super::pens;
 use super::softened::{Edges, Widths, meant, thin_colours};
 
 /// The most main colours, and the most colours that small shapes have in common.
 const MOST: usize = 16;
-/// The most colours that a shape may have: white and black, its own, those of its edges, and those in common.
-pub(super) const MOST_KNOWN: usize = 3 * MOST + 2;
+/// The most colours that a shape may have: white and black, its own, those of its edges, those in common, and those of pens.
+pub(super) const MOST_KNOWN: usize = 3 * MOST + 2 + pens::MOST;
 /// Colours in stretches of two pixels or more; photographs have more.
 const MOST_FOUND: usize = 4096;
 /// The least pixels of a main colour: a square of eight.
@@ -30,8 +31,9 @@ const LEAST: u64 = 64;
 pub(super) const SMALL: usize = 64 * 64;
 /// Main colours cover at least this part of the art: thin letters are mostly softened edge.
 const COVERED: f64 = 0.3;
-/// At most this part of the pixels is neither a main colour nor between two.
+/// At most this part of the pixels is neither a main colour nor between two; of thin lines, where they cross in three colours.
 const STRAY: f64 = 0.01;
+const STRAY_THIN: f64 = 0.1;
 /// The strokes of a small shape are black, and not grey, if at least one in so many pixels is nearly so.
 const DARK: u64 = 20;
 /// The most times that pictures are enlarged where edges are looked for.
@@ -42,13 +44,23 @@ pub(super) const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
 /// A stretch of pixels, and the colour that it becomes.
 pub(super) type Span = (Range<usize>, [u8; 3]);
 
-/// The spans of what hangs together, if it is flat art. `stretches` are the pixels of it, in order; what is small may have colours
-/// that are `common` on the page, and what is in one colour has no others. Pixels may have been `enlarged` so many times.
+/// What is known of a page before its shapes are looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'a> {
+    /// Colours that small shapes may have.
+    pub common: &'a [[u8; 3]],
+    /// Whether all shapes are of thin lines and may have them.
+    pub thin: bool,
+    /// How many times pixels may have been enlarged.
+    pub enlarged: usize,
+}
+
+/// The spans of what hangs together, if it is flat art. `stretches` are the pixels of it, in order. What is in one colour has no others.
 pub(super) fn spans<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
-    (common, enlarged): (&[[u8; 3]], usize),
+    Known { common, thin: all_thin, enlarged }: Known,
 ) -> Option<Vec<Span>> {
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
     let first = &pixels[stretches.first()?.start];
@@ -56,11 +68,21 @@ pub(super) fn spans<const N: usize>(
     let widths = LazyCell::new(|| Widths::of(pixels, width, stretches, enlarged));
     let mut colours = main_colours(pixels, width, stretches, (total, enlarged), &widths).filter(|_| !one);
     let mut of_shape = usize::MAX;
-    if total as usize <= SMALL * enlarged * enlarged {
+    if all_thin || total as usize <= SMALL * enlarged * enlarged {
         let is_bare = colours.is_none();
         let colours = colours.get_or_insert(WHITE_AND_BLACK.to_vec());
+        if all_thin {
+            // What pens drew is known; a line that covers half of its pixels is no colour.
+            let mut thin = thin_colours(colours, &widths).into_iter();
+            colours.retain(|_| thin.next() == Some(false));
+        }
         // Strokes may be so thin that none of their pixels is black.
-        of_shape = if is_bare && is_dark(pixels, stretches, total) { 1 } else { colours.len() };
+        of_shape = match is_bare && is_dark(pixels, stretches, total) {
+            true => 1,
+            // No pixel of a thin line may have its colour, though others of the shape do.
+            false if all_thin => WHITE_AND_BLACK.len(),
+            false => colours.len(),
+        };
         let more: Vec<[u8; 3]> = common.iter().copied().filter(|colour| !colours.contains(colour)).collect();
         colours.extend(more);
     }
@@ -70,7 +92,7 @@ pub(super) fn spans<const N: usize>(
     let meant = meant(&colours, &thin);
     let edges = Edges { pixels, width, colours: &colours, of_shape, thin: &thin, meant: &meant, enlarged };
     let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
-    let most = (STRAY * total as f64) as u64;
+    let most = (if all_thin { STRAY_THIN } else { STRAY } * total as f64) as u64;
     for stretch in stretches {
         let mut at = stretch.start;
         for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
@@ -85,7 +107,13 @@ pub(super) fn spans<const N: usize>(
             for at in all {
                 let colour = edges.colour(at, known);
                 stray += u64::from(colour.is_none());
-                push(&mut spans, at..at + 1, colour.unwrap_or(own));
+                let nearest =
+                    || colours.iter().copied().min_by_key(|&known| apart(known, own)).unwrap_or(own);
+                push(
+                    &mut spans,
+                    at..at + 1,
+                    colour.unwrap_or_else(|| if all_thin { nearest() } else { own }),
+                );
             }
             if stray > most {
                 return None;
@@ -94,6 +122,11 @@ pub(super) fn spans<const N: usize>(
     }
     edges.decide_strokes(&mut spans);
     Some(spans)
+}
+
+/// The square of the distance between two colours in sRGB.
+fn apart(a: [u8; 3], b: [u8; 3]) -> u32 {
+    (0..3).map(|c| u32::from(a[c].abs_diff(b[c])).pow(2)).sum()
 }
 
 /// Whether one in [`DARK`] pixels is more black than white.
@@ -105,11 +138,12 @@ fn is_dark<const N: usize>(pixels: &[[u8; N]], stretches: &[Range<usize>], total
 
 /// The colours that small shapes have in common, and those of large `areas`, half as many at most: [`MOST`] that are not alike. Of both
 /// the counts of pixels.
-pub(super) fn common(counts: HashMap<[u8; 3], u64>, areas: HashMap<[u8; 3], u64>) -> Vec<[u8; 3]> {
+pub(super) fn common(counts: HashMap<[u8; 3], u64>, areas: &HashMap<[u8; 3], u64>) -> Vec<[u8; 3]> {
     let mut colours: Vec<[u8; 3]> = Vec::new();
-    for (counts, most) in [(areas, MOST / 2), (counts, MOST)] {
+    for (counts, most) in [(areas, MOST / 2), (&counts, MOST)] {
         let mut found: Vec<([u8; 3], u64)> = counts
-            .into_iter()
+            .iter()
+            .map(|(&colour, &dots)| (colour, dots))
             .filter(|(colour, dots)| *dots >= LEAST && !WHITE_AND_BLACK.contains(colour))
             .collect();
         found.sort_unstable_by_key(|&(colour, dots)| (std::cmp::Reverse(dots), colour));
@@ -120,6 +154,11 @@ pub(super) fn common(counts: HashMap<[u8; 3], u64>, areas: HashMap<[u8; 3], u64>
         }
     }
     colours
+}
+
+/// What thin lines are drawn on: white, black, and colours of large `areas` that are not alike.
+pub(super) fn grounds(areas: &HashMap<[u8; 3], u64>) -> Vec<[u8; 3]> {
+    [&WHITE_AND_BLACK[..], &common(HashMap::new(), areas)].concat()
 }
 
 /// The main colours, white and black first.
@@ -238,7 +277,7 @@ mod tests {
     fn all(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, (&[], 1))? {
+        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })? {
             out[span].fill(colour);
         }
         Some(out)
@@ -345,9 +384,16 @@ mod tests {
             })
             .collect();
         let strokes: Vec<Range<usize>> = (0..16).map(|y| y * SIDE + 1..y * SIDE + 5).collect();
-        assert_eq!(spans(&pixels, SIDE, &strokes, (&[], 1)), None, "nobody knows the colour");
+        assert_eq!(
+            spans(&pixels, SIDE, &strokes, Known { common: &[], thin: false, enlarged: 1 }),
+            None,
+            "nobody knows the colour"
+        );
         let mut found = vec![white; pixels.len()];
-        for (span, colour) in spans(&pixels, SIDE, &strokes, (&[[200, 0, 0], blue], 1)).expect("flat art") {
+        for (span, colour) in
+            spans(&pixels, SIDE, &strokes, Known { common: &[[200, 0, 0], blue], thin: false, enlarged: 1 })
+                .expect("flat art")
+        {
             found[span].fill(colour);
         }
         for at in strokes.into_iter().flatten() {

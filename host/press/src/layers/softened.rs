@@ -267,7 +267,7 @@ impl<const N: usize> Edges<'_, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layers::posters::spans;
+    use crate::layers::posters::{Known, spans};
 
     const SIDE: usize = 120;
 
@@ -275,7 +275,7 @@ mod tests {
     fn cut(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, (&[], 1))? {
+        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })? {
             out[span].fill(colour);
         }
         Some(out)
