@@ -174,10 +174,10 @@ impl<const N: usize> Page<'_, N> {
     }
 
     fn ridges(&self, shape: &[Range<usize>], grounds: &[[u8; 3]]) -> Vec<Ridge> {
-        let e = self.enlarged;
         // One of the pixels that were one when they were drawn.
-        let drawn =
-            shape.iter().cloned().flatten().filter(|at| at % self.width % e == 0 && at / self.width % e == 0);
+        let is_first = |v: usize| v.is_multiple_of(self.enlarged);
+        let drawn = shape.iter().cloned().flatten();
+        let drawn = drawn.filter(|at| is_first(at % self.width) && is_first(at / self.width));
         let ridge = |at: usize| {
             let own = split(&self.pixels[at]).1;
             if grounds.iter().any(|&ground| similar(ground, own)) {
