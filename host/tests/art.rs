@@ -182,6 +182,45 @@ fn pages_are_chosen_or_given_their_inks_on_the_command_line() {
     }
 }
 
+/// What a page asks for in CMYK is printed on as many dots, whatever the amount: 75 % was a solid, and half was a fifth.
+#[test]
+fn tints_in_cmyk_are_printed_as_they_are_asked_for() {
+    if !ghostscript() {
+        return;
+    }
+    let bench = Bench::new();
+    let area = (36.0f64 * 600.0 / 72.0).powi(2);
+    for asked in [
+        [0.1, 0.0, 0.0],
+        [0.5, 0.0, 0.0],
+        [0.75, 0.0, 0.0],
+        [0.9, 0.0, 0.0],
+        [0.0, 0.6, 0.0],
+        [0.0, 0.0, 0.85],
+        [0.75, 0.0, 0.75],
+    ] {
+        let [c, m, y] = asked;
+        let page = format!(
+            "%!PS\n<</PageSize [72 72]>> setpagedevice {c} {m} {y} 0 setcmykcolor 18 18 36 36 rectfill showpage\n"
+        );
+        fs::write(bench.path("tint.ps"), page).unwrap();
+        let plan = json(&bench.done("plan layers tint.ps --paper postcard --json"));
+        let dots = |ink: &str| {
+            let passes = plan["passes"].as_array().unwrap();
+            passes.iter().find(|pass| pass["ink"] == ink).map_or(0.0, |pass| pass["dots"].as_f64().unwrap())
+        };
+        for (ink, asked) in
+            ["cyan", "magenta", "yellow", "black"].into_iter().zip(asked.into_iter().chain([0.0]))
+        {
+            let printed = dots(ink) / area;
+            assert!(
+                (printed - asked).abs() < 0.02,
+                "{ink}: {printed:.3} instead of {asked}, C {c}, M {m}, Y {y}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_page_as_large_as_the_sheet_is_refused_with_the_remedy_and_printed_at_true_size_when_cropped() {
     if !ghostscript() {

@@ -4,7 +4,8 @@
 //! Method: by colour, kind and width of their [shapes](super::shapes). A shape is thin if no square of [`STROKE`] dots a side ([`LETTER`]
 //! for text and for what is as small as a letter) fits in it. Thin shapes that have more ink than paper are printed in the nearest solid,
 //! and so are the [lines](super::lines) that hang on wide ones. Wide ones keep their rim, all dots beside another shape, in that solid
-//! and are screened inside; so do thin letters with more paper than ink, which a solid would make too dark. All other
+//! and are screened inside; so do thin shapes with more paper than ink, which a solid would make too dark. Of pale lines of [`HAIR`] dots or
+//! less only the middle is printed, one dot wide: screened they were dashes, and the palest had no dot. Wide pale
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
 //! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
 //! solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies on ink, by nearly
@@ -14,7 +15,7 @@
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
 //! widths are measured with squares, so a slanting stroke counts as thinner than it is.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use rayon::prelude::*;
 
@@ -28,8 +29,14 @@ use super::words::{self, Letter};
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.
 const STROKE: u8 = 9;
+/// A pale line at most so many dots wide has less than a cluster in each of its dots along it.
+const HAIR: u8 = 4;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 const LETTER: u8 = 24;
+
+/// A pale shape lies on ink if at least this share of its border is; with more than the lesser share it lies beside ink, as a soft edge.
+const ON_INK: f32 = 7.0 / 8.0;
+const BESIDE_INK: f32 = 1.0 / 4.0;
 
 /// The stack without ink.
 const PAPER: u8 = 0;
@@ -64,10 +71,10 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let words = Words::of(flat, (runs, rows), takes_part);
     let is_thin = |root: u32| !is_counter[root as usize] && words.thin(root).unwrap_or_else(|| is_thin(root));
     let is_pale = |colour: u8| matches!(of(colour), Some(Treatment::Shape(shape)) if !shape.dark);
-    let on_ink =
-        on_ink(flat, width, treatments, (runs, rows), |run| is_pale(run.colour) && is_thin(run.root));
+    let takes_part = |run: &Run| is_pale(run.colour) && is_thin(run.root);
+    let inked = inked(flat, width, treatments, (runs, rows), takes_part);
     let solid = |root: u32, shape: &Shape| {
-        if on_ink.contains(&root) {
+        if inked.get(&root).is_some_and(|&share| share >= ON_INK) {
             return Some(PAPER);
         }
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape))
@@ -75,15 +82,21 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for run in &runs[rows[y]..rows[y + 1]] {
             let root = run.root;
-            let (kind, _) = flat.colours[usize::from(run.colour)];
             let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
             let (thin, first) = (is_thin(root), shape.solids[0]);
             let (start, end) = (run.start as usize, run.end as usize);
             match solid(root, &shape) {
                 Some(solid) if thin && (shape.dark || solid != first) => fixed[start..end].fill(solid),
-                Some(solid) if solid > 0 && (shape.dark || thin && kind == Kind::Text) => {
+                Some(solid) if solid > PAPER && (shape.dark || thin) => {
+                    let side = runs[root as usize].side;
+                    let is_hairline = !shape.dark && side <= HAIR && !is_letter[root as usize];
+                    if is_hairline && inked.get(&root).is_some_and(|&share| share > BESIDE_INK) {
+                        continue;
+                    }
                     for (x, dot) in (start..).zip(&mut fixed[start..end]) {
-                        if at_the_rim(flat, width, (x, y)) {
+                        if is_hairline {
+                            *dot = if is_ridge(flat, width, (x, y)) { solid } else { PAPER };
+                        } else if at_the_rim(flat, width, (x, y)) {
                             *dot = solid;
                         }
                     }
@@ -104,14 +117,14 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     fixed
 }
 
-/// The shapes, by their roots, of which nearly all of the border has more ink than paper. Only runs that take part are looked at.
-fn on_ink(
+/// The share of ink in the border of shapes, by their roots: dots beside it that have more ink than paper. Only runs that take part are looked at.
+fn inked(
     flat: &Flat,
     width: usize,
     treatments: &[Treatment],
     (runs, rows): (&[Run], &[usize]),
     takes_part: impl Fn(&Run) -> bool,
-) -> HashSet<u32> {
+) -> HashMap<u32, f32> {
     let has_ink: [bool; 256] = std::array::from_fn(|colour| match treatments.get(colour) {
         Some(Treatment::Solid(stack)) => *stack != PAPER,
         Some(Treatment::Shape(shape)) => shape.dark,
@@ -136,8 +149,7 @@ fn on_ink(
             }
         }
     }
-    borders.retain(|_, [all, inked]| *inked > 0 && 8 * *inked >= 7 * *all);
-    borders.into_keys().collect()
+    borders.into_iter().map(|(root, [all, inked])| (root, inked as f32 / all.max(1) as f32)).collect()
 }
 
 /// What shapes lie on, where one of them may lie on its own solid.
@@ -286,20 +298,42 @@ fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Vec<bool> {
 }
 
 /// Whether one of the four dots beside a dot is of another shape. Dots outside the art are.
-fn at_the_rim(flat: &Flat, width: usize, (x, y): (usize, usize)) -> bool {
-    let at = y * width + x;
-    let own = flat.index[at];
-    let other = |beside: Option<&u8>| {
-        beside.is_none_or(|&colour| {
-            usize::from(colour) >= flat.colours.len() || colour != own && !joined(flat, own, colour)
-        })
+fn at_the_rim(flat: &Flat, width: usize, at: (usize, usize)) -> bool {
+    [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter().any(|way| reach(flat, width, at, way, 1) == 0)
+}
+
+/// Whether a dot of a hairline is midway across it. Where lines cross all dots are.
+fn is_ridge(flat: &Flat, width: usize, at: (usize, usize)) -> bool {
+    let most = 3 * usize::from(HAIR);
+    let [left, right, above, below] =
+        [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|way| reach(flat, width, at, way, most));
+    let (across, down) = (left + 1 + right, above + 1 + below);
+    let midway = [left == (across - 1) / 2, above == (down - 1) / 2];
+    match (across > most, down > most) {
+        (true, true) => true,
+        // A slanting line is cut unevenly.
+        _ if across.abs_diff(down) <= 2 => midway.contains(&true),
+        _ => midway[usize::from(across > down)],
+    }
+}
+
+/// How many dots of the same shape follow a dot one way, so many at most.
+fn reach(
+    flat: &Flat,
+    width: usize,
+    (x, y): (usize, usize),
+    (right, down): (isize, isize),
+    most: usize,
+) -> usize {
+    let own = flat.index[y * width + x];
+    let is_own = |step: usize| {
+        let step = step as isize;
+        let x = x.checked_add_signed(right * step).filter(|&x| x < width)?;
+        let colour = *flat.index.get(y.checked_add_signed(down * step)? * width + x)?;
+        (usize::from(colour) < flat.colours.len() && (colour == own || joined(flat, own, colour)))
+            .then_some(())
     };
-    let row = &flat.index[at - x..at - x + width];
-    let above = at.checked_sub(width).and_then(|at| flat.index.get(at));
-    other(above)
-        || other(flat.index.get(at + width))
-        || other(x.checked_sub(1).and_then(|x| row.get(x)))
-        || other(row.get(x + 1))
+    (1..=most).take_while(|&step| is_own(step).is_some()).count()
 }
 
 #[cfg(test)]
@@ -405,11 +439,70 @@ mod tests {
     }
 
     #[test]
-    fn a_pale_letter_keeps_its_rim_and_a_pale_line_its_tone() {
-        let letter = drawn((20, 20), Kind::Text, LIGHT, |x, _| (5..11).contains(&x));
-        assert_eq!(letter[20..40][4..12], [0, 7, TONE, TONE, TONE, TONE, 7, 0]);
-        let line = drawn((20, 20), Kind::Drawing, LIGHT, |x, _| (5..11).contains(&x));
-        assert_eq!(line[20..40][4..12], [0, TONE, TONE, TONE, TONE, TONE, TONE, 0]);
+    fn a_pale_letter_keeps_its_rim_and_a_pale_hairline_its_edge() {
+        let long = SMALL as usize + 1;
+        let cut = |kind, long, wide: usize| {
+            drawn((20, long), kind, LIGHT, |x, _| (5..5 + wide).contains(&x))[20..40].to_vec()
+        };
+        let rim = [0, 7, TONE, TONE, TONE, TONE, 7, 0];
+        for (kind, long) in [(Kind::Text, 20), (Kind::Drawing, 20), (Kind::Drawing, long)] {
+            assert_eq!(cut(kind, long, 6)[4..12], rim, "{kind:?}, {long}");
+        }
+        assert_eq!(cut(Kind::Drawing, long, 12)[4..8], [0, TONE, TONE, TONE], "a wide one is a tint");
+        for (wide, middle) in (1..=usize::from(HAIR)).zip([5, 5, 6, 6]) {
+            let line = cut(Kind::Drawing, long, wide);
+            let printed: Vec<usize> = (0..20).filter(|&x| line[x] != 0).collect();
+            assert!(printed == [middle] && line[middle] == 7, "{wide}: {printed:?}");
+        }
+        // A cross is whole.
+        let cross = drawn((long, long), Kind::Drawing, LIGHT, |x, y| x / 2 == 30 || y / 2 == 20);
+        let row = |y: usize| (0..long).filter(|x| cross[y * long + x] == 7).count();
+        assert_eq!([row(39), row(40), row(41)], [1, long, 2]);
+        // A soft edge lies beside ink.
+        let colours = vec![
+            (Kind::Picture, [255; 3]),
+            (Kind::Picture, [0; 3]),
+            (Kind::Drawing, [230; 3]),
+            (Kind::Drawing, [60; 3]),
+        ];
+        let index = (0..40 * long).map(|at| [3, 3, 2, 2, 0].get(at % 40 / 2).copied().unwrap_or(0)).collect();
+        let flat = Flat { colours, index };
+        let fixed = fixed(&flat, 40, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, Treatment::Solid(5)]);
+        assert_eq!(fixed[400..409], [5, 5, 5, 5, TONE, TONE, TONE, TONE, 0]);
+    }
+
+    /// Whatever its slope, what is left of a pale hairline is one line, each dot of which touches the next. It is as long as what was drawn.
+    #[test]
+    fn a_pale_hairline_has_no_gap() {
+        const SIDE: usize = 200;
+        for degrees in (0..180).step_by(7) {
+            let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+            let inside = |x: usize, y: usize| {
+                let (x, y) = (x as f64 + 0.5 - SIDE as f64 / 2.0, y as f64 + 0.5 - SIDE as f64 / 2.0);
+                (x * sin - y * cos).abs() < 1.5 && (x * cos + y * sin).abs() < 90.0
+            };
+            let fixed = drawn((SIDE, SIDE), Kind::Drawing, LIGHT, inside);
+            let dots: Vec<usize> = (0..SIDE * SIDE).filter(|&at| fixed[at] == 7).collect();
+            let middle = |&&at: &&usize| (at % SIDE).abs_diff(SIDE / 2) + (at / SIDE).abs_diff(SIDE / 2);
+            let first = *dots.iter().min_by_key(middle).unwrap();
+            let (mut seen, mut next) = (vec![first], vec![first]);
+            while let Some(at) = next.pop() {
+                for &other in &dots {
+                    let near =
+                        (at % SIDE).abs_diff(other % SIDE) <= 1 && (at / SIDE).abs_diff(other / SIDE) <= 1;
+                    if near && !seen.contains(&other) {
+                        seen.push(other);
+                        next.push(other);
+                    }
+                }
+            }
+            let along = |at: &usize| (at % SIDE) as f64 * cos + (at / SIDE) as f64 * sin;
+            let (from, to) =
+                seen.iter().map(along).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+            assert!(to - from > 172.0, "{degrees}: {from} to {to}");
+            let drawn = (0..SIDE * SIDE).filter(|&at| inside(at % SIDE, at / SIDE)).count();
+            assert!(3 * dots.len() <= 2 * drawn, "{degrees}: {} of {drawn}", dots.len());
+        }
     }
 
     /// A letter of treatment [`DARK`] or [`LIGHT`] on a ground that is printed so, `share` of its border on it and the rest on paper.
