@@ -450,6 +450,23 @@ fn line_art_prints_at_1200_dpi_in_process_inks_and_in_no_other() {
 }
 
 #[test]
+fn a_job_replaces_a_job_and_nothing_else() {
+    let bench = Bench::new();
+    layer(&bench, "white.png", 5..55, 5..35);
+    bench.done("layers white.png --paper postcard -o a.print");
+    for (name, content) in [("mine.txt", "my notes"), ("mine.json", "{}"), ("mine.csv", "a,b")] {
+        fs::write(bench.path(name), content).unwrap();
+        let said = bench.refused(1, &format!("send a.print/job.rgl --to file:{name}"));
+        assert!(said.contains(name) && said.contains("choose another name"), "{said}");
+        assert_eq!(fs::read_to_string(bench.path(name)).unwrap(), content);
+    }
+    fs::write(bench.path("empty.rgl"), "").unwrap();
+    for _ in 0..2 {
+        bench.done("send a.print/job.rgl --to file:empty.rgl");
+    }
+}
+
+#[test]
 fn lists_are_there_for_programs() {
     let bench = Bench::new();
     // The preset that is built in.

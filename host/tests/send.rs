@@ -119,6 +119,22 @@ fn a_job_whose_bridge_is_gone_waits_and_can_be_cancelled_without_it() {
     assert!(bench.says(1, "cancel 12345678").contains("no job 12345678"));
 }
 
+/// A job whose record is damaged may be half printed: nobody may say that nothing waits.
+#[test]
+fn a_damaged_record_is_told_by_everything_that_lists_jobs() {
+    let bench = Bench::new();
+    let folder = bench.folder.path().join("jobs/5f3a9c01");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("job.json"), "junk").unwrap();
+    assert!(bench.says(0, "resume --list").contains("job 5f3a9c01:"));
+    let listed: serde_json::Value = serde_json::from_str(&bench.says(0, "-q resume --list --json")).unwrap();
+    assert_eq!(listed[0]["job"], "5f3a9c01");
+    assert!(listed[0]["error"].as_str().is_some_and(|error| error.contains("job.json")), "{listed}");
+    let said = bench.says(1, "resume");
+    assert!(said.contains("job 5f3a9c01 cannot be read") && !said.contains("all have ended"), "{said}");
+    assert!(bench.says(1, "doctor").contains("job 5f3a9c01 cannot be read"));
+}
+
 #[test]
 fn a_wrong_destination_is_wrong_usage_and_the_right_ones_are_shown() {
     let bench = Bench::new();

@@ -145,7 +145,11 @@ impl Choice for press::halftone::Method {
 
 impl Choice for press::layers::Intent {
     const ALL: &'static [(press::layers::Intent, &'static str, &'static str)] = &[
-        (press::layers::Intent::Auto, "auto", "Perceptual for pictures, colorimetric for text and drawings"),
+        (
+            press::layers::Intent::Auto,
+            "auto",
+            "Perceptual for pictures, colorimetric for text and drawings; tints of cyan, magenta, yellow, red, green and blue keep those inks there",
+        ),
         (
             press::layers::Intent::Perceptual,
             "perceptual",

@@ -104,6 +104,9 @@ impl<W: std::io::Write> Visit<W> {
                         push(&mut self.found["unfinished_jobs"], as_json(&entry));
                     }
                 }
+                for (job, error) in journal.damaged()? {
+                    self.trouble(&format!("job {job:08x} cannot be read: {error}"))?;
+                }
                 Ok(())
             }
         }

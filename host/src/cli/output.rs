@@ -153,7 +153,8 @@ fn format_of(path: &Path) -> Option<&'static str> {
         (b"<", "a drawing or another XML file"),
         (b"\x1b", "a print job"),
     ];
-    formats.into_iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, name)| name)
+    let known = formats.into_iter().find(|(magic, _)| start.starts_with(magic));
+    known.map(|(_, name)| name).or((!start.is_empty()).then_some("another file"))
 }
 
 /// A place to write a file or a folder before it appears under its own name.
@@ -228,7 +229,9 @@ impl Staged {
         }
         let folder = Scratch::beside(parent).map_err(|error| {
             // The error's own text names the staging folder, which means nothing to the user.
-            let reason = error.raw_os_error().map_or(error, io::Error::from_raw_os_error);
+            let inner = error.get_ref().and_then(|error| error.source()?.downcast_ref::<io::Error>());
+            let code = error.raw_os_error().or_else(|| inner.and_then(io::Error::raw_os_error));
+            let reason = code.map_or(error, io::Error::from_raw_os_error);
             anyhow::anyhow!("cannot write in {}: {reason}", parent.display())
         })?;
         Ok(Staged { inside: folder.path().join(name), target, folder })

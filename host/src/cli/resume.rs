@@ -16,6 +16,7 @@ use device::send::query::Query;
 use device::send::session::Phase;
 use device::send::{Address, words};
 use observe::Observer;
+use serde_json::json;
 
 /// Arguments of `resume`.
 #[derive(ClapArgs, Debug)]
@@ -59,6 +60,14 @@ pub struct Cancel {
     yes: bool,
 }
 
+/// What there is to say where no job ever was.
+const NONE_YET: &str = "no job has been sent to a bridge yet";
+
+/// A job's number as people read it.
+fn number_of(job: u32) -> String {
+    format!("{job:08x}")
+}
+
 fn number(text: &str) -> Result<u32, String> {
     u32::from_str_radix(text, 16).map_err(|_| {
         "expected a job number of eight digits 0-9 and a-f; `foilpress resume --list` shows them".into()
@@ -69,14 +78,20 @@ fn number(text: &str) -> Result<u32, String> {
 pub fn resume(args: &Resume, observer: &dyn Observer) -> Result<()> {
     let journal = Journal::of_user()?;
     if args.list {
-        let entries = journal.entries()?;
+        let (entries, damaged) = (journal.entries()?, journal.damaged()?);
         if args.json {
-            let entries: Vec<_> = entries.iter().map(as_json).collect();
-            return super::show(&format!("{}\n", serde_json::to_string_pretty(&entries)?));
+            let mut list: Vec<_> = entries.iter().map(as_json).collect();
+            list.extend(
+                damaged
+                    .iter()
+                    .map(|(job, error)| json!({ "job": number_of(*job), "error": error.to_string() })),
+            );
+            return super::show(&format!("{}\n", serde_json::to_string_pretty(&list)?));
         }
-        if entries.is_empty() {
-            observer.note("no job has been sent to a bridge yet");
+        if entries.is_empty() && damaged.is_empty() {
+            observer.note(NONE_YET);
         }
+        damaged.iter().for_each(|(job, error)| observer.note(&format!("job {}: {error}", number_of(*job))));
         let mut out = std::io::stdout().lock();
         for entry in entries {
             writeln!(out, "{}", line(&entry))?;
@@ -192,13 +207,25 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
     if let Some(number) = asked {
         return Ok(number);
     }
-    let open: Vec<Entry> = journal
-        .entries()?
-        .into_iter()
-        .filter(|entry| !matches!(entry.record.phase, Phase::Ended(_)))
-        .collect();
+    let all = journal.entries()?;
+    let open: Vec<&Entry> =
+        all.iter().filter(|entry| !matches!(entry.record.phase, Phase::Ended(_))).collect();
     match &open[..] {
-        [] => bail!("no job waits; all have ended (`foilpress resume --list`)"),
+        [] => {
+            if let Some((job, error)) = journal.damaged()?.into_iter().next() {
+                return Err(
+                    anyhow::Error::from(error).context(format!("job {} cannot be read", number_of(job)))
+                );
+            }
+            bail!(
+                "{}",
+                if all.is_empty() {
+                    NONE_YET
+                } else {
+                    "no job waits; all have ended (`foilpress resume --list`)"
+                }
+            )
+        }
         [one] => Ok(one.record.job),
         // Sheets of one job wait for each other; any of them is the next.
         several if are_copies(&several.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>()) => {
@@ -206,7 +233,7 @@ fn choose(journal: &Journal, asked: Option<u32>) -> Result<u32> {
             next.map(|entry| entry.record.job).context("several jobs are none")
         }
         several => {
-            let lines: Vec<String> = several.iter().map(line).collect();
+            let lines: Vec<String> = several.iter().map(|entry| line(entry)).collect();
             bail!("several jobs have not ended; choose one:\n{}", lines.join("\n"))
         }
     }

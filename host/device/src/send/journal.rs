@@ -225,12 +225,22 @@ impl Journal {
         Ok(OpenJob { folder, entry, data, _lock: lock })
     }
 
-    /// All jobs that can be read, oldest first. Folders that are none of ours are passed over.
+    /// All jobs that can be read, oldest first. Folders that are none of ours are passed over, and [those that are damaged](Journal::damaged).
     pub fn entries(&self) -> Result<Vec<Entry>, JournalError> {
         let mut entries: Vec<Entry> =
             self.folders()?.iter().filter_map(|folder| read_entry(folder).ok()).collect();
         entries.sort_by_key(|entry| (entry.queued, entry.record.job));
         Ok(entries)
+    }
+
+    /// Why jobs cannot be read whose record is there.
+    pub fn damaged(&self) -> Result<Vec<(u32, JournalError)>, JournalError> {
+        let damage = |folder: &PathBuf| {
+            let number = u32::from_str_radix(folder.file_name()?.to_str()?, 16).ok()?;
+            let error = read_entry(folder).err()?;
+            matches!(error, JournalError::Damaged { .. }).then_some((number, error))
+        };
+        Ok(self.folders()?.iter().filter_map(damage).collect())
     }
 
     fn folders(&self) -> Result<Vec<PathBuf>, JournalError> {

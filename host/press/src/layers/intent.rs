@@ -21,7 +21,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intent {
-    /// Perceptual for pictures, colorimetric for text and drawings.
+    /// Perceptual for pictures, colorimetric for text and drawings; tints of the six primaries keep their inks there.
     #[default]
     Auto,
     /// Smoothly: saturated colours move closer together, and none become equal.

@@ -4,6 +4,7 @@
 //! is anti-aliased. Cost: some 0.1 s a page for drafts, seconds for a page. Limits: the time limit of [`process`] for each
 //! page; Ghostscript can read only the file (its safer mode); Poppler knows no plates.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -209,14 +210,19 @@ fn ghostscript_leaves(
         begun += u32::from(next);
         next && only.is_none()
     };
-    let said = ghostscript(path, &options, "tiffsep", (DRAFT, DRAFT), &to, progressed)?;
+    let said = ghostscript(path, &options, "tiffsep", (DRAFT, DRAFT), &to, progressed);
+    if only.is_none() && place(MOST_PAGES + 1).exists() {
+        return Err(wrong(path, format!("it has more than {MOST_PAGES} pages; print one with --page")));
+    }
+    let said = said?;
+    let mut plates = plates(path, folder)?;
     let sizes = sizes(&said);
     let mut leaves = Vec::new();
     for number in only.map_or(1..=u32::MAX, |number| number..=number) {
         let draft = place(number);
         let Ok((width, height)) = image::image_dimensions(&draft) else { break };
         let (mut drawn, mut spots) = (false, Vec::new());
-        for (name, file) in plates_beside(&draft, folder)? {
+        for (name, file) in plates.remove(&stem(&draft)).unwrap_or_default() {
             // A page paints every pixel it touches, so a draft misses nothing.
             if coverage::scan(&file, None)?.coverage.iter().any(|&c| c > 0) {
                 drawn = true;
@@ -273,17 +279,20 @@ fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Dr
 
 /// The names and files of the plates beside a separated page, such as `page(Gold Foil).tif` or `page(Wei%DF).tif`.
 pub(super) fn plates_beside(page: &Path, folder: &Scratch) -> Result<Vec<(String, PathBuf)>, LayersError> {
-    let prefix = stem(page);
-    let mut plates = Vec::new();
-    for entry in std::fs::read_dir(folder.path()).map_err(io(page, "list its plates"))? {
-        let file = entry.map_err(io(page, "list its plates"))?.path();
+    Ok(plates(page, folder)?.remove(&stem(page)).unwrap_or_default())
+}
+
+/// The plates of all separated pages, by the name of the page.
+fn plates(path: &Path, folder: &Scratch) -> Result<HashMap<String, Vec<(String, PathBuf)>>, LayersError> {
+    let mut plates: HashMap<String, Vec<(String, PathBuf)>> = HashMap::new();
+    for entry in std::fs::read_dir(folder.path()).map_err(io(path, "list its plates"))? {
+        let file = entry.map_err(io(path, "list its plates"))?.path();
         let name = stem(&file);
-        let plate = name.strip_prefix(&prefix).and_then(|rest| rest.strip_prefix('(')?.strip_suffix(')'));
-        if let Some(plate) = plate {
-            plates.push((decoded(plate), file.clone()));
+        if let Some((page, plate)) = name.strip_suffix(')').and_then(|name| name.split_once('(')) {
+            plates.entry(page.to_owned()).or_default().push((decoded(plate), file));
         }
     }
-    plates.sort();
+    plates.values_mut().for_each(|plates| plates.sort());
     Ok(plates)
 }
 

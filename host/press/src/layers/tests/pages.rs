@@ -176,11 +176,11 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let art = read(std::slice::from_ref(&file), &Options::default());
     let [(Ink::White, white)] = amounts(&art)[..] else { panic!("{:?}", art.layers) };
     assert!((white / (800.0 * 250.0) - 1.0).abs() < 0.03, "{white}");
-    // In pixels of 300 dpi: the line, half of it on white, and white alone. Half of an ink leaves half of the light, which is
-    // 188 in sRGB.
+    // In pixels of 300 dpi: the line, half of it on white, and white alone. Half of an ink is half of a value in sRGB, which is printed on
+    // half of the dots.
     let colour = art.colour.as_ref().unwrap().averages((art.width, art.length), None);
     for ((x, y), wanted) in
-        [((250, 237), [255, 0, 188]), ((175, 125), [255, 188, 225]), ((350, 125), [255; 3])]
+        [((250, 237), [255, 0, 127]), ((175, 125), [255, 127, 191]), ((350, 125), [255; 3])]
     {
         let found = &colour.rgb[3 * (y * colour.width + x)..][..3];
         assert!(found.iter().zip(wanted).all(|(v, w)| v.abs_diff(w) <= 3), "at {x}, {y}: {found:?}");
