@@ -14,7 +14,6 @@
 use std::fmt::Display;
 use std::path::Path;
 
-use palette::{LinSrgb, Srgb};
 use protocol::ink::Kind;
 use rayon::prelude::*;
 
@@ -177,11 +176,10 @@ fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[
     pixels.par_chunks_mut(kinds::BYTES * ROWS).enumerate().for_each(|(block, pixels)| {
         for (at, pixel) in (block * ROWS..).zip(pixels.as_chunks_mut::<{ kinds::BYTES }>().0) {
             if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
-                let [c, m, y, k] = inks.map(|ink| 255 - ink.map_or(0, |coverage| u32::from(coverage[at])));
-                // Half of an ink leaves half of the light, as in what was drawn beside the layers.
-                let light = [c, m, y].map(|v| (v * k) as f32 / (255.0 * 255.0));
+                let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
                 let [_, rgb @ ..] = pixel;
-                *rgb = Srgb::<u8>::from_linear(LinSrgb::from(light)).into();
+                // As what is drawn beside the layers is converted ([`kinds::conversions`]).
+                *rgb = [c, m, y].map(|ink| 255 - ink.saturating_add(k));
             }
         }
     });
