@@ -85,7 +85,9 @@ fn tones_are_kept_at_any_ratio_of_pixels_to_dots() {
 #[test]
 fn the_search_settles_tones_to_a_cell_a_part() {
     let points: [Point; 4] = [[0.0; 4], [1.0, 0.0, 0.0, 0.0], [0.3, 0.8, 0.0, 0.0], [0.9, 0.4, 0.3, 0.0]];
-    for (seed, (width, height)) in [(472, 472), (301, 530), (203, 640), (97, 77)].into_iter().enumerate() {
+    for (seed, (width, height)) in
+        [(472, 472), (301, 530), (203, 640), (97, 77), (300, 300)].into_iter().enumerate()
+    {
         let disc = |x: usize, y: usize| x.abs_diff(width / 3).pow(2) + y.abs_diff(height / 2).pow(2) < 900;
         let mix = plain(width, height, 4, |x, y| {
             let wave = |q: usize| {

@@ -35,9 +35,12 @@ struct Gift {
 }
 
 impl Part<'_> {
-    /// Brings tones to what is asked by changes in these rows of blocks.
+    /// Brings tones to what is asked by changes in these rows of blocks, of which the last part of a page may have none.
     #[inline(always)]
     pub(super) fn settle(&mut self, rows: Range<usize>) {
+        if rows.is_empty() {
+            return;
+        }
         let dots = |zone: &super::Zone| (zone.columns * zone.size * BLOCK) as f64;
         let settled = SETTLED * self.zones.iter().flatten().map(dots).sum::<f64>();
         let here = || rows.clone();
