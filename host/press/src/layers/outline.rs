@@ -5,7 +5,7 @@
 //! for text and for what is as small as a letter) fits in it. Thin shapes that have more ink than paper are printed in the nearest solid,
 //! and so are the [lines](super::lines) that hang on wide ones. Wide ones keep their rim, all dots beside another shape, in that solid
 //! and are screened inside; so do thin shapes with more paper than ink, which a solid would make too dark. Of pale lines of [`HAIR`] dots or
-//! less only the middle is printed, one dot wide: screened they were dashes, and the palest had no dot. Wide pale
+//! less only the middle is printed, one dot wide: screened they were dashes, and the palest had no dot. Soft edges, which lie between colours, and wide pale
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
 //! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
 //! solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies on ink, by nearly
@@ -20,7 +20,7 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::counters::counters;
-use super::flat::{Flat, TONE};
+use super::flat::{Flat, TONE, similar};
 use super::kinds::Kind;
 use super::lines::lines;
 use super::shapes::{Run, joined, shapes};
@@ -34,9 +34,9 @@ const HAIR: u8 = 4;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 const LETTER: u8 = 24;
 
-/// A pale shape lies on ink if at least this share of its border is; with more than the lesser share it lies beside ink, as a soft edge.
-const ON_INK: f32 = 7.0 / 8.0;
-const BESIDE_INK: f32 = 1.0 / 4.0;
+/// The least share of the border of what lies on ink, and of what lies on another colour.
+const ON_INK: f64 = 7.0 / 8.0;
+const ON_ONE: f64 = 3.0 / 4.0;
 
 /// The stack without ink.
 const PAPER: u8 = 0;
@@ -72,9 +72,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let is_thin = |root: u32| !is_counter[root as usize] && words.thin(root).unwrap_or_else(|| is_thin(root));
     let is_pale = |colour: u8| matches!(of(colour), Some(Treatment::Shape(shape)) if !shape.dark);
     let takes_part = |run: &Run| is_pale(run.colour) && is_thin(run.root);
-    let inked = inked(flat, width, treatments, (runs, rows), takes_part);
+    let lies = lies(flat, width, treatments, (runs, rows), takes_part);
     let solid = |root: u32, shape: &Shape| {
-        if inked.get(&root).is_some_and(|&share| share >= ON_INK) {
+        if lies.get(&root) == Some(&Lies::OnInk) {
             return Some(PAPER);
         }
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape))
@@ -90,7 +90,8 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
                 Some(solid) if solid > PAPER && (shape.dark || thin) => {
                     let side = runs[root as usize].side;
                     let is_hairline = !shape.dark && side <= HAIR && !is_letter[root as usize];
-                    if is_hairline && inked.get(&root).is_some_and(|&share| share > BESIDE_INK) {
+                    let (kind, _) = flat.colours[usize::from(run.colour)];
+                    if !shape.dark && kind != Kind::Text && lies.get(&root) != Some(&Lies::OnOneColour) {
                         continue;
                     }
                     for (x, dot) in (start..).zip(&mut fixed[start..end]) {
@@ -117,23 +118,29 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     fixed
 }
 
-/// The share of ink in the border of shapes, by their roots: dots beside it that have more ink than paper. Only runs that take part are looked at.
-fn inked(
+/// What a pale shape lies on.
+#[derive(PartialEq, Eq)]
+enum Lies {
+    /// On ink, by nearly all of its border.
+    OnInk,
+    /// On one paler colour, or one that is as pale, by most of it.
+    OnOneColour,
+    /// Between colours, as a soft edge does, or on one that is like it, as a ripple.
+    Between,
+}
+
+/// What shapes lie on, by their roots. Only runs that take part are looked at.
+fn lies(
     flat: &Flat,
     width: usize,
     treatments: &[Treatment],
     (runs, rows): (&[Run], &[usize]),
     takes_part: impl Fn(&Run) -> bool,
-) -> HashMap<u32, f32> {
-    let has_ink: [bool; 256] = std::array::from_fn(|colour| match treatments.get(colour) {
-        Some(Treatment::Solid(stack)) => *stack != PAPER,
-        Some(Treatment::Shape(shape)) => shape.dark,
-        None => false,
-    });
-    let mut borders: HashMap<u32, [u32; 2]> = HashMap::new();
+) -> HashMap<u32, Lies> {
+    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
     for (y, row) in rows.windows(2).enumerate() {
         for run in runs[row[0]..row[1]].iter().filter(|run| takes_part(run)) {
-            let [all, inked] = borders.entry(run.root).or_default();
+            let border = borders.entry(run.root).or_default();
             let (start, end) = (run.start as usize, run.end as usize);
             let line = y * width;
             let left = start.checked_sub(1).map(|x| line + x);
@@ -143,13 +150,37 @@ fn inked(
             let upright = [above, below].into_iter().flatten().flat_map(|line| line + start..line + end);
             for beside in left.into_iter().chain(right).chain(upright).map(|at| flat.index[at]) {
                 if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
-                    *all += 1;
-                    *inked += u32::from(has_ink[usize::from(beside)]);
+                    *border.entry(beside).or_default() += 1;
                 }
             }
         }
     }
-    borders.into_iter().map(|(root, [all, inked])| (root, inked as f32 / all.max(1) as f32)).collect()
+    let has_ink = |&colour: &u8| match treatments.get(usize::from(colour)) {
+        Some(Treatment::Solid(stack)) => *stack != PAPER,
+        Some(Treatment::Shape(shape)) => shape.dark,
+        None => false,
+    };
+    let judge = |root: u32, border: HashMap<u8, u32>| {
+        let all: u32 = border.values().sum();
+        let (inked, pale): (Vec<_>, Vec<_>) = border.into_iter().partition(|(colour, _)| has_ink(colour));
+        let inked: u32 = inked.iter().map(|&(_, dots)| dots).sum();
+        let own = flat.colours[usize::from(runs[root as usize].colour)].1;
+        // Beside what filters sharpened there are ripples in all tints. What is no colour is a shading or a picture.
+        let is_ripple = |&(beside, _): &(u8, u32)| {
+            let is_like = |&(_, colour): &(Kind, [u8; 3])| similar(colour, own);
+            treatments.get(usize::from(beside)) != Some(&Treatment::Solid(PAPER))
+                && flat.colours.get(usize::from(beside)).is_none_or(is_like)
+        };
+        let most = pale.iter().filter(|beside| !is_ripple(beside)).map(|&(_, dots)| dots).max().unwrap_or(0);
+        if inked > 0 && f64::from(inked) >= ON_INK * f64::from(all) {
+            Lies::OnInk
+        } else if f64::from(most) >= ON_ONE * f64::from(all) {
+            Lies::OnOneColour
+        } else {
+            Lies::Between
+        }
+    };
+    borders.into_iter().map(|(root, border)| (root, judge(root, border))).collect()
 }
 
 /// What shapes lie on, where one of them may lie on its own solid.
@@ -458,6 +489,20 @@ mod tests {
         let cross = drawn((long, long), Kind::Drawing, LIGHT, |x, y| x / 2 == 30 || y / 2 == 20);
         let row = |y: usize| (0..long).filter(|x| cross[y * long + x] == 7).count();
         assert_eq!([row(39), row(40), row(41)], [1, long, 2]);
+        // On a shading, and on a tint that is like it, it is no line.
+        for (ground, beside) in [(255, TONE), (3, TONE)] {
+            let colours = vec![
+                (Kind::Picture, [255; 3]),
+                (Kind::Picture, [0; 3]),
+                (Kind::Drawing, [230; 3]),
+                (Kind::Drawing, [238; 3]),
+            ];
+            let index =
+                (0..20 * long).map(|at| if (5..7).contains(&(at % 20)) { 2 } else { ground }).collect();
+            let flat = Flat { colours, index };
+            let fixed = fixed(&flat, 20, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, LIGHT]);
+            assert_eq!(fixed[24..28], [beside, TONE, TONE, beside], "{ground}");
+        }
         // A soft edge lies beside ink.
         let colours = vec![
             (Kind::Picture, [255; 3]),
