@@ -8,7 +8,7 @@ use observe::Silent;
 use press::inspect::inspect;
 use protocol::ink::Ink;
 
-use testing::needs::{Need, starts};
+use testing::needs::{Need, ghostscript, starts};
 use testing::program::Bench;
 
 /// Dots row by row.
@@ -140,14 +140,6 @@ fn one_bit_art_is_exact_beside_tones_in_pictures_and_drawings() {
 }
 
 /// Whether Ghostscript is here; else the test is left out.
-fn ghostscript() -> bool {
-    let found = starts("gs");
-    if !found {
-        Need::Queue.skip("there is no Ghostscript");
-    }
-    found
-}
-
 /// A page as PostScript, in points from its lower left corner.
 fn page((width, length): (f64, f64), drawing: &str) -> String {
     format!(

@@ -138,7 +138,7 @@ fn is_pass(name: &str) -> bool {
     })
 }
 
-/// What a file is by its first bytes, if that can be told.
+/// What a file is by its first bytes; `None` if it is empty or not there.
 fn format_of(path: &Path) -> Option<&'static str> {
     let mut start = Vec::new();
     fs::File::open(path).ok()?.take(16).read_to_end(&mut start).ok()?;

@@ -116,3 +116,12 @@ pub fn numpy() -> bool {
 pub fn starts(program: &str) -> bool {
     std::process::Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
+
+/// Whether Ghostscript is there; if not, the test is left out.
+pub fn ghostscript() -> bool {
+    let found = starts("gs");
+    if !found {
+        Need::Queue.skip("Ghostscript is not installed; `cargo xtask queue` installs it");
+    }
+    found
+}

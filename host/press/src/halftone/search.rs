@@ -5,8 +5,8 @@
 //! cells, convolved with the autocorrelation of the eye's response ([`Kernel`]), gives what a change would make of it in a
 //! few products (Analoui and Allebach 1992). The best change of a cell is made if it lessens the error: it or a half of it
 //! changes places with one of its eight neighbours or a half of that, or its own halves are arranged in another way
-//! ([`moves`]); each pair is looked at once a round. So every stack keeps its dots, and tones need no term of their own: after the first
-//! round they are made as exact as cells allow ([`settle`]).
+//! ([`moves`]); each pair is looked at once a round. So every stack keeps its dots, and tones need no term of their own: what the
+//! diffusion dropped is brought back after the first round ([`settle`]).
 //! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
 //! Parts of at most [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.

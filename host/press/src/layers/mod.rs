@@ -20,6 +20,7 @@ mod decode;
 mod distance;
 mod error;
 mod flat;
+mod grounds;
 mod intent;
 pub mod kinds;
 mod lattice;

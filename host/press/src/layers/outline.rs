@@ -7,7 +7,7 @@
 //! and are screened inside; so do thin shapes with more paper than ink, which a solid would make too dark. Of pale lines of [`HAIR`] dots or
 //! less only the middle is printed, one dot wide: screened they were dashes, and the palest had no dot. Soft edges, which lie between colours, and wide pale
 //! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
-//! A shape that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
+//! What a shape lies on ([`grounds`](super::grounds)) counts, too. One that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
 //! solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies on ink, by nearly
 //! all of its border, is printed in paper: a rim of ink would be drawn within white letters, and screened they are ragged.
 //! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines. What of the ground lies
@@ -15,16 +15,15 @@
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
 //! widths are measured with squares, so a slanting stroke counts as thinner than it is.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
 use super::counters::counters;
-use super::flat::{Flat, TONE, similar};
+use super::flat::{Flat, TONE};
+use super::grounds::{Grounds, Lies, PAPER, lies};
 use super::kinds::Kind;
 use super::lines::lines;
 use super::shapes::{Run, joined, shapes};
-use super::treatments::{CHOICES, Shape, Treatment};
+use super::treatments::{Shape, Treatment};
 use super::words::{self, Letter};
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.
@@ -33,13 +32,6 @@ const STROKE: u8 = 9;
 const HAIR: u8 = 4;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 const LETTER: u8 = 24;
-
-/// The least share of the border of what lies on ink, and of what lies on another colour.
-const ON_INK: f64 = 7.0 / 8.0;
-const ON_ONE: f64 = 3.0 / 4.0;
-
-/// The stack without ink.
-const PAPER: u8 = 0;
 
 /// A drawing at most so many dots wide and high, 5 mm, is as small as a letter: text that was made outlines, a module of a QR code.
 const SMALL: u32 = 118;
@@ -118,148 +110,6 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     fixed
 }
 
-/// What a pale shape lies on.
-#[derive(PartialEq, Eq)]
-enum Lies {
-    /// On ink, by nearly all of its border.
-    OnInk,
-    /// On one paler colour, or one that is as pale, by most of it.
-    OnOneColour,
-    /// Between colours, as a soft edge does, or on one that is like it, as a ripple.
-    Between,
-}
-
-/// What shapes lie on, by their roots. Only runs that take part are looked at.
-fn lies(
-    flat: &Flat,
-    width: usize,
-    treatments: &[Treatment],
-    (runs, rows): (&[Run], &[usize]),
-    takes_part: impl Fn(&Run) -> bool,
-) -> HashMap<u32, Lies> {
-    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
-    for (y, row) in rows.windows(2).enumerate() {
-        for run in runs[row[0]..row[1]].iter().filter(|run| takes_part(run)) {
-            let border = borders.entry(run.root).or_default();
-            let (start, end) = (run.start as usize, run.end as usize);
-            let line = y * width;
-            let left = start.checked_sub(1).map(|x| line + x);
-            let right = (end < width).then_some(line + end);
-            let above = y.checked_sub(1).map(|y| y * width);
-            let below = (y + 2 < rows.len()).then_some(line + width);
-            let upright = [above, below].into_iter().flatten().flat_map(|line| line + start..line + end);
-            for beside in left.into_iter().chain(right).chain(upright).map(|at| flat.index[at]) {
-                if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
-                    *border.entry(beside).or_default() += 1;
-                }
-            }
-        }
-    }
-    let has_ink = |&colour: &u8| match treatments.get(usize::from(colour)) {
-        Some(Treatment::Solid(stack)) => *stack != PAPER,
-        Some(Treatment::Shape(shape)) => shape.dark,
-        None => false,
-    };
-    let judge = |root: u32, border: HashMap<u8, u32>| {
-        let all: u32 = border.values().sum();
-        let (inked, pale): (Vec<_>, Vec<_>) = border.into_iter().partition(|(colour, _)| has_ink(colour));
-        let inked: u32 = inked.iter().map(|&(_, dots)| dots).sum();
-        let own = flat.colours[usize::from(runs[root as usize].colour)].1;
-        // Beside what filters sharpened there are ripples in all tints. What is no colour is a shading or a picture.
-        let is_ripple = |&(beside, _): &(u8, u32)| {
-            let is_like = |&(_, colour): &(Kind, [u8; 3])| similar(colour, own);
-            treatments.get(usize::from(beside)) != Some(&Treatment::Solid(PAPER))
-                && flat.colours.get(usize::from(beside)).is_none_or(is_like)
-        };
-        let most = pale.iter().filter(|beside| !is_ripple(beside)).map(|&(_, dots)| dots).max().unwrap_or(0);
-        if inked > 0 && f64::from(inked) >= ON_INK * f64::from(all) {
-            Lies::OnInk
-        } else if f64::from(most) >= ON_ONE * f64::from(all) {
-            Lies::OnOneColour
-        } else {
-            Lies::Between
-        }
-    };
-    borders.into_iter().map(|(root, border)| (root, judge(root, border))).collect()
-}
-
-/// What shapes lie on, where one of them may lie on its own solid.
-struct Grounds {
-    /// For each run: of the border of the shape it is the root of, the dots of other shapes, and those of them that are printed
-    /// as each of its stacks.
-    border: Vec<(u32, [u32; CHOICES])>,
-}
-
-impl Grounds {
-    /// Counts the borders; `None` if no two colours have a stack in common.
-    fn of(
-        flat: &Flat,
-        width: usize,
-        treatments: &[Treatment],
-        (runs, rows): (&[Run], &[usize]),
-    ) -> Option<Grounds> {
-        let shape = |colour: u8| match treatments.get(usize::from(colour)) {
-            Some(Treatment::Shape(shape)) => Some(shape),
-            _ => None,
-        };
-        // The stacks of a shape that dots of another colour are printed as, a bit each.
-        let meet = |shape: &Shape, beside: u8| -> u8 {
-            let (stack, yields) = match treatments.get(usize::from(beside)) {
-                Some(&Treatment::Solid(stack)) => (stack, true),
-                Some(Treatment::Shape(other)) => (other.solids[0], other.dark && other.rank < shape.rank),
-                None => return 0,
-            };
-            let same = shape.solids.iter().enumerate().filter(|&(_, &solid)| yields && solid == stack);
-            same.fold(0, |bits, (at, _)| bits | 1 << at)
-        };
-        let met: Vec<u8> = (0..=255u8)
-            .flat_map(|own| (0..=255u8).map(move |beside| (own, beside)))
-            .map(|(own, beside)| match shape(own) {
-                Some(shape) if own != beside && !joined_or_none(flat, own, beside) => meet(shape, beside),
-                _ => 0,
-            })
-            .collect();
-        if !met.iter().any(|bits| bits & 1 == 1) {
-            return None;
-        }
-        let mut border = vec![(0, [0; CHOICES]); runs.len()];
-        for y in 0..rows.len() - 1 {
-            for run in &runs[rows[y]..rows[y + 1]] {
-                let (all, stacks) = &mut border[run.root as usize];
-                let mut count = |beside: u8| {
-                    if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
-                        *all += 1;
-                        let bits = met[256 * usize::from(run.colour) + usize::from(beside)];
-                        stacks
-                            .iter_mut()
-                            .enumerate()
-                            .for_each(|(at, dots)| *dots += u32::from(bits >> at & 1));
-                    }
-                };
-                let (start, end) = (run.start as usize, run.end as usize);
-                let row = &flat.index[y * width..(y + 1) * width];
-                start
-                    .checked_sub(1)
-                    .into_iter()
-                    .chain((end < width).then_some(end))
-                    .for_each(|x| count(row[x]));
-                let others = [y.checked_sub(1), (y + 2 < rows.len()).then_some(y + 1)];
-                for other in others.into_iter().flatten() {
-                    flat.index[other * width..][start..end].iter().for_each(|&beside| count(beside));
-                }
-            }
-        }
-        Some(Grounds { border })
-    }
-
-    /// The solid of a shape: the nearest that it does not lie on.
-    fn solid(&self, root: u32, shape: &Shape) -> Option<u8> {
-        let (all, stacks) = self.border[root as usize];
-        let free = |&(_, dots): &(u8, u32)| 2 * dots < all.max(1);
-        shape.solids.into_iter().zip(stacks).find(free).map(|(solid, _)| solid)
-    }
-}
-
 /// Letters that are decided by the word they belong to.
 struct Words {
     /// For each run, the number of the letter it is the root of, or [`NO_LETTER`]. Empty if there is none.
@@ -304,11 +154,6 @@ impl Words {
     fn thin(&self, root: u32) -> Option<bool> {
         self.letter.get(root as usize).and_then(|&number| self.thin.get(number as usize)).copied()
     }
-}
-
-/// Whether a colour of the palette can belong to the shape of another, or is none of the palette.
-fn joined_or_none(flat: &Flat, own: u8, beside: u8) -> bool {
-    usize::from(beside) < flat.colours.len() && joined(flat, own, beside)
 }
 
 /// For each run that is the root of a shape, whether the shape is text or as small as a letter.

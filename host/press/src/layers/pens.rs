@@ -51,16 +51,19 @@ struct Ridge {
 
 impl Ridge {
     fn length(&self) -> f32 {
-        self.differs.iter().map(|v| v * v).sum::<f32>().sqrt()
+        length(self.differs)
     }
 
     /// Whether a colour that differs so from the ground is seen in this ridge, and by how much of it.
     fn share_of(&self, of: [f32; 3]) -> Option<f32> {
-        let square = |a: [f32; 3], b: [f32; 3]| (0..3).map(|c| a[c] * b[c]).sum::<f32>();
-        let (along, whole) = (square(self.differs, of), square(of, of));
-        (along > 0.0 && along * along >= ALIGNED * ALIGNED * whole * square(self.differs, self.differs))
-            .then(|| along / whole)
+        let along: f32 = self.differs.iter().zip(of).map(|(own, of)| own * of).sum();
+        let whole = length(of);
+        (along >= ALIGNED * whole * self.length() && along > 0.0).then(|| along / (whole * whole))
     }
+}
+
+fn length(of: [f32; 3]) -> f32 {
+    of.iter().map(|v| v * v).sum::<f32>().sqrt()
 }
 
 /// The colours of pens that drew these ridges on these grounds, but for those that are `known`. `None` if many of them
@@ -95,14 +98,14 @@ fn colours(mut rest: Vec<Ridge>, grounds: &[[u8; 3]], known: &[[u8; 3]]) -> Opti
         }
         lengths.sort_unstable_by(f32::total_cmp);
         let strongest = &lengths[lengths.len() * 17 / 20..=lengths.len() * 19 / 20];
-        let length = strongest.iter().sum::<f32>() / strongest.len() as f32;
-        let weak = lengths.iter().filter(|&&own| own < WEAK * length).count();
+        let strength = strongest.iter().sum::<f32>() / strongest.len() as f32;
+        let weak = lengths.iter().filter(|&&own| own < WEAK * strength).count();
         if weak as f64 > OTHERS * lengths.len() as f64 {
             return None;
         }
-        let whole = direction.iter().map(|v| v * v).sum::<f32>().sqrt();
+        let whole = length(direction);
         let pen = std::array::from_fn(|c| {
-            (f32::from(grounds[ground][c]) + direction[c] / whole * length).round().clamp(0.0, 255.0) as u8
+            (f32::from(grounds[ground][c]) + direction[c] / whole * strength).round().clamp(0.0, 255.0) as u8
         });
         rest.retain(|ridge| !on_it(ridge) && ridge.share_of(differs(pen, ridge.ground)).is_none());
         if !pens.iter().chain(grounds).any(|&other| similar(other, pen)) {
@@ -191,11 +194,8 @@ impl<const N: usize> Page<'_, N> {
                 std::array::from_fn(|c| f32::from(pixel[c]) - f32::from(grounds[ground][c]))
             };
             let own = Ridge { ground, differs: differs(at) };
-            let length = own.length();
-            let is_highest = || {
-                self.around(at, 1).all(|beside| Ridge { ground, differs: differs(beside) }.length() <= length)
-            };
-            (length >= FAINT && is_highest()).then_some(own)
+            let is_highest = || self.around(at, 1).all(|beside| length(differs(beside)) <= own.length());
+            (own.length() >= FAINT && is_highest()).then_some(own)
         };
         drawn.filter_map(ridge).collect()
     }

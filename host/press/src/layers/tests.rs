@@ -19,7 +19,7 @@ use super::*;
 use observe::Silent;
 use protocol::ink::Ink;
 use tempfile::TempDir;
-use testing::needs::{self, Need};
+use testing::needs::ghostscript;
 
 struct Bench(TempDir);
 
@@ -78,14 +78,6 @@ fn extent(layer: &Layer) -> (usize, usize, usize, usize, u64) {
     let all = || (0..plane.length).flat_map(|y| (0..plane.width).map(move |x| (x, y))).filter(inked);
     let (xs, ys) = (all().map(|p| p.0), all().map(|p| p.1));
     (xs.clone().min().unwrap(), ys.clone().min().unwrap(), xs.max().unwrap(), ys.max().unwrap(), plane.dots())
-}
-
-fn ghostscript() -> bool {
-    let found = needs::starts("gs");
-    if !found {
-        Need::Queue.skip("Ghostscript is not installed; `cargo xtask queue` installs it");
-    }
-    found
 }
 
 /// Dots of a length in millimetres.

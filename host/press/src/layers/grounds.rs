@@ -1,0 +1,153 @@
+//! What the shapes of colours that no stack prints lie on.
+//!
+//! Problem: a letter vanishes in a ground that is printed as its solid, a rim of ink spoils a white letter on ink, and a soft edge is no line.
+//! Method: of each shape the dots beside it that are of other shapes are counted, by the stacks that they are printed as ([`Grounds`])
+//! or by their colours ([`lies`]).
+//! Cost: 2 ns a dot of shapes, twice where solids may meet and there are pale shapes. Limits: contact is that of four neighbours.
+
+use std::collections::HashMap;
+
+use super::flat::{Flat, similar};
+use super::kinds::Kind;
+use super::shapes::{Run, joined};
+use super::treatments::{CHOICES, Shape, Treatment};
+
+/// The least share of the border of what lies on ink, and of what lies on another colour.
+const ON_INK: f64 = 7.0 / 8.0;
+const ON_ONE: f64 = 3.0 / 4.0;
+
+/// The stack without ink.
+pub(super) const PAPER: u8 = 0;
+
+/// What a pale shape lies on.
+#[derive(PartialEq, Eq)]
+pub(super) enum Lies {
+    /// On ink, by nearly all of its border.
+    OnInk,
+    /// On one paler colour, or one that is as pale, by most of it.
+    OnOneColour,
+    /// Between colours, as a soft edge does, or on one that is like it, as a ripple.
+    Between,
+}
+
+/// What shapes lie on, by their roots. Only runs that take part are looked at.
+pub(super) fn lies(
+    flat: &Flat,
+    width: usize,
+    treatments: &[Treatment],
+    (runs, rows): (&[Run], &[usize]),
+    takes_part: impl Fn(&Run) -> bool,
+) -> HashMap<u32, Lies> {
+    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
+    each_beside(flat, width, (runs, rows), |run, beside| {
+        if takes_part(run) {
+            *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
+        }
+    });
+    let has_ink = |&colour: &u8| match treatments.get(usize::from(colour)) {
+        Some(Treatment::Solid(stack)) => *stack != PAPER,
+        Some(Treatment::Shape(shape)) => shape.dark,
+        None => false,
+    };
+    let judge = |root: u32, border: HashMap<u8, u32>| {
+        let all: u32 = border.values().sum();
+        let (inked, pale): (Vec<_>, Vec<_>) = border.into_iter().partition(|(colour, _)| has_ink(colour));
+        let inked: u32 = inked.iter().map(|&(_, dots)| dots).sum();
+        let own = flat.colours[usize::from(runs[root as usize].colour)].1;
+        // Beside what filters sharpened there are ripples in all tints. What is no colour is a shading or a picture.
+        let is_ripple = |&(beside, _): &(u8, u32)| {
+            let is_like = |&(_, colour): &(Kind, [u8; 3])| similar(colour, own);
+            treatments.get(usize::from(beside)) != Some(&Treatment::Solid(PAPER))
+                && flat.colours.get(usize::from(beside)).is_none_or(is_like)
+        };
+        let most = pale.iter().filter(|beside| !is_ripple(beside)).map(|&(_, dots)| dots).max().unwrap_or(0);
+        if inked > 0 && f64::from(inked) >= ON_INK * f64::from(all) {
+            Lies::OnInk
+        } else if f64::from(most) >= ON_ONE * f64::from(all) {
+            Lies::OnOneColour
+        } else {
+            Lies::Between
+        }
+    };
+    borders.into_iter().map(|(root, border)| (root, judge(root, border))).collect()
+}
+
+/// What shapes lie on, where one of them may lie on its own solid.
+pub(super) struct Grounds {
+    /// For each run: of the border of the shape it is the root of, the dots of other shapes, and those of them that are printed
+    /// as each of its stacks.
+    border: Vec<(u32, [u32; CHOICES])>,
+}
+
+impl Grounds {
+    /// Counts the borders; `None` if no two colours have a stack in common.
+    pub(super) fn of(
+        flat: &Flat,
+        width: usize,
+        treatments: &[Treatment],
+        (runs, rows): (&[Run], &[usize]),
+    ) -> Option<Grounds> {
+        let shape = |colour: u8| match treatments.get(usize::from(colour)) {
+            Some(Treatment::Shape(shape)) => Some(shape),
+            _ => None,
+        };
+        // The stacks of a shape that dots of another colour are printed as, a bit each.
+        let meet = |shape: &Shape, beside: u8| -> u8 {
+            let (stack, yields) = match treatments.get(usize::from(beside)) {
+                Some(&Treatment::Solid(stack)) => (stack, true),
+                Some(Treatment::Shape(other)) => (other.solids[0], other.dark && other.rank < shape.rank),
+                None => return 0,
+            };
+            let same = shape.solids.iter().enumerate().filter(|&(_, &solid)| yields && solid == stack);
+            same.fold(0, |bits, (at, _)| bits | 1 << at)
+        };
+        let met: Vec<u8> = (0..=255u8)
+            .flat_map(|own| (0..=255u8).map(move |beside| (own, beside)))
+            .map(|(own, beside)| match shape(own) {
+                Some(shape) if own != beside && !joined_or_none(flat, own, beside) => meet(shape, beside),
+                _ => 0,
+            })
+            .collect();
+        if !met.iter().any(|bits| bits & 1 == 1) {
+            return None;
+        }
+        let mut border = vec![(0, [0; CHOICES]); runs.len()];
+        each_beside(flat, width, (runs, rows), |run, beside| {
+            let (all, stacks) = &mut border[run.root as usize];
+            *all += 1;
+            let bits = met[256 * usize::from(run.colour) + usize::from(beside)];
+            stacks.iter_mut().enumerate().for_each(|(at, dots)| *dots += u32::from(bits >> at & 1));
+        });
+        Some(Grounds { border })
+    }
+
+    /// The solid of a shape: the nearest that it does not lie on.
+    pub(super) fn solid(&self, root: u32, shape: &Shape) -> Option<u8> {
+        let (all, stacks) = self.border[root as usize];
+        let free = |&(_, dots): &(u8, u32)| 2 * dots < all.max(1);
+        shape.solids.into_iter().zip(stacks).find(free).map(|(solid, _)| solid)
+    }
+}
+
+/// Calls `with` for each dot that is beside a run, and of another shape.
+fn each_beside(flat: &Flat, width: usize, (runs, rows): (&[Run], &[usize]), mut with: impl FnMut(&Run, u8)) {
+    for (y, row) in rows.windows(2).enumerate() {
+        for run in &runs[row[0]..row[1]] {
+            let (start, end, line) = (run.start as usize, run.end as usize, y * width);
+            let ends = [start.checked_sub(1), (end < width).then_some(end)];
+            let lines = [y.checked_sub(1), (y + 2 < rows.len()).then_some(y + 1)];
+            let ends = ends.into_iter().flatten().map(|x| line + x);
+            let upright = lines.into_iter().flatten().flat_map(|y| y * width + start..y * width + end);
+            for beside in ends.chain(upright).map(|at| flat.index[at]) {
+                if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
+                    with(run, beside);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a colour of the palette can belong to the shape of another, or is none of the palette.
+fn joined_or_none(flat: &Flat, own: u8, beside: u8) -> bool {
+    usize::from(beside) < flat.colours.len() && joined(flat, own, beside)
+}
