@@ -1,4 +1,4 @@
-//! What strangers feed the program: every mistake has exit code 1, a message with the file and the field, and leaves
+//! What strangers feed the program: every mistake has exit code 1 (2 in the arguments), a message with the file and the field, and leaves
 //! the folder as it was.
 
 use std::fs;
@@ -250,8 +250,8 @@ fn painted_weights_that_do_not_sum_to_one_are_named_once() {
 #[test]
 fn inks_that_make_no_stack_are_refused_at_once() {
     let bench = Bench::new();
-    for (inks, says) in [("-all", "no ink"), ("white", "white"), ("tin", "tin")] {
-        let said = bench.refused(1, &format!("print sample:leaf --inks {inks}"));
+    for (inks, code, says) in [("-all", 2, "no ink"), ("white", 1, "white"), ("tin", 2, "tin")] {
+        let said = bench.refused(code, &format!("print sample:leaf --inks {inks}"));
         assert!(said.contains(says) && !said.contains("basis"), "{said}");
     }
 }

@@ -114,6 +114,17 @@ fn wrong_usage_is_exit_code_2() {
     assert!(said.contains("120x90mm"), "{said}");
     let said = bench.refused(2, "print sample:leaf --paper a3");
     assert!(said.contains("a4"), "{said}");
+    for (args, expected) in [
+        ("print sample:leaf --inks process,metalic-silver", "did you mean `metallic-silver`"),
+        ("layers white.png --inks goold", "--inks: `goold` is neither an ink nor"),
+        ("layers white.png --knockout pinc", "--knockout: `pinc` is neither an ink nor"),
+        ("layers white.png --choke 50mm", "from 0 to 10 mm"),
+        ("preview sample:leaf -o out.jpg", "must end in .html, .png, .exr or .glb"),
+        ("profile set --cross 99x30mm mine", "--cross and --distance"),
+    ] {
+        let said = bench.refused(2, args);
+        assert!(said.contains(expected), "{args}: {said}");
+    }
     let said = bench.refused(2, "inks choose sample:leaf --cartridges 8");
     assert!(said.contains("from 1 to 7"), "{said}");
 }
@@ -167,13 +178,6 @@ fn bad_input_names_the_file_and_leaves_nothing_behind() {
     let said = bench.refused(1, "inspect tile/base_color.png");
     assert!(said.contains("base_color.png") && said.contains("byte"), "{said}");
     assert_eq!(bench.entries(), ["tile"]);
-}
-
-#[test]
-fn a_misspelt_ink_is_answered_with_the_one_meant() {
-    let bench = Bench::new();
-    let said = bench.refused(1, "print sample:leaf --inks process,metalic-silver");
-    assert!(said.contains("metallic-silver"), "{said}");
 }
 
 #[test]

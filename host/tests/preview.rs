@@ -340,7 +340,6 @@ fn what_cannot_be_shown_is_refused_with_what_to_do_and_leaves_nothing() {
         ("-o out.png --view 120,0", "behind the sheet"),
         ("-o out.png --view 60,0 --tilt -60,0", "behind the sheet"),
         ("-o out.png --curl 0.001", "cannot be bent"),
-        ("-o out.jpg", "must end in .html, .png, .exr or .glb"),
         ("-o out.glb --light 10,20", "a .glb has no lights"),
         ("-o out.png --light-probe nan.hdr", "nan.hdr"),
         ("-o out.png --light-probe negative.hdr", "negative.hdr"),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
 use clap::Args;
-use inks::{InkSet, Library, Trust};
+use inks::{InkSet, InkSetError, Library, Trust};
 
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
@@ -12,6 +12,7 @@ use appearance::gamut::{self, Intent};
 use press::{halftone, layers};
 
 use super::choice::{Metric, choice, name, utf8, whole};
+use super::stdio::usage;
 use crate::libraries;
 use observe::Observer;
 
@@ -139,11 +140,11 @@ impl InkArgs {
 
     fn set(&self) -> Result<InkSet> {
         let set: InkSet = match &self.inks {
-            Some(text) => text.parse()?,
+            Some(text) => text.parse().map_err(|error: InkSetError| usage(format!("--inks: {error}")))?,
             None => InkSet::default(),
         };
         if set.is_empty() {
-            bail!("--inks leaves no ink to print with");
+            return Err(usage("--inks leaves no ink to print with"));
         }
         Ok(set)
     }

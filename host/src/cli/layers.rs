@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use clap::Args as ClapArgs;
-use inks::{InkSet, Library};
+use inks::{InkSet, InkSetError, Library};
 use protocol::ink::Ink;
 use protocol::rgl::Resolution;
 use serde_json::json;
@@ -17,9 +17,13 @@ use super::job::{Artwork, ResultArgs};
 use super::layout::{LayoutArgs, MediaArgs};
 use super::preset::PresetArg;
 use super::shown::Shown;
+use super::stdio::usage;
 use observe::Observer;
 use press::job::plan::{Suggestion, grouped};
-use press::layers::{self, Accept, Composed, Finish, GAMMAS, Intent, Order, Pages, Room, White, names};
+use press::layers::{
+    self, Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, RESOLUTIONS, Room, White,
+    names,
+};
 use press::layout::{Layout, Mm, NoLength, Size};
 use press::pipeline;
 use press::sheet::DOTS_PER_MM;
@@ -97,8 +101,9 @@ pub struct LayersArgs {
 }
 
 fn dpi(text: &str) -> Result<f64, String> {
-    let dpi = text.parse().ok().filter(|dpi| (20.0..=10_000.0).contains(dpi));
-    dpi.ok_or_else(|| "expected pixels per inch from 20 to 10000, such as 600".into())
+    let dpi = text.parse().ok().filter(|dpi| RESOLUTIONS.contains(dpi));
+    let (least, most) = RESOLUTIONS.into_inner();
+    dpi.ok_or_else(|| format!("expected pixels per inch from {least} to {most}, such as 600"))
 }
 
 fn resolution(text: &str) -> Result<Resolution, String> {
@@ -125,13 +130,13 @@ fn page(text: &str) -> Result<u32, String> {
     }
 }
 
-/// A length that is not negative, in dots of 600 dpi.
+/// How far white may grow or shrink, in dots of 600 dpi.
 fn length(text: &str) -> Result<f64, String> {
     let length: Mm = text.parse().map_err(|error: NoLength| error.to_string())?;
-    if length.0 >= 0.0 {
+    if (0.0..=MOST_CHOKE_MM).contains(&length.0) {
         Ok(length.0 * DOTS_PER_MM)
     } else {
-        Err("expected a length of 0 or more, such as 0.1mm".into())
+        Err(format!("expected a length from 0 to {MOST_CHOKE_MM} mm, such as 0.1mm"))
     }
 }
 
@@ -153,7 +158,7 @@ fn order(text: &str) -> Result<Order, String> {
 
 /// Inks as typed: any of their names, or groups.
 fn set(option: &str, text: &str) -> Result<InkSet> {
-    text.parse().with_context(|| option.to_owned())
+    text.parse().map_err(|error: InkSetError| usage(format!("{option}: {error}")))
 }
 
 impl LayersArgs {
@@ -171,7 +176,7 @@ impl LayersArgs {
         };
         let inks = set("--inks", &text)?;
         if inks.is_empty() {
-            bail!("--inks leaves no ink to print with");
+            return Err(usage("--inks leaves no ink to print with"));
         }
         Ok(inks)
     }

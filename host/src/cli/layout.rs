@@ -8,7 +8,7 @@ use inks::InkSet;
 use protocol::paper::Paper;
 use protocol::rgl::{Media, Resolution};
 
-use super::stdio::{chain, show};
+use super::stdio::{chain, show, usage};
 use crate::folders;
 use observe::Observer;
 use press::job::Handling;
@@ -280,6 +280,9 @@ pub fn profile_command(args: &ProfileArgs) -> Result<()> {
         ProfileCommand::List { json } => list_profiles(*json),
         ProfileCommand::Set(set) => {
             let profile = press::chart::calibration::profile(set.cross, set.distance);
+            if let Some(problem) = profile.problem() {
+                return Err(usage(format!("--cross and --distance make {problem}; measure them again")));
+            }
             let path = save_profile(&set.name, &profile)?;
             show(&format!("{}: {}\n", path.display(), in_words(&profile)))
         }

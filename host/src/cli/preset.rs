@@ -128,7 +128,8 @@ impl Preset {
     /// The preset of this name, and its options as words.
     fn load(name: &str) -> Result<(Preset, Vec<String>)> {
         let path = folders::file(&presets()?, name)?;
-        if path.is_file() {
+        // A link that leads nowhere is a preset that cannot be used.
+        if path.symlink_metadata().is_ok() {
             let bad = || format!("preset `{name}` cannot be used; correct its file, or save it again");
             let preset: Preset = read_toml(&path).with_context(bad)?;
             let words = preset.words().with_context(|| path.display().to_string()).with_context(bad)?;
@@ -229,7 +230,11 @@ fn save(name: &str, options: &[String], program: &clap::Command) -> Result<()> {
         .filter(|(_, refusal)| refusal.is_none())
         .map(|(command, _)| command.get_name())
         .collect();
-    show(&format!("{}: {} (for {})\n", path.display(), words.join(" "), fits.join(", ")))
+    let instead = match BUILT_IN.iter().any(|(known, _)| known == &name) {
+        true => "; it stands in for the built-in one of this name until its file is removed",
+        false => "",
+    };
+    show(&format!("{}: {} (for {}){instead}\n", path.display(), words.join(" "), fits.join(", ")))
 }
 
 /// Lists the presets, a line each. One that cannot be used says so.

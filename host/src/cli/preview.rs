@@ -23,6 +23,7 @@ use super::choice::whole;
 use super::laid::DotsArgs;
 use super::output::Staged;
 use super::preset::PresetArg;
+use super::stdio::usage;
 
 /// What is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,7 +185,10 @@ fn format(output: &Path) -> Result<Format> {
         Some("png") => Ok(Format::Png),
         Some("exr") => Ok(Format::Exr),
         Some("glb") => Ok(Format::Glb),
-        _ => bail!("{}: the name of the file must end in .html, .png, .exr or .glb", output.display()),
+        _ => Err(usage(format!(
+            "{}: the name of the file must end in .html, .png, .exr or .glb",
+            output.display()
+        ))),
     }
 }
 

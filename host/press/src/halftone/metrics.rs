@@ -18,7 +18,7 @@ use super::solids::Solids;
 use super::thin;
 use super::{HalftoneError, SAMPLES, Settings, TONE, cells, check};
 use crate::sheet::DotMap;
-use crate::sheet::clusters::smallest_clusters;
+use crate::sheet::clusters::{Touch, smallest_clusters};
 use appearance::brdf::Space;
 use appearance::gamut::InkMix;
 use appearance::wide::wide;
@@ -94,7 +94,7 @@ pub fn tones(mix: &InkMix, dots: &DotMap, observer: &dyn Observer) -> Result<Vec
 
     let (runs, clusters) = rayon::join(
         || runs(&lattice, &tiles, stacks, row),
-        || smallest_clusters(width, dots.index(), &std::array::from_fn(|stack| stack as u8)),
+        || smallest_clusters(width, dots.index(), &std::array::from_fn(|stack| stack as u8), Touch::Side),
     );
     let total = f64::from(walk.len());
     let tone = |q: usize| {

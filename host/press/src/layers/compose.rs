@@ -35,6 +35,7 @@ use observe::Observer;
 use slot::{COLOURS, Slot};
 
 pub use arrange::Order;
+pub use beds::MOST_CHOKE_MM;
 pub use settings::{Finish, GAMMAS, Settings};
 pub use slot::Laid;
 pub use suggest::{Accept, Remedy, Suggestion};

@@ -7,7 +7,7 @@
 use std::io::{BufRead, BufReader, Seek};
 use std::path::{Path, PathBuf};
 
-use super::decode::decode;
+use super::decode::{decode, undecodable};
 use super::error::{LayersError, io, resolution_in_words, wrong};
 use super::orientation::Turn;
 use super::resolution::{Dpi, of_png};
@@ -187,7 +187,10 @@ pub(super) fn scan(path: &Path, page: Option<u32>) -> Result<Scan, LayersError> 
 }
 
 fn scan_png(path: &Path, file: impl BufRead + Seek) -> Result<Scan, LayersError> {
-    let bad = |error: png::DecodingError| wrong(path, format!("cannot decode the picture: {error}"));
+    let bad = |error: png::DecodingError| {
+        let cause = if let png::DecodingError::IoError(cause) = &error { Some(cause) } else { None };
+        undecodable(path, &error, cause)
+    };
     let limits = png::Limits { bytes: 1 << 26 };
     let mut decoder = png::Decoder::new_with_limits(file, limits);
     decoder.set_transformations(png::Transformations::normalize_to_color8());

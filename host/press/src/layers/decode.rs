@@ -4,10 +4,11 @@
 //! first picture. Limits: a gigabyte of file, [`MOST_PIXELS`] pixels. A damaged colour profile is no reason to refuse a picture. The decoder of JPEG makes up what a file
 //! that was cut short lacks, so the end of the picture is looked for first.
 
-use std::io::{Cursor, Read};
+use std::fmt::Display;
+use std::io::{Cursor, ErrorKind, Read};
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageFormat};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat};
 
 use super::error::{LayersError, io, wrong};
 use super::orientation::Turn;
@@ -55,7 +56,10 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         ImageFormat::Tiff => tiff_pages::choose(path, &mut bytes, page)?,
         _ => {}
     }
-    let bad = |error: image::ImageError| wrong(path, format!("cannot decode the picture: {error}"));
+    let bad = |error: ImageError| {
+        let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
+        undecodable(path, &error, cause)
+    };
     let mut reader = image::ImageReader::with_format(Cursor::new(&bytes[..]), format);
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(8 * MOST_PIXELS);
@@ -71,12 +75,20 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
     Ok(Decoded { image, dpi, profile })
 }
 
+/// A picture that ends before its end.
+const CUT_SHORT: &str = "the picture ends before its last row: the file was cut short; copy or save it again";
+
+/// Why a picture cannot be decoded; `cause` is what reading its bytes ended with, if that is the reason.
+pub(super) fn undecodable(path: &Path, error: &impl Display, cause: Option<&std::io::Error>) -> LayersError {
+    match cause {
+        Some(cause) if cause.kind() == ErrorKind::UnexpectedEof => wrong(path, CUT_SHORT),
+        _ => wrong(path, format!("cannot decode the picture: {error}")),
+    }
+}
+
 /// Refuses a JPEG that was cut short: one without the marker of its end.
 pub(super) fn whole_jpeg(path: &Path, bytes: &[u8]) -> Result<(), LayersError> {
-    if jpeg_has_end(bytes) {
-        return Ok(());
-    }
-    Err(wrong(path, "the picture ends before its last row: the file was cut short; copy or save it again"))
+    if jpeg_has_end(bytes) { Ok(()) } else { Err(wrong(path, CUT_SHORT)) }
 }
 
 /// Whether a JPEG has the marker of its end, outside of the segments with data of their own, such as a small copy in EXIF.

@@ -59,13 +59,15 @@ mod words;
 pub use artwork::{Artwork, Layer, Shape};
 pub use colour::Colour;
 pub use compose::{
-    Accept, Composed, Finish, GAMMAS, Laid, Order, Remedy, Report, Settings, Suggestion, compose,
+    Accept, Composed, Finish, GAMMAS, Laid, MOST_CHOKE_MM, Order, Remedy, Report, Settings, Suggestion,
+    compose,
 };
 pub use error::{LayersError, NamedPart, Setting};
 pub use intent::Intent;
 pub use open::{is_art, open};
 pub use options::{Options, Pages, Room};
 pub use page::Page;
+pub use resolution::RESOLUTIONS;
 pub use svg::DRAWING;
 pub use white::White;
 pub use window::Window;

@@ -2,9 +2,10 @@
 //!
 //! Method: PNG and BMP state pixels per metre; the JFIF and EXIF segments of a JPEG and the tags of a TIFF state pixels per inch or
 //! per centimetre. Of the two segments JFIF comes first; in EXIF, 72 dpi means that the resolution is unknown, by its
-//! standard (CIPA DC-008). Limits: resolutions below 20 or above 10000 dpi are ignored, because programs that mean none write 1.
+//! standard (CIPA DC-008). Limits: resolutions outside of [`RESOLUTIONS`] are ignored.
 
 use std::io::Cursor;
+use std::ops::RangeInclusive;
 
 use ::tiff::decoder::{Decoder, Limits};
 use ::tiff::tags::Tag;
@@ -41,10 +42,11 @@ fn of_bmp(bytes: &[u8]) -> Option<Dpi> {
     if number(14)? < 40 { None } else { Some((inch(38)?, inch(42)?)) }
 }
 
-/// Programs that mean no resolution leave 1 and the like.
+/// Resolutions of pictures, in pixels per inch: programs that mean none leave 1 and the like.
+pub const RESOLUTIONS: RangeInclusive<f64> = 5.0..=10_000.0;
+
 fn plausible(dpi: &Dpi) -> bool {
-    let fine = |d: f64| d.is_finite() && (20.0..=10_000.0).contains(&d);
-    fine(dpi.0) && fine(dpi.1)
+    RESOLUTIONS.contains(&dpi.0) && RESOLUTIONS.contains(&dpi.1)
 }
 
 /// The resolution in the JFIF segment, which follows the start of the file if there is one.

@@ -17,7 +17,7 @@ use protocol::ink::Kind;
 use serde::Serialize;
 
 use super::passes::{MOST_CARTRIDGES, Plan};
-use crate::sheet::clusters::smallest_clusters;
+use crate::sheet::clusters::{Touch, smallest_clusters};
 use crate::sheet::{Sheet, dots_in_words};
 
 /// A rule that a sheet touches.
@@ -95,14 +95,14 @@ const PAGE_RULES: [PageRule; 9] = [
         Certainty::Published,
         When::Finer(Kind::Foil, 9),
         "foil in clusters of fewer than 3 x 3 dots does not stick, or takes more foil with it; \
-         set the minimum cluster of foil stacks to 16",
+         draw what is smaller larger, or set the minimum cluster of foil stacks to 16",
     ),
     rule(
         "foil-fine",
         Severity::Warning,
         Certainty::Vendor,
         When::Finer(Kind::Foil, 16),
-        "foil in clusters of fewer than 4 x 4 dots may not stick; raise the minimum cluster of foil",
+        "foil in clusters of fewer than 4 x 4 dots may not stick; draw what is smaller larger, or raise the minimum cluster of foil",
     ),
     rule(
         "foil-code",
@@ -130,7 +130,7 @@ const PAGE_RULES: [PageRule; 9] = [
         Severity::Warning,
         Certainty::Published,
         When::Finer(Kind::Metallic, 8),
-        "metallic inks need clusters of 8 to 16 dots; raise their minimum cluster",
+        "metallic inks need clusters of 8 to 16 dots; draw what is smaller larger, or raise the minimum cluster of what a halftone made",
     ),
     rule(
         "finish-partial",
@@ -178,7 +178,7 @@ impl<'a> Page<'a> {
                 label[q] = u8::from(census[q] > 0 && layers(stack, kind) > 0);
             }
             let any = label.contains(&1);
-            any.then(|| (kind, smallest_clusters(sheet.width(), sheet.index(), &label)[1]))
+            any.then(|| (kind, smallest_clusters(sheet.width(), sheet.index(), &label, Touch::Corner)[1]))
         });
         Page {
             plan,

@@ -12,7 +12,7 @@ use super::super::{Method, Settings, TONE, halftone};
 use super::Point;
 use super::cell::{Cell, fits_half};
 use super::plan::{halved_size_of, size_of};
-use crate::sheet::clusters::smallest_clusters;
+use crate::sheet::clusters::{Touch, smallest_clusters};
 use appearance::brdf::{Space, reflectances};
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};

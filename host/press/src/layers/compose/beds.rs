@@ -11,8 +11,8 @@ use super::settings::{Finish, Settings};
 use super::slot::Slot;
 use crate::separate::Plane;
 
-/// The most that white is choked or spread.
-const MOST_MM: f64 = 10.0;
+/// The most that white is choked or spread, in mm.
+pub const MOST_CHOKE_MM: f64 = 10.0;
 
 /// Adds white, and chokes or spreads it.
 pub(super) fn lay_white(
@@ -85,9 +85,9 @@ fn choke(slots: &mut [Slot], choke: f64, tell: &mut dyn FnMut(String)) -> Result
     let setting = if choke > 0.0 { Setting::Choke } else { Setting::Spread };
     let radius = choke.abs();
     // What is typed as 10 mm may be a little more in dots.
-    if radius.is_nan() || radius * MM > MOST_MM + 1e-9 {
+    if radius.is_nan() || radius * MM > MOST_CHOKE_MM + 1e-9 {
         let typed = (radius * MM * 1e4).round() / 1e4;
-        return refused(setting, format!("{typed} mm is more than {MOST_MM} mm"));
+        return refused(setting, format!("{typed} mm is more than {MOST_CHOKE_MM} mm"));
     }
     let square = (radius * radius + 1e-6) as u32;
     if square == 0 {

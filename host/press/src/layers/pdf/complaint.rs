@@ -12,6 +12,9 @@ use std::path::Path;
 /// more.
 const END: u64 = 4096;
 
+/// What Ghostscript says of a page that there is not; then follows how many there are.
+const BEYOND: &str = "greater than the number of pages";
+
 /// The longest quote, in characters.
 const LONGEST: usize = 120;
 
@@ -21,14 +24,22 @@ pub fn no_page(said: &str, number: Option<u32>) -> String {
     if said.contains("requires a password") {
         return "it is encrypted and needs a password; save it without one".into();
     }
-    let beyond = said.contains("greater than the number of pages");
+    let beyond = said.contains(BEYOND);
     match (complaint(said).filter(|_| !beyond), number) {
         (Some(complaint), _) => {
             format!("it is damaged (Ghostscript says `{complaint}`); save or export it again")
         }
-        (None, Some(number)) => format!("there is no page {number}"),
+        (None, Some(number)) => match pages(said) {
+            Some(pages) => format!("there is no page {number}; the file has {pages}"),
+            None => format!("there is no page {number}"),
+        },
         (None, None) => "it has no page".into(),
     }
+}
+
+/// How many pages a document has that has not the page that was asked for.
+fn pages(said: &str) -> Option<u32> {
+    said.split_once(BEYOND)?.1.lines().next()?.rsplit(' ').next()?.parse().ok()
 }
 
 /// The first thing that Ghostscript complains of.
@@ -80,7 +91,8 @@ mod tests {
             no_page(broken, Some(1)).contains("is damaged (Ghostscript says `Couldn't initialise file`)")
         );
         assert!(no_page(&[locked, broken].concat(), None).contains("needs a password"));
-        assert_eq!(no_page(&[broken, beyond].concat(), Some(7)), "there is no page 7");
+        assert_eq!(no_page(&[broken, beyond].concat(), Some(7)), "there is no page 7; the file has 1");
+        assert_eq!(no_page(BEYOND, Some(7)), "there is no page 7");
         assert_eq!(no_page("noise", None), "it has no page");
         assert_eq!((damaged("noise"), cut_short(Path::new("none"))), (None, None));
         let long = complaint(&format!("**** Error: \x1b{}", "x".repeat(500))).unwrap();

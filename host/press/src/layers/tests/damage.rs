@@ -49,6 +49,22 @@ fn a_jpeg_that_was_cut_short_is_refused_as_a_layer_as_colour_and_as_plates() {
     }
 }
 
+#[test]
+fn a_picture_of_any_format_that_was_cut_short_says_so() {
+    use image::ImageFormat::{Bmp, Png, Pnm, Tiff, WebP};
+    let bench = Bench::new();
+    let noise = |x: u32, y: u32| image::Rgb([(x.wrapping_mul(y * y + 7919) % 251) as u8, x as u8, y as u8]);
+    let picture = image::RgbImage::from_fn(64, 64, noise);
+    for (format, name) in [(Bmp, "a.bmp"), (Png, "a.png"), (Pnm, "a.ppm"), (Tiff, "a.tif"), (WebP, "a.webp")]
+    {
+        let mut whole = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut whole, format).unwrap();
+        let whole = whole.into_inner();
+        let text = refused(&[bench.write(name, &whole[..whole.len() * 2 / 3])]);
+        assert!(text.contains("ends before its last row: the file was cut short"), "{name}: {text}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
     #[test]

@@ -120,7 +120,7 @@ fn parts_beside_solids_keep_their_minimum() {
     let free: Vec<bool> = (0..dots.len()).map(|at| solid(at % width, at / width)).collect();
     // Solids of the same stack may touch a part, so they are numbered apart.
     let numbered: Vec<u8> = dots.iter().zip(&free).map(|(&dot, &free)| if free { 3 } else { dot }).collect();
-    let least = smallest_clusters(width, &numbered, &std::array::from_fn(|stack| stack as u8));
+    let least = smallest_clusters(width, &numbered, &std::array::from_fn(|stack| stack as u8), Touch::Side);
     assert!(least[..3].iter().all(|&area| area >= 9), "{:?}", &least[..4]);
     let tones = free.iter().filter(|&&free| !free).count();
     let thin_dots = thin(width, &dots, |_| 9, |at| free[at]);
