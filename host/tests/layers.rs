@@ -74,7 +74,7 @@ fn what_is_wrong_is_said_and_nothing_is_left() {
         (1, "layers silver-foil.png", "--inks +silver-foil"),
         (1, "layers white.png --size 900mm", "even cropped it can be at most"),
         (1, "layers white.png --white alpha", "has no transparency"),
-        (1, "layers white.png --inks yelow", "did you mean `yellow`?"),
+        (2, "layers white.png --inks yelow", "did you mean `yellow`?"),
         (2, "layers white.png --passes white=0", "1 to 9"),
         (2, "layers white.png --choke 3", "length"),
         (2, "layers white.png --order white,blak", "did you mean `black`?"),

@@ -267,7 +267,7 @@ fn a_measured_machine_is_corrected_without_being_named() {
     let plan = json(&bench.done("plan moved.rgl --json"));
     // It prints 1 mm too far to the right: what is sent lies 1 mm further left.
     assert!((plan["from_edge_mm"][0].as_f64().unwrap() - 19.0).abs() < 0.1, "{}", plan["from_edge_mm"]);
-    assert!(bench.refused(1, "profile set x --cross 50x50mm").contains("measure again"));
+    assert!(bench.refused(2, "profile set x --cross 50x50mm").contains("measure them again"));
     assert!(bench.refused(1, "print tile --profile other").contains("(there are: default)"));
 }
 

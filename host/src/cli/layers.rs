@@ -24,7 +24,7 @@ use press::layers::{
     self, Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, RESOLUTIONS, Room, White,
     names,
 };
-use press::layout::{Layout, Mm, NoLength, Size};
+use press::layout::{self, Layout, Mm, NoLength, Size};
 use press::pipeline;
 use press::sheet::DOTS_PER_MM;
 
@@ -221,9 +221,7 @@ impl LayersArgs {
             accept: self.accept.clone(),
         })
     }
-}
 
-impl LayersArgs {
     /// Notes on options that have no effect on this art.
     fn idle(
         &self,
@@ -334,6 +332,8 @@ impl Work {
         let options = self.layers.options(self.size, &layout)?;
         let settings = self.layers.settings()?;
         let art = layers::open(&self.layers.art, &options, observer)?;
+        // Before the long work.
+        layout::check(art.width / usize::from(self.resolution.across(1)), art.length, &layout)?;
         let mut composed = layers::compose(&art, &settings, &library, observer)?;
         for note in self.layers.idle(&art, &options, &settings, &composed) {
             observer.note(&note);

@@ -36,6 +36,10 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         let found = match guessed {
             Some(format) => format!("{format:?}").to_uppercase() + ", which is not read; save it as PNG",
             None if bytes.is_empty() => "an empty file".into(),
+            // As drawings in `.svgz` are.
+            None if bytes.starts_with(b"\x1f\x8b") => {
+                "a compressed one; unpack it, such as with gunzip".into()
+            }
             None => "an unknown format".into(),
         };
         return Err(wrong(

@@ -30,6 +30,15 @@ pub(super) enum Lies {
     Between,
 }
 
+/// Whether most of what is printed so is ink. A shading or a picture is none of these.
+pub(super) fn has_ink(treatment: Option<Treatment>) -> bool {
+    match treatment {
+        Some(Treatment::Solid(stack)) => stack != PAPER,
+        Some(Treatment::Shape(shape)) => shape.dark,
+        None => false,
+    }
+}
+
 /// What shapes lie on, by their roots. Only runs that take part are looked at.
 pub(super) fn lies(
     flat: &Flat,
@@ -44,11 +53,7 @@ pub(super) fn lies(
             *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
         }
     });
-    let has_ink = |&colour: &u8| match treatments.get(usize::from(colour)) {
-        Some(Treatment::Solid(stack)) => *stack != PAPER,
-        Some(Treatment::Shape(shape)) => shape.dark,
-        None => false,
-    };
+    let has_ink = |&colour: &u8| has_ink(treatments.get(usize::from(colour)).copied());
     let judge = |root: u32, border: HashMap<u8, u32>| {
         let all: u32 = border.values().sum();
         let (inked, pale): (Vec<_>, Vec<_>) = border.into_iter().partition(|(colour, _)| has_ink(colour));

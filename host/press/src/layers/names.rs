@@ -60,6 +60,22 @@ pub(super) fn ink(name: &str) -> Option<Named> {
         .map(|ink| Named { place, ink })
 }
 
+/// Words that say of a name only that it is one of an ink.
+const SAYING: [&str; 5] = ["spot", "ink", "layer", "plate", "pass"];
+
+/// Whether a name is that of an ink, apart from numbers around it: a `black cat` is a cat. Codes are none: programs name shapes `c` or
+/// `k` for other reasons.
+pub(super) fn is_whole(name: &str) -> bool {
+    let name = name.to_lowercase();
+    let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| !SAYING.contains(word));
+    let words: Vec<&str> = words.collect();
+    let number = |word: &&str| word.chars().all(|c| c.is_ascii_digit());
+    let first = words.iter().take_while(|word| number(word)).count();
+    let last = words.iter().rev().take_while(|word| number(word)).count();
+    let name = words.get(first..words.len() - last).unwrap_or_default().join("-");
+    name.len() > 2 && typed(&name).is_ok()
+}
+
 /// The ink of one of several pages for which these inks are named. Equal inks need to know at which depth they lie: that of
 /// their page.
 pub(super) fn of_page(inks: &[Ink], page: u32, ink: Ink) -> Named {
@@ -154,6 +170,22 @@ mod tests {
         assert_eq!((closest("holiday"), closest("Fold"), closest("Blanc")), (None, None, None));
         assert!(typed("sliver").unwrap_err().contains("did you mean `silver`?"));
         assert_eq!(typed("silver foil"), Ok(Ink::SilverFoil));
+    }
+
+    #[test]
+    fn single_elements_need_the_whole_name_of_an_ink() {
+        for (name, whole) in [
+            ("white", true),
+            ("01-white", true),
+            ("Gold_Foil-2", true),
+            ("path-white", false),
+            ("black eye", false),
+            ("k", false),
+            ("12", false),
+            ("", false),
+        ] {
+            assert_eq!(is_whole(name), whole, "{name}");
+        }
     }
 
     proptest! {

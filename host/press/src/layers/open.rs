@@ -104,7 +104,9 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     if svg::is_svg(file, &start) {
         return svg::read(file, options, observer);
     }
-    if !options.reserved && names::ink(&stem(file)).is_some() {
+    let named = names::ink(&stem(file)).filter(|_| !options.reserved);
+    let is_whole = names::is_whole(&stem(file));
+    if named.is_some() && (is_whole || !picture::has_colours(file, options.page())) {
         return named_files(&stem(file), &[file.to_path_buf()], options, observer);
     }
     if start.starts_with(b"\xff\xd8")
@@ -114,10 +116,13 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     }
     let pixels = picture::read(file, options.page())?;
     let mut art = picture::artwork(&stem(file), pixels, options)?;
-    if let Some(known) = names::closest(&stem(file)).filter(|_| !options.reserved && art.drawn.dots() > 0) {
+    let close = || names::closest(&stem(file)).map(|known| (known, "its name is that of no ink"));
+    let part = named.map(|named| (named.ink.name(), "it has colours and only a part of its name is an ink"));
+    let meant = part.or_else(close).filter(|_| !options.reserved && art.drawn.dots() > 0);
+    if let Some((known, why)) = meant {
         art.notes.push(format!(
-            "{}: printed as a picture in process inks, because its name is that of no ink; to print it as a layer of {known}, \
-             rename the file to {known}.{}",
+            "{}: printed as a picture in process inks, because {why}; to print it as a layer of {known}, rename the file to \
+             {known}.{}",
             file.display(),
             file.extension().unwrap_or_default().display()
         ));

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 
 use super::counters::counters;
 use super::flat::{Flat, TONE};
-use super::grounds::{Grounds, Lies, PAPER, lies};
+use super::grounds::{Grounds, Lies, PAPER, has_ink, lies};
 use super::kinds::Kind;
 use super::lines::lines;
 use super::shapes::{Run, joined, shapes};
@@ -55,7 +55,13 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let shapes = shapes(flat, width, (&shaped, STROKE));
     let (runs, rows) = (&shapes.runs, &shapes.rows);
     let grounds = Grounds::of(flat, width, treatments, (runs, rows));
-    let is_letter = letters(flat, (runs, rows));
+    let small = letters(flat, (runs, rows));
+    // A small drawing in a colour unlike all stacks would be a blot of another colour.
+    let is_like = |run: &Run| match of(run.colour) {
+        Some(Treatment::Shape(shape)) => shape.near || !shape.dark || is_text(flat, run),
+        _ => true,
+    };
+    let is_letter: Vec<bool> = runs.iter().zip(&small).map(|(run, &small)| small && is_like(run)).collect();
     let is_thin =
         |root: u32| runs[root as usize].side < if is_letter[root as usize] { LETTER } else { STROKE };
     let is_counter = counters(flat, (runs, rows), u32::from(2 * LETTER), is_thin);
@@ -75,7 +81,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         for run in &runs[rows[y]..rows[y + 1]] {
             let root = run.root;
             let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
-            let (thin, first) = (is_thin(root), shape.solids[0]);
+            let (thin, first, is_small) = (is_thin(root), shape.solids[0], small[root as usize]);
             let (start, end) = (run.start as usize, run.end as usize);
             match solid(root, &shape) {
                 Some(solid) if thin && (shape.dark || solid != first) => fixed[start..end].fill(solid),
@@ -89,7 +95,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
                     for (x, dot) in (start..).zip(&mut fixed[start..end]) {
                         if is_hairline {
                             *dot = if is_ridge(flat, width, (x, y)) { solid } else { PAPER };
-                        } else if at_the_rim(flat, width, (x, y)) {
+                        } else if at_the_rim(flat, width, (x, y), |beside| {
+                            is_small || needs_rim(&shape, of(beside))
+                        }) {
                             *dot = solid;
                         }
                     }
@@ -156,9 +164,12 @@ impl Words {
     }
 }
 
+fn is_text(flat: &Flat, run: &Run) -> bool {
+    flat.colours[usize::from(run.colour)].0 == Kind::Text
+}
+
 /// For each run that is the root of a shape, whether the shape is text or as small as a letter.
 fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Vec<bool> {
-    let is_text = |run: &Run| flat.colours[usize::from(run.colour)].0 == Kind::Text;
     let mut bounds = vec![[u32::MAX, 0, u32::MAX, 0]; runs.len()];
     for (y, row) in (0u32..).zip(rows.windows(2)) {
         for run in &runs[row[0]..row[1]] {
@@ -170,12 +181,29 @@ fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Vec<bool> {
     let is_small = |[left, right, top, bottom]: [u32; 4]| {
         right - left.min(right) <= SMALL && bottom - top.min(bottom) <= SMALL
     };
-    runs.iter().zip(bounds).map(|(run, bounds)| is_text(run) || is_small(bounds)).collect()
+    runs.iter().zip(bounds).map(|(run, bounds)| is_text(flat, run) || is_small(bounds)).collect()
 }
 
-/// Whether one of the four dots beside a dot is of another shape. Dots outside the art are.
-fn at_the_rim(flat: &Flat, width: usize, at: (usize, usize)) -> bool {
-    [(-1, 0), (1, 0), (0, -1), (0, 1)].into_iter().any(|way| reach(flat, width, at, way, 1) == 0)
+/// Whether one of the four dots beside a dot is outside the art, or of another shape and `needs` a rim.
+fn at_the_rim(flat: &Flat, width: usize, (x, y): (usize, usize), needs: impl Fn(u8) -> bool) -> bool {
+    let beside = |(right, down): (isize, isize)| {
+        let x = x.checked_add_signed(right).filter(|&x| x < width)?;
+        flat.index.get(y.checked_add_signed(down)? * width + x).copied()
+    };
+    [(-1, 0), (1, 0), (0, -1), (0, 1)]
+        .into_iter()
+        .any(|way| reach(flat, width, (x, y), way, 1) == 0 && beside(way).is_none_or(&needs))
+}
+
+/// Whether a shape has a rim beside what is printed so. Between inks it would be a line of a third colour; but where the stack beside it is
+/// one of its mixture, clusters of that would hang on the edge.
+fn needs_rim(shape: &Shape, beside: Option<Treatment>) -> bool {
+    match beside {
+        Some(Treatment::Solid(stack)) if stack != PAPER => {
+            shape.mixed.checked_shr(stack.into()).unwrap_or(1) & 1 == 1
+        }
+        beside => !has_ink(beside),
+    }
 }
 
 /// Whether a dot of a hairline is midway across it. Where lines cross all dots are.
@@ -216,8 +244,10 @@ fn reach(
 mod tests {
     use super::*;
 
-    const DARK: Treatment = Treatment::Shape(Shape { solids: [7, 5, 0, 0], dark: true, rank: 9 });
-    const LIGHT: Treatment = Treatment::Shape(Shape { solids: [7, 0, 0, 0], dark: false, rank: 9 });
+    const DARK: Treatment =
+        Treatment::Shape(Shape { solids: [7, 5, 0, 0], dark: true, near: true, mixed: 1 << 7, rank: 9 });
+    const LIGHT: Treatment =
+        Treatment::Shape(Shape { solids: [7, 0, 0, 0], dark: false, near: true, mixed: 1 << 7, rank: 9 });
 
     /// Paper, black, then a colour of this kind with this treatment, at all dots that satisfy `is`.
     fn drawn(
@@ -289,6 +319,49 @@ mod tests {
                     assert_eq!(stack, wanted, "{kind:?}, {wide} wide, at {x}, {y}");
                 }
             }
+        }
+    }
+
+    /// A small drawing in a colour unlike all stacks is none of them: grey enclaves of a map were black.
+    #[test]
+    fn a_small_drawing_unlike_its_solid_is_screened_within_its_rim() {
+        let unlike =
+            Treatment::Shape(Shape { solids: [7, 5, 0, 0], dark: true, near: false, mixed: 1 << 7, rank: 9 });
+        let cut =
+            |kind| drawn((60, 50), kind, unlike, |x, _| (5..17).contains(&x))[25 * 60..26 * 60].to_vec();
+        let (drawing, text) = (cut(Kind::Drawing), cut(Kind::Text));
+        assert_eq!([4, 5, 6, 15, 16, 17].map(|x| drawing[x]), [0, 7, TONE, TONE, 7, 0]);
+        assert_eq!([4, 5, 6, 15, 16, 17].map(|x| text[x]), [0, 7, 7, 7, 7, 0]);
+    }
+
+    /// Beside inks a rim would be a line of a third colour; beside a stack of its own mixture it keeps the edge.
+    #[test]
+    fn a_wide_shape_has_its_rim_beside_paper_and_what_would_fray_its_edge() {
+        for (beside, rim) in [
+            (Treatment::Solid(PAPER), true),
+            (Treatment::Solid(4), false),
+            (Treatment::Solid(3), true),
+            (LIGHT, true),
+            (DARK, false),
+        ] {
+            let colours = vec![
+                (Kind::Picture, [255; 3]),
+                (Kind::Picture, [0; 3]),
+                (Kind::Drawing, [128; 3]),
+                (Kind::Drawing, [60; 3]),
+            ];
+            let index = (0..300 * 200).map(|at| if at % 300 < 150 { 2 } else { 3 }).collect();
+            let own = Treatment::Shape(Shape {
+                solids: [7, 5, 0, 0],
+                dark: true,
+                near: true,
+                mixed: 1 << 3,
+                rank: 9,
+            });
+            let flat = Flat { colours, index };
+            let fixed = fixed(&flat, 300, &[Treatment::Solid(0), Treatment::Solid(1), own, beside]);
+            let row = &fixed[100 * 300..101 * 300];
+            assert_eq!([row[148], row[149]], [TONE, if rim { 7 } else { TONE }], "{beside:?}");
         }
     }
 
@@ -433,7 +506,9 @@ mod tests {
         assert_eq!(partly[15 * 60 + 22], 7);
         assert_eq!(at(&partly, 22), 7);
         // Of two shapes the nearer to the solid keeps it.
-        let ground = |rank| Treatment::Shape(Shape { solids: [7, 0, 0, 0], dark: true, rank });
+        let ground = |rank| {
+            Treatment::Shape(Shape { solids: [7, 0, 0, 0], dark: true, near: true, mixed: 1 << 7, rank })
+        };
         assert_eq!(at(&on_a_ground(DARK, 6, ground(3), 1.0), 22), 5);
         assert_eq!(at(&on_a_ground(DARK, 6, ground(12), 1.0), 22), 7);
     }

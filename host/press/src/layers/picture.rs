@@ -4,6 +4,7 @@
 //! become layers if the options say so; whatever else is not white is colour.
 //! Cost: four bytes a pixel, and some nanoseconds. Limits: 8 bits a channel.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -55,6 +56,32 @@ pub(super) fn read(path: &Path, page: Option<u32>) -> Result<Pixels, LayersError
         notes.extend(to_srgb(path, &profile, grey, &mut rgba)?);
     }
     Ok(Pixels { path: path.to_path_buf(), width, height, dpi: decoded.dpi, rgba, notes })
+}
+
+/// Colours of which red, green and blue differ by so much are no grey.
+const COLOURED: u8 = 48;
+/// Colours that differ by at most so much in red, green and blue are about one.
+const ALIKE: u8 = 24;
+
+/// Whether a picture is in several colours, unlike the layer of an ink, which is grey or in one colour. No file that cannot be read is.
+pub(super) fn has_colours(path: &Path, page: Option<u32>) -> bool {
+    let Ok(Pixels { rgba, .. }) = read(path, page) else { return false };
+    let (pixels, _) = rgba.as_chunks::<4>();
+    let seen = pixels.iter().filter(|pixel| pixel[3] > 0 && **pixel != [255; 4]).count();
+    let coloured =
+        |&&[r, g, b, opacity]: &&[u8; 4]| opacity >= 128 && r.max(g).max(b) - r.min(g).min(b) >= COLOURED;
+    let coloured: Vec<&[u8; 4]> = pixels.iter().filter(coloured).collect();
+    // The commonest of 4096 colours, and all that is about like it.
+    let mut counts = HashMap::<[u8; 3], usize>::new();
+    for &&[r, g, b, _] in &coloured {
+        *counts.entry([r >> 4, g >> 4, b >> 4]).or_default() += 1;
+    }
+    let Some((most, _)) = counts.into_iter().max_by_key(|&(colour, count)| (count, colour)) else {
+        return false;
+    };
+    let most = most.map(|v| v << 4 | 8);
+    let like = coloured.iter().filter(|pixel| (0..3).all(|c| pixel[c].abs_diff(most[c]) <= ALIKE)).count();
+    20 * coloured.len() >= seen && 4 * like < 3 * coloured.len()
 }
 
 /// Applies an embedded profile, and returns a note if that changed anything. `grey` marks pixels of a greyscale file.

@@ -24,8 +24,14 @@ const BARE: f64 = 0.01;
 /// viewing flare of IEC 61966-2-1. Without it 2 of 255 is as far from black as light grey is from white.
 const APART: f64 = 0.02;
 const FLARE: f64 = 0.01;
+/// A stack that differs from a colour by at most so much looks about like it: dark grey as K, dark red as M+Y; not 50 % grey as K, nor orange
+/// as M+Y.
+const NEAR: f64 = 0.1;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for.
 const NEARLY: f64 = 1.0 / 8.0;
+/// A stack or paper that differs from a colour by more than so many times what its nearest stack does never stands for it: near-black in
+/// black is no white letter.
+const AS_NEAR: f64 = 2.0;
 /// Stacks that may stand for a colour; the last is repeated where there are fewer.
 pub(super) const CHOICES: usize = 4;
 
@@ -45,6 +51,10 @@ pub(super) struct Shape {
     pub solids: [u8; CHOICES],
     /// Whether the colour has more ink than paper.
     pub dark: bool,
+    /// Whether the nearest stack looks about like the colour.
+    pub near: bool,
+    /// The stacks of its mixture, a bit each; those beyond the 64th are not told.
+    pub mixed: u64,
     /// Among all colours: those nearer to their stack keep it first.
     pub rank: u8,
 }
@@ -61,8 +71,8 @@ pub(super) fn treatments(flat: &Flat, width: usize, fit: &mut Fit, solids: &Soli
     order.iter().enumerate().for_each(|(place, &at)| rank[at] = place as u8);
     let parted = parted(flat, width, &found, &rank);
     let treatment = |at: usize| match found[at].shape {
-        Some((solids, dark)) if !found[at].is_solid || parted[at] => {
-            Treatment::Shape(Shape { solids, dark, rank: rank[at] })
+        Some(shape) if !found[at].is_solid || parted[at] => {
+            Treatment::Shape(Shape { rank: rank[at], ..shape })
         }
         _ => Treatment::Solid(found[at].stack),
     };
@@ -78,8 +88,8 @@ struct Found {
     off: f64,
     /// Whether it may be printed as that stack.
     is_solid: bool,
-    /// Stacks that may stand for it, and whether it is dark; `None` for a stack that the colour names.
-    shape: Option<([u8; CHOICES], bool)>,
+    /// What may stand for it, of no rank yet; `None` for a stack that the colour names.
+    shape: Option<Shape>,
 }
 
 impl Found {
@@ -103,6 +113,7 @@ impl Found {
         };
         // Paper stands for a colour where it is nearer than the inks that are left, or where none is.
         let mut others: Vec<usize> = near.into_iter().skip(1).chain([0]).collect();
+        others.retain(|&stack| off(stack) <= AS_NEAR * off(nearest));
         others.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
         let ranked: Vec<usize> = std::iter::once(nearest).chain(others).take(CHOICES).collect();
         let choices = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
@@ -112,7 +123,13 @@ impl Found {
             stack: nearest as u8,
             off: from_mixture,
             is_solid: from_mixture <= SAME && difference_in_hue(bodies[nearest], mixed) <= SAME_HUE,
-            shape: Some((choices, weights[0] < 0.5)),
+            shape: Some(Shape {
+                solids: choices,
+                dark: weights[0] < 0.5,
+                near: off(nearest) <= NEAR,
+                mixed: inked().filter(|&stack| stack < 64).fold(0, |bits, stack| bits | 1 << stack),
+                rank: 0,
+            }),
         }
     }
 }
@@ -210,6 +227,25 @@ mod tests {
             &same[..4.min(same.len())]
         );
         assert!(solid > 3000, "{solid}");
+    }
+
+    /// Near-black in black was a white letter.
+    #[test]
+    fn what_is_nearly_its_ground_is_no_letter_in_the_opposite_colour() {
+        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let solids = Solids::new(&printable, &space);
+        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        for kind in [Kind::Text, Kind::Drawing] {
+            for dark in [[32; 3], [51; 3], [28, 8, 8], [74, 13, 13], [10, 58, 10], [92, 74, 36]] {
+                let [_, over] = printed(&mut fit, &solids, kind, [[0; 3], dark]);
+                assert!(over == TONE || fit.stacks[usize::from(over)].to_string() == "K", "{dark:?}: {over}");
+            }
+            // Halfway it is read by the contrast.
+            assert_eq!(printed(&mut fit, &solids, kind, [[0; 3], [138; 3]])[1], 0);
+        }
     }
 
     /// How a colour is printed where nothing else is: the stack nearest to it, how far that is from the mixture, and whether it

@@ -80,7 +80,7 @@ impl Laid {
 ///
 /// # Errors
 /// Those of [`arrange`] that follow from sizes.
-pub(crate) fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutError> {
+pub fn check(width: usize, length: usize, layout: &Layout) -> Result<(), LayoutError> {
     Block::of((width, length), layout).map(|_| ())
 }
 

@@ -40,7 +40,7 @@ const CUT: f32 = 0.2;
 const LOCKED: f32 = 0.55;
 
 /// By how much a weight differs over a block whose cells, if they may be cut, need hardly any disturbance.
-const TEXTURED: f32 = 0.015 * ONE as f32;
+const TEXTURED: f32 = 0.06 * ONE as f32;
 
 /// Numbers in -1..1 without order, of mean 0: 256 beginnings, and as many stacks from there.
 pub(super) static NOISE: [f32; 512] = {

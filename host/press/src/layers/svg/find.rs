@@ -54,7 +54,7 @@ pub(super) fn layers(
             ids.entry(id).or_insert(node);
         }
     }
-    let mut slips = Vec::new();
+    let (mut slips, mut parts) = (Vec::new(), Vec::new());
     // The parser bounds the depth; a stack of its own spares this walk the recursion.
     let mut waiting: Vec<(Node, Option<usize>)> = vec![(document.root_element(), None)];
     while let Some((node, mut within)) = waiting.pop() {
@@ -95,6 +95,11 @@ pub(super) fn layers(
             within = Some(at);
         } else if within.is_none() && is_layer(node) {
             slips.push(label(node));
+        } else if within.is_none() && parts.len() < LISTED && nodes::is_holder(node) {
+            let label = label(node);
+            if let Some(named) = names::ink(&label) {
+                parts.push(format!("`{label}` (a layer of ink would be `{}`)", named.ink.name()));
+            }
         }
         waiting.extend(nodes::drawn(node).into_iter().rev().map(|child| (child, within)));
     }
@@ -102,7 +107,7 @@ pub(super) fn layers(
         // A drawing may have layers that mean nothing; the name of an ink with a slip of the hand is worth a note.
         let meant =
             |name: &String| names::closest(name).map(|ink| format!("`{name}` (did you mean `{ink}`?)"));
-        let found: Vec<String> = slips.iter().filter_map(meant).collect();
+        let found: Vec<String> = slips.iter().filter_map(meant).chain(parts).collect();
         if !found.is_empty() {
             let found = found.join(", ");
             notes.push(format!(
@@ -189,26 +194,15 @@ fn unescaped(id: &str) -> String {
 /// The ink that an element is named after, and that name.
 fn ink(node: Node<'_, '_>, within: bool, ids: &HashMap<&str, Node<'_, '_>>) -> Option<(String, Named)> {
     let own = label(node);
-    let named = |label: &str, group: bool| names::ink(label).filter(|_| group || is_whole(label));
-    if let Some(named) = named(&own, nodes::is_holder(node)) {
+    let named = |label: &str, layer: bool| names::ink(label).filter(|_| layer || names::is_whole(label));
+    if let Some(named) = named(&own, is_layer(node)) {
         return Some((own, named));
     }
     // Within a layer a clone of another layer is art like any other.
     let target = *ids.get(nodes::reference(node).filter(|_| !within && nodes::name(node) == Some("use"))?)?;
     let label = label(target);
-    let named = named(&label, nodes::is_holder(target) || nodes::name(target) == Some("symbol"))?;
+    let named = named(&label, is_layer(target))?;
     Some((label, named))
-}
-
-/// Whether a name is that of an ink, apart from numbers around it.
-fn is_whole(label: &str) -> bool {
-    let words: Vec<&str> = label.split(|c: char| !c.is_alphanumeric()).collect();
-    let number = |word: &&str| word.chars().all(|c| c.is_ascii_digit());
-    let first = words.iter().take_while(|word| number(word)).count();
-    let last = words.iter().rev().take_while(|word| number(word)).count();
-    let name = words.get(first..words.len() - last).unwrap_or_default().join("-");
-    // Programs name shapes `c` or `k` for other reasons.
-    name.len() > 2 && names::typed(&name).is_ok()
 }
 
 /// A note on what is drawn beside the layers.
@@ -340,22 +334,6 @@ mod tests {
             ("a_x41_", "aA"),
         ] {
             assert_eq!(unescaped(id), typed);
-        }
-    }
-
-    #[test]
-    fn single_elements_need_the_whole_name_of_an_ink() {
-        for (name, whole) in [
-            ("white", true),
-            ("01-white", true),
-            ("Gold_Foil-2", true),
-            ("path-white", false),
-            ("black eye", false),
-            ("k", false),
-            ("12", false),
-            ("", false),
-        ] {
-            assert_eq!(is_whole(name), whole, "{name}");
         }
     }
 }

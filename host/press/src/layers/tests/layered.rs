@@ -42,6 +42,21 @@ fn layers_are_found_in_links_switches_drawings_clones_and_single_shapes() {
     assert_eq!(layers("art.svg", names).0[0].0, Ink::GoldFoil);
 }
 
+/// A group needs the whole name of an ink, unlike a layer that its owner named in a program that has layers.
+#[test]
+fn a_part_of_a_groups_name_is_no_ink() {
+    let cat = r##"<g id="black_cat"><rect width="8" height="4"/></g>"##;
+    let (found, notes) = layers("art.svg", cat);
+    assert!(found.is_empty() && noted(&notes, "`black_cat` (a layer of ink would be `black`)"), "{notes:?}");
+    let named = r##"<g id="g1" inkscape:groupmode="layer" inkscape:label="logo white"><rect width="8" height="4"/></g>"##;
+    let prefix = r##"<g xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape">"##;
+    assert_eq!(layers("art.svg", &format!("{prefix}{named}</g>")).0[0].0, Ink::White);
+    for name in ["Spot White", "white-layer", "2_White"] {
+        let group = format!(r##"<g id="{name}"><rect width="8" height="4"/></g>"##);
+        assert_eq!(layers("art.svg", &group).0[0].0, Ink::White, "{name}");
+    }
+}
+
 #[test]
 fn everything_drawn_beside_the_layers_is_listed_once() {
     let (found, notes) = layers(

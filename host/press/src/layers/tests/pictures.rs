@@ -107,6 +107,24 @@ fn one_picture_is_colour_unless_its_name_says_an_ink() {
     assert!(art.notes.iter().any(|note| note.contains("rename the file to white.png")), "{:?}", art.notes);
     let layer = read(&[bench.grey("black.png", (2, 1), &[0, 255])], &Options::default());
     assert!(layer.colour.is_none() && layer.layers.len() == 1);
+    // A part of a name is an ink where the picture is one, and no more: a yellow folder has many colours.
+    let saved = |name: &str, at: &dyn Fn(u8) -> [u8; 3]| {
+        let pixels = (0..64u8).flat_map(at).collect();
+        image::RgbImage::from_raw(8, 8, pixels).unwrap().save(bench.path(name)).unwrap();
+        read(&[bench.path(name)], &Options { dpi: Some(600.0), ..Options::default() })
+    };
+    let logo = saved("logo-yellow.png", &|at| if at % 3 == 0 { [255; 3] } else { [220, 170, 0] });
+    assert!(logo.colour.is_none() && logo.layers.len() == 1);
+    let shaded = |at: u8| [255 - at, 200 - 2 * at, 20];
+    let folder = saved("folder-yellow.png", &shaded);
+    assert!(folder.layers.is_empty() && folder.colour.is_some());
+    assert!(
+        folder.notes.iter().any(|note| note.contains("rename the file to yellow.png")),
+        "{:?}",
+        folder.notes
+    );
+    let plate = saved("yellow.png", &shaded);
+    assert!(plate.colour.is_none() && plate.layers.len() == 1);
 }
 
 #[test]

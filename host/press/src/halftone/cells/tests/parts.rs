@@ -105,6 +105,29 @@ fn ramps_have_no_lines() {
     }
 }
 
+/// A ramp does not repeat along its rows where it passes a tone that locks, however slowly it rises: by so much over a block.
+#[test]
+fn ramps_do_not_repeat() {
+    let width = 1416;
+    for rise in [0.01, 0.02, 0.04, 0.08] {
+        let long = (0.96 / rise) as usize * 24;
+        let ramp = |y: usize| 0.02 + 0.96 * (y as f64 + 0.5) / (long / 2) as f64;
+        let mix = plain(1, long / 2, 2, |_, y| vec![1.0 - ramp(y), ramp(y)]);
+        let dots = cells(&mix, (width, long), &[8; 2], None, &Silent);
+        for (band, dots) in dots.chunks_exact(36 * width).enumerate() {
+            let ink = dots.iter().filter(|&&dot| dot == 1).count() as f64 / dots.len() as f64;
+            let off = |dot: u8| f64::from(dot) - ink;
+            let all: f64 = dots.iter().map(|&dot| off(dot).powi(2)).sum();
+            // Three mean spacings are at most 24 dots where there is most to see.
+            for lag in (24..128).step_by(4) {
+                let pairs = dots.chunks_exact(width).flat_map(|row| row.iter().zip(&row[lag..]));
+                let alike = pairs.map(|(&a, &b)| off(a) * off(b)).sum::<f64>() / all;
+                assert!(alike < 0.2, "{rise}, rows from {}, ink {ink:.2}: {alike:.2} at {lag}", 36 * band);
+            }
+        }
+    }
+}
+
 /// A disc and slanted bars of solid in a tone: every connected part of the tone keeps its minimum, and what is thin
 /// lies beside a solid that makes it so.
 #[test]
