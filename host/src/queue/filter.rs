@@ -47,6 +47,9 @@ pub enum FilterError {
         "the document is neither PDF nor PWG raster; install the print system's filters to convert other files"
     )]
     Kind,
+    /// Nothing to print, as where no page was selected.
+    #[error("the document is empty; select pages that it has")]
+    Empty,
     /// Reading or writing.
     #[error("cannot {what}")]
     Io {
@@ -151,7 +154,10 @@ pub fn run(
     observer: &dyn Observer,
 ) -> Result<usize, FilterError> {
     let mut head = [0; 4];
-    document.read_exact(&mut head).map_err(io_error("read the document"))?;
+    document.read_exact(&mut head).map_err(|error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => FilterError::Empty,
+        _ => io_error("read the document")(error),
+    })?;
     let mut press = Press { choices, library, out, observer, jobs: 0, white: 0 };
     if head == raster::SYNC {
         pictures(document, &mut press)?;
@@ -502,7 +508,7 @@ mod tests {
                 &mut io::sink(),
                 &Silent,
             );
-            assert!(matches!(result, Err(FilterError::Kind | FilterError::Io { .. })));
+            assert!(matches!(result, Err(FilterError::Kind | FilterError::Empty)));
         }
     }
 }

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use super::flat::{Flat, similar};
 use super::kinds::Kind;
 use super::shapes::{Run, joined};
-use super::treatments::{CHOICES, Shape, Treatment};
+use super::treatments::{CHOICES, Shape, Treatment, is_faint};
 
 /// The least share of the border of what lies on ink, and of what lies on another colour.
 const ON_INK: f64 = 7.0 / 8.0;
@@ -77,11 +77,22 @@ pub(super) fn lies(
     borders.into_iter().map(|(root, border)| (root, judge(root, border))).collect()
 }
 
+/// Of the border of the shape that a run is the root of, the dots of other shapes.
+#[derive(Clone, Default)]
+struct Border {
+    all: u32,
+    /// Those that are printed as each of its stacks.
+    stacks: [u32; CHOICES],
+    /// Those in colours that it hardly differs from.
+    faint: u32,
+}
+
+/// The bit of a pair of colours that hardly differ, beside one for each stack.
+const FAINT: u8 = 1 << 7;
+
 /// What shapes lie on, where one of them may lie on its own solid.
 pub(super) struct Grounds {
-    /// For each run: of the border of the shape it is the root of, the dots of other shapes, and those of them that are printed
-    /// as each of its stacks.
-    border: Vec<(u32, [u32; CHOICES])>,
+    border: Vec<Border>,
 }
 
 impl Grounds {
@@ -109,28 +120,35 @@ impl Grounds {
         let met: Vec<u8> = (0..=255u8)
             .flat_map(|own| (0..=255u8).map(move |beside| (own, beside)))
             .map(|(own, beside)| match shape(own) {
-                Some(shape) if own != beside && !joined_or_none(flat, own, beside) => meet(shape, beside),
+                Some(shape) if own != beside && !joined_or_none(flat, own, beside) => {
+                    let bits = meet(shape, beside);
+                    let colour = |of: u8| flat.colours.get(usize::from(of)).map(|&(_, colour)| colour);
+                    let faint = || colour(own).zip(colour(beside)).is_some_and(|(a, b)| is_faint(a, b));
+                    if bits != 0 && faint() { bits | FAINT } else { bits }
+                }
                 _ => 0,
             })
             .collect();
         if !met.iter().any(|bits| bits & 1 == 1) {
             return None;
         }
-        let mut border = vec![(0, [0; CHOICES]); runs.len()];
+        let mut border = vec![Border::default(); runs.len()];
         each_beside(flat, width, (runs, rows), |run, beside| {
-            let (all, stacks) = &mut border[run.root as usize];
+            let Border { all, stacks, faint } = &mut border[run.root as usize];
             *all += 1;
             let bits = met[256 * usize::from(run.colour) + usize::from(beside)];
+            *faint += u32::from(bits & FAINT != 0);
             stacks.iter_mut().enumerate().for_each(|(at, dots)| *dots += u32::from(bits >> at & 1));
         });
         Some(Grounds { border })
     }
 
-    /// The solid of a shape: the nearest that it does not lie on.
+    /// The solid of a shape: the nearest that it does not lie on; none that is much farther, if it hardly differs from what it lies on.
     pub(super) fn solid(&self, root: u32, shape: &Shape) -> Option<u8> {
-        let (all, stacks) = self.border[root as usize];
-        let free = |&(_, dots): &(u8, u32)| 2 * dots < all.max(1);
-        shape.solids.into_iter().zip(stacks).find(free).map(|(solid, _)| solid)
+        let Border { all, stacks, faint } = &self.border[root as usize];
+        let most = if 2 * faint >= (*all).max(1) { shape.as_near.into() } else { CHOICES };
+        let free = |&(_, dots): &(u8, &u32)| 2 * dots < (*all).max(1);
+        shape.solids.into_iter().zip(stacks).take(most).find(free).map(|(solid, _)| solid)
     }
 }
 

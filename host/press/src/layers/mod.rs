@@ -10,6 +10,7 @@
 
 mod artwork;
 mod averages;
+mod beside;
 mod bits;
 mod cmyk;
 mod colour;
@@ -37,6 +38,7 @@ mod page;
 pub mod pdf;
 mod pens;
 mod picture;
+mod pieces;
 mod posters;
 mod resample;
 mod reserved;

@@ -22,16 +22,24 @@ const SAME_HUE: f64 = 0.02;
 const BARE: f64 = 0.01;
 /// Colours of sRGB that differ by more can be told apart where they touch, in light of which the screen reflects so much by itself: the
 /// viewing flare of IEC 61966-2-1. Without it 2 of 255 is as far from black as light grey is from white.
-const APART: f64 = 0.02;
+const APART: f64 = 0.05;
 const FLARE: f64 = 0.01;
 /// A stack that differs from a colour by at most so much looks about like it: dark grey as K, dark red as M+Y; not 50 % grey as K, nor orange
 /// as M+Y.
 const NEAR: f64 = 0.1;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for.
 const NEARLY: f64 = 1.0 / 8.0;
-/// A stack or paper that differs from a colour by more than so many times what its nearest stack does never stands for it: near-black in
-/// black is no white letter.
+/// Where a colour hardly differs from what it lies on, as in near-black on black, a stack or paper stands for it only if it is at most so many
+/// times farther from it than its nearest stack: what is drawn faintly is not printed with the most contrast.
 const AS_NEAR: f64 = 2.0;
+/// Colours that differ by less hardly do.
+const FAINT: f64 = 0.25;
+/// What hue and chroma count against lightness where a stack stands for a colour: darker letters are still of their colour, others are not.
+const HUE: f64 = 2.5;
+/// How far in hue and chroma such a stack may be: so far, and so many times the colour's own chroma more. Letters in a grey with a little blue
+/// are black, not cyan.
+const TURNED: f64 = 0.03;
+const MORE_TURNED: f64 = 1.5;
 /// Stacks that may stand for a colour; the last is repeated where there are fewer.
 pub(super) const CHOICES: usize = 4;
 
@@ -49,6 +57,8 @@ pub(super) enum Treatment {
 pub(super) struct Shape {
     /// The nearest stack with ink, then others of its mixture and paper, the nearest first.
     pub solids: [u8; CHOICES],
+    /// How many of them are about as near as the first.
+    pub as_near: u8,
     /// Whether the colour has more ink than paper.
     pub dark: bool,
     /// Whether the nearest stack looks about like the colour.
@@ -103,17 +113,22 @@ impl Found {
         if difference(bodies[0], wanted) <= BARE {
             return Found { colour, stack: 0, off: 0.0, is_solid: true, shape: None };
         }
-        let off = |stack: usize| difference(bodies[stack], wanted);
+        let hue = |stack: usize| difference_in_hue(bodies[stack], wanted);
+        let all = |stack: usize| difference(bodies[stack], wanted);
+        let lightness = |stack: usize| (all(stack).powi(2) - hue(stack).powi(2)).max(0.0).sqrt();
+        let off = |stack: usize| lightness(stack).hypot(HUE * hue(stack));
         let inked = || (1..weights.len()).filter(|&stack| weights[stack] > 0.0);
         let mut near: Vec<usize> = inked().filter(|&stack| weights[stack] >= NEARLY).collect();
         near.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
+        // White has no chroma.
+        let most_hue = TURNED + MORE_TURNED * difference_in_hue(wanted, [1.0; 3]);
+        let of_hue = near.iter().position(|&stack| hue(stack) <= most_hue).unwrap_or(0);
         let most = || inked().max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
-        let Some(nearest) = near.first().copied().or_else(most) else {
+        let Some(nearest) = near.get(of_hue).copied().or_else(most) else {
             return Found { colour, stack: 0, off: 0.0, is_solid: true, shape: None };
         };
         // Paper stands for a colour where it is nearer than the inks that are left, or where none is.
-        let mut others: Vec<usize> = near.into_iter().skip(1).chain([0]).collect();
-        others.retain(|&stack| off(stack) <= AS_NEAR * off(nearest));
+        let mut others: Vec<usize> = near.into_iter().filter(|&stack| stack != nearest).chain([0]).collect();
         others.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
         let ranked: Vec<usize> = std::iter::once(nearest).chain(others).take(CHOICES).collect();
         let choices = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
@@ -126,7 +141,9 @@ impl Found {
             shape: Some(Shape {
                 solids: choices,
                 dark: weights[0] < 0.5,
-                near: off(nearest) <= NEAR,
+                near: all(nearest) <= NEAR,
+                as_near: ranked.iter().take_while(|&&stack| off(stack) <= AS_NEAR * off(nearest)).count()
+                    as u8,
                 mixed: inked().filter(|&stack| stack < 64).fold(0, |bits, stack| bits | 1 << stack),
                 rank: 0,
             }),
@@ -134,17 +151,27 @@ impl Found {
     }
 }
 
-/// The colours that may not be printed as their stack, because a colour that can be told from them is printed as it beside
-/// them.
-fn parted(flat: &Flat, width: usize, found: &[Found], rank: &[u8]) -> Vec<bool> {
+/// How far two colours are apart as a screen shows them.
+fn apart(a: [u8; 3], b: [u8; 3]) -> f64 {
     let light = |colour: [u8; 3]| {
         colour.map(|v| (f64::from(appearance::srgb::decode(f32::from(v) / 255.0)) + FLARE) / (1.0 + FLARE))
     };
+    difference(light(a), light(b))
+}
+
+/// Whether colours hardly differ as a screen shows them.
+pub(super) fn is_faint(a: [u8; 3], b: [u8; 3]) -> bool {
+    apart(a, b) < FAINT
+}
+
+/// The colours that may not be printed as their stack, because a colour that can be told from them is printed as it beside
+/// them.
+fn parted(flat: &Flat, width: usize, found: &[Found], rank: &[u8]) -> Vec<bool> {
     let share = |a: usize, b: usize| {
         found[a].stack == found[b].stack
             && found[a].is_solid
             && found[b].is_solid
-            && difference(light(found[a].colour), light(found[b].colour)) > APART
+            && apart(found[a].colour, found[b].colour) > APART
     };
     let mut parted = vec![false; found.len()];
     let pairs = || (0..found.len()).flat_map(|a| (0..found.len()).map(move |b| (a, b)));
@@ -245,6 +272,28 @@ mod tests {
             }
             // Halfway it is read by the contrast.
             assert_eq!(printed(&mut fit, &solids, kind, [[0; 3], [138; 3]])[1], 0);
+        }
+    }
+
+    /// Grey letters with a little blue were cyan, and purple ones were cyan as well.
+    #[test]
+    fn what_stands_for_a_colour_is_darker_rather_than_of_another_hue() {
+        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let solids = Solids::new(&printable, &space);
+        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        for (colour, wanted) in [
+            ([149, 165, 166], "K"),
+            ([100, 116, 139], "K"),
+            ([141, 110, 99], "K"),
+            ([148, 103, 189], "C+M"),
+            ([31, 119, 180], "C"),
+            ([192, 0, 0], "M+Y"),
+            ([245, 121, 0], "M+Y"),
+        ] {
+            assert_eq!(alone(colour, &mut fit, &solids).0, wanted, "{colour:?}");
         }
     }
 

@@ -9,11 +9,65 @@
 //! Limits: a page as Ghostscript tags it knows letters but no words, so near lines of one size are decided together, too, and
 //! letters that are spaced more widely than words are decided by themselves.
 
+use super::flat::Flat;
+use super::shapes::{Run, joined};
 use crate::forest::Forest;
+
+/// Letters that are decided by the word they belong to.
+pub(super) struct Words {
+    /// For each run, the number of the letter it is the root of, or [`NO_LETTER`]. Empty if there is none.
+    letter: Vec<u32>,
+    /// For each letter, whether it is thin.
+    thin: Vec<bool>,
+}
+
+const NO_LETTER: u32 = u32::MAX;
+
+impl Words {
+    /// The words of letters with strokes near the `limit`.
+    pub(super) fn of(
+        flat: &Flat,
+        (runs, rows): (&[Run], &[usize]),
+        limit: u8,
+        is_letter: impl Fn(u32) -> bool,
+    ) -> Words {
+        let is_near = |root: u32| is_letter(root) && takes_part(runs[root as usize].side, limit);
+        let (mut letter, mut letters) = (Vec::new(), Vec::<Letter>::new());
+        for (y, row) in rows.windows(2).enumerate() {
+            for run in &runs[row[0]..row[1]] {
+                if !is_near(run.root) {
+                    continue;
+                }
+                let root = &runs[run.root as usize];
+                if letter.is_empty() {
+                    letter = vec![NO_LETTER; runs.len()];
+                }
+                let number = &mut letter[run.root as usize];
+                let y = y as u32;
+                if *number == NO_LETTER {
+                    *number = letters.len() as u32;
+                    let bounds = [run.start, y, run.end, y + 1];
+                    letters.push(Letter { colour: root.colour, bounds, side: root.side, dots: 0 });
+                }
+                let found = &mut letters[*number as usize];
+                let [left, _, right, bottom] = &mut found.bounds;
+                (*left, *right, *bottom) = ((*left).min(run.start), (*right).max(run.end), y + 1);
+                found.dots += run.end - run.start;
+            }
+        }
+        let thin = thin(&letters, limit, |a, b| joined(flat, a, b));
+        Words { letter, thin }
+    }
+
+    /// Whether the word of the shape with this root is thin; `None` for a shape that is decided by itself.
+    pub(super) fn thin(&self, root: u32) -> Option<bool> {
+        self.letter.get(root as usize).and_then(|&number| self.thin.get(number as usize)).copied()
+    }
+}
 
 /// A letter whose strokes are near the limit.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Letter {
+struct Letter {
     /// The number of its colour.
     pub colour: u8,
     /// Left, top, right and bottom in dots; right and bottom are beyond it.
@@ -31,12 +85,12 @@ const RANGE: u8 = 2;
 const SPACE: u32 = 5;
 
 /// Whether a letter with such strokes is decided together with others.
-pub(super) fn takes_part(side: u8, limit: u8) -> bool {
+fn takes_part(side: u8, limit: u8) -> bool {
     (limit / RANGE..limit.saturating_mul(RANGE)).contains(&side)
 }
 
 /// For each letter, whether it is printed as a thin one, under `limit` dots wide. `joined` says whether two colours may be one.
-pub(super) fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<bool> {
+fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<bool> {
     let mut order: Vec<usize> = (0..letters.len()).collect();
     order.sort_by_key(|&at| letters[at].bounds[0]);
     let mut words = Forest::new(letters.len());
