@@ -94,7 +94,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     };
     // Of a pale line that lies on several colours, what each dot is by what is on both sides of it: ink, paper, or a tone.
     let line = |at: (usize, usize), own: u8, side: u8| {
-        let sides = across(flat, width, at, 2 * usize::from(LETTER));
+        let sides = across(flat, width, at, 2 * usize::from(STROKE));
         let is_line = sides.iter().all(|side| side.is_some_and(|side| is_paler(side, own)));
         let is_rim = || at_the_rim(flat, width, at, |beside| !has_ink(of(beside)));
         match sides.map(|side| side.and_then(of)).map(is_ink_or_paper) {
