@@ -2,14 +2,15 @@
 //!
 //! Problem: a halftone of clusters is coarser than a letter's strokes, so a screened letter loses its outline.
 //! Method: by colour, kind and width of their [shapes](super::shapes). A shape is thin if no square of [`STROKE`] dots a side ([`LETTER`]
-//! for text and for what is as small as a letter) fits in it. Thin shapes that have more ink than paper are printed in the nearest solid,
-//! and so are the [lines](super::lines) that hang on wide ones. Wide ones keep their rim, all dots beside another shape, in that solid
-//! and are screened inside; so do thin shapes with more paper than ink, which a solid would make too dark. Of pale lines of [`HAIR`] dots or
-//! less only the middle is printed, one dot wide: screened they were dashes, and the palest had no dot. Soft edges, which lie between colours, and wide pale
-//! shapes are screened as they are: their edge is exact, because the halftone does not cross it.
-//! What a shape lies on ([`grounds`](super::grounds)) counts, too. One that lies on its own solid, by half of its border or more, would vanish in it. Such a thin shape is printed in the next
-//! solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies on ink, by nearly
-//! all of its border, is printed in paper: a rim of ink would be drawn within white letters, and screened they are ragged.
+//! for text, and for what is as small as a letter and about like a stack) fits in it, and if it is no [piece](super::pieces) that a line cut off of a fill. Thin
+//! shapes that have more ink than paper are printed in the nearest solid, and so are the [lines](super::lines) that hang on wide ones. Wide
+//! ones keep their rim in that solid [where they need it](super::beside) and are screened inside; so do thin shapes with more paper than ink, which a solid
+//! would make too dark. Of pale lines of [`HAIR`] dots or less only the middle is printed, one dot wide: screened they were dashes, and the palest had no
+//! dot. Pale lines that lie on several colours are decided dot by dot by both sides of them. Soft edges, which lie between colours, and wide pale shapes are
+//! screened as they are: their edge is exact, because the halftone does not cross it.
+//! What a shape lies on ([`grounds`](super::grounds)) counts, too. One that lies on its own solid, by half of its border or more, would vanish in it. Such a
+//! thin shape is printed in the next solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies
+//! on ink, by nearly all of its border, is printed in paper: a rim of ink would be drawn within white letters, and screened they are ragged.
 //! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines. What of the ground lies
 //! inside letters is as wide as the ground ([`counters`](super::counters)).
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
@@ -17,10 +18,10 @@
 
 use rayon::prelude::*;
 
-use super::beside::{across, at_the_rim, is_ink_or_paper, is_ridge, needs_rim};
+use super::beside::{PaleLines, at_the_rim, is_ridge, needs_rim};
 use super::counters::counters;
-use super::flat::{Flat, TONE, similar};
-use super::grounds::{Grounds, Lies, PAPER, has_ink, lies};
+use super::flat::{Flat, TONE};
+use super::grounds::{Grounds, Lies, PAPER, lies};
 use super::kinds::Kind;
 use super::lines::lines;
 use super::pieces::pieces;
@@ -80,31 +81,13 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let is_pale = |colour: u8| matches!(of(colour), Some(Treatment::Shape(shape)) if !shape.dark);
     let takes_part = |run: &Run| is_pale(run.colour) && is_thin(run.root);
     let lies = lies(flat, width, treatments, (runs, rows), takes_part);
-    let is_paler = |beside: u8, own: u8| {
-        let Some(&(_, colour)) = flat.colours.get(usize::from(beside)) else { return false };
-        let own = flat.colours[usize::from(own)].1;
-        let light = |colour: [u8; 3]| colour.map(u32::from).iter().sum::<u32>();
-        !has_ink(of(beside)) && !similar(colour, own) && light(colour) > light(own)
-    };
     let solid = |root: u32, shape: &Shape| {
         if lies.get(&root) == Some(&Lies::OnInk) {
             return Some(PAPER);
         }
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape))
     };
-    // Of a pale line that lies on several colours, what each dot is by what is on both sides of it: ink, paper, or a tone.
-    let line = |at: (usize, usize), own: u8, side: u8| {
-        let sides = across(flat, width, at, 2 * usize::from(STROKE));
-        let is_line = sides.iter().all(|side| side.is_some_and(|side| is_paler(side, own)));
-        let is_rim = || at_the_rim(flat, width, at, |beside| !has_ink(of(beside)));
-        match sides.map(|side| side.and_then(of)).map(is_ink_or_paper) {
-            [Some(true), Some(true)] => Some(false),
-            [Some(a), Some(b)] if a != b && side > HAIR => Some(is_rim()),
-            _ if is_line && side <= HAIR => Some(is_ridge(flat, width, at, 3 * usize::from(HAIR))),
-            _ if is_line => is_rim().then_some(true),
-            _ => None,
-        }
-    };
+    let pale = PaleLines { flat, width, treatments };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for run in &runs[rows[y]..rows[y + 1]] {
             let root = run.root;
@@ -119,21 +102,16 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
                     let (kind, _) = flat.colours[usize::from(run.colour)];
                     if !shape.dark && kind != Kind::Text && lies.get(&root) != Some(&Lies::OnOneColour) {
                         if side < STROKE {
-                            let line =
-                                |at| line(at, run.colour, side).map(|ink| if ink { solid } else { PAPER });
                             for (x, dot) in (start..).zip(&mut fixed[start..end]) {
-                                *dot = line((x, y)).unwrap_or(*dot);
+                                let ink = pale.has_ink((x, y), side, HAIR);
+                                *dot = ink.map_or(*dot, |ink| if ink { solid } else { PAPER });
                             }
                         }
                         continue;
                     }
                     for (x, dot) in (start..).zip(&mut fixed[start..end]) {
                         if is_hairline {
-                            *dot = if is_ridge(flat, width, (x, y), 3 * usize::from(HAIR)) {
-                                solid
-                            } else {
-                                PAPER
-                            };
+                            *dot = if is_ridge(flat, width, (x, y), HAIR) { solid } else { PAPER };
                         } else if at_the_rim(flat, width, (x, y), |beside| {
                             is_small || needs_rim(&shape, of(beside))
                         }) {
