@@ -6,7 +6,7 @@
 
 use super::flat::{Flat, similar};
 use super::grounds::{PAPER, has_ink};
-use super::shapes::joined;
+use super::shapes::continues;
 use super::treatments::{Shape, Treatment};
 
 /// Whether one of the four dots beside a dot is outside the art, or of another shape and `needs` a rim.
@@ -126,8 +126,7 @@ fn reach(
         let step = step as isize;
         let x = x.checked_add_signed(right * step).filter(|&x| x < width)?;
         let colour = *flat.index.get(y.checked_add_signed(down * step)? * width + x)?;
-        (usize::from(colour) < flat.colours.len() && (colour == own || joined(flat, own, colour)))
-            .then_some(())
+        continues(flat, own, colour).then_some(())
     };
     (1..=most).take_while(|&step| is_own(step).is_some()).count()
 }

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use super::flat::{Flat, similar};
 use super::kinds::Kind;
-use super::shapes::{Run, joined};
+use super::shapes::{Run, continues};
 use super::treatments::{CHOICES, Shape, Treatment, is_faint};
 
 /// The least share of the border of what lies on ink, and of what lies on another colour.
@@ -120,7 +120,7 @@ impl Grounds {
         let met: Vec<u8> = (0..=255u8)
             .flat_map(|own| (0..=255u8).map(move |beside| (own, beside)))
             .map(|(own, beside)| match shape(own) {
-                Some(shape) if own != beside && !joined_or_none(flat, own, beside) => {
+                Some(shape) if own != beside && !continues(flat, own, beside) => {
                     let bits = meet(shape, beside);
                     let colour = |of: u8| flat.colours.get(usize::from(of)).map(|&(_, colour)| colour);
                     let faint = || colour(own).zip(colour(beside)).is_some_and(|(a, b)| is_faint(a, b));
@@ -162,15 +162,10 @@ fn each_beside(flat: &Flat, width: usize, (runs, rows): (&[Run], &[usize]), mut 
             let ends = ends.into_iter().flatten().map(|x| line + x);
             let upright = lines.into_iter().flatten().flat_map(|y| y * width + start..y * width + end);
             for beside in ends.chain(upright).map(|at| flat.index[at]) {
-                if beside != run.colour && !joined_or_none(flat, run.colour, beside) {
+                if beside != run.colour && !continues(flat, run.colour, beside) {
                     with(run, beside);
                 }
             }
         }
     }
-}
-
-/// Whether a colour of the palette can belong to the shape of another, or is none of the palette.
-fn joined_or_none(flat: &Flat, own: u8, beside: u8) -> bool {
-    usize::from(beside) < flat.colours.len() && joined(flat, own, beside)
 }

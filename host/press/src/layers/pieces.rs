@@ -9,7 +9,7 @@
 use std::collections::HashMap;
 
 use super::flat::Flat;
-use super::shapes::{Run, joined};
+use super::shapes::{Run, continues};
 use crate::forest::Forest;
 
 /// A line that cuts is at most so many dots wide.
@@ -24,7 +24,6 @@ pub(super) fn pieces(
     is_bare: impl Fn(u8) -> bool,
 ) -> Vec<u32> {
     let colour = |x: usize, y: usize| flat.index[y * width + x];
-    let is_own = |own: u8, beside: u8| usize::from(beside) < flat.colours.len() && joined(flat, own, beside);
     let root_at = |x: usize, y: usize| {
         let row = &runs[rows[y]..rows[y + 1]];
         let at = row.partition_point(|run| run.end as usize <= x);
@@ -43,14 +42,14 @@ pub(super) fn pieces(
                     let y = from.1.checked_add_signed(down * step).filter(|&y| y + 1 < rows.len())?;
                     Some((x, y))
                 };
-                if dot(1).is_some_and(|(x, y)| is_own(own, colour(x, y))) {
+                if dot(1).is_some_and(|(x, y)| continues(flat, own, colour(x, y))) {
                     return;
                 }
                 *border += 1;
                 let there = (1..=GAP + 1)
                     .map_while(dot)
                     .take_while(|&(x, y)| !is_bare(colour(x, y)))
-                    .find(|&(x, y)| is_own(own, colour(x, y)));
+                    .find(|&(x, y)| continues(flat, own, colour(x, y)));
                 if let Some(root) = there.and_then(|(x, y)| root_at(x, y)).filter(|&root| root != run.root) {
                     *beyond.entry(root).or_default() += 1;
                 }

@@ -26,6 +26,11 @@ pub(super) fn joined(flat: &Flat, a: u8, b: u8) -> bool {
     a == b || kind == other && similar(colour, beside)
 }
 
+/// Whether what is beside a colour of the palette can belong to its shape; what is no colour of the palette cannot.
+pub(super) fn continues(flat: &Flat, own: u8, beside: u8) -> bool {
+    usize::from(beside) < flat.colours.len() && joined(flat, own, beside)
+}
+
 /// A stretch of a run at whose dots large squares end: each is the lower right corner of one that lies in its shape.
 pub(super) struct Core {
     pub run: u32,

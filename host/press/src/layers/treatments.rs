@@ -202,6 +202,17 @@ mod tests {
     use observe::Silent;
     use protocol::ink::Kind as InkKind;
 
+    fn process_inks() -> (Printable, Space) {
+        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
+        let space = Space::half_angle(SAMPLES);
+        (Printable::from_library(&Library::builtin(), &process, &space), space)
+    }
+
+    fn fit(printable: &Printable, solids: &Solids<'_>, space: &Space) -> Fit {
+        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        drawn.fit((printable, solids), space.clone(), &Settings::default(), &Silent).unwrap()
+    }
+
     /// A ground with a bar of another colour, seven dots wide: what each is printed as in the middle.
     fn printed(fit: &mut Fit, solids: &Solids<'_>, kind: Kind, [ground, bar]: [[u8; 3]; 2]) -> [u8; 2] {
         let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
@@ -223,15 +234,12 @@ mod tests {
 
     #[test]
     fn no_letter_vanishes_in_its_ground() {
-        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
-        let space = Space::half_angle(SAMPLES);
-        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let (printable, space) = process_inks();
         let solids = Solids::new(&printable, &space);
         let levels = [0u8, 85, 170, 255];
         let colours: Vec<[u8; 3]> =
             (0..64).map(|at| [at / 16, at / 4 % 4, at % 4].map(|i| levels[i])).collect();
-        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
-        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        let mut fit = fit(&printable, &solids, &space);
         let light = |rgb: [u8; 3]| rgb.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
         let (mut same, mut solid) = (Vec::new(), 0);
         for &ground in &colours {
@@ -259,12 +267,9 @@ mod tests {
     /// Near-black in black was a white letter.
     #[test]
     fn what_is_nearly_its_ground_is_no_letter_in_the_opposite_colour() {
-        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
-        let space = Space::half_angle(SAMPLES);
-        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let (printable, space) = process_inks();
         let solids = Solids::new(&printable, &space);
-        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
-        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        let mut fit = fit(&printable, &solids, &space);
         for kind in [Kind::Text, Kind::Drawing] {
             for dark in [[32; 3], [51; 3], [28, 8, 8], [74, 13, 13], [10, 58, 10], [92, 74, 36]] {
                 let [_, over] = printed(&mut fit, &solids, kind, [[0; 3], dark]);
@@ -278,12 +283,9 @@ mod tests {
     /// Grey letters with a little blue were cyan, and purple ones were cyan as well.
     #[test]
     fn what_stands_for_a_colour_is_darker_rather_than_of_another_hue() {
-        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
-        let space = Space::half_angle(SAMPLES);
-        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let (printable, space) = process_inks();
         let solids = Solids::new(&printable, &space);
-        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
-        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        let mut fit = fit(&printable, &solids, &space);
         for (colour, wanted) in [
             ([149, 165, 166], "K"),
             ([100, 116, 139], "K"),
@@ -307,12 +309,9 @@ mod tests {
 
     #[test]
     fn a_stack_stands_for_a_colour_a_little_lighter_and_for_none_of_another_hue() {
-        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
-        let space = Space::half_angle(SAMPLES);
-        let printable = Printable::from_library(&Library::builtin(), &process, &space);
+        let (printable, space) = process_inks();
         let solids = Solids::new(&printable, &space);
-        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
-        let mut fit = drawn.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
+        let mut fit = fit(&printable, &solids, &space);
         // Yellow on half and on three quarters of the dots of magenta: another hue than either solid.
         for (colour, stack) in [([255, 0, 127], "M"), ([255, 0, 64], "M+Y")] {
             let (nearest, found, solid) = alone(colour, &mut fit, &solids);
