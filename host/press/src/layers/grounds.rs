@@ -143,12 +143,13 @@ impl Grounds {
         Some(Grounds { border })
     }
 
-    /// The solid of a shape: the nearest that it does not lie on; none that is much farther, if it hardly differs from what it lies on.
+    /// The solid of a shape: the nearest that it does not lie on; if it hardly differs from what it lies on, only of the mild ones.
     pub(super) fn solid(&self, root: u32, shape: &Shape) -> Option<u8> {
         let Border { all, stacks, faint } = &self.border[root as usize];
-        let most = if 2 * faint >= (*all).max(1) { shape.as_near.into() } else { CHOICES };
-        let free = |&(_, dots): &(u8, &u32)| 2 * dots < (*all).max(1);
-        shape.solids.into_iter().zip(stacks).take(most).find(free).map(|(solid, _)| solid)
+        let all = (*all).max(1);
+        let allowed = if 2 * faint >= all { shape.mild } else { u8::MAX };
+        let free = |&at: &usize| allowed >> at & 1 == 1 && 2 * stacks[at] < all;
+        (0..CHOICES).find(free).map(|at| shape.solids[at])
     }
 }
 

@@ -30,7 +30,8 @@ const NEAR: f64 = 0.1;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for.
 const NEARLY: f64 = 1.0 / 8.0;
 /// Where a colour hardly differs from what it lies on, as in near-black on black, a stack or paper stands for it only if it is at most so many
-/// times farther from it than its nearest stack: what is drawn faintly is not printed with the most contrast.
+/// times farther from it than its nearest stack, or darker: what is drawn faintly is not printed in a brighter ink or in paper. Dark red letters on red are
+/// black.
 const AS_NEAR: f64 = 2.0;
 /// Colours that differ by less hardly do.
 const FAINT: f64 = 0.25;
@@ -57,8 +58,8 @@ pub(super) enum Treatment {
 pub(super) struct Shape {
     /// The nearest stack with ink, then others of its mixture and paper, the nearest first.
     pub solids: [u8; CHOICES],
-    /// How many of them are about as near as the first.
-    pub as_near: u8,
+    /// Those that stand for it even where it hardly differs from what it lies on, a bit each: about as near as the first, or darker.
+    pub mild: u8,
     /// Whether the colour has more ink than paper.
     pub dark: bool,
     /// Whether the nearest stack looks about like the colour.
@@ -131,7 +132,9 @@ impl Found {
         let mut others: Vec<usize> = near.into_iter().filter(|&stack| stack != nearest).chain([0]).collect();
         others.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
         let ranked: Vec<usize> = std::iter::once(nearest).chain(others).take(CHOICES).collect();
-        let choices = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
+        let choices: [u8; CHOICES] = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
+        let bright = |stack: usize| bodies[stack].iter().sum::<f64>();
+        let is_mild = |stack: usize| off(stack) <= AS_NEAR * off(nearest) || bright(stack) < bright(nearest);
         let from_mixture = difference(bodies[nearest], mixed);
         Found {
             colour,
@@ -142,8 +145,9 @@ impl Found {
                 solids: choices,
                 dark: weights[0] < 0.5,
                 near: all(nearest) <= NEAR,
-                as_near: ranked.iter().take_while(|&&stack| off(stack) <= AS_NEAR * off(nearest)).count()
-                    as u8,
+                mild: (0..CHOICES)
+                    .filter(|&at| is_mild(choices[at].into()))
+                    .fold(0, |bits, at| bits | 1 << at),
                 mixed: inked().filter(|&stack| stack < 64).fold(0, |bits, stack| bits | 1 << stack),
                 rank: 0,
             }),
@@ -275,6 +279,9 @@ mod tests {
                 let [_, over] = printed(&mut fit, &solids, kind, [[0; 3], dark]);
                 assert!(over == TONE || fit.stacks[usize::from(over)].to_string() == "K", "{dark:?}: {over}");
             }
+            // Dark red on red is black.
+            let [_, over] = printed(&mut fit, &solids, kind, [[255, 0, 0], [192, 0, 0]]);
+            assert!(over != TONE && fit.stacks[usize::from(over)].to_string() == "K", "{over}");
             // Halfway it is read by the contrast.
             assert_eq!(printed(&mut fit, &solids, kind, [[0; 3], [138; 3]])[1], 0);
         }

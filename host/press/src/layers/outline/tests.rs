@@ -4,7 +4,7 @@ use super::*;
 
 const DARK: Treatment = Treatment::Shape(Shape {
     solids: [7, 5, 0, 0],
-    as_near: 4,
+    mild: u8::MAX,
     dark: true,
     near: true,
     mixed: 1 << 7,
@@ -12,7 +12,7 @@ const DARK: Treatment = Treatment::Shape(Shape {
 });
 const LIGHT: Treatment = Treatment::Shape(Shape {
     solids: [7, 0, 0, 0],
-    as_near: 4,
+    mild: u8::MAX,
     dark: false,
     near: true,
     mixed: 1 << 7,
@@ -97,7 +97,7 @@ fn a_thin_stroke_is_solid_and_a_wide_one_keeps_its_rim() {
 fn a_small_drawing_unlike_its_solid_is_screened_within_its_rim() {
     let unlike = Treatment::Shape(Shape {
         solids: [7, 5, 0, 0],
-        as_near: 4,
+        mild: u8::MAX,
         dark: true,
         near: false,
         mixed: 1 << 7,
@@ -128,7 +128,7 @@ fn a_wide_shape_has_its_rim_beside_paper_and_what_would_fray_its_edge() {
         let index = (0..300 * 200).map(|at| if at % 300 < 150 { 2 } else { 3 }).collect();
         let own = Treatment::Shape(Shape {
             solids: [7, 5, 0, 0],
-            as_near: 4,
+            mild: u8::MAX,
             dark: true,
             near: true,
             mixed: 1 << 3,
@@ -338,7 +338,7 @@ fn what_lies_on_its_own_solid_is_printed_in_the_next() {
     let ground = |rank| {
         Treatment::Shape(Shape {
             solids: [7, 0, 0, 0],
-            as_near: 4,
+            mild: u8::MAX,
             dark: true,
             near: true,
             mixed: 1 << 7,
