@@ -490,6 +490,26 @@ mod tests {
         }
     }
 
+    /// It was 0.6 over the last sixteenth: a dark band at the end.
+    #[test]
+    fn a_shading_that_ends_in_a_tint_of_two_inks_has_no_step() {
+        let colour = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let space = Space::half_angle(SAMPLES);
+        let printable = Printable::from_library(&Library::builtin(), &process(), &space);
+        let solids = Solids::new(&printable, &space);
+        let fit = colour.fit((&printable, &solids), space, &Settings::default(), &Silent).unwrap();
+        for (end, name) in [([0, 170, 255], "C+M"), ([255, 102, 0], "Y"), ([128, 0, 255], "M")] {
+            let stack = fit.stacks.iter().position(|stack| stack.to_string() == name).unwrap();
+            let at = |part: u32| {
+                let colour = end.map(|v: u32| (255 - (255 - v) * part / 64) as u8);
+                fit.weights(colour)[stack]
+            };
+            let steps = (4..=64).map(|part| (at(part) - at(part - 4)).abs());
+            let most = steps.fold(0.0, f64::max);
+            assert!(most < 0.2, "{end:?}: {most}");
+        }
+    }
+
     #[test]
     fn inks_are_found_in_flat_colours() {
         let names = [

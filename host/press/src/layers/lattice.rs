@@ -16,7 +16,7 @@ use super::intent::{Hull, Intent, Light};
 use appearance::brdf::Space;
 use appearance::document::Materials;
 use appearance::gamut::{InkMix, Printable};
-use appearance::weights::{ONE, WeightError, WeightMaps};
+use appearance::weights::{ONE, WeightError, WeightMaps, quantise};
 
 /// Nodes along an edge of the lattice.
 pub(super) const NODES: usize = 17;
@@ -99,9 +99,43 @@ impl Nodes {
     }
 }
 
+/// How far inside the cube nodes are still tints in part, in nodes from an edge of the cube.
+const NEAR: f64 = 4.0;
+/// The same for the lines from white, as a share of the distance from white.
+const NEAR_IN_HUE: f64 = 1.0 / 8.0;
+
+/// What a colour is made of as tints: paper, a primary, and the secondary towards which its hue is turned.
+struct Tint {
+    /// Which of red, green and blue have all of their light, a bit each, and the share of each.
+    parts: [(usize, f64); 3],
+    /// How much of the colour is printed so, from none to 1 on the edges where no fit is wanted.
+    part: f64,
+}
+
+impl Tint {
+    /// The tint nearest to a node; `None` for greys.
+    fn of(node: [usize; 3], gamma: f64) -> Option<Tint> {
+        let mut order = [(node[0], 4), (node[1], 2), (node[2], 1)];
+        order.sort_by_key(|&(level, _)| std::cmp::Reverse(level));
+        let [most, middle, least] = order.map(|(level, _)| level as f64);
+        if most == 0.0 || (most == least && order[0].0 < NODES - 1) {
+            return None;
+        }
+        let towards = if most > least { (middle - least) / (most - least) } else { 1.0 };
+        let (dark, pale) = ((NODES - 1) as f64 - most, least);
+        let off_line = towards.min(1.0 - towards) / NEAR_IN_HUE;
+        let part = (1.0 - dark / NEAR).max(0.0) * (1.0 - off_line.min(pale / NEAR)).max(0.0);
+        let (paper, second) = ((least / most).powf(1.0 / gamma), towards.powf(1.0 / gamma));
+        let (primary, secondary) = (order[0].1, order[0].1 | order[1].1);
+        let ink = 1.0 - paper;
+        Some(Tint { parts: [(7, paper), (secondary, ink * second), (primary, ink * (1.0 - second))], part })
+    }
+}
+
 /// Prints the edges of a lattice on which no fit is wanted: from white to each of the six primaries and from cyan, magenta and
 /// yellow to the red, green and blue beside them. Along them are the two stacks that the ends name, in shares that change
-/// evenly: 30 % cyan is cyan on 30 % of the dots, M 100 Y 50 is magenta, with yellow on half of its dots.
+/// evenly: 30 % cyan is cyan on 30 % of the dots, M 100 Y 50 is magenta, with yellow on half of its dots. Nodes near them are such tints in
+/// part, so that a shading that ends there has no step.
 pub(super) fn with_tints(
     mix: InkMix,
     lattice: usize,
@@ -134,24 +168,24 @@ pub(super) fn with_tints(
     for (out, weights) in data.chunks_exact_mut(channels).zip(maps.data().chunks_exact(old)) {
         out[..old].copy_from_slice(weights);
     }
-    for (light, dark) in (1..8).flat_map(|light| (1..light).map(move |dark| (light, dark))) {
-        let (Some(from), Some(to), true) = (corners[light], corners[dark], dark & !light == 0) else {
+    for node in 0..ALL {
+        let Some(Tint { parts, part }) =
+            Tint::of([node / (NODES * NODES), node / NODES % NODES, node % NODES], gamma)
+        else {
             continue;
         };
-        for level in 0..NODES {
-            let along = [4, 2, 1].map(|bit| match (light & bit > 0, dark & bit > 0) {
-                (true, true) => NODES - 1,
-                (true, false) => level,
-                _ => 0,
-            });
-            let node = lattice * ALL + along.into_iter().fold(0, |node, at| node * NODES + at);
-            let left = (level as f64 / (NODES - 1) as f64).powf(1.0 / gamma);
-            let share = (f64::from(ONE) * (1.0 - left)).round() as u16;
-            let out = &mut data[node * channels..(node + 1) * channels];
-            out.fill(0);
-            out[to] += share;
-            out[from] += ONE - share;
+        let parts = parts.map(|(corner, share)| (corners[corner], share));
+        if part == 0.0 || parts.iter().any(|&(corner, share)| corner.is_none() && share > 0.0) {
+            continue;
         }
+        let out = &mut data[(lattice * ALL + node) * channels..][..channels];
+        let mut mixed: Vec<f64> = out.iter().map(|&weight| (1.0 - part) * f64::from(weight)).collect();
+        for (corner, share) in parts {
+            if let Some(corner) = corner {
+                mixed[corner] += part * share * f64::from(ONE);
+            }
+        }
+        quantise(&mixed, out);
     }
     let maps = WeightMaps::new(maps.width(), maps.height(), channels, data)?;
     Ok(InkMix { stacks, maps, matrix })
@@ -247,7 +281,7 @@ mod tests {
             let mut data = vec![0; 2 * ALL * channels];
             for (node, out) in data.chunks_exact_mut(channels).enumerate() {
                 let weights: Vec<f64> = (0..channels).map(|q| random(channels * node + q)).collect();
-                appearance::weights::quantise(&weights, out);
+                quantise(&weights, out);
             }
             let maps = WeightMaps::new(NODES * NODES, 2 * NODES, channels, data).unwrap();
             let (nodes, at) = (Nodes::new(&maps), pixel.map(|v| step(usize::from(v))));
