@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::colour::Colour;
-use super::flat::{BLACK, Flat, TONE, WHITE};
+use super::flat::{BLACK, Flat, WHITE, is_tone};
 use super::kinds::Kind;
 
 /// The colours of pixels averaged to at most one pixel for two dots along each side; `pixel` says what drew one, in which colour,
@@ -59,7 +59,7 @@ pub(super) fn averaged(
             let toned = at().find(|&at| counts(at));
             plain[x] = toned.is_none();
             // Flat colours are drawn wherever they come from, and so are shadings.
-            drawn[x] = toned.is_some_and(|at| flat.index[at] != TONE || pixel(at).0 != Kind::Picture);
+            drawn[x] = toned.is_some_and(|at| !is_tone(flat.index[at]) || pixel(at).0 != Kind::Picture);
             let (mut sum, mut count) = ([0u64; 3], 0);
             for at in at().filter(|&at| toned.is_none() || counts(at)) {
                 sum.iter_mut()
@@ -102,6 +102,7 @@ fn spread(rgb: &mut [u8], drawn: &mut [bool], plain: &[bool], width: usize) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::flat::TONE;
     use super::*;
 
     #[test]
@@ -153,6 +154,29 @@ mod tests {
             for near in x.saturating_sub(1)..(x + 2).min(20) {
                 assert_eq!(apart.rgb[3 * (20 * y + near)..][..3], tint, "at {x}, {y}, read from {near}");
             }
+        }
+    }
+
+    /// Nor do letters that will be fixed whatever they lie on: dark ones, and pale ones on a shading with more ink than paper.
+    #[test]
+    fn a_shading_is_not_mixed_with_letters() {
+        let is_letter = |at: usize| (at % 40) % 13 < 5;
+        for (letter, ground, mixed) in
+            [([60, 0, 90], 230, false), ([230, 235, 240], 60, false), ([230, 235, 240], 200, true)]
+        {
+            // More greys than a palette holds, so that they are tones.
+            let shading = |at: usize| [ground + (at / 40 / 2) as u8; 3].map(|v| v - (at % 40 / 2 % 13) as u8);
+            let pixel = |at: usize| {
+                let ([r, g, b], tag) =
+                    if is_letter(at) { (letter, Kind::TEXT) } else { (shading(at), Kind::PICTURE) };
+                [tag, r, g, b]
+            };
+            let page: Vec<[u8; 4]> = (0..40 * 40).map(pixel).collect();
+            let colour = Colour::of(&page, (40, 40), (40, 40)).unwrap();
+            let beside = (0..40 * 40).filter(|&at| !is_letter(at));
+            let found = beside.map(|at| &colour.rgb[3 * (at / 40 / 2 * 20 + at % 40 / 2)..][..3]);
+            let strange = found.filter(|rgb| rgb.iter().any(|&v| v.abs_diff(ground + 4) > 17)).count();
+            assert_eq!(strange > 0, mixed, "{letter:?} on {ground}");
         }
     }
 }

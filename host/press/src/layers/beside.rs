@@ -4,8 +4,9 @@
 //! Method: steps along the row and the column, at most so many, until the shape ends. Cost: 2 ns a step. Limits: a slanting line is cut
 //! along its row or its column, whichever is shorter.
 
-use super::flat::{Flat, similar};
+use super::flat::{Flat, INKED, similar, tone};
 use super::grounds::{PAPER, has_ink};
+use super::kinds::Kind;
 use super::shapes::continues;
 use super::treatments::{Shape, Treatment};
 
@@ -34,6 +35,20 @@ pub(super) fn needs_rim(shape: &Shape, beside: Option<Treatment>) -> bool {
         }
         beside => !has_ink(beside),
     }
+}
+
+/// Whether a dot is of a letter that is printed solid whatever else is on the page: text in strokes of less than so many dots, which has more ink
+/// than paper or lies on a tone that has.
+pub(super) fn is_solid_letter(flat: &Flat, width: usize, at: usize, stroke: usize) -> bool {
+    let own = flat.index[at];
+    let Some(&(Kind::Text, colour)) = flat.colours.get(usize::from(own)) else { return false };
+    let at = (at % width, at / width);
+    let ways = [[(-1, 0), (1, 0)], [(0, -1), (0, 1)]];
+    ways.into_iter().any(|ways| {
+        let steps = ways.map(|way| reach(flat, width, at, way, stroke));
+        let is_on_ink = |side: usize| beyond(flat, width, at, ways[side], steps[side]) == Some(INKED);
+        steps.iter().sum::<usize>() + 1 < stroke && (tone(colour) == INKED || is_on_ink(0) || is_on_ink(1))
+    })
 }
 
 /// Pale lines that lie on several colours: borders of a table whose rows are tinted in turns, wires of a dartboard.
@@ -70,9 +85,7 @@ impl PaleLines<'_> {
         let steps = ways.map(|ways| ways.map(|way| reach(self.flat, self.width, (x, y), way, most)));
         let shorter = usize::from(steps[1].iter().sum::<usize>() < steps[0].iter().sum());
         std::array::from_fn(|side| {
-            let ((right, down), steps) = (ways[shorter][side], steps[shorter][side] as isize + 1);
-            let x = x.checked_add_signed(right * steps).filter(|&x| x < self.width)?;
-            self.flat.index.get(y.checked_add_signed(down * steps)? * self.width + x).copied()
+            beyond(self.flat, self.width, (x, y), ways[shorter][side], steps[shorter][side])
         })
     }
 
@@ -111,6 +124,19 @@ pub(super) fn is_ridge(flat: &Flat, width: usize, at: (usize, usize), hair: u8) 
         _ if across.abs_diff(down) <= 2 => midway.contains(&true),
         _ => midway[usize::from(across > down)],
     }
+}
+
+/// The colour behind so many dots one way; `None` outside the art.
+fn beyond(
+    flat: &Flat,
+    width: usize,
+    (x, y): (usize, usize),
+    (right, down): (isize, isize),
+    steps: usize,
+) -> Option<u8> {
+    let steps = steps as isize + 1;
+    let x = x.checked_add_signed(right * steps).filter(|&x| x < width)?;
+    flat.index.get(y.checked_add_signed(down * steps)? * width + x).copied()
 }
 
 /// How many dots of the same shape follow a dot one way, so many at most.

@@ -17,10 +17,11 @@ use protocol::ink::Ink;
 use rayon::prelude::*;
 
 use super::averages::averaged;
+use super::beside::is_solid_letter;
 use super::bits;
 use super::compose::Settings;
 use super::error::LayersError;
-use super::flat::{BLACK, Flat, TONE, split};
+use super::flat::{BLACK, Flat, INKED, TONE, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
 use super::outline;
@@ -73,22 +74,23 @@ impl Colour {
             let flat = flat.at_dots(size, dots);
             return Some(Colour::black(bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
         }
-        if !flat.index.par_chunks(1 << 16).any(|dots| dots.contains(&TONE)) {
+        if !flat.has_tones() {
             return Colour::of_flat(flat.at_dots(size, dots), dots);
         }
         // A softened edge is no darker tone of its ground.
         let pixel = |at: usize| match flat.index[at] {
-            dot if (2..TONE).contains(&dot) => (split(&pixels[at]).0, flat.colours[usize::from(dot)].1),
+            dot if (2..INKED).contains(&dot) => (split(&pixels[at]).0, flat.colours[usize::from(dot)].1),
             _ => split(&pixels[at]),
         };
-        let colour = averaged(pixel, |_| false, &flat, (size.0 as usize, size.1 as usize), dots);
+        let (width, height) = (size.0 as usize, size.1 as usize);
+        let is_letter = |at: usize| is_solid_letter(&flat, width, at, outline::LETTER.into());
+        let colour = averaged(pixel, is_letter, &flat, (width, height), dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
     /// Whether there are no tones: every dot is in a flat colour.
     pub(super) fn is_line_art(&self) -> bool {
-        self.black.is_some()
-            || !self.flat.index.is_empty() && !self.flat.index.par_iter().any(|&dot| dot == TONE)
+        self.black.is_some() || !self.flat.index.is_empty() && !self.flat.has_tones()
     }
 
     /// Flat colours alone; `None` if all are white.
@@ -237,7 +239,7 @@ impl Colour {
             used
         });
         let used = used.reduce(|| [false; 256], |a, b| std::array::from_fn(|at| a[at] | b[at]));
-        if index.is_empty() || used[usize::from(TONE)] {
+        if index.is_empty() || used[usize::from(TONE)] || used[usize::from(INKED)] {
             return None;
         }
         let mut stacks = vec![Stack::SUBSTRATE];

@@ -3,8 +3,9 @@
 //! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
 //! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
 //! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are
-//! left out first: the ones with a similar colour on the page that has nearly as many dots; an area stays, but not the band of a shading
-//! in its colour. White and black dots of a picture count only in lines and areas; a lone one beside tones is noise.
+//! left out first: the ones with a similar colour on the page that has nearly as many dots, if half of their border or more is to such colours. An area
+//! stays and so does a line, but not the band of a shading in its colour. White and black dots of a picture count only in lines and areas; a lone one beside tones is noise. Of tones it is
+//! known whether they have more ink than paper.
 //! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
 
 use std::collections::HashMap;
@@ -14,17 +15,22 @@ use rayon::prelude::*;
 
 use super::kinds::{K_OF_PICTURES, Kind};
 use super::masks::Masks;
-use super::resample;
+use super::posters::Span;
+use super::{resample, translucent};
 use crate::forest::Forest;
 
-/// A dot that is a tone.
+/// A dot that is a tone with more paper than ink.
 pub(super) const TONE: u8 = u8::MAX;
+/// A dot that is a tone with more ink than paper.
+pub(super) const INKED: u8 = TONE - 1;
 /// Number of white, which is bare paper, whatever drew it.
 pub(super) const WHITE: u8 = 0;
 /// Number of black.
 pub(super) const BLACK: u8 = 1;
 /// The most colours besides white and black.
-const MOST: usize = TONE as usize - 2;
+const MOST: usize = INKED as usize - 2;
+/// sRGB's value of half of the light. Where a channel has less, ink that takes it away lies on more than half of the dots.
+const HALF: u8 = 188;
 /// A colour with so many times the dots of any similar one is an area, though a shading passes through it.
 const AREA: u64 = 16;
 /// Colours gathered before the palette is chosen.
@@ -42,7 +48,7 @@ type Drawn = (Kind, [u8; 3]);
 pub struct Flat {
     /// What draws in each colour, and its sRGB. White and black come first.
     pub(super) colours: Vec<Drawn>,
-    /// For each dot the number of its colour, or [`TONE`].
+    /// For each dot the number of its colour, [`TONE`] or [`INKED`].
     pub(super) index: Vec<u8>,
 }
 
@@ -81,6 +87,16 @@ pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (Kind, [u8; 3]) {
     (kind, [pixel[N - 3], pixel[N - 2], pixel[N - 1]])
 }
 
+/// What a dot is whose colour is no flat one.
+pub(super) fn tone(colour: [u8; 3]) -> u8 {
+    if colour.iter().any(|&v| v < HALF) { INKED } else { TONE }
+}
+
+/// Whether a dot is a tone.
+pub(super) fn is_tone(dot: u8) -> bool {
+    dot >= INKED
+}
+
 /// Whether one colour may follow the other in a shading.
 pub(super) fn similar(a: [u8; 3], b: [u8; 3]) -> bool {
     (0..3).all(|c| a[c].abs_diff(b[c]) <= SIMILAR)
@@ -91,14 +107,15 @@ impl Flat {
     pub(super) fn of<const N: usize>(pixels: &[[u8; N]], width: usize) -> Flat {
         let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
         let masks = Masks::of(pixels, width);
-        let (palette, shaded) = palette(pixels, width, &masks);
+        let letters = translucent::letters(pixels, width);
+        let (palette, shaded) = palette(pixels, width, (&masks, &letters));
         colours.extend(palette);
         let numbers: HashMap<(Kind, [u8; 3]), u8> = colours.iter().copied().zip(0..).skip(2).collect();
         let number = |pixel: &[u8; N]| match split(pixel) {
             (_, [255, 255, 255]) => WHITE,
             (_, [0, 0, 0]) => BLACK,
-            (Kind::Picture, _) => TONE,
-            key => numbers.get(&key).copied().unwrap_or(TONE),
+            (Kind::Picture, colour) => tone(colour),
+            key => numbers.get(&key).copied().unwrap_or_else(|| tone(key.1)),
         };
         let mut index = vec![WHITE; pixels.len()];
         index.par_chunks_mut(width).zip(pixels.par_chunks(width)).for_each(|(index, row)| {
@@ -115,9 +132,14 @@ impl Flat {
                 K_OF_PICTURES if N == 4 => BLACK,
                 [255, 255, 255] => WHITE,
                 [0, 0, 0] => BLACK,
-                colour => numbers.get(&(Kind::Drawing, colour)).copied().unwrap_or(TONE),
+                colour => numbers.get(&(Kind::Drawing, colour)).copied().unwrap_or_else(|| tone(colour)),
             };
             index[stretch].fill(number);
+        }
+        for (stretch, colour) in letters {
+            if let Some(&number) = numbers.get(&(Kind::Text, colour)) {
+                index[stretch].fill(number);
+            }
         }
         let mut flat = Flat { colours, index };
         flat.forget_noise(pixels, width);
@@ -146,7 +168,8 @@ impl Flat {
     /// Makes tones of the white and black dots of pictures that lie alone beside tones.
     fn forget_noise<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize) {
         let index = &self.index;
-        let busy: Vec<bool> = index.par_chunks(width).map(|row| row.contains(&TONE)).collect();
+        let busy: Vec<bool> =
+            index.par_chunks(width).map(|row| row.iter().any(|&dot| is_tone(dot))).collect();
         let rows = index.len() / width;
         let noise: Vec<usize> = (0..rows)
             .into_par_iter()
@@ -161,17 +184,17 @@ impl Flat {
             })
             .map(|(x, y)| y * width + x)
             .collect();
-        noise.into_iter().for_each(|at| self.index[at] = TONE);
+        noise.into_iter().for_each(|at| self.index[at] = if self.index[at] == BLACK { INKED } else { TONE });
     }
 
     /// Makes tones of what is `shaded` where it is a band of a shading: by half of its border or more it lies beside tones like it.
     fn forget_bands<const N: usize>(&mut self, pixels: &[[u8; N]], width: usize, shaded: &[Drawn]) {
         let is_shaded: Vec<bool> = self.colours.iter().map(|colour| shaded.contains(colour)).collect();
-        let number = |dot: u8| is_shaded.get(usize::from(dot)) == Some(&true);
+        let shades = |dot: u8| is_shaded.get(usize::from(dot)) == Some(&true);
         let (mut bands, mut at): (Vec<Range<usize>>, usize) = (Vec::new(), 0);
         for row in self.index.chunks(width).filter(|_| !shaded.is_empty()) {
             for run in row.chunk_by(|a, b| a == b) {
-                if number(run[0]) {
+                if shades(run[0]) {
                     bands.push(at..at + run.len());
                 }
                 at += run.len();
@@ -194,14 +217,18 @@ impl Flat {
                 let (own_kind, own_colour) = self.colours[usize::from(own)];
                 let [border, like] = &mut borders[root as usize];
                 *border += 1;
-                *like +=
-                    u64::from(self.index[other] == TONE && kind == own_kind && similar(colour, own_colour));
+                *like += u64::from(
+                    (is_tone(self.index[other]) || shades(self.index[other]))
+                        && kind == own_kind
+                        && similar(colour, own_colour),
+                );
             }
         }
         for (band, root) in bands.into_iter().zip(roots) {
             let [border, like] = borders[root as usize];
             if border > 0 && 2 * like >= border {
-                self.index[band].fill(TONE);
+                let tone = tone(self.colours[usize::from(self.index[band.start])].1);
+                self.index[band].fill(tone);
             }
         }
     }
@@ -225,6 +252,10 @@ impl Flat {
         rows.reduce(Touching::none, Touching::joined)
     }
 
+    pub(super) fn has_tones(&self) -> bool {
+        self.index.par_chunks(1 << 16).any(|dots| dots.iter().any(|&dot| is_tone(dot)))
+    }
+
     /// Whether the halftone has nothing to do: every dot is white or black.
     pub(super) fn is_black_and_white(&self) -> bool {
         !self.index.is_empty()
@@ -241,14 +272,18 @@ fn is_noise(index: &[u8], width: usize, (x, y): (usize, usize)) -> bool {
     let rows = index.chunks_exact(width).skip(y.saturating_sub(1)).take(y.min(1) + 2);
     let around = rows.flat_map(|row| &row[x.saturating_sub(1)..(x + 2).min(width)]);
     let (tones, like) = around.fold((0, 0), |(tones, like), &dot| {
-        (tones + usize::from(dot == TONE), like + usize::from(dot == own))
+        (tones + usize::from(is_tone(dot)), like + usize::from(dot == own))
     });
     // The dot itself is like itself.
     tones > 0 && like < 2
 }
 
 /// The colours of text and drawings, text first, then the most frequent; and those of them through which a shading passes.
-fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> (Vec<Drawn>, Vec<Drawn>) {
+fn palette<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    (masks, letters): (&Masks, &[Span]),
+) -> (Vec<Drawn>, Vec<Drawn>) {
     type Counts = HashMap<(Kind, [u8; 3]), u64>;
     let add = |counts: &mut Counts, key, dots| {
         if counts.len() < GATHERED || counts.contains_key(&key) {
@@ -275,6 +310,9 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> (
         .filter(|(colour, _)| !plain(**colour))
         .map(|(&colour, &dots)| ((Kind::Drawing, colour), dots))
         .collect();
+    for (stretch, colour) in letters {
+        add(&mut counts, (Kind::Text, *colour), stretch.len() as u64);
+    }
     for part in gathered {
         // In a fixed order, because the number of colours is limited.
         let mut part: Vec<_> = part.into_iter().collect();
@@ -285,13 +323,15 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> (
     let mut shaded = Vec::new();
     if colours.len() > MOST {
         let all = colours.clone();
+        let borders = borders(pixels, width, &all);
         colours.retain(|&((kind, colour), dots)| {
             let mut similar = all
                 .iter()
                 .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
                 .peekable();
             let is_shaded = kind != Kind::Text && similar.peek().is_some();
-            let stays = !is_shaded || similar.all(|&(_, as_many)| dots >= AREA * as_many);
+            let is_band = || borders.get(&(kind, colour)).is_some_and(|&[border, like]| 2 * like >= border);
+            let stays = !is_shaded || !is_band() || similar.all(|&(_, as_many)| dots >= AREA * as_many);
             if is_shaded && stays {
                 shaded.push((kind, colour));
             }
@@ -301,6 +341,51 @@ fn palette<const N: usize>(pixels: &[[u8; N]], width: usize, masks: &Masks) -> (
     sort(&mut colours);
     colours.truncate(MOST);
     (colours.into_iter().map(|(key, _)| key).collect(), shaded)
+}
+
+/// How much of the border of each colour there is, and how much of it to similar colours. Of each run of dots both ends count, and above
+/// and below it the middle.
+fn borders<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    colours: &[(Drawn, u64)],
+) -> HashMap<Drawn, [u64; 2]> {
+    let none: HashMap<Drawn, [u64; 2]> = colours.iter().map(|&(key, _)| (key, [0; 2])).collect();
+    let rows = pixels.par_chunks(width * ROWS).enumerate().map(|(part, rows)| {
+        let mut borders = none.clone();
+        let mut start = part * width * ROWS;
+        for run in rows.chunks(width).flat_map(|row| row.chunk_by(|a, b| a == b)) {
+            let (first, end) = (start, start + run.len());
+            start = end;
+            let (kind, colour) = split(&run[0]);
+            let Some([border, like]) = borders.get_mut(&(kind, colour)) else { continue };
+            let middle = first + run.len() / 2;
+            let beside = [
+                (first.checked_sub(1).filter(|_| !first.is_multiple_of(width)), 1),
+                (Some(end).filter(|end| !end.is_multiple_of(width)), 1),
+                (middle.checked_sub(width), run.len() as u64),
+                (Some(middle + width), run.len() as u64),
+            ];
+            for (at, dots) in beside {
+                let Some(pixel) = at.and_then(|at| pixels.get(at)).filter(|pixel| **pixel != run[0]) else {
+                    continue;
+                };
+                let (other, near) = split(pixel);
+                *border += dots;
+                *like += if other == kind && similar(near, colour) { dots } else { 0 };
+            }
+        }
+        borders
+    });
+    let sum = |mut all: HashMap<Drawn, [u64; 2]>, part: HashMap<Drawn, [u64; 2]>| {
+        for (key, [border, like]) in part {
+            let [all_border, all_like] = all.entry(key).or_default();
+            *all_border += border;
+            *all_like += like;
+        }
+        all
+    };
+    rows.reduce(HashMap::new, sum)
 }
 
 /// Text first, then the most frequent.
@@ -318,7 +403,7 @@ mod tests {
         let row = [[0, 255, 255, 255], blue, [1, 0, 0, 200], [1, 0, 0, 0], photo, photo, [1, 255, 255, 255]];
         let flat = Flat::of(&row, 7);
         assert_eq!(flat.colours[2..], [(Kind::Text, [0, 0, 200]), (Kind::Drawing, [0, 0, 200])]);
-        assert_eq!(flat.index, [WHITE, 3, 2, BLACK, TONE, TONE, WHITE]);
+        assert_eq!(flat.index, [WHITE, 3, 2, BLACK, INKED, INKED, WHITE]);
     }
 
     #[test]
@@ -372,7 +457,7 @@ mod tests {
             } else if x >= 190 {
                 WHITE
             } else {
-                TONE
+                INKED
             };
             assert_eq!(dot, wanted, "at {x}, {y}");
         }
@@ -386,6 +471,33 @@ mod tests {
         pixels.extend([[4, 10, 200, 10]; 3]);
         let flat = Flat::of(&pixels, pixels.len());
         assert_eq!(flat.colours[2..], [(Kind::Text, [200, 10, 10]), (Kind::Drawing, [10, 200, 10])]);
-        assert_eq!(flat.index.iter().filter(|&&dot| dot == TONE).count(), 2000);
+        assert_eq!(flat.index.iter().filter(|&&dot| is_tone(dot)).count(), 2000);
+    }
+
+    /// The border of a table, in a grey through which a shadow passes elsewhere.
+    #[test]
+    fn a_line_in_the_colour_of_a_shading_stays() {
+        let (ink, ground) = ([4, 187, 187, 187], [0, 255, 255, 255]);
+        let shading = |x: usize, y: usize| {
+            let grey = 20 + (y / 2) as u8;
+            [4, grey, grey, grey + (x % 2) as u8]
+        };
+        let is_line = |x: usize, y: usize| (400..600).contains(&y) && (x % 50 < 4 || y % 50 < 4);
+        let pixels: Vec<[u8; 4]> = (0..300 * 600)
+            .map(|at| match (at % 300, at / 300) {
+                (x, y @ 0..400) => shading(x, y),
+                (x, y) if is_line(x, y) => ink,
+                _ => ground,
+            })
+            .collect();
+        let flat = Flat::of(&pixels, 300);
+        let grey = flat.colours.iter().position(|&colour| colour == (Kind::Drawing, [187; 3])).unwrap();
+        for (at, &dot) in flat.index.iter().enumerate() {
+            let (x, y) = (at % 300, at / 300);
+            match (y < 400, is_line(x, y)) {
+                (true, _) => assert!(is_tone(dot), "at {x}, {y}"),
+                (_, line) => assert_eq!(usize::from(dot), if line { grey } else { 0 }, "at {x}, {y}"),
+            }
+        }
     }
 }

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use super::flat::{Flat, similar};
+use super::flat::{Flat, INKED, similar};
 use super::kinds::Kind;
 use super::shapes::{Run, continues};
 use super::treatments::{CHOICES, Shape, Treatment, is_faint};
@@ -53,12 +53,17 @@ pub(super) fn lies(
             *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
         }
     });
-    let has_ink = |&colour: &u8| has_ink(treatments.get(usize::from(colour)).copied());
+    // Of what is not tagged as text it is not known whether it is a part of the tone beside it.
+    let has_ink = |beside: u8, kind: Kind| match beside {
+        INKED => kind == Kind::Text,
+        colour => has_ink(treatments.get(usize::from(colour)).copied()),
+    };
     let judge = |root: u32, border: HashMap<u8, u32>| {
         let all: u32 = border.values().sum();
-        let (inked, pale): (Vec<_>, Vec<_>) = border.into_iter().partition(|(colour, _)| has_ink(colour));
+        let (kind, own) = flat.colours[usize::from(runs[root as usize].colour)];
+        let (inked, pale): (Vec<_>, Vec<_>) =
+            border.into_iter().partition(|&(beside, _)| has_ink(beside, kind));
         let inked: u32 = inked.iter().map(|&(_, dots)| dots).sum();
-        let own = flat.colours[usize::from(runs[root as usize].colour)].1;
         // Beside what filters sharpened there are ripples in all tints. What is no colour is a shading or a picture.
         let is_ripple = |&(beside, _): &(u8, u32)| {
             let is_like = |&(_, colour): &(Kind, [u8; 3])| similar(colour, own);

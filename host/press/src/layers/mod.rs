@@ -53,6 +53,7 @@ mod svg;
 mod svg_kinds;
 mod tiff;
 mod tiff_pages;
+mod translucent;
 mod treatments;
 mod white;
 mod window;

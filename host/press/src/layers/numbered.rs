@@ -8,7 +8,7 @@
 
 use std::collections::HashMap;
 
-use super::flat::{Flat, TONE, WHITE, split};
+use super::flat::{Flat, INKED, WHITE, split};
 use super::kinds::{BYTES, Kind};
 use super::window::Window;
 use crate::separate::Plane;
@@ -110,7 +110,7 @@ impl Numbered {
             return Some(number);
         }
         let tone = key.0 == Kind::Picture && key.1 != [255; 3] && key.1 != [0; 3];
-        let number = u8::try_from(self.colours.len()).ok().filter(|&number| !tone && number < TONE)?;
+        let number = u8::try_from(self.colours.len()).ok().filter(|&number| !tone && number < INKED)?;
         self.numbers.insert(key, number);
         self.colours.push(key);
         Some(number)

@@ -34,7 +34,7 @@ const STROKE: u8 = 9;
 /// A pale line at most so many dots wide has less than a cluster in each of its dots along it.
 const HAIR: u8 = 4;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
-const LETTER: u8 = 24;
+pub(super) const LETTER: u8 = 24;
 
 /// A drawing at most so many dots wide and high, 5 mm, is as small as a letter: text that was made outlines, a module of a QR code.
 const SMALL: u32 = 118;

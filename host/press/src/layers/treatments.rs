@@ -156,7 +156,7 @@ impl Found {
 }
 
 /// How far two colours are apart as a screen shows them.
-fn apart(a: [u8; 3], b: [u8; 3]) -> f64 {
+pub(super) fn apart(a: [u8; 3], b: [u8; 3]) -> f64 {
     let light = |colour: [u8; 3]| {
         colour.map(|v| (f64::from(appearance::srgb::decode(f32::from(v) / 255.0)) + FLARE) / (1.0 + FLARE))
     };

@@ -1,5 +1,6 @@
 //! Letters and lines of every width, ground and side, with the dots that they are fixed to.
 
+use super::super::flat::INKED;
 use super::*;
 
 const DARK: Treatment = Treatment::Shape(Shape {
@@ -59,6 +60,23 @@ fn a_pale_stroke_on_ink_is_paper_and_beside_paper_keeps_its_rim() {
         let fixed = fixed(&flat, 60, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, DARK]);
         let (middle, rim) = (fixed[20 * 60 + 23], fixed[20 * 60 + 20]);
         assert_eq!((middle, rim), fill.map_or((TONE, 7), |stack| (stack, stack)), "{bar:?}");
+    }
+}
+
+/// The same on a shading, where text is told from what belongs to the shading.
+#[test]
+fn pale_text_on_a_shading_with_more_ink_than_paper_is_paper() {
+    for (kind, ground, printed) in [
+        (Kind::Text, INKED, [PAPER, PAPER]),
+        (Kind::Text, TONE, [7, TONE]),
+        (Kind::Drawing, INKED, [TONE, TONE]),
+    ] {
+        let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (kind, [235; 3])];
+        let is_stroke = |at: usize| (20..27).contains(&(at % 60)) && (4..40).contains(&(at / 60));
+        let index = (0..60 * 50).map(|at| if is_stroke(at) { 2 } else { ground }).collect();
+        let fixed = fixed(&Flat { colours, index }, 60, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT]);
+        assert_eq!([fixed[20 * 60 + 20], fixed[20 * 60 + 23]], printed, "{kind:?} on {ground}");
+        assert_eq!(fixed[20 * 60 + 10], TONE);
     }
 }
 
