@@ -1,12 +1,11 @@
 //! Flat colours: the dots that must not be treated as tones of a photograph.
 //!
 //! Problem: colours are averaged to 300 dpi for the halftone, but letters and edges must be decided at every dot.
-//! Method: a palette. Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
-//! tone, but for [masks](super::masks), which are drawings. If a page draws in more colours than a palette holds, those of shadings are
-//! left out first: the ones with a similar colour on the page that has nearly as many dots, if half of their border or more is to such colours. An area
-//! stays and so does a line, but not the band of a shading in its colour. White and black dots of a picture count only in lines and areas; a lone one beside tones is noise. Of tones it is
-//! known whether they have more ink than paper.
-//! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: [`MOST`] colours.
+//! Method: a [palette](super::palette). Every dot of text or a drawing has the number of its colour; a dot of a picture is white, black or a
+//! tone, but for [masks](super::masks), which are drawings, and [letters](super::translucent) through which a picture shows. The band of a shading
+//! in a colour of the palette is a tone. White and black dots of a picture count only in lines and areas; a lone one beside tones is noise. Of tones
+//! it is known whether they have more ink than paper.
+//! Cost: two scans of the page, 1 to 2 ns a pixel; one byte a dot. Limits: those of the palette.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -15,7 +14,7 @@ use rayon::prelude::*;
 
 use super::kinds::{K_OF_PICTURES, Kind};
 use super::masks::Masks;
-use super::posters::Span;
+use super::palette::{palette, sort};
 use super::{resample, translucent};
 use crate::forest::Forest;
 
@@ -27,21 +26,13 @@ pub(super) const INKED: u8 = TONE - 1;
 pub(super) const WHITE: u8 = 0;
 /// Number of black.
 pub(super) const BLACK: u8 = 1;
-/// The most colours besides white and black.
-const MOST: usize = INKED as usize - 2;
 /// sRGB's value of half of the light. Where a channel has less, ink that takes it away lies on more than half of the dots.
 const HALF: u8 = 188;
-/// A colour with so many times the dots of any similar one is an area, though a shading passes through it.
-const AREA: u64 = 16;
-/// Colours gathered before the palette is chosen.
-const GATHERED: usize = 4096;
 /// Neighbours in a shading differ by at most this much in each of red, green and blue.
 const SIMILAR: u8 = 12;
-/// Rows that are gathered at once.
-const ROWS: usize = 64;
 
 /// What draws in a colour, and its sRGB.
-type Drawn = (Kind, [u8; 3]);
+pub(super) type Drawn = (Kind, [u8; 3]);
 
 /// Flat colours and where they are.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -147,8 +138,8 @@ impl Flat {
         flat
     }
 
-    /// The palette of colours that have so many dots each, and the number of each colour in it. There are no tones, and
-    /// [`MOST`] colours at most besides white and black.
+    /// The palette of colours that have so many dots each, and the number of each colour in it. There are no tones, and no more colours
+    /// than a palette holds.
     pub(super) fn ordered(colours: &[(Kind, [u8; 3])], counts: &[u64]) -> (Vec<(Kind, [u8; 3])>, Vec<u8>) {
         let plain = |rgb: [u8; 3]| rgb == [255; 3] || rgb == [0; 3];
         let drawn = colours.iter().zip(counts).filter(|&(&(_, rgb), &dots)| dots > 0 && !plain(rgb));
@@ -276,121 +267,6 @@ fn is_noise(index: &[u8], width: usize, (x, y): (usize, usize)) -> bool {
     });
     // The dot itself is like itself.
     tones > 0 && like < 2
-}
-
-/// The colours of text and drawings, text first, then the most frequent; and those of them through which a shading passes.
-fn palette<const N: usize>(
-    pixels: &[[u8; N]],
-    width: usize,
-    (masks, letters): (&Masks, &[Span]),
-) -> (Vec<Drawn>, Vec<Drawn>) {
-    type Counts = HashMap<(Kind, [u8; 3]), u64>;
-    let add = |counts: &mut Counts, key, dots| {
-        if counts.len() < GATHERED || counts.contains_key(&key) {
-            *counts.entry(key).or_default() += dots;
-        }
-    };
-    let gathered: Vec<Counts> = pixels
-        .par_chunks(width * ROWS)
-        .map(|pixels| {
-            let mut counts = Counts::new();
-            for run in pixels.chunk_by(|a, b| a == b) {
-                match split(&run[0]) {
-                    (Kind::Picture, _) | (_, [255, 255, 255] | [0, 0, 0]) => {}
-                    key => add(&mut counts, key, run.len() as u64),
-                }
-            }
-            counts
-        })
-        .collect();
-    let plain = |colour: [u8; 3]| colour == [255; 3] || colour == [0; 3];
-    let mut counts: Counts = masks
-        .colours
-        .iter()
-        .filter(|(colour, _)| !plain(**colour))
-        .map(|(&colour, &dots)| ((Kind::Drawing, colour), dots))
-        .collect();
-    for (stretch, colour) in letters {
-        add(&mut counts, (Kind::Text, *colour), stretch.len() as u64);
-    }
-    for part in gathered {
-        // In a fixed order, because the number of colours is limited.
-        let mut part: Vec<_> = part.into_iter().collect();
-        part.sort_unstable();
-        part.into_iter().for_each(|(key, dots)| add(&mut counts, key, dots));
-    }
-    let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
-    let mut shaded = Vec::new();
-    if colours.len() > MOST {
-        let all = colours.clone();
-        let borders = borders(pixels, width, &all);
-        colours.retain(|&((kind, colour), dots)| {
-            let mut similar = all
-                .iter()
-                .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
-                .peekable();
-            let is_shaded = kind != Kind::Text && similar.peek().is_some();
-            let is_band = || borders.get(&(kind, colour)).is_some_and(|&[border, like]| 2 * like >= border);
-            let stays = !is_shaded || !is_band() || similar.all(|&(_, as_many)| dots >= AREA * as_many);
-            if is_shaded && stays {
-                shaded.push((kind, colour));
-            }
-            stays
-        });
-    }
-    sort(&mut colours);
-    colours.truncate(MOST);
-    (colours.into_iter().map(|(key, _)| key).collect(), shaded)
-}
-
-/// How much of the border of each colour there is, and how much of it to similar colours. Of each run of dots both ends count, and above
-/// and below it the middle.
-fn borders<const N: usize>(
-    pixels: &[[u8; N]],
-    width: usize,
-    colours: &[(Drawn, u64)],
-) -> HashMap<Drawn, [u64; 2]> {
-    let none: HashMap<Drawn, [u64; 2]> = colours.iter().map(|&(key, _)| (key, [0; 2])).collect();
-    let rows = pixels.par_chunks(width * ROWS).enumerate().map(|(part, rows)| {
-        let mut borders = none.clone();
-        let mut start = part * width * ROWS;
-        for run in rows.chunks(width).flat_map(|row| row.chunk_by(|a, b| a == b)) {
-            let (first, end) = (start, start + run.len());
-            start = end;
-            let (kind, colour) = split(&run[0]);
-            let Some([border, like]) = borders.get_mut(&(kind, colour)) else { continue };
-            let middle = first + run.len() / 2;
-            let beside = [
-                (first.checked_sub(1).filter(|_| !first.is_multiple_of(width)), 1),
-                (Some(end).filter(|end| !end.is_multiple_of(width)), 1),
-                (middle.checked_sub(width), run.len() as u64),
-                (Some(middle + width), run.len() as u64),
-            ];
-            for (at, dots) in beside {
-                let Some(pixel) = at.and_then(|at| pixels.get(at)).filter(|pixel| **pixel != run[0]) else {
-                    continue;
-                };
-                let (other, near) = split(pixel);
-                *border += dots;
-                *like += if other == kind && similar(near, colour) { dots } else { 0 };
-            }
-        }
-        borders
-    });
-    let sum = |mut all: HashMap<Drawn, [u64; 2]>, part: HashMap<Drawn, [u64; 2]>| {
-        for (key, [border, like]) in part {
-            let [all_border, all_like] = all.entry(key).or_default();
-            *all_border += border;
-            *all_like += like;
-        }
-        all
-    };
-    rows.reduce(HashMap::new, sum)
-}
-
-/// Text first, then the most frequent.
-fn sort(colours: &mut [((Kind, [u8; 3]), u64)]) {
-    colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
 }
 
 #[cfg(test)]

@@ -35,6 +35,7 @@ mod order;
 mod orientation;
 mod outline;
 mod page;
+mod palette;
 pub mod pdf;
 mod pens;
 mod picture;

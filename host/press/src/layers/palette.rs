@@ -1,0 +1,141 @@
+//! The palette of flat colours of a page that may draw in more than there are numbers.
+//!
+//! Problem: a shading has hundreds of colours, which would crowd out those of lines and areas.
+//! Method: text comes first, then the most frequent. If there are too many, the colours of shadings are left out: the ones with a similar
+//! colour on the page that has nearly as many dots, if half of their border or more is to such colours. An area stays, and so does a line,
+//! though a shading passes through their colour.
+//! Cost: a look at each pixel; at four more for each run of a row on pages with too many colours. Limits: [`MOST`] colours of
+//! [`GATHERED`].
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::flat::{Drawn, INKED, similar, split};
+use super::kinds::Kind;
+use super::masks::Masks;
+use super::posters::Span;
+
+/// The most colours besides white and black.
+const MOST: usize = INKED as usize - 2;
+/// A colour with so many times the dots of any similar one is an area, though a shading passes through it.
+const AREA: u64 = 16;
+/// Colours gathered before the palette is chosen.
+const GATHERED: usize = 4096;
+/// Rows that are gathered at once.
+const ROWS: usize = 64;
+
+/// The colours of text and drawings, text first, then the most frequent; and those of them through which a shading passes.
+pub(super) fn palette<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    (masks, letters): (&Masks, &[Span]),
+) -> (Vec<Drawn>, Vec<Drawn>) {
+    type Counts = HashMap<(Kind, [u8; 3]), u64>;
+    let add = |counts: &mut Counts, key, dots| {
+        if counts.len() < GATHERED || counts.contains_key(&key) {
+            *counts.entry(key).or_default() += dots;
+        }
+    };
+    let gathered: Vec<Counts> = pixels
+        .par_chunks(width * ROWS)
+        .map(|pixels| {
+            let mut counts = Counts::new();
+            for run in pixels.chunk_by(|a, b| a == b) {
+                match split(&run[0]) {
+                    (Kind::Picture, _) | (_, [255, 255, 255] | [0, 0, 0]) => {}
+                    key => add(&mut counts, key, run.len() as u64),
+                }
+            }
+            counts
+        })
+        .collect();
+    let plain = |colour: [u8; 3]| colour == [255; 3] || colour == [0; 3];
+    let mut counts: Counts = masks
+        .colours
+        .iter()
+        .filter(|(colour, _)| !plain(**colour))
+        .map(|(&colour, &dots)| ((Kind::Drawing, colour), dots))
+        .collect();
+    for (stretch, colour) in letters {
+        add(&mut counts, (Kind::Text, *colour), stretch.len() as u64);
+    }
+    for part in gathered {
+        // In a fixed order, because the number of colours is limited.
+        let mut part: Vec<_> = part.into_iter().collect();
+        part.sort_unstable();
+        part.into_iter().for_each(|(key, dots)| add(&mut counts, key, dots));
+    }
+    let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
+    let mut shaded = Vec::new();
+    if colours.len() > MOST {
+        let all = colours.clone();
+        let borders = borders(pixels, width, &all);
+        colours.retain(|&((kind, colour), dots)| {
+            let mut similar = all
+                .iter()
+                .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
+                .peekable();
+            let is_shaded = kind != Kind::Text && similar.peek().is_some();
+            let is_band = || borders.get(&(kind, colour)).is_some_and(|&[border, like]| 2 * like >= border);
+            let stays = !is_shaded || !is_band() || similar.all(|&(_, as_many)| dots >= AREA * as_many);
+            if is_shaded && stays {
+                shaded.push((kind, colour));
+            }
+            stays
+        });
+    }
+    sort(&mut colours);
+    colours.truncate(MOST);
+    (colours.into_iter().map(|(key, _)| key).collect(), shaded)
+}
+
+/// How much of the border of each colour there is, and how much of it to similar colours. Of each run of dots both ends count, and above
+/// and below it the middle.
+fn borders<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    colours: &[(Drawn, u64)],
+) -> HashMap<Drawn, [u64; 2]> {
+    let none: HashMap<Drawn, [u64; 2]> = colours.iter().map(|&(key, _)| (key, [0; 2])).collect();
+    let rows = pixels.par_chunks(width * ROWS).enumerate().map(|(part, rows)| {
+        let mut borders = none.clone();
+        let mut start = part * width * ROWS;
+        for run in rows.chunks(width).flat_map(|row| row.chunk_by(|a, b| a == b)) {
+            let (first, end) = (start, start + run.len());
+            start = end;
+            let (kind, colour) = split(&run[0]);
+            let Some([border, like]) = borders.get_mut(&(kind, colour)) else { continue };
+            let middle = first + run.len() / 2;
+            let beside = [
+                (first.checked_sub(1).filter(|_| !first.is_multiple_of(width)), 1),
+                (Some(end).filter(|end| !end.is_multiple_of(width)), 1),
+                (middle.checked_sub(width), run.len() as u64),
+                (Some(middle + width), run.len() as u64),
+            ];
+            for (at, dots) in beside {
+                let Some(pixel) = at.and_then(|at| pixels.get(at)).filter(|pixel| **pixel != run[0]) else {
+                    continue;
+                };
+                let (other, near) = split(pixel);
+                *border += dots;
+                *like += if other == kind && similar(near, colour) { dots } else { 0 };
+            }
+        }
+        borders
+    });
+    let sum = |mut all: HashMap<Drawn, [u64; 2]>, part: HashMap<Drawn, [u64; 2]>| {
+        for (key, [border, like]) in part {
+            let [all_border, all_like] = all.entry(key).or_default();
+            *all_border += border;
+            *all_like += like;
+        }
+        all
+    };
+    rows.reduce(HashMap::new, sum)
+}
+
+/// Text first, then the most frequent.
+pub(super) fn sort(colours: &mut [((Kind, [u8; 3]), u64)]) {
+    colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
+}
