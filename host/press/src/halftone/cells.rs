@@ -16,6 +16,7 @@ mod border;
 pub(super) mod cell;
 mod choose;
 mod diffuse;
+mod evenness;
 pub(super) mod field;
 pub(super) mod plan;
 

@@ -10,7 +10,8 @@ use std::ops::Range;
 
 use super::super::mix::Axis;
 use super::super::solids::Solids;
-use super::plan::{BLOCK, FLAT, Mask, bits};
+use super::evenness::{Evenness, FLAT};
+use super::plan::{BLOCK, Mask, bits};
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 
@@ -130,14 +131,14 @@ impl<'a> Field<'a> {
         shares
     }
 
-    /// For the pixels that dots of a block read, all of them without a mask: marks the stacks that have weight there. Returns by how
-    /// much the weight of a channel differs at most; 0 where nearly all neighbours are alike, as beside the edge of a flat tone.
+    /// For the pixels that dots of a block read, all of them without a mask: marks the stacks that have weight there, and tells how even
+    /// they are.
     pub(super) fn survey(
         &self,
         (column, row): (usize, usize),
         dots: Option<&Mask>,
         present: &mut [bool],
-    ) -> u16 {
+    ) -> Evenness {
         let (left, right) = Field::spans(&self.across, BLOCK).pixels(column);
         let (top, bottom) = Field::spans(&self.down, BLOCK).pixels(row);
         let (maps, count, across) = (&self.mix.maps, self.mix.maps.channels(), right - left);
@@ -159,7 +160,8 @@ impl<'a> Field<'a> {
                 *present |= self.mix.matrix[channel][usize::from(q)] > 0;
             }
         }
-        let varies = most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max();
+        let varies =
+            most.iter().zip(&least).map(|(most, least)| most.saturating_sub(*least)).max().unwrap_or(0);
         let (mut pairs, mut alike) = (0, 0);
         let mut count_pair = |a: (usize, usize), b: (usize, usize)| {
             if is_read(a.0, a.1) && is_read(b.0, b.1) {
@@ -167,13 +169,13 @@ impl<'a> Field<'a> {
                 (pairs, alike) = (pairs + 1, alike + u32::from(at(a) == at(b)));
             }
         };
-        for y in (0..bottom - top).filter(|_| varies > Some(FLAT)) {
+        for y in (0..bottom - top).filter(|_| varies > FLAT) {
             (1..across).for_each(|x| count_pair((x - 1, y), (x, y)));
             if y > 0 {
                 (0..across).for_each(|x| count_pair((x, y - 1), (x, y)));
             }
         }
-        if 4 * alike > 3 * pairs { 0 } else { varies.unwrap_or(0) }
+        Evenness { varies, alike: if pairs > 0 { f64::from(alike) / f64::from(pairs) } else { 1.0 } }
     }
 
     /// Which pixels of a rectangle dots of a block read, row by row.

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 
 use super::super::TONE;
 use super::cell::fits_half;
+use super::evenness::{Evenness, varying};
 use super::field::Field;
-use appearance::weights::ONE;
 
 /// Side of a block in dots. The sides of cells are its divisors.
 pub(in crate::halftone) const BLOCK: usize = 24;
@@ -55,14 +55,11 @@ pub(super) struct Block {
     pub(super) owns: bool,
     /// Whether this block and the eight around it consist of whole cells.
     pub(super) calm: bool,
-    /// By how much a weight of the document differs over the block; 0 if it does only at edges between flat tones.
+    /// By how much a weight of the document differs over the block; 0 if it is [flat](super::evenness).
     pub(super) varies: u16,
     /// Dots that are tones.
     pub(super) tone: Mask,
 }
-
-/// By how much a weight may differ over a flat block. In flat tones squares look more even than halves, in all others less.
-pub(super) const FLAT: u16 = ONE / 512;
 
 /// Connected tones that are less than a cell.
 pub(super) struct Fragment {
@@ -98,10 +95,10 @@ impl Plan {
         let sizes: Vec<[usize; 2]> =
             minimum.iter().map(|&minimum| [size_of(minimum), halved_size_of(minimum)]).collect();
         let rows = index.par_chunks_mut(BLOCK * width).enumerate();
-        let blocks = rows
+        let surveyed: Vec<(Block, [u8; 2], Evenness)> = rows
             .flat_map_iter(|(row, dots)| {
                 let mut present = vec![false; sizes.len()];
-                let blocks: Vec<Block> = (0..across)
+                let blocks: Vec<(Block, [u8; 2], Evenness)> = (0..across)
                     .map(|column| {
                         present.fill(false);
                         let (left, top) = (column * BLOCK, row * BLOCK);
@@ -110,19 +107,24 @@ impl Plan {
                         let tone =
                             if solid { cut(field, column, row, dots) } else { inside(field, column, row) };
                         let some = Some(&tone).filter(|tone| solid && **tone != [0; BLOCK]);
-                        let varies = field.survey((column, row), some, &mut present);
-                        let needed = sizes
-                            .iter()
-                            .zip(&present)
-                            .filter(|&(_, &present)| present)
-                            .map(|(size, _)| size[usize::from(varies > FLAT)]);
-                        let size = needed.max().unwrap_or(1) as u8;
-                        Block { size, owns: false, calm: false, varies, tone }
+                        let evenness = field.survey((column, row), some, &mut present);
+                        let needed = sizes.iter().zip(&present).filter(|&(_, &present)| present);
+                        let sizes = [0, 1].map(|halved| {
+                            needed.clone().map(|(sizes, _)| sizes[halved]).max().unwrap_or(1) as u8
+                        });
+                        (Block { size: 0, owns: false, calm: false, varies: 0, tone }, sizes, evenness)
                     })
                     .collect();
                 blocks
             })
             .collect();
+        let varies = varying(&surveyed.iter().map(|&(.., evenness)| evenness).collect::<Vec<_>>(), across);
+        let blocks = surveyed.into_iter().zip(varies).map(|((block, sizes, _), varies)| Block {
+            size: sizes[usize::from(varies > 0)],
+            varies,
+            ..block
+        });
+        let blocks = blocks.collect();
         let mut plan = Plan {
             width,
             height,

@@ -105,6 +105,24 @@ fn ramps_have_no_lines() {
     }
 }
 
+/// A shading of 8 bits has about so many steps in each block that some blocks would be flat and others not: its bands took turns.
+#[test]
+fn an_upright_shading_has_no_bands_of_blocks() {
+    let (width, long) = (720, 1176);
+    for levels in [80, 100, 120, 140, 170] {
+        let ink = |y: usize| 0.9 - 0.8 * (y * levels / (long / 4)) as f64 / levels as f64;
+        let mix = plain(1, long / 4, 2, |_, y| vec![1.0 - ink(y), ink(y)]);
+        let dots = cells(&mix, (width, long), &[8; 2], None, &Silent);
+        let printed: Vec<f64> = dots
+            .chunks_exact(24 * width)
+            .map(|band| band.iter().filter(|&&dot| dot == 1).count() as f64 / band.len() as f64)
+            .collect();
+        for pair in printed.windows(2) {
+            assert!(pair[1] < pair[0] + 0.004, "{levels}: {printed:.3?}");
+        }
+    }
+}
+
 /// A ramp does not repeat along its rows where it passes a tone that locks, however slowly it rises: by so much over a block.
 #[test]
 fn ramps_do_not_repeat() {
