@@ -67,7 +67,7 @@ impl Masks {
         }
         let found = flat_art(pixels, width, (&all, roots));
         let mut colours = HashMap::new();
-        for (stretches, spans) in &found {
+        for Art { stretches, spans, .. } in &found {
             stretches.iter().for_each(|&at| all[at as usize].colour = None);
             for (span, colour) in spans {
                 *colours.entry(*colour).or_default() += span.len() as u64;
@@ -80,7 +80,7 @@ impl Masks {
             }
         }
         colours.retain(|colour, dots| *dots >= LEAST || drawn.contains(colour));
-        let spans = found.into_iter().flat_map(|(_, spans)| spans).collect();
+        let spans = found.into_iter().flat_map(|art| art.spans).collect();
         all.retain(|stretch| stretch.colour.is_some_and(|colour| colours.contains_key(&colour)));
         Masks { stretches: all, spans, colours }
     }
@@ -95,13 +95,22 @@ impl Masks {
     }
 }
 
-/// The shapes that are flat art in several colours, or softened edges in one: their stretches, and the spans that these become. From
-/// all stretches and the root of each.
+/// A shape that is flat art in several colours, or softened edges in one.
+struct Art {
+    /// The numbers of its stretches.
+    stretches: Vec<u32>,
+    /// What these become.
+    spans: Vec<Span>,
+    /// Pixels in colours that are not explained.
+    strays: u64,
+}
+
+/// The shapes that are flat art, from all stretches and the root of each.
 fn flat_art<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     (all, roots): (&[Stretch], Vec<u32>),
-) -> Vec<(Vec<u32>, Vec<Span>)> {
+) -> Vec<Art> {
     let mut order: Vec<u32> = (0..all.len() as u32).collect();
     order.sort_by_key(|&at| roots[at as usize]);
     let shapes: Vec<&[u32]> = order.chunk_by(|&a, &b| roots[a as usize] == roots[b as usize]).collect();
@@ -117,7 +126,7 @@ fn flat_art<const N: usize>(
     for shape in shapes.iter().filter(|shape| pixels_of(shape) <= small) {
         shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
-    let find = |shapes: &[&[u32]], common: &[[u8; 3]], thin: bool| -> Vec<(Vec<u32>, Vec<Span>)> {
+    let find = |shapes: &[&[u32]], common: &[[u8; 3]], thin: bool| -> Vec<Art> {
         let palette = [&posters::WHITE_AND_BLACK[..], common].concat();
         let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette, |_| true);
         let found = shapes.par_iter().filter_map(|shape| {
@@ -126,10 +135,10 @@ fn flat_art<const N: usize>(
                 return None;
             }
             let known = Known { common, thin, enlarged };
-            let spans = posters::spans(pixels, width, &places(shape), known)?;
+            let (spans, strays) = posters::spans(pixels, width, &places(shape), known)?;
             // In one colour it is line art by itself.
             let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
-            (!itself).then(|| (shape.to_vec(), spans))
+            (!itself).then(|| Art { stretches: shape.to_vec(), spans, strays })
         });
         found.collect()
     };
@@ -140,7 +149,7 @@ fn flat_art<const N: usize>(
     let mut found = find(&in_several, &[], false);
     // What a letter encloses of its ground is small, too.
     let mut areas: HashMap<[u8; 3], u64> = HashMap::new();
-    for (span, colour) in found.iter().flat_map(|(_, spans)| spans) {
+    for (span, colour) in found.iter().flat_map(|art| &art.spans) {
         *areas.entry(*colour).or_default() += span.len() as u64;
     }
     for shape in in_one {
@@ -150,13 +159,22 @@ fn flat_art<const N: usize>(
     }
     let common = posters::common(counts, &areas);
     found.extend(find(&of_letters, &common, false));
-    let flat: HashSet<u32> = found.iter().filter_map(|(shape, _)| shape.first().copied()).collect();
-    let is_left = |shape: &&&[u32]| all[shape[0] as usize].colour.is_none() && !flat.contains(&shape[0]);
+    let flat: HashMap<u32, u64> =
+        found.iter().filter_map(|art| Some((*art.stretches.first()?, art.strays))).collect();
+    // Text in a colour of its own may be less than what is left over of a large ground.
+    let is_left = |shape: &&&[u32]| {
+        all[shape[0] as usize].colour.is_none()
+            && flat.get(&shape[0]).is_none_or(|&strays| strays >= posters::LEAST)
+    };
     let left: Vec<&[u32]> = in_several.iter().chain(&of_letters).filter(is_left).copied().collect();
     let shapes: Vec<Vec<Range<usize>>> = left.iter().map(|shape| places(shape)).collect();
     let (thin, pens) = Page { pixels, width, enlarged }.pens(&shapes, areas, &common);
     let thin: Vec<&[u32]> = thin.into_iter().map(|at| left[at]).collect();
-    found.extend(find(&thin, &[&pens[..], &common].concat(), true));
+    let mut drawn = find(&thin, &[&pens[..], &common].concat(), true);
+    drawn.retain(|art| flat.get(&art.stretches[0]).is_none_or(|&strays| art.strays <= strays));
+    let again: HashSet<u32> = drawn.iter().map(|art| art.stretches[0]).collect();
+    found.retain(|art| !again.contains(&art.stretches[0]));
+    found.extend(drawn);
     found
 }
 

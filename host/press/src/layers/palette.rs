@@ -77,7 +77,11 @@ pub(super) fn palette<const N: usize>(
                 .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
                 .peekable();
             let is_shaded = kind != Kind::Text && similar.peek().is_some();
-            let is_band = || borders.get(&(kind, colour)).is_some_and(|&[border, like]| 2 * like >= border);
+            // What lies in pictures has no border here. It is flat art, which has no shadings.
+            let is_band = || {
+                let border = borders.get(&(kind, colour)).copied();
+                border.is_some_and(|[border, like]| border > 0 && 2 * like >= border)
+            };
             let stays = !is_shaded || !is_band() || similar.all(|&(_, as_many)| dots >= AREA * as_many);
             if is_shaded && stays {
                 shaded.push((kind, colour));

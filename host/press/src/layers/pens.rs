@@ -3,7 +3,8 @@
 //! Problem: on a map of thin lines hardly a pixel has the full colour of its line, so [flat art](super::posters) does not know it.
 //! Method: what is thin has ground within [`REACH`] pixels of nearly all of it. A ridge is a pixel as far from its ground in colour as
 //! any beside it. On one ground all ridges of a pen lie on one ray in sRGB, as filters mix them, and the longest have the colour of the
-//! pen. The most frequent direction is a pen, then that of the ridges which no pen explains, and so on.
+//! pen. The most frequent direction is a pen, then that of the ridges which no pen explains, and so on. Shapes with more than a few ridges that no pen
+//! explains are pictures.
 //! Cost: a few looks at ground for each pixel of what is thin; photographs are given up where the first have none near.
 //! Limits: [`MOST`] pens of at least [`LEAST`] ridges. Sketches, whose lines are of any strength, are no pens' work and stay pictures.
 
@@ -14,6 +15,7 @@ use rayon::prelude::*;
 
 use super::flat::{similar, split};
 use super::posters;
+use super::softened::OFF;
 
 /// Ground is within so many pixels, as they were drawn, of what is thin.
 const REACH: usize = 4;
@@ -30,9 +32,10 @@ const ALIGNED: f32 = 0.98;
 /// The most pens, and the least ridges of one.
 pub(super) const MOST: usize = 12;
 const LEAST: usize = 64;
-/// At most this part of a pen's ridges is fainter than [`WEAK`] of its colour, and of all ridges has no pen.
+/// At most this part of a pen's ridges is fainter than [`WEAK`] of its colour, and of a shape's ridges has no pen, or [`SPECKS`] of them.
 const OTHERS: f64 = 0.05;
 const WEAK: f32 = 0.3;
+const SPECKS: usize = 2;
 
 /// A picture, and how many times its pixels were enlarged after they were drawn.
 #[derive(Clone, Copy)]
@@ -66,23 +69,29 @@ fn length(of: [f32; 3]) -> f32 {
     of.iter().map(|v| v * v).sum::<f32>().sqrt()
 }
 
-/// The colours of pens that drew these ridges on these grounds, but for those that are `known`. `None` if many of them
-/// are of no pen.
-fn colours(mut rest: Vec<Ridge>, grounds: &[[u8; 3]], known: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
-    let most = ((OTHERS * rest.len() as f64) as usize).max(LEAST);
+/// The colours of pens that drew the ridges of these shapes on these grounds, but for those that are `known`; and of each shape whether nearly
+/// all of it is of pens. None is if half of the ridges have no pen.
+fn colours(shapes: &[Vec<Ridge>], grounds: &[[u8; 3]], known: &[[u8; 3]]) -> (Vec<[u8; 3]>, Vec<bool>) {
     let differs = |colour: [u8; 3], ground: usize| -> [f32; 3] {
         std::array::from_fn(|c| f32::from(colour[c]) - f32::from(grounds[ground][c]))
     };
-    rest.retain(|ridge| {
-        !known
-            .iter()
-            .any(|&colour| ridge.share_of(differs(colour, ridge.ground)).is_some_and(|share| share >= 0.5))
-    });
+    let is_known = |ridge: &Ridge| {
+        known.iter().map(|&colour| differs(colour, ridge.ground)).any(|of| {
+            ridge.share_of(of).is_some_and(|share| {
+                let off: [f32; 3] = std::array::from_fn(|c| ridge.differs[c] - share * of[c]);
+                share >= 0.5 && length(off) <= OFF
+            })
+        })
+    };
+    let numbered =
+        shapes.iter().enumerate().flat_map(|(at, ridges)| ridges.iter().map(move |ridge| (at, ridge)));
+    let mut rest: Vec<(usize, &Ridge)> = numbered.filter(|(_, ridge)| !is_known(ridge)).collect();
+    let mut strange = vec![0; shapes.len()];
     let mut pens: Vec<[u8; 3]> = Vec::new();
     while pens.len() < MOST && rest.len() >= LEAST {
         // Directions to an eighth.
         let mut directions: HashMap<(usize, [i8; 3]), (usize, [f32; 3])> = HashMap::new();
-        for ridge in &rest {
+        for (_, ridge) in &rest {
             let one = ridge.differs.map(|v| v / ridge.length());
             let (count, sum) =
                 directions.entry((ridge.ground, one.map(|v| (v * 8.0).round() as i8))).or_default();
@@ -92,32 +101,49 @@ fn colours(mut rest: Vec<Ridge>, grounds: &[[u8; 3]], known: &[[u8; 3]]) -> Opti
         let most = directions.into_iter().max_by_key(|&(key, (count, _))| (count, std::cmp::Reverse(key)));
         let Some(((ground, _), (_, direction))) = most else { break };
         let on_it = |ridge: &Ridge| ridge.ground == ground && ridge.share_of(direction).is_some();
-        let mut lengths: Vec<f32> = rest.iter().filter(|ridge| on_it(ridge)).map(Ridge::length).collect();
+        let mut lengths: Vec<f32> =
+            rest.iter().filter(|(_, ridge)| on_it(ridge)).map(|(_, ridge)| ridge.length()).collect();
         if lengths.len() < LEAST {
             break;
         }
         lengths.sort_unstable_by(f32::total_cmp);
         let strongest = &lengths[lengths.len() * 17 / 20..=lengths.len() * 19 / 20];
         let strength = strongest.iter().sum::<f32>() / strongest.len() as f32;
-        let weak = lengths.iter().filter(|&&own| own < WEAK * strength).count();
-        if weak as f64 > OTHERS * lengths.len() as f64 {
-            return None;
+        // Of each shape the ridges on it, and the weak ones.
+        let mut of_shape = vec![[0usize; 2]; shapes.len()];
+        for (at, ridge) in rest.iter().filter(|(_, ridge)| on_it(ridge)) {
+            of_shape[*at][0] += 1;
+            of_shape[*at][1] += usize::from(ridge.length() < WEAK * strength);
+        }
+        let is_weak = |[all, weak]: [usize; 2]| weak as f64 > OTHERS * all as f64;
+        if is_weak([lengths.len(), of_shape.iter().map(|[_, weak]| weak).sum()]) {
+            // A sketch, or one beside lines in its colour.
+            rest.retain(|&(at, ridge)| {
+                let sketched = on_it(ridge) && is_weak(of_shape[at]);
+                strange[at] += usize::from(sketched);
+                !sketched
+            });
+            continue;
         }
         let whole = length(direction);
         let pen = std::array::from_fn(|c| {
             (f32::from(grounds[ground][c]) + direction[c] / whole * strength).round().clamp(0.0, 255.0) as u8
         });
-        rest.retain(|ridge| !on_it(ridge) && ridge.share_of(differs(pen, ridge.ground)).is_none());
+        rest.retain(|(_, ridge)| !on_it(ridge) && ridge.share_of(differs(pen, ridge.ground)).is_none());
         if !pens.iter().chain(grounds).any(|&other| similar(other, pen)) {
             pens.push(pen);
         }
     }
-    (rest.len() <= most).then_some(pens)
+    rest.iter().for_each(|&(at, _)| strange[at] += 1);
+    let (all, most): (usize, usize) = (strange.iter().sum(), shapes.iter().map(Vec::len).sum());
+    let of_pens = shapes.iter().zip(strange).map(|(ridges, strange)| {
+        2 * all <= most && strange <= ((OTHERS * ridges.len() as f64) as usize).max(SPECKS)
+    });
+    (pens, of_pens.collect())
 }
 
 impl<const N: usize> Page<'_, N> {
-    /// Which of these shapes are thin, by their numbers, and the colours of the pens that drew them, but for those that are `known`. Nothing if
-    /// many lines are of no pen. Lines are drawn on white, black, large `areas` and on what the shapes bring with them.
+    /// Which of these shapes are thin and drawn by pens, by their numbers, and the colours of these pens, but for those that are `known`. Lines are drawn on white, black, large `areas` and on what the shapes bring with them.
     pub(super) fn pens(
         &self,
         shapes: &[Vec<Range<usize>>],
@@ -129,7 +155,8 @@ impl<const N: usize> Page<'_, N> {
         let thin: Vec<usize> =
             (0..shapes.len()).into_par_iter().filter(|&at| self.is_thin(&shapes[at], &grounds)).collect();
         let ridges: Vec<Vec<Ridge>> = thin.par_iter().map(|&at| self.ridges(&shapes[at], &grounds)).collect();
-        colours(ridges.concat(), &grounds, known).map_or_else(Default::default, |pens| (thin, pens))
+        let (pens, of_pens) = colours(&ridges, &grounds, known);
+        (thin.into_iter().zip(of_pens).filter(|&(_, of_pens)| of_pens).map(|(at, _)| at).collect(), pens)
     }
 
     /// The colour of at least [`OPEN`] of a shape, and its pixels: what lines are drawn on, if it is neither white nor black.
@@ -259,6 +286,45 @@ mod tests {
             }
             assert!(100 * wrong <= lines && lines > 4000, "{wrong} wrong of {lines} on {ground:?}");
         }
+    }
+
+    /// A sketch beside it is a picture as by itself.
+    #[test]
+    fn a_net_of_thin_lines_beside_a_sketch_is_cut_as_by_itself() {
+        let (drawn, sketch) =
+            (net([255; 3], |_| 1.0), net([255; 3], |line| 0.15 + 0.17 * (line * 7 % 6) as f64));
+        let blank = vec![[255; 3]; SIDE * 4];
+        let pixels: Vec<[u8; 3]> = [&drawn, &sketch]
+            .map(|net| net.iter().map(|&(colour, ..)| colour).collect::<Vec<_>>())
+            .join(&blank[..]);
+        let alone = Masks::of(&pixels[..SIDE * SIDE], SIDE);
+        let both = Masks::of(&pixels, SIDE);
+        let size = |masks: &Masks, from: usize, to: usize| -> usize {
+            masks
+                .stretches()
+                .filter(|(span, _)| (from..to).contains(&span.start))
+                .map(|(span, _)| span.len())
+                .sum()
+        };
+        let (all, net) = (SIDE * SIDE + blank.len(), SIDE * SIDE);
+        assert!(size(&alone, 0, net) > net / 10);
+        assert_eq!(size(&both, 0, net), size(&alone, 0, net));
+        assert!(10 * size(&both, all, pixels.len()) < net / 2);
+    }
+
+    /// Green lines on white, and a little grey that lies almost in their direction.
+    #[test]
+    fn a_colour_that_others_have_explains_only_what_lies_on_its_line() {
+        let (green, grey) = ([62, 122, 56], [51; 3]);
+        let ridge = |colour: [u8; 3], share: f32| Ridge {
+            ground: 0,
+            differs: std::array::from_fn(|c| share * (f32::from(colour[c]) - 255.0)),
+        };
+        let of =
+            |colour: [u8; 3]| (0..200).map(|at| ridge(colour, 0.9 + at as f32 / 2000.0)).collect::<Vec<_>>();
+        let (pens, of_pens) = colours(&[of(green), of(grey)], &[[255; 3]], &[grey]);
+        assert!(pens.len() == 1 && similar(pens[0], green), "{pens:?}");
+        assert_eq!(of_pens, [true, true]);
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub(super) const MOST_KNOWN: usize = 3 * MOST + 2 + pens::MOST;
 /// Colours in stretches of two pixels or more; photographs have more.
 const MOST_FOUND: usize = 4096;
 /// The least pixels of a main colour: a square of eight.
-const LEAST: u64 = 64;
+pub(super) const LEAST: u64 = 64;
 /// What has so many pixels or less is small: a letter, or what is softened between black and white.
 pub(super) const SMALL: usize = 64 * 64;
 /// Main colours cover at least this part of the art: thin letters are mostly softened edge.
@@ -55,13 +55,14 @@ pub(super) struct Known<'a> {
     pub enlarged: usize,
 }
 
-/// The spans of what hangs together, if it is flat art. `stretches` are the pixels of it, in order. What is in one colour has no others.
+/// The spans of what hangs together, if it is flat art, and how many of its pixels are neither a main colour nor between two. `stretches` are the
+/// pixels of it, in order. What is in one colour has no others.
 pub(super) fn spans<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
     Known { common, thin: all_thin, enlarged }: Known,
-) -> Option<Vec<Span>> {
+) -> Option<(Vec<Span>, u64)> {
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
     let first = &pixels[stretches.first()?.start];
     let one = stretches.iter().all(|stretch| pixels[stretch.clone()].iter().all(|pixel| pixel == first));
@@ -121,7 +122,7 @@ pub(super) fn spans<const N: usize>(
         }
     }
     edges.decide_strokes(&mut spans);
-    Some(spans)
+    Some((spans, stray))
 }
 
 /// The square of the distance between two colours in sRGB.
@@ -277,7 +278,7 @@ mod tests {
     fn all(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })? {
+        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })?.0 {
             out[span].fill(colour);
         }
         Some(out)
@@ -393,6 +394,7 @@ mod tests {
         for (span, colour) in
             spans(&pixels, SIDE, &strokes, Known { common: &[[200, 0, 0], blue], thin: false, enlarged: 1 })
                 .expect("flat art")
+                .0
         {
             found[span].fill(colour);
         }

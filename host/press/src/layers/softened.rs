@@ -20,7 +20,7 @@ use super::posters::{MOST_KNOWN, WHITE_AND_BLACK};
 /// How far a softened edge reaches, in pixels as they were drawn.
 const REACH: usize = 2;
 /// How far from the line between two colours a softened edge may lie, in sRGB of 0 to 255.
-const OFF: f32 = 24.0;
+pub(super) const OFF: f32 = 24.0;
 /// How far beyond the colours a softened edge may lie: filters that sharpen draw edges stronger than they are. Twice as far where two
 /// edges add up.
 const BEYOND: f32 = 0.15;
@@ -275,7 +275,7 @@ mod tests {
     fn cut(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })? {
+        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })?.0 {
             out[span].fill(colour);
         }
         Some(out)
