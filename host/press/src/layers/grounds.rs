@@ -5,16 +5,21 @@
 //! or by their colours ([`lies`]).
 //! Cost: 2 ns a dot of shapes, twice where solids may meet and there are pale shapes. Limits: contact is that of four neighbours.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::ops::RangeInclusive;
 
 use super::flat::{Flat, INKED, similar};
 use super::kinds::Kind;
 use super::shapes::{Run, continues};
+use super::softened::along;
 use super::treatments::{CHOICES, Shape, Treatment, is_faint};
 
 /// The least share of the border of what lies on ink, and of what lies on another colour.
 const ON_INK: f64 = 7.0 / 8.0;
 const ON_ONE: f64 = 3.0 / 4.0;
+
+/// Where between the colours on both sides of it a step of a shading lies.
+const MIDST: RangeInclusive<f32> = 0.1..=0.9;
 
 /// The stack without ink.
 pub(super) const PAPER: u8 = 0;
@@ -80,6 +85,35 @@ pub(super) fn lies(
         }
     };
     borders.into_iter().map(|(root, border)| (root, judge(root, border))).collect()
+}
+
+/// The roots of shapes that are a step of a shading: of two colours that each make up a quarter or more of their border, one is lighter and one
+/// darker, and their own lies on the line between them. Only runs that take part are looked at.
+pub(super) fn steps(
+    flat: &Flat,
+    width: usize,
+    (runs, rows): (&[Run], &[usize]),
+    takes_part: impl Fn(&Run) -> bool,
+) -> HashSet<u32> {
+    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
+    each_beside(flat, width, (runs, rows), |run, beside| {
+        if takes_part(run) {
+            *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
+        }
+    });
+    let is_step = |root: u32, border: &HashMap<u8, u32>| {
+        let all: u32 = border.values().sum();
+        let own = flat.colours[usize::from(runs[root as usize].colour)].1;
+        let large = border.iter().filter(|&(_, &dots)| 4 * dots >= all);
+        let large: Vec<[u8; 3]> =
+            large.filter_map(|(&beside, _)| Some(flat.colours.get(usize::from(beside))?.1)).collect();
+        large.iter().enumerate().any(|(at, &from)| {
+            large[at + 1..]
+                .iter()
+                .any(|&to| along(own, from, to).is_some_and(|(share, _)| MIDST.contains(&share)))
+        })
+    };
+    borders.iter().filter(|&(&root, border)| is_step(root, border)).map(|(&root, _)| root).collect()
 }
 
 /// Of the border of the shape that a run is the root of, the dots of other shapes.

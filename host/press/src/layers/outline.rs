@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use super::beside::{PaleLines, at_the_rim, is_ridge, needs_rim};
 use super::counters::counters;
 use super::flat::{Flat, TONE};
-use super::grounds::{Grounds, Lies, PAPER, lies};
+use super::grounds::{Grounds, Lies, PAPER, lies, steps};
 use super::kinds::Kind;
 use super::lines::lines;
 use super::pieces::pieces;
@@ -64,7 +64,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         Some(Treatment::Shape(shape)) => shape.near || !shape.dark || is_text(flat, run),
         _ => true,
     };
-    let is_letter: Vec<bool> = runs.iter().zip(&small).map(|(run, &small)| small && is_like(run)).collect();
+    let drawn_larger = drawn_larger(flat, runs, &small);
+    let is_letter: Vec<bool> =
+        (runs.iter().zip(&small)).map(|(run, &small)| small && is_like(run) && !drawn_larger(run)).collect();
     let is_thin =
         |root: u32| runs[root as usize].side < if is_letter[root as usize] { LETTER } else { STROKE };
     let is_counter = counters(flat, (runs, rows), u32::from(2 * LETTER), is_thin);
@@ -73,6 +75,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let is_thin = |root: u32| !is_counter[root as usize] && words.thin(root).unwrap_or_else(|| is_thin(root));
     let is_narrow = |run: &Run| !is_text(flat, run) && is_thin(run.root);
     let is_bare = |colour: u8| matches!(of(colour), None | Some(Treatment::Solid(PAPER)));
+    let is_dark = |run: &Run| matches!(of(run.colour), Some(Treatment::Shape(shape)) if shape.dark);
+    let may_be_step = |run: &Run| is_dark(run) && !is_text(flat, run) && runs[run.root as usize].side > HAIR;
+    let steps = steps(flat, width, (runs, rows), may_be_step);
     let mut is_piece = vec![false; runs.len()];
     for root in pieces(flat, width, (runs, rows), is_narrow, is_bare) {
         is_piece[root as usize] = true;
@@ -91,7 +96,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for run in &runs[rows[y]..rows[y + 1]] {
             let root = run.root;
-            let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
+            let Some(Treatment::Shape(shape)) = of(run.colour).filter(|_| !steps.contains(&root)) else {
+                continue;
+            };
             let (thin, first, is_small) = (is_thin(root), shape.solids[0], small[root as usize]);
             let (start, end) = (run.start as usize, run.end as usize);
             match solid(root, &shape) {
@@ -123,7 +130,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
             }
         }
     });
-    let is_wide = |root: u32| !is_letter[root as usize] && !is_piece[root as usize] && !is_thin(root);
+    let is_wide = |root: u32| {
+        !is_letter[root as usize] && !is_piece[root as usize] && !steps.contains(&root) && !is_thin(root)
+    };
     for line in lines(&shapes, width, STROKE, is_wide) {
         let run = &runs[line.run as usize];
         let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
@@ -133,6 +142,30 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         }
     }
     fixed
+}
+
+/// Whether a small drawing has the strokes of larger ones in its colour, which are screened: of stripes of a flag, the shorter are no letters.
+fn drawn_larger<'a>(flat: &'a Flat, runs: &[Run], small: &[bool]) -> impl Fn(&Run) -> bool + use<'a> {
+    // Dots in each colour and width of strokes, of small drawings and of others.
+    let mut dots = vec![[[0u64; 2]; LETTER as usize]; flat.colours.len()];
+    for run in runs {
+        if let Some([small_dots, others]) =
+            dots[usize::from(run.colour)].get_mut(usize::from(runs[run.root as usize].side))
+        {
+            let own = if small[run.root as usize] { small_dots } else { others };
+            *own += u64::from(run.end - run.start);
+        }
+    }
+    let sides: Vec<u8> = runs.iter().map(|run| runs[run.root as usize].side).collect();
+    move |run| {
+        let side = usize::from(sides[run.root as usize]);
+        if is_text(flat, run) || !(usize::from(STROKE)..usize::from(LETTER)).contains(&side) {
+            return false;
+        }
+        let like = dots[usize::from(run.colour)].iter().take(side + side / 4 + 1).skip(side - side / 5);
+        let [small, others] = like.fold([0, 0], |sum, own| [sum[0] + own[0], sum[1] + own[1]]);
+        others > small
+    }
 }
 
 fn is_text(flat: &Flat, run: &Run) -> bool {

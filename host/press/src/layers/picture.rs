@@ -155,7 +155,7 @@ pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), optio
     let Pixels { path, width, height, mut rgba, notes, .. } = pixels;
     let size = (width, height);
     let transparent = rgba.par_chunks_exact(4).any(|p| p[3] < 255);
-    let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 0));
+    let opaque = transparent.then(|| plane_of::<4>(&rgba, size, dots, |p| p[3] > 127));
     rgba.par_chunks_exact_mut(4).for_each(|p| {
         let alpha = u32::from(p[3]);
         for v in &mut p[..3] {

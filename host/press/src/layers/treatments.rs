@@ -123,13 +123,17 @@ impl Found {
         near.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
         // White has no chroma.
         let most_hue = TURNED + MORE_TURNED * difference_in_hue(wanted, [1.0; 3]);
-        let of_hue = near.iter().position(|&stack| hue(stack) <= most_hue).unwrap_or(0);
-        let most = || inked().max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
-        let Some(nearest) = near.get(of_hue).copied().or_else(most) else {
+        let is_like = |&stack: &usize| hue(stack) <= most_hue;
+        let most = |stacks: &mut dyn Iterator<Item = usize>| {
+            stacks.max_by(|&a, &b| weights[a].total_cmp(&weights[b]))
+        };
+        let nearest = near.iter().copied().find(is_like).or_else(|| most(&mut inked().filter(is_like)));
+        let Some(nearest) = nearest.or(near.first().copied()).or_else(|| most(&mut inked())) else {
             return Found { colour, stack: 0, off: 0.0, is_solid: true, shape: None };
         };
         // Paper stands for a colour where it is nearer than the inks that are left, or where none is.
-        let mut others: Vec<usize> = near.into_iter().filter(|&stack| stack != nearest).chain([0]).collect();
+        let others = near.into_iter().filter(|&stack| stack != nearest).filter(is_like);
+        let mut others: Vec<usize> = others.chain([0]).collect();
         others.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
         let ranked: Vec<usize> = std::iter::once(nearest).chain(others).take(CHOICES).collect();
         let choices: [u8; CHOICES] = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
@@ -301,6 +305,7 @@ mod tests {
             ([31, 119, 180], "C"),
             ([192, 0, 0], "M+Y"),
             ([245, 121, 0], "M+Y"),
+            ([204, 214, 221], "K"),
         ] {
             assert_eq!(alone(colour, &mut fit, &solids).0, wanted, "{colour:?}");
         }

@@ -80,6 +80,47 @@ fn pale_text_on_a_shading_with_more_ink_than_paper_is_paper() {
     }
 }
 
+/// Rings of a shading in few steps: what lies between a lighter and a darker one is no line, but a frame that is darker than both sides is.
+#[test]
+fn a_step_of_a_shading_is_screened_and_a_line_between_areas_is_not() {
+    for (inner, step) in [([200; 3], true), ([90; 3], false), ([160, 160, 20], false)] {
+        let colours = vec![
+            (Kind::Picture, [255; 3]),
+            (Kind::Picture, [0; 3]),
+            (Kind::Drawing, [160; 3]),
+            (Kind::Drawing, inner),
+        ];
+        // A square of 200 dots on black, with a border of seven.
+        let index = (0..300 * 300)
+            .map(|at| match (at % 300usize, at / 300usize) {
+                (x, y) if (57..243).contains(&x) && (57..243).contains(&y) => 3,
+                (50..250, 50..250) => 2,
+                _ => 1,
+            })
+            .collect();
+        let treatments = [Treatment::Solid(0), Treatment::Solid(1), DARK, LIGHT];
+        let fixed = fixed(&Flat { colours, index }, 300, &treatments);
+        let middle = fixed[53 * 300 + 150];
+        assert_eq!(middle, if step { TONE } else { 7 }, "{inner:?}");
+    }
+}
+
+/// Of stripes that are as thick, one is a little shorter than a letter and the others are longer.
+#[test]
+fn short_stripes_are_printed_like_long_ones() {
+    let stripes = |lengths: &'static [usize]| {
+        let is = move |x: usize, y: usize| {
+            y % 30 < 14 && lengths.get(y / 30).is_some_and(|&long| (10..10 + long).contains(&x))
+        };
+        drawn((300, 150), Kind::Drawing, DARK, is)
+    };
+    let (alone, beside) = (stripes(&[100]), stripes(&[100, 200, 200]));
+    assert_eq!(alone[7 * 300 + 50], 7);
+    for row in [7, 37, 67] {
+        assert_eq!(beside[row * 300 + 50], TONE, "{row}");
+    }
+}
+
 #[test]
 fn a_thin_stroke_is_solid_and_a_wide_one_keeps_its_rim() {
     // A drawing no larger than a letter is one.
