@@ -98,6 +98,7 @@ fn of_layers(error: &LayersError) -> Option<String> {
             format!("--size {}mm is the largest that fits", below(*fits_mm))
         }
         LayersError::TooSmall { .. } => "the options are --size and --dpi".into(),
+        LayersError::White { .. } => "--white alpha prints white wherever the art is not transparent".into(),
         LayersError::Passes { .. } => "the option is --passes".into(),
         _ => return None,
     })

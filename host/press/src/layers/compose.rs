@@ -90,7 +90,9 @@ pub fn compose(
     beds::lay_finish(&mut slots, art, settings)?;
     slots.retain(|slot| slot.plane.dots() > 0);
     if slots.is_empty() {
+        let is_drawn = art.opaque.as_ref().is_some_and(|opaque| opaque.dots() > 0);
         let reason = match &art.layers[..] {
+            [] if is_drawn => return Err(LayersError::White { name: art.name.clone() }),
             [] => format!("{} is white or transparent everywhere", art.name),
             _ => format!("no layer of {} has a dot", art.name),
         };

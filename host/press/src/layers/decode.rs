@@ -61,6 +61,10 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         _ => {}
     }
     let bad = |error: ImageError| {
+        if let ImageError::Unsupported(found) = &error {
+            let problem = format!("{found}; save the picture in RGB or grey, with 8 or 16 bits a channel");
+            return wrong(path, problem);
+        }
         let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
         undecodable(path, &error, cause)
     };

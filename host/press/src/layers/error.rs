@@ -145,6 +145,12 @@ pub enum LayersError {
         /// Why.
         reason: String,
     },
+    /// Everything drawn is white, and the settings ask for no white.
+    #[error("there is nothing to print: {name} is drawn in nothing but white, which is bare paper")]
+    White {
+        /// Name of the art.
+        name: String,
+    },
     /// A setting does not suit the art.
     #[error("{setting}: {problem}")]
     Setting {

@@ -171,7 +171,7 @@ fn flat_art<const N: usize>(
     let (thin, pens) = Page { pixels, width, enlarged }.pens(&shapes, areas, &common);
     let thin: Vec<&[u32]> = thin.into_iter().map(|at| left[at]).collect();
     let mut drawn = find(&thin, &[&pens[..], &common].concat(), true);
-    drawn.retain(|art| flat.get(&art.stretches[0]).is_none_or(|&strays| art.strays <= strays));
+    drawn.retain(|art| flat.get(&art.stretches[0]).is_none_or(|&strays| 2 * art.strays <= strays));
     let again: HashSet<u32> = drawn.iter().map(|art| art.stretches[0]).collect();
     found.retain(|art| !again.contains(&art.stretches[0]));
     found.extend(drawn);

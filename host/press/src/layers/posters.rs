@@ -17,7 +17,7 @@ use std::ops::{Deref, Range};
 
 use super::flat::{similar, split};
 use super::pens;
-use super::softened::{Edges, Widths, meant, thin_colours};
+use super::softened::{Edges, Widths, along, meant, thin_colours};
 
 /// The most main colours, and the most colours that small shapes have in common.
 const MOST: usize = 16;
@@ -31,6 +31,8 @@ pub(super) const LEAST: u64 = 64;
 pub(super) const SMALL: usize = 64 * 64;
 /// Main colours cover at least this part of the art: thin letters are mostly softened edge.
 const COVERED: f64 = 0.3;
+/// A shading in few colours has at least so many, white and black among them.
+const STEPS: usize = 8;
 /// At most this part of the pixels is neither a main colour nor between two; of thin lines, where they cross in three colours.
 const STRAY: f64 = 0.01;
 const STRAY_THIN: f64 = 0.1;
@@ -224,7 +226,34 @@ fn main_colours<const N: usize>(
             return None;
         }
     }
-    (covered as f64 >= COVERED * total as f64).then_some(colours)
+    (covered as f64 >= COVERED * total as f64 && !is_shaded(pixels, stretches, &colours)).then_some(colours)
+}
+
+/// Whether most of these colours are the steps of one shading: those between the two that are farthest apart are many, and one in three that touch
+/// follow each other. In softened text in 16 greys it is one in seven.
+fn is_shaded<const N: usize>(pixels: &[[u8; N]], stretches: &[Range<usize>], colours: &[[u8; 3]]) -> bool {
+    let pairs =
+        colours.iter().enumerate().flat_map(|(at, &a)| colours[at + 1..].iter().map(move |&b| (a, b)));
+    let Some((from, to)) = pairs.max_by_key(|&(a, b)| apart(a, b)) else { return false };
+    let mut steps: Vec<(f32, [u8; 3])> = colours
+        .iter()
+        .filter_map(|&colour| along(colour, from, to).map(|(share, _)| (share, colour)))
+        .collect();
+    if steps.len() < STEPS || 2 * steps.len() < colours.len() {
+        return false;
+    }
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let places: HashMap<[u8; 3], usize> = steps.iter().enumerate().map(|(at, step)| (step.1, at)).collect();
+    let (mut touch, mut follow) = (0, 0);
+    for stretch in stretches {
+        for pair in pixels[stretch.clone()].windows(2).filter(|pair| pair[0] != pair[1]) {
+            let [a, b] = [0, 1].map(|at| places.get(&split(&pair[at]).1));
+            if let (Some(a), Some(b)) = (a, b) {
+                (touch, follow) = (touch + 1, follow + u64::from(a.abs_diff(*b) == 1));
+            }
+        }
+    }
+    touch >= LEAST && 3 * follow > touch
 }
 
 /// Of these colours, those of a shading: by half of their border or more they touch pixels that are like them, which are as wide where
@@ -292,6 +321,21 @@ mod tests {
             (18.0..26.0).contains(&far) || far < 6.0
         };
         (0..64).filter(|&i| inside(i)).count() as f64 / 64.0
+    }
+
+    /// Waves of light in few greys are a picture; panels and rings in as many are flat art.
+    #[test]
+    fn a_shading_in_few_colours_is_no_flat_art() {
+        let grey = |level: f64| [(level / 15.0).round() as u8 * 15; 3];
+        let wave =
+            |x: usize, y: usize| 120.0 + 70.0 * (x as f64 / 19.0).sin() + 60.0 * (y as f64 / 23.0).cos();
+        let panel = |x: usize, y: usize| f64::from(((x / 12 * 5 + y / 12 * 3) % 11) as u8) * 22.0;
+        let picture = |level: &dyn Fn(usize, usize) -> f64| -> Vec<[u8; 3]> {
+            (0..SIDE * SIDE).map(|at| grey(level(at % SIDE, at / SIDE))).collect()
+        };
+        assert!(all(&picture(&wave)).is_none());
+        let panels = picture(&panel);
+        assert_eq!(all(&panels).as_ref(), Some(&panels));
     }
 
     /// A softened drawing in two colours is cut where half a pixel is covered.

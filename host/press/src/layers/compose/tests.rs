@@ -90,6 +90,17 @@ fn metal_on_process_ink_knocks_it_out_and_not_the_white_beneath() {
     assert_eq!((hidden.dots, &hidden.remedy), (2, &order));
 }
 
+/// Glass and ghosts: what is drawn in white alone is no blank page, and a mode of white prints it.
+#[test]
+fn art_in_white_alone_names_the_remedy() {
+    let mut art = Artwork::blank("ghost", (8, 8));
+    assert!(refused(&art, &with(|_| ())).contains("ghost is white or transparent everywhere"));
+    art.opaque = Some(bits::full(8, 8));
+    assert!(refused(&art, &with(|_| ())).contains("ghost is drawn in nothing but white"));
+    let composed = composed(&art, &with(|s| s.white = Some(White::Alpha)));
+    assert_eq!(composed.dots.index().iter().filter(|&&dot| dot > 0).count(), 64);
+}
+
 #[test]
 fn white_goes_where_its_mode_says() {
     let mut eye = art(&[

@@ -114,7 +114,7 @@ fn of(
     };
     let named = match first {
         FontFamily::Named(name) if has(name) => return None,
-        FontFamily::Named(name) => Some(name.clone()).filter(|name| name != DEFAULT),
+        FontFamily::Named(name) => Some(name.clone()).filter(|name| !is_generic(name)),
         _ => None,
     };
     if fonts.is_empty() {
@@ -141,6 +141,21 @@ fn of(
     let database = Arc::new(database);
     stand_ins.insert(list, StandIn { named, family, database: database.clone() });
     Some(database)
+}
+
+/// Whether a name stands for any font of a kind, as drawing programs and browsers write it beside those of CSS: nobody can install that.
+fn is_generic(name: &str) -> bool {
+    const GENERIC: [&str; 8] = [
+        DEFAULT,
+        "sans",
+        "sans serif",
+        "mono",
+        "monospace",
+        "system-ui",
+        "-apple-system",
+        "blinkmacsystemfont",
+    ];
+    GENERIC.iter().any(|generic| name.eq_ignore_ascii_case(generic)) || name.starts_with("ui-")
 }
 
 /// A family as fontconfig reads it.

@@ -87,7 +87,7 @@ fn text_is_drawn_in_the_font_that_stands_for_its_own_in_drawing_programs() {
             .collect::<Vec<String>>();
         (art.layers[0].shape.clone(), said)
     };
-    for generic in ["sans-serif", "serif", "monospace"] {
+    for generic in ["sans-serif", "serif", "monospace", "Sans", "Mono"] {
         let family = matched(generic).unwrap();
         let ((shape, said), (wanted, _)) = (read_as(generic), read_as(&format!("'{family}'")));
         assert!(shape == wanted, "{generic} is not drawn in {family}");
