@@ -29,7 +29,7 @@ pub enum White {
     Opaque,
     /// Everything inside the outline, including holes and white areas.
     Silhouette,
-    /// Where the picture is not transparent, including pure white.
+    /// Where the picture is at least half opaque, including pure white.
     Alpha,
 }
 

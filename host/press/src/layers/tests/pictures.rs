@@ -170,6 +170,17 @@ fn sixteen_bits_and_grey_with_transparency_are_read_as_they_are() {
     assert_eq!(extent(&read(&[file], &Options::default()).layers[0]), (0, 0, 0, 0, 1));
 }
 
+/// A soft shadow had white beneath all of it, and black line art a white rim.
+#[test]
+fn white_goes_beneath_what_is_at_least_half_opaque() {
+    let bench = Bench::new();
+    let pixels: Vec<u8> = [0, 1, 127, 128, 255].iter().flat_map(|&alpha| [30, 30, 30, alpha]).collect();
+    let (kind, depth) = (png::ColorType::Rgba, png::BitDepth::Eight);
+    let file = bench.png("shadow.png", (5, 1), kind, depth, &pixels, |_| ());
+    let opaque = read(&[file], &Options { dpi: Some(600.0), ..Options::default() }).opaque.unwrap();
+    assert_eq!((opaque.dots(), opaque.bits[0]), (2, 0b0001_1000));
+}
+
 /// A picture of one colour with a profile, and the colour it is read as.
 fn with_profile(profile: &moxcms::ColorProfile, kind: png::ColorType, pixel: &[u8]) -> [u8; 3] {
     let bench = Bench::new();
