@@ -2,7 +2,7 @@
 //!
 //! Problem: a letter vanishes in a ground that is printed as its solid, a rim of ink spoils a white letter on ink, and a soft edge is no line.
 //! Method: of each shape the dots beside it that are of other shapes are counted, by the stacks that they are printed as ([`Grounds`])
-//! or by their colours ([`lies`]).
+//! or by their colours ([`lies`], [`steps`]).
 //! Cost: 2 ns a dot of shapes, twice where solids may meet and there are pale shapes. Limits: contact is that of four neighbours.
 
 use std::collections::{HashMap, HashSet};

@@ -11,6 +11,8 @@
 //! What a shape lies on ([`grounds`](super::grounds)) counts, too. One that lies on its own solid, by half of its border or more, would vanish in it. Such a
 //! thin shape is printed in the next solid or in paper; such a wide one has its rim in the next solid or none. A thin shape with more paper than ink that lies
 //! on ink, by nearly all of its border, is printed in paper: a rim of ink would be drawn within white letters, and screened they are ragged.
+//! A drawing that is a step between a lighter and a darker colour is part of a shading, and screened; small drawings with the strokes of larger ones in their
+//! colour are no letters.
 //! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines. What of the ground lies
 //! inside letters is as wide as the ground ([`counters`](super::counters)).
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
