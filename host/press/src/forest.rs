@@ -7,6 +7,14 @@
 
 use std::ops::Range;
 
+/// The dots beside a stretch of a row, above, below and at both ends; the numbers of some below may be beyond the image.
+pub(crate) fn beside(stretch: Range<usize>, width: usize) -> impl Iterator<Item = usize> {
+    let left = (!stretch.start.is_multiple_of(width)).then(|| stretch.start - 1);
+    let right = (!stretch.end.is_multiple_of(width)).then_some(stretch.end);
+    let lines = stretch.flat_map(move |at| [at.checked_sub(width), Some(at + width)]);
+    lines.chain([left, right]).flatten()
+}
+
 /// Numbers from 0 on, and the sets they are in.
 #[derive(Default)]
 pub(crate) struct Forest {

@@ -11,19 +11,10 @@ use super::shapes::continues;
 use super::treatments::{Shape, Treatment};
 
 /// Whether one of the four dots beside a dot is outside the art, or of another shape and `needs` a rim.
-pub(super) fn at_the_rim(
-    flat: &Flat,
-    width: usize,
-    (x, y): (usize, usize),
-    needs: impl Fn(u8) -> bool,
-) -> bool {
-    let beside = |(right, down): (isize, isize)| {
-        let x = x.checked_add_signed(right).filter(|&x| x < width)?;
-        flat.index.get(y.checked_add_signed(down)? * width + x).copied()
-    };
+pub(super) fn at_the_rim(flat: &Flat, width: usize, at: (usize, usize), needs: impl Fn(u8) -> bool) -> bool {
     [(-1, 0), (1, 0), (0, -1), (0, 1)]
         .into_iter()
-        .any(|way| reach(flat, width, (x, y), way, 1) == 0 && beside(way).is_none_or(&needs))
+        .any(|way| reach(flat, width, at, way, 1) == 0 && beyond(flat, width, at, way, 0).is_none_or(&needs))
 }
 
 /// Whether a shape has a rim beside what is printed so. Between inks it would be a line of a third colour; but where the stack beside it is

@@ -16,7 +16,7 @@ use super::kinds::{K_OF_PICTURES, Kind};
 use super::masks::Masks;
 use super::palette::{palette, sort};
 use super::{resample, translucent};
-use crate::forest::Forest;
+use crate::forest::{Forest, beside};
 
 /// A dot that is a tone with more paper than ink.
 pub(super) const TONE: u8 = u8::MAX;
@@ -196,14 +196,8 @@ impl Flat {
         let mut borders = vec![[0u64; 2]; bands.len()];
         for (band, &root) in bands.iter().zip(&roots) {
             let own = self.index[band.start];
-            let ends = [
-                (!band.start.is_multiple_of(width)).then(|| band.start - 1),
-                (!band.end.is_multiple_of(width)).then_some(band.end),
-            ];
-            let beside = band.clone().flat_map(|at| [at.checked_sub(width), Some(at + width)]).chain(ends);
-            for other in
-                beside.flatten().filter(|&other| self.index.get(other).is_some_and(|&dot| dot != own))
-            {
+            let is_other = |&other: &usize| self.index.get(other).is_some_and(|&dot| dot != own);
+            for other in beside(band.clone(), width).filter(is_other) {
                 let (kind, colour) = split(&pixels[other]);
                 let (own_kind, own_colour) = self.colours[usize::from(own)];
                 let [border, like] = &mut borders[root as usize];

@@ -52,12 +52,7 @@ pub(super) fn lies(
     (runs, rows): (&[Run], &[usize]),
     takes_part: impl Fn(&Run) -> bool,
 ) -> HashMap<u32, Lies> {
-    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
-    each_beside(flat, width, (runs, rows), |run, beside| {
-        if takes_part(run) {
-            *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
-        }
-    });
+    let borders = borders(flat, width, (runs, rows), takes_part);
     // Of what is not tagged as text it is not known whether it is a part of the tone beside it.
     let has_ink = |beside: u8, kind: Kind| match beside {
         INKED => kind == Kind::Text,
@@ -95,12 +90,7 @@ pub(super) fn steps(
     (runs, rows): (&[Run], &[usize]),
     takes_part: impl Fn(&Run) -> bool,
 ) -> HashSet<u32> {
-    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
-    each_beside(flat, width, (runs, rows), |run, beside| {
-        if takes_part(run) {
-            *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
-        }
-    });
+    let borders = borders(flat, width, (runs, rows), takes_part);
     let is_step = |root: u32, border: &HashMap<u8, u32>| {
         let all: u32 = border.values().sum();
         let own = flat.colours[usize::from(runs[root as usize].colour)].1;
@@ -190,6 +180,22 @@ impl Grounds {
         let free = |&at: &usize| allowed >> at & 1 == 1 && 2 * stacks[at] < all;
         (0..CHOICES).find(free).map(|at| shape.solids[at])
     }
+}
+
+/// Of shapes, by their roots, how many dots of each colour lie beside them. Only runs that take part are looked at.
+fn borders(
+    flat: &Flat,
+    width: usize,
+    shapes: (&[Run], &[usize]),
+    takes_part: impl Fn(&Run) -> bool,
+) -> HashMap<u32, HashMap<u8, u32>> {
+    let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
+    each_beside(flat, width, shapes, |run, beside| {
+        if takes_part(run) {
+            *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
+        }
+    });
+    borders
 }
 
 /// Calls `with` for each dot that is beside a run, and of another shape.

@@ -18,6 +18,7 @@ use std::ops::{Deref, Range};
 use super::flat::{similar, split};
 use super::pens;
 use super::softened::{Edges, Widths, along, meant, thin_colours};
+use crate::forest::beside;
 
 /// The most main colours, and the most colours that small shapes have in common.
 const MOST: usize = 16;
@@ -274,10 +275,7 @@ fn shades<const N: usize>(
             let own = split(&run[0]).1;
             let Some([border, like]) = borders.get_mut(&own) else { continue };
             let is_thin = widths.is_thin(own);
-            let left = (all.start % width > 0).then(|| all.start - 1);
-            let right = (all.end % width > 0).then_some(all.end);
-            let beneath = all.flat_map(|at| [at.checked_sub(width), Some(at + width)]);
-            for beside in [left, right].into_iter().chain(beneath).flatten().filter_map(|at| pixels.get(at)) {
+            for beside in beside(all, width).filter_map(|at| pixels.get(at)) {
                 let other = split(beside).1;
                 *border += u64::from(other != own);
                 let is_like = other != own && similar(other, own) && (is_thin || !widths.is_thin(other));

@@ -14,7 +14,7 @@ use super::flat::{similar, split};
 use super::kinds::{BYTES, Kind};
 use super::posters::{Span, WHITE_AND_BLACK};
 use super::treatments::apart;
-use crate::forest::Forest;
+use crate::forest::{Forest, beside};
 
 /// The tag of such a letter.
 const BOTH: u8 = Kind::TEXT | Kind::PICTURE;
@@ -65,15 +65,10 @@ pub(super) fn letters<const N: usize>(pixels: &[[u8; N]], width: usize) -> Vec<S
     let roots = Forest::of_stretches(&stretches, width, |_, _| true).roots();
     let mut found = vec![[Colours::none(), Colours::none()]; stretches.len()];
     for (stretch, &root) in stretches.iter().zip(&roots) {
-        let [own, beside] = &mut found[root as usize];
+        let [own, border] = &mut found[root as usize];
         pixels[stretch.clone()].iter().for_each(|pixel| own.add(split(pixel).1));
-        let ends = [
-            (!stretch.start.is_multiple_of(width)).then(|| stretch.start - 1),
-            (!stretch.end.is_multiple_of(width)).then_some(stretch.end),
-        ];
-        let lines = stretch.clone().flat_map(|at| [at.checked_sub(width), Some(at + width)]);
-        let around = lines.chain(ends).flatten().filter_map(|at| pixels.get(at));
-        around.filter(|pixel| !is_both(pixel)).for_each(|pixel| beside.add(split(pixel).1));
+        let around = beside(stretch.clone(), width).filter_map(|at| pixels.get(at));
+        around.filter(|pixel| !is_both(pixel)).for_each(|pixel| border.add(split(pixel).1));
     }
     let mut chosen: Vec<[u8; 3]> = Vec::new();
     let colours: Vec<Option<[u8; 3]>> = found
