@@ -4,9 +4,8 @@
 //! Method: steps along the row and the column, at most so many, until the shape ends. Cost: 2 ns a step. Limits: a slanting line is cut
 //! along its row or its column, whichever is shorter.
 
-use super::flat::{Flat, INKED, similar, tone};
+use super::flat::{Flat, similar};
 use super::grounds::{PAPER, has_ink};
-use super::kinds::Kind;
 use super::shapes::continues;
 use super::treatments::{Shape, Treatment};
 
@@ -26,20 +25,6 @@ pub(super) fn needs_rim(shape: &Shape, beside: Option<Treatment>) -> bool {
         }
         beside => !has_ink(beside),
     }
-}
-
-/// Whether a dot is of a letter that is printed solid whatever else is on the page: text in strokes of less than so many dots, which has more ink
-/// than paper or lies on a tone that has.
-pub(super) fn is_solid_letter(flat: &Flat, width: usize, at: usize, stroke: usize) -> bool {
-    let own = flat.index[at];
-    let Some(&(Kind::Text, colour)) = flat.colours.get(usize::from(own)) else { return false };
-    let at = (at % width, at / width);
-    let ways = [[(-1, 0), (1, 0)], [(0, -1), (0, 1)]];
-    ways.into_iter().any(|ways| {
-        let steps = ways.map(|way| reach(flat, width, at, way, stroke));
-        let is_on_ink = |side: usize| beyond(flat, width, at, ways[side], steps[side]) == Some(INKED);
-        steps.iter().sum::<usize>() + 1 < stroke && (tone(colour) == INKED || is_on_ink(0) || is_on_ink(1))
-    })
 }
 
 /// Pale lines that lie on several colours: borders of a table whose rows are tinted in turns, wires of a dartboard.

@@ -16,12 +16,11 @@ use inks::{InkSet, Library, Stack};
 use protocol::ink::Ink;
 use rayon::prelude::*;
 
-use super::averages::averaged;
-use super::beside::is_solid_letter;
+use super::averages::{averaged, joined};
 use super::bits;
 use super::compose::Settings;
 use super::error::LayersError;
-use super::flat::{BLACK, Flat, INKED, TONE, split};
+use super::flat::{BLACK, Flat, INKED, TONE, is_tone, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
 use super::outline;
@@ -77,14 +76,10 @@ impl Colour {
         if !flat.has_tones() {
             return Colour::of_flat(flat.at_dots(size, dots), dots);
         }
-        // A softened edge is no darker tone of its ground.
-        let pixel = |at: usize| match flat.index[at] {
-            dot if (2..INKED).contains(&dot) => (split(&pixels[at]).0, flat.colours[usize::from(dot)].1),
-            _ => split(&pixels[at]),
-        };
-        let (width, height) = (size.0 as usize, size.1 as usize);
-        let is_letter = |at: usize| is_solid_letter(&flat, width, at, outline::LETTER.into());
-        let colour = averaged(pixel, is_letter, &flat, (width, height), dots);
+        // Of flat colours it is not yet known which are fixed.
+        let is_flat = |at: usize| !is_tone(flat.index[at]);
+        let size_of = (size.0 as usize, size.1 as usize);
+        let colour = averaged(|at| split(&pixels[at]), is_flat, &flat, size_of, dots);
         Some(Colour { flat: flat.at_dots(size, dots), ..colour })
     }
 
@@ -102,15 +97,18 @@ impl Colour {
         Some(Colour { flat, ..Colour::default() })
     }
 
-    /// The colours between which dots are halftoned, without the flat ones: those of flat colours alone are averaged only now, when
-    /// it may be known which dots are `fixed`.
+    /// The colours between which dots are halftoned. Flat colours are averaged only now, when it may be known which dots are `fixed`.
     pub(super) fn averages(&self, dots: (usize, usize), fixed: Option<&[u8]>) -> Cow<'_, Colour> {
-        if !self.rgb.is_empty() || self.flat.index.is_empty() {
-            return Cow::Borrowed(self);
-        }
-        let pixel = |at: usize| self.flat.colours[usize::from(self.flat.index[at])];
         let is_fixed = |at: usize| fixed.is_some_and(|fixed| fixed[at] != TONE);
-        Cow::Owned(averaged(pixel, is_fixed, &self.flat, dots, dots))
+        let has_colours = !self.flat.index.is_empty() && self.flat.colours.len() > usize::from(BLACK) + 1;
+        match self.rgb.is_empty() {
+            _ if !has_colours => Cow::Borrowed(self),
+            false => Cow::Owned(joined(self, &self.flat, is_fixed, dots)),
+            true => {
+                let pixel = |at: usize| self.flat.colours[usize::from(self.flat.index[at])];
+                Cow::Owned(averaged(pixel, is_fixed, &self.flat, dots, dots))
+            }
+        }
     }
 
     /// Black dots on white.

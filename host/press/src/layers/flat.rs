@@ -303,7 +303,8 @@ mod tests {
         assert_eq!(flat.colours[2..], [(Kind::Drawing, colour)]);
         // The shading itself is a drawing's tone, mixed like the area.
         let drawn = super::super::colour::Colour::of(&pixels, (2020, 1), (4040, 2)).unwrap();
-        assert!(drawn.drawn.iter().all(|&drawn| drawn) && drawn.drawn.len() == drawn.width);
+        let mixed = drawn.averages((4040, 2), None);
+        assert!(mixed.drawn.iter().all(|&drawn| drawn) && mixed.drawn.len() == mixed.width);
     }
 
     /// A shading downwards and, in one of its colours, a panel beside it.

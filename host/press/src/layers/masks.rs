@@ -14,9 +14,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::flat::split;
+use super::islands::without;
 use super::kinds::Kind;
 use super::pens::Page;
-use super::posters::{self, Known, Span};
+use super::posters::{self, Known, Poster, Span};
 use super::softened::is_between;
 use crate::forest::Forest;
 
@@ -67,9 +68,9 @@ impl Masks {
         }
         let found = flat_art(pixels, width, (&all, roots));
         let mut colours = HashMap::new();
-        for Art { stretches, spans, .. } in &found {
+        for Art { stretches, poster } in &found {
             stretches.iter().for_each(|&at| all[at as usize].colour = None);
-            for (span, colour) in spans {
+            for (span, colour) in &poster.spans {
                 *colours.entry(*colour).or_default() += span.len() as u64;
             }
         }
@@ -80,7 +81,7 @@ impl Masks {
             }
         }
         colours.retain(|colour, dots| *dots >= LEAST || drawn.contains(colour));
-        let spans = found.into_iter().flat_map(|art| art.spans).collect();
+        let spans = found.into_iter().flat_map(|art| art.poster.spans).collect();
         all.retain(|stretch| stretch.colour.is_some_and(|colour| colours.contains_key(&colour)));
         Masks { stretches: all, spans, colours }
     }
@@ -99,11 +100,12 @@ impl Masks {
 struct Art {
     /// The numbers of its stretches.
     stretches: Vec<u32>,
-    /// What these become.
-    spans: Vec<Span>,
-    /// Pixels in colours that are not explained.
-    strays: u64,
+    /// What these become; pixels of pictures amid it have none.
+    poster: Poster,
 }
+
+/// The pictures amid shapes, by the first stretch of each.
+type Islands<'a> = HashMap<u32, &'a [Range<usize>]>;
 
 /// The shapes that are flat art, from all stretches and the root of each.
 fn flat_art<const N: usize>(
@@ -117,8 +119,15 @@ fn flat_art<const N: usize>(
     let pixels_of = |shape: &[u32]| -> usize {
         shape.iter().map(|&at| all[at as usize].end - all[at as usize].start).sum()
     };
-    let places = |shape: &[u32]| -> Vec<Range<usize>> {
-        shape.iter().map(|&at| all[at as usize].start..all[at as usize].end).collect()
+    let places = |shape: &[u32], islands: &Islands<'_>| -> Vec<Range<usize>> {
+        let all = shape.iter().map(|&at| all[at as usize].start..all[at as usize].end);
+        match islands.get(&shape[0]) {
+            Some(islands) => {
+                let all: Vec<_> = all.map(|stretch| (stretch, ())).collect();
+                without(&all, islands).map(|(part, ())| part).collect()
+            }
+            None => all.collect(),
+        }
     };
     let enlarged = enlarged(pixels, all);
     let small = posters::SMALL * enlarged * enlarged;
@@ -126,7 +135,7 @@ fn flat_art<const N: usize>(
     for shape in shapes.iter().filter(|shape| pixels_of(shape) <= small) {
         shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
-    let find = |shapes: &[&[u32]], common: &[[u8; 3]], thin: bool| -> Vec<Art> {
+    let find = |shapes: &[&[u32]], islands: &Islands<'_>, common: &[[u8; 3]], thin: bool| -> Vec<Art> {
         let palette = [&posters::WHITE_AND_BLACK[..], common].concat();
         let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette, |_| true);
         let found = shapes.par_iter().filter_map(|shape| {
@@ -135,10 +144,10 @@ fn flat_art<const N: usize>(
                 return None;
             }
             let known = Known { common, thin, enlarged };
-            let (spans, strays) = posters::spans(pixels, width, &places(shape), known)?;
+            let poster = posters::poster(pixels, width, &places(shape, islands), known)?;
             // In one colour it is line art by itself.
-            let itself = colour.is_some() && spans.iter().any(|span| Some(span.1) == colour);
-            (!itself).then(|| Art { stretches: shape.to_vec(), spans, strays })
+            let itself = colour.is_some() && poster.spans.iter().any(|span| Some(span.1) == colour);
+            (!itself).then(|| Art { stretches: shape.to_vec(), poster })
         });
         found.collect()
     };
@@ -146,10 +155,10 @@ fn flat_art<const N: usize>(
         shapes.into_iter().partition(|shape| pixels_of(shape) <= small);
     let (in_one, in_several): (Vec<&[u32]>, Vec<&[u32]>) =
         large.into_iter().partition(|shape| all[shape[0] as usize].colour.is_some());
-    let mut found = find(&in_several, &[], false);
+    let mut found = find(&in_several, &Islands::new(), &[], false);
     // What a letter encloses of its ground is small, too.
     let mut areas: HashMap<[u8; 3], u64> = HashMap::new();
-    for (span, colour) in found.iter().flat_map(|art| &art.spans) {
+    for (span, colour) in found.iter().flat_map(|art| &art.poster.spans) {
         *areas.entry(*colour).or_default() += span.len() as u64;
     }
     for shape in in_one {
@@ -158,20 +167,22 @@ fn flat_art<const N: usize>(
         }
     }
     let common = posters::common(counts, &areas);
-    found.extend(find(&of_letters, &common, false));
-    let flat: HashMap<u32, u64> =
-        found.iter().filter_map(|art| Some((*art.stretches.first()?, art.strays))).collect();
+    found.extend(find(&of_letters, &Islands::new(), &common, false));
+    let flat: HashMap<u32, &Poster> = found.iter().map(|art| (art.stretches[0], &art.poster)).collect();
     // Text in a colour of its own may be less than what is left over of a large ground.
     let is_left = |shape: &&&[u32]| {
         all[shape[0] as usize].colour.is_none()
-            && flat.get(&shape[0]).is_none_or(|&strays| strays >= posters::LEAST)
+            && flat.get(&shape[0]).is_none_or(|poster| poster.strays >= posters::LEAST)
     };
     let left: Vec<&[u32]> = in_several.iter().chain(&of_letters).filter(is_left).copied().collect();
-    let shapes: Vec<Vec<Range<usize>>> = left.iter().map(|shape| places(shape)).collect();
+    let islands: Islands<'_> = flat.iter().map(|(&at, poster)| (at, &poster.islands[..])).collect();
+    let shapes: Vec<Vec<Range<usize>>> = left.iter().map(|shape| places(shape, &islands)).collect();
     let (thin, pens) = Page { pixels, width, enlarged }.pens(&shapes, areas, &common);
     let thin: Vec<&[u32]> = thin.into_iter().map(|at| left[at]).collect();
-    let mut drawn = find(&thin, &[&pens[..], &common].concat(), true);
-    drawn.retain(|art| flat.get(&art.stretches[0]).is_none_or(|&strays| 2 * art.strays <= strays));
+    let mut drawn = find(&thin, &islands, &[&pens[..], &common].concat(), true);
+    drawn.retain(|art| {
+        flat.get(&art.stretches[0]).is_none_or(|poster| 2 * art.poster.strays <= poster.strays)
+    });
     let again: HashSet<u32> = drawn.iter().map(|art| art.stretches[0]).collect();
     found.retain(|art| !again.contains(&art.stretches[0]));
     found.extend(drawn);

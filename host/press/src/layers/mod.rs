@@ -23,6 +23,7 @@ mod error;
 mod flat;
 mod grounds;
 mod intent;
+mod islands;
 pub mod kinds;
 mod lattice;
 mod lines;

@@ -16,6 +16,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::{Deref, Range};
 
 use super::flat::{similar, split};
+use super::islands::{Sea, without};
 use super::pens;
 use super::softened::{Edges, Widths, along, meant, thin_colours};
 use crate::forest::beside;
@@ -37,6 +38,8 @@ const STEPS: usize = 8;
 /// At most this part of the pixels is neither a main colour nor between two; of thin lines, where they cross in three colours.
 const STRAY: f64 = 0.01;
 const STRAY_THIN: f64 = 0.1;
+/// At most this part of the pixels is of pictures.
+const ISLANDS: f64 = 0.5;
 /// The strokes of a small shape are black, and not grey, if at least one in so many pixels is nearly so.
 const DARK: u64 = 20;
 /// The most times that pictures are enlarged where edges are looked for.
@@ -58,21 +61,31 @@ pub(super) struct Known<'a> {
     pub enlarged: usize,
 }
 
-/// The spans of what hangs together, if it is flat art, and how many of its pixels are neither a main colour nor between two. `stretches` are the
-/// pixels of it, in order. What is in one colour has no others.
-pub(super) fn spans<const N: usize>(
+/// What hangs together and is flat art.
+pub(super) struct Poster {
+    /// Its pixels, but for those of islands.
+    pub spans: Vec<Span>,
+    /// How many of these are neither a main colour nor between two.
+    pub strays: u64,
+    /// The pictures amid it, in order.
+    pub islands: Vec<Range<usize>>,
+}
+
+/// What hangs together, if it is flat art. `stretches` are the pixels of it, in order. What is in one colour has no others.
+pub(super) fn poster<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
     stretches: &[Range<usize>],
     Known { common, thin: all_thin, enlarged }: Known,
-) -> Option<(Vec<Span>, u64)> {
+) -> Option<Poster> {
     let total: u64 = stretches.iter().map(|stretch| stretch.len() as u64).sum();
     let first = &pixels[stretches.first()?.start];
     let one = stretches.iter().all(|stretch| pixels[stretch.clone()].iter().all(|pixel| pixel == first));
     let widths = LazyCell::new(|| Widths::of(pixels, width, stretches, enlarged));
     let mut colours = main_colours(pixels, width, stretches, (total, enlarged), &widths).filter(|_| !one);
     let mut of_shape = usize::MAX;
-    if all_thin || total as usize <= SMALL * enlarged * enlarged {
+    let is_small = total as usize <= SMALL * enlarged * enlarged;
+    if all_thin || is_small {
         let is_bare = colours.is_none();
         let colours = colours.get_or_insert(WHITE_AND_BLACK.to_vec());
         if all_thin {
@@ -95,8 +108,10 @@ pub(super) fn spans<const N: usize>(
     let thin = thin_colours(&colours, &widths);
     let meant = meant(&colours, &thin);
     let edges = Edges { pixels, width, colours: &colours, of_shape, thin: &thin, meant: &meant, enlarged };
-    let (mut spans, mut stray): (Vec<Span>, u64) = (Vec::new(), 0);
-    let most = (if all_thin { STRAY_THIN } else { STRAY } * total as f64) as u64;
+    let (mut spans, mut strays): (Vec<Span>, Vec<usize>) = (Vec::new(), Vec::new());
+    let has_islands = !all_thin && !is_small;
+    let share = if all_thin { STRAY_THIN } else { STRAY };
+    let most = if has_islands { ISLANDS } else { share } * total as f64;
     for stretch in stretches {
         let mut at = stretch.start;
         for run in pixels[stretch.clone()].chunk_by(|a, b| a == b) {
@@ -110,7 +125,7 @@ pub(super) fn spans<const N: usize>(
             }
             for at in all {
                 let colour = edges.colour(at, known);
-                stray += u64::from(colour.is_none());
+                strays.extend(colour.is_none().then_some(at));
                 let nearest =
                     || colours.iter().copied().min_by_key(|&known| apart(known, own)).unwrap_or(own);
                 push(
@@ -119,13 +134,40 @@ pub(super) fn spans<const N: usize>(
                     colour.unwrap_or_else(|| if all_thin { nearest() } else { own }),
                 );
             }
-            if stray > most {
+            if strays.len() as f64 > most {
                 return None;
             }
         }
     }
+    let mut islands = Vec::new();
+    if has_islands {
+        let is_wide = |colour| colours.iter().zip(&thin).any(|(&known, &thin)| known == colour && !thin);
+        islands = Sea { pixels, width, stretches, strays: &strays, enlarged }.islands(is_wide);
+        strays.retain(|at| {
+            let island = islands.get(islands.partition_point(|island| island.end <= *at));
+            island.is_none_or(|island| *at < island.start)
+        });
+        let land: usize = islands.iter().map(Range::len).sum();
+        if land as f64 > ISLANDS * total as f64 || strays.len() as f64 > share * (total - land as u64) as f64
+        {
+            return None;
+        }
+        // Letters may be so thin that none of their colours is near.
+        let edges = Edges { of_shape: WHITE_AND_BLACK.len(), ..edges };
+        spans = without(&spans, &islands)
+            .flat_map(|(span, colour)| {
+                let first = strays.partition_point(|&at| at < span.start);
+                let is_stray = strays.get(first) == Some(&span.start);
+                let colour_of = |at| edges.colour(at, None).unwrap_or(colour);
+                match is_stray {
+                    true => span.map(|at| (at..at + 1, colour_of(at))).collect(),
+                    false => vec![(span, colour)],
+                }
+            })
+            .collect();
+    }
     edges.decide_strokes(&mut spans);
-    Some((spans, stray))
+    Some(Poster { spans, strays: strays.len() as u64, islands })
 }
 
 /// The square of the distance between two colours in sRGB.
@@ -305,7 +347,9 @@ mod tests {
     fn all(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })?.0 {
+        for (span, colour) in
+            poster(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })?.spans
+        {
             out[span].fill(colour);
         }
         Some(out)
@@ -427,16 +471,13 @@ mod tests {
             })
             .collect();
         let strokes: Vec<Range<usize>> = (0..16).map(|y| y * SIDE + 1..y * SIDE + 5).collect();
-        assert_eq!(
-            spans(&pixels, SIDE, &strokes, Known { common: &[], thin: false, enlarged: 1 }),
-            None,
-            "nobody knows the colour"
-        );
+        let alone = poster(&pixels, SIDE, &strokes, Known { common: &[], thin: false, enlarged: 1 });
+        assert!(alone.is_none(), "nobody knows the colour");
         let mut found = vec![white; pixels.len()];
         for (span, colour) in
-            spans(&pixels, SIDE, &strokes, Known { common: &[[200, 0, 0], blue], thin: false, enlarged: 1 })
+            poster(&pixels, SIDE, &strokes, Known { common: &[[200, 0, 0], blue], thin: false, enlarged: 1 })
                 .expect("flat art")
-                .0
+                .spans
         {
             found[span].fill(colour);
         }

@@ -36,6 +36,7 @@ const FAINTEST: f32 = 0.25;
 const ALIKE: f32 = 0.2;
 
 /// Flat art whose edges are looked at.
+#[derive(Clone, Copy)]
 pub(super) struct Edges<'a, const N: usize> {
     pub pixels: &'a [[u8; N]],
     pub width: usize,
@@ -267,7 +268,7 @@ impl<const N: usize> Edges<'_, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layers::posters::{Known, spans};
+    use crate::layers::posters::{Known, poster};
 
     const SIDE: usize = 120;
 
@@ -275,7 +276,9 @@ mod tests {
     fn cut(pixels: &[[u8; 3]]) -> Option<Vec<[u8; 3]>> {
         let rows: Vec<Range<usize>> = (0..SIDE).map(|y| y * SIDE..(y + 1) * SIDE).collect();
         let mut out = vec![[0; 3]; pixels.len()];
-        for (span, colour) in spans(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })?.0 {
+        for (span, colour) in
+            poster(pixels, SIDE, &rows, Known { common: &[], thin: false, enlarged: 1 })?.spans
+        {
             out[span].fill(colour);
         }
         Some(out)
