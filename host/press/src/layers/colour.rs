@@ -111,6 +111,15 @@ impl Colour {
         }
     }
 
+    /// The colour of a dot that is a tone, or is beside one; `None` if there are no tones.
+    fn tones(&self, dots: (usize, usize)) -> Option<impl Fn(usize) -> [u8; 3] + Sync> {
+        (!self.rgb.is_empty()).then_some(move |at: usize| {
+            let (x, y) = (at % dots.0 * self.width / dots.0, at / dots.0 * self.height / dots.1);
+            let at = 3 * (y * self.width + x);
+            [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
+        })
+    }
+
     /// Black dots on white.
     pub(super) fn black(dots: Plane) -> Colour {
         Colour { black: Some(dots), ..Colour::default() }
@@ -156,8 +165,8 @@ impl Colour {
         }
         let mut fit = self.fit((&printable, &solids), space, settings, observer)?;
         let fixed = (!self.flat.index.is_empty()).then(|| {
-            let treatments = treatments(&self.flat, dots.0, &mut fit, &solids);
-            outline::fixed(&self.flat, dots.0, &treatments)
+            let (treatments, looks) = treatments(&self.flat, dots.0, &mut fit, &solids, self.tones(dots));
+            outline::fixed(&self.flat, dots.0, &treatments, &looks)
         });
         let fixed = match fixed {
             Some(fixed) if !fixed.par_chunks(1 << 16).any(|dots| dots.contains(&TONE)) => {
@@ -533,7 +542,8 @@ mod tests {
         let solids = Solids::new(&printable, &space);
         let mut fit =
             colour.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
-        let treatments = treatments(&colour.flat, pixels.len(), &mut fit, &solids);
+        let (treatments, _) =
+            treatments(&colour.flat, pixels.len(), &mut fit, &solids, colour.tones((pixels.len(), 1)));
         let found = |rgb: [u8; 3]| {
             let at = colour.flat.colours.iter().position(|(_, colour)| *colour == rgb).unwrap();
             match treatments[at] {

@@ -8,11 +8,11 @@
 use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
 
-use super::flat::{Flat, INKED, similar};
+use super::flat::{Flat, INKED, is_tone, similar};
 use super::kinds::Kind;
 use super::shapes::{Run, continues};
 use super::softened::along;
-use super::treatments::{CHOICES, Shape, Treatment, is_faint};
+use super::treatments::{CHOICES, Looks, Seen, Shape, Treatment, is_faint, is_hidden};
 
 /// The least share of the border of what lies on ink, and of what lies on another colour.
 const ON_INK: f64 = 7.0 / 8.0;
@@ -110,14 +110,22 @@ pub(super) fn steps(
 #[derive(Clone, Default)]
 struct Border {
     all: u32,
-    /// Those that are printed as each of its stacks.
+    /// Those that are printed as each of its stacks, those on which the stack would not be seen as the shape's colour, and those on which not even
+    /// faintly.
     stacks: [u32; CHOICES],
-    /// Those in colours that it hardly differs from.
+    faint_on: [u32; CHOICES],
+    lost_on: [u32; CHOICES],
+    /// Those in colours that it hardly differs from, and those that nobody can tell from it.
     faint: u32,
+    hidden: u32,
 }
 
-/// The bit of a pair of colours that hardly differ, beside one for each stack.
-const FAINT: u8 = 1 << 7;
+/// The bits of a pair of colours: one for each stack that the other is printed as, one for each that would not be seen on it as asked, one for
+/// each that would be lost, and whether the colours hardly differ, or not at all.
+const WEAK: usize = CHOICES;
+const LOST: usize = 2 * CHOICES;
+const FAINT: u16 = 1 << (3 * CHOICES);
+const HIDDEN: u16 = FAINT << 1;
 
 /// What shapes lie on, where one of them may lie on its own solid.
 pub(super) struct Grounds {
@@ -125,11 +133,11 @@ pub(super) struct Grounds {
 }
 
 impl Grounds {
-    /// Counts the borders; `None` if no two colours have a stack in common.
+    /// Counts the borders; `None` if every colour can be told from all others as its nearest stack.
     pub(super) fn of(
         flat: &Flat,
         width: usize,
-        treatments: &[Treatment],
+        (treatments, looks): (&[Treatment], &Looks<'_>),
         (runs, rows): (&[Run], &[usize]),
     ) -> Option<Grounds> {
         let shape = |colour: u8| match treatments.get(usize::from(colour)) {
@@ -137,7 +145,7 @@ impl Grounds {
             _ => None,
         };
         // The stacks of a shape that dots of another colour are printed as, a bit each.
-        let meet = |shape: &Shape, beside: u8| -> u8 {
+        let meet = |shape: &Shape, beside: u8| -> u16 {
             let (stack, yields) = match treatments.get(usize::from(beside)) {
                 Some(&Treatment::Solid(stack)) => (stack, true),
                 Some(Treatment::Shape(other)) => (other.solids[0], other.dark && other.rank < shape.rank),
@@ -146,40 +154,85 @@ impl Grounds {
             let same = shape.solids.iter().enumerate().filter(|&(_, &solid)| yields && solid == stack);
             same.fold(0, |bits, (at, _)| bits | 1 << at)
         };
-        let met: Vec<u8> = (0..=255u8)
+        let colour = |of: u8| flat.colours.get(usize::from(of)).map(|&(_, colour)| colour);
+        let met: Vec<u16> = (0..=255u8)
             .flat_map(|own| (0..=255u8).map(move |beside| (own, beside)))
-            .map(|(own, beside)| match shape(own) {
-                Some(shape) if own != beside && !continues(flat, own, beside) => {
-                    let bits = meet(shape, beside);
-                    let colour = |of: u8| flat.colours.get(usize::from(of)).map(|&(_, colour)| colour);
-                    let faint = || colour(own).zip(colour(beside)).is_some_and(|(a, b)| is_faint(a, b));
-                    if bits != 0 && faint() { bits | FAINT } else { bits }
+            .map(|(own, beside)| {
+                let Some(shape) = shape(own).filter(|_| own != beside && !continues(flat, own, beside))
+                else {
+                    return 0;
+                };
+                let Some((a, b)) = colour(own).zip(colour(beside)) else { return 0 };
+                let bits =
+                    meet(shape, beside) | unseen(shape.solids.map(|stack| looks.seen(own, beside, stack)));
+                match bits {
+                    _ if is_hidden(a, b) => bits | FAINT | HIDDEN,
+                    0 => 0,
+                    bits if is_faint(a, b) => bits | FAINT,
+                    bits => bits,
                 }
-                _ => 0,
             })
             .collect();
-        if !met.iter().any(|bits| bits & 1 == 1) {
+        if !looks.has_tones() && met.iter().all(|bits| bits & (1 | 1 << WEAK | HIDDEN) == 0) {
             return None;
         }
+        let on_tone = |own: u8, at: usize| -> u16 {
+            let Some(shape) = shape(own) else { return 0 };
+            let Some((seen, tone)) = looks.seen_on_tone(own, at, shape.solids) else { return 0 };
+            let bits = unseen(seen);
+            let is_faint = bits != 0 && colour(own).is_some_and(|own| is_faint(own, tone));
+            bits | if is_faint { FAINT } else { 0 }
+        };
         let mut border = vec![Border::default(); runs.len()];
-        each_beside(flat, width, (runs, rows), |run, beside| {
-            let Border { all, stacks, faint } = &mut border[run.root as usize];
+        each_beside(flat, width, (runs, rows), |run, at| {
+            let Border { all, stacks, faint_on, lost_on, faint, hidden } = &mut border[run.root as usize];
             *all += 1;
-            let bits = met[256 * usize::from(run.colour) + usize::from(beside)];
+            let bits = match flat.index[at] {
+                beside if is_tone(beside) => on_tone(run.colour, at),
+                beside => met[256 * usize::from(run.colour) + usize::from(beside)],
+            };
             *faint += u32::from(bits & FAINT != 0);
-            stacks.iter_mut().enumerate().for_each(|(at, dots)| *dots += u32::from(bits >> at & 1));
+            *hidden += u32::from(bits & HIDDEN != 0);
+            let count = |counts: &mut [u32; CHOICES], first: usize| {
+                counts
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(at, dots)| *dots += u32::from(bits >> (first + at) & 1));
+            };
+            count(stacks, 0);
+            count(faint_on, WEAK);
+            count(lost_on, LOST);
         });
         Some(Grounds { border })
     }
 
-    /// The solid of a shape: the nearest that it does not lie on; if it hardly differs from what it lies on, only of the mild ones.
-    pub(super) fn solid(&self, root: u32, shape: &Shape) -> Option<u8> {
-        let Border { all, stacks, faint } = &self.border[root as usize];
+    /// The solid of a shape: the nearest that it does not lie on, and, if it is `thin`, that is seen as its colour; if it hardly differs from what
+    /// it lies on, only of the mild ones, and none if nobody can tell them apart.
+    pub(super) fn solid(&self, root: u32, shape: &Shape, thin: bool) -> Option<u8> {
+        let Border { all, stacks, faint_on, lost_on, faint, hidden } = &self.border[root as usize];
         let all = (*all).max(1);
+        if 2 * hidden >= all {
+            return None;
+        }
         let allowed = if 2 * faint >= all { shape.mild } else { u8::MAX };
-        let free = |&at: &usize| allowed >> at & 1 == 1 && 2 * stacks[at] < all;
-        (0..CHOICES).find(free).map(|at| shape.solids[at])
+        let free = || (0..CHOICES).filter(|&at| allowed >> at & 1 == 1 && 2 * stacks[at] < all);
+        let seen = match thin {
+            true => {
+                free().find(|&at| 2 * faint_on[at] < all).or_else(|| free().find(|&at| 2 * lost_on[at] < all))
+            }
+            false => free().next(),
+        };
+        seen.map(|at| shape.solids[at])
     }
+}
+
+/// The bits of what is not seen as asked, and of what is lost.
+fn unseen(seen: [Seen; CHOICES]) -> u16 {
+    seen.into_iter().enumerate().fold(0, |bits, (at, seen)| match seen {
+        Seen::AsAsked => bits,
+        Seen::Faintly => bits | 1 << (WEAK + at),
+        Seen::Otherwise => bits | 1 << (WEAK + at) | 1 << (LOST + at),
+    })
 }
 
 /// Of shapes, by their roots, how many dots of each colour lie beside them. Only runs that take part are looked at.
@@ -190,16 +243,21 @@ fn borders(
     takes_part: impl Fn(&Run) -> bool,
 ) -> HashMap<u32, HashMap<u8, u32>> {
     let mut borders: HashMap<u32, HashMap<u8, u32>> = HashMap::new();
-    each_beside(flat, width, shapes, |run, beside| {
+    each_beside(flat, width, shapes, |run, at| {
         if takes_part(run) {
-            *borders.entry(run.root).or_default().entry(beside).or_default() += 1;
+            *borders.entry(run.root).or_default().entry(flat.index[at]).or_default() += 1;
         }
     });
     borders
 }
 
-/// Calls `with` for each dot that is beside a run, and of another shape.
-fn each_beside(flat: &Flat, width: usize, (runs, rows): (&[Run], &[usize]), mut with: impl FnMut(&Run, u8)) {
+/// Calls `with` for each dot that is beside a run, and of another shape, with its number.
+fn each_beside(
+    flat: &Flat,
+    width: usize,
+    (runs, rows): (&[Run], &[usize]),
+    mut with: impl FnMut(&Run, usize),
+) {
     for (y, row) in rows.windows(2).enumerate() {
         for run in &runs[row[0]..row[1]] {
             let (start, end, line) = (run.start as usize, run.end as usize, y * width);
@@ -207,9 +265,10 @@ fn each_beside(flat: &Flat, width: usize, (runs, rows): (&[Run], &[usize]), mut 
             let lines = [y.checked_sub(1), (y + 2 < rows.len()).then_some(y + 1)];
             let ends = ends.into_iter().flatten().map(|x| line + x);
             let upright = lines.into_iter().flatten().flat_map(|y| y * width + start..y * width + end);
-            for beside in ends.chain(upright).map(|at| flat.index[at]) {
+            for at in ends.chain(upright) {
+                let beside = flat.index[at];
                 if beside != run.colour && !continues(flat, run.colour, beside) {
-                    with(run, beside);
+                    with(run, at);
                 }
             }
         }

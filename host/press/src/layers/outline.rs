@@ -28,8 +28,8 @@ use super::kinds::Kind;
 use super::lines::lines;
 use super::pieces::pieces;
 use super::shapes::{Run, shapes};
-use super::treatments::{Shape, Treatment};
-use super::words::Words;
+use super::treatments::{Looks, Shape, Treatment};
+use super::words::{Words, near};
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.
 const STROKE: u8 = 9;
@@ -38,11 +38,15 @@ const HAIR: u8 = 4;
 /// The strokes of thin letters are narrower than this many dots, 1 mm: those of bold text of 14 points are up to 22 wide.
 pub(super) const LETTER: u8 = 24;
 
+/// The strokes of a letter that was made an outline are at most one in so many of its width or height, and so many of them are a word.
+const SLENDER: u32 = 3;
+const WORD: usize = 3;
+
 /// A drawing at most so many dots wide and high, 5 mm, is as small as a letter: text that was made outlines, a module of a QR code.
 const SMALL: u32 = 118;
 
-/// For each dot the stack it is fixed to, or [`TONE`]. `treatments` has one for each colour.
-pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<u8> {
+/// For each dot the stack it is fixed to, or [`TONE`]. `treatments` has one for each colour, and `looks` tells what is seen on what.
+pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: &Looks<'_>) -> Vec<u8> {
     let of = |colour: u8| treatments.get(usize::from(colour)).copied();
     let stack: [u8; 256] = std::array::from_fn(|colour| match of(colour as u8) {
         Some(Treatment::Solid(stack)) => stack,
@@ -59,8 +63,8 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     }
     let shapes = shapes(flat, width, (&shaped, STROKE));
     let (runs, rows) = (&shapes.runs, &shapes.rows);
-    let grounds = Grounds::of(flat, width, treatments, (runs, rows));
-    let small = letters(flat, (runs, rows));
+    let grounds = Grounds::of(flat, width, (treatments, looks), (runs, rows));
+    let (small, slender) = letters(flat, (runs, rows));
     // A small drawing in a colour unlike all stacks would be a blot of another colour.
     let is_like = |run: &Run| match of(run.colour) {
         Some(Treatment::Shape(shape)) => shape.near || !shape.dark || is_text(flat, run),
@@ -73,8 +77,19 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
         |root: u32| runs[root as usize].side < if is_letter[root as usize] { LETTER } else { STROKE };
     let is_counter = counters(flat, (runs, rows), u32::from(2 * LETTER), is_thin);
     let takes_part = |root: u32| is_letter[root as usize] && !is_counter[root as usize];
-    let words = Words::of(flat, (runs, rows), LETTER, takes_part);
-    let is_thin = |root: u32| !is_counter[root as usize] && words.thin(root).unwrap_or_else(|| is_thin(root));
+    let words = Words::of(flat, (runs, rows), (near(LETTER), LETTER), takes_part);
+    // Text that was made outlines, in a colour unlike all stacks: a row of slender shapes.
+    let takes_part = |root: u32| {
+        let at = root as usize;
+        slender[at] && !is_letter[at] && !is_counter[at]
+    };
+    let outlined = Words::of(flat, (runs, rows), (HAIR..2 * LETTER, LETTER), takes_part);
+    let of_word = |root: u32| words.thin(root).or_else(|| outlined.thin_in_a_word_of(WORD, root));
+    let is_of_word = |root: u32| {
+        let found = [&words, &outlined].map(|words| words.thin_in_a_word_of(WORD, root));
+        slender[root as usize] && found.iter().any(Option::is_some)
+    };
+    let is_thin = |root: u32| !is_counter[root as usize] && of_word(root).unwrap_or_else(|| is_thin(root));
     let is_narrow = |run: &Run| !is_text(flat, run) && is_thin(run.root);
     let is_bare = |colour: u8| matches!(of(colour), None | Some(Treatment::Solid(PAPER)));
     let is_dark = |run: &Run| matches!(of(run.colour), Some(Treatment::Shape(shape)) if shape.dark);
@@ -90,9 +105,13 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment]) -> Vec<
     let lies = lies(flat, width, treatments, (runs, rows), takes_part);
     let solid = |root: u32, shape: &Shape| {
         if lies.get(&root) == Some(&Lies::OnInk) {
-            return Some(PAPER);
+            // A pale disc as small as a letter is no letter.
+            let run = &runs[root as usize];
+            let stands = shape.bare || run.side < STROKE || is_text(flat, run) || is_of_word(root);
+            return stands.then_some(PAPER);
         }
-        grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape))
+        let thin = is_thin(root);
+        grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape, thin))
     };
     let pale = PaleLines { flat, width, treatments };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
@@ -174,8 +193,8 @@ fn is_text(flat: &Flat, run: &Run) -> bool {
     flat.colours[usize::from(run.colour)].0 == Kind::Text
 }
 
-/// For each run that is the root of a shape, whether the shape is text or as small as a letter.
-fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Vec<bool> {
+/// For each run that is the root of a shape, whether the shape is text or as small as a letter, and whether it is a drawing as small and as slender.
+fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> (Vec<bool>, Vec<bool>) {
     let mut bounds = vec![[u32::MAX, 0, u32::MAX, 0]; runs.len()];
     for (y, row) in (0u32..).zip(rows.windows(2)) {
         for run in &runs[row[0]..row[1]] {
@@ -184,10 +203,13 @@ fn letters(flat: &Flat, (runs, rows): (&[Run], &[usize])) -> Vec<bool> {
             (*top, *bottom) = ((*top).min(y), y + 1);
         }
     }
-    let is_small = |[left, right, top, bottom]: [u32; 4]| {
-        right - left.min(right) <= SMALL && bottom - top.min(bottom) <= SMALL
-    };
-    runs.iter().zip(bounds).map(|(run, bounds)| is_text(flat, run) || is_small(bounds)).collect()
+    let judged = runs.iter().zip(bounds).map(|(run, [left, right, top, bottom])| {
+        let (across, down) = (right - left.min(right), bottom - top.min(bottom));
+        let is_small = across.max(down) <= SMALL;
+        let text = is_text(flat, run);
+        (text || is_small, !text && is_small && SLENDER * u32::from(run.side) <= across.max(down))
+    });
+    judged.unzip()
 }
 
 #[cfg(test)]

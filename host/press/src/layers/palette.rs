@@ -4,8 +4,8 @@
 //! Method: text comes first, then the most frequent. If there are too many, the colours of shadings are left out: the ones with a similar
 //! colour on the page that has nearly as many dots, if half of their border or more is to such colours. An area stays, and so does a line,
 //! though a shading passes through their colour.
-//! Cost: a look at each pixel; at four more for each run of a row on pages with too many colours. Limits: [`MOST`] colours of
-//! [`GATHERED`].
+//! Cost: a look at each pixel; at four more for each run of a row on pages with too many colours. Limits: [`MOST`] colours of the
+//! [`JUDGED`] most frequent.
 
 use std::collections::HashMap;
 
@@ -20,8 +20,10 @@ use super::posters::Span;
 const MOST: usize = INKED as usize - 2;
 /// A colour with so many times the dots of any similar one is an area, though a shading passes through it.
 const AREA: u64 = 16;
-/// Colours gathered before the palette is chosen.
-const GATHERED: usize = 4096;
+/// Colours gathered before the palette is chosen, and those of them among which it is: a shading may have more, and what is below it on the page
+/// counts as well.
+const GATHERED: usize = 1 << 16;
+const JUDGED: usize = 4096;
 /// Rows that are gathered at once.
 const ROWS: usize = 64;
 
@@ -67,6 +69,8 @@ pub(super) fn palette<const N: usize>(
         part.into_iter().for_each(|(key, dots)| add(&mut counts, key, dots));
     }
     let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
+    sort(&mut colours);
+    colours.truncate(JUDGED);
     let mut shaded = Vec::new();
     if colours.len() > MOST {
         let all = colours.clone();
@@ -89,7 +93,6 @@ pub(super) fn palette<const N: usize>(
             stays
         });
     }
-    sort(&mut colours);
     colours.truncate(MOST);
     (colours.into_iter().map(|(key, _)| key).collect(), shaded)
 }

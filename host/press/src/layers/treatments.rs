@@ -10,7 +10,8 @@
 
 use super::colour::Fit;
 use super::flat::Flat;
-use super::intent::{Light, difference, difference_in_hue};
+use super::intent::{Light, difference, difference_in_hue, oklab};
+use super::kinds::K_OF_PICTURES;
 use super::solids::Solids;
 
 /// A flat colour is printed as a stack that differs from its mixture by at most so much in Oklab; 0.02 is barely visible. Two
@@ -20,6 +21,13 @@ const SAME: f64 = 0.05;
 const SAME_HUE: f64 = 0.02;
 /// A colour that differs from paper by at most so much is paper: nobody sees the difference, but everybody the specks.
 const BARE: f64 = 0.01;
+/// A stack stands for a colour on a ground if it differs from the ground in the colour's way, by at least this part of it, and by at least that part
+/// in lightness where most of the difference is that, as letters are read by it; and by at most so many times as much.
+const CONTRAST: f64 = 0.5;
+const READ: f64 = 2.0 / 3.0;
+const GLARING: f64 = 3.0;
+/// Where no stack does, one that differs by so much: what is lighter than its ground is never printed darker than it.
+const TRACE: f64 = 0.15;
 /// Colours of sRGB that differ by more can be told apart where they touch, in light of which the screen reflects so much by itself: the
 /// viewing flare of IEC 61966-2-1. Without it 2 of 255 is as far from black as light grey is from white.
 const APART: f64 = 0.05;
@@ -27,14 +35,18 @@ const FLARE: f64 = 0.01;
 /// A stack that differs from a colour by at most so much looks about like it: dark grey as K, dark red as M+Y; not 50 % grey as K, nor orange
 /// as M+Y.
 const NEAR: f64 = 0.1;
-/// Least weight of a stack in the mixture of a colour that the stack may stand for.
+/// Least weight of a stack in the mixture of a colour that the stack may stand for, and least part of the mixture's ink.
 const NEARLY: f64 = 1.0 / 8.0;
+/// The same where no other is seen.
+const LEAST: f64 = 1.0 / 32.0;
 /// Where a colour hardly differs from what it lies on, as in near-black on black, a stack or paper stands for it only if it is at most so many
 /// times farther from it than its nearest stack, or darker: what is drawn faintly is not printed in a brighter ink or in paper. Dark red letters on red are
 /// black.
 const AS_NEAR: f64 = 2.0;
 /// Colours that differ by less hardly do.
 const FAINT: f64 = 0.25;
+/// And by less, not at all: text in the colour of its ground.
+const HIDDEN: f64 = 0.02;
 /// What hue and chroma count against lightness where a stack stands for a colour: darker letters are still of their colour, others are not.
 const HUE: f64 = 2.5;
 /// How far in hue and chroma such a stack may be: so far, and so many times the colour's own chroma more. Letters in a grey with a little blue
@@ -56,23 +68,96 @@ pub(super) enum Treatment {
 /// What may stand for a colour that is no stack.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Shape {
-    /// The nearest stack with ink, then others of its mixture and paper, the nearest first.
+    /// The nearest stack with ink, then others of its mixture and paper, the nearest first, then those with little of the mixture.
     pub solids: [u8; CHOICES],
     /// Those that stand for it even where it hardly differs from what it lies on, a bit each: about as near as the first, or darker.
     pub mild: u8,
-    /// Whether the colour has more ink than paper.
+    /// Whether the colour has more ink than paper, and is no pale one that paper is much nearer to than any stack.
     pub dark: bool,
-    /// Whether the nearest stack looks about like the colour.
+    /// Whether the nearest stack looks about like the colour, and whether paper does.
     pub near: bool,
+    pub bare: bool,
     /// The stacks of its mixture, a bit each; those beyond the 64th are not told.
     pub mixed: u64,
     /// Among all colours: those nearer to their stack keep it first.
     pub rank: u8,
 }
 
-/// How each flat colour is printed, from the weights of the stacks in its mixture. Stacks that colours name and nothing else
-/// uses are added to the mix.
-pub(super) fn treatments(flat: &Flat, width: usize, fit: &mut Fit, solids: &Solids<'_>) -> Vec<Treatment> {
+/// How colours look, in Oklab: what stands for a colour must be seen on its ground as the colour would be.
+#[derive(Default)]
+pub(super) struct Looks<'a> {
+    /// Each flat colour as a screen shows it, and what is printed for it as an area.
+    asked: Vec<[f64; 3]>,
+    printed: Vec<[f64; 3]>,
+    /// Of each stack.
+    stacks: Vec<[f64; 3]>,
+    /// Of each dot that is a tone its colour, and both of these.
+    tone: Option<Box<Tone<'a>>>,
+}
+
+type Tone<'a> = dyn Fn(usize) -> ([u8; 3], [[f64; 3]; 2]) + Sync + 'a;
+
+impl Looks<'_> {
+    pub fn has_tones(&self) -> bool {
+        self.tone.is_some()
+    }
+
+    /// How each of these stacks would be seen on a tone beside the colour that it stands for; and the tone.
+    pub fn seen_on_tone(
+        &self,
+        own: u8,
+        at: usize,
+        stacks: [u8; CHOICES],
+    ) -> Option<([Seen; CHOICES], [u8; 3])> {
+        let (colour, ground) = self.tone.as_ref()?(at);
+        Some((stacks.map(|stack| self.seen_on(own, ground, stack)), colour))
+    }
+
+    /// How a stack that stands for a colour would be seen on a flat colour beside it.
+    pub fn seen(&self, own: u8, beside: u8, stack: u8) -> Seen {
+        let ground = usize::from(beside);
+        let ground = self.asked.get(ground).zip(self.printed.get(ground));
+        ground.map_or(Seen::AsAsked, |(&asked, &printed)| self.seen_on(own, [asked, printed], stack))
+    }
+
+    fn seen_on(&self, own: u8, [asked, printed]: [[f64; 3]; 2], stack: u8) -> Seen {
+        let Some((own, stack)) = self.asked.get(usize::from(own)).zip(self.stacks.get(usize::from(stack)))
+        else {
+            return Seen::AsAsked;
+        };
+        let way: [f64; 3] = std::array::from_fn(|i| own[i] - asked[i]);
+        let found: [f64; 3] = std::array::from_fn(|i| stack[i] - printed[i]);
+        let whole: f64 = way.iter().map(|v| v * v).sum();
+        let along = (0..3).map(|i| way[i] * found[i]).sum::<f64>() / whole;
+        let is_read = 2.0 * way[0] * way[0] < whole || found[0] / way[0] >= READ;
+        match along {
+            CONTRAST..=GLARING if is_read => Seen::AsAsked,
+            TRACE..=GLARING => Seen::Faintly,
+            _ => Seen::Otherwise,
+        }
+    }
+}
+
+/// How a stack is seen that stands for a colour.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Seen {
+    /// As the colour would be, or a little more.
+    AsAsked,
+    /// Hardly.
+    Faintly,
+    /// Not at all, the other way, or far too much.
+    Otherwise,
+}
+
+/// How each flat colour is printed, from the weights of the stacks in its mixture, and how it looks. Stacks that colours name and nothing else
+/// uses are added to the mix. `tone` tells the colour of a dot that is a tone.
+pub(super) fn treatments<'a>(
+    flat: &Flat,
+    width: usize,
+    fit: &mut Fit,
+    solids: &'a Solids<'a>,
+    tone: Option<impl Fn(usize) -> [u8; 3] + Sync + 'a>,
+) -> (Vec<Treatment>, Looks<'a>) {
     let bodies: Vec<Light> = fit.stacks.iter().map(|stack| solids.body(stack)).collect();
     let found: Vec<Found> =
         flat.colours.iter().map(|&(_, colour)| Found::of(colour, fit, &bodies, solids)).collect();
@@ -87,7 +172,22 @@ pub(super) fn treatments(flat: &Flat, width: usize, fit: &mut Fit, solids: &Soli
         }
         _ => Treatment::Solid(found[at].stack),
     };
-    (0..found.len()).map(treatment).collect()
+    let treatments: Vec<Treatment> = (0..found.len()).map(treatment).collect();
+    let stacks: Vec<[f64; 3]> = fit.stacks.iter().map(|stack| oklab(solids.body(stack))).collect();
+    let asked = flat.colours.iter().map(|&(_, colour)| oklab(shown(colour))).collect();
+    let printed = treatments.iter().zip(&flat.colours).map(|(treatment, &(_, colour))| match treatment {
+        Treatment::Solid(stack) => stacks[usize::from(*stack)],
+        Treatment::Shape(_) => oklab(solids.wanted(colour)),
+    });
+    let printed = printed.collect();
+    let tone = tone.map(|tone| {
+        let look = move |at: usize| {
+            let colour = tone(at);
+            (colour, [oklab(shown(colour)), oklab(solids.wanted(colour))])
+        };
+        Box::new(look) as Box<Tone<'a>>
+    });
+    (treatments, Looks { asked, printed, stacks, tone })
 }
 
 /// What the inks make of a flat colour.
@@ -127,19 +227,29 @@ impl Found {
         let most = |stacks: &mut dyn Iterator<Item = usize>| {
             stacks.max_by(|&a, &b| weights[a].total_cmp(&weights[b]))
         };
-        let nearest = near.iter().copied().find(is_like).or_else(|| most(&mut inked().filter(is_like)));
+        let nearest = near.iter().copied().find(is_like);
+        // In pale colours hardly any stack has an eighth; a stack without an eighth of the ink is but a correction.
+        let ink = 1.0 - weights[0];
+        let of_ink = || inked().filter(|&stack| weights[stack] >= NEARLY * ink);
+        let nearest = nearest.or_else(|| most(&mut of_ink().filter(is_like)));
         let Some(nearest) = nearest.or(near.first().copied()).or_else(|| most(&mut inked())) else {
             return Found { colour, stack: 0, off: 0.0, is_solid: true, shape: None };
         };
         // Paper stands for a colour where it is nearer than the inks that are left, or where none is.
-        let others = near.into_iter().filter(|&stack| stack != nearest).filter(is_like);
+        let others = near.iter().copied().filter(|&stack| stack != nearest).filter(is_like);
         let mut others: Vec<usize> = others.chain([0]).collect();
         others.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
-        let ranked: Vec<usize> = std::iter::once(nearest).chain(others).take(CHOICES).collect();
+        // What is seen on its ground in none of these may be seen in less of the mixture.
+        let mut less: Vec<usize> =
+            inked().filter(|&stack| (LEAST..NEARLY).contains(&weights[stack])).filter(is_like).collect();
+        less.sort_by(|&a, &b| off(a).total_cmp(&off(b)));
+        let less = less.into_iter().filter(|&stack| stack != nearest);
+        let ranked: Vec<usize> = std::iter::once(nearest).chain(others).chain(less).take(CHOICES).collect();
         let choices: [u8; CHOICES] = std::array::from_fn(|at| ranked[at.min(ranked.len() - 1)] as u8);
         let bright = |stack: usize| bodies[stack].iter().sum::<f64>();
         let is_mild = |stack: usize| off(stack) <= AS_NEAR * off(nearest) || bright(stack) < bright(nearest);
         let from_mixture = difference(bodies[nearest], mixed);
+        let is_pale = luminance(wanted) >= 0.5 && off(nearest) > off(0);
         Found {
             colour,
             stack: nearest as u8,
@@ -147,8 +257,9 @@ impl Found {
             is_solid: from_mixture <= SAME && difference_in_hue(bodies[nearest], mixed) <= SAME_HUE,
             shape: Some(Shape {
                 solids: choices,
-                dark: weights[0] < 0.5,
+                dark: weights[0] < 0.5 && !is_pale,
                 near: all(nearest) <= NEAR,
+                bare: all(0) <= NEAR,
                 mild: (0..CHOICES)
                     .filter(|&at| is_mild(choices[at].into()))
                     .fold(0, |bits, at| bits | 1 << at),
@@ -159,12 +270,19 @@ impl Found {
     }
 }
 
+/// How much light the eye sees.
+fn luminance([r, g, b]: Light) -> f64 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// The light of a colour as a screen shows it.
+fn shown(colour: [u8; 3]) -> Light {
+    colour.map(|v| (f64::from(appearance::srgb::decode(f32::from(v) / 255.0)) + FLARE) / (1.0 + FLARE))
+}
+
 /// How far two colours are apart as a screen shows them.
 pub(super) fn apart(a: [u8; 3], b: [u8; 3]) -> f64 {
-    let light = |colour: [u8; 3]| {
-        colour.map(|v| (f64::from(appearance::srgb::decode(f32::from(v) / 255.0)) + FLARE) / (1.0 + FLARE))
-    };
-    difference(light(a), light(b))
+    difference(shown(a), shown(b))
 }
 
 /// Whether colours hardly differ as a screen shows them.
@@ -172,11 +290,18 @@ pub(super) fn is_faint(a: [u8; 3], b: [u8; 3]) -> bool {
     apart(a, b) < FAINT
 }
 
+/// Whether nobody can tell two colours apart on a screen.
+pub(super) fn is_hidden(a: [u8; 3], b: [u8; 3]) -> bool {
+    apart(a, b) < HIDDEN
+}
+
 /// The colours that may not be printed as their stack, because a colour that can be told from them is printed as it beside
 /// them.
 fn parted(flat: &Flat, width: usize, found: &[Found], rank: &[u8]) -> Vec<bool> {
+    // Black in CMYK beside black in sRGB is black.
     let share = |a: usize, b: usize| {
-        found[a].stack == found[b].stack
+        found[a].colour != K_OF_PICTURES
+            && found[a].stack == found[b].stack
             && found[a].is_solid
             && found[b].is_solid
             && apart(found[a].colour, found[b].colour) > APART
@@ -235,8 +360,8 @@ mod tests {
         let inside = |at: usize| (20..27).contains(&(at % 60)) && (10..40).contains(&(at / 60));
         let index = (0..60 * 50).map(|at| if inside(at) { over } else { under }).collect();
         let flat = Flat { colours, index };
-        let treatments = treatments(&flat, 60, fit, solids);
-        let fixed = fixed(&flat, 60, &treatments);
+        let (treatments, looks) = treatments(&flat, 60, fit, solids, None::<fn(usize) -> [u8; 3]>);
+        let fixed = fixed(&flat, 60, &treatments, &looks);
         [fixed[25 * 60 + 5], fixed[25 * 60 + 23]]
     }
 

@@ -9,6 +9,8 @@
 //! Limits: a page as Ghostscript tags it knows letters but no words, so near lines of one size are decided together, too, and
 //! letters that are spaced more widely than words are decided by themselves.
 
+use std::ops::Range;
+
 use super::flat::Flat;
 use super::shapes::{Run, joined};
 use crate::forest::Forest;
@@ -17,21 +19,21 @@ use crate::forest::Forest;
 pub(super) struct Words {
     /// For each run, the number of the letter it is the root of, or [`NO_LETTER`]. Empty if there is none.
     letter: Vec<u32>,
-    /// For each letter, whether it is thin.
-    thin: Vec<bool>,
+    /// For each letter, whether it is thin, and how many letters its word has.
+    thin: Vec<(bool, usize)>,
 }
 
 const NO_LETTER: u32 = u32::MAX;
 
 impl Words {
-    /// The words of letters with strokes near the `limit`.
+    /// The words of letters with strokes from so many dots to so many; of `limit` dots or more they are wide.
     pub(super) fn of(
         flat: &Flat,
         (runs, rows): (&[Run], &[usize]),
-        limit: u8,
+        (sides, limit): (Range<u8>, u8),
         is_letter: impl Fn(u32) -> bool,
     ) -> Words {
-        let is_near = |root: u32| is_letter(root) && takes_part(runs[root as usize].side, limit);
+        let is_near = |root: u32| is_letter(root) && sides.contains(&runs[root as usize].side);
         let (mut letter, mut letters) = (Vec::new(), Vec::<Letter>::new());
         for (y, row) in rows.windows(2).enumerate() {
             for run in &runs[row[0]..row[1]] {
@@ -61,6 +63,15 @@ impl Words {
 
     /// Whether the word of the shape with this root is thin; `None` for a shape that is decided by itself.
     pub(super) fn thin(&self, root: u32) -> Option<bool> {
+        self.word(root).map(|(thin, _)| thin)
+    }
+
+    /// The same for words of at least so many letters.
+    pub(super) fn thin_in_a_word_of(&self, least: usize, root: u32) -> Option<bool> {
+        self.word(root).filter(|&(_, letters)| letters >= least).map(|(thin, _)| thin)
+    }
+
+    fn word(&self, root: u32) -> Option<(bool, usize)> {
         self.letter.get(root as usize).and_then(|&number| self.thin.get(number as usize)).copied()
     }
 }
@@ -84,13 +95,13 @@ const RANGE: u8 = 2;
 /// The space between two words is at most so many strokes of a letter: 4.2 in regular Helvetica, 3 in Times, 2 in bold text.
 const SPACE: u32 = 5;
 
-/// Whether a letter with such strokes is decided together with others.
-fn takes_part(side: u8, limit: u8) -> bool {
-    (limit / RANGE..limit.saturating_mul(RANGE)).contains(&side)
+/// The strokes of letters that are decided together with others.
+pub(super) const fn near(limit: u8) -> Range<u8> {
+    limit / RANGE..limit.saturating_mul(RANGE)
 }
 
-/// For each letter, whether it is printed as a thin one, under `limit` dots wide. `joined` says whether two colours may be one.
-fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<bool> {
+/// For each letter, whether it is printed as a thin one, under `limit` dots wide, and how many letters its word has. `joined` says whether two colours may be one.
+fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<(bool, usize)> {
     let mut order: Vec<usize> = (0..letters.len()).collect();
     order.sort_by_key(|&at| letters[at].bounds[0]);
     let mut words = Forest::new(letters.len());
@@ -106,12 +117,15 @@ fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<b
         }
         open.push(at);
     }
-    let mut thin_dots = vec![0i64; letters.len()];
+    let mut thin_dots = vec![(0i64, 0); letters.len()];
     let roots = words.roots();
     for (letter, &root) in letters.iter().zip(&roots) {
-        thin_dots[root as usize] += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
+        let (dots, letters) = &mut thin_dots[root as usize];
+        *dots += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
+        *letters += 1;
     }
-    roots.into_iter().map(|root| thin_dots[root as usize] > 0).collect()
+    let decided = roots.into_iter().map(|root| thin_dots[root as usize]);
+    decided.map(|(dots, letters)| (dots > 0, letters)).collect()
 }
 
 /// Whether two letters are near each other, and their strokes alike: within a half.
@@ -134,7 +148,7 @@ mod tests {
     }
 
     fn decided(letters: &[Letter]) -> Vec<bool> {
-        thin(letters, LIMIT, |a, b| a == b)
+        thin(letters, LIMIT, |a, b| a == b).into_iter().map(|(thin, _)| thin).collect()
     }
 
     #[test]
@@ -169,11 +183,6 @@ mod tests {
         let mut initial = letter(0, 0, 40);
         initial.dots = 60_000;
         assert_eq!(decided(&[initial, letter(110, 0, 20)]), [false, true]);
-        assert!(
-            takes_part(12, LIMIT)
-                && takes_part(47, LIMIT)
-                && !takes_part(11, LIMIT)
-                && !takes_part(48, LIMIT)
-        );
+        assert_eq!(near(LIMIT), 12..48);
     }
 }

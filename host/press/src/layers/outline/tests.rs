@@ -8,6 +8,7 @@ const DARK: Treatment = Treatment::Shape(Shape {
     mild: u8::MAX,
     dark: true,
     near: true,
+    bare: true,
     mixed: 1 << 7,
     rank: 9,
 });
@@ -16,6 +17,7 @@ const LIGHT: Treatment = Treatment::Shape(Shape {
     mild: u8::MAX,
     dark: false,
     near: true,
+    bare: true,
     mixed: 1 << 7,
     rank: 9,
 });
@@ -29,7 +31,12 @@ fn drawn(
 ) -> Vec<u8> {
     let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (kind, [128; 3])];
     let index = (0..width * length).map(|at| 2 * u8::from(is(at % width, at / width))).collect();
-    fixed(&Flat { colours, index }, width, &[Treatment::Solid(0), Treatment::Solid(1), treatment])
+    fixed(
+        &Flat { colours, index },
+        width,
+        &[Treatment::Solid(0), Treatment::Solid(1), treatment],
+        &Looks::default(),
+    )
 }
 
 /// White letters in a dark bar would have rims of ink, and beside paper they would vanish without.
@@ -57,7 +64,8 @@ fn a_pale_stroke_on_ink_is_paper_and_beside_paper_keeps_its_rim() {
             index.collect()
         };
         let flat = Flat { colours: colours.clone(), index };
-        let fixed = fixed(&flat, 60, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, DARK]);
+        let fixed =
+            fixed(&flat, 60, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, DARK], &Looks::default());
         let (middle, rim) = (fixed[20 * 60 + 23], fixed[20 * 60 + 20]);
         assert_eq!((middle, rim), fill.map_or((TONE, 7), |stack| (stack, stack)), "{bar:?}");
     }
@@ -74,7 +82,12 @@ fn pale_text_on_a_shading_with_more_ink_than_paper_is_paper() {
         let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (kind, [235; 3])];
         let is_stroke = |at: usize| (20..27).contains(&(at % 60)) && (4..40).contains(&(at / 60));
         let index = (0..60 * 50).map(|at| if is_stroke(at) { 2 } else { ground }).collect();
-        let fixed = fixed(&Flat { colours, index }, 60, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT]);
+        let fixed = fixed(
+            &Flat { colours, index },
+            60,
+            &[Treatment::Solid(0), Treatment::Solid(1), LIGHT],
+            &Looks::default(),
+        );
         assert_eq!([fixed[20 * 60 + 20], fixed[20 * 60 + 23]], printed, "{kind:?} on {ground}");
         assert_eq!(fixed[20 * 60 + 10], TONE);
     }
@@ -99,7 +112,7 @@ fn a_step_of_a_shading_is_screened_and_a_line_between_areas_is_not() {
             })
             .collect();
         let treatments = [Treatment::Solid(0), Treatment::Solid(1), DARK, LIGHT];
-        let fixed = fixed(&Flat { colours, index }, 300, &treatments);
+        let fixed = fixed(&Flat { colours, index }, 300, &treatments, &Looks::default());
         let middle = fixed[53 * 300 + 150];
         assert_eq!(middle, if step { TONE } else { 7 }, "{inner:?}");
     }
@@ -159,6 +172,7 @@ fn a_small_drawing_unlike_its_solid_is_screened_within_its_rim() {
         mild: u8::MAX,
         dark: true,
         near: false,
+        bare: true,
         mixed: 1 << 7,
         rank: 9,
     });
@@ -190,11 +204,13 @@ fn a_wide_shape_has_its_rim_beside_paper_and_what_would_fray_its_edge() {
             mild: u8::MAX,
             dark: true,
             near: true,
+            bare: true,
             mixed: 1 << 3,
             rank: 9,
         });
         let flat = Flat { colours, index };
-        let fixed = fixed(&flat, 300, &[Treatment::Solid(0), Treatment::Solid(1), own, beside]);
+        let fixed =
+            fixed(&flat, 300, &[Treatment::Solid(0), Treatment::Solid(1), own, beside], &Looks::default());
         let row = &fixed[100 * 300..101 * 300];
         assert_eq!([row[148], row[149]], [TONE, if rim { 7 } else { TONE }], "{beside:?}");
     }
@@ -219,8 +235,12 @@ fn a_piece_of_a_fill_is_printed_like_the_fill() {
                 _ => 0,
             });
             let flat = Flat { colours: colours.clone(), index: index.collect() };
-            let fixed =
-                fixed(&flat, 80, &[Treatment::Solid(0), Treatment::Solid(1), treatment, Treatment::Solid(5)]);
+            let fixed = fixed(
+                &flat,
+                80,
+                &[Treatment::Solid(0), Treatment::Solid(1), treatment, Treatment::Solid(5)],
+                &Looks::default(),
+            );
             let rim_alone = treatment == LIGHT || piece == TONE;
             assert_eq!(fixed[30 * 80 + 67], if rim_alone { TONE } else { piece }, "{gap}, {treatment:?}");
             assert_eq!(fixed[30 * 80 + 64], piece, "{gap}, {treatment:?}");
@@ -245,7 +265,8 @@ fn a_pale_line_between_colours_is_decided_by_both_sides_of_it() {
             _ => right,
         });
         let flat = Flat { colours: colours.clone(), index: index.collect() };
-        fixed(&flat, 100, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, LIGHT])[4040..4040 + wide]
+        fixed(&flat, 100, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, LIGHT], &Looks::default())
+            [4040..4040 + wide]
             .to_vec()
     };
     // Between ink it is paper; between ink and paper its edge to the paper is drawn; between paper and a tint it is a line.
@@ -308,7 +329,8 @@ fn a_pale_letter_keeps_its_rim_and_a_pale_hairline_its_edge() {
         ];
         let index = (0..20 * long).map(|at| if (5..7).contains(&(at % 20)) { 2 } else { ground }).collect();
         let flat = Flat { colours, index };
-        let fixed = fixed(&flat, 20, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, LIGHT]);
+        let fixed =
+            fixed(&flat, 20, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, LIGHT], &Looks::default());
         assert_eq!(fixed[24..28], [beside, TONE, TONE, beside], "{ground}");
     }
     // A soft edge lies beside ink.
@@ -320,7 +342,12 @@ fn a_pale_letter_keeps_its_rim_and_a_pale_hairline_its_edge() {
     ];
     let index = (0..40 * long).map(|at| [3, 3, 2, 2, 0].get(at % 40 / 2).copied().unwrap_or(0)).collect();
     let flat = Flat { colours, index };
-    let fixed = fixed(&flat, 40, &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, Treatment::Solid(5)]);
+    let fixed = fixed(
+        &flat,
+        40,
+        &[Treatment::Solid(0), Treatment::Solid(1), LIGHT, Treatment::Solid(5)],
+        &Looks::default(),
+    );
     assert_eq!(fixed[400..409], [5, 5, 5, 5, TONE, TONE, TONE, TONE, 0]);
 }
 
@@ -371,7 +398,12 @@ fn on_a_ground(letter: Treatment, wide: usize, ground: Treatment, share: f64) ->
             _ => 0,
         })
         .collect();
-    fixed(&Flat { colours, index }, 60, &[Treatment::Solid(0), Treatment::Solid(1), letter, ground])
+    fixed(
+        &Flat { colours, index },
+        60,
+        &[Treatment::Solid(0), Treatment::Solid(1), letter, ground],
+        &Looks::default(),
+    )
 }
 
 #[test]
@@ -400,6 +432,7 @@ fn what_lies_on_its_own_solid_is_printed_in_the_next() {
             mild: u8::MAX,
             dark: true,
             near: true,
+            bare: true,
             mixed: 1 << 7,
             rank,
         })
@@ -416,7 +449,7 @@ fn the_bands_of_a_shading_are_one_wide_shape() {
     let index = (0..60 * 40).map(|at| 2 + (at % 60 / 3) as u8).collect();
     let mut treatments = vec![Treatment::Solid(0), Treatment::Solid(1)];
     treatments.extend([DARK; 20]);
-    let fixed = fixed(&Flat { colours, index }, 60, &treatments);
+    let fixed = fixed(&Flat { colours, index }, 60, &treatments, &Looks::default());
     for (at, &stack) in fixed.iter().enumerate() {
         let rim = at % 60 == 0 || at % 60 == 59 || at / 60 == 0 || at / 60 == 39;
         assert_eq!(stack, if rim { 7 } else { TONE });
