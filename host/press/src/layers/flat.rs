@@ -336,13 +336,14 @@ mod tests {
 
     #[test]
     fn a_shading_does_not_crowd_out_the_colours_of_text() {
+        // A rainbow has more colours than are judged.
         let mut pixels: Vec<[u8; 4]> =
-            (0..2000).map(|at| [4, (at / 8) as u8, (at % 8) as u8 * 3, 77]).collect();
+            (0..6000).map(|at| [4, (at / 64) as u8, (at % 64) as u8 * 3, 77]).collect();
         pixels.extend([[1, 200, 10, 10]; 3]);
         pixels.extend([[4, 10, 200, 10]; 3]);
         let flat = Flat::of(&pixels, pixels.len());
         assert_eq!(flat.colours[2..], [(Kind::Text, [200, 10, 10]), (Kind::Drawing, [10, 200, 10])]);
-        assert_eq!(flat.index.iter().filter(|&&dot| is_tone(dot)).count(), 2000);
+        assert_eq!(flat.index.iter().filter(|&&dot| is_tone(dot)).count(), 6000);
     }
 
     /// The border of a table, in a grey through which a shadow passes elsewhere.

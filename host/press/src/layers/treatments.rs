@@ -375,6 +375,7 @@ mod tests {
         let mut fit = fit(&printable, &solids, &space);
         let light = |rgb: [u8; 3]| rgb.map(|v| f64::from(appearance::srgb::decode(f32::from(v) / 255.0)));
         let (mut same, mut solid) = (Vec::new(), 0);
+        let mut turned = Vec::new();
         for &ground in &colours {
             for &bar in colours.iter().filter(|&&bar| difference(light(bar), light(ground)) > 0.1) {
                 for kind in [Kind::Text, Kind::Drawing] {
@@ -383,6 +384,18 @@ mod tests {
                         solid += 1;
                         if under == over {
                             same.push((ground, bar));
+                        }
+                        // What is plainly lighter than its ground is not printed darker, nor the other way round.
+                        let body = |stack: u8| solids.body(&fit.stacks[usize::from(stack)]);
+                        let seen = if under == TONE { solids.wanted(ground) } else { body(under) };
+                        let asked = oklab(light(bar))[0] - oklab(light(ground))[0];
+                        let found = oklab(body(over))[0] - oklab(seen)[0];
+                        // The six primaries are their inks, however dark, and cyan with magenta is a little darker than black.
+                        let is_named = solids.named(bar).is_some();
+                        let is_lightness =
+                            asked.abs() > 0.2 && asked.abs() > 0.75 * difference(light(bar), light(ground));
+                        if !is_named && is_lightness && asked.signum() * found < -0.02 {
+                            turned.push((ground, bar));
                         }
                     }
                 }
@@ -395,6 +408,45 @@ mod tests {
             &same[..4.min(same.len())]
         );
         assert!(solid > 3000, "{solid}");
+        assert!(
+            turned.is_empty(),
+            "{} of {solid} are turned, such as {:?}",
+            turned.len(),
+            &turned[..4.min(turned.len())]
+        );
+    }
+
+    /// Peach, sand, pink, lilac and mint letters were black, and cream ones had black outlines.
+    #[test]
+    fn pale_letters_on_paper_are_neither_black_nor_solid() {
+        let (printable, space) = process_inks();
+        let solids = Solids::new(&printable, &space);
+        let mut fit = fit(&printable, &solids, &space);
+        for pale in [[255, 242, 204], [255, 217, 178], [237, 190, 213], [225, 190, 237], [173, 217, 195]] {
+            let (nearest, ..) = alone(pale, &mut fit, &solids);
+            assert_ne!(nearest, "K", "{pale:?}");
+            let [under, middle] = printed(&mut fit, &solids, Kind::Text, [[255; 3], pale]);
+            assert_eq!((under, middle), (0, TONE), "{pale:?}");
+        }
+        // Pale, but an ink is much nearer than paper.
+        let [_, over] = printed(&mut fit, &solids, Kind::Text, [[255; 3], [255, 240, 120]]);
+        assert_eq!(fit.stacks[usize::from(over)].to_string(), "Y");
+    }
+
+    /// Text in the colour of its ground was a solid in it.
+    #[test]
+    fn what_nobody_can_tell_from_its_ground_is_screened_with_it() {
+        let (printable, space) = process_inks();
+        let solids = Solids::new(&printable, &space);
+        let mut fit = fit(&printable, &solids, &space);
+        for (ground, text) in [
+            ([245, 158, 11], [245, 160, 14]),
+            ([34, 150, 94], [33, 151, 95]),
+            ([90, 122, 153], [90, 122, 153]),
+        ] {
+            let [_, over] = printed(&mut fit, &solids, Kind::Text, [ground, text]);
+            assert_eq!(over, TONE, "{text:?} on {ground:?}");
+        }
     }
 
     /// Near-black in black was a white letter.
