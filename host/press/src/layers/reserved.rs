@@ -7,7 +7,7 @@
 //! and any pixel outside a square of four pixels of the same ink, may be an edge. It is the edge of two colours (an ink and
 //! white, or two inks) if both occur near it and its own colour lies on the straight line between them, or slightly beyond
 //! the ends, as sharpening leaves it; it then takes the nearer one. A lone pixel near the colour of a metal is
-//! accidental. All other pixels are colour for the process inks.
+//! accidental, and what is exactly in an ink's colour beside its like is a thin line of it. All other pixels are colour for the process inks.
 //! Cost: 2 ns a pixel, and 10 ns more for possible edges. Limits: edges softer than two pixels remain partly colour.
 //! Source of the colours: the vendor's user's guide, English and Japanese editions.
 
@@ -46,6 +46,9 @@ const TABLE: [Reserved; 6] = [
     reserved(Ink::MetallicCyan, [0, 176, 201], 12),
     reserved(Ink::Black, [0, 0, 0], 8),
 ];
+
+/// An ink that the picture has elsewhere is on at least so many pixels.
+const LEAST: u64 = 64;
 
 /// The largest difference that a file's depth and profile make to a pixel drawn in a reserved colour.
 const EXACT: u8 = 2;
@@ -121,9 +124,18 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
 /// The class of every pixel, and the pixels whose class was that of an edge or accidental, with their new class.
 fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, Vec<(usize, u8)>) {
     let mut classes = Classes { of: by_colour(pixels, table), width };
+    // No softened edge has exactly the colour of an ink pixel after pixel, unless that is grey: a thin line has.
+    let is_exact = |class: u8, at: usize| {
+        let entry = usize::from(class).checked_sub(1).and_then(|at| table.get(at));
+        let is_grey = |[r, g, b]: [u8; 3]| r == g && g == b && r > 0;
+        entry.is_some_and(|entry| entry.colour == pixels[at] && !is_grey(entry.colour))
+    };
     let loose = classes.changes(
         |class| class != PAPER && class != OTHER,
-        |class, at| (!classes.in_a_square(at)).then_some(class | LOOSE),
+        |class, at| {
+            let is_line = || is_exact(class, at) && !classes.is_alone(at);
+            (!classes.in_a_square(at) && !is_line()).then_some(class | LOOSE)
+        },
     );
     classes.apply(&loose);
     let mut colours = vec![[255; 3]];
@@ -144,7 +156,26 @@ fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, V
         },
     );
     classes.apply(&edges);
-    (classes, edges)
+    let thin = thin_lines(pixels, &classes, &colours);
+    classes.apply(&thin);
+    (classes, [edges, thin].concat())
+}
+
+/// Lines so thin that no pixel has their colour: what is nowhere three pixels wide and lies between a colour near it and that of an ink which the
+/// picture has elsewhere.
+fn thin_lines(pixels: &[[u8; 3]], classes: &Classes, colours: &[[u8; 3]]) -> Vec<(usize, u8)> {
+    let mut counts = [0u64; 256];
+    classes.of.iter().for_each(|&class| counts[usize::from(class & !LOOSE)] += 1);
+    let inks: Vec<usize> = (1..colours.len()).filter(|&class| counts[class] >= LEAST).collect();
+    classes.changes(
+        |class| class == OTHER,
+        |_, at| {
+            let near = classes.around(at);
+            let far = inks.iter().filter(|&ink| near & 1 << ink == 0);
+            let found = || far.clone().find_map(|ink| edge(pixels[at], near | 1 << ink, colours));
+            (near != 0 && !classes.in_three(at)).then(found).flatten()
+        },
+    )
 }
 
 /// The class of every pixel by its own colour: paper, an entry of the table from 1, or [`OTHER`].
@@ -308,6 +339,39 @@ mod tests {
         let mut rgb = picture(&|x, y| y == 9 && x > 3);
         let found = take(&mut rgb, (20, 20), (20, 20), &Options::default());
         assert_eq!((found.layers[0].ink, plane(&found.layers[0])), (Ink::MetallicSilver, 16));
+    }
+
+    /// A line of which one pixel is covered wholly and those beside it in part, on black and on paper; no pixel of it lies in a square.
+    #[test]
+    fn a_thin_line_is_of_its_ink_with_its_softened_edges() {
+        let gold = [225, 160, 0];
+        for ground in [[0u8; 3], [255; 3]] {
+            for shares in
+                [[0.25, 1.0, 0.75], [0.0, 1.0, 0.5], [0.4, 1.0, 0.6], [0.0, 0.75, 0.6], [0.0, 0.8, 0.2]]
+            {
+                let pixel = |at: usize| -> [u8; 3] {
+                    // And a square of it elsewhere.
+                    if at % 40 < 9 && at / 40 < 9 {
+                        return gold;
+                    }
+                    let share = (at % 40).checked_sub(19).and_then(|x| shares.get(x)).copied().unwrap_or(0.0);
+                    std::array::from_fn(|c| {
+                        (share * f64::from(gold[c]) + (1.0 - share) * f64::from(ground[c])).round() as u8
+                    })
+                };
+                let mut rgb: Vec<u8> = (0..40 * 40).flat_map(pixel).collect();
+                let found =
+                    take(&mut rgb, (40, 40), (40, 40), &Options { reserved: true, ..Options::default() });
+                let of_gold = found.layers.iter().find(|layer| layer.ink == Ink::MetallicGold).map(plane);
+                let wide = shares.iter().filter(|&&share| share > 0.5).count() as u64;
+                let half = shares.iter().filter(|&&share| share == 0.5).count() as u64;
+                assert!(
+                    of_gold.is_some_and(|dots| (81 + 40 * wide..=81 + 40 * (wide + half)).contains(&dots)),
+                    "{of_gold:?} for {shares:?} on {ground:?}"
+                );
+                assert!(rgb.iter().all(|&v| v == 255), "{shares:?} on {ground:?}: process colours are left");
+            }
+        }
     }
 
     #[test]

@@ -78,6 +78,18 @@ impl Classes {
         beside.into_iter().any(|u| same(u, y) && beyond.into_iter().any(|v| same(x, v) && same(u, v)))
     }
 
+    /// Whether a pixel belongs to a square of nine pixels of its class.
+    pub fn in_three(&self, at: usize) -> bool {
+        let (x, y) = (at % self.width, at / self.width);
+        let is_whole = |left: usize, top: usize| {
+            (0..9).all(|place| {
+                let (u, v) = (left.wrapping_add(place % 3), top.wrapping_add(place / 3));
+                self.at(u, v) == Some(self.of[at])
+            })
+        };
+        (0..9).any(|place| is_whole(x.wrapping_sub(place % 3), y.wrapping_sub(place / 3)))
+    }
+
     /// Whether all four pixels beside a pixel are of other classes.
     pub fn is_alone(&self, at: usize) -> bool {
         let (x, y) = (at % self.width, at / self.width);
