@@ -103,14 +103,13 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
     let is_pale = |colour: u8| matches!(of(colour), Some(Treatment::Shape(shape)) if !shape.dark);
     let takes_part = |run: &Run| is_pale(run.colour) && is_thin(run.root);
     let lies = lies(flat, width, treatments, (runs, rows), takes_part);
-    let solid = |root: u32, shape: &Shape| {
+    let solid = |root: u32, shape: &Shape, thin: bool| {
         if lies.get(&root) == Some(&Lies::OnInk) {
             // A pale disc as small as a letter is no letter.
             let run = &runs[root as usize];
             let stands = shape.bare || run.side < STROKE || is_text(flat, run) || is_of_word(root);
             return stands.then_some(PAPER);
         }
-        let thin = is_thin(root);
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape, thin))
     };
     let pale = PaleLines { flat, width, treatments };
@@ -122,7 +121,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
             };
             let (thin, first, is_small) = (is_thin(root), shape.solids[0], small[root as usize]);
             let (start, end) = (run.start as usize, run.end as usize);
-            match solid(root, &shape) {
+            match solid(root, &shape, thin) {
                 Some(solid) if thin && (shape.dark || solid != first) => fixed[start..end].fill(solid),
                 Some(solid) if solid > PAPER && (shape.dark || thin) => {
                     let side = runs[root as usize].side;
@@ -157,7 +156,9 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
     for line in lines(&shapes, width, STROKE, is_wide) {
         let run = &runs[line.run as usize];
         let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
-        if let Some(solid) = solid(run.root, &shape).filter(|&solid| shape.dark || solid != shape.solids[0]) {
+        if let Some(solid) =
+            solid(run.root, &shape, true).filter(|&solid| shape.dark || solid != shape.solids[0])
+        {
             let row = line.row as usize * width;
             fixed[row + line.start as usize..row + line.end as usize].fill(solid);
         }

@@ -21,11 +21,12 @@ const SAME: f64 = 0.05;
 const SAME_HUE: f64 = 0.02;
 /// A colour that differs from paper by at most so much is paper: nobody sees the difference, but everybody the specks.
 const BARE: f64 = 0.01;
-/// A stack stands for a colour on a ground if it differs from the ground in the colour's way, by at least this part of it, and by at least that part
-/// in lightness where most of the difference is that, as letters are read by it; and by at most so many times as much.
+/// A stack stands for a colour on a ground if it differs from the ground in the colour's way, by at least this part of it, and by at most so many
+/// times as much. On a ground that has cells of the same stack letters are read by lightness: where most of the difference is that, it is at least
+/// that part of it.
 const CONTRAST: f64 = 0.5;
-const READ: f64 = 2.0 / 3.0;
 const GLARING: f64 = 3.0;
+const READ: f64 = 2.0 / 3.0;
 /// Where no stack does, one that differs by so much: what is lighter than its ground is never printed darker than it.
 const TRACE: f64 = 0.15;
 /// Colours of sRGB that differ by more can be told apart where they touch, in light of which the screen reflects so much by itself: the
@@ -43,6 +44,8 @@ const LEAST: f64 = 1.0 / 32.0;
 /// times farther from it than its nearest stack, or darker: what is drawn faintly is not printed in a brighter ink or in paper. Dark red letters on red are
 /// black.
 const AS_NEAR: f64 = 2.0;
+/// A light colour is pale if its nearest stack is more than so many times farther from it than paper.
+const PALE: f64 = 4.0 / 3.0;
 /// Colours that differ by less hardly do.
 const FAINT: f64 = 0.25;
 /// And by less, not at all: text in the colour of its ground.
@@ -72,7 +75,7 @@ pub(super) struct Shape {
     pub solids: [u8; CHOICES],
     /// Those that stand for it even where it hardly differs from what it lies on, a bit each: about as near as the first, or darker.
     pub mild: u8,
-    /// Whether the colour has more ink than paper, and is no pale one that paper is much nearer to than any stack.
+    /// Whether the colour has more ink than paper, and is no pale one that paper is nearer to than any stack.
     pub dark: bool,
     /// Whether the nearest stack looks about like the colour, and whether paper does.
     pub near: bool,
@@ -89,6 +92,8 @@ pub(super) struct Looks<'a> {
     /// Each flat colour as a screen shows it, and what is printed for it as an area.
     asked: Vec<[f64; 3]>,
     printed: Vec<[f64; 3]>,
+    /// The stacks of whose cells most of that is made, if it is screened.
+    cells: Vec<Option<[u8; CHOICES]>>,
     /// Of each stack.
     stacks: Vec<[f64; 3]>,
     /// Of each dot that is a tone its colour, and both of these.
@@ -110,17 +115,18 @@ impl Looks<'_> {
         stacks: [u8; CHOICES],
     ) -> Option<([Seen; CHOICES], [u8; 3])> {
         let (colour, ground) = self.tone.as_ref()?(at);
-        Some((stacks.map(|stack| self.seen_on(own, ground, stack)), colour))
+        Some((stacks.map(|stack| self.seen_on(own, ground, stack, false)), colour))
     }
 
     /// How a stack that stands for a colour would be seen on a flat colour beside it.
     pub fn seen(&self, own: u8, beside: u8, stack: u8) -> Seen {
         let ground = usize::from(beside);
+        let is_cell = matches!(self.cells.get(ground), Some(Some(cells)) if cells.contains(&stack));
         let ground = self.asked.get(ground).zip(self.printed.get(ground));
-        ground.map_or(Seen::AsAsked, |(&asked, &printed)| self.seen_on(own, [asked, printed], stack))
+        ground.map_or(Seen::AsAsked, |(&asked, &printed)| self.seen_on(own, [asked, printed], stack, is_cell))
     }
 
-    fn seen_on(&self, own: u8, [asked, printed]: [[f64; 3]; 2], stack: u8) -> Seen {
+    fn seen_on(&self, own: u8, [asked, printed]: [[f64; 3]; 2], stack: u8, is_cell: bool) -> Seen {
         let Some((own, stack)) = self.asked.get(usize::from(own)).zip(self.stacks.get(usize::from(stack)))
         else {
             return Seen::AsAsked;
@@ -129,7 +135,7 @@ impl Looks<'_> {
         let found: [f64; 3] = std::array::from_fn(|i| stack[i] - printed[i]);
         let whole: f64 = way.iter().map(|v| v * v).sum();
         let along = (0..3).map(|i| way[i] * found[i]).sum::<f64>() / whole;
-        let is_read = 2.0 * way[0] * way[0] < whole || found[0] / way[0] >= READ;
+        let is_read = !is_cell || 2.0 * way[0] * way[0] < whole || found[0] / way[0] >= READ;
         match along {
             CONTRAST..=GLARING if is_read => Seen::AsAsked,
             TRACE..=GLARING => Seen::Faintly,
@@ -187,7 +193,12 @@ pub(super) fn treatments<'a>(
         };
         Box::new(look) as Box<Tone<'a>>
     });
-    (treatments, Looks { asked, printed, stacks, tone })
+    let cells = treatments.iter().map(|treatment| match treatment {
+        Treatment::Shape(shape) => Some(shape.solids),
+        Treatment::Solid(_) => None,
+    });
+    let cells = cells.collect();
+    (treatments, Looks { asked, printed, cells, stacks, tone })
 }
 
 /// What the inks make of a flat colour.
@@ -249,7 +260,7 @@ impl Found {
         let bright = |stack: usize| bodies[stack].iter().sum::<f64>();
         let is_mild = |stack: usize| off(stack) <= AS_NEAR * off(nearest) || bright(stack) < bright(nearest);
         let from_mixture = difference(bodies[nearest], mixed);
-        let is_pale = luminance(wanted) >= 0.5 && off(nearest) > off(0);
+        let is_pale = luminance(wanted) >= 0.5 && off(nearest) > PALE * off(0);
         Found {
             colour,
             stack: nearest as u8,
