@@ -10,9 +10,9 @@ use testing::program::{Bench, text};
 
 /// What stands in a document with a gradient by a function of two variables, as browsers write it: without a matrix.
 const GRADIENT: &str = "/Pattern << /P5 << /Type /Pattern /PatternType 2 /Shading << /ShadingType 1 /ColorSpace /DeviceRGB \
-    /Domain [0 144 0 144] /Function 5 0 R >> >> >>";
+    /Domain [0 288 0 432] /Function 5 0 R >> >> >>";
 
-/// One page of 2 x 2 inches with these resources and content; object 5 is a function that is yellow everywhere.
+/// One page of 4 x 6 inches with these resources and content; object 5 is a function that is yellow everywhere.
 fn document(resources: &str, content: &str) -> Vec<u8> {
     let stream =
         |start: &str, text: &str| format!("<< {start} /Length {} >> stream\n{text}\nendstream", text.len());
@@ -20,10 +20,10 @@ fn document(resources: &str, content: &str) -> Vec<u8> {
         "<< /Type /Catalog /Pages 2 0 R >>".to_owned(),
         "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".into(),
         format!(
-            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 144 144] /Contents 4 0 R /Resources << {resources} >> >>"
+            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 288 432] /Contents 4 0 R /Resources << {resources} >> >>"
         ),
         stream("", content),
-        stream("/FunctionType 4 /Domain [0 144 0 144] /Range [0 1 0 1 0 1]", "{ pop pop 1 1 0 }"),
+        stream("/FunctionType 4 /Domain [0 288 0 432] /Range [0 1 0 1 0 1]", "{ pop pop 1 1 0 }"),
     ];
     let mut file = "%PDF-1.4\n".to_owned();
     let mut table = "xref\n0 6\n0000000000 65535 f \n".to_owned();
@@ -60,7 +60,7 @@ fn both(document: &[u8], path: Option<&str>) -> [(Vec<(String, u64)>, String); 2
         assert!(output.status.success(), "{}", text(&output.stderr));
         output
     };
-    let layers: Output = run("layers page.pdf --paper postcard -o page.print");
+    let layers: Output = run("layers page.pdf --paper a4 -o page.print");
     let job = fs::read(bench.path("page.print/job.rgl")).unwrap();
     let file = bench.path("page.pdf").display().to_string();
     let queued = run(&format!("cups-filter 1 me title 1 FoilpressPosition=Centre {file}"));
@@ -73,7 +73,7 @@ fn has(passes: &[(String, u64)], ink: &str, points: f64) -> bool {
     passes.iter().any(|(found, dots)| found == ink && (*dots as f64 / wanted - 1.0).abs() < 0.1)
 }
 
-const CONTENT: &str = "0 0 0 rg 12 12 36 36 re f /Pattern cs /P5 scn 60 60 72 72 re f";
+const CONTENT: &str = "0 0 0 rg 102 102 36 36 re f /Pattern cs /P5 scn 150 150 72 72 re f";
 
 #[test]
 fn a_gradient_that_browsers_write_is_drawn_or_its_loss_is_told() {
@@ -85,7 +85,7 @@ fn a_gradient_that_browsers_write_is_drawn_or_its_loss_is_told() {
         assert_eq!(has(&passes, "yellow", 72.0), !said.contains("part of the document is missing"), "{said}");
     }
     // An ordinary page has no note.
-    for (passes, said) in both(&document("", "1 1 0 rg 60 60 72 72 re f BT q ET Q"), None) {
+    for (passes, said) in both(&document("", "1 1 0 rg 150 150 72 72 re f BT q ET Q"), None) {
         assert!(has(&passes, "yellow", 72.0), "{passes:?}");
         assert!(!said.contains("Ghostscript") && !said.contains("missing"), "{said}");
     }
@@ -117,7 +117,7 @@ fn parts_that_a_document_names_but_does_not_have_are_told() {
     if !ghostscript() {
         return;
     }
-    for (passes, said) in both(&document("", "0 0 0 rg 12 12 36 36 re f /Im9 Do"), None) {
+    for (passes, said) in both(&document("", "0 0 0 rg 102 102 36 36 re f /Im9 Do"), None) {
         assert!(has(&passes, "black", 36.0), "{passes:?}");
         assert!(said.contains("the document is damaged (Ghostscript says `"), "{said}");
     }
