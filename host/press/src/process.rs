@@ -28,8 +28,14 @@ pub const MOST_PAGES: u32 = 1000;
 /// Environment variable with another limit in seconds, for slow computers.
 pub const LIMIT_VARIABLE: &str = "FOILPRESS_TIME_LIMIT";
 
-/// The most bytes of complaints that are kept.
+/// The most bytes of complaints that are kept from their beginning.
 const MOST_WORDS: u64 = 1 << 16;
+
+/// The most bytes of complaints that are kept from their end, where Ghostscript sums them up.
+const LAST_WORDS: usize = 1 << 14;
+
+/// How lines begin that only tell how far Ghostscript is.
+const PROGRESS: [&str; 3] = ["Processing pages ", "Page ", "Loading "];
 
 /// How often a program is asked whether it has ended.
 const POLL: Duration = Duration::from_millis(5);
@@ -160,7 +166,11 @@ impl Process {
                 let mut text = Vec::new();
                 // What cannot be read is not shown.
                 let _ = (&mut pipe).take(MOST_WORDS).read_to_end(&mut text);
-                let _ = io::copy(&mut pipe, &mut io::sink());
+                let first = text.len();
+                while let Ok(1..) = (&mut pipe).take(LAST_WORDS as u64).read_to_end(&mut text) {
+                    let beyond = (text.len() - first).saturating_sub(LAST_WORDS);
+                    text.drain(first..first + beyond);
+                }
                 self::text(&text)
             })
         });
@@ -236,6 +246,7 @@ impl Process {
         }
         let said: Vec<String> = words
             .lines()
+            .filter(|line| !PROGRESS.iter().any(|start| line.starts_with(start)))
             .take(3)
             .map(|line| line.chars().filter(|c| !c.is_control()).collect::<String>())
             .collect();
@@ -307,10 +318,22 @@ mod tests {
         assert_eq!(said, "fine\n");
         let failed = Process::start(&mut shell("echo one >&2; echo two >&2; exit 3"), second).unwrap();
         assert_eq!(failed.end(|| false).unwrap_err().to_string(), "one; two");
+        let far = "echo Processing pages 1 through 2. >&2; echo Page 1 >&2; echo one >&2; exit 3";
+        let failed = Process::start(&mut shell(far), second).unwrap();
+        assert_eq!(failed.end(|| false).unwrap_err().to_string(), "one");
         let missing = Process::start(&mut Command::new("no-such-program"), second);
         assert!(
             matches!(missing, Err(ProcessError::Start(error)) if error.kind() == io::ErrorKind::NotFound)
         );
+    }
+
+    #[test]
+    fn of_a_flood_of_words_the_first_and_the_last_are_kept() {
+        let script = "echo first >&2; yes | head -c 300000 >&2; echo last >&2";
+        let said =
+            Process::start(&mut shell(script), Duration::from_secs(20)).unwrap().end(|| false).unwrap();
+        assert!(said.starts_with("first\n") && said.ends_with("y\nlast\n"));
+        assert_eq!(said.len(), MOST_WORDS as usize + LAST_WORDS);
     }
 
     #[test]

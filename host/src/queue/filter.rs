@@ -7,7 +7,8 @@
 //! layers. The art is laid where the page has it, or where the user wants it, on a sheet of the page's size; what lies on the
 //! margins is reported in millimetres.
 //! Cost: the page at a bit or four bytes a pixel, and what [`layers`] costs; for documents that may have spot colours, one
-//! more drawing of all pages at a low resolution.
+//! more drawing of all pages at a low resolution; for those that may have gradients that Ghostscript leaves out, a run
+//! without output.
 //! Limits: documents of 1 GB and 1000 pages, sheets the printer takes, upright. Transparency is gone when a page has been
 //! drawn, so white cannot follow it.
 
@@ -29,6 +30,7 @@ use super::raster::{self, RasterError};
 use drawing::Drawing;
 use observe::Observer;
 use page::Press;
+use press::layers::pdf::{Interpreter, Survey};
 use press::layers::{self, LayersError, Page};
 use press::pipeline::JobError;
 use press::process::MOST_PAGES;
@@ -218,25 +220,34 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     if let Some(doubt) = layers::pdf::cut_short(path) {
         press.observer.note(&doubt);
     }
-    let spots = match press.choices.spots {
-        Spots::None => Vec::new(),
-        _ if !may_have_spots(path)? => Vec::new(),
-        _ => layers::pdf::spots(path, press.observer).map_err(|error| match of_document(error) {
-            error @ LayersError::UnknownInk { .. } => FilterError::Spot(error),
-            error => FilterError::Plates(error),
-        })?,
+    let suspected = Suspected::of(path)?;
+    let whole = |interpreter| Survey { spots: Vec::new(), interpreter };
+    let Survey { spots, interpreter } = match press.choices.spots {
+        Spots::None if suspected.gradients => whole(layers::pdf::interpreter(path)),
+        Spots::None => whole(Interpreter::Usual),
+        _ if suspected.spots => {
+            layers::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
+                error @ LayersError::UnknownInk { .. } => FilterError::Spot(error),
+                error => FilterError::Plates(error),
+            })?
+        }
+        _ if suspected.gradients => whole(layers::pdf::interpreter(path)),
+        _ => whole(Interpreter::Usual),
     };
+    if interpreter == Interpreter::Older {
+        press.observer.note(layers::pdf::OLDER);
+    }
     if spots.iter().all(Vec::is_empty) {
-        return drawn(path, None, press);
+        return drawn((path, interpreter), None, press);
     }
     for (number, plates) in (1..).zip(&spots) {
         if plates.is_empty() {
-            drawn(path, Some(number), press)?;
+            drawn((path, interpreter), Some(number), press)?;
             continue;
         }
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
-        let page = layers::pdf::separated(path, number, dpi.into()).map_err(in_page)?;
+        let page = layers::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
         let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
             let art =
@@ -265,9 +276,13 @@ fn within_limit(number: usize) -> Result<(), FilterError> {
 }
 
 /// Pages as Ghostscript draws them, or one of them.
-fn drawn(path: &Path, only: Option<usize>, press: &mut Press<'_>) -> Result<(), FilterError> {
+fn drawn(
+    (path, interpreter): (&Path, Interpreter),
+    only: Option<usize>,
+    press: &mut Press<'_>,
+) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
-    let mut drawing = Drawing::begin(path, only, dpi)?;
+    let mut drawing = Drawing::begin(path, interpreter, only, dpi)?;
     let first = only.unwrap_or(1);
     let mut number = first;
     while let Some(size) = drawing.next_page()? {
@@ -307,23 +322,37 @@ fn picture(
     press.job(number, paper, &art, &view, mirrored)
 }
 
-/// Whether a document may have spot colours: it is a program, or their words are in it, or parts of it are packed.
-fn may_have_spots(path: &Path) -> Result<bool, FilterError> {
-    const WORDS: [&[u8]; 3] = [b"/Separation", b"/DeviceN", b"/ObjStm"];
-    const LONGEST: usize = 11;
-    let mut file = File::open(path).map_err(io_error("read the document"))?.take(LARGEST);
-    let mut part = Vec::new();
-    loop {
-        // A word may lie across two parts.
-        part.drain(..part.len().saturating_sub(LONGEST - 1));
-        let before = part.len();
-        (&mut file).take(1 << 20).read_to_end(&mut part).map_err(io_error("read the document"))?;
-        let program = before == 0 && part.starts_with(b"%!");
-        if program || WORDS.iter().any(|word| memmem::find(&part, word).is_some()) {
-            return Ok(true);
-        }
-        if part.len() == before {
-            return Ok(false);
+/// What the words of a document let suspect, or that parts of it are packed.
+struct Suspected {
+    /// Spot colours; also if it is a program.
+    spots: bool,
+    /// Gradients that not every interpreter draws ([`layers::pdf::interpreter`]).
+    gradients: bool,
+}
+
+impl Suspected {
+    fn of(path: &Path) -> Result<Suspected, FilterError> {
+        const PACKED: &[u8] = b"/ObjStm";
+        const SPOTS: [&[u8]; 3] = [b"/Separation", b"/DeviceN", PACKED];
+        const SHADING: &[u8] = b"/ShadingType";
+        /// More than the words and the white space within them.
+        const LONGEST: usize = 64;
+        let mut found = Suspected { spots: false, gradients: false };
+        let mut file = File::open(path).map_err(io_error("read the document"))?.take(LARGEST);
+        let mut part = Vec::new();
+        loop {
+            // A word may lie across two parts.
+            part.drain(..part.len().saturating_sub(LONGEST - 1));
+            let before = part.len();
+            (&mut file).take(1 << 20).read_to_end(&mut part).map_err(io_error("read the document"))?;
+            if part.len() == before || found.spots && found.gradients {
+                return Ok(found);
+            }
+            let program = before == 0 && part.starts_with(b"%!");
+            found.spots |= program || SPOTS.iter().any(|word| memmem::find(&part, word).is_some());
+            let by_two = |at: usize| part[at + SHADING.len()..].trim_ascii_start().starts_with(b"1");
+            found.gradients |=
+                memmem::find(&part, PACKED).is_some() || memmem::find_iter(&part, SHADING).any(by_two);
         }
     }
 }
@@ -479,20 +508,27 @@ mod tests {
     }
 
     #[test]
-    fn spot_colours_are_suspected_wherever_their_words_begin() {
+    fn spot_colours_and_gradients_are_suspected_wherever_their_words_begin() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("document");
         let suspected = |bytes: &[u8]| {
             std::fs::write(&path, bytes).unwrap();
-            may_have_spots(&path).unwrap()
+            let found = Suspected::of(&path).unwrap();
+            (found.spots, found.gradients)
         };
-        assert!(suspected(b"%!PS"));
-        assert!(!suspected(b"%PDF-1.4 /DeviceRGB /DeviceCMYK /Separa tion"));
+        assert_eq!(suspected(b"%!PS"), (true, false));
+        assert_eq!(suspected(b"%PDF-1.4 /DeviceRGB /DeviceCMYK /Separa tion /ShadingType 2"), (false, false));
+        assert_eq!(suspected(b"%PDF-1.4 /ShadingType 3 /ShadingType\r\n1"), (false, true));
+        assert_eq!(suspected(b"%PDF-1.5 /ObjStm"), (true, true));
         // Before, across and after the border of two parts.
-        for at in (1 << 20) - 14..(1 << 20) + 3 {
-            let mut bytes = vec![b' '; 3 << 20];
-            bytes[at..at + 11].copy_from_slice(b"/Separation");
-            assert!(suspected(&bytes), "{at}");
+        for at in (1 << 20) - 20..(1 << 20) + 3 {
+            let with = |word: &[u8]| {
+                let mut bytes = vec![b' '; 3 << 20];
+                bytes[at..at + word.len()].copy_from_slice(word);
+                bytes
+            };
+            assert_eq!(suspected(&with(b"/Separation")), (true, false), "{at}");
+            assert_eq!(suspected(&with(b"/ShadingType 1")), (false, true), "{at}");
         }
     }
 

@@ -76,6 +76,13 @@ pub(super) fn is_whole(name: &str) -> bool {
     name.len() > 2 && typed(&name).is_ok()
 }
 
+/// Whether a file is named after an ink and nothing else but a place: in `2024 white` the number is no place.
+pub(super) fn is_exact(name: &str) -> bool {
+    const DIGITS: usize = 2;
+    let mut numbers = name.split(|c: char| !c.is_ascii_digit());
+    numbers.all(|number| number.len() <= DIGITS) && (is_whole(name) || exact(&words(name).1).is_some())
+}
+
 /// The ink of one of several pages for which these inks are named. Equal inks need to know at which depth they lie: that of
 /// their page.
 pub(super) fn of_page(inks: &[Ink], page: u32, ink: Ink) -> Named {
@@ -185,6 +192,16 @@ mod tests {
             ("", false),
         ] {
             assert_eq!(is_whole(name), whole, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_year_or_a_word_beside_an_ink_makes_a_name_of_something_else() {
+        for name in ["white", "k", "01-white", "Gold_Foil-2", "Spot White", "3 Gold Foil"] {
+            assert!(is_exact(name), "{name}");
+        }
+        for name in ["2024 white", "white-1024", "scan-yellow", "logo white", "photo", ""] {
+            assert!(!is_exact(name), "{name}");
         }
     }
 

@@ -1,7 +1,8 @@
 //! Reads art from files: chooses the reader by what a file holds, and joins several files into one artwork.
 //!
 //! Method: the first bytes tell PDF, PostScript, TIFF, SVG and JPEG apart. A picture whose name is that of an ink is a
-//! layer, and so is a page of a TIFF for which an ink is named; any other picture is colour for the process inks. Cost: that of the readers; files are read in pairs, so both
+//! layer, and so is a page of a TIFF for which an ink is named; any other picture is colour for the process inks. If only a
+//! part of its name is an ink, it must also look like a layer. Cost: that of the readers; files are read in pairs, so both
 //! cores work and at most two layers are in memory as bytes. Limits: layers must have the same size in pixels.
 
 use std::io::Read;
@@ -16,6 +17,7 @@ use super::coverage::{self, Scan};
 use super::error::{LayersError, NamedPart, io, wrong};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
+use super::picture::Looks;
 use super::resolution::Dpi;
 use super::size::{self, MOST_BYTES, Unstated};
 use super::{cmyk, pdf, picture, svg, tiff, tiff_pages};
@@ -104,10 +106,25 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     if svg::is_svg(file, &start) {
         return svg::read(file, options, observer);
     }
-    let named = names::ink(&stem(file)).filter(|_| !options.reserved);
-    let is_whole = names::is_whole(&stem(file));
-    if named.is_some() && (is_whole || !picture::has_colours(file, options.page())) {
-        return named_files(&stem(file), &[file.to_path_buf()], options, observer);
+    let name = stem(file);
+    let named = names::ink(&name).filter(|_| !options.reserved);
+    let looks = named.map_or(Looks::Layer, |named| match picture::looks(file, options.page()) {
+        Looks::Tones if options.tones.contains(named.ink) => Looks::Layer,
+        looks => looks,
+    });
+    let is_exact = names::is_exact(&name);
+    if let Some(named) = named
+        && (looks == Looks::Layer || is_exact && names::is_whole(&name))
+    {
+        let mut art = named_files(&name, &[file.to_path_buf()], options, observer)?;
+        if !is_exact || looks != Looks::Layer {
+            art.notes.push(format!(
+                "{} is printed as the layer {}, because of its name; rename it to print it as a picture",
+                file.display(),
+                named.ink.name()
+            ));
+        }
+        return Ok(art);
     }
     if start.starts_with(b"\xff\xd8")
         && let Some(art) = cmyk::read_jpeg(file, options)?
@@ -117,7 +134,11 @@ fn open_file(file: &Path, options: &Options, observer: &dyn Observer) -> Result<
     let pixels = picture::read(file, options.page())?;
     let mut art = picture::artwork(&stem(file), pixels, options)?;
     let close = || names::closest(&stem(file)).map(|known| (known, "its name is that of no ink"));
-    let part = named.map(|named| (named.ink.name(), "it has colours and only a part of its name is an ink"));
+    let why = match looks {
+        Looks::Tones => "it has many tones and only a part of its name is an ink",
+        _ => "it has colours and only a part of its name is an ink",
+    };
+    let part = named.map(|named| (named.ink.name(), why));
     let meant = part.or_else(close).filter(|_| !options.reserved && art.drawn.dots() > 0);
     if let Some((known, why)) = meant {
         art.notes.push(format!(

@@ -9,6 +9,7 @@
 
 mod complaint;
 mod draw;
+mod ghostscript;
 mod plates;
 
 use std::fs::File;
@@ -29,8 +30,9 @@ use crate::scratch::Scratch;
 use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
-pub use complaint::{cut_short, damaged, no_page};
-pub use plates::{Separated, separated, spots};
+pub use complaint::{OLDER, cut_short, damaged, no_page};
+pub use ghostscript::{Interpreter, command, interpreter};
+pub use plates::{Separated, Survey, separated, survey};
 
 /// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.
 const EPS_WITH_PREVIEW: &[u8] = b"\xc5\xd0\xd3\xc6";
@@ -45,13 +47,13 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
     let only = options.page();
     observer.begin("reading pages", 2);
-    let mut program = Program::Ghostscript;
-    let mut drafts = program.leaves(path, only, Part::CropBox, &folder);
-    if let (Err(LayersError::Program { .. }), true) = (&drafts, is_pdf(path)?) {
-        program = Program::Poppler;
-        drafts = program.leaves(path, only, Part::CropBox, &folder);
-    }
-    let Drafts { leaves, said } = drafts?;
+    let drawn = draw::drafts(path, only, Part::CropBox, &folder);
+    let (Drafts { leaves, said }, program) = match (drawn, is_pdf(path)?) {
+        (Err(LayersError::Program { .. }), true) => {
+            (Program::Poppler.leaves(path, only, Part::CropBox, &folder)?, Program::Poppler)
+        }
+        (drawn, _) => drawn.map(|(drafts, interpreter)| (drafts, Program::Ghostscript(interpreter)))?,
+    };
     observer.advance(1);
     let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
     let document = Document { path, program, folder: &folder, options };
@@ -64,6 +66,9 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     art.notes.extend(
         damaged(&said).or_else(|| cut_short(path)).map(|doubt| format!("{}: {doubt}", path.display())),
     );
+    if program == Program::Ghostscript(Interpreter::Older) {
+        art.notes.push(format!("{}: {OLDER}", path.display()));
+    }
     if program == Program::Poppler {
         art.notes.push(format!(
             "{}: read by Poppler, without spot plates; install Ghostscript to print them in their inks",
@@ -118,8 +123,9 @@ impl Document<'_> {
         let dpi = self.dpi(leaf, &mut notes)?;
         if !plates::layers(self.path, &self.path.display(), &leaf.spots, &mut notes)?.is_empty() {
             // The plates tell of the other spots themselves.
-            let mut art = plates::separated_part(self.path, leaf.number, Part::CropBox, dpi)?
-                .whole(&name, self.options);
+            let mut art =
+                plates::separated_part((self.path, self.interpreter()), leaf.number, Part::CropBox, dpi)?
+                    .whole(&name, self.options);
             if art.layers.is_empty() && art.colour.is_none() {
                 return Err(LayersError::Nothing { reason: "no plate of the page has a dot".into() });
             }
@@ -128,7 +134,7 @@ impl Document<'_> {
             return Ok(art);
         }
         let mut art = match self.program {
-            Program::Ghostscript => self.drawn(leaf, dpi)?,
+            Program::Ghostscript(_) => self.drawn(leaf, dpi)?,
             Program::Poppler => {
                 let pixels =
                     picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?, None)?;
@@ -142,9 +148,18 @@ impl Document<'_> {
         Ok(art)
     }
 
+    /// Ghostscript's interpreter, if that draws the document.
+    fn interpreter(&self) -> Interpreter {
+        match self.program {
+            Program::Ghostscript(interpreter) => interpreter,
+            Program::Poppler => Interpreter::Usual,
+        }
+    }
+
     /// What a page draws, with the kind of each pixel.
     fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, LayersError> {
-        let Tagged { size, pixels } = draw::tagged(self.path, leaf.number, Part::CropBox, dpi, self.folder)?;
+        let Tagged { size, pixels } =
+            draw::tagged((self.path, self.interpreter()), leaf.number, Part::CropBox, dpi, self.folder)?;
         let dots = (size.0 as usize, size.1 as usize);
         Ok(picture::tagged_artwork(&stem(self.path), size, dots, pixels, self.options))
     }

@@ -63,10 +63,32 @@ const COLOURED: u8 = 48;
 /// Colours that differ by at most so much in red, green and blue are about one.
 const ALIKE: u8 = 24;
 
-/// Whether a picture is in several colours, unlike the layer of an ink, which is grey or in one colour. No file that cannot be read is.
-pub(super) fn has_colours(path: &Path, page: Option<u32>) -> bool {
-    let Ok(Pixels { rgba, .. }) = read(path, page) else { return false };
+/// Darkness from and to which a pixel is neither nearly paper nor nearly ink.
+const TONES: std::ops::RangeInclusive<u8> = 48..=207;
+
+/// What a picture has that the layer of an ink does not. That is grey or in one colour, and ink or paper but at its edges.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Looks {
+    /// Nothing.
+    Layer,
+    /// Several colours.
+    Colours,
+    /// Mostly tones, none of which is most of them.
+    Tones,
+}
+
+/// What a picture looks like. A file that cannot be read looks like a layer, whose reader tells why.
+pub(super) fn looks(path: &Path, page: Option<u32>) -> Looks {
+    let Ok(Pixels { rgba, .. }) = read(path, page) else { return Looks::Layer };
     let (pixels, _) = rgba.as_chunks::<4>();
+    match () {
+        () if has_colours(pixels) => Looks::Colours,
+        () if has_tones(pixels) => Looks::Tones,
+        () => Looks::Layer,
+    }
+}
+
+fn has_colours(pixels: &[[u8; 4]]) -> bool {
     let seen = pixels.iter().filter(|pixel| pixel[3] > 0 && **pixel != [255; 4]).count();
     let coloured =
         |&&[r, g, b, opacity]: &&[u8; 4]| opacity >= 128 && r.max(g).max(b) - r.min(g).min(b) >= COLOURED;
@@ -82,6 +104,19 @@ pub(super) fn has_colours(path: &Path, page: Option<u32>) -> bool {
     let most = most.map(|v| v << 4 | 8);
     let like = coloured.iter().filter(|pixel| (0..3).all(|c| pixel[c].abs_diff(most[c]) <= ALIKE)).count();
     20 * coloured.len() >= seen && 4 * like < 3 * coloured.len()
+}
+
+/// Whether more than half of what is drawn has tones, and no sixteenth of all tones has half of these: a flat grey is the ink
+/// of a layer. Opacity counts like darkness.
+fn has_tones(pixels: &[[u8; 4]]) -> bool {
+    let (mut drawn, mut counts) = (0, [0; 16]);
+    for &[r, g, b, opacity] in pixels {
+        let dark = (u32::from(255 - r.min(g).min(b)) * u32::from(opacity) / 255) as u8;
+        drawn += usize::from(dark > 8);
+        counts[usize::from(dark >> 4)] += usize::from(TONES.contains(&dark));
+    }
+    let toned: usize = counts.iter().sum();
+    2 * toned > drawn && counts.iter().all(|count| 2 * count < toned)
 }
 
 /// Applies an embedded profile, and returns a note if that changed anything. `grey` marks pixels of a greyscale file.

@@ -90,8 +90,21 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
 /// The elements of a drawing.
 fn parsed<'a>(path: &Path, text: &'a str) -> Result<roxmltree::Document<'a>, LayersError> {
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
-    roxmltree::Document::parse_with_options(text, options)
-        .map_err(|error| wrong(path, format!("the drawing cannot be read: {error}")))
+    roxmltree::Document::parse_with_options(text, options).map_err(|error| {
+        let remedy = match &error {
+            roxmltree::Error::UnknownNamespace(prefix, _) => format!(
+                "; open the drawing in Inkscape and save it again, or declare the prefix in its first element{}",
+                match prefix.as_str() {
+                    "inkscape" => ": xmlns:inkscape=\"http://www.inkscape.org/namespaces/inkscape\"",
+                    "sodipodi" => ": xmlns:sodipodi=\"http://sodipodi.sourceforge.net/DTD/sodipodi-0.dtd\"",
+                    "xlink" => ": xmlns:xlink=\"http://www.w3.org/1999/xlink\"",
+                    _ => "",
+                }
+            ),
+            _ => String::new(),
+        };
+        wrong(path, format!("the drawing cannot be read: {error}{remedy}"))
+    })
 }
 
 /// A drawing on its way to its own thread.

@@ -15,6 +15,7 @@ mod sizes;
 mod thin;
 mod turned;
 
+use super::pdf::Interpreter;
 use super::*;
 use observe::Silent;
 use protocol::ink::Ink;

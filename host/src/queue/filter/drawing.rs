@@ -2,17 +2,15 @@
 
 use std::io::{self, BufReader};
 use std::path::Path;
-use std::process::{ChildStdout, Command, Stdio};
+use std::process::{ChildStdout, Stdio};
 
+use press::layers::pdf::{self, Interpreter};
 use press::layers::{Page, kinds};
 use press::process::{self, Process, ProcessError};
 use press::scratch::Scratch;
 use tempfile::NamedTempFile;
 
 use super::{FilterError, io_error};
-
-/// Memory for a page's bands: with less, Ghostscript reads its list of objects once for each of many bands.
-const BANDS: usize = 100_000_000;
 
 /// Ghostscript at work. Each page has the time limit of [`process::limit`]; while a page is printed there is none.
 pub(super) struct Drawing {
@@ -34,21 +32,25 @@ fn failed(error: ProcessError) -> FilterError {
 
 impl Drawing {
     /// Begins to draw a document, or one page of it.
-    pub(super) fn begin(path: &Path, page: Option<usize>, dpi: u16) -> Result<Drawing, FilterError> {
+    pub(super) fn begin(
+        path: &Path,
+        interpreter: Interpreter,
+        page: Option<usize>,
+        dpi: u16,
+    ) -> Result<Drawing, FilterError> {
         let conversions = kinds::conversions().map_err(io_error("keep the conversion of colours"))?;
         let scratch = Scratch::new().map_err(io_error("make a temporary folder"))?;
-        let mut command = Command::new("gs");
-        command
-            .env("TMPDIR", scratch.path())
-            .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-dNOINTERPOLATE"])
-            .arg(format!("-sDEVICE={}", kinds::DEVICE))
-            .arg(format!("-sSourceObjectICC={}", conversions.path().display()))
-            .arg(format!("-dBufferSpace={BANDS}"))
-            .args(page.into_iter().flat_map(|n| [format!("-dFirstPage={n}"), format!("-dLastPage={n}")]))
-            .arg(format!("-r{dpi}"))
-            .args(["-sstdout=%stderr", "-sOutputFile=%stdout", "-f"])
-            .arg(path)
-            .stdout(Stdio::piped());
+        let options = [
+            "-dNOINTERPOLATE".into(),
+            format!("-sDEVICE={}", kinds::DEVICE),
+            format!("-sSourceObjectICC={}", conversions.path().display()),
+            format!("-r{dpi}"),
+            "-sOutputFile=%stdout".into(),
+        ];
+        let page = page.map(|n| [format!("-dFirstPage={n}"), format!("-dLastPage={n}")]);
+        let options = options.into_iter().chain(page.into_iter().flatten());
+        let mut command = pdf::command(path, interpreter, scratch.path(), options);
+        command.stdout(Stdio::piped());
         let mut process = Process::start(&mut command, process::limit()).map_err(failed)?;
         let Some(pages) = process.output() else {
             return Err(FilterError::Ghostscript("its pipe cannot be had".into()));

@@ -1,8 +1,11 @@
-//! What Ghostscript says of a document that it cannot read, in words for its owner.
+//! What Ghostscript says of a document that it cannot read or draws in part, in words for its owner.
 //!
-//! Problem: Ghostscript ends well even if it has drawn nothing, and what it then says is many lines.
-//! Method: a few of its sentences have a meaning of their own; of the others the first complaint is quoted.
-//! Limits: the sentences are those of versions 9.5 to 10; of other versions the quote alone remains.
+//! Problem: Ghostscript ends well even if it has drawn nothing, and what it then says is many lines. Its interpreter of PDF
+//! since version 9.56 complains in other words than the one before it: of some things at once, and of all at the end, in
+//! two lists of errors and warnings. Most warnings are about the form of the document, and nothing is missing.
+//! Method: a few sentences have a meaning of their own. Of the others the first complaint is quoted: any error that is no
+//! matter of form, and the warnings that mean that something is not drawn.
+//! Limits: the sentences are those of versions 9.5 to 10; what other versions say in other words is not noticed.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
@@ -14,6 +17,51 @@ const END: u64 = 4096;
 
 /// What Ghostscript says of a page that there is not; then follows how many there are.
 const BEYOND: &str = "greater than the number of pages";
+
+/// What begins the lists at the end, and whether it is the one of errors.
+const LISTS: [(&str, bool); 2] =
+    [("The following errors were encountered", true), ("The following warnings were encountered", false)];
+
+/// Listed errors of form: nothing is missing.
+const FORM: [&str; 17] = [
+    "no header detected",
+    "header lacks a version number",
+    "content stream lacks endstream",
+    "missing white space after number",
+    "object lacks an endobj",
+    "Incorrect /Length for stream object",
+    "Page object doe snot have /Page type",
+    "Page object does not have /Page type",
+    "A dictionary is missing a required /Type key.",
+    "object lacks a required Subtype",
+    "stream inherited a resource",
+    "Group attributes dictionary is missing /CS",
+    "Image has both ImageMask and ColorSpace keys.",
+    "Definition of a name is a reference to itself",
+    "page tree root node /Count did not match the actual number of pages in the tree.",
+    "An annotation has an invalid named destination",
+    "Error setting a halftone",
+];
+
+/// Listed warnings that mean that what has the pattern is not drawn.
+const PATTERN: [&str; 2] = ["error in pattern", "error in shading"];
+
+/// Listed warnings that mean that something else is not drawn.
+const MISSING: [&str; 5] = [
+    "recoverable image error",
+    "error in Mask",
+    "error in annotation Appearance",
+    "error in annotation",
+    "Couldn't find a named resource",
+];
+
+/// What is said at once of parts that the document names but does not have.
+const UNNAMED: &str = "Couldn't find named resource";
+
+/// A note on a document that the older interpreter draws.
+pub const OLDER: &str = "the document has gradients that this version of Ghostscript leaves out, so its older interpreter draws \
+    them; it draws some, such as narrow stripes, wrong or not at all; where it does, save the page as a \
+    picture (PNG) and print that";
 
 /// The longest quote, in characters.
 const LONGEST: usize = 120;
@@ -42,19 +90,86 @@ fn pages(said: &str) -> Option<u32> {
     said.split_once(BEYOND)?.1.lines().next()?.rsplit(' ').next()?.parse().ok()
 }
 
+/// What Ghostscript complains of.
+#[derive(Default)]
+struct Complaints<'a> {
+    /// The first that means that a pattern is missing.
+    pattern: Option<&'a str>,
+    /// The first other.
+    other: Option<&'a str>,
+}
+
+impl Complaints<'_> {
+    fn of(said: &str) -> Complaints<'_> {
+        let (mut found, mut list) = (Complaints::default(), None);
+        for line in said.lines() {
+            let item = line.strip_prefix('\t').map(str::trim);
+            list = match (item, LISTS.iter().find(|(start, _)| line.starts_with(start))) {
+                (None, begun) => begun.map(|&(_, errors)| errors),
+                (Some(_), _) => list,
+            };
+            match (item, list) {
+                (Some(item), Some(errors)) => {
+                    let pattern = !errors && PATTERN.contains(&item);
+                    let other = if errors { !FORM.contains(&item) } else { MISSING.contains(&item) };
+                    found.pattern = found.pattern.or(Some(item).filter(|_| pattern));
+                    found.other = found.other.or(Some(item).filter(|_| other));
+                }
+                _ if line.starts_with(UNNAMED) => found.other = found.other.or(Some(UNNAMED)),
+                _ => {
+                    let error = line.split_once("**** Error").map(|(_, text)| text);
+                    let error = error.filter(|text| text.starts_with([':', ' ']));
+                    found.other = found.other.or(error.map(|text| text.trim_start_matches([':', ' '])));
+                }
+            }
+        }
+        found
+    }
+}
+
+/// A complaint as it may be quoted.
+fn quote(complaint: &str) -> String {
+    let quote: String = complaint.chars().filter(|c| !c.is_control()).take(LONGEST).collect();
+    quote.trim().trim_end_matches('.').to_owned()
+}
+
 /// The first thing that Ghostscript complains of.
 fn complaint(said: &str) -> Option<String> {
-    let line = said.lines().find_map(|line| Some(line.split_once("**** Error: ")?.1))?;
-    let quote: String = line.chars().filter(|c| !c.is_control()).take(LONGEST).collect();
-    Some(quote.trim().trim_end_matches('.').to_owned())
+    let found = Complaints::of(said);
+    found.other.or(found.pattern).map(quote)
+}
+
+/// Whether a pattern of a document was not drawn.
+pub(super) fn lacks_pattern(said: &str) -> bool {
+    Complaints::of(said).pattern.is_some()
+}
+
+/// Whether the older interpreter draws more of a document than the usual one, which left out a pattern: it draws the pattern,
+/// and has a complaint only if the usual one has another as well.
+pub(super) fn is_better(older: &str, usual: &str) -> bool {
+    let (older, usual) = (Complaints::of(older), Complaints::of(usual));
+    older.pattern.is_none() && (older.other.is_none() || usual.other.is_some())
 }
 
 /// A note on a document that was drawn with complaints, if there are any.
 #[must_use]
 pub fn damaged(said: &str) -> Option<String> {
-    complaint(said).map(|complaint| {
-        format!("the document is damaged (Ghostscript says `{complaint}`), so some of it may be missing")
-    })
+    let found = Complaints::of(said);
+    let pattern = found.pattern.map(|complaint| {
+        format!(
+            "part of the document is missing, because Ghostscript cannot draw it (it says `{}`); save the page as a picture \
+             (PNG) and print that, or save the PDF with another program",
+            quote(complaint)
+        )
+    });
+    let other = found.other.map(|complaint| {
+        format!(
+            "the document is damaged (Ghostscript says `{}`), so some of it may be missing",
+            quote(complaint)
+        )
+    });
+    let notes: Vec<String> = other.into_iter().chain(pattern).collect();
+    (!notes.is_empty()).then(|| notes.join("; "))
 }
 
 /// A note on a document that has no end.
@@ -97,6 +212,68 @@ mod tests {
         assert_eq!((damaged("noise"), cut_short(Path::new("none"))), (None, None));
         let long = complaint(&format!("**** Error: \x1b{}", "x".repeat(500))).unwrap();
         assert_eq!(long, "x".repeat(120));
+    }
+
+    /// The end of what Ghostscript 10.00 says of a document with these errors and warnings.
+    fn listed(errors: &[&str], warnings: &[&str]) -> String {
+        let list = |kind: &str, items: &[&str]| {
+            let items: String = items.iter().map(|item| format!("\t{item}\n")).collect();
+            match items.as_str() {
+                "" => String::new(),
+                items => format!(
+                    "\nThe following {kind} were encountered at least once while processing this file:\n{items}"
+                ),
+            }
+        };
+        format!(
+            "Processing pages 1 through 1.\nPage 1\n{}{}\n   **** This file had errors that were repaired or ignored.\n   \
+             **** The file was produced by: \n   **** >>>> Skia/PDF m156 <<<<\n   **** Please notify the author of the \
+             software that produced this\n",
+            list("errors", errors),
+            list("warnings", warnings)
+        )
+    }
+
+    #[test]
+    fn what_is_listed_at_the_end_is_noted_if_something_may_be_missing() {
+        let noted = |errors: &[&str], warnings: &[&str]| damaged(&listed(errors, warnings));
+        let token = noted(&["error executing PDF token"], &[]).unwrap();
+        assert!(token.contains("is damaged (Ghostscript says `error executing PDF token`)"), "{token}");
+        let pattern = noted(&[], &["garbage left on stack", "error in pattern"]).unwrap();
+        assert!(
+            pattern.starts_with("part of the document is missing") && pattern.contains("`error in pattern`")
+        );
+        let both = noted(&["PDF file was repaired"], &["error in pattern"]).unwrap();
+        assert!(both.contains("`PDF file was repaired`") && both.contains("`error in pattern`"), "{both}");
+        assert!(noted(&[], &["error in Mask"]).unwrap().contains("is damaged"));
+        for (errors, warnings) in [
+            (&["missing white space after number"][..], &[][..]),
+            (&[], &["invalid operator used in text block", "encountered more Q than q"]),
+            (&["object lacks an endobj"], &["badly escaped name"]),
+        ] {
+            assert_eq!(noted(errors, warnings), None, "{errors:?} {warnings:?}");
+        }
+        let named = damaged("Page 1\nCouldn't find named resource\nCouldn't find named resource\n").unwrap();
+        assert!(named.contains("`Couldn't find named resource`"), "{named}");
+        let old = damaged("   **** Error 'gs' ignored -- ExtGState missing from Resources.\n").unwrap();
+        assert!(old.contains("`'gs' ignored -- ExtGState missing from Resources`"), "{old}");
+        // The older interpreter always says this, and titles may say anything.
+        assert_eq!(
+            damaged("   **** Warning: You are using the legacy PDF interpreter (-dNEWPDF=false)\n"),
+            None
+        );
+        assert_eq!(damaged("   **** >>>> The following errors were encountered <<<<\n\tx\n"), None);
+    }
+
+    #[test]
+    fn the_older_interpreter_is_better_if_it_draws_the_pattern_and_loses_nothing_else() {
+        let usual = listed(&[], &["error in pattern"]);
+        let torn = listed(&["error executing PDF token"], &["error in pattern"]);
+        let error = "   **** Error: Unable to determine object number for Im9 so ignoring it\n";
+        assert!(lacks_pattern(&usual) && !lacks_pattern(&listed(&["malformed number"], &[])));
+        assert!(is_better("noise", &usual) && is_better("noise", &torn) && is_better(error, &torn));
+        // As versions answer that have one interpreter only.
+        assert!(!is_better(error, &usual) && !is_better(&usual, &usual));
     }
 
     #[test]

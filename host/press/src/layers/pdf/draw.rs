@@ -16,6 +16,8 @@ use super::super::kinds;
 use super::super::names::stem;
 use super::super::size::check_pixels;
 use super::EPS_WITH_PREVIEW;
+use super::complaint;
+use super::ghostscript::{self, Interpreter};
 use crate::process::{self, MOST_PAGES, Process, ProcessError};
 use crate::scratch::Scratch;
 
@@ -66,7 +68,7 @@ pub(super) enum Part {
 /// The program that draws.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Program {
-    Ghostscript,
+    Ghostscript(Interpreter),
     Poppler,
 }
 
@@ -83,7 +85,7 @@ impl Program {
         folder: &Scratch,
     ) -> Result<Drafts, LayersError> {
         match self {
-            Program::Ghostscript => ghostscript_leaves(path, only, part, folder),
+            Program::Ghostscript(interpreter) => ghostscript_leaves((path, interpreter), only, part, folder),
             Program::Poppler => poppler_leaves(path, only, folder),
         }
     }
@@ -101,9 +103,9 @@ impl Program {
     ) -> Result<PathBuf, LayersError> {
         let picture = folder.path().join("page.png");
         match self {
-            Program::Ghostscript => {
+            Program::Ghostscript(interpreter) => {
                 let options = [one_page(page), crop(path, Part::CropBox)?].concat();
-                ghostscript(path, &options, "pngalpha", dpi, &picture, || false)?;
+                ghostscript((path, interpreter), &options, "pngalpha", dpi, &picture, || false)?;
             }
             Program::Poppler => {
                 let (x, y) = dpi;
@@ -120,6 +122,30 @@ impl Program {
     }
 }
 
+/// Drafts by Ghostscript, and the interpreter that draws most of the document.
+///
+/// # Errors
+/// As [`Program::leaves`].
+pub(super) fn drafts(
+    path: &Path,
+    only: Option<u32>,
+    part: Part,
+    folder: &Scratch,
+) -> Result<(Drafts, Interpreter), LayersError> {
+    let usual = ghostscript_leaves((path, Interpreter::Usual), only, part, folder)?;
+    if complaint::lacks_pattern(&usual.said) {
+        let again = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
+        // If it fails, there is a drawing already.
+        if let Ok(older) = ghostscript_leaves((path, Interpreter::Older), only, part, &again)
+            && older.leaves.len() == usual.leaves.len()
+            && complaint::is_better(&older.said, &usual.said)
+        {
+            return Ok((older, Interpreter::Older));
+        }
+    }
+    Ok((usual, Interpreter::Usual))
+}
+
 /// A page with the kind of each pixel ([`kinds`]).
 pub(super) struct Tagged {
     /// Pixels across and down.
@@ -133,7 +159,7 @@ pub(super) struct Tagged {
 /// # Errors
 /// As [`Program::leaves`], or too many pixels.
 pub(super) fn tagged(
-    path: &Path,
+    (path, interpreter): (&Path, Interpreter),
     page: u32,
     part: Part,
     dpi: (f64, f64),
@@ -143,7 +169,7 @@ pub(super) fn tagged(
     let conversions = kinds::conversions().map_err(io(path, "keep the conversion of its colours"))?;
     let convert = vec![format!("-sSourceObjectICC={}", conversions.path().display())];
     let options = [one_page(page), crop(path, part)?, convert].concat();
-    ghostscript(path, &options, kinds::DEVICE, dpi, &picture, || false)?;
+    ghostscript((path, interpreter), &options, kinds::DEVICE, dpi, &picture, || false)?;
     let damaged = || wrong(path, format!("page {page} cannot be drawn"));
     let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
     let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
@@ -191,7 +217,7 @@ fn pages(page: u32) -> Vec<String> {
 }
 
 fn ghostscript_leaves(
-    path: &Path,
+    (path, interpreter): (&Path, Interpreter),
     only: Option<u32>,
     part: Part,
     folder: &Scratch,
@@ -210,7 +236,7 @@ fn ghostscript_leaves(
         begun += u32::from(next);
         next && only.is_none()
     };
-    let said = ghostscript(path, &options, "tiffsep", (DRAFT, DRAFT), &to, progressed);
+    let said = ghostscript((path, interpreter), &options, "tiffsep", (DRAFT, DRAFT), &to, progressed);
     if only.is_none() && place(MOST_PAGES + 1).exists() {
         return Err(wrong(path, format!("it has more than {MOST_PAGES} pages; print one with --page")));
     }
@@ -319,19 +345,19 @@ fn decoded(plate: &str) -> String {
 
 /// Separates a page into a TIFF for each plate beside `to`. Returns what Ghostscript says of them.
 pub(super) fn separate(
-    path: &Path,
+    (path, interpreter): (&Path, Interpreter),
     page: u32,
     part: Part,
     dpi: (f64, f64),
     to: &Path,
 ) -> Result<String, LayersError> {
     let options = [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into()]].concat();
-    ghostscript(path, &options, "tiffsep", dpi, to, || false)
+    ghostscript((path, interpreter), &options, "tiffsep", dpi, to, || false)
 }
 
 /// Runs Ghostscript on a document; `progressed` tells whether it has begun another page.
 fn ghostscript(
-    path: &Path,
+    (path, interpreter): (&Path, Interpreter),
     options: &[String],
     device: &str,
     dpi: (f64, f64),
@@ -339,21 +365,15 @@ fn ghostscript(
     progressed: impl FnMut() -> bool,
 ) -> Result<String, LayersError> {
     let file = std::path::absolute(path).map_err(io(path, "find it"))?;
-    let mut command = Command::new("gs");
-    // Its own files lie beside its result: it leaves them behind when it is stopped.
-    if let Some(folder) = to.parent() {
-        command.env("TMPDIR", folder);
-    }
-    command
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
-        .args(["-dTextAlphaBits=1", "-dGraphicsAlphaBits=1"])
-        .arg(format!("-r{:.4}x{:.4}", dpi.0, dpi.1))
-        .arg(format!("-sDEVICE={device}"))
-        .arg(format!("-sOutputFile={}", to.display()))
-        // What they run needs the device.
-        .args(options)
-        .arg("-f")
-        .arg(file);
+    let drawing = [
+        "-dTextAlphaBits=1".into(),
+        "-dGraphicsAlphaBits=1".into(),
+        format!("-r{:.4}x{:.4}", dpi.0, dpi.1),
+        format!("-sDEVICE={device}"),
+        format!("-sOutputFile={}", to.display()),
+    ];
+    let folder = to.parent().unwrap_or(Path::new("."));
+    let command = ghostscript::command(&file, interpreter, folder, drawing.iter().chain(options));
     let install = "install it (Debian: apt install ghostscript), or export the page as PNG";
     run(path, command, install, progressed)
 }

@@ -5,7 +5,7 @@
 //! Method: Ghostscript makes a plate of every spot. A spot that names a special ink is a layer of it. Every other spot is
 //! printed by its process colours: its plate is added to the process plates, in the shares that Ghostscript gives for its
 //! full tint. So a colour of several spots keeps each part. A name that resembles that of an ink is an error, because a
-//! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`spots`] and [`separated`].
+//! slip would cost ribbon. The layers of art and the print queues use the same two functions, [`survey`] and [`separated`].
 //! If a process plate has tones, the page is drawn once more with the kind of each pixel, and what lies beside the layers is
 //! treated like any page: letters keep their outline. On dots of layers the process plates say what overprints.
 //! Cost: seconds a page, twice if it has tones. Limits: where a spot overprints, tints between none and full are taken as
@@ -25,7 +25,8 @@ use super::super::options::Options;
 use super::super::size;
 use super::super::window::Window;
 use super::super::{kinds, picture};
-use super::draw::{PROCESS, Part, Program, Tagged, plates_beside, separate, tagged};
+use super::draw::{PROCESS, Part, Tagged, drafts, plates_beside, separate, tagged};
+use super::ghostscript::Interpreter;
 use crate::scratch::Scratch;
 use observe::Observer;
 
@@ -76,21 +77,29 @@ pub(super) fn layers(
     Ok(found)
 }
 
-/// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages. Notes name the
-/// page of a spot colour that names no ink.
+/// What drafts tell of a whole document.
+pub struct Survey {
+    /// For each page the spot colours that are layers of ink and not blank. Empty for a document without pages.
+    pub spots: Vec<Vec<String>>,
+    /// The interpreter that draws most of it.
+    pub interpreter: Interpreter,
+}
+
+/// Looks at all pages of a document. Notes name the page of a spot colour that names no ink.
 ///
 /// # Errors
 /// A document that Ghostscript cannot read, no Ghostscript, or a name that resembles that of an ink.
-pub fn spots(path: &Path, observer: &dyn Observer) -> Result<Vec<Vec<String>>, LayersError> {
+pub fn survey(path: &Path, observer: &dyn Observer) -> Result<Survey, LayersError> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
-    let leaves = Program::Ghostscript.leaves(path, None, Part::Sheet, &folder)?.leaves;
+    let (drafts, interpreter) = drafts(path, None, Part::Sheet, &folder)?;
     let mut notes = Vec::new();
-    let found = leaves
+    let spots = drafts
+        .leaves
         .iter()
         .map(|leaf| layers(path, &format_args!("page {}", leaf.number), &leaf.spots, &mut notes))
         .collect::<Result<_, _>>()?;
     notes.iter().for_each(|note| observer.note(note));
-    Ok(found)
+    Ok(Survey { spots, interpreter })
 }
 
 /// A page as plates: one for each spot colour that is a layer of ink, and the process plates for the rest.
@@ -104,24 +113,29 @@ pub struct Separated {
     notes: Vec<String>,
 }
 
-/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`spots`] and the process plates.
+/// Separates a page at `dpi` pixels per inch into plates for the spot colours of [`survey`] and the process plates.
 ///
 /// # Errors
 /// As [`open`](super::super::open()).
-pub fn separated(path: &Path, page: usize, dpi: f64) -> Result<Separated, LayersError> {
+pub fn separated(
+    path: &Path,
+    interpreter: Interpreter,
+    page: usize,
+    dpi: f64,
+) -> Result<Separated, LayersError> {
     let page = u32::try_from(page).map_err(|_| wrong(path, format!("there is no page {page}")))?;
-    separated_part(path, page, Part::Sheet, (dpi, dpi))
+    separated_part((path, interpreter), page, Part::Sheet, (dpi, dpi))
 }
 
 pub(super) fn separated_part(
-    path: &Path,
+    (path, interpreter): (&Path, Interpreter),
     page: u32,
     part: Part,
     dpi: (f64, f64),
 ) -> Result<Separated, LayersError> {
     let folder = Scratch::new().map_err(io(path, "make a folder for its plates"))?;
     let full = folder.path().join("page.tif");
-    let said = separate(path, page, part, dpi, &full)?;
+    let said = separate((path, interpreter), page, part, dpi, &full)?;
     let (width, height) =
         image::image_dimensions(&full).map_err(|_| wrong(path, format!("there is no page {page}")))?;
     let (mut plates, mut notes) = (Vec::new(), Vec::new());
@@ -152,7 +166,7 @@ pub(super) fn separated_part(
     let toned = |coverage: &[u8]| coverage.par_iter().any(|&c| c != 0 && c != 255);
     let mut rest = None;
     if process.iter().any(|(_, coverage)| toned(coverage)) {
-        let Tagged { size, mut pixels } = tagged(path, page, part, dpi, &folder)?;
+        let Tagged { size, mut pixels } = tagged((path, interpreter), page, part, dpi, &folder)?;
         if size != (width, height) {
             return Err(wrong(path, format!("page {page} differs in size from its plates")));
         }

@@ -103,6 +103,18 @@ pub(super) fn layers(
         }
         waiting.extend(nodes::drawn(node).into_iter().rev().map(|child| (child, within)));
     }
+    if layers.iter().all(|layer| layer.hidden)
+        && !layers.is_empty()
+        && left_out(path, document, &layers).is_some()
+    {
+        notes.push(format!(
+            "{}: printed as a picture, since all layers named after inks are hidden: {}; to print them as layers, show them in \
+             the drawing program",
+            path.display(),
+            labels(&layers)
+        ));
+        layers.clear();
+    }
     if layers.is_empty() {
         // A drawing may have layers that mean nothing; the name of an ink with a slip of the hand is worth a note.
         let meant =
@@ -125,6 +137,15 @@ pub(super) fn layers(
         if let Some(note) = left_out(path, document, &layers) {
             notes.push(note);
             notes.extend(shapes_alone(path, &layers));
+        }
+        for layer in layers.iter().filter(|layer| layer.group && !names::is_whole(&layer.label)) {
+            notes.push(format!(
+                "{}: layer `{}` is printed in {}, because of its name; a drawing is printed as a picture if no layer is named \
+                 after an ink: rename the layer for that",
+                path.display(),
+                layer.label,
+                layer.named.ink.name()
+            ));
         }
     }
     notes.extend(flowed(path, document, &layers));
@@ -215,6 +236,9 @@ fn left_out(path: &Path, document: &Document<'_>, layers: &[Layer]) -> Option<St
         if layers.iter().any(|layer| layer.roots.contains(&id)) {
             continue;
         }
+        if nodes::is_hidden(node) {
+            continue;
+        }
         if node == document.root_element() || layers.iter().any(|layer| layer.around.contains(&id)) {
             waiting.extend(nodes::drawn(node).into_iter().rev());
             continue;
@@ -257,13 +281,18 @@ fn shapes_alone(path: &Path, layers: &[Layer]) -> Option<String> {
     if layers.iter().any(|layer| layer.group) {
         return None;
     }
-    let names: Vec<String> = layers.iter().map(|layer| format!("`{}`", layer.label)).collect();
     Some(format!(
         "{}: only the shapes named after inks are printed: {}; to print the whole drawing as a picture, rename them, or export \
          it as PNG",
         path.display(),
-        names.join(", ")
+        labels(layers)
     ))
+}
+
+/// The names of layers, quoted.
+fn labels(layers: &[Layer]) -> String {
+    let labels: Vec<String> = layers.iter().map(|layer| format!("`{}`", layer.label)).collect();
+    labels.join(", ")
 }
 
 /// Whether an element or something in it draws.

@@ -252,3 +252,59 @@ fn a_drawing_without_a_size_is_as_large_as_all_that_is_drawn() {
     let found: Vec<_> = art.layers.iter().map(extent).collect();
     assert_eq!(found, [(0, 0, 599, 299, 180_000), (600, 300, 1199, 674, 225_000)]);
 }
+
+/// A layer of Inkscape.
+fn inkscape(label: &str, style: &str, content: &str) -> String {
+    let prefix = r##"xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape""##;
+    format!(
+        r##"<g {prefix} inkscape:groupmode="layer" inkscape:label="{label}" style="{style}">{content}</g>"##
+    )
+}
+
+#[test]
+fn what_is_visible_beside_hidden_layers_of_ink_is_a_picture() {
+    let square = r##"<rect width="8" height="4" fill="#c4281b"/>"##;
+    let bench = Bench::new();
+    let hidden = inkscape("Black Adam", "display:none", square);
+    let torso = inkscape("Torso", "", r##"<rect x="10" width="6" height="5" fill="#c4281b"/>"##);
+    let art = read(&[bench.write("adam.svg", drawing(&format!("{hidden}{torso}")))], &Options::default());
+    assert!(art.layers.is_empty() && art.colour.is_some());
+    assert!(near(art.drawn.dots(), dots(6.0) * dots(5.0), 0.02), "{}", art.drawn.dots());
+    assert!(noted(&art.notes, "are hidden: `Black Adam`; to print them"), "{:?}", art.notes);
+    // Nothing is visible beside it, or only within what is hidden as well.
+    for content in [hidden.clone(), format!(r##"<g style="display:none">{hidden}{torso}</g>"##)] {
+        let refused = refused(&[bench.write("none.svg", drawing(&content))]);
+        assert!(refused.contains("no layer of"), "{refused}");
+    }
+    // Another layer of ink is visible.
+    let (found, notes) = layers("art.svg", &format!("{hidden}{torso}{BLACK}"));
+    assert_eq!(found.len(), 1);
+    assert!(noted(&notes, "layer `Black Adam` is hidden") || noted(&notes, "left out"), "{notes:?}");
+}
+
+#[test]
+fn a_note_tells_of_layers_of_which_a_part_of_the_name_is_an_ink() {
+    let square = r##"<rect width="8" height="4" fill="#1b2a34"/>"##;
+    let (found, notes) = layers("art.svg", &inkscape("Black Adam", "", square));
+    assert_eq!(found[0].0, Ink::Black);
+    assert!(noted(&notes, "layer `Black Adam` is printed in black, because of its name"), "{notes:?}");
+    for label in ["Black", "02 black", "Spot White"] {
+        let (_, notes) = layers("art.svg", &inkscape(label, "", square));
+        assert!(!noted(&notes, "because of its name"), "{label}: {notes:?}");
+    }
+}
+
+#[test]
+fn a_prefix_that_is_not_declared_is_an_error_that_says_what_to_do() {
+    let bench = Bench::new();
+    let layer = r##"<g inkscape:groupmode="layer" inkscape:label="white"><rect width="8" height="4"/></g>"##;
+    let text = refused(&[bench.write("bare.svg", drawing(layer))]);
+    for words in [
+        "bare.svg",
+        "prefix 'inkscape'",
+        "open the drawing in Inkscape and save it again",
+        "xmlns:inkscape=\"http://www.inkscape.org/",
+    ] {
+        assert!(text.contains(words), "{text}");
+    }
+}

@@ -188,16 +188,17 @@ fn spots_without_an_ink_print_by_their_process_colours_in_layers_and_queue_alike
     let note = "spot colour `Dieline` names no ink: printed by its process colours";
     assert!(art.notes.iter().any(|said| said.contains(note)), "{:?}", art.notes);
     // The queue's way.
-    assert_eq!(pdf::spots(&file, &Silent).unwrap(), [["White"]]);
-    let page = pdf::separated(&file, 1, 600.0).unwrap();
+    assert_eq!(pdf::survey(&file, &Silent).unwrap().spots, [["White"]]);
+    let page = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
     let window = Window { left: 0, top: 0, width: page.size.0, height: page.size.1 };
     let queued = page.art("page", &window, &Options::default()).unwrap();
     assert_eq!((amounts(&queued), &queued.colour), (amounts(&art), &art.colour));
     // A slip is an error in both.
     let slip = bench.write("slip.ps", MIXED.replace("Dieline", "Golld"));
-    for error in
-        [pdf::spots(&slip, &Silent).unwrap_err(), open(&[slip], &Options::default(), &Silent).unwrap_err()]
-    {
+    for error in [
+        pdf::survey(&slip, &Silent).map(|found| found.spots).unwrap_err(),
+        open(&[slip], &Options::default(), &Silent).unwrap_err(),
+    ] {
         assert!(
             error
                 .to_string()
@@ -217,7 +218,7 @@ fn a_page_keeps_tints_of_its_spot_colours_in_layers_and_queue_alike() {
         1 setcolor 12 12 48 48 rectfill 0.3 setcolor 72 12 48 48 rectfill showpage\n";
     let file = bench.write("tint.ps", page);
     let art = read(std::slice::from_ref(&file), &Options::default());
-    let separated = pdf::separated(&file, 1, 600.0).unwrap();
+    let separated = pdf::separated(&file, Interpreter::Usual, 1, 600.0).unwrap();
     let window = Window { left: 0, top: 0, width: separated.size.0, height: separated.size.1 };
     let queued = separated.art("page", &window, &Options::default()).unwrap();
     assert_eq!(amounts(&queued), amounts(&art));

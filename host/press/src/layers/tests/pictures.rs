@@ -125,6 +125,49 @@ fn one_picture_is_colour_unless_its_name_says_an_ink() {
     );
     let plate = saved("yellow.png", &shaded);
     assert!(plate.colour.is_none() && plate.layers.len() == 1);
+    // Who named it may have meant a picture.
+    let named = |art: &Artwork| art.notes.iter().any(|note| note.contains("because of its name; rename it"));
+    assert!(named(&logo) && named(&plate) && !named(&layer) && !named(&folder));
+    // A number that is no place is a part of the name.
+    let year = saved("2024 white.png", &shaded);
+    assert!(year.layers.is_empty() && year.colour.is_some(), "{:?}", year.notes);
+}
+
+#[test]
+fn a_grey_photograph_is_no_layer_though_a_part_of_its_name_is_an_ink() {
+    let bench = Bench::new();
+    let size = (64, 64);
+    let saved = |name: &str, at: &dyn Fn(usize, usize) -> u8| {
+        let greys: Vec<u8> = (0..64 * 64).map(|i| at(i % 64, i / 64)).collect();
+        bench.grey(name, size, &greys)
+    };
+    let usual = Options::default();
+    // Greys of all depths; the note says how to print it as a layer.
+    let photograph = |x: usize, y: usize| (40 + 2 * x + y) as u8;
+    let scan = read(&[saved("scan-yellow.png", &photograph)], &usual);
+    assert!(scan.layers.is_empty() && scan.colour.is_some());
+    assert!(
+        scan.notes.iter().any(|note| note.contains("many tones")
+            && note.contains("only a part of its name")
+            && note.contains("rename the file to yellow.png")),
+        "{:?}",
+        scan.notes
+    );
+    // Somebody asked for its tones, gave it the name of the ink, or gave several plates.
+    let toned = Options { tones: inks::InkSet::of([Ink::Yellow]), ..Options::default() };
+    let asked = read(&[saved("scan-yellow.png", &photograph)], &toned);
+    assert!(matches!(asked.layers[..], [Layer { ink: Ink::Yellow, shape: Shape::Tone(_), .. }]));
+    assert_eq!(read(&[saved("yellow.png", &photograph)], &usual).layers.len(), 1);
+    let plates = [saved("scan-yellow.png", &photograph), saved("scan-cyan.png", &photograph)];
+    assert_eq!(read(&plates, &usual).layers.len(), 2);
+    // One grey, and black with edges five pixels wide.
+    let flat = |x: usize, y: usize| if x % 32 < 24 && y < 50 { 128u8 } else { 255 };
+    let soft = |x: usize, _: usize| [0u8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 60, 110, 160, 210, 250, 255][x % 16];
+    for (name, at) in [("logo-white.png", &flat as &dyn Fn(usize, usize) -> u8), ("logo-gold.png", &soft)] {
+        let art = read(&[saved(name, at)], &usual);
+        assert_eq!(art.layers.len(), 1, "{name}: {:?}", art.notes);
+        assert!(art.notes.iter().any(|note| note.contains("because of its name; rename it")), "{name}");
+    }
 }
 
 #[test]

@@ -1,0 +1,90 @@
+//! Ghostscript's command line, and which of its two interpreters reads a PDF.
+//!
+//! Problem: layers of art and print queues must draw a document alike. Ghostscript 9.56 to 10.01 have two interpreters of
+//! PDF. The usual one of 10.00 refuses every shading by a function of two variables (`ShadingType 1`) that has no matrix of
+//! its own, which is how browsers write gradients that repeat, turn, or end within their shape. What is filled with it is
+//! missing, Ghostscript ends well, and with `-q` it says nothing of it.
+//! Method: one function begins every command. `-q` holds for the start only, so that the interpreter says at its end what it
+//! left out. If that is a pattern, the document is tried with the older interpreter, which draws it unless it has complaints
+//! of its own ([`complaint`](super::complaint)). Versions with one interpreter ignore the option and complain again.
+//! Cost: a second draft of documents that lack a pattern; of others none. Limits: the older interpreter compares the
+//! corners of a shading first, so narrow stripes may become one colour; a note says so.
+
+use std::ffi::OsStr;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use super::complaint;
+use crate::process::{self, Process};
+use crate::scratch::Scratch;
+
+/// Memory for a page's bands in bytes: with less, Ghostscript reads its list of objects once for each of many bands.
+const BANDS: usize = 100_000_000;
+
+/// Lets the interpreter of PDF say what it left out. The greeting and the loading of Ghostscript's own files stay quiet.
+const SPEAKS: &str = "userdict /QUIET false put";
+
+/// Ghostscript's interpreter of PDF.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Interpreter {
+    /// The one that this version of Ghostscript prefers.
+    #[default]
+    Usual,
+    /// The one before it, where there are two.
+    Older,
+}
+
+/// A command that draws a document with these options, among them the device and where its output goes. Files of its own
+/// are in `folder`, where it leaves them behind when it is stopped. Its complaints go to the standard error.
+pub fn command<O: AsRef<OsStr>>(
+    path: &Path,
+    interpreter: Interpreter,
+    folder: &Path,
+    options: impl IntoIterator<Item = O>,
+) -> Command {
+    let mut command = Command::new("gs");
+    command
+        .env("TMPDIR", folder)
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
+        .arg(format!("-dBufferSpace={BANDS}"));
+    if interpreter == Interpreter::Older {
+        command.arg("-dNEWPDF=false");
+    }
+    // What the options run needs the device.
+    command.args(options).args(["-c", SPEAKS, "-f"]).arg(path);
+    command
+}
+
+/// The interpreter that draws most of a PDF, found without drawing it.
+pub fn interpreter(path: &Path) -> Interpreter {
+    let said = |interpreter| {
+        let folder = Scratch::new().ok()?;
+        let mut command = command(path, interpreter, folder.path(), ["-sDEVICE=nullpage", "-r72"]);
+        let process = Process::start(command.stdout(Stdio::null()), process::limit()).ok()?;
+        process.end(|| false).ok()
+    };
+    // Whoever draws the document tells why that fails.
+    let Some(usual) = said(Interpreter::Usual).filter(|usual| complaint::lacks_pattern(usual)) else {
+        return Interpreter::Usual;
+    };
+    match said(Interpreter::Older) {
+        Some(older) if complaint::is_better(&older, &usual) => Interpreter::Older,
+        _ => Interpreter::Usual,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_has_memory_for_bands_and_ends_with_the_document() {
+        for (interpreter, older) in [(Interpreter::Usual, false), (Interpreter::Older, true)] {
+            let command = command(Path::new("a.pdf"), interpreter, Path::new("f"), ["-r600", "-c", "x"]);
+            let args: Vec<&str> = command.get_args().filter_map(OsStr::to_str).collect();
+            assert!(args.contains(&"-dBufferSpace=100000000") && args.contains(&"-dSAFER"), "{args:?}");
+            assert_eq!(args.contains(&"-dNEWPDF=false"), older, "{args:?}");
+            assert!(args.ends_with(&["-r600", "-c", "x", "-c", SPEAKS, "-f", "a.pdf"]), "{args:?}");
+        }
+    }
+}
