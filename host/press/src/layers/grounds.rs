@@ -206,9 +206,9 @@ impl Grounds {
         Some(Grounds { border })
     }
 
-    /// The solid of a shape: the nearest that it does not lie on, and, if it is `thin`, that is seen as its colour; if it hardly differs from what
-    /// it lies on, only of the mild ones, and none if nobody can tell them apart.
-    pub(super) fn solid(&self, root: u32, shape: &Shape, thin: bool) -> Option<u8> {
+    /// The solid of a shape: the nearest that it does not lie on, and, if it `stands` for the colour alone, that is seen as it; if the shape hardly
+    /// differs from what it lies on, only of the mild ones, and none if nobody can tell them apart.
+    pub(super) fn solid(&self, root: u32, shape: &Shape, stands: bool) -> Option<u8> {
         let Border { all, stacks, faint_on, lost_on, faint, hidden } = &self.border[root as usize];
         let all = (*all).max(1);
         if 2 * hidden >= all {
@@ -216,7 +216,7 @@ impl Grounds {
         }
         let allowed = if 2 * faint >= all { shape.mild } else { u8::MAX };
         let free = || (0..CHOICES).filter(|&at| allowed >> at & 1 == 1 && 2 * stacks[at] < all);
-        let seen = match thin {
+        let seen = match stands {
             true => {
                 free().find(|&at| 2 * faint_on[at] < all).or_else(|| free().find(|&at| 2 * lost_on[at] < all))
             }

@@ -103,14 +103,15 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
     let is_pale = |colour: u8| matches!(of(colour), Some(Treatment::Shape(shape)) if !shape.dark);
     let takes_part = |run: &Run| is_pale(run.colour) && is_thin(run.root);
     let lies = lies(flat, width, treatments, (runs, rows), takes_part);
-    let solid = |root: u32, shape: &Shape, thin: bool| {
+    // What is only the rim of a pale shape does not stand for it.
+    let solid = |root: u32, shape: &Shape, stands: bool| {
         if lies.get(&root) == Some(&Lies::OnInk) {
             // A pale disc as small as a letter is no letter.
             let run = &runs[root as usize];
-            let stands = shape.bare || run.side < STROKE || is_text(flat, run) || is_of_word(root);
-            return stands.then_some(PAPER);
+            let is_fine = shape.bare || run.side < STROKE || is_text(flat, run) || is_of_word(root);
+            return is_fine.then_some(PAPER);
         }
-        grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape, thin))
+        grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape, stands))
     };
     let pale = PaleLines { flat, width, treatments };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
@@ -121,7 +122,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
             };
             let (thin, first, is_small) = (is_thin(root), shape.solids[0], small[root as usize]);
             let (start, end) = (run.start as usize, run.end as usize);
-            match solid(root, &shape, thin) {
+            match solid(root, &shape, thin && shape.dark) {
                 Some(solid) if thin && (shape.dark || solid != first) => fixed[start..end].fill(solid),
                 Some(solid) if solid > PAPER && (shape.dark || thin) => {
                     let side = runs[root as usize].side;

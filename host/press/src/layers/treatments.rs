@@ -357,8 +357,8 @@ mod tests {
         drawn.fit((printable, solids), space.clone(), &Settings::default(), &Silent).unwrap()
     }
 
-    /// A ground with a bar of another colour, seven dots wide: what each is printed as in the middle.
-    fn printed(fit: &mut Fit, solids: &Solids<'_>, kind: Kind, [ground, bar]: [[u8; 3]; 2]) -> [u8; 2] {
+    /// A ground with a bar of another colour, seven dots wide: what each is printed as in the middle, and the bar at its edge.
+    fn printed(fit: &mut Fit, solids: &Solids<'_>, kind: Kind, [ground, bar]: [[u8; 3]; 2]) -> [u8; 3] {
         let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
         let mut number = |kind: Kind, rgb: [u8; 3]| {
             let plain = colours.iter().position(|&(_, known)| known == rgb);
@@ -373,7 +373,7 @@ mod tests {
         let flat = Flat { colours, index };
         let (treatments, looks) = treatments(&flat, 60, fit, solids, None::<fn(usize) -> [u8; 3]>);
         let fixed = fixed(&flat, 60, &treatments, &looks);
-        [fixed[25 * 60 + 5], fixed[25 * 60 + 23]]
+        [5, 23, 20].map(|x| fixed[25 * 60 + x])
     }
 
     #[test]
@@ -390,7 +390,7 @@ mod tests {
         for &ground in &colours {
             for &bar in colours.iter().filter(|&&bar| difference(light(bar), light(ground)) > 0.1) {
                 for kind in [Kind::Text, Kind::Drawing] {
-                    let [under, over] = printed(&mut fit, &solids, kind, [ground, bar]);
+                    let [under, over, _] = printed(&mut fit, &solids, kind, [ground, bar]);
                     if over != TONE {
                         solid += 1;
                         if under == over {
@@ -433,14 +433,22 @@ mod tests {
         let (printable, space) = process_inks();
         let solids = Solids::new(&printable, &space);
         let mut fit = fit(&printable, &solids, &space);
-        for pale in [[255, 242, 204], [255, 217, 178], [237, 190, 213], [225, 190, 237], [173, 217, 195]] {
+        for pale in [
+            [255, 242, 204],
+            [255, 217, 178],
+            [237, 190, 213],
+            [225, 190, 237],
+            [173, 217, 195],
+            [204, 204, 255],
+        ] {
             let (nearest, ..) = alone(pale, &mut fit, &solids);
             assert_ne!(nearest, "K", "{pale:?}");
-            let [under, middle] = printed(&mut fit, &solids, Kind::Text, [[255; 3], pale]);
+            let [under, middle, edge] = printed(&mut fit, &solids, Kind::Text, [[255; 3], pale]);
             assert_eq!((under, middle), (0, TONE), "{pale:?}");
+            assert!(edge != TONE && edge > 0, "{pale:?} has no edge");
         }
         // Pale, but an ink is much nearer than paper.
-        let [_, over] = printed(&mut fit, &solids, Kind::Text, [[255; 3], [255, 240, 120]]);
+        let [_, over, _] = printed(&mut fit, &solids, Kind::Text, [[255; 3], [255, 240, 120]]);
         assert_eq!(fit.stacks[usize::from(over)].to_string(), "Y");
     }
 
@@ -455,7 +463,7 @@ mod tests {
             ([34, 150, 94], [33, 151, 95]),
             ([90, 122, 153], [90, 122, 153]),
         ] {
-            let [_, over] = printed(&mut fit, &solids, Kind::Text, [ground, text]);
+            let [_, over, _] = printed(&mut fit, &solids, Kind::Text, [ground, text]);
             assert_eq!(over, TONE, "{text:?} on {ground:?}");
         }
     }
@@ -468,11 +476,11 @@ mod tests {
         let mut fit = fit(&printable, &solids, &space);
         for kind in [Kind::Text, Kind::Drawing] {
             for dark in [[32; 3], [51; 3], [28, 8, 8], [74, 13, 13], [10, 58, 10], [92, 74, 36]] {
-                let [_, over] = printed(&mut fit, &solids, kind, [[0; 3], dark]);
+                let [_, over, _] = printed(&mut fit, &solids, kind, [[0; 3], dark]);
                 assert!(over == TONE || fit.stacks[usize::from(over)].to_string() == "K", "{dark:?}: {over}");
             }
             // Dark red on red is black.
-            let [_, over] = printed(&mut fit, &solids, kind, [[255, 0, 0], [192, 0, 0]]);
+            let [_, over, _] = printed(&mut fit, &solids, kind, [[255, 0, 0], [192, 0, 0]]);
             assert!(over != TONE && fit.stacks[usize::from(over)].to_string() == "K", "{over}");
             // Halfway it is read by the contrast.
             assert_eq!(printed(&mut fit, &solids, kind, [[0; 3], [138; 3]])[1], 0);
@@ -527,7 +535,7 @@ mod tests {
         for nearly in [2, 5, 10] {
             for kind in [Kind::Text, Kind::Drawing] {
                 let printed = printed(&mut fit, &solids, kind, [[0; 3], [nearly; 3]]);
-                assert_eq!(printed.map(Some), [black; 2], "{nearly} on black");
+                assert_eq!(printed.map(Some), [black; 3], "{nearly} on black");
             }
         }
         // A ground that is nearly white has no specks, and a tint of five hundredths of a stack is one.
