@@ -23,6 +23,7 @@ use super::error::LayersError;
 use super::flat::{BLACK, Flat, INKED, TONE, is_tone, split};
 use super::intent::Intent;
 use super::lattice::{Lattice, Nodes, ends, step, with_tints};
+use super::looks::Looks;
 use super::outline;
 use super::solids::Solids;
 use super::treatments::treatments;
@@ -165,7 +166,8 @@ impl Colour {
         }
         let mut fit = self.fit((&printable, &solids), space, settings, observer)?;
         let fixed = (!self.flat.index.is_empty()).then(|| {
-            let (treatments, looks) = treatments(&self.flat, dots.0, &mut fit, &solids, self.tones(dots));
+            let treatments = treatments(&self.flat, dots.0, &mut fit, &solids);
+            let looks = Looks::of(&self.flat, &treatments, &fit.stacks, &solids, self.tones(dots));
             outline::fixed(&self.flat, dots.0, &treatments, &looks)
         });
         let fixed = match fixed {
@@ -542,8 +544,7 @@ mod tests {
         let solids = Solids::new(&printable, &space);
         let mut fit =
             colour.fit((&printable, &solids), space.clone(), &Settings::default(), &Silent).unwrap();
-        let (treatments, _) =
-            treatments(&colour.flat, pixels.len(), &mut fit, &solids, colour.tones((pixels.len(), 1)));
+        let treatments = treatments(&colour.flat, pixels.len(), &mut fit, &solids);
         let found = |rgb: [u8; 3]| {
             let at = colour.flat.colours.iter().position(|(_, colour)| *colour == rgb).unwrap();
             match treatments[at] {

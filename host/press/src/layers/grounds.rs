@@ -10,9 +10,10 @@ use std::ops::RangeInclusive;
 
 use super::flat::{Flat, INKED, is_tone, similar};
 use super::kinds::Kind;
+use super::looks::{Looks, Seen, is_faint, is_hidden};
 use super::shapes::{Run, continues};
 use super::softened::along;
-use super::treatments::{CHOICES, Looks, Seen, Shape, Treatment, is_faint, is_hidden};
+use super::treatments::{CHOICES, Shape, Treatment};
 
 /// The least share of the border of what lies on ink, and of what lies on another colour.
 const ON_INK: f64 = 7.0 / 8.0;

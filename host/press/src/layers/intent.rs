@@ -5,7 +5,7 @@
 //! Method: red, green and blue are relative to paper and black, so black, white and all greys are printable. What mixtures
 //! of stacks reach is the convex hull of their colours in linear light. Both intents work in Oklab and keep the hue.
 //! [`Intent::Colorimetric`] keeps printable colours and takes others to the nearest printable colour of their hue.
-//! [`Intent::Perceptual`] moves every colour along the ray from a grey, a middle one for saturated colours and one as light as the colour for what is
+//! [`Intent::Perceptual`] moves every colour along the ray from a grey, a middle one for saturated colours and one nearly as light as the colour for what is
 //! nearly grey: pale colours stay pale. Up to [`KNEE`] of the way to the hull nothing
 //! changes; from there to the surface of sRGB, a hyperbola brings it to the surface of the hull. It starts with slope 1 and
 //! never becomes level, so what differs in the picture differs in print.
@@ -33,7 +33,9 @@ pub enum Intent {
 
 /// Lightness of the grey that rays to saturated colours start from.
 const MIDDLE: f64 = 0.6;
-/// The chroma of which rays start halfway between that and the lightness of the colour itself.
+/// How far from that to the lightness of the colour itself the grey of colours that are nearly grey is. With all of it pale skies would be grey.
+const AS_LIGHT: f64 = 0.8;
+/// The chroma at which it is half as far.
 const SATURATED: f64 = 0.15;
 /// Part of the way to the hull on which the perceptual intent changes nothing.
 const KNEE: f64 = 0.7;
@@ -113,7 +115,7 @@ impl Hull {
     fn compressed(&self, colour: Light) -> Light {
         let to = oklab(colour);
         let saturation = to[1].hypot(to[2]) / SATURATED;
-        let grey = MIDDLE + (to[0] - MIDDLE) / (1.0 + saturation * saturation);
+        let grey = MIDDLE + AS_LIGHT * (to[0] - MIDDLE) / (1.0 + saturation * saturation);
         let ray = Ray { from: [grey, 0.0, 0.0], to };
         if ray.length() < 1e-6 {
             return colour;

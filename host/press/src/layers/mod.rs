@@ -27,6 +27,7 @@ mod islands;
 pub mod kinds;
 mod lattice;
 mod lines;
+mod looks;
 mod masks;
 pub mod names;
 mod numbered;

@@ -26,9 +26,10 @@ use super::flat::{Flat, TONE};
 use super::grounds::{Grounds, Lies, PAPER, lies, steps};
 use super::kinds::Kind;
 use super::lines::lines;
+use super::looks::Looks;
 use super::pieces::pieces;
 use super::shapes::{Run, shapes};
-use super::treatments::{Looks, Shape, Treatment};
+use super::treatments::{Shape, Treatment};
 use super::words::{Words, near};
 
 /// A thin line is narrower than this many dots: about three clusters of eight dots.

@@ -10,8 +10,9 @@
 
 use super::colour::Fit;
 use super::flat::Flat;
-use super::intent::{Light, difference, difference_in_hue, oklab};
+use super::intent::{Light, difference, difference_in_hue};
 use super::kinds::K_OF_PICTURES;
+use super::looks::apart;
 use super::solids::Solids;
 
 /// A flat colour is printed as a stack that differs from its mixture by at most so much in Oklab; 0.02 is barely visible. Two
@@ -21,21 +22,11 @@ const SAME: f64 = 0.05;
 const SAME_HUE: f64 = 0.02;
 /// A colour that differs from paper by at most so much is paper: nobody sees the difference, but everybody the specks.
 const BARE: f64 = 0.01;
-/// A stack stands for a colour on a ground if it differs from the ground in the colour's way, by at least this part of it, and by at most so many
-/// times as much. On a ground that has cells of the same stack letters are read by lightness: where most of the difference is that, it is at least
-/// that part of it.
-const CONTRAST: f64 = 0.5;
-const GLARING: f64 = 3.0;
-const READ: f64 = 2.0 / 3.0;
-/// Where no stack does, one that differs by so much: what is lighter than its ground is never printed darker than it.
-const TRACE: f64 = 0.15;
-/// Colours of sRGB that differ by more can be told apart where they touch, in light of which the screen reflects so much by itself: the
-/// viewing flare of IEC 61966-2-1. Without it 2 of 255 is as far from black as light grey is from white.
-const APART: f64 = 0.05;
-const FLARE: f64 = 0.01;
 /// A stack that differs from a colour by at most so much looks about like it: dark grey as K, dark red as M+Y; not 50 % grey as K, nor orange
 /// as M+Y.
 const NEAR: f64 = 0.1;
+/// Colours of sRGB that differ by more can be told apart where they touch.
+const APART: f64 = 0.05;
 /// Least weight of a stack in the mixture of a colour that the stack may stand for, and least part of the mixture's ink.
 const NEARLY: f64 = 1.0 / 8.0;
 /// The same where no other is seen.
@@ -46,10 +37,6 @@ const LEAST: f64 = 1.0 / 32.0;
 const AS_NEAR: f64 = 2.0;
 /// A light colour is pale if its nearest stack is more than so many times farther from it than paper.
 const PALE: f64 = 4.0 / 3.0;
-/// Colours that differ by less hardly do.
-const FAINT: f64 = 0.25;
-/// And by less, not at all: text in the colour of its ground.
-const HIDDEN: f64 = 0.02;
 /// What hue and chroma count against lightness where a stack stands for a colour: darker letters are still of their colour, others are not.
 const HUE: f64 = 2.5;
 /// How far in hue and chroma such a stack may be: so far, and so many times the colour's own chroma more. Letters in a grey with a little blue
@@ -86,84 +73,9 @@ pub(super) struct Shape {
     pub rank: u8,
 }
 
-/// How colours look, in Oklab: what stands for a colour must be seen on its ground as the colour would be.
-#[derive(Default)]
-pub(super) struct Looks<'a> {
-    /// Each flat colour as a screen shows it, and what is printed for it as an area.
-    asked: Vec<[f64; 3]>,
-    printed: Vec<[f64; 3]>,
-    /// The stacks of whose cells most of that is made, if it is screened.
-    cells: Vec<Option<[u8; CHOICES]>>,
-    /// Of each stack.
-    stacks: Vec<[f64; 3]>,
-    /// Of each dot that is a tone its colour, and both of these.
-    tone: Option<Box<Tone<'a>>>,
-}
-
-type Tone<'a> = dyn Fn(usize) -> ([u8; 3], [[f64; 3]; 2]) + Sync + 'a;
-
-impl Looks<'_> {
-    pub fn has_tones(&self) -> bool {
-        self.tone.is_some()
-    }
-
-    /// How each of these stacks would be seen on a tone beside the colour that it stands for; and the tone.
-    pub fn seen_on_tone(
-        &self,
-        own: u8,
-        at: usize,
-        stacks: [u8; CHOICES],
-    ) -> Option<([Seen; CHOICES], [u8; 3])> {
-        let (colour, ground) = self.tone.as_ref()?(at);
-        Some((stacks.map(|stack| self.seen_on(own, ground, stack, false)), colour))
-    }
-
-    /// How a stack that stands for a colour would be seen on a flat colour beside it.
-    pub fn seen(&self, own: u8, beside: u8, stack: u8) -> Seen {
-        let ground = usize::from(beside);
-        let is_cell = matches!(self.cells.get(ground), Some(Some(cells)) if cells.contains(&stack));
-        let ground = self.asked.get(ground).zip(self.printed.get(ground));
-        ground.map_or(Seen::AsAsked, |(&asked, &printed)| self.seen_on(own, [asked, printed], stack, is_cell))
-    }
-
-    fn seen_on(&self, own: u8, [asked, printed]: [[f64; 3]; 2], stack: u8, is_cell: bool) -> Seen {
-        let Some((own, stack)) = self.asked.get(usize::from(own)).zip(self.stacks.get(usize::from(stack)))
-        else {
-            return Seen::AsAsked;
-        };
-        let way: [f64; 3] = std::array::from_fn(|i| own[i] - asked[i]);
-        let found: [f64; 3] = std::array::from_fn(|i| stack[i] - printed[i]);
-        let whole: f64 = way.iter().map(|v| v * v).sum();
-        let along = (0..3).map(|i| way[i] * found[i]).sum::<f64>() / whole;
-        let is_read = !is_cell || 2.0 * way[0] * way[0] < whole || found[0] / way[0] >= READ;
-        match along {
-            CONTRAST..=GLARING if is_read => Seen::AsAsked,
-            TRACE..=GLARING => Seen::Faintly,
-            _ => Seen::Otherwise,
-        }
-    }
-}
-
-/// How a stack is seen that stands for a colour.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Seen {
-    /// As the colour would be, or a little more.
-    AsAsked,
-    /// Hardly.
-    Faintly,
-    /// Not at all, the other way, or far too much.
-    Otherwise,
-}
-
-/// How each flat colour is printed, from the weights of the stacks in its mixture, and how it looks. Stacks that colours name and nothing else
-/// uses are added to the mix. `tone` tells the colour of a dot that is a tone.
-pub(super) fn treatments<'a>(
-    flat: &Flat,
-    width: usize,
-    fit: &mut Fit,
-    solids: &'a Solids<'a>,
-    tone: Option<impl Fn(usize) -> [u8; 3] + Sync + 'a>,
-) -> (Vec<Treatment>, Looks<'a>) {
+/// How each flat colour is printed, from the weights of the stacks in its mixture. Stacks that colours name and nothing else
+/// uses are added to the mix.
+pub(super) fn treatments(flat: &Flat, width: usize, fit: &mut Fit, solids: &Solids<'_>) -> Vec<Treatment> {
     let bodies: Vec<Light> = fit.stacks.iter().map(|stack| solids.body(stack)).collect();
     let found: Vec<Found> =
         flat.colours.iter().map(|&(_, colour)| Found::of(colour, fit, &bodies, solids)).collect();
@@ -178,27 +90,7 @@ pub(super) fn treatments<'a>(
         }
         _ => Treatment::Solid(found[at].stack),
     };
-    let treatments: Vec<Treatment> = (0..found.len()).map(treatment).collect();
-    let stacks: Vec<[f64; 3]> = fit.stacks.iter().map(|stack| oklab(solids.body(stack))).collect();
-    let asked = flat.colours.iter().map(|&(_, colour)| oklab(shown(colour))).collect();
-    let printed = treatments.iter().zip(&flat.colours).map(|(treatment, &(_, colour))| match treatment {
-        Treatment::Solid(stack) => stacks[usize::from(*stack)],
-        Treatment::Shape(_) => oklab(solids.wanted(colour)),
-    });
-    let printed = printed.collect();
-    let tone = tone.map(|tone| {
-        let look = move |at: usize| {
-            let colour = tone(at);
-            (colour, [oklab(shown(colour)), oklab(solids.wanted(colour))])
-        };
-        Box::new(look) as Box<Tone<'a>>
-    });
-    let cells = treatments.iter().map(|treatment| match treatment {
-        Treatment::Shape(shape) => Some(shape.solids),
-        Treatment::Solid(_) => None,
-    });
-    let cells = cells.collect();
-    (treatments, Looks { asked, printed, cells, stacks, tone })
+    (0..found.len()).map(treatment).collect()
 }
 
 /// What the inks make of a flat colour.
@@ -286,26 +178,6 @@ fn luminance([r, g, b]: Light) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// The light of a colour as a screen shows it.
-fn shown(colour: [u8; 3]) -> Light {
-    colour.map(|v| (f64::from(appearance::srgb::decode(f32::from(v) / 255.0)) + FLARE) / (1.0 + FLARE))
-}
-
-/// How far two colours are apart as a screen shows them.
-pub(super) fn apart(a: [u8; 3], b: [u8; 3]) -> f64 {
-    difference(shown(a), shown(b))
-}
-
-/// Whether colours hardly differ as a screen shows them.
-pub(super) fn is_faint(a: [u8; 3], b: [u8; 3]) -> bool {
-    apart(a, b) < FAINT
-}
-
-/// Whether nobody can tell two colours apart on a screen.
-pub(super) fn is_hidden(a: [u8; 3], b: [u8; 3]) -> bool {
-    apart(a, b) < HIDDEN
-}
-
 /// The colours that may not be printed as their stack, because a colour that can be told from them is printed as it beside
 /// them.
 fn parted(flat: &Flat, width: usize, found: &[Found], rank: &[u8]) -> Vec<bool> {
@@ -336,7 +208,9 @@ mod tests {
     use super::super::colour::Colour;
     use super::super::compose::Settings;
     use super::super::flat::TONE;
+    use super::super::intent::oklab;
     use super::super::kinds::Kind;
+    use super::super::looks::Looks;
     use super::super::outline::fixed;
     use super::*;
     use appearance::brdf::Space;
@@ -371,7 +245,8 @@ mod tests {
         let inside = |at: usize| (20..27).contains(&(at % 60)) && (10..40).contains(&(at / 60));
         let index = (0..60 * 50).map(|at| if inside(at) { over } else { under }).collect();
         let flat = Flat { colours, index };
-        let (treatments, looks) = treatments(&flat, 60, fit, solids, None::<fn(usize) -> [u8; 3]>);
+        let treatments = treatments(&flat, 60, fit, solids);
+        let looks = Looks::of(&flat, &treatments, &fit.stacks, solids, None::<fn(usize) -> [u8; 3]>);
         let fixed = fixed(&flat, 60, &treatments, &looks);
         [5, 23, 20].map(|x| fixed[25 * 60 + x])
     }
