@@ -5,7 +5,7 @@
 //! Method: a stretch of a row is what lies between white, black and what is no picture. Stretches that touch are one shape. A
 //! shape in exactly one colour is line art: photographs have no such shapes beyond specks, so a colour counts only if its
 //! shapes have [`LEAST`] dots. Shapes in several colours may be flat art ([`posters`](super::posters)), in colours of [`pens`](super::pens) if they are thin, and
-//! small ones in a single colour may be the softened edge of black on white.
+//! small ones in a single colour may be the softened edge of black on white, or what letters enclose of a picture.
 //! Cost: 1 ns a pixel of pictures, 20 ns a stretch. Limits: a speck of another colour makes a picture of a mask, unless both are flat art.
 
 use std::collections::{HashMap, HashSet};
@@ -23,6 +23,12 @@ use crate::forest::Forest;
 
 /// The least dots of a colour in shapes of its own: a square of eight dots.
 const LEAST: u64 = 64;
+
+/// How far beyond the strokes of a letter the ground is that it encloses: strokes of 1 mm, and as much of what softens them.
+const REACH: usize = 48;
+
+/// The ground has so many pixels of its colour in a row.
+const AREA: usize = 8;
 
 /// Softened edges have at least so many colours on a page.
 const SOFTENED: usize = 32;
@@ -66,10 +72,17 @@ impl Masks {
         for at in 0..all.len() {
             all[at].colour = all[roots[at] as usize].colour;
         }
-        let found = flat_art(pixels, width, (&all, roots));
+        let found = flat_art(pixels, width, (&all, &roots));
+        let mut flat = vec![false; all.len()];
+        found.iter().flat_map(|art| &art.stretches).for_each(|&at| flat[at as usize] = true);
+        let mut enclosed = enclosed(pixels, width, (&all, &roots), &flat).into_iter();
+        for (stretch, flat) in all.iter_mut().zip(flat) {
+            if enclosed.next() == Some(true) || flat {
+                stretch.colour = None;
+            }
+        }
         let mut colours = HashMap::new();
-        for Art { stretches, poster } in &found {
-            stretches.iter().for_each(|&at| all[at as usize].colour = None);
+        for Art { poster, .. } in &found {
             for (span, colour) in &poster.spans {
                 *colours.entry(*colour).or_default() += span.len() as u64;
             }
@@ -104,6 +117,37 @@ struct Art {
     poster: Poster,
 }
 
+/// For each stretch whether its shape, in one colour, is what letters enclose of a picture: in most of its rows the picture has the same colour
+/// on both sides. `flat` tells stretches of flat art.
+fn enclosed<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    (all, roots): (&[Stretch], &[u32]),
+    flat: &[bool],
+) -> Vec<bool> {
+    let is_picture = |pixel: usize| {
+        let at = all.partition_point(|stretch| stretch.end <= pixel);
+        all.get(at).is_some_and(|stretch| stretch.start <= pixel && stretch.colour.is_none()) && !flat[at]
+    };
+    let mut balance = vec![0i32; all.len()];
+    for ((stretch, &root), _) in
+        all.iter().zip(roots).zip(flat).filter(|((stretch, _), flat)| stretch.colour.is_some() && !**flat)
+    {
+        let own = &pixels[stretch.start];
+        let row = stretch.start / width * width;
+        // An area, no speck.
+        let like = |area: &[[u8; N]], at: usize| area.iter().all(|pixel| pixel == own) && is_picture(at);
+        let before = row.max(stretch.start.saturating_sub(REACH))..stretch.start;
+        let behind = stretch.end..(stretch.end + REACH).min(row + width);
+        let both = [before, behind].into_iter().all(|side| {
+            let areas = pixels[side.clone()].windows(AREA).zip(side);
+            areas.rev().any(|(area, at)| like(area, at))
+        });
+        balance[root as usize] += if both { 1 } else { -1 };
+    }
+    roots.iter().map(|&root| balance[root as usize] > 0).collect()
+}
+
 /// The pictures amid shapes, by the first stretch of each.
 type Islands<'a> = HashMap<u32, &'a [Range<usize>]>;
 
@@ -111,7 +155,7 @@ type Islands<'a> = HashMap<u32, &'a [Range<usize>]>;
 fn flat_art<const N: usize>(
     pixels: &[[u8; N]],
     width: usize,
-    (all, roots): (&[Stretch], Vec<u32>),
+    (all, roots): (&[Stretch], &[u32]),
 ) -> Vec<Art> {
     let mut order: Vec<u32> = (0..all.len() as u32).collect();
     order.sort_by_key(|&at| roots[at as usize]);
@@ -167,6 +211,11 @@ fn flat_art<const N: usize>(
         }
     }
     let common = posters::common(counts, &areas);
+    let mut is_flat = vec![false; all.len()];
+    found.iter().flat_map(|art| &art.stretches).for_each(|&at| is_flat[at as usize] = true);
+    let enclosed = enclosed(pixels, width, (all, roots), &is_flat);
+    let of_letters: Vec<&[u32]> =
+        of_letters.into_iter().filter(|shape| !enclosed[shape[0] as usize]).collect();
     found.extend(find(&of_letters, &Islands::new(), &common, false));
     let flat: HashMap<u32, &Poster> = found.iter().map(|art| (art.stretches[0], &art.poster)).collect();
     // Text in a colour of its own may be less than what is left over of a large ground.
@@ -250,6 +299,35 @@ fn stretches_of<const N: usize>(row: &[[u8; N]]) -> impl Iterator<Item = Stretch
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// A map of cells in many colours with a black ring in each: what rings enclose is of the picture. A disc beside it is not.
+    #[test]
+    fn what_letters_enclose_of_a_picture_is_no_mask() {
+        const CELL: usize = 48;
+        let width = 7 * CELL;
+        let disc = |x: usize, y: usize| ((x % CELL) as f64 - 23.5).hypot((y % CELL) as f64 - 23.5);
+        let pixels: Vec<[u8; 3]> = (0..width * 6 * CELL)
+            .map(|at| {
+                let (x, y) = (at % width, at / width);
+                let cell = (x / CELL + y / CELL * 6) as u8;
+                let own = [40 + 5 * cell, 200 - 5 * cell, 3 * cell];
+                match (x / CELL, disc(x, y)) {
+                    (6, ..6.0) if y < CELL => [40, 200, 0],
+                    (6, _) => [255; 3],
+                    (_, 6.0..9.0) => [0; 3],
+                    _ => own,
+                }
+            })
+            .collect();
+        let masks = Masks::of(&pixels, width);
+        for (span, _) in masks.stretches() {
+            for at in span {
+                let (x, y) = (at % width, at / width);
+                assert!(x / CELL == 6 && y < CELL, "at {x}, {y}");
+            }
+        }
+        assert_eq!(masks.colours.get(&[40, 200, 0]).copied(), Some(112));
+    }
 
     proptest! {
         #[test]

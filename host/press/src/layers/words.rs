@@ -19,7 +19,7 @@ use crate::forest::Forest;
 pub(super) struct Words {
     /// For each run, the number of the letter it is the root of, or [`NO_LETTER`]. Empty if there is none.
     letter: Vec<u32>,
-    /// For each letter, whether it is thin, and how many letters its word has.
+    /// For each letter, whether it is thin, and how many letters are beside each other there.
     thin: Vec<(bool, usize)>,
 }
 
@@ -66,7 +66,7 @@ impl Words {
         self.word(root).map(|(thin, _)| thin)
     }
 
-    /// The same for words of at least so many letters.
+    /// The same where at least so many letters are beside each other.
     pub(super) fn thin_in_a_word_of(&self, least: usize, root: u32) -> Option<bool> {
         self.word(root).filter(|&(_, letters)| letters >= least).map(|(thin, _)| thin)
     }
@@ -94,47 +94,52 @@ struct Letter {
 const RANGE: u8 = 2;
 /// The space between two words is at most so many strokes of a letter: 4.2 in regular Helvetica, 3 in Times, 2 in bold text.
 const SPACE: u32 = 5;
+/// That between two letters of a word.
+const BESIDE: u32 = 2;
 
 /// The strokes of letters that are decided together with others.
 pub(super) const fn near(limit: u8) -> Range<u8> {
     limit / RANGE..limit.saturating_mul(RANGE)
 }
 
-/// For each letter, whether it is printed as a thin one, under `limit` dots wide, and how many letters its word has. `joined` says whether two colours may be one.
+/// For each letter, whether it is printed as a thin one, under `limit` dots wide, and how many
+/// letters are beside each other there, one after the other. `joined` says whether two colours may be one.
 fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<(bool, usize)> {
     let mut order: Vec<usize> = (0..letters.len()).collect();
     order.sort_by_key(|&at| letters[at].bounds[0]);
-    let mut words = Forest::new(letters.len());
+    let [mut words, mut rows] = [(); 2].map(|()| Forest::new(letters.len()));
     let mut open: Vec<usize> = Vec::new();
     for &at in &order {
         let letter = &letters[at];
         let most = SPACE * 2 * u32::from(limit);
         open.retain(|&other| letters[other].bounds[2] + most > letter.bounds[0]);
         for &other in &open {
-            if joined(letter.colour, letters[other].colour) && belong_together(letter, &letters[other]) {
+            let near = Some(&letters[other]).filter(|other| joined(letter.colour, other.colour));
+            if near.is_some_and(|near| belong_together(letter, near, [SPACE; 2])) {
                 words.join(at as u32, other as u32);
+            }
+            if near.is_some_and(|near| belong_together(letter, near, [BESIDE, 0])) {
+                rows.join(at as u32, other as u32);
             }
         }
         open.push(at);
     }
-    let mut thin_dots = vec![(0i64, 0); letters.len()];
-    let roots = words.roots();
-    for (letter, &root) in letters.iter().zip(&roots) {
-        let (dots, letters) = &mut thin_dots[root as usize];
-        *dots += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
-        *letters += 1;
+    let (mut thin_dots, mut count) = (vec![0i64; letters.len()], vec![0; letters.len()]);
+    let (words, rows) = (words.roots(), rows.roots());
+    for ((letter, &word), &row) in letters.iter().zip(&words).zip(&rows) {
+        thin_dots[word as usize] += if letter.side < limit { 1 } else { -1 } * i64::from(letter.dots);
+        count[row as usize] += 1;
     }
-    let decided = roots.into_iter().map(|root| thin_dots[root as usize]);
-    decided.map(|(dots, letters)| (dots > 0, letters)).collect()
+    words.iter().zip(rows).map(|(&word, row)| (thin_dots[word as usize] > 0, count[row as usize])).collect()
 }
 
-/// Whether two letters are near each other, and their strokes alike: within a half.
-fn belong_together(a: &Letter, b: &Letter) -> bool {
+/// Whether two letters are at most so many strokes apart, across and down, and their strokes alike: within a half.
+fn belong_together(a: &Letter, b: &Letter, space: [u32; 2]) -> bool {
     let (thinner, wider) = (u32::from(a.side.min(b.side)), u32::from(a.side.max(b.side)));
     let gap = |low: usize, high: usize| {
         a.bounds[low].max(b.bounds[low]).saturating_sub(a.bounds[high].min(b.bounds[high]))
     };
-    2 * wider <= 3 * thinner && gap(0, 2).max(gap(1, 3)) <= SPACE * wider
+    2 * wider <= 3 * thinner && gap(0, 2) <= space[0] * wider && gap(1, 3) <= space[1] * wider
 }
 
 #[cfg(test)]
@@ -165,6 +170,17 @@ mod tests {
         let backwards: Vec<Letter> =
             (0..4).rev().map(|at| letter(120 * at, 0, [25, 22, 21, 23][at as usize])).collect();
         assert_eq!(decided(&backwards), [true; 4]);
+    }
+
+    #[test]
+    fn letters_beside_each_other_are_a_row_and_arrows_in_a_field_are_none() {
+        let rows = |across: u32, down: u32| {
+            let letters: Vec<Letter> = (0..4).map(|at| letter((100 + across) * at, down * at, 12)).collect();
+            thin(&letters, LIMIT, |a, b| a == b).into_iter().map(|(_, row)| row).collect::<Vec<_>>()
+        };
+        assert_eq!(rows(24, 0), [4; 4]);
+        assert_eq!(rows(25, 0), [1; 4]);
+        assert_eq!(rows(10, 141), [1; 4]);
     }
 
     #[test]
