@@ -38,8 +38,9 @@ const STEPS: usize = 8;
 /// At most this part of the pixels is neither a main colour nor between two; of thin lines, where they cross in three colours.
 const STRAY: f64 = 0.01;
 const STRAY_THIN: f64 = 0.1;
-/// At most this part of the pixels is of pictures.
+/// At most this part of the pixels is of pictures, and at most that part seems to be of neither a picture nor flat art while they are looked at.
 const ISLANDS: f64 = 0.5;
+const ALONE: f64 = 2.0 * STRAY;
 /// The strokes of a small shape are black, and not grey, if at least one in so many pixels is nearly so.
 const DARK: u64 = 20;
 /// The most times that pictures are enlarged where edges are looked for.
@@ -110,6 +111,8 @@ pub(super) fn poster<const N: usize>(
     let edges = Edges { pixels, width, colours: &colours, of_shape, thin: &thin, meant: &meant, enlarged };
     let (mut spans, mut strays): (Vec<Span>, Vec<usize>) = (Vec::new(), Vec::new());
     let has_islands = !all_thin && !is_small;
+    // Strays of pictures lie in rows, and those of edges that no two colours explain are one or two.
+    let mut in_rows = 0;
     let share = if all_thin { STRAY_THIN } else { STRAY };
     let most = if has_islands { ISLANDS } else { share } * total as f64;
     for stretch in stretches {
@@ -124,8 +127,12 @@ pub(super) fn poster<const N: usize>(
                 continue;
             }
             for at in all {
-                let colour = edges.colour(at, known);
-                strays.extend(colour.is_none().then_some(at));
+                let colour = edges.colour(at, known, strays.len() as f64 <= share * total as f64);
+                if colour.is_none() {
+                    let third = strays.len().checked_sub(2 * enlarged).map(|third| strays[third]);
+                    in_rows += usize::from(third == at.checked_sub(2 * enlarged));
+                    strays.push(at);
+                }
                 let nearest =
                     || colours.iter().copied().min_by_key(|&known| apart(known, own)).unwrap_or(own);
                 push(
@@ -134,7 +141,8 @@ pub(super) fn poster<const N: usize>(
                     colour.unwrap_or_else(|| if all_thin { nearest() } else { own }),
                 );
             }
-            if strays.len() as f64 > most {
+            let alone = strays.len().saturating_sub(3 * in_rows);
+            if strays.len() as f64 > most || has_islands && alone as f64 > ALONE * total as f64 {
                 return None;
             }
         }
@@ -158,7 +166,7 @@ pub(super) fn poster<const N: usize>(
             .flat_map(|(span, colour)| {
                 let first = strays.partition_point(|&at| at < span.start);
                 let is_stray = strays.get(first) == Some(&span.start);
-                let colour_of = |at| edges.colour(at, None).unwrap_or(colour);
+                let colour_of = |at| edges.colour(at, None, true).unwrap_or(colour);
                 match is_stray {
                     true => span.map(|at| (at..at + 1, colour_of(at))).collect(),
                     false => vec![(span, colour)],

@@ -139,13 +139,17 @@ pub(super) fn along(own: [u8; 3], from: [u8; 3], to: [u8; 3]) -> Option<(f32, f3
 }
 
 impl<const N: usize> Edges<'_, N> {
-    /// The colour that a pixel belongs to; `known` is the number of its own, if that is a thin one.
-    pub fn colour(&self, at: usize, known: Option<usize>) -> Option<[u8; 3]> {
+    /// The colour that a pixel belongs to; `known` is the number of its own, if that is a thin one. Ripples of edges farther away take long to find.
+    pub fn colour(&self, at: usize, known: Option<usize>, ripples: bool) -> Option<[u8; 3]> {
         let own = split(&self.pixels[at]).1;
         if let Some(known) = known.filter(|_| self.is_in_a_square(at)) {
             return Some(self.colours[self.meant[known]]);
         }
         let (near, far) = (self.near(at, REACH), LazyCell::new(|| self.near(at, RIPPLES)));
+        // A ripple is like the colour beside the edge.
+        if known.is_none() && !near.contains(&true) {
+            return None;
+        }
         // Filters that sharpen leave ripples farther from edges. The ground is more frequent.
         let beyond = |wide: bool| {
             let found = self.between(own, &far, (wide, known))?;
@@ -153,10 +157,9 @@ impl<const N: usize> Edges<'_, N> {
             let of_ink = near[more.max(less)] && !near[more.min(less)];
             (of_ink || known.is_none() && share <= BEYOND).then_some(found)
         };
-        let found = [true, false]
-            .into_iter()
-            .filter(|&wide| wide || known.is_none())
-            .find_map(|wide| self.between(own, &near, (wide, known)).or_else(|| beyond(wide)));
+        let found = [true, false].into_iter().filter(|&wide| wide || known.is_none()).find_map(|wide| {
+            self.between(own, &near, (wide, known)).or_else(|| if ripples { beyond(wide) } else { None })
+        });
         let Some((more, less, share)) = found else {
             return known.map(|_| own);
         };
