@@ -4,11 +4,11 @@
 //! Method: what hangs together is looked at as a whole. Its main colours are those that cover most of it in stretches of two
 //! pixels or more; of colours that follow each other in a shading (they touch) only one counts. A pixel of another colour is a
 //! [softened](super::softened) edge between two main colours, white and black among them: it becomes the nearer one. The whole is flat
-//! art if hardly any pixel is neither, and if its colours are not the steps of one shading. What is small, a letter or what is softened between black and white, may have the colours that
+//! art if hardly any pixel is neither, but for [pictures amid it](super::islands), and if its colours are not the steps of one shading. What is small, a letter or what is softened between black and white, may have the colours that
 //! small shapes have in common. A colour that is nowhere three pixels wide and lies between two others may be an edge itself.
 //! Cost: 3 ns a pixel of such art, more for its softened edges; photographs are given up after some thousand colours. Colours
 //! that are nearly alike cost another pass.
-//! Limits: [`MOST`] colours; what is joined to a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
+//! Limits: [`MOST`] colours; what fades into a photograph, or has the noise of JPEG, stays a picture, and so does all that is joined to
 //! text on a ground that is hardly apart from it.
 
 use std::cell::LazyCell;
@@ -160,7 +160,7 @@ pub(super) fn poster<const N: usize>(
         {
             return None;
         }
-        // Letters may be so thin that none of their colours is near.
+        // Letters may be so thin that none of their pixels has their colour.
         let edges = Edges { of_shape: WHITE_AND_BLACK.len(), ..edges };
         spans = without(&spans, &islands)
             .flat_map(|(span, colour)| {
