@@ -45,6 +45,8 @@ const ALONE: f64 = 2.0 * STRAY;
 const DARK: u64 = 20;
 /// The most times that pictures are enlarged where edges are looked for.
 pub(super) const MOST_ENLARGED: usize = 4;
+/// What is nearly white or black differs from it by more than this in red, green or blue if anybody is to see it.
+const UNSEEN: u8 = 3;
 /// The first two main colours.
 pub(super) const WHITE_AND_BLACK: [[u8; 3]; 2] = [[255; 3], [0; 3]];
 
@@ -245,13 +247,22 @@ fn main_colours<const N: usize>(
     let mut found: Vec<([u8; 3], u64)> = found.into_iter().filter(|&(_, dots)| dots >= LEAST).collect();
     found.sort_unstable_by_key(|&(colour, dots)| (std::cmp::Reverse(dots), colour));
     let (mut colours, mut covered) = (WHITE_AND_BLACK.to_vec(), 0);
-    // White and black may be beside the art without being of it. Nearly white and nearly black are main colours in their place.
+    // White and black may be beside the art without being of it. Nearly white and nearly black are main colours in their place, or beside them where
+    // the art touches them: the edge of a disc in pale grey with a rim is softened to white.
     let mut own = [false; 2];
     let mut shading = None;
     for &(colour, dots) in &found {
         match colours.iter().position(|&known| similar(known, colour)) {
             None => colours.push(colour),
-            Some(at) if own.get(at) == Some(&false) => (colours[at], own[at]) = (colour, true),
+            Some(at) if own.get(at) == Some(&false) => {
+                own[at] = true;
+                let is_seen = (0..3).any(|c| colours[at][c].abs_diff(colour[c]) > UNSEEN);
+                if is_seen && touches(pixels, width, stretches, colours[at]) {
+                    colours.push(colour);
+                } else {
+                    colours[at] = colour;
+                }
+            }
             Some(_) => {
                 if shading
                     .get_or_insert_with(|| shades(pixels, width, stretches, &found, widths))
@@ -278,6 +289,18 @@ fn main_colours<const N: usize>(
         }
     }
     (covered as f64 >= COVERED * total as f64 && !is_shaded(pixels, stretches, &colours)).then_some(colours)
+}
+
+/// Whether pixels of a colour lie beside the art.
+fn touches<const N: usize>(
+    pixels: &[[u8; N]],
+    width: usize,
+    stretches: &[Range<usize>],
+    colour: [u8; 3],
+) -> bool {
+    let beside = stretches.iter().flat_map(|stretch| beside(stretch.clone(), width));
+    let like = beside.filter_map(|at| pixels.get(at)).filter(|pixel| split(*pixel).1 == colour);
+    like.take(LEAST as usize).count() == LEAST as usize
 }
 
 /// Whether most of these colours are the steps of one shading: those between the two that are farthest apart are many, and one in three that touch
@@ -461,6 +484,38 @@ mod tests {
             let (panel, disc, share) = at_part(at);
             if (share - 0.5).abs() > 0.05 {
                 assert_eq!(colour, if share > 0.5 { disc } else { panel }, "at {} {}", at % SIDE, at / SIDE);
+            }
+        }
+    }
+
+    /// A disc in a pale grey with a golden rim, on white: the rim is softened to each of them where it meets it.
+    #[test]
+    fn the_edge_of_a_rim_is_of_what_lies_beside_it() {
+        let (gold, grey, white) = ([245, 197, 24], [244; 3], [255; 3]);
+        let far = |at: usize| {
+            let place = |v: usize| v as f64 + 0.5 - SIDE as f64 / 2.0;
+            place(at % SIDE).hypot(place(at / SIDE))
+        };
+        let mixed = |a: [u8; 3], b: [u8; 3], share: f64| -> [u8; 3] {
+            std::array::from_fn(|c| (f64::from(a[c]) * share + f64::from(b[c]) * (1.0 - share)).round() as u8)
+        };
+        let pixel = |at: usize| match far(at) {
+            far @ ..35.0 => mixed(gold, grey, (far - 30.0 + 0.5).clamp(0.0, 1.0)),
+            far => mixed(gold, white, (40.0 - far + 0.5).clamp(0.0, 1.0)),
+        };
+        let pixels: Vec<[u8; 3]> = (0..SIDE * SIDE).map(pixel).collect();
+        let mut stretches: Vec<Range<usize>> = Vec::new();
+        for at in (0..pixels.len()).filter(|&at| pixels[at] != white) {
+            match stretches.last_mut() {
+                Some(last) if last.end == at && at % SIDE > 0 => last.end = at + 1,
+                _ => stretches.push(at..at + 1),
+            }
+        }
+        let found = poster(&pixels, SIDE, &stretches, Known { common: &[], thin: false, enlarged: 1 });
+        for (span, colour) in found.expect("flat art").spans {
+            for at in span {
+                let wanted = if far(at) < 35.0 { [gold, grey] } else { [gold, white] };
+                assert!(wanted.contains(&colour), "{colour:?} at {}, {}", at % SIDE, at / SIDE);
             }
         }
     }
