@@ -299,7 +299,7 @@ fn touches<const N: usize>(
     colour: [u8; 3],
 ) -> bool {
     let beside = stretches.iter().flat_map(|stretch| beside(stretch.clone(), width));
-    let like = beside.filter_map(|at| pixels.get(at)).filter(|pixel| split(*pixel).1 == colour);
+    let like = beside.filter_map(|at| pixels.get(at)).filter(|pixel| split(pixel).1 == colour);
     like.take(LEAST as usize).count() == LEAST as usize
 }
 
