@@ -7,8 +7,10 @@
 //! and any pixel outside a square of four pixels of the same ink, may be an edge. It is the edge of two colours (an ink and
 //! white, or two inks) if both occur near it and its own colour lies on the straight line between them, or slightly beyond
 //! the ends, as sharpening leaves it; it then takes the nearer one. A lone pixel near the colour of a metal is
-//! accidental, and what is exactly in an ink's colour beside its like is a thin line of it. All other pixels are colour for the process inks.
-//! Cost: 2 ns a pixel, and 10 ns more for possible edges. Limits: edges softer than two pixels remain partly colour.
+//! accidental, and what is exactly in an ink's colour beside its like is a thin line of it. So is a line of which no
+//! pixel has the colour, if the ink is no grey and the picture has it elsewhere. All other pixels are colour for the process inks.
+//! Cost: 2 ns a pixel, and 10 ns more for possible edges. Limits: edges softer than two pixels remain partly colour, and thin lines
+//! in a colour between black and gold are gold.
 //! Source of the colours: the vendor's user's guide, English and Japanese editions.
 
 mod classes;
@@ -47,8 +49,9 @@ const TABLE: [Reserved; 6] = [
     reserved(Ink::Black, [0, 0, 0], 8),
 ];
 
-/// An ink that the picture has elsewhere is on at least so many pixels.
+/// An ink that the picture has elsewhere is on at least so many pixels, and its red, green and blue differ by at least so much.
 const LEAST: u64 = 64;
+const COLOURED: u8 = 48;
 
 /// The largest difference that a file's depth and profile make to a pixel drawn in a reserved colour.
 const EXACT: u8 = 2;
@@ -140,7 +143,7 @@ fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, V
     classes.apply(&loose);
     let mut colours = vec![[255; 3]];
     colours.extend(table.iter().map(|entry| entry.colour));
-    let is_accidental = |class: u8, at: usize| {
+    let is_accidental = |class: u8, at: usize, classes: &Classes| {
         let place = usize::from(class & !LOOSE);
         place.checked_sub(1).and_then(|at| table.get(at)).is_some_and(|entry| {
             entry.ink.kind() == Kind::Metallic
@@ -148,32 +151,44 @@ fn classify(pixels: &[[u8; 3]], width: usize, table: &[Reserved]) -> (Classes, V
                 && classes.is_alone(at)
         })
     };
-    let edges = classes.changes(
-        |class| class >= LOOSE,
-        |class, at| {
-            edge(pixels[at], classes.around(at), &colours)
-                .or_else(|| is_accidental(class, at).then_some(OTHER))
-        },
-    );
+    let edges_of = |classes: &Classes| {
+        classes.changes(
+            |class| class >= LOOSE,
+            |class, at| {
+                edge(pixels[at], classes.around(at), &colours)
+                    .or_else(|| is_accidental(class, at, classes).then_some(OTHER))
+            },
+        )
+    };
+    let mut edges = edges_of(&classes);
     classes.apply(&edges);
     let thin = thin_lines(pixels, &classes, &colours);
     classes.apply(&thin);
-    (classes, [edges, thin].concat())
+    if !thin.is_empty() {
+        // Now their ink is near their own softened edges.
+        let beside = edges_of(&classes);
+        classes.apply(&beside);
+        edges = [edges, thin, beside].concat();
+    }
+    (classes, edges)
 }
 
-/// Lines so thin that no pixel has their colour: what is nowhere three pixels wide and lies between a colour near it and that of an ink which the
-/// picture has elsewhere.
+/// Lines so thin that no pixel has their colour: what is nowhere three pixels wide and is more than half an ink that the picture has elsewhere, on a
+/// colour near it. Greys and silver are no such inks: thin lines in grey are grey.
 fn thin_lines(pixels: &[[u8; 3]], classes: &Classes, colours: &[[u8; 3]]) -> Vec<(usize, u8)> {
     let mut counts = [0u64; 256];
     classes.of.iter().for_each(|&class| counts[usize::from(class & !LOOSE)] += 1);
-    let inks: Vec<usize> = (1..colours.len()).filter(|&class| counts[class] >= LEAST).collect();
+    let has_colour = |[r, g, b]: [u8; 3]| r.max(g).max(b) - r.min(g).min(b) >= COLOURED;
+    let is_known = |&class: &usize| counts[class] >= LEAST && has_colour(colours[class]);
+    let inks: Vec<usize> = (1..colours.len()).filter(is_known).collect();
     classes.changes(
         |class| class == OTHER,
         |_, at| {
             let near = classes.around(at);
-            let far = inks.iter().filter(|&ink| near & 1 << ink == 0);
-            let found = || far.clone().find_map(|ink| edge(pixels[at], near | 1 << ink, colours));
-            (near != 0 && !classes.in_three(at)).then(found).flatten()
+            let is_of = |&ink: &usize| edge(pixels[at], near | 1 << ink, colours) == Some(ink as u8);
+            let may_be = near != 0 && !classes.in_three(at);
+            let ink = may_be.then(|| inks.iter().copied().filter(|ink| near & 1 << ink == 0).find(is_of));
+            ink.flatten().map(|ink| ink as u8)
         },
     )
 }
@@ -371,6 +386,24 @@ mod tests {
                 );
                 assert!(rgb.iter().all(|&v| v == 255), "{shares:?} on {ground:?}: process colours are left");
             }
+        }
+    }
+
+    /// Lines a pixel wide beside squares of every ink: greys and pale colours stay what they are.
+    #[test]
+    fn thin_lines_in_grey_and_in_pale_colours_are_colour() {
+        let squares = TABLE.map(|entry| entry.colour);
+        for line in [[90; 3], [128; 3], [170; 3], [210; 3], [220, 221, 222], [250, 240, 214], [200, 226, 231]]
+        {
+            let pixel = |at: usize| match (at % 80, at / 80) {
+                (60, _) => line,
+                (x @ ..54, 2..13) if x % 9 < 8 => squares[x / 9],
+                _ => [255; 3],
+            };
+            let mut rgb: Vec<u8> = (0..80 * 40).flat_map(pixel).collect();
+            take(&mut rgb, (80, 40), (80, 40), &Options { reserved: true, ..Options::default() });
+            let kept = (0..40).filter(|y| rgb[3 * (80 * y + 60)..][..3] == line).count();
+            assert_eq!(kept, 40, "{line:?}");
         }
     }
 
