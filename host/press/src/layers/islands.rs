@@ -10,7 +10,7 @@
 use std::ops::Range;
 
 use super::flat::{similar, split};
-use super::posters::WHITE_AND_BLACK;
+use super::main_colours::WHITE_AND_BLACK;
 use crate::forest::{Forest, beside};
 
 /// Flat art and what is not explained of it.

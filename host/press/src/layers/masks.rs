@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::flat::split;
 use super::islands::without;
 use super::kinds::Kind;
+use super::main_colours;
 use super::pens::Page;
 use super::posters::{self, Known, Poster, Span};
 use super::softened::is_between;
@@ -180,7 +181,7 @@ fn flat_art<const N: usize>(
         shape.iter().for_each(|&at| count_squares(pixels, (width, enlarged), &all[at as usize], &mut counts));
     }
     let find = |shapes: &[&[u32]], islands: &Islands<'_>, common: &[[u8; 3]], thin: bool| -> Vec<Art> {
-        let palette = [&posters::WHITE_AND_BLACK[..], common].concat();
+        let palette = [&main_colours::WHITE_AND_BLACK[..], common].concat();
         let is_itself = |colour| common.contains(&colour) && !is_between(colour, &palette, |_| true);
         let found = shapes.par_iter().filter_map(|shape| {
             let colour = all[shape[0] as usize].colour;
@@ -210,7 +211,7 @@ fn flat_art<const N: usize>(
             *areas.entry(colour).or_default() += pixels_of(shape) as u64;
         }
     }
-    let common = posters::common(counts, &areas);
+    let common = main_colours::common(counts, &areas);
     let mut is_flat = vec![false; all.len()];
     found.iter().flat_map(|art| &art.stretches).for_each(|&at| is_flat[at as usize] = true);
     let enclosed = enclosed(pixels, width, (all, roots), &is_flat);
@@ -221,7 +222,7 @@ fn flat_art<const N: usize>(
     // Text in a colour of its own may be less than what is left over of a large ground.
     let is_left = |shape: &&&[u32]| {
         all[shape[0] as usize].colour.is_none()
-            && flat.get(&shape[0]).is_none_or(|poster| poster.strays >= posters::LEAST)
+            && flat.get(&shape[0]).is_none_or(|poster| poster.strays >= main_colours::LEAST)
     };
     let left: Vec<&[u32]> = in_several.iter().chain(&of_letters).filter(is_left).copied().collect();
     let islands: Islands<'_> = flat.iter().map(|(&at, poster)| (at, &poster.islands[..])).collect();

@@ -28,6 +28,7 @@ pub mod kinds;
 mod lattice;
 mod lines;
 mod looks;
+mod main_colours;
 mod masks;
 pub mod names;
 mod numbered;

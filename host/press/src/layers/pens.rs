@@ -14,7 +14,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::flat::{similar, split};
-use super::posters;
+use super::main_colours;
 use super::softened::OFF;
 
 /// Ground is within so many pixels, as they were drawn, of what is thin.
@@ -151,7 +151,7 @@ impl<const N: usize> Page<'_, N> {
         known: &[[u8; 3]],
     ) -> (Vec<usize>, Vec<[u8; 3]>) {
         areas.extend(shapes.par_iter().filter_map(|shape| self.ground(shape)).collect::<Vec<_>>());
-        let grounds = posters::grounds(&areas);
+        let grounds = main_colours::grounds(&areas);
         let thin: Vec<usize> =
             (0..shapes.len()).into_par_iter().filter(|&at| self.is_thin(&shapes[at], &grounds)).collect();
         let ridges: Vec<Vec<Ridge>> = thin.par_iter().map(|&at| self.ridges(&shapes[at], &grounds)).collect();

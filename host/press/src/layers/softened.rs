@@ -15,7 +15,8 @@ use std::collections::HashMap;
 use std::ops::{Deref, Range};
 
 use super::flat::{similar, split};
-use super::posters::{MOST_KNOWN, WHITE_AND_BLACK};
+use super::main_colours::WHITE_AND_BLACK;
+use super::posters::MOST_KNOWN;
 
 /// How far a softened edge reaches, in pixels as they were drawn.
 const REACH: usize = 2;

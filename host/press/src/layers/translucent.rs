@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use super::flat::{similar, split};
 use super::kinds::{BYTES, Kind};
 use super::looks::apart;
-use super::posters::{Span, WHITE_AND_BLACK};
+use super::main_colours::WHITE_AND_BLACK;
+use super::posters::Span;
 use crate::forest::{Forest, beside};
 
 /// The tag of such a letter.
