@@ -8,7 +8,7 @@ use observe::Silent;
 use press::inspect::inspect;
 use protocol::ink::Ink;
 
-use testing::needs::{Need, ghostscript, starts};
+use testing::needs::{Need, ghostscript, md5k, starts};
 use testing::program::Bench;
 
 /// Dots row by row.
@@ -296,7 +296,7 @@ fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
             }
             dots
         };
-        let driver = drawn_by("md5k", &bench.path("page.pdf"));
+        let driver = md5k().then(|| text(&drawn_by("md5k", &bench.path("page.pdf"))));
         let at_queue = text(&queued(&bench, "page.pdf"));
         let by_layers = text(&job(&bench, "page.pdf"));
         for (path, found) in [("queue", &at_queue), ("layers", &by_layers)] {
@@ -311,14 +311,8 @@ fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
             continue;
         }
         let whole = [LINE; 12].join("\n");
-        let mut errors = [0; 3];
-        for (ours, (errors, found)) in [true, true, false].into_iter().zip(errors.iter_mut().zip([
-            &at_queue,
-            &by_layers,
-            &text(&driver),
-        ])) {
+        let errors = |found: &Dots, ours: bool| {
             let read = read(&bench, found);
-            *errors = edits(&read.join("\n"), &whole);
             if ours && solid {
                 assert_eq!(read.len(), 12, "{name}: {read:?}");
                 for (line, size) in
@@ -327,9 +321,12 @@ fn text_has_the_outline_it_was_drawn_with_and_is_read_without_error() {
                     assert_eq!(edits(line, LINE), 0, "{name}, {size} points: {line}");
                 }
             }
-        }
-        println!("{name}: errors of queue, layers and md5k {errors:?}");
-        assert!(errors[0] <= errors[2] && errors[1] <= errors[2], "{name}: {errors:?}");
+            edits(&read.join("\n"), &whole)
+        };
+        let ours = [&at_queue, &by_layers].map(|found| errors(found, true));
+        let driver = driver.map(|found| errors(&found, false));
+        println!("{name}: errors of queue and layers {ours:?}, of md5k {driver:?}");
+        assert!(driver.is_none_or(|most| ours.into_iter().all(|found| found <= most)), "{name}");
     }
 }
 

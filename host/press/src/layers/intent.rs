@@ -122,7 +122,8 @@ impl Hull {
         }
         // In parts of the way from the middle to the colour.
         let srgb = |colour: Light| colour.iter().all(|v| (-1e-6..=1.0 + 1e-6).contains(v));
-        let (source, target) = (ray.leaves(srgb), ray.leaves(|colour| self.has(colour)));
+        // A straight way to a deep blue leaves sRGB before it comes back to that blue.
+        let (source, target) = (ray.leaves(srgb).max(1.0), ray.leaves(|colour| self.has(colour)));
         let knee = KNEE * target;
         if source <= target || knee >= 1.0 {
             return colour;
@@ -226,6 +227,19 @@ mod tests {
             for intent in [Intent::Perceptual, Intent::Colorimetric] {
                 assert!(difference(hull.map(grey, intent), grey) < 1e-3, "{grey:?}, {intent:?}");
             }
+        }
+    }
+
+    #[test]
+    fn blues_whose_ray_leaves_srgb_before_them_are_printable_and_stay_apart() {
+        let hull = Hull::new(&STACKS);
+        let mut last = 0.0;
+        for blue in (8..=255).step_by(4) {
+            let printed = hull.map([0.0, 0.0, f64::from(blue) / 255.0], Intent::Perceptual);
+            assert!(hull.has(printed.map(|v| v * 0.999 + 0.0003)), "{blue} becomes {printed:?}");
+            let lightness = oklab(printed)[0];
+            assert!(lightness > last, "{blue} becomes {printed:?}");
+            last = lightness;
         }
     }
 

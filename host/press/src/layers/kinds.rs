@@ -1,19 +1,16 @@
 //! Pages that know what drew each pixel: text, a drawing or a picture.
 //!
 //! Problem: letters must stay whole and photographs must stay smooth, but a drawn page is only colours.
-//! Method: Ghostscript's device `bitrgbtags` writes four bytes a pixel: a tag of what was drawn there last, then red,
-//! green and blue. Where objects are transparent, the tag has the bits of all of them; a picture among them makes the dot
-//! part of a picture. Text and drawings in CMYK are converted without a colour profile, so that K is black and C is cyan;
-//! pictures keep the usual conversion.
+//! Method: Ghostscript's device `bitrgbtags` writes four bytes a pixel: red, green, blue, and a tag of what was drawn there
+//! last, which is the first byte in older versions and the last in newer ones. Here it is the first. Where objects are
+//! transparent, the tag has the bits of all of them; a picture among them makes the dot part of a picture.
 //! Cost: four bytes a pixel. Limits: an SVG without pictures is all drawing; other pictures have no kinds.
-//! Source: Ghostscript's documentation of its devices and of `SourceObjectICC`.
+//! Source: Ghostscript's `gdevbit.c`; its documentation does not tell of this device.
 
-use std::io::{self, BufRead, Read, Write as _};
-
-use rayon::prelude::*;
-use tempfile::NamedTempFile;
+use std::io::{self, BufRead, Read};
 
 use super::window::Window;
+use rayon::prelude::*;
 
 /// Ghostscript's device for such pages.
 pub const DEVICE: &str = "bitrgbtags";
@@ -55,16 +52,36 @@ impl Kind {
     }
 }
 
-/// A file that tells Ghostscript how to convert CMYK, for its option `-sSourceObjectICC`. It must outlive the process.
-///
-/// # Errors
-/// Those of writing a temporary file.
-pub fn conversions() -> io::Result<NamedTempFile> {
-    let mut file = NamedTempFile::new()?;
-    // Without a profile red is 1 - min(1, C + K), and so on. Through `ps_cmyk.icc` half of cyan was a fifth, and three quarters were all.
-    file.write_all(b"Graphic_CMYK None\nText_CMYK None\n")?;
-    file.flush()?;
-    Ok(file)
+/// Where Ghostscript writes the tag of a pixel. What is read here always has it first.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Order {
+    /// Before red, green and blue: before version 10.04.
+    First,
+    /// After them.
+    Last,
+}
+
+impl Order {
+    /// The order in which a bare pixel has these bytes: it is white, and its tag is 0.
+    pub(super) fn of(bare: &[u8]) -> Option<Order> {
+        match bare {
+            [0, 255, 255, 255] => Some(Order::First),
+            [255, 255, 255, 0] => Some(Order::Last),
+            _ => None,
+        }
+    }
+
+    /// Reads whole pixels.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn read(self, input: &mut impl Read, pixels: &mut [u8]) -> io::Result<()> {
+        input.read_exact(pixels)?;
+        if self == Order::Last {
+            pixels.as_chunks_mut::<BYTES>().0.iter_mut().for_each(|pixel| pixel.rotate_right(1));
+        }
+        Ok(())
+    }
 }
 
 /// Reads the header of the next page: its width and height; `None` at the end.

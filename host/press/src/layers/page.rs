@@ -13,7 +13,7 @@ use super::artwork::Artwork;
 use super::colour::Colour;
 use super::error::{LayersError, wrong};
 use super::flat::WHITE;
-use super::kinds::{BYTES, Kind};
+use super::kinds::{BYTES, Kind, Order};
 use super::numbered::Numbered;
 use super::options::Options;
 use super::window::Window;
@@ -45,18 +45,18 @@ impl Page {
         Page(Pixels::Plain(rgb, width))
     }
 
-    /// Reads a page with tags ([`kinds`]) of so many pixels across and down.
+    /// Reads a page with tags ([`kinds`]) in this order, of so many pixels across and down.
     ///
     /// # Errors
     /// Those of reading.
-    pub fn read(input: &mut impl Read, (width, height): (usize, usize)) -> io::Result<Page> {
+    pub fn read(input: &mut impl Read, order: Order, (width, height): (usize, usize)) -> io::Result<Page> {
         let mut plane = bits::blank(width, height);
         let mut numbered: Option<Numbered> = None;
         let mut strip = vec![0; BYTES * width * ROWS.min(height)];
         let mut last = vec![0; BYTES * width];
         for top in (0..height).step_by(ROWS) {
             let strip = &mut strip[..BYTES * width * ROWS.min(height - top)];
-            input.read_exact(strip)?;
+            order.read(input, strip)?;
             if numbered.is_none() {
                 let rows = plane.bits[plane.stride * top..].chunks_exact_mut(plane.stride);
                 if rows.zip(strip.chunks_exact(BYTES * width)).all(|(bits, row)| black(row, bits)) {
@@ -73,7 +73,7 @@ impl Page {
             page.expand(before);
             let (these, rest) = rest.split_at_mut(strip.len());
             these.copy_from_slice(strip);
-            input.read_exact(rest)?;
+            order.read(input, rest)?;
             return Ok(Page(Pixels::Tagged(pixels, width)));
         }
         Ok(Page(numbered.map_or(Pixels::Black(plane), Pixels::Numbered)))
@@ -215,11 +215,18 @@ mod tests {
                 prop::collection::vec(any::<usize>(), 900),
             ],
             most in prop_oneof![Just(1u32), Just(5), Just(256)],
-            draft: bool, part in (0usize..3, 0usize..3, 0usize..3, 0usize..3)
+            tag_last: bool, draft: bool, part in (0usize..3, 0usize..3, 0usize..3, 0usize..3)
         ) {
             let is_black = tone.is_none() && colours.is_empty();
             let pixels = page((width, height), seed, (colours, most), tone);
-            let found = Page::read(&mut &pixels[..], (width, height)).unwrap();
+            let found = match tag_last {
+                false => Page::read(&mut &pixels[..], Order::First, (width, height)).unwrap(),
+                true => {
+                    let turned: Vec<u8> =
+                        pixels.as_chunks::<BYTES>().0.iter().flat_map(|&[tag, r, g, b]| [r, g, b, tag]).collect();
+                    Page::read(&mut &turned[..], Order::Last, (width, height)).unwrap()
+                }
+            };
             let whole = Page(Pixels::Tagged(pixels, width));
             prop_assert_eq!(matches!(found.0, Pixels::Black(_)), is_black);
             let numbered = matches!(found.0, Pixels::Numbered(_));
@@ -253,8 +260,8 @@ mod tests {
     #[test]
     fn a_page_cut_short_and_a_window_beyond_it_are_errors() {
         let pixels = page((9, 40), 1, (Vec::new(), 1), None);
-        assert!(Page::read(&mut &pixels[..pixels.len() - 1], (9, 40)).is_err());
-        let page = Page::read(&mut &pixels[..], (9, 40)).unwrap();
+        assert!(Page::read(&mut &pixels[..pixels.len() - 1], Order::First, (9, 40)).is_err());
+        let page = Page::read(&mut &pixels[..], Order::First, (9, 40)).unwrap();
         let beyond = Window { left: 1, top: 0, width: 9, height: 9 };
         assert!(page.art("page", &beyond, 600, &Options::default()).is_err());
     }

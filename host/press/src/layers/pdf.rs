@@ -8,6 +8,7 @@
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
 mod complaint;
+pub mod conversion;
 mod draw;
 mod ghostscript;
 mod plates;
@@ -31,7 +32,7 @@ use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
 pub use complaint::{OLDER, cut_short, damaged, no_page};
-pub use ghostscript::{Interpreter, command, interpreter};
+pub use ghostscript::{Interpreter, Probe, command, interpreter};
 pub use plates::{Separated, Survey, separated, survey};
 
 /// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.

@@ -4,11 +4,11 @@ use std::io::{self, BufReader};
 use std::path::Path;
 use std::process::{ChildStdout, Stdio};
 
-use press::layers::pdf::{self, Interpreter};
-use press::layers::{Page, kinds};
+use press::layers::Page;
+use press::layers::kinds::{self, Order};
+use press::layers::pdf::{self, Interpreter, Probe, conversion};
 use press::process::{self, Process, ProcessError};
 use press::scratch::Scratch;
-use tempfile::NamedTempFile;
 
 use super::{FilterError, io_error};
 
@@ -16,9 +16,8 @@ use super::{FilterError, io_error};
 pub(super) struct Drawing {
     process: Process,
     pages: BufReader<ChildStdout>,
-    /// Read by the process.
-    _conversions: NamedTempFile,
-    /// Where the process keeps files of its own, which it leaves behind when it is stopped.
+    order: Order,
+    /// Where the process runs, and keeps files of its own, which it leaves behind when it is stopped.
     _scratch: Scratch,
 }
 
@@ -38,12 +37,12 @@ impl Drawing {
         page: Option<usize>,
         dpi: u16,
     ) -> Result<Drawing, FilterError> {
-        let conversions = kinds::conversions().map_err(io_error("keep the conversion of colours"))?;
         let scratch = Scratch::new().map_err(io_error("make a temporary folder"))?;
+        conversion::write(scratch.path()).map_err(io_error("keep the conversion of colours"))?;
         let options = [
             "-dNOINTERPOLATE".into(),
             format!("-sDEVICE={}", kinds::DEVICE),
-            format!("-sSourceObjectICC={}", conversions.path().display()),
+            conversion::OPTION.into(),
             format!("-r{dpi}"),
             "-sOutputFile=%stdout".into(),
         ];
@@ -52,6 +51,7 @@ impl Drawing {
         let mut command = pdf::command(path, interpreter, scratch.path(), options);
         command.stdout(Stdio::piped());
         let mut process = Process::start(&mut command, process::limit()).map_err(failed)?;
+        let order = Probe::begin().and_then(Probe::order).map_err(failed)?;
         let Some(pages) = process.output() else {
             return Err(FilterError::Ghostscript("its pipe cannot be had".into()));
         };
@@ -59,7 +59,7 @@ impl Drawing {
         #[cfg(target_os = "linux")]
         let _ = rustix::pipe::fcntl_setpipe_size(&pages, 1 << 20);
         let pages = BufReader::with_capacity(1 << 18, pages);
-        Ok(Drawing { process, pages, _conversions: conversions, _scratch: scratch })
+        Ok(Drawing { process, pages, order, _scratch: scratch })
     }
 
     /// Width and height of the next page in pixels, whatever they are.
@@ -70,7 +70,7 @@ impl Drawing {
 
     /// The page.
     pub(super) fn page(&mut self, size: (usize, usize)) -> Result<Page, FilterError> {
-        let page = Page::read(&mut self.pages, size).map_err(|source| self.cut_short(source))?;
+        let page = Page::read(&mut self.pages, self.order, size).map_err(|source| self.cut_short(source))?;
         self.process.pause();
         Ok(page)
     }

@@ -16,8 +16,8 @@ use super::super::kinds;
 use super::super::names::stem;
 use super::super::size::check_pixels;
 use super::EPS_WITH_PREVIEW;
-use super::complaint;
-use super::ghostscript::{self, Interpreter};
+use super::ghostscript::{self, Interpreter, Probe};
+use super::{complaint, conversion};
 use crate::process::{self, MOST_PAGES, Process, ProcessError};
 use crate::scratch::Scratch;
 
@@ -30,6 +30,9 @@ const ROUNDED_MM: f64 = 25.4 / DRAFT;
 /// Has Ghostscript say the size of each page in points at its end: a draft rounds it to its own pixels.
 const SAYS_SIZES: &str = "<< /EndPage { exch pop 2 ne dup { (%%PageSize:) print currentpagedevice /PageSize get \
     { ( ) print 20 string cvs print } forall (\\n) print flush } if } >> setpagedevice";
+
+/// What to do without Ghostscript.
+const NO_GHOSTSCRIPT: &str = "install it (Debian: apt install ghostscript), or export the page as PNG";
 
 /// The plates that every page has.
 pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
@@ -166,10 +169,11 @@ pub(super) fn tagged(
     folder: &Scratch,
 ) -> Result<Tagged, LayersError> {
     let picture = folder.path().join("page.pam");
-    let conversions = kinds::conversions().map_err(io(path, "keep the conversion of its colours"))?;
-    let convert = vec![format!("-sSourceObjectICC={}", conversions.path().display())];
-    let options = [one_page(page), crop(path, part)?, convert].concat();
+    conversion::write(folder.path()).map_err(io(path, "keep the conversion of its colours"))?;
+    let options = [one_page(page), crop(path, part)?, vec![conversion::OPTION.into()]].concat();
+    let order = Probe::begin();
     ghostscript((path, interpreter), &options, kinds::DEVICE, dpi, &picture, || false)?;
+    let order = order.and_then(Probe::order).map_err(|error| failed(path, error, NO_GHOSTSCRIPT))?;
     let damaged = || wrong(path, format!("page {page} cannot be drawn"));
     let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
     let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
@@ -177,7 +181,7 @@ pub(super) fn tagged(
     let size = (side(width)?, side(height)?);
     check_pixels(path, size.0, size.1)?;
     let mut pixels = vec![0; kinds::BYTES * width * height];
-    file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
+    order.read(&mut file, &mut pixels).map_err(io(path, "read its page"))?;
     Ok(Tagged { size, pixels })
 }
 
@@ -364,7 +368,6 @@ fn ghostscript(
     to: &Path,
     progressed: impl FnMut() -> bool,
 ) -> Result<String, LayersError> {
-    let file = std::path::absolute(path).map_err(io(path, "find it"))?;
     let drawing = [
         "-dTextAlphaBits=1".into(),
         "-dGraphicsAlphaBits=1".into(),
@@ -373,9 +376,8 @@ fn ghostscript(
         format!("-sOutputFile={}", to.display()),
     ];
     let folder = to.parent().unwrap_or(Path::new("."));
-    let command = ghostscript::command(&file, interpreter, folder, drawing.iter().chain(options));
-    let install = "install it (Debian: apt install ghostscript), or export the page as PNG";
-    run(path, command, install, progressed)
+    let command = ghostscript::command(path, interpreter, folder, drawing.iter().chain(options));
+    run(path, command, NO_GHOSTSCRIPT, progressed)
 }
 
 /// Runs Poppler on a PDF.
@@ -396,7 +398,12 @@ fn run(
     progressed: impl FnMut() -> bool,
 ) -> Result<String, LayersError> {
     let begun = Process::start(command.stdout(Stdio::null()), process::limit());
-    begun.and_then(|process| process.end(progressed)).map_err(|error| match error {
+    begun.and_then(|process| process.end(progressed)).map_err(|error| failed(path, error, install))
+}
+
+/// Why a document cannot be drawn.
+fn failed(path: &Path, error: ProcessError, install: &'static str) -> LayersError {
+    match error {
         ProcessError::Start(error) if error.kind() == std::io::ErrorKind::NotFound => {
             LayersError::Program { path: path.to_path_buf(), program: "Ghostscript", install }
         }
@@ -412,7 +419,7 @@ fn run(
         error @ (ProcessError::TooLong(_) | ProcessError::TooLongAltogether(_)) => {
             wrong(path, error.to_string())
         }
-    })
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! Ghostscript's command line, and which of its two interpreters reads a PDF.
+//! Ghostscript's command line, which of its two interpreters reads a PDF, and in which order it writes a pixel's bytes.
 //!
-//! Problem: layers of art and print queues must draw a document alike. Ghostscript 9.56 to 10.01 have two interpreters of
+//! Problem: layers of art and print queues must draw a document alike, with every version. Ghostscript 9.56 to 10.01 have two interpreters of
 //! PDF. The usual one of 10.00 refuses every shading by a function of two variables (`ShadingType 1`) that has no matrix of
 //! its own, which is how browsers write gradients that repeat, turn, or end within their shape. What is filled with it is
 //! missing, Ghostscript ends well, and with `-q` it says nothing of it.
@@ -11,11 +11,13 @@
 //! corners of a shading first, so narrow stripes may become one colour; a note says so.
 
 use std::ffi::OsStr;
+use std::io::Read as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{ChildStdout, Command, Stdio};
 
+use super::super::kinds::{self, Order};
 use super::complaint;
-use crate::process::{self, Process};
+use crate::process::{self, Process, ProcessError};
 use crate::scratch::Scratch;
 
 /// Memory for a page's bands in bytes: with less, Ghostscript reads its list of objects once for each of many bands.
@@ -34,8 +36,9 @@ pub enum Interpreter {
     Older,
 }
 
-/// A command that draws a document with these options, among them the device and where its output goes. Files of its own
-/// are in `folder`, where it leaves them behind when it is stopped. Its complaints go to the standard error.
+/// A command that draws a document with these options, among them the device and where its output goes, which is an absolute
+/// path. It runs in `folder`, where its own files are, which it leaves behind when it is stopped. Its complaints go to the
+/// standard error.
 pub fn command<O: AsRef<OsStr>>(
     path: &Path,
     interpreter: Interpreter,
@@ -44,6 +47,7 @@ pub fn command<O: AsRef<OsStr>>(
 ) -> Command {
     let mut command = Command::new("gs");
     command
+        .current_dir(folder)
         .env("TMPDIR", folder)
         .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
         .arg(format!("-dBufferSpace={BANDS}"));
@@ -51,7 +55,8 @@ pub fn command<O: AsRef<OsStr>>(
         command.arg("-dNEWPDF=false");
     }
     // What the options run needs the device.
-    command.args(options).args(["-c", SPEAKS, "-f"]).arg(path);
+    command.args(options).args(["-c", SPEAKS, "-f"]);
+    command.arg(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     command
 }
 
@@ -73,6 +78,38 @@ pub fn interpreter(path: &Path) -> Interpreter {
     }
 }
 
+/// Ghostscript at work on a bare pixel.
+pub struct Probe(Process, Option<ChildStdout>);
+
+impl Probe {
+    /// Begins to draw it.
+    ///
+    /// # Errors
+    /// Ghostscript cannot be started.
+    pub fn begin() -> Result<Probe, ProcessError> {
+        let mut command = Command::new("gs");
+        command.args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-g1x1", "-sOutputFile=-"]);
+        command.arg(format!("-sDEVICE={}", kinds::DEVICE)).args(["-c", "showpage"]);
+        let mut process = Process::start(command.stdout(Stdio::piped()), process::limit())?;
+        let output = process.output();
+        Ok(Probe(process, output))
+    }
+
+    /// The order of the bytes of its pixels.
+    ///
+    /// # Errors
+    /// Ghostscript fails, or its bare pixel is neither of the two that are known.
+    pub fn order(self) -> Result<Order, ProcessError> {
+        let mut page = Vec::new();
+        self.1.map_or(Ok(0), |output| output.take(1 << 10).read_to_end(&mut page))?;
+        self.0.end(|| false)?;
+        let order = page.last_chunk::<{ kinds::BYTES }>().and_then(|bare| Order::of(bare));
+        order.ok_or_else(|| {
+            ProcessError::Failed("this version of Ghostscript writes pixels in an unknown way".into())
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,11 +117,11 @@ mod tests {
     #[test]
     fn every_command_has_memory_for_bands_and_ends_with_the_document() {
         for (interpreter, older) in [(Interpreter::Usual, false), (Interpreter::Older, true)] {
-            let command = command(Path::new("a.pdf"), interpreter, Path::new("f"), ["-r600", "-c", "x"]);
+            let command = command(Path::new("/a.pdf"), interpreter, Path::new("f"), ["-r600", "-c", "x"]);
             let args: Vec<&str> = command.get_args().filter_map(OsStr::to_str).collect();
             assert!(args.contains(&"-dBufferSpace=100000000") && args.contains(&"-dSAFER"), "{args:?}");
             assert_eq!(args.contains(&"-dNEWPDF=false"), older, "{args:?}");
-            assert!(args.ends_with(&["-r600", "-c", "x", "-c", SPEAKS, "-f", "a.pdf"]), "{args:?}");
+            assert!(args.ends_with(&["-r600", "-c", "x", "-c", SPEAKS, "-f", "/a.pdf"]), "{args:?}");
         }
     }
 }

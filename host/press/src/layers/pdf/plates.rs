@@ -192,7 +192,7 @@ fn overprint(pixels: &mut [u8], layers: &[(String, Named, Vec<u8>)], process: &[
             if layers.iter().any(|(.., coverage)| coverage[at] > 0) {
                 let [c, m, y, k] = inks.map(|ink| ink.map_or(0, |coverage| coverage[at]));
                 let [_, rgb @ ..] = pixel;
-                // As what is drawn beside the layers is converted ([`kinds::conversions`]).
+                // As what is drawn beside the layers is converted ([`conversion`](super::conversion)).
                 *rgb = [c, m, y].map(|ink| 255 - ink.saturating_add(k));
             }
         }
