@@ -62,25 +62,24 @@ pub enum Order {
 }
 
 impl Order {
-    /// The order in which a bare pixel has these bytes: it is white, and its tag is 0.
-    pub(super) fn of(bare: &[u8]) -> Option<Order> {
-        match bare {
-            [0, 255, 255, 255] => Some(Order::First),
-            [255, 255, 255, 0] => Some(Order::Last),
-            _ => None,
-        }
+    /// The order that shows in some pixels: a tag is less than 128, and red or blue of one pixel at least is more, unless all
+    /// are dark.
+    pub(super) fn seen(pixels: &[u8]) -> Option<Order> {
+        let is_light = |value: u8| value >= 128;
+        pixels.as_chunks::<BYTES>().0.iter().find_map(|&[first, .., last]| {
+            match (is_light(first), is_light(last)) {
+                (false, true) => Some(Order::First),
+                (true, false) => Some(Order::Last),
+                _ => None,
+            }
+        })
     }
 
-    /// Reads whole pixels.
-    ///
-    /// # Errors
-    /// Those of reading.
-    pub fn read(self, input: &mut impl Read, pixels: &mut [u8]) -> io::Result<()> {
-        input.read_exact(pixels)?;
+    /// Brings the tags of pixels to the front.
+    pub(super) fn turn(self, pixels: &mut [u8]) {
         if self == Order::Last {
             pixels.as_chunks_mut::<BYTES>().0.iter_mut().for_each(|pixel| pixel.rotate_right(1));
         }
-        Ok(())
     }
 }
 
@@ -153,6 +152,19 @@ mod tests {
             [&b"P6\n12 7\n255\n"[..], b"P7\nWIDTH 12\nHEIGHT 7\nDEPTH 3\nENDHDR\n", b"P7\nWIDTH 12\n"]
         {
             assert!(header(&mut &wrong[..]).is_err());
+        }
+    }
+
+    #[test]
+    fn tags_come_to_the_front_and_dark_pixels_do_not_tell_where_they_were() {
+        let first = [[4, 0, 0, 0], [1, 100, 200, 7], [2, 3, 4, 128], [0, 255, 255, 255]];
+        let last = first.map(|[tag, r, g, b]| [r, g, b, tag]);
+        for (pixels, order) in [(first, Order::First), (last, Order::Last)] {
+            assert_eq!(Order::seen(pixels[..2].as_flattened()), None);
+            assert_eq!(Order::seen(pixels.as_flattened()), Some(order));
+            let mut turned = pixels;
+            order.turn(turned.as_flattened_mut());
+            assert_eq!(turned, first);
         }
     }
 

@@ -56,7 +56,8 @@ impl Page {
         let mut last = vec![0; BYTES * width];
         for top in (0..height).step_by(ROWS) {
             let strip = &mut strip[..BYTES * width * ROWS.min(height - top)];
-            order.read(input, strip)?;
+            input.read_exact(strip)?;
+            order.turn(strip);
             if numbered.is_none() {
                 let rows = plane.bits[plane.stride * top..].chunks_exact_mut(plane.stride);
                 if rows.zip(strip.chunks_exact(BYTES * width)).all(|(bits, row)| black(row, bits)) {
@@ -73,7 +74,8 @@ impl Page {
             page.expand(before);
             let (these, rest) = rest.split_at_mut(strip.len());
             these.copy_from_slice(strip);
-            order.read(input, rest)?;
+            input.read_exact(rest)?;
+            order.turn(rest);
             return Ok(Page(Pixels::Tagged(pixels, width)));
         }
         Ok(Page(numbered.map_or(Pixels::Black(plane), Pixels::Numbered)))

@@ -32,7 +32,7 @@ use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
 use observe::Observer;
 
 pub use complaint::{OLDER, cut_short, damaged, no_page};
-pub use ghostscript::{Interpreter, Probe, command, interpreter};
+pub use ghostscript::{Interpreter, command, interpreter, order};
 pub use plates::{Separated, Survey, separated, survey};
 
 /// What the first bytes of an EPS file are that has a preview for DOS beside its PostScript, which Ghostscript finds.

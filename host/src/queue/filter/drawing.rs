@@ -1,12 +1,12 @@
 //! Ghostscript at work: the pages of a document with the kind of each pixel, through a pipe.
 
-use std::io::{self, BufReader};
+use std::io::{self, BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{ChildStdout, Stdio};
 
 use press::layers::Page;
 use press::layers::kinds::{self, Order};
-use press::layers::pdf::{self, Interpreter, Probe, conversion};
+use press::layers::pdf::{self, Interpreter, conversion};
 use press::process::{self, Process, ProcessError};
 use press::scratch::Scratch;
 
@@ -16,7 +16,8 @@ use super::{FilterError, io_error};
 pub(super) struct Drawing {
     process: Process,
     pages: BufReader<ChildStdout>,
-    order: Order,
+    /// Known from the first page on.
+    order: Option<Order>,
     /// Where the process runs, and keeps files of its own, which it leaves behind when it is stopped.
     _scratch: Scratch,
 }
@@ -51,7 +52,6 @@ impl Drawing {
         let mut command = pdf::command(path, interpreter, scratch.path(), options);
         command.stdout(Stdio::piped());
         let mut process = Process::start(&mut command, process::limit()).map_err(failed)?;
-        let order = Probe::begin().and_then(Probe::order).map_err(failed)?;
         let Some(pages) = process.output() else {
             return Err(FilterError::Ghostscript("its pipe cannot be had".into()));
         };
@@ -59,7 +59,7 @@ impl Drawing {
         #[cfg(target_os = "linux")]
         let _ = rustix::pipe::fcntl_setpipe_size(&pages, 1 << 20);
         let pages = BufReader::with_capacity(1 << 18, pages);
-        Ok(Drawing { process, pages, order, _scratch: scratch })
+        Ok(Drawing { process, pages, order: None, _scratch: scratch })
     }
 
     /// Width and height of the next page in pixels, whatever they are.
@@ -70,7 +70,13 @@ impl Drawing {
 
     /// The page.
     pub(super) fn page(&mut self, size: (usize, usize)) -> Result<Page, FilterError> {
-        let page = Page::read(&mut self.pages, self.order, size).map_err(|source| self.cut_short(source))?;
+        let order = match (self.order, self.pages.fill_buf()) {
+            (Some(order), _) => order,
+            (None, Ok(begun)) => pdf::order(begun).map_err(failed)?,
+            (None, Err(source)) => return Err(self.cut_short(source)),
+        };
+        self.order = Some(order);
+        let page = Page::read(&mut self.pages, order, size).map_err(|source| self.cut_short(source))?;
         self.process.pause();
         Ok(page)
     }

@@ -79,7 +79,7 @@ mod tests {
     use testing::needs::ghostscript;
 
     use super::super::super::kinds::{self, Kind};
-    use super::super::{Interpreter, Probe, command};
+    use super::super::{Interpreter, command, order};
     use super::*;
     use crate::process::{Process, limit};
     use crate::scratch::Scratch;
@@ -95,13 +95,12 @@ mod tests {
         let options = [OPTION, "-r72", &device, &output];
         let mut command = command(&page, Interpreter::Usual, folder.path(), options);
         let said = Process::start(&mut command, limit()).unwrap().end(|| false).unwrap();
-        let order = Probe::begin().unwrap().order().unwrap();
         let picture = fs::read(picture).unwrap();
         let mut input = &picture[..];
         assert_eq!(kinds::header(&mut input).unwrap(), Some((240, 10)), "{said}");
         let mut pixels = vec![[0; kinds::BYTES]; 2400];
-        order.read(&mut input, pixels.as_flattened_mut()).unwrap();
-        assert!(input.is_empty());
+        pixels.as_flattened_mut().copy_from_slice(input);
+        order(input).unwrap().turn(pixels.as_flattened_mut());
         pixels
     }
 
@@ -156,5 +155,8 @@ mod tests {
         assert!(row[40..60].contains(&[text, 204, 204, 204]), "{:?}", &row[40..60]);
         assert_eq!(row[105][0], Kind::PICTURE);
         assert!(row[105][1..].iter().all(|&level| level > 20), "{:?}", row[105]);
+        // Of these alone nothing tells the order.
+        let dark = drawn("0 setgray 0 0 240 10 rectfill");
+        assert_eq!(dark, vec![[drawing, 0, 0, 0]; 2400]);
     }
 }

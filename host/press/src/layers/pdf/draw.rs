@@ -16,7 +16,7 @@ use super::super::kinds;
 use super::super::names::stem;
 use super::super::size::check_pixels;
 use super::EPS_WITH_PREVIEW;
-use super::ghostscript::{self, Interpreter, Probe};
+use super::ghostscript::{self, Interpreter};
 use super::{complaint, conversion};
 use crate::process::{self, MOST_PAGES, Process, ProcessError};
 use crate::scratch::Scratch;
@@ -171,9 +171,7 @@ pub(super) fn tagged(
     let picture = folder.path().join("page.pam");
     conversion::write(folder.path()).map_err(io(path, "keep the conversion of its colours"))?;
     let options = [one_page(page), crop(path, part)?, vec![conversion::OPTION.into()]].concat();
-    let order = Probe::begin();
     ghostscript((path, interpreter), &options, kinds::DEVICE, dpi, &picture, || false)?;
-    let order = order.and_then(Probe::order).map_err(|error| failed(path, error, NO_GHOSTSCRIPT))?;
     let damaged = || wrong(path, format!("page {page} cannot be drawn"));
     let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
     let (width, height) = kinds::header(&mut file).ok().flatten().ok_or_else(damaged)?;
@@ -181,7 +179,9 @@ pub(super) fn tagged(
     let size = (side(width)?, side(height)?);
     check_pixels(path, size.0, size.1)?;
     let mut pixels = vec![0; kinds::BYTES * width * height];
-    order.read(&mut file, &mut pixels).map_err(io(path, "read its page"))?;
+    file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
+    let order = ghostscript::order(&pixels).map_err(|error| failed(path, error, NO_GHOSTSCRIPT))?;
+    order.turn(&mut pixels);
     Ok(Tagged { size, pixels })
 }
 

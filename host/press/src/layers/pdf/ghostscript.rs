@@ -13,7 +13,7 @@
 use std::ffi::OsStr;
 use std::io::Read as _;
 use std::path::Path;
-use std::process::{ChildStdout, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use super::super::kinds::{self, Order};
 use super::complaint;
@@ -78,36 +78,25 @@ pub fn interpreter(path: &Path) -> Interpreter {
     }
 }
 
-/// Ghostscript at work on a bare pixel.
-pub struct Probe(Process, Option<ChildStdout>);
-
-impl Probe {
-    /// Begins to draw it.
-    ///
-    /// # Errors
-    /// Ghostscript cannot be started.
-    pub fn begin() -> Result<Probe, ProcessError> {
-        let mut command = Command::new("gs");
-        command.args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-g1x1", "-sOutputFile=-"]);
-        command.arg(format!("-sDEVICE={}", kinds::DEVICE)).args(["-c", "showpage"]);
-        let mut process = Process::start(command.stdout(Stdio::piped()), process::limit())?;
-        let output = process.output();
-        Ok(Probe(process, output))
+/// The order of the bytes of pixels with tags, of which these are some. If all of them are dark, Ghostscript draws a bare one.
+///
+/// # Errors
+/// Ghostscript cannot be started or fails, or its bare pixel has no light byte at an end.
+pub fn order(pixels: &[u8]) -> Result<Order, ProcessError> {
+    if let Some(order) = Order::seen(pixels) {
+        return Ok(order);
     }
-
-    /// The order of the bytes of its pixels.
-    ///
-    /// # Errors
-    /// Ghostscript fails, or its bare pixel is neither of the two that are known.
-    pub fn order(self) -> Result<Order, ProcessError> {
-        let mut page = Vec::new();
-        self.1.map_or(Ok(0), |output| output.take(1 << 10).read_to_end(&mut page))?;
-        self.0.end(|| false)?;
-        let order = page.last_chunk::<{ kinds::BYTES }>().and_then(|bare| Order::of(bare));
-        order.ok_or_else(|| {
-            ProcessError::Failed("this version of Ghostscript writes pixels in an unknown way".into())
-        })
-    }
+    let mut command = Command::new("gs");
+    command.args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-g1x1", "-sOutputFile=-"]);
+    command.arg(format!("-sDEVICE={}", kinds::DEVICE)).args(["-c", "showpage"]);
+    let mut process = Process::start(command.stdout(Stdio::piped()), process::limit())?;
+    let mut page = Vec::new();
+    process.output().map_or(Ok(0), |output| output.take(1 << 10).read_to_end(&mut page))?;
+    process.end(|| false)?;
+    let order = page.last_chunk::<{ kinds::BYTES }>().and_then(|bare| Order::seen(bare));
+    order.ok_or_else(|| {
+        ProcessError::Failed("this version of Ghostscript writes pixels in an unknown way".into())
+    })
 }
 
 #[cfg(test)]
