@@ -19,6 +19,9 @@ use super::treatments::{CHOICES, Shape, Treatment};
 const ON_INK: f64 = 7.0 / 8.0;
 const ON_ONE: f64 = 3.0 / 4.0;
 
+/// What is a shape's ground is at least one in so many dots of its border.
+const PART: u32 = 8;
+
 /// Where between the colours on both sides of it a step of a shading lies.
 const MIDST: RangeInclusive<f32> = 0.1..=0.9;
 
@@ -111,14 +114,37 @@ pub(super) fn steps(
 #[derive(Clone, Default)]
 struct Border {
     all: u32,
-    /// Those that are printed as each of its stacks, those on which the stack would not be seen as the shape's colour, and those on which not even
-    /// faintly.
+    /// Those that are printed as each of its stacks.
     stacks: [u32; CHOICES],
-    faint_on: [u32; CHOICES],
-    lost_on: [u32; CHOICES],
     /// Those in colours that it hardly differs from, and those that nobody can tell from it.
     faint: u32,
     hidden: u32,
+    contrast: Contrast,
+}
+
+/// Of the border of a shape, or of all shapes of its colour on the same grounds.
+#[derive(Clone, Copy, Default)]
+struct Contrast {
+    all: u32,
+    /// The dots on which each of its stacks would not be seen as the shape's colour, and those on which not even faintly.
+    faint_on: [u32; CHOICES],
+    lost_on: [u32; CHOICES],
+}
+
+impl Contrast {
+    fn add(&mut self, other: &Contrast) {
+        let sum = |own: &mut u32, other: u32| *own = own.saturating_add(other);
+        sum(&mut self.all, other.all);
+        for at in 0..CHOICES {
+            sum(&mut self.faint_on[at], other.faint_on[at]);
+            sum(&mut self.lost_on[at], other.lost_on[at]);
+        }
+    }
+
+    /// Whether a stack is seen on one part of the border, and not on another.
+    fn is_mixed(&self) -> bool {
+        self.faint_on.iter().any(|dots| (1..self.all).contains(dots))
+    }
 }
 
 /// The bits of a pair of colours: one for each stack that the other is printed as, one for each that would not be seen on it as asked, one for
@@ -186,8 +212,9 @@ impl Grounds {
         };
         let mut border = vec![Border::default(); runs.len()];
         each_beside(flat, width, (runs, rows), |run, at| {
-            let Border { all, stacks, faint_on, lost_on, faint, hidden } = &mut border[run.root as usize];
+            let Border { all, stacks, faint, hidden, contrast } = &mut border[run.root as usize];
             *all += 1;
+            contrast.all += 1;
             let bits = match flat.index[at] {
                 beside if is_tone(beside) => on_tone(run.colour, at),
                 beside => met[256 * usize::from(run.colour) + usize::from(beside)],
@@ -201,16 +228,17 @@ impl Grounds {
                     .for_each(|(at, dots)| *dots += u32::from(bits >> (first + at) & 1));
             };
             count(stacks, 0);
-            count(faint_on, WEAK);
-            count(lost_on, LOST);
+            count(&mut contrast.faint_on, WEAK);
+            count(&mut contrast.lost_on, LOST);
         });
+        judge_alike(flat, width, (runs, rows), &mut border);
         Some(Grounds { border })
     }
 
     /// The solid of a shape: the nearest that it does not lie on, and, if it `stands` for the colour alone, that is seen as it; if the shape hardly
     /// differs from what it lies on, only of the mild ones, and none if nobody can tell them apart.
     pub(super) fn solid(&self, root: u32, shape: &Shape, stands: bool) -> Option<u8> {
-        let Border { all, stacks, faint_on, lost_on, faint, hidden } = &self.border[root as usize];
+        let Border { all, stacks, faint, hidden, contrast } = &self.border[root as usize];
         let all = (*all).max(1);
         if 2 * hidden >= all {
             return None;
@@ -219,11 +247,34 @@ impl Grounds {
         let free = || (0..CHOICES).filter(|&at| allowed >> at & 1 == 1 && 2 * stacks[at] < all);
         let seen = match stands {
             true => {
-                free().find(|&at| 2 * faint_on[at] < all).or_else(|| free().find(|&at| 2 * lost_on[at] < all))
+                let fewer = |dots: &[u32; CHOICES]| free().find(|&at| 2 * dots[at] < contrast.all.max(1));
+                fewer(&contrast.faint_on).or_else(|| fewer(&contrast.lost_on))
             }
             false => free().next(),
         };
         seen.map(|at| shape.solids[at])
+    }
+}
+
+/// Shapes of one colour that lie on the same grounds have the contrast of all of them: of letters with a shadow half lie on white and half on the
+/// shadow, some a little more and some a little less.
+fn judge_alike(flat: &Flat, width: usize, (runs, rows): (&[Run], &[usize]), border: &mut [Border]) {
+    let is_mixed: Vec<bool> = border.iter().map(|border| border.contrast.is_mixed()).collect();
+    if !is_mixed.contains(&true) {
+        return;
+    }
+    let mut alike: HashMap<(u8, Vec<u8>), (Contrast, Vec<u32>)> = HashMap::new();
+    for (root, beside) in borders(flat, width, (runs, rows), |run| is_mixed[run.root as usize]) {
+        let Border { all, contrast, .. } = &border[root as usize];
+        let large = beside.into_iter().filter(|&(_, dots)| PART * dots >= *all).map(|(colour, _)| colour);
+        let mut grounds: Vec<u8> = large.collect();
+        grounds.sort_unstable();
+        let (sum, roots) = alike.entry((runs[root as usize].colour, grounds)).or_default();
+        sum.add(contrast);
+        roots.push(root);
+    }
+    for (sum, roots) in alike.into_values() {
+        roots.into_iter().for_each(|root| border[root as usize].contrast = sum);
     }
 }
 

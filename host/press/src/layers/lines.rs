@@ -2,15 +2,17 @@
 //!
 //! Problem: a shape is as wide as its widest place, so that a line with a marker on it is screened all along, and becomes a row of dots.
 //! Method: the opening of the shape by the square that tells wide from thin (Serra 1982): what no such square in it covers is
-//! thin. Such parts are lines if they are long; short ones are the corners that squares do not reach into. Where the shape is mostly lines, small
-//! wide parts are where they turn or cross.
-//! Cost: 4 ns a dot of wide shapes. Memory: four bytes a dot of a row, 40 a stretch.
+//! thin. Such parts are lines if they are long; short ones are the corners that squares do not reach into. Squares are narrow across a slanting
+//! stroke, so its width is found from its chords along a row and a column. What lies amid more of its shape, cut by something else than paper, is
+//! ground: between hatching, contours and the strands of hair. Where the shape is mostly lines, small wide parts are where they turn or cross.
+//! Cost: 4 ns a dot of wide shapes, 200 ns a stretch of what may be a line. Memory: four bytes a dot of a row, 40 a stretch.
 //! Limits: a line is decided apart from its shape only if it is [`LONG`] squares long, and not if the shape is large: the ground
 //! between two letters is no line.
 
 use std::ops::Range;
 
-use super::shapes::{Run, Shapes};
+use super::flat::Flat;
+use super::shapes::{Run, Shapes, continues};
 use crate::forest::Forest;
 
 /// A line is at least so many times longer than it may be wide.
@@ -20,6 +22,11 @@ const PART: u64 = 6;
 
 /// What is left of a shape that is half lines or more is one of their corners, if it is at most so many times as wide and high as a line may be.
 const CORNER: u32 = 3;
+
+/// How far to both sides of a stretch more of its shape is looked for, in widths of a line.
+const NEAR: usize = 3;
+/// What has so much of its shape in all directions is no line: lines of half of the distance between them have half.
+const GROUND: f32 = 0.4;
 
 /// A stretch of a line.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,8 +38,15 @@ pub(super) struct Line {
     pub end: u32,
 }
 
-/// The lines that hang on shapes with a root that `is_wide`. `stroke` is the side of the squares in [`Shapes::cores`].
-pub(super) fn lines(shapes: &Shapes, width: usize, stroke: u8, is_wide: impl Fn(u32) -> bool) -> Vec<Line> {
+/// The lines that hang on shapes with a root that `is_wide`. `stroke` is the side of the squares in [`Shapes::cores`], and `is_bare` is asked of
+/// colours.
+pub(super) fn lines(
+    shapes: &Shapes,
+    (flat, width): (&Flat, usize),
+    stroke: u8,
+    is_wide: impl Fn(u32) -> bool,
+    is_bare: impl Fn(u8) -> bool,
+) -> Vec<Line> {
     let Shapes { runs, rows, cores } = shapes;
     let mut cores = cores.iter().rev().peekable();
     // For each column the first row that a square which ends in this row or beneath it covers.
@@ -59,8 +73,18 @@ pub(super) fn lines(shapes: &Shapes, width: usize, stroke: u8, is_wide: impl Fn(
     found.reverse();
     is_thin.reverse();
     let parts = Parts { all: &found, runs, width };
-    let size = parts.sizes(|a, b| is_thin[a] == is_thin[b]);
-    let is_line = |at: usize| is_thin[at] && size[at] >= LONG * u32::from(stroke);
+    let (roots, size) = parts.sizes(|a, b| is_thin[a] == is_thin[b]);
+    let is_long = |at: usize| is_thin[at] && size[at] >= LONG * u32::from(stroke);
+    // Of each long part how many dots are slender, and how many others.
+    let mut balance = vec![0i64; found.len()];
+    let look = Look { flat, width, stroke: stroke.into() };
+    for at in (0..found.len()).filter(|&at| is_long(at)) {
+        let part = &found[at];
+        let dots = i64::from(part.end - part.start);
+        let is_slender = look.is_slender(part, &runs[part.run as usize], &is_bare);
+        balance[roots[at] as usize] += if is_slender { dots } else { -dots };
+    }
+    let is_line = |at: usize| is_long(at) && balance[roots[at] as usize] > 0;
     // How many dots of each shape are of lines, and how many it has.
     let mut dots = vec![[0u64; 2]; runs.len()];
     for (at, part) in found.iter().enumerate() {
@@ -76,7 +100,7 @@ pub(super) fn lines(shapes: &Shapes, width: usize, stroke: u8, is_wide: impl Fn(
         })
         .collect();
     // Where lines meet or turn, squares fit between them.
-    let size = parts.sizes(|a, b| line[a] == line[b]);
+    let (_, size) = parts.sizes(|a, b| line[a] == line[b]);
     for at in 0..found.len() {
         let [of_lines, all] = dots[parts.shape(at)];
         line[at] |= 2 * of_lines >= all && size[at] <= CORNER * u32::from(stroke);
@@ -99,8 +123,9 @@ impl Parts<'_> {
         self.runs[self.all[at].run as usize].root as usize
     }
 
-    /// For each stretch the width or height, whichever is more, of what it hangs together with of its shape and belongs `together`.
-    fn sizes(&self, together: impl Fn(usize, usize) -> bool) -> Vec<u32> {
+    /// For each stretch the root of what it hangs together with of its shape and belongs `together`, and the width or height of that, whichever is
+    /// more.
+    fn sizes(&self, together: impl Fn(usize, usize) -> bool) -> (Vec<u32>, Vec<u32>) {
         let place = |part: &Line| {
             let row = part.row as usize * self.width;
             row + part.start as usize..row + part.end as usize
@@ -115,14 +140,73 @@ impl Parts<'_> {
             (*top, *bottom) = ((*top).min(part.row), part.row + 1);
         }
         let size = |[left, top, right, bottom]: [u32; 4]| (right - left).max(bottom - top);
-        roots.into_iter().map(|root| size(bounds[root as usize])).collect()
+        let sizes = roots.iter().map(|&root| size(bounds[root as usize])).collect();
+        (roots, sizes)
+    }
+}
+
+/// What is seen from the middle of a stretch to one side.
+#[derive(Default)]
+struct Way {
+    /// Dots looked at, those that continue its shape, and those up to the first that does not, and that one's colour.
+    all: usize,
+    own: usize,
+    chord: usize,
+    beside: Option<u8>,
+}
+
+/// The surroundings of stretches.
+struct Look<'a> {
+    flat: &'a Flat,
+    width: usize,
+    stroke: usize,
+}
+
+impl Look<'_> {
+    /// Whether the middle of a stretch of a run is of a line: narrow, and no ground that something else than paper cuts.
+    fn is_slender(&self, part: &Line, run: &Run, is_bare: impl Fn(u8) -> bool) -> bool {
+        let Look { flat, width, stroke } = self;
+        let (x, y) = ((part.start + part.end) as usize / 2, part.row as usize);
+        let middle = y * width + x;
+        let length = flat.index.len() / width;
+        let far = NEAR * stroke;
+        // The colours to both ends of a row and of a column, from the middle.
+        let ways: [&mut dyn Iterator<Item = usize>; 4] = [
+            &mut (1..=far.min(x)).map(|step| middle - step),
+            &mut (1..=far.min(width - 1 - x)).map(|step| middle + step),
+            &mut (1..=far.min(y)).map(|step| middle - step * width),
+            &mut (1..=far.min(length - 1 - y)).map(|step| middle + step * width),
+        ];
+        let [left, right, up, down] = ways.map(|way| {
+            let mut seen = Way::default();
+            for colour in way.map(|at| flat.index[at]) {
+                let is_own = continues(flat, run.colour, colour);
+                seen.all += 1;
+                seen.own += usize::from(is_own);
+                match seen.beside {
+                    None if is_own => seen.chord += 1,
+                    None => seen.beside = Some(colour),
+                    Some(_) => {}
+                }
+            }
+            seen
+        });
+        let chord = |a: &Way, b: &Way| (1 + a.chord + b.chord) as f32;
+        let share = |a: &Way, b: &Way| (1 + a.own + b.own) as f32 / (1 + a.all + b.all) as f32;
+        // The height of the right triangle that a slanting stroke's edge makes with a row and a column.
+        let (across, along) = (chord(&left, &right), chord(&up, &down));
+        let is_narrow = across * along / across.hypot(along) < *stroke as f32;
+        let beside = || [&left, &right, &up, &down].into_iter().filter_map(|way| way.beside);
+        let bare = beside().filter(|&colour| is_bare(colour)).count();
+        let drawn = beside().count() - bare;
+        let is_ground = share(&left, &right).min(share(&up, &down)) >= GROUND && drawn > bare;
+        is_narrow && !is_ground
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layers::flat::Flat;
     use crate::layers::kinds::Kind;
     use crate::layers::shapes::shapes;
 
@@ -131,13 +215,20 @@ mod tests {
 
     /// The dots of lines in a drawing of the dots that satisfy `is`.
     fn drawn(is: impl Fn(usize, usize) -> bool) -> Vec<bool> {
-        let index = (0..SIDE * SIDE).map(|at| 2 * u8::from(is(at % SIDE, at / SIDE))).collect();
+        drawn_on(0, is)
+    }
+
+    /// The same on another ground than paper.
+    fn drawn_on(ground: u8, is: impl Fn(usize, usize) -> bool) -> Vec<bool> {
+        let index = (0..SIDE * SIDE).map(|at| if is(at % SIDE, at / SIDE) { 2 } else { ground }).collect();
         let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (Kind::Drawing, [128; 3])];
         let mut shaped = [false; 256];
         shaped[2] = true;
-        let all = shapes(&Flat { colours, index }, SIDE, (&shaped, STROKE));
+        let flat = Flat { colours, index };
+        let all = shapes(&flat, SIDE, (&shaped, STROKE));
         let mut dots = vec![false; SIDE * SIDE];
-        for line in lines(&all, SIDE, STROKE, |root| all.runs[root as usize].side >= STROKE) {
+        let is_wide = |root: u32| all.runs[root as usize].side >= STROKE;
+        for line in lines(&all, (&flat, SIDE), STROKE, is_wide, |colour| colour == 0) {
             let row = line.row as usize * SIDE;
             dots[row + line.start as usize..row + line.end as usize].fill(true);
         }
@@ -180,6 +271,30 @@ mod tests {
         // Stems 40 dots high, six dots apart, on a ground.
         let stem = |x: usize, y: usize| (20..60).contains(&y) && (20..60).contains(&x) && x % 10 < 4;
         assert!(!drawn(|x, y| !stem(x, y)).contains(&true));
+    }
+
+    /// A tint between hatching was printed in paper or in its ink. The same between bare lines is lines.
+    #[test]
+    fn what_is_left_of_a_ground_between_lines_is_ground() {
+        let is = |x: usize, y: usize| y < 20 || x % 8 < 5;
+        for (between, is_line) in [(0, true), (1, false)] {
+            let found = drawn_on(between, is);
+            assert_eq!(found[50 * SIDE + 42], is_line, "between lines in colour {between}");
+        }
+    }
+
+    /// A square of nine dots fits in a ring 9.4 dots wide where it is level or upright, and in a slanting stroke only from 12.7 on.
+    #[test]
+    fn a_ring_is_one_stroke_all_around() {
+        for radius in [33.0f64, 36.0, 38.5] {
+            for stroke in [9.4, 9.9, 11.0, 12.5] {
+                let is = |x: usize, y: usize| {
+                    let far = (x as f64 - 39.5).hypot(y as f64 - 39.5);
+                    (radius - stroke..radius).contains(&far)
+                };
+                assert!(!drawn(is).contains(&true), "{radius}, {stroke}");
+            }
+        }
     }
 
     #[test]

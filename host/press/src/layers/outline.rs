@@ -155,7 +155,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
     let is_wide = |root: u32| {
         !is_letter[root as usize] && !is_piece[root as usize] && !steps.contains(&root) && !is_thin(root)
     };
-    for line in lines(&shapes, width, STROKE, is_wide) {
+    for line in lines(&shapes, (flat, width), STROKE, is_wide, is_bare) {
         let run = &runs[line.run as usize];
         let Some(Treatment::Shape(shape)) = of(run.colour) else { continue };
         if let Some(solid) =
