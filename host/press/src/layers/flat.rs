@@ -29,7 +29,7 @@ pub(super) const BLACK: u8 = 1;
 /// sRGB's value of half of the light. Where a channel has less, ink that takes it away lies on more than half of the dots.
 const HALF: u8 = 188;
 /// Neighbours in a shading differ by at most this much in each of red, green and blue.
-const SIMILAR: u8 = 12;
+pub(super) const SIMILAR: u8 = 12;
 
 /// What draws in a colour, and its sRGB.
 pub(super) type Drawn = (Kind, [u8; 3]);

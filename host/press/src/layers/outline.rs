@@ -13,16 +13,19 @@
 //! on ink, by nearly all of its border, is printed in paper: a rim of ink would be drawn within white letters, and screened they are ragged.
 //! A drawing that is a step between a lighter and a darker colour is part of a shading, and screened; small drawings with the strokes of larger ones in their
 //! colour are no letters.
+//! A letter that is filled with a shading is screened; in strokes narrower than a thin line it has one colour, that nearest to its mean.
 //! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines. What of the ground lies
 //! inside letters is as wide as the ground ([`counters`](super::counters)).
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
 //! widths are measured with squares, so a slanting stroke counts as thinner than it is.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
 use super::beside::{PaleLines, at_the_rim, is_ridge, needs_rim};
 use super::counters::counters;
-use super::flat::{Flat, TONE};
+use super::flat::{Flat, SIMILAR, TONE};
 use super::grounds::{Grounds, Lies, PAPER, lies, steps};
 use super::kinds::Kind;
 use super::lines::lines;
@@ -114,11 +117,17 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
         }
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape, stands))
     };
+    let shaded = shaded_letters(flat, runs);
     let pale = PaleLines { flat, width, treatments };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for run in &runs[rows[y]..rows[y + 1]] {
             let root = run.root;
-            let Some(Treatment::Shape(shape)) = of(run.colour).filter(|_| !steps.contains(&root)) else {
+            let colour = match shaded.get(&root) {
+                Some(_) if runs[root as usize].side >= STROKE => continue,
+                Some(&mean) => mean,
+                None => run.colour,
+            };
+            let Some(Treatment::Shape(shape)) = of(colour).filter(|_| !steps.contains(&root)) else {
                 continue;
             };
             let (thin, first, is_small) = (is_thin(root), shape.solids[0], small[root as usize]);
@@ -166,6 +175,64 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
         }
     }
     fixed
+}
+
+/// The letters, by their roots, that are filled with a shading: their colours differ by more than three steps of one. Of each the colour that is
+/// nearest to their mean.
+fn shaded_letters(flat: &Flat, runs: &[Run]) -> HashMap<u32, u8> {
+    let colour = |run: &Run| flat.colours[usize::from(run.colour)].1;
+    let several =
+        runs.iter().filter(|run| run.colour != runs[run.root as usize].colour && is_text(flat, run));
+    let mut letters: HashMap<u32, Shades> = several.map(|run| (run.root, Shades::default())).collect();
+    if letters.is_empty() {
+        return HashMap::new();
+    }
+    for run in runs {
+        if let Some(shades) = letters.get_mut(&run.root) {
+            shades.add(colour(run), u64::from(run.end - run.start));
+        }
+    }
+    letters.retain(|_, shades| shades.are_a_shading());
+    let mut nearest: HashMap<u32, (u64, u8)> = HashMap::new();
+    for run in runs {
+        let Some(shades) = letters.get(&run.root) else { continue };
+        let off = (shades.off(colour(run)), run.colour);
+        nearest.entry(run.root).and_modify(|least| *least = off.min(*least)).or_insert(off);
+    }
+    nearest.into_iter().map(|(root, (_, colour))| (root, colour)).collect()
+}
+
+/// The colours of a shape.
+struct Shades {
+    least: [u8; 3],
+    most: [u8; 3],
+    sum: [u64; 3],
+    dots: u64,
+}
+
+impl Default for Shades {
+    fn default() -> Shades {
+        Shades { least: [u8::MAX; 3], most: [0; 3], sum: [0; 3], dots: 0 }
+    }
+}
+
+impl Shades {
+    fn add(&mut self, colour: [u8; 3], dots: u64) {
+        self.dots += dots;
+        for (c, value) in colour.into_iter().enumerate() {
+            (self.least[c], self.most[c]) = (self.least[c].min(value), self.most[c].max(value));
+            self.sum[c] += dots * u64::from(value);
+        }
+    }
+
+    fn are_a_shading(&self) -> bool {
+        (0..3).any(|c| self.most[c] - self.least[c] > 3 * SIMILAR)
+    }
+
+    /// How far a colour is from the mean.
+    fn off(&self, colour: [u8; 3]) -> u64 {
+        (0..3).map(|c| (self.sum[c] / self.dots.max(1)).abs_diff(colour[c].into())).sum()
+    }
 }
 
 /// Whether a small drawing has the strokes of larger ones in its colour, which are screened: of stripes of a flag, the shorter are no letters.

@@ -7,7 +7,7 @@
 //! Cost: a look at each pixel; at four more for each run of a row on pages with too many colours. Limits: [`MOST`] colours of the
 //! [`JUDGED`] most frequent.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -59,6 +59,8 @@ pub(super) fn palette<const N: usize>(
         .filter(|(colour, _)| !plain(**colour))
         .map(|(&colour, &dots)| ((Kind::Drawing, colour), dots))
         .collect();
+    // Letters through which a picture shows have many colours, and stay letters.
+    let translucent: HashSet<[u8; 3]> = letters.iter().map(|(_, colour)| *colour).collect();
     for (stretch, colour) in letters {
         add(&mut counts, (Kind::Text, *colour), stretch.len() as u64);
     }
@@ -80,7 +82,8 @@ pub(super) fn palette<const N: usize>(
                 .iter()
                 .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
                 .peekable();
-            let is_shaded = kind != Kind::Text && similar.peek().is_some();
+            let may_be_shaded = kind != Kind::Text || !translucent.contains(&colour);
+            let is_shaded = may_be_shaded && similar.peek().is_some();
             // What lies in pictures has no border here. It is flat art, which has no shadings.
             let is_band = || {
                 let border = borders.get(&(kind, colour)).copied();
