@@ -44,7 +44,8 @@ fn passes(job: &[u8]) -> Vec<(String, u64)> {
 /// The passes and the messages of a document through `layers` and through the filter, with this search path for programs.
 fn both(document: &[u8], path: Option<&str>) -> [(Vec<(String, u64)>, String); 2] {
     let bench = Bench::new();
-    fs::write(bench.path("page.pdf"), document).unwrap();
+    let name = if document.starts_with(b"%PDF") { "page.pdf" } else { "page.ps" };
+    fs::write(bench.path(name), document).unwrap();
     let run = |args: &str| {
         let mut command = bench.command(args);
         if let Some(script) = path {
@@ -60,9 +61,9 @@ fn both(document: &[u8], path: Option<&str>) -> [(Vec<(String, u64)>, String); 2
         assert!(output.status.success(), "{}", text(&output.stderr));
         output
     };
-    let layers: Output = run("layers page.pdf --paper a4 -o page.print");
+    let layers: Output = run(&format!("layers {name} --paper a4 -o page.print"));
     let job = fs::read(bench.path("page.print/job.rgl")).unwrap();
-    let file = bench.path("page.pdf").display().to_string();
+    let file = bench.path(name).display().to_string();
     let queued = run(&format!("cups-filter 1 me title 1 FoilpressPosition=Centre {file}"));
     [(passes(&job), text(&layers.stderr)), (passes(&queued.stdout), text(&queued.stderr))]
 }
@@ -120,5 +121,56 @@ fn parts_that_a_document_names_but_does_not_have_are_told() {
     for (passes, said) in both(&document("", "0 0 0 rg 102 102 36 36 re f /Im9 Do"), None) {
         assert!(has(&passes, "black", 36.0), "{passes:?}");
         assert!(said.contains("the document is damaged (Ghostscript says `"), "{said}");
+    }
+}
+
+/// Where a group is mixed in CMYK, K became white and cyan red.
+#[test]
+fn inks_in_a_transparency_group_of_cmyk_stay_what_they_are() {
+    if !ghostscript() {
+        return;
+    }
+    let marks = "0 0 0 1 k 102 102 36 36 re f 1 0 0 0 k 150 150 54 54 re f /s gs 0 1 1 0 k 30 330 72 72 re f";
+    let resources = "/ExtGState << /s << /ca .5 >> >>";
+    let page = String::from_utf8(document(resources, marks)).unwrap();
+    let group = page.replace("/Contents", "/Group << /S /Transparency /CS /DeviceCMYK >> /Contents");
+    for (passes, said) in both(group.as_bytes(), None) {
+        assert!(has(&passes, "black", 36.0) && has(&passes, "cyan", 54.0), "{passes:?}, {said}");
+    }
+}
+
+/// Newer versions write each further copy of a page in other colours.
+#[test]
+fn copies_that_a_document_asks_for_are_left_to_the_print_system() {
+    if !ghostscript() {
+        return;
+    }
+    for asks in ["/#copies 2 def", "<< /NumCopies 3 >> setpagedevice"] {
+        let page = format!(
+            "%!PS\n<< /PageSize [288 432] >> setpagedevice {asks} 0 setgray 102 102 36 36 rectfill showpage\n"
+        );
+        for (passes, said) in both(page.as_bytes(), None) {
+            assert!(passes.len() == 1 && has(&passes, "black", 36.0), "{asks}: {passes:?}, {said}");
+        }
+    }
+}
+
+/// Ghostscript knows ten spot colours of a document unless it is told of more.
+#[test]
+fn a_document_with_many_spot_colours_keeps_its_layers_of_ink() {
+    if !ghostscript() {
+        return;
+    }
+    let spot = |name: &str, at: usize| {
+        format!(
+            "[/Separation ({name}) /DeviceCMYK {{0 exch 0 0}}] setcolorspace 1 setcolor {} 200 9 9 rectfill\n",
+            9 * at
+        )
+    };
+    let mut page = "%!PS\n<< /PageSize [288 432] >> setpagedevice\n".to_owned();
+    page.extend((0..14).map(|at| spot(&format!("Tone {at}"), at)));
+    page += "[/Separation (Gold) /DeviceCMYK {0 exch dup 0}] setcolorspace 1 setcolor 102 102 36 36 rectfill showpage\n";
+    for (passes, said) in both(page.as_bytes(), None) {
+        assert!(has(&passes, "metallic-gold", 36.0), "{passes:?}, {said}");
     }
 }

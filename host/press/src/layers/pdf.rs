@@ -10,11 +10,10 @@
 mod complaint;
 pub mod conversion;
 mod draw;
+mod eps;
 mod ghostscript;
 mod plates;
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use protocol::ink::Ink;
@@ -49,12 +48,13 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let only = options.page();
     observer.begin("reading pages", 2);
     let drawn = draw::drafts(path, only, Part::CropBox, &folder);
-    let (Drafts { leaves, said }, program) = match (drawn, is_pdf(path)?) {
-        (Err(LayersError::Program { .. }), true) => {
-            (Program::Poppler.leaves(path, only, Part::CropBox, &folder)?, Program::Poppler)
-        }
-        (drawn, _) => drawn.map(|(drafts, interpreter)| (drafts, Program::Ghostscript(interpreter)))?,
-    };
+    let (Drafts { leaves, said }, program) =
+        match (drawn, ghostscript::is_pdf(path).map_err(io(path, "open it"))?) {
+            (Err(LayersError::Program { .. }), true) => {
+                (Program::Poppler.leaves(path, only, Part::CropBox, &folder)?, Program::Poppler)
+            }
+            (drawn, _) => drawn.map(|(drafts, interpreter)| (drafts, Program::Ghostscript(interpreter)))?,
+        };
     observer.advance(1);
     let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
     let document = Document { path, program, folder: &folder, options };
@@ -77,12 +77,6 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
         ));
     }
     Ok(art)
-}
-
-fn is_pdf(path: &Path) -> Result<bool, LayersError> {
-    let mut start = [0; 4];
-    let mut file = File::open(path).map_err(io(path, "open it"))?;
-    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
 }
 
 /// A document and how it is read.

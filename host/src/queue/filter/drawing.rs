@@ -43,12 +43,14 @@ impl Drawing {
         let options = [
             "-dNOINTERPOLATE".into(),
             format!("-sDEVICE={}", kinds::DEVICE),
-            conversion::OPTION.into(),
             format!("-r{dpi}"),
             "-sOutputFile=%stdout".into(),
         ];
         let page = page.map(|n| [format!("-dFirstPage={n}"), format!("-dLastPage={n}")]);
-        let options = options.into_iter().chain(page.into_iter().flatten());
+        let options = options
+            .into_iter()
+            .chain(conversion::OPTIONS.map(String::from))
+            .chain(page.into_iter().flatten());
         let mut command = pdf::command(path, interpreter, scratch.path(), options);
         command.stdout(Stdio::piped());
         let mut process = Process::start(&mut command, process::limit()).map_err(failed)?;

@@ -58,6 +58,9 @@ const MISSING: [&str; 5] = [
 /// What is said at once of parts that the document names but does not have.
 const UNNAMED: &str = "Couldn't find named resource";
 
+/// What is said of a document with more spot colours than have plates.
+const SPOTS: &str = "Max spot colorants reached";
+
 /// A note on a document that the older interpreter draws.
 pub const OLDER: &str = "the document has gradients that this version of Ghostscript leaves out, so its older interpreter draws \
     them; it draws some, such as narrow stripes, wrong or not at all; where it does, save the page as a \
@@ -168,7 +171,12 @@ pub fn damaged(said: &str) -> Option<String> {
             quote(complaint)
         )
     });
-    let notes: Vec<String> = other.into_iter().chain(pattern).collect();
+    let spots = said.contains(SPOTS).then(|| {
+        "the document has more than 60 spot colours, and Ghostscript makes process colours of the others, layers of ink \
+         among them; leave out colours that the page does not use"
+            .into()
+    });
+    let notes: Vec<String> = other.into_iter().chain(pattern).chain(spots).collect();
     (!notes.is_empty()).then(|| notes.join("; "))
 }
 

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -15,7 +15,7 @@ use super::super::error::{LayersError, io, wrong};
 use super::super::kinds;
 use super::super::names::stem;
 use super::super::size::check_pixels;
-use super::EPS_WITH_PREVIEW;
+use super::eps::{self, Bounds};
 use super::ghostscript::{self, Interpreter};
 use super::{complaint, conversion};
 use crate::process::{self, MOST_PAGES, Process, ProcessError};
@@ -33,6 +33,9 @@ const SAYS_SIZES: &str = "<< /EndPage { exch pop 2 ne dup { (%%PageSize:) print 
 
 /// What to do without Ghostscript.
 const NO_GHOSTSCRIPT: &str = "install it (Debian: apt install ghostscript), or export the page as PNG";
+
+/// The most spot colours of a document that have plates of their own; it is ten without this, and never more.
+const SPOTS: &str = "-dMaxSpots=60";
 
 /// The plates that every page has.
 pub(super) const PROCESS: [&str; 4] = ["Cyan", "Magenta", "Yellow", "Black"];
@@ -170,7 +173,8 @@ pub(super) fn tagged(
 ) -> Result<Tagged, LayersError> {
     let picture = folder.path().join("page.pam");
     conversion::write(folder.path()).map_err(io(path, "keep the conversion of its colours"))?;
-    let options = [one_page(page), crop(path, part)?, vec![conversion::OPTION.into()]].concat();
+    let convert = conversion::OPTIONS.map(String::from).to_vec();
+    let options = [one_page(page), crop(path, part)?, convert].concat();
     ghostscript((path, interpreter), &options, kinds::DEVICE, dpi, &picture, || false)?;
     let damaged = || wrong(path, format!("page {page} cannot be drawn"));
     let mut file = BufReader::new(File::open(&picture).map_err(|_| damaged())?);
@@ -193,27 +197,19 @@ fn crop(path: &Path, part: Part) -> Result<Vec<String>, LayersError> {
     if part == Part::Sheet {
         return Ok(Vec::new());
     }
-    let mut options = vec!["-dUseCropBox".into()];
-    if is_eps(path).map_err(io(path, "read it"))? {
-        options.push("-dEPSCrop".into());
-    }
-    Ok(options)
-}
-
-/// Whether a file is EPS: one picture, whose size is its bounding box, also if a preview for DOS lies beside it.
-fn is_eps(path: &Path) -> std::io::Result<bool> {
-    let mut file = File::open(path)?;
-    let mut start = Vec::new();
-    (&mut file).take(64).read_to_end(&mut start)?;
-    if start.starts_with(EPS_WITH_PREVIEW)
-        && let Some(place) = start.get(4..).and_then(|rest| rest.first_chunk())
-    {
-        file.seek(SeekFrom::Start(u32::from_le_bytes(*place).into()))?;
-        start.clear();
-        file.take(64).read_to_end(&mut start)?;
-    }
-    let line = start.split(|&byte| matches!(byte, b'\r' | b'\n')).next().unwrap_or_default();
-    Ok(line.starts_with(b"%!PS-Adobe-") && line.windows(4).any(|word| word == b"EPSF"))
+    let cropped = match eps::bounds(path).map_err(io(path, "read it"))? {
+        None => Vec::new(),
+        Some(Bounds::InHeader) => vec!["-dEPSCrop".into()],
+        // Ghostscript looks for it in the header alone.
+        Some(Bounds::AtEnd([left, bottom, right, top])) => vec![
+            "-dFIXEDMEDIA".into(),
+            format!("-dDEVICEWIDTHPOINTS={}", right - left),
+            format!("-dDEVICEHEIGHTPOINTS={}", top - bottom),
+            "-c".into(),
+            format!("<< /Install {{ {} {} translate }} >> setpagedevice", -left, -bottom),
+        ],
+    };
+    Ok([vec!["-dUseCropBox".into()], cropped].concat())
 }
 
 fn pages(page: u32) -> Vec<String> {
@@ -231,8 +227,12 @@ fn ghostscript_leaves(
         None => folder.path().join(format!("draft{number}.tif")),
     };
     let to = if only.is_some() { place(1) } else { folder.path().join("draft%d.tif") };
-    let options =
-        [vec!["-sCompression=lzw".into()], only.map_or_else(Vec::new, one_page), crop(path, part)?].concat();
+    let options = [
+        vec!["-sCompression=lzw".into(), SPOTS.into()],
+        only.map_or_else(Vec::new, one_page),
+        crop(path, part)?,
+    ]
+    .concat();
     let options = [options, vec!["-c".into(), SAYS_SIZES.into()]].concat();
     let mut begun = 0;
     let progressed = || {
@@ -355,7 +355,7 @@ pub(super) fn separate(
     dpi: (f64, f64),
     to: &Path,
 ) -> Result<String, LayersError> {
-    let options = [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into()]].concat();
+    let options = [one_page(page), crop(path, part)?, vec!["-dPrintSpotCMYK".into(), SPOTS.into()]].concat();
     ghostscript((path, interpreter), &options, "tiffsep", dpi, to, || false)
 }
 
@@ -373,7 +373,8 @@ fn ghostscript(
         "-dGraphicsAlphaBits=1".into(),
         format!("-r{:.4}x{:.4}", dpi.0, dpi.1),
         format!("-sDEVICE={device}"),
-        format!("-sOutputFile={}", to.display()),
+        // It runs in the folder: what the folder's path has of `%` would be a number of pages.
+        format!("-sOutputFile={}", to.file_name().unwrap_or_default().display()),
     ];
     let folder = to.parent().unwrap_or(Path::new("."));
     let command = ghostscript::command(path, interpreter, folder, drawing.iter().chain(options));

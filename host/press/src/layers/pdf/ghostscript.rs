@@ -11,7 +11,8 @@
 //! corners of a shading first, so narrow stripes may become one colour; a note says so.
 
 use std::ffi::OsStr;
-use std::io::Read as _;
+use std::fs::File;
+use std::io::{self, Read as _};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -25,6 +26,22 @@ const BANDS: usize = 100_000_000;
 
 /// Lets the interpreter of PDF say what it left out. The greeting and the loading of Ghostscript's own files stay quiet.
 const SPEAKS: &str = "userdict /QUIET false put";
+
+/// Copies are the print system's affair, and since 10.04 each copy of a page with tags has its bytes in another order. PostScript asks for copies in
+/// two ways.
+const ONE_COPY: &str = "-dNumCopies=1";
+const NO_COPIES: &str = "userdict begin /setpagedevice { dup /NumCopies known { dup length dict copy dup /NumCopies undef } if \
+    systemdict /setpagedevice get exec } bind def end";
+
+/// Whether a document is PDF.
+///
+/// # Errors
+/// Those of opening it.
+pub(super) fn is_pdf(path: &Path) -> io::Result<bool> {
+    let mut start = [0; 4];
+    let mut file = File::open(path)?;
+    Ok(file.read_exact(&mut start).is_ok() && &start == b"%PDF")
+}
 
 /// Ghostscript's interpreter of PDF.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -49,13 +66,16 @@ pub fn command<O: AsRef<OsStr>>(
     command
         .current_dir(folder)
         .env("TMPDIR", folder)
-        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr"])
+        .args(["-q", "-dSAFER", "-dBATCH", "-dNOPAUSE", "-sstdout=%stderr", ONE_COPY])
         .arg(format!("-dBufferSpace={BANDS}"));
     if interpreter == Interpreter::Older {
         command.arg("-dNEWPDF=false");
     }
     // What the options run needs the device.
-    command.args(options).args(["-c", SPEAKS, "-f"]);
+    command.args(options);
+    // What warns of a box in EPS does not work when it may speak.
+    let first = if is_pdf(path).unwrap_or(false) { SPEAKS } else { NO_COPIES };
+    command.args(["-c", first, "-f"]);
     command.arg(std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     command
 }
@@ -110,7 +130,8 @@ mod tests {
             let args: Vec<&str> = command.get_args().filter_map(OsStr::to_str).collect();
             assert!(args.contains(&"-dBufferSpace=100000000") && args.contains(&"-dSAFER"), "{args:?}");
             assert_eq!(args.contains(&"-dNEWPDF=false"), older, "{args:?}");
-            assert!(args.ends_with(&["-r600", "-c", "x", "-c", SPEAKS, "-f", "/a.pdf"]), "{args:?}");
+            // What cannot be read is not taken for PDF.
+            assert!(args.ends_with(&["-r600", "-c", "x", "-c", NO_COPIES, "-f", "/a.pdf"]), "{args:?}");
         }
     }
 }
