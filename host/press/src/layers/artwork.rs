@@ -1,7 +1,7 @@
 //! Art as read: layers of ink, and colours, at 600 dpi.
 //!
 //! Method: a layer starts as coverage, one byte a pixel, whatever its file was. Coverage is resampled to the dots. Layers
-//! to be halftoned keep it; all others become one bit a dot at half coverage.
+//! to be halftoned keep it, but what is flat in them has the edges of flat art; all others become one bit a dot at half coverage.
 //! Cost: 1 ns a dot for each layer. Limits: soft edges become hard, and a note says how many pixels they had.
 
 use protocol::ink::{Ink, Kind};
@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::colour::Colour;
 use super::coverage::{Coverage, Scan};
+use super::flat::Flat;
 use super::options::Options;
 use super::{bits, names, resample};
 use crate::separate::Plane;
@@ -152,8 +153,16 @@ fn layer(
     if !tones && let Some(note) = soft_edges(name, &scan.coverage, scan.width as usize) {
         notes.push(note);
     }
-    let resampled = if tones { resample::tones } else { resample::solid };
-    let coverage = resampled(scan.coverage, (scan.width, scan.height), (width, length));
+    let size = (scan.width, scan.height);
+    let coverage = match tones {
+        true => {
+            let flat = flat(&scan.coverage, size).at_dots(size, (width, length));
+            let mut coverage = resample::tones(scan.coverage, size, (width, length));
+            exact(&mut coverage, &flat);
+            coverage
+        }
+        false => resample::solid(scan.coverage, size, (width, length)),
+    };
     let layer =
         Layer { ink: named.ink, name: name.into(), place: named.place, shape: shape(width, coverage, tones) };
     if let Shape::Solid(plane) = &layer.shape
@@ -162,6 +171,21 @@ fn layer(
         notes.push(format!("{}: no pixel is dark enough to be ink; draw layers in black", layer.name));
     }
     (layer, notes)
+}
+
+/// What is flat in a plate, as in a grey picture: beside tones the softened edges of letters are still edges.
+fn flat(coverage: &[u8], (width, _): (u32, u32)) -> Flat {
+    let grey: Vec<[u8; 3]> = coverage.par_iter().map(|&c| [255 - c; 3]).collect();
+    Flat::of(&grey, width as usize)
+}
+
+/// Gives the dots of flat areas and letters their own coverage, without what lies beside them.
+fn exact(coverage: &mut [u8], flat: &Flat) {
+    coverage.par_iter_mut().zip(&flat.index).for_each(|(coverage, &dot)| {
+        if let Some((_, [grey, ..])) = flat.colours.get(usize::from(dot)) {
+            *coverage = 255 - grey;
+        }
+    });
 }
 
 /// Coverage as a layer's shape.

@@ -343,6 +343,54 @@ mod tests {
         }
     }
 
+    /// Half of the border of such letters is white and half of it the shadow, here a little more and there a little less.
+    #[test]
+    fn letters_with_a_shadow_are_printed_alike() {
+        let (printable, space) = process_inks();
+        let solids = Solids::new(&printable, &space);
+        let mut fit = fit(&printable, &solids, &space);
+        let colours = vec![
+            (Kind::Picture, [255; 3]),
+            (Kind::Picture, [0; 3]),
+            (Kind::Text, [16, 96, 192]),
+            (Kind::Text, [136, 136, 170]),
+        ];
+        let width = 40;
+        // Letters of several forms, each with a shadow to the right and below.
+        let letters = [(10, 60, 6), (14, 40, 6), (20, 12, 5), (22, 18, 7), (12, 12, 4), (16, 30, 8)];
+        let is = |letter: (usize, usize, usize), x: usize, y: usize| {
+            let (wide, high, stroke) = letter;
+            let inside = (8..8 + wide).contains(&x) && (4..4 + high).contains(&y);
+            inside && (x < 8 + stroke || y >= 4 + high - stroke)
+        };
+        let mut index = Vec::new();
+        for letter in letters {
+            index.extend((0..width * 80).map(|at| {
+                let (x, y) = (at % width, at / width);
+                match is(letter, x, y) {
+                    true => 2,
+                    false if x >= 3 && y >= 3 && is(letter, x - 3, y - 3) => 3,
+                    false => 0,
+                }
+            }));
+        }
+        let flat = Flat { colours, index };
+        let treatments = treatments(&flat, width, &mut fit, &solids);
+        let looks = Looks::of(&flat, &treatments, &fit.stacks, &solids, None::<fn(usize) -> [u8; 3]>);
+        let fixed = fixed(&flat, width, &treatments, &looks);
+        for colour in [2, 3] {
+            let mut found: Vec<u8> = fixed
+                .iter()
+                .zip(&flat.index)
+                .filter(|&(_, &own)| own == colour)
+                .map(|(&dot, _)| dot)
+                .collect();
+            found.sort_unstable();
+            found.dedup();
+            assert!(found.len() == 1 && found[0] != TONE, "colour {colour} is {found:?}");
+        }
+    }
+
     /// Near-black in black was a white letter.
     #[test]
     fn what_is_nearly_its_ground_is_no_letter_in_the_opposite_colour() {

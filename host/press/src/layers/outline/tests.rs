@@ -455,3 +455,31 @@ fn the_bands_of_a_shading_are_one_wide_shape() {
         assert_eq!(stack, if rim { 7 } else { TONE });
     }
 }
+
+/// Chrome and gold letters: each band was a letter in its nearest solid.
+#[test]
+fn a_letter_that_is_filled_with_a_shading_is_screened_and_a_fine_one_has_one_colour() {
+    let steps = 24;
+    let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
+    colours.extend((0..steps).map(|at| (Kind::Text, [255 - 8 * at, 120, 8 * at])));
+    let Treatment::Shape(dark) = DARK else { panic!() };
+    // One half in one solid, the other in another.
+    let treatment =
+        |at: u8| Treatment::Shape(Shape { solids: [if at < steps / 2 { 7 } else { 6 }, 5, 0, 0], ..dark });
+    let treatments: Vec<Treatment> =
+        [Treatment::Solid(0), Treatment::Solid(1)].into_iter().chain((0..steps).map(treatment)).collect();
+    for (wide, wanted) in [(6usize, 1usize), (12, 0)] {
+        let index = (0..60 * 80).map(|at| match (at % 60, at / 60) {
+            (x, y) if (20..20 + wide).contains(&x) && (4..4 + 72).contains(&y) => 2 + (y as u8 - 4) / 3,
+            _ => 0,
+        });
+        let flat = Flat { colours: colours.clone(), index: index.collect() };
+        let fixed = fixed(&flat, 60, &treatments, &Looks::default());
+        let mut found: Vec<u8> =
+            fixed.iter().zip(&flat.index).filter(|&(_, &own)| own > 1).map(|(&dot, _)| dot).collect();
+        found.sort_unstable();
+        found.dedup();
+        assert_eq!(found.len(), 1, "{wide}: {found:?}");
+        assert_eq!(found.iter().filter(|&&dot| dot != TONE).count(), wanted, "{wide}: {found:?}");
+    }
+}

@@ -117,6 +117,42 @@ fn plates_with_tones_keep_them() {
     assert_eq!((art.layers[1].ink, extent(&art.layers[1])), (Ink::Black, (3, 3, 6, 6, 16)));
 }
 
+/// One tint in a plate, and its letters were torn.
+#[test]
+fn softened_letters_in_a_plate_with_tones_keep_their_edges() {
+    let bench = Bench::new();
+    let (width, length) = (80usize, 50usize);
+    // A disc and a bar with the share of each pixel that lies in them, beside a ramp.
+    let disc = |x: f64, y: f64| (x - 20.3).hypot(y - 25.4) < 9.2 || (34.3..37.6).contains(&x);
+    let share = |x: usize, y: usize| {
+        let parts = (0..64)
+            .filter(|part| disc(x as f64 + f64::from(part % 8) / 8.0, y as f64 + f64::from(part / 8) / 8.0));
+        (parts.count() * 255 / 64) as u8
+    };
+    let plate: Vec<u8> = (0..width * length)
+        .map(|at| match (at % width, at / width) {
+            (x @ 48.., 10..40) => (x - 40) as u8 * 5,
+            (x, y) => share(x, y),
+        })
+        .collect();
+    let none = vec![0; width * length];
+    let channels = [none.clone(), none.clone(), none, plate.clone()];
+    let file = tiff_file((width as u32, length as u32), &channels, 5, &[]);
+    let art = read(&[bench.write("cmyk.tif", file)], &Options::default());
+    let Shape::Tone(tones) = &art.layers[0].shape else { panic!("no tones") };
+    for (at, &tone) in tones.iter().enumerate() {
+        if at % width >= 48 {
+            assert_eq!(tone, plate[at]);
+        } else {
+            let wanted = if plate[at] >= 128 { 255 } else { 0 };
+            assert!(
+                tone == wanted || plate[at].abs_diff(128) < 64 && [0, 255].contains(&tone),
+                "{at}: {tone}"
+            );
+        }
+    }
+}
+
 #[test]
 fn tints_of_a_spot_colour_are_printed_and_softened_edges_of_a_solid_one_are_cut() {
     let bench = Bench::new();
