@@ -1,9 +1,10 @@
 //! Counters: the ground inside letters.
 //!
 //! Problem: what an o encloses is as small as a letter, and would be printed solid amid a ground that is screened.
-//! Method: a thin shape is a counter if most of its rows have a wide shape in its colour on both sides within a stroke's reach.
+//! Method: a thin shape is a counter if most of its rows have one wide shape in its colour on both sides within a stroke's reach. Between two bars of a
+//! code there are two.
 //! Cost: a look at a few runs for each run of a thin shape.
-//! Limits: a small shape in the colour of two wide ones near it on both sides is taken for a part of them.
+//! Limits: a small shape in the colour of a wide one near it on both sides is taken for a part of it.
 
 use super::flat::Flat;
 use super::shapes::{Run, joined};
@@ -21,9 +22,9 @@ pub(super) fn counters(
         let row = &runs[row[0]..row[1]];
         for (at, run) in row.iter().enumerate().filter(|(_, run)| is_thin(run.root)) {
             let is_ground = |other: &&Run| joined(flat, run.colour, other.colour) && !is_thin(other.root);
-            let mut before = row[..at].iter().rev().take_while(|other| other.end + reach >= run.start);
-            let mut behind = row[at + 1..].iter().take_while(|other| run.end + reach >= other.start);
-            let both = before.any(|other| is_ground(&other)) && behind.any(|other| is_ground(&other));
+            let before = row[..at].iter().rev().take_while(|other| other.end + reach >= run.start);
+            let behind = || row[at + 1..].iter().take_while(|other| run.end + reach >= other.start);
+            let both = before.filter(is_ground).any(|other| behind().any(|own| own.root == other.root));
             balance[run.root as usize] += if both { 1 } else { -1 };
         }
     }
@@ -81,5 +82,8 @@ mod tests {
         assert_eq!(found(&rows, 4), ['a', 'b', 'c']);
         // Beyond reach, nothing tells c from a small drawing; and d has the ground on one side alone.
         assert_eq!(found(&rows, 2), ['a', 'b']);
+        // Bars of a code.
+        let rows = ["gggg  a  ggggg  b ggg"; 4];
+        assert!(found(&[&["                     "], &rows[..]].concat(), 4).is_empty());
     }
 }

@@ -9,6 +9,7 @@
 //! Limits: a line is decided apart from its shape only if it is [`LONG`] squares long, and not if the shape is large: the ground
 //! between two letters is no line.
 
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 use super::flat::Flat;
@@ -145,6 +146,36 @@ impl Parts<'_> {
     }
 }
 
+/// The width of a slanting stroke from its chords along a row and a column: the height of the right triangle of these.
+fn across_slant(row: f32, column: f32) -> f32 {
+    row * column / row.hypot(column)
+}
+
+/// The shapes among these, by their roots, that are as wide as `stroke` or more across, though no square of it fits in them because they slant: by
+/// most of their dots.
+pub(super) fn slanting(
+    (runs, rows): (&[Run], &[usize]),
+    (flat, width): (&Flat, usize),
+    stroke: u8,
+    takes_part: impl Fn(u32) -> bool,
+) -> HashSet<u32> {
+    let far = 2 * usize::from(stroke);
+    let mut balance: HashMap<u32, i64> = HashMap::new();
+    for (y, row) in rows.windows(2).enumerate() {
+        for run in runs[row[0]..row[1]].iter().filter(|run| takes_part(run.root)) {
+            let middle = y * width + (run.start + run.end) as usize / 2;
+            let is_own =
+                |at: &usize| flat.index.get(*at).is_some_and(|&dot| continues(flat, run.colour, dot));
+            let up = (1..=far.min(y)).map(|step| middle - step * width).take_while(is_own).count();
+            let down = (1..=far).map(|step| middle + step * width).take_while(is_own).count();
+            let dots = run.end - run.start;
+            let is_wide = across_slant(dots as f32, (1 + up + down) as f32) >= f32::from(stroke);
+            *balance.entry(run.root).or_default() += if is_wide { 1 } else { -1 } * i64::from(dots);
+        }
+    }
+    balance.into_iter().filter(|&(_, dots)| dots > 0).map(|(root, _)| root).collect()
+}
+
 /// What is seen from the middle of a stretch to one side.
 #[derive(Default)]
 struct Way {
@@ -193,9 +224,7 @@ impl Look<'_> {
         });
         let chord = |a: &Way, b: &Way| (1 + a.chord + b.chord) as f32;
         let share = |a: &Way, b: &Way| (1 + a.own + b.own) as f32 / (1 + a.all + b.all) as f32;
-        // The height of the right triangle that a slanting stroke's edge makes with a row and a column.
-        let (across, along) = (chord(&left, &right), chord(&up, &down));
-        let is_narrow = across * along / across.hypot(along) < *stroke as f32;
+        let is_narrow = across_slant(chord(&left, &right), chord(&up, &down)) < *stroke as f32;
         let beside = || [&left, &right, &up, &down].into_iter().filter_map(|way| way.beside);
         let bare = beside().filter(|&colour| is_bare(colour)).count();
         let drawn = beside().count() - bare;

@@ -17,7 +17,7 @@
 //! Letters of a word are all thin or all wide ([`words`](super::words)), also where they were drawn as outlines. What of the ground lies
 //! inside letters is as wide as the ground ([`counters`](super::counters)).
 //! Cost: 5 ns a dot of such shapes, 0.3 ns of others. Memory: 44 bytes a run of a row, 20 bytes a run where solids may meet. Limits:
-//! widths are measured with squares, so a slanting stroke counts as thinner than it is.
+//! widths of letters are measured with squares, so a slanting stroke of one counts as thinner than it is.
 
 use std::collections::HashMap;
 
@@ -28,7 +28,7 @@ use super::counters::counters;
 use super::flat::{Flat, SIMILAR, TONE};
 use super::grounds::{Grounds, Lies, PAPER, lies, steps};
 use super::kinds::Kind;
-use super::lines::lines;
+use super::lines::{lines, slanting};
 use super::looks::Looks;
 use super::pieces::pieces;
 use super::shapes::{Run, shapes};
@@ -77,8 +77,14 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
     let drawn_larger = drawn_larger(flat, runs, &small);
     let is_letter: Vec<bool> =
         (runs.iter().zip(&small)).map(|(run, &small)| small && is_like(run) && !drawn_larger(run)).collect();
-    let is_thin =
-        |root: u32| runs[root as usize].side < if is_letter[root as usize] { LETTER } else { STROKE };
+    // At 45 degrees a square is narrower than the stroke it fits in by the root of two.
+    let may_slant =
+        |root: u32| !is_letter[root as usize] && (2 * STROKE / 3..STROKE).contains(&runs[root as usize].side);
+    let slanting = slanting((runs, rows), (flat, width), STROKE, may_slant);
+    let is_thin = |root: u32| {
+        let limit = if is_letter[root as usize] { LETTER } else { STROKE };
+        runs[root as usize].side < limit && !slanting.contains(&root)
+    };
     let is_counter = counters(flat, (runs, rows), u32::from(2 * LETTER), is_thin);
     let takes_part = |root: u32| is_letter[root as usize] && !is_counter[root as usize];
     let words = Words::of(flat, (runs, rows), (near(LETTER), LETTER), takes_part);

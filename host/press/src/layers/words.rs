@@ -133,13 +133,15 @@ fn thin(letters: &[Letter], limit: u8, joined: impl Fn(u8, u8) -> bool) -> Vec<(
     words.iter().zip(rows).map(|(&word, row)| (thin_dots[word as usize] > 0, count[row as usize])).collect()
 }
 
-/// Whether two letters are at most so many strokes apart, across and down, and their strokes alike: within a half.
+/// Whether two letters are at most so many strokes apart, across and down, and their strokes alike: within a half; or they begin and end in the same
+/// rows, as bars of a code do.
 fn belong_together(a: &Letter, b: &Letter, space: [u32; 2]) -> bool {
     let (thinner, wider) = (u32::from(a.side.min(b.side)), u32::from(a.side.max(b.side)));
     let gap = |low: usize, high: usize| {
         a.bounds[low].max(b.bounds[low]).saturating_sub(a.bounds[high].min(b.bounds[high]))
     };
-    2 * wider <= 3 * thinner && gap(0, 2) <= space[0] * wider && gap(1, 3) <= space[1] * wider
+    let are_bars = (1..=3).step_by(2).all(|side| a.bounds[side].abs_diff(b.bounds[side]) <= 1);
+    (2 * wider <= 3 * thinner || are_bars) && gap(0, 2) <= space[0] * wider && gap(1, 3) <= space[1] * wider
 }
 
 #[cfg(test)]
@@ -192,12 +194,19 @@ mod tests {
         assert_eq!(apart(120, 120), [true; 3]);
         assert_eq!(apart(121, 120), [false, true, false]);
         assert_eq!(apart(120, 121), [false, false, true]);
+        // Bars of a code have strokes of one to four modules.
+        let bar = |left: u32, side: u8| Letter {
+            bounds: [left, 9, left + u32::from(side), 99],
+            side,
+            ..letter(0, 0, side)
+        };
+        assert_eq!(decided(&[bar(0, 18), bar(24, 6), bar(36, 24), bar(66, 6)]), [true; 4]);
         let mut other = letter(110, 0, 20);
         other.colour = 3;
         assert_eq!(decided(&[letter(0, 0, 25), other]), [false, true]);
         // An initial beside text of half its size.
         let mut initial = letter(0, 0, 40);
-        initial.dots = 60_000;
+        (initial.dots, initial.bounds[3]) = (60_000, 280);
         assert_eq!(decided(&[initial, letter(110, 0, 20)]), [false, true]);
         assert_eq!(near(LIMIT), 12..48);
     }
