@@ -123,7 +123,7 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
         }
         grounds.as_ref().map_or(Some(shape.solids[0]), |grounds| grounds.solid(root, shape, stands))
     };
-    let shaded = shaded_letters(flat, runs);
+    let shaded = shaded_letters(flat, runs, of);
     let pale = PaleLines { flat, width, treatments };
     fixed.par_chunks_mut(width).enumerate().for_each(|(y, fixed)| {
         for run in &runs[rows[y]..rows[y + 1]] {
@@ -183,9 +183,14 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
     fixed
 }
 
-/// The letters, by their roots, that are filled with a shading: their colours differ by more than three steps of one. Of each the colour that is
-/// nearest to their mean.
-fn shaded_letters(flat: &Flat, runs: &[Run]) -> HashMap<u32, u8> {
+/// The letters, by their roots, that are filled with a shading: their colours differ by more than three steps of one, and are not all dark, or all
+/// pale, with one solid for all. Of each the colour that is nearest to their mean.
+fn shaded_letters(flat: &Flat, runs: &[Run], of: impl Fn(u8) -> Option<Treatment>) -> HashMap<u32, u8> {
+    let printed = |colour: u8| match of(colour) {
+        Some(Treatment::Solid(stack)) => Some((stack, true)),
+        Some(Treatment::Shape(shape)) => Some((shape.solids[0], shape.dark)),
+        None => None,
+    };
     let colour = |run: &Run| flat.colours[usize::from(run.colour)].1;
     let several =
         runs.iter().filter(|run| run.colour != runs[run.root as usize].colour && is_text(flat, run));
@@ -196,6 +201,7 @@ fn shaded_letters(flat: &Flat, runs: &[Run]) -> HashMap<u32, u8> {
     for run in runs {
         if let Some(shades) = letters.get_mut(&run.root) {
             shades.add(colour(run), u64::from(run.end - run.start));
+            shades.in_several |= printed(run.colour) != printed(runs[run.root as usize].colour);
         }
     }
     letters.retain(|_, shades| shades.are_a_shading());
@@ -214,11 +220,13 @@ struct Shades {
     most: [u8; 3],
     sum: [u64; 3],
     dots: u64,
+    /// Whether not all of them are printed alike.
+    in_several: bool,
 }
 
 impl Default for Shades {
     fn default() -> Shades {
-        Shades { least: [u8::MAX; 3], most: [0; 3], sum: [0; 3], dots: 0 }
+        Shades { least: [u8::MAX; 3], most: [0; 3], sum: [0; 3], dots: 0, in_several: false }
     }
 }
 
@@ -232,7 +240,7 @@ impl Shades {
     }
 
     fn are_a_shading(&self) -> bool {
-        (0..3).any(|c| self.most[c] - self.least[c] > 3 * SIMILAR)
+        self.in_several && (0..3).any(|c| self.most[c] - self.least[c] > 3 * SIMILAR)
     }
 
     /// How far a colour is from the mean.

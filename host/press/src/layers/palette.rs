@@ -4,7 +4,8 @@
 //! Method: text comes first, then the most frequent. If there are too many, the colours of shadings are left out: the ones with a similar
 //! colour on the page that has nearly as many dots, if half of their border or more is to such colours. An area stays, and so does a line,
 //! though a shading passes through their colour.
-//! Cost: a look at each pixel; at four more for each run of a row on pages with too many colours. Limits: [`MOST`] colours of the
+//! Shadings in letters count only if their strokes are wide.
+//! Cost: a look at each pixel; at five more for each run of a row on pages with too many colours. Limits: [`MOST`] colours of the
 //! [`JUDGED`] most frequent.
 
 use std::collections::{HashMap, HashSet};
@@ -24,6 +25,8 @@ const AREA: u64 = 16;
 /// counts as well.
 const GATHERED: usize = 1 << 16;
 const JUDGED: usize = 4096;
+/// Strokes in which a shading is screened are at least so many dots wide.
+const WIDE: u64 = 18;
 /// Rows that are gathered at once.
 const ROWS: usize = 64;
 
@@ -75,6 +78,7 @@ pub(super) fn palette<const N: usize>(
     colours.truncate(JUDGED);
     let mut shaded = Vec::new();
     if colours.len() > MOST {
+        let wide = in_wide_strokes(pixels, width);
         let all = colours.clone();
         let borders = borders(pixels, width, &all);
         colours.retain(|&((kind, colour), dots)| {
@@ -82,7 +86,8 @@ pub(super) fn palette<const N: usize>(
                 .iter()
                 .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
                 .peekable();
-            let may_be_shaded = kind != Kind::Text || !translucent.contains(&colour);
+            let may_be_shaded =
+                kind != Kind::Text || wide.contains(&colour) && !translucent.contains(&colour);
             let is_shaded = may_be_shaded && similar.peek().is_some();
             // What lies in pictures has no border here. It is flat art, which has no shadings.
             let is_band = || {
@@ -98,6 +103,23 @@ pub(super) fn palette<const N: usize>(
     }
     colours.truncate(MOST);
     (colours.into_iter().map(|(key, _)| key).collect(), shaded)
+}
+
+/// The colours of letters whose strokes are wide along rows, in the mean: what is fine is not read if it is screened.
+fn in_wide_strokes<const N: usize>(pixels: &[[u8; N]], width: usize) -> HashSet<[u8; 3]> {
+    let mut strokes: HashMap<[u8; 3], [u64; 2]> = HashMap::new();
+    let is_text = |pixel: &[u8; N]| split(pixel).0 == Kind::Text;
+    for row in pixels.chunks(width) {
+        for stroke in row.chunk_by(|a, b| is_text(a) == is_text(b)).filter(|stroke| is_text(&stroke[0])) {
+            for run in stroke.chunk_by(|a, b| a == b) {
+                let [count, length] = strokes.entry(split(&run[0]).1).or_default();
+                *count += 1;
+                *length += stroke.len() as u64;
+            }
+        }
+    }
+    strokes.retain(|_, [count, length]| *length >= WIDE * *count);
+    strokes.into_keys().collect()
 }
 
 /// How much of the border of each colour there is, and how much of it to similar colours. Of each run of dots both ends count, and above
