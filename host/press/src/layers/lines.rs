@@ -295,6 +295,29 @@ mod tests {
         }
     }
 
+    /// Bars at many angles, to both sides of the limit: a square of nine dots fits in none that slants much.
+    #[test]
+    fn a_slanting_bar_is_as_wide_as_it_is_across() {
+        for degrees in (20..=70).step_by(5) {
+            let (sin, cos) = f64::from(degrees).to_radians().sin_cos();
+            for (across, is_wide) in [(7.5, false), (8.2, false), (9.8, true), (10.5, true)] {
+                let is = |at: usize| {
+                    let (x, y) = ((at % SIDE) as f64 - 39.7, (at / SIDE) as f64 - 39.4);
+                    (x * sin + y * cos).abs() < across / 2.0 && (x * cos - y * sin).abs() < 36.0
+                };
+                let index = (0..SIDE * SIDE).map(|at| 2 * u8::from(is(at))).collect();
+                let colours =
+                    vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (Kind::Drawing, [128; 3])];
+                let flat = Flat { colours, index };
+                let mut shaped = [false; 256];
+                shaped[2] = true;
+                let all = shapes(&flat, SIDE, (&shaped, STROKE));
+                let found = slanting((&all.runs, &all.rows), (&flat, SIDE), STROKE, |_| true);
+                assert_eq!(found.len(), usize::from(is_wide), "{across} dots across at {degrees} degrees");
+            }
+        }
+    }
+
     #[test]
     fn the_ground_between_letters_is_no_line() {
         // Stems 40 dots high, six dots apart, on a ground.

@@ -47,9 +47,12 @@ pub fn write(folder: &Path) -> io::Result<()> {
 /// The profile of a printer that prints inks.
 fn inks() -> ColorProfile {
     let part = |node: usize, nodes: usize| node as f64 / (nodes - 1) as f64;
-    let to_lab = nodes::<4>(NODES).flat_map(|node| {
-        let [c, m, y, k] = node.map(|at| part(at, NODES));
-        encoded(lab([c, m, y].map(|ink| 1.0 - (ink + k).min(1.0))))
+    // Red, green and blue of all nodes are nodes, too.
+    let colours: Vec<[u16; 3]> =
+        nodes::<3>(NODES).map(|rgb| encoded(lab(rgb.map(|at| part(at, NODES))))).collect();
+    let to_lab = nodes::<4>(NODES).flat_map(|[c, m, y, k]| {
+        let [r, g, b] = [c, m, y].map(|ink| NODES - 1 - (ink + k).min(NODES - 1));
+        colours[(r * NODES + g) * NODES + b]
     });
     let from_lab = nodes::<3>(NODES_OF_LAB).flat_map(|node| {
         let rgb = rgb(decoded(node.map(|at| part(at, NODES_OF_LAB))));

@@ -46,7 +46,7 @@ pub(super) fn bounds(path: &Path) -> io::Result<Option<Bounds>> {
         return Ok(None);
     }
     let stated = lines(&start).find_map(|line| line.strip_prefix(COMMENT));
-    if !stated.is_some_and(|value| value.trim_ascii() == b"(atend)") {
+    if stated.is_none_or(|value| value.trim_ascii() != b"(atend)") {
         return Ok(Some(Bounds::InHeader));
     }
     let length = file.seek(SeekFrom::End(0))?;
