@@ -171,3 +171,33 @@ fn borders<const N: usize>(
 pub(super) fn sort(colours: &mut [((Kind, [u8; 3]), u64)]) {
     colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Letters over a shadow have hundreds of colours, and are not read if they are screened; gold letters are shaded.
+    #[test]
+    fn shadings_in_fine_letters_stay_letters_and_those_in_wide_ones_are_tones() {
+        let width = 60;
+        for (stroke, stay) in [(8usize, true), (30, false)] {
+            let pixel = |at: usize| {
+                let step = (at / width / 2) as u8;
+                match at % width {
+                    x if x < stroke => [Kind::TEXT, 30 + step / 3, 60 + (step + 1) / 3, 90 + (step + 5) / 3],
+                    _ => [0, 255, 255, 255],
+                }
+            };
+            // Of two rows each; half as many again in a drawing, which alone are too many.
+            let mut pixels: Vec<[u8; 4]> = (0..width * 400).map(pixel).collect();
+            pixels.extend(
+                (0..width * 300).map(|at| [Kind::DRAWING, 200, (at / 64 % 256) as u8, (at / 64 / 256) as u8]),
+            );
+            let found = palette(&pixels, width, (&Masks::of(&pixels, width), &[])).0;
+            let letters = found.iter().filter(|(kind, _)| *kind == Kind::Text).count();
+            assert_eq!(letters > 150, stay, "{stroke}: {letters}");
+            // The last step borders on something else.
+            assert!(stay || letters <= 2, "{stroke}: {letters}");
+        }
+    }
+}
