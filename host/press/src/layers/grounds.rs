@@ -133,11 +133,10 @@ struct Contrast {
 
 impl Contrast {
     fn add(&mut self, other: &Contrast) {
-        let sum = |own: &mut u32, other: u32| *own = own.saturating_add(other);
-        sum(&mut self.all, other.all);
+        self.all += other.all;
         for at in 0..CHOICES {
-            sum(&mut self.faint_on[at], other.faint_on[at]);
-            sum(&mut self.lost_on[at], other.lost_on[at]);
+            self.faint_on[at] += other.faint_on[at];
+            self.lost_on[at] += other.lost_on[at];
         }
     }
 

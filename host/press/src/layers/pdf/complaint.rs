@@ -11,6 +11,8 @@ use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
+use super::ghostscript::is_pdf;
+
 /// How far from its end a document says where the table of its objects is: readers look in the last 1024 bytes, and forgive some
 /// more.
 const END: u64 = 4096;
@@ -190,15 +192,13 @@ pub fn cut_short(path: &Path) -> Option<String> {
 fn is_cut_short(path: &Path) -> bool {
     let ends = || {
         let mut file = File::open(path)?;
-        let mut start = [0; 4];
-        file.read_exact(&mut start)?;
         let length = file.seek(SeekFrom::End(0))?;
         file.seek(SeekFrom::Start(length.saturating_sub(END)))?;
         let mut end = Vec::new();
         file.read_to_end(&mut end)?;
-        Ok::<_, std::io::Error>((start, end))
+        Ok::<_, std::io::Error>(end)
     };
-    ends().is_ok_and(|(start, end)| &start == b"%PDF" && !end.windows(9).any(|word| word == b"startxref"))
+    is_pdf(path).unwrap_or(false) && ends().is_ok_and(|end| !end.windows(9).any(|word| word == b"startxref"))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! How Ghostscript converts the CMYK of text and drawings: as inks, so that K is black and C is cyan.
 //!
 //! Problem: its usual profile makes a brown black of K and a fifth of half a cyan. It can be told to convert without a
-//! profile, but since 10.04 its device with tags then writes cyan, magenta and yellow for red, green and blue. A profile that leads straight from
+//! profile, but in 10.05 and 10.08 its device with tags then writes cyan, magenta and yellow for red, green and blue. A profile that leads straight from
 //! CMYK to red, green and blue does so even where a transparency group is to be mixed in CMYK, and K becomes white there.
 //! Method: an ordinary profile of a printer whose red is `1 - min(1, C + K)`, and so on, is the one of all CMYK; pictures keep the usual one.
 //! What is red, green and blue in a group of CMYK becomes the colour's least ink over its K, `1 - max(R, G, B)`.

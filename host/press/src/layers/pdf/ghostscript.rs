@@ -53,9 +53,9 @@ pub enum Interpreter {
     Older,
 }
 
-/// A command that draws a document with these options, among them the device and where its output goes, which is an absolute
-/// path. It runs in `folder`, where its own files are, which it leaves behind when it is stopped. Its complaints go to the
-/// standard error.
+/// A command that draws a document with these options, among them the device and where its output goes, a name in
+/// `folder`. It runs there, and files of its own are there, too, which it leaves behind when it is stopped. Its complaints go to
+/// the standard error.
 pub fn command<O: AsRef<OsStr>>(
     path: &Path,
     interpreter: Interpreter,
@@ -125,13 +125,23 @@ mod tests {
 
     #[test]
     fn every_command_has_memory_for_bands_and_ends_with_the_document() {
-        for (interpreter, older) in [(Interpreter::Usual, false), (Interpreter::Older, true)] {
-            let command = command(Path::new("/a.pdf"), interpreter, Path::new("f"), ["-r600", "-c", "x"]);
+        let folder = Scratch::new().unwrap();
+        let [pdf, postscript] = ["%PDF-1.4", "%!PS"].map(|start| {
+            let path = folder.path().join(&start[1..4]);
+            std::fs::write(&path, start).unwrap();
+            path
+        });
+        for (interpreter, older, path, first) in [
+            (Interpreter::Usual, false, &pdf, SPEAKS),
+            (Interpreter::Older, true, &pdf, SPEAKS),
+            (Interpreter::Usual, false, &postscript, NO_COPIES),
+        ] {
+            let command = command(path, interpreter, folder.path(), ["-r600", "-c", "x"]);
             let args: Vec<&str> = command.get_args().filter_map(OsStr::to_str).collect();
             assert!(args.contains(&"-dBufferSpace=100000000") && args.contains(&"-dSAFER"), "{args:?}");
             assert_eq!(args.contains(&"-dNEWPDF=false"), older, "{args:?}");
-            // What cannot be read is not taken for PDF.
-            assert!(args.ends_with(&["-r600", "-c", "x", "-c", NO_COPIES, "-f", "/a.pdf"]), "{args:?}");
+            let file = path.to_str().unwrap();
+            assert!(args.ends_with(&["-r600", "-c", "x", "-c", first, "-f", file]), "{args:?}");
         }
     }
 }
