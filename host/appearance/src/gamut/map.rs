@@ -6,16 +6,19 @@ use inks::{InkSet, Stack};
 use observe::Observer;
 use protocol::ink::Ink;
 
-use super::basis::Bases;
 use super::candidates::{Candidates, Printable};
-use super::cartridges::{Cartridges, Precision};
-use super::clamp::Clamped;
 use super::error::GamutError;
-use super::fitted::Targets;
-use super::gloss::FEW_MERGED;
-use super::report::{GivenUp, Judged, Mapped, PixelReport, Report};
+use super::fitting::basis::Bases;
+use super::fitting::clamp::Clamped;
+use super::fitting::gloss::FEW_MERGED;
+use super::fitting::{basis, blend, clamp, local, spatial_average};
+use super::result::report::{GivenUp, Judged, Mapped, PixelReport, Report};
+use super::result::{assemble, typical};
+use super::sample;
+use super::selection::cartridges::{Cartridges, Precision};
+use super::selection::fitted::Targets;
+use super::selection::{cartridges, stacks};
 use super::settings::{Gloss, Intent, Settings};
-use super::{assemble, basis, blend, cartridges, choice, clamp, eye, local, sample, typical};
 use crate::brdf::{Space, Table};
 use crate::materials::{Factored, Materials};
 use crate::solve::MixtureError;
@@ -237,7 +240,7 @@ impl<'a> Pixels<'a> {
         let (targets, rows) = self.targets(bases)?;
         let cartridges = self.cartridges(&targets, observer)?;
         let stacks =
-            choice::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
+            stacks::choose(&self.all, &cartridges.stacks, &targets).map_err(in_target("choosing stacks"))?;
         let candidates = self.all.subset(&stacks);
         check_number(&candidates.stacks)?;
         let judged = Judged { rows, importance: targets.importance, distance: cartridges.chosen };
@@ -284,7 +287,7 @@ impl<'a> Pixels<'a> {
             }
             _ => {
                 if let Some(spot) = self.settings.eye {
-                    kept = eye::please(candidates, self.pixels, &mut clamped, spot, observer)?;
+                    kept = spatial_average::please(candidates, self.pixels, &mut clamped, spot, observer)?;
                 }
                 Intent::Clamp
             }

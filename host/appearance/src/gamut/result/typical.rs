@@ -15,7 +15,7 @@ const MOST: usize = 6;
 const NEAR: f64 = 0.015 * 0.015;
 
 /// Rows of a sample that stand for the others, and the share of the rows for which each is the nearest; largest first.
-pub(super) fn rows(space: &Space, sample: &Table) -> (Table, Vec<f64>) {
+pub(crate) fn rows(space: &Space, sample: &Table) -> (Table, Vec<f64>) {
     let seen: Vec<Vec<f64>> = sample.rows().map(|row| space.seen(row)).collect();
     let apart = |a: usize, b: usize| {
         let both = seen[a].iter().zip(&seen[b]);

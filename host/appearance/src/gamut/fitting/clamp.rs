@@ -10,11 +10,11 @@
 
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
-use super::error::GamutError;
-use super::prune::prune;
-use super::recent::Recent;
+use super::warm_start::Recent;
 use crate::brdf::{Space, Table};
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
+use crate::gamut::prune::prune;
 use crate::materials::{Distinct, Materials};
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::quantise;
@@ -23,10 +23,10 @@ use observe::Observer;
 /// Materials per run: a run starts with nothing to start from, and thousands of cores are not expected.
 const RUN: usize = 8192;
 /// An invisible gap in squared distance: at d = 0.01 it is 5e-6 in d. A tenth of the price of a layer, which decides ties.
-pub(super) const ENOUGH: f64 = 1e-7;
+pub(crate) const ENOUGH: f64 = 1e-7;
 
 /// The mixture of every pixel over the candidates.
-pub(super) struct Clamped {
+pub(crate) struct Clamped {
     /// Interleaved fixed-point weights, one per candidate; those of each pixel sum to [`ONE`](crate::weights::ONE).
     pub shares: Vec<u16>,
     /// Distance d between each pixel and its mixture.
@@ -39,7 +39,7 @@ pub(super) struct Clamped {
     pub gap: f64,
 }
 
-pub(super) fn map(
+pub(crate) fn map(
     candidates: &Candidates,
     pixels: &dyn Materials,
     observer: &dyn Observer,
@@ -93,7 +93,7 @@ pub(super) fn map(
 }
 
 /// The printed reflectance (1/sr) of clamped targets, given as rows.
-pub(super) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, GamutError> {
+pub(crate) fn rows(candidates: &Candidates, targets: &Table) -> Result<Table, GamutError> {
     let fit = |mixer: &mut Mixer, i: usize| {
         let mut weights = vec![0.0; candidates.len()];
         let hull = &candidates.priced;

@@ -5,16 +5,16 @@
 //! Method: a moved target is a target ([`Target::shift`]), so the solver of clamping fits it, from the pixel's last mixture.
 //! Cost: two or three steps of the solver. Limits: those of [`Mixer::refine`].
 
-use super::candidates::Candidates;
 use super::clamp::ENOUGH;
-use super::error::GamutError;
-use super::prune::prune;
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
+use crate::gamut::prune::prune;
 use crate::materials::Materials;
 use crate::solve::{Mixer, MixtureError, Target};
 use crate::weights::ONE;
 
 /// Names the pixel of a failed fit.
-pub(super) fn in_pixel(pixel: usize, width: usize) -> impl FnOnce(MixtureError) -> GamutError {
+pub(crate) fn in_pixel(pixel: usize, width: usize) -> impl FnOnce(MixtureError) -> GamutError {
     move |source| GamutError::Mixture {
         what: format!("pixel ({}, {})", pixel % width, pixel / width),
         source,
@@ -22,7 +22,7 @@ pub(super) fn in_pixel(pixel: usize, width: usize) -> impl FnOnce(MixtureError) 
 }
 
 /// Solves one pixel after another.
-pub(super) struct Solver<'a> {
+pub(crate) struct Solver<'a> {
     candidates: &'a Candidates,
     pixels: &'a dyn Materials,
     mixer: Mixer,

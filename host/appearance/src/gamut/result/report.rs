@@ -4,8 +4,8 @@ use inks::Stack;
 use protocol::ink::Ink;
 
 use super::mix::InkMix;
-use super::settings::Intent;
 use crate::brdf::Table;
+use crate::gamut::settings::Intent;
 
 /// A mapped document and the report of the mapping.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,6 +107,6 @@ pub struct PixelReport {
     /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
     pub merged: f64,
     /// Mean weight of the clamped mixture in the result: 1 for clamp; for contrast, and with
-    /// [`Settings::eye`](super::Settings::eye), the share of pixels that keep it.
+    /// [`Settings::eye`](crate::gamut::Settings::eye), the share of pixels that keep it.
     pub clamped: f64,
 }

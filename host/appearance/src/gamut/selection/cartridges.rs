@@ -12,17 +12,17 @@
 use inks::InkSet;
 use protocol::ink::Ink;
 
-use super::candidates::Candidates;
-use super::error::GamutError;
 use super::fitted::{Fitted, Targets};
-use super::prune::PRUNED;
-use super::report::GivenUp;
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
+use crate::gamut::prune::PRUNED;
+use crate::gamut::result::report::GivenUp;
 use crate::solve::MixtureError;
 use observe::Observer;
 
 /// How exactly cartridges are chosen.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Precision {
+pub(crate) struct Precision {
     /// Sets whose mean squared distances differ by less than this share are equally good.
     tie: f64,
     /// Weights below this need no cartridge.
@@ -37,7 +37,7 @@ impl Precision {
 }
 
 /// Cartridges that were chosen.
-pub(super) struct Cartridges {
+pub(crate) struct Cartridges {
     /// The stacks that they print.
     pub stacks: Vec<usize>,
     /// Their inks.
@@ -50,7 +50,7 @@ pub(super) struct Cartridges {
 }
 
 /// The best cartridges, at most `most`.
-pub(super) fn choose(
+pub(crate) fn choose(
     candidates: &Candidates,
     targets: &Targets,
     most: usize,
@@ -84,7 +84,7 @@ pub(super) fn choose(
 
 /// What each of the chosen cartridges is worth: the distance without it, with the other ones. The one that is missed most
 /// comes first.
-pub(super) fn worth(
+pub(crate) fn worth(
     candidates: &Candidates,
     targets: &Targets,
     cartridges: &Cartridges,
@@ -155,9 +155,9 @@ impl Search<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::Printable;
     use super::*;
     use crate::brdf::Space;
+    use crate::gamut::candidates::Printable;
     use crate::materials::Surface;
     use inks::Library;
     use observe::Silent;

@@ -12,8 +12,8 @@ use inks::Library;
 use serde::Serialize;
 
 use super::mix::InkMix;
-use super::sample;
 use crate::brdf::{Space, Table, reflectances};
+use crate::gamut::sample;
 use crate::materials::Materials;
 
 /// Pixels that are compared.

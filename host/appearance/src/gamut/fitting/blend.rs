@@ -9,11 +9,11 @@
 
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
 use super::clamp::Clamped;
-use super::error::GamutError;
-use super::moved::{Solver, in_pixel};
-use super::prune::prune;
+use super::refit::{Solver, in_pixel};
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
+use crate::gamut::prune::prune;
 use crate::materials::Materials;
 use crate::weights::{ONE, WeightMaps, quantise};
 
@@ -27,7 +27,7 @@ const RADIUS: usize = 8;
 const EDGE: f64 = 0.02;
 
 /// The weight of the clamped mixture at each pixel, 0..=1, from its distance and brightness.
-pub(super) fn shares(distance: &[f32], brightness: &[f32], width: usize) -> Vec<f32> {
+pub(crate) fn shares(distance: &[f32], brightness: &[f32], width: usize) -> Vec<f32> {
     let near: Vec<f32> = distance
         .iter()
         .map(|&d| {
@@ -40,7 +40,7 @@ pub(super) fn shares(distance: &[f32], brightness: &[f32], width: usize) -> Vec<
 
 /// Averages the clamped mixture of each pixel with its mixture of the mapped bases; `s` is the weight of the former. The
 /// distances become those of the averages.
-pub(super) fn mix(
+pub(crate) fn mix(
     candidates: &Candidates,
     pixels: &dyn Materials,
     clamped: &mut Clamped,
@@ -69,7 +69,7 @@ pub(super) fn mix(
 
 /// The average of a pixel's clamped mixture, with weight `s`, and its mixture of the mapped bases. Weights below 0.5 % are
 /// left out. `row` has room for one number a candidate.
-pub(super) fn average(shares: &mut [u16], s: f32, weights: &[u16], bases: &[Vec<u16>], row: &mut [f64]) {
+pub(crate) fn average(shares: &mut [u16], s: f32, weights: &[u16], bases: &[Vec<u16>], row: &mut [f64]) {
     let s = f64::from(s);
     row.fill(0.0);
     for (&weight, basis) in weights.iter().zip(bases) {

@@ -3,7 +3,7 @@
 use inks::InkSet;
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
+use crate::gamut::candidates::Candidates;
 use crate::solve::{Hull, Mixer, MixtureError, Target};
 
 /// Gap in squared distance that decides nothing.
@@ -13,7 +13,7 @@ const ENOUGH: f64 = 1e-8;
 const ENOUGH_LEFT: f64 = 0.05;
 
 /// Targets, and the importance of each.
-pub(super) struct Targets {
+pub(crate) struct Targets {
     pub rows: Vec<Target>,
     pub importance: Vec<f64>,
 }
@@ -28,7 +28,7 @@ struct Mixture {
 
 /// Every target's best mixture of some of the candidates.
 #[derive(Clone)]
-pub(super) struct Fitted {
+pub(crate) struct Fitted {
     mixtures: Vec<Mixture>,
     /// Mean squared distance by importance, in the metric of the candidates.
     pub loss: f64,

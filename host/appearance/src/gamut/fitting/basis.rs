@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
-use super::error::GamutError;
 use super::gloss;
-use super::prune::prune;
-use super::report::MaterialReport;
-use super::settings::Gloss;
 use crate::brdf::{Space, Table};
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
+use crate::gamut::prune::prune;
+use crate::gamut::result::report::MaterialReport;
+use crate::gamut::settings::Gloss;
 use crate::solve::{Best, Mixer, MixtureError};
 use crate::weights::{ONE, quantise};
 
 /// The mixtures of materials over the candidates.
-pub(super) struct Bases {
+pub(crate) struct Bases {
     /// One row of weights per material, with sum [`ONE`].
     pub shares: Vec<Vec<u16>>,
     pub reports: Vec<MaterialReport>,
@@ -29,7 +29,7 @@ struct Mapping {
 }
 
 /// Maps each row of `bases`; `shares` are those of the document that they stand for.
-pub(super) fn map(
+pub(crate) fn map(
     space: &Space,
     bases: &Table,
     shares: &[f64],

@@ -11,10 +11,10 @@
 use inks::Stack;
 use rayon::prelude::*;
 
-use super::candidates::{Candidates, Printable};
-use super::error::GamutError;
-use super::prune::PRUNED;
 use crate::brdf::Space;
+use crate::gamut::candidates::{Candidates, Printable};
+use crate::gamut::error::GamutError;
+use crate::gamut::prune::PRUNED;
 use crate::solve::{Best, Mixer};
 
 /// A stack against the mixtures of others.

@@ -14,10 +14,10 @@
 use observe::Observer;
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
 use super::clamp::Clamped;
-use super::error::GamutError;
-use super::moved::{Solver, in_pixel};
+use super::refit::{Solver, in_pixel};
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
 use crate::materials::Materials;
 use crate::solve::Target;
 use crate::weights::{ONE, quantise};
@@ -33,7 +33,7 @@ const LEAST: f64 = 2.0;
 
 /// Moves clamped pixels of a document, of which `spot` pixels make a side of the square that the eye averages over. Returns the
 /// share of pixels that keep their clamped mixture.
-pub(super) fn please(
+pub(crate) fn please(
     candidates: &Candidates,
     pixels: &dyn Materials,
     clamped: &mut Clamped,
@@ -224,10 +224,10 @@ impl Cells {
 
 #[cfg(test)]
 mod tests {
-    use super::super::clamp;
     use super::*;
     use crate::brdf::{Space, Table};
     use crate::gamut::Printable;
+    use crate::gamut::fitting::clamp;
     use inks::Stack;
     use observe::Silent;
 

@@ -3,14 +3,14 @@
 use inks::Stack;
 use rayon::prelude::*;
 
-use super::candidates::Candidates;
-use super::error::GamutError;
 use super::mix::InkMix;
 use crate::brdf::Table;
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
 use crate::weights::{ONE, RUN, WeightError, WeightMaps};
 
 /// Drops the candidates that no pixel uses. Returns the identity as matrix and the maps of the others.
-pub(super) fn compact(
+pub(crate) fn compact(
     mut shares: Vec<u16>,
     k: usize,
     width: usize,
@@ -50,7 +50,7 @@ pub(super) fn compact(
 
 /// The mix from rows of weights over the candidates, and the curves of its stacks: the substrate first, then the candidates
 /// with any weight.
-pub(super) fn assemble(
+pub(crate) fn assemble(
     candidates: &Candidates,
     shares: Vec<Vec<u16>>,
     maps: WeightMaps,

@@ -8,8 +8,8 @@
 //! use first, as long as the sample stays within 1 % of the distance it had. Cost: one fit of the sample, and one of the
 //! targets concerned for each such stack.
 
-use super::candidates::Candidates;
 use super::fitted::{Fitted, Targets};
+use crate::gamut::candidates::Candidates;
 use crate::solve::MixtureError;
 
 /// The most stacks beyond the usual ones, and the share of the document from which one is worth it.
@@ -22,7 +22,7 @@ const SLACK: f64 = 1.01 * 1.01;
 const UNSEEN: f64 = 1e-8;
 
 /// Which of the stacks `allowed` to mix from.
-pub(super) fn choose(
+pub(crate) fn choose(
     candidates: &Candidates,
     allowed: &[usize],
     targets: &Targets,
@@ -86,9 +86,9 @@ fn worthwhile(candidates: &Candidates, allowed: &[usize], shares: &[f64]) -> Vec
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidates::Printable;
     use super::*;
     use crate::brdf::{Space, Table};
+    use crate::gamut::candidates::Printable;
     use inks::Stack;
 
     /// Substrate, a usual stack that is advised against, its neighbour beyond the list, and one that nobody needs.

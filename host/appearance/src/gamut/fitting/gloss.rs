@@ -9,15 +9,15 @@
 use crate::brdf::{Space, Table};
 
 /// Two rows differ if their distance exceeds this.
-pub(super) const DIFFERENT: f64 = 0.03;
+pub(crate) const DIFFERENT: f64 = 0.03;
 /// Two rows that differ are merged if they are printed at less than this share of their distance.
-pub(super) const MERGED: f64 = 0.25;
+pub(crate) const MERGED: f64 = 0.25;
 
 /// Share of merged pairs of materials up to which nothing need be done about them.
-pub(super) const FEW_MERGED: f64 = 0.01;
+pub(crate) const FEW_MERGED: f64 = 0.01;
 
 /// The share of pairs of materials that are different bases printed alike, where each basis has its share of the document.
-pub(super) fn merges(space: &Space, targets: &Table, shares: &[f64], printed: &[Vec<f64>]) -> f64 {
+pub(crate) fn merges(space: &Space, targets: &Table, shares: &[f64], printed: &[Vec<f64>]) -> f64 {
     let mut merged = 0.0;
     for i in 0..targets.len() {
         for j in 0..i {
@@ -32,7 +32,7 @@ pub(super) fn merges(space: &Space, targets: &Table, shares: &[f64], printed: &[
 }
 
 /// Rows with their gloss multiplied by `factor`.
-pub(super) fn scaled(rows: &Table, factor: f64) -> Table {
+pub(crate) fn scaled(rows: &Table, factor: f64) -> Table {
     let mut out = Table::new(rows.columns());
     for row in rows.rows() {
         let base = base(row);
@@ -53,7 +53,7 @@ fn base(row: &[f64]) -> [f64; 3] {
 }
 
 /// The factor (0.02..=1) on the gloss of all bases that brings the most extreme one into the gamut.
-pub(super) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f64 {
+pub(crate) fn factor(space: &Space, targets: &Table, printed: &[Vec<f64>]) -> f64 {
     let mut least = 1.0f64;
     for (i, printed) in printed.iter().enumerate() {
         let mut one = Table::new(targets.columns());

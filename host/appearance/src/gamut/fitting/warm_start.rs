@@ -19,7 +19,7 @@ const LANES: usize = 8;
 
 /// Solutions to start from.
 #[derive(Default)]
-pub(super) struct Recent {
+pub(crate) struct Recent {
     summaries: Vec<[f32; NUMBERS]>,
     /// The weights of each, one after the other.
     weights: Vec<f64>,

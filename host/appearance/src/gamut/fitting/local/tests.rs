@@ -4,9 +4,10 @@ use inks::{InkSet, Library};
 use observe::Silent;
 use protocol::ink::Ink;
 
-use super::super::{Intent, Mapped, Printable, Settings, clamp};
 use super::*;
 use crate::brdf::Space;
+use crate::gamut::fitting::clamp;
+use crate::gamut::{Intent, Mapped, Printable, Settings};
 use crate::materials::Surface;
 use crate::weights::ONE;
 
@@ -73,7 +74,7 @@ fn grain(x: usize, y: usize) -> Surface {
 fn mapped(pixels: &Rows, printable: &Printable, intent: Intent) -> Mapped {
     let settings = Settings { intent, light: 0.0, most_cartridges: 13, ..Settings::default() };
     let bases = || -> Result<_, GamutError> { unreachable!("neither intent uses bases") };
-    super::super::map(pixels, bases, printable, &settings, &Silent).unwrap()
+    crate::gamut::map(pixels, bases, printable, &settings, &Silent).unwrap()
 }
 
 /// The printed reflectance of each pixel, from the mix alone.

@@ -24,12 +24,12 @@ use observe::Observer;
 use rayon::prelude::*;
 
 use self::regions::{CELL, Place, Regions, Sums};
-use super::candidates::Candidates;
 use super::clamp::Clamped;
-use super::error::GamutError;
-use super::moved::{Solver, in_pixel};
-use super::sample;
+use super::refit::{Solver, in_pixel};
 use crate::brdf::Table;
+use crate::gamut::candidates::Candidates;
+use crate::gamut::error::GamutError;
+use crate::gamut::sample;
 use crate::materials::Materials;
 use crate::weights::quantise;
 
@@ -48,7 +48,7 @@ const SEED: u64 = 1;
 
 /// Replaces the clamped mixtures of pixels outside the gamut, and their distances, by those that keep contrast. Returns the
 /// share of pixels that keep their clamped mixture.
-pub(super) fn keep_contrast(
+pub(crate) fn keep_contrast(
     candidates: &Candidates,
     pixels: &dyn Materials,
     clamped: &mut Clamped,
