@@ -53,7 +53,7 @@ pub trait Memory {
 }
 
 /// The checkpoints of this run.
-pub struct Keeper<M> {
+pub struct CheckpointStore<M> {
     memory: M,
     number: u32,
     /// Position in the ring that belongs to the last checkpoint.
@@ -64,7 +64,7 @@ pub struct Keeper<M> {
     past_number: u32,
 }
 
-impl<M: Memory> Keeper<M> {
+impl<M: Memory> CheckpointStore<M> {
     /// Looks for what an earlier run has left; `known` says whether the memory is what such a run left there. To be called
     /// before anything is sent.
     pub fn new(mut memory: M, known: bool) -> (Self, Option<Checkpoint>) {
@@ -74,7 +74,7 @@ impl<M: Memory> Keeper<M> {
             (0..2).for_each(|which| memory.write_past(which, [0; PAST_SLOT]));
             memory.clear(0..MARKS);
             let past = [PastJob::NONE; PAST];
-            return (Keeper { memory, number: 0, place: 0, last: None, past, past_number: 0 }, None);
+            return (CheckpointStore { memory, number: 0, place: 0, last: None, past, past_number: 0 }, None);
         };
         // A slot may say anything.
         let place = place % MARKS;
@@ -85,11 +85,11 @@ impl<M: Memory> Keeper<M> {
         let (mut progress, ends_at, needs_reset, at_rest, one_way): Position = position;
         progress.printed = progress.printed.wrapping_add(count);
         let checkpoint = Checkpoint { progress, ends_at, needs_reset, at_rest, one_way, past };
-        let mut keeper = Keeper { memory, number, place, last: None, past, past_number };
-        keeper.store(checkpoint, place + crossed);
+        let mut checkpoints = CheckpointStore { memory, number, place, last: None, past, past_number };
+        checkpoints.store(checkpoint, place + crossed);
         // What a reset left between a slot and the clearing of its marks would be counted a turn of the ring later.
-        keeper.memory.clear(0..MARKS);
-        (keeper, Some(checkpoint))
+        checkpoints.memory.clear(0..MARKS);
+        (checkpoints, Some(checkpoint))
     }
 
     /// Where in the ring the next mark belongs.
@@ -280,31 +280,31 @@ mod tests {
                 marks: std::vec![rubbish > 99; MARKS],
             };
             let mut crossed = 0;
-            let (mut keeper, none) = Keeper::new(Board { held: &mut held, left: usize::MAX }, false);
+            let (mut checkpoints, none) = CheckpointStore::new(Board { held: &mut held, left: usize::MAX }, false);
             prop_assert_eq!(none, None);
-            keeper.store(at(0), 0);
+            checkpoints.store(at(0), 0);
             for (left, turns) in lives {
-                let (mut keeper, found) = Keeper::new(Board { held: &mut held, left }, true);
+                let (mut checkpoints, found) = CheckpointStore::new(Board { held: &mut held, left }, true);
                 prop_assert_eq!(found.map(|found| found.progress.printed), Some(crossed));
                 for (count, again) in turns {
                     for sent in 0..count {
-                        if keeper.memory.left == 0 {
+                        if checkpoints.memory.left == 0 {
                             break;
                         }
-                        keeper.mark(sent);
+                        checkpoints.mark(sent);
                         crossed += 1;
                     }
-                    let place = keeper.place() + count;
-                    keeper.store(at(crossed), place);
+                    let place = checkpoints.place() + count;
+                    checkpoints.store(at(crossed), place);
                     if again {
-                        keeper.store(at(crossed), place);
+                        checkpoints.store(at(crossed), place);
                     }
-                    if keeper.memory.left == 0 {
+                    if checkpoints.memory.left == 0 {
                         break;
                     }
                 }
             }
-            let found = Keeper::new(Board { held: &mut held, left: usize::MAX }, true).1;
+            let found = CheckpointStore::new(Board { held: &mut held, left: usize::MAX }, true).1;
             prop_assert_eq!(found.map(|found| found.progress.printed), Some(crossed));
         }
 
@@ -324,14 +324,14 @@ mod tests {
         #[test]
         fn a_reset_at_any_instant_leaves_how_jobs_have_ended(lives in prop::collection::vec((0usize..9000, 1u32..6), 1..8)) {
             let mut held = held();
-            let (mut keeper, _) = Keeper::new(Board { held: &mut held, left: usize::MAX }, false);
+            let (mut checkpoints, _) = CheckpointStore::new(Board { held: &mut held, left: usize::MAX }, false);
             let mut now = at(0);
             now.progress.job = 1;
-            keeper.store(now, 0);
+            checkpoints.store(now, 0);
             for (left, jobs) in lives {
-                let (mut keeper, found) = Keeper::new(Board { held: &mut held, left }, true);
+                let (mut checkpoints, found) = CheckpointStore::new(Board { held: &mut held, left }, true);
                 now = found.expect("a checkpoint");
-                if keeper.memory.left == 0 {
+                if checkpoints.memory.left == 0 {
                     continue;
                 }
                 for _ in 0..jobs {
@@ -343,10 +343,10 @@ mod tests {
                     }
                     // The driver looks when the next job is open already.
                     now.progress.job = job + 1;
-                    keeper.store(now, 0);
+                    checkpoints.store(now, 0);
                 }
             }
-            let found = Keeper::new(Board { held: &mut held, left: usize::MAX }, true).1.expect("a checkpoint");
+            let found = CheckpointStore::new(Board { held: &mut held, left: usize::MAX }, true).1.expect("a checkpoint");
             let open = found.progress.job;
             let last = found.past[0].job;
             prop_assert!(last == open || last == open - 1, "open {open}, last ended {last}");
@@ -381,7 +381,7 @@ mod tests {
         let mut held = held();
         held.slots[1] = write(u32::MAX, 0, &position(at(1))).expect("a slot");
         held.slots[0] = write(0, 0, &position(at(2))).expect("a slot");
-        assert_eq!(Keeper::new(Board { held: &mut held, left: 0 }, true).1, Some(at(2)));
+        assert_eq!(CheckpointStore::new(Board { held: &mut held, left: 0 }, true).1, Some(at(2)));
     }
 
     #[test]
@@ -389,8 +389,8 @@ mod tests {
         let mut held = held();
         held.slots = [write(5, 3, &position(at(9))).expect("a slot"); 2];
         held.marks.fill(true);
-        let (keeper, found) = Keeper::new(Board { held: &mut held, left: usize::MAX }, false);
-        assert_eq!((found, keeper.place()), (None, 0));
+        let (checkpoints, found) = CheckpointStore::new(Board { held: &mut held, left: usize::MAX }, false);
+        assert_eq!((found, checkpoints.place()), (None, 0));
         assert!(held.slots == [[0; SLOT]; 2] && held.marks.iter().all(|set| !set));
     }
 }

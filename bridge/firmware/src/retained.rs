@@ -1,6 +1,6 @@
 //! Memory that outlives a reset of the board: where a job stands, and the log.
 //!
-//! Problem: the library's [`Keeper`](bridge::keeper::Keeper) and the log need memory that a reset by the watchdog leaves as
+//! Problem: the library's [`CheckpointStore`](bridge::checkpoint::CheckpointStore) and the log need memory that a reset by the watchdog leaves as
 //! it is. Method: a part of the memory that nothing initialises. What crosses the port leaves marks there: the DMA channel
 //! that counts the bytes writes one for each, and the processor does the same for bytes it sends itself. The ring of marks
 //! holds more than the strobe engine can send without the processor.
@@ -19,7 +19,7 @@
 //! stack is below all of it and grows away from it ([`crate::stack`]).
 //!
 //! *The bytes may be read.* To the compiler a static without an initial value is uninitialised, and reading it is
-//! undefined whatever the hardware holds. So every access goes through [`kept`], whose empty assembly block stands for
+//! undefined whatever the hardware holds. So every access goes through [`layout`], whose empty assembly block stands for
 //! a write of the bytes the hardware holds. The compiler has to assume that the block has written any bytes, and all
 //! fields are integers, for which any bytes are valid. What the bytes *mean* is checked by the checksums; wrong bytes
 //! that pass would give a wrong position, never a wrong access.
@@ -31,8 +31,8 @@
 //! only raw pointers, so none can be aliased.
 
 use crate::board::FLASH;
+use bridge::checkpoint::{self, MARKS, Memory, PAST_SLOT, SLOT};
 use bridge::engine::Checkpoint;
-use bridge::keeper::{self, MARKS, Memory, PAST_SLOT, SLOT};
 use core::cell::UnsafeCell;
 use core::marker::PhantomData;
 use core::mem::MaybeUninit;
@@ -45,7 +45,7 @@ use protocol::link::frame::checksum;
 const LOG: usize = MARKS - 2 * SLOT - 2 * PAST_SLOT - 12;
 
 #[repr(C, align(4096))]
-struct Kept {
+struct Layout {
     marks: [u8; MARKS],
     image: u32,
     slots: [[u8; SLOT]; 2],
@@ -55,30 +55,30 @@ struct Kept {
     log: [u8; LOG],
 }
 
-struct Keep(UnsafeCell<MaybeUninit<Kept>>);
+struct Cell(UnsafeCell<MaybeUninit<Layout>>);
 
 // SAFETY: see "Nobody interferes" above. The functions below are the only accesses, and none is at the same time as
 // another to the same bytes.
-unsafe impl Sync for Keep {}
+unsafe impl Sync for Cell {}
 
-#[unsafe(link_section = ".uninit.keep")]
-static KEEP: Keep = Keep(UnsafeCell::new(MaybeUninit::uninit()));
+#[unsafe(link_section = ".uninit.retained")]
+static RETAINED: Cell = Cell(UnsafeCell::new(MaybeUninit::uninit()));
 
 /// Whether there is a [`Ring`].
 static WOKEN: AtomicBool = AtomicBool::new(false);
 
 /// The memory, initialised with what it holds.
-fn kept() -> *mut Kept {
-    let kept: *mut Kept = KEEP.0.get().cast();
-    // SAFETY: there are no instructions. The block stands for a write to `KEEP` of the bytes that are there: it may
+fn layout() -> *mut Layout {
+    let layout: *mut Layout = RETAINED.0.get().cast();
+    // SAFETY: there are no instructions. The block stands for a write to `RETAINED` of the bytes that are there: it may
     // access memory, being neither `nomem` nor `readonly`, and it is given the pointer.
-    unsafe { core::arch::asm!("/* {0} */", in(reg) kept, options(nostack, preserves_flags)) };
-    kept
+    unsafe { core::arch::asm!("/* {0} */", in(reg) layout, options(nostack, preserves_flags)) };
+    layout
 }
 
 fn mark(at: usize) -> *mut u8 {
     // SAFETY: within the array.
-    unsafe { (&raw mut (*kept()).marks).cast::<u8>().add(at % MARKS) }
+    unsafe { (&raw mut (*layout()).marks).cast::<u8>().add(at % MARKS) }
 }
 
 /// Slots and marks. There is one, and it stays in thread mode.
@@ -89,23 +89,23 @@ pub struct Ring {
 
 impl Memory for Ring {
     fn slots(&self) -> [[u8; SLOT]; 2] {
-        // SAFETY: initialised by `kept`; only this uses the slots.
-        unsafe { (&raw const (*kept()).slots).read() }
+        // SAFETY: initialised by `layout`; only this uses the slots.
+        unsafe { (&raw const (*layout()).slots).read() }
     }
 
     fn write(&mut self, which: usize, slot: [u8; SLOT]) {
         // SAFETY: one of the two slots, which only this uses.
-        unsafe { (&raw mut (*kept()).slots[which % 2]).write_volatile(slot) };
+        unsafe { (&raw mut (*layout()).slots[which % 2]).write_volatile(slot) };
     }
 
     fn past(&self) -> [[u8; PAST_SLOT]; 2] {
-        // SAFETY: initialised by `kept`; only this uses these slots.
-        unsafe { (&raw const (*kept()).past).read() }
+        // SAFETY: initialised by `layout`; only this uses these slots.
+        unsafe { (&raw const (*layout()).past).read() }
     }
 
     fn write_past(&mut self, which: usize, slot: [u8; PAST_SLOT]) {
         // SAFETY: one of the two slots, which only this uses.
-        unsafe { (&raw mut (*kept()).past[which % 2]).write_volatile(slot) };
+        unsafe { (&raw mut (*layout()).past[which % 2]).write_volatile(slot) };
     }
 
     fn is_marked(&self, at: usize) -> bool {
@@ -128,7 +128,7 @@ impl Memory for Ring {
 }
 
 /// The checkpoints of this run.
-pub type Keeper = keeper::Keeper<Ring>;
+pub type CheckpointStore = checkpoint::CheckpointStore<Ring>;
 
 unsafe extern "C" {
     // Addresses the linker knows: initial values of variables in flash, which are the image's end, and where they go.
@@ -146,32 +146,32 @@ fn image_checksum() -> u32 {
     checksum(unsafe { core::slice::from_raw_parts(FLASH as *const u8, length) })
 }
 
-/// The keeper, what an earlier run has left, and whether there was one of this image. To be called before the first word of the
-/// log, and before the strobe engine is started.
+/// The store of checkpoints, what an earlier run has left, and whether there was one of this image. To be called before the
+/// first word of the log, and before the strobe engine is started.
 ///
 /// Panics when it is called again.
-pub fn keeper() -> (Keeper, Option<Checkpoint>, bool) {
+pub fn checkpoints() -> (CheckpointStore, Option<Checkpoint>, bool) {
     assert!(!WOKEN.swap(true, Ordering::Relaxed));
     let image = image_checksum();
-    let kept = kept();
+    let layout = layout();
     let known = critical_section::with(|_| {
-        // SAFETY: fields of the static, initialised by `kept`.
+        // SAFETY: fields of the static, initialised by `layout`.
         let (left, written) =
-            unsafe { ((&raw const (*kept).image).read(), (&raw const (*kept).written).read()) };
+            unsafe { ((&raw const (*layout).image).read(), (&raw const (*layout).written).read()) };
         left == image && written[0] == !written[1]
     });
-    let (keeper, found) = keeper::Keeper::new(Ring { thread: PhantomData }, known);
+    let (store, found) = checkpoint::CheckpointStore::new(Ring { thread: PhantomData }, known);
     if !known {
         // Last: a reset before this leaves memory that is made empty once more.
         critical_section::with(|_| {
             // SAFETY: the same fields.
             unsafe {
-                (&raw mut (*kept).written).write_volatile([0, !0]);
-                (&raw mut (*kept).image).write_volatile(image);
+                (&raw mut (*layout).written).write_volatile([0, !0]);
+                (&raw mut (*layout).image).write_volatile(image);
             }
         });
     }
-    (keeper, found, known)
+    (store, found, known)
 }
 
 /// The ring for the DMA: where it begins.
@@ -182,29 +182,29 @@ pub fn marks() -> *mut u8 {
 /// Adds bytes to the log, over the oldest.
 pub fn log(bytes: &[u8]) {
     critical_section::with(|_| {
-        let kept = kept();
+        let layout = layout();
         // SAFETY: in a critical section, as all accesses to these fields.
-        let mut end = unsafe { (&raw const (*kept).written).read() }[0];
+        let mut end = unsafe { (&raw const (*layout).written).read() }[0];
         for &byte in bytes {
             // SAFETY: likewise, and within the array.
-            unsafe { (&raw mut (*kept).log).cast::<u8>().add(end as usize % LOG).write(byte) };
+            unsafe { (&raw mut (*layout).log).cast::<u8>().add(end as usize % LOG).write(byte) };
             end = end.wrapping_add(1);
         }
         // SAFETY: likewise.
-        unsafe { (&raw mut (*kept).written).write([end, !end]) };
+        unsafe { (&raw mut (*layout).written).write([end, !end]) };
     });
 }
 
 /// Log from byte `from` on: where the piece begins, how much there is in all, and how many bytes were copied to `out`.
 pub fn read_log(from: u32, out: &mut [u8]) -> (u32, u32, usize) {
     critical_section::with(|_| {
-        let kept = kept();
+        let layout = layout();
         // SAFETY: in a critical section, as all accesses to these fields.
-        let end = unsafe { (&raw const (*kept).written).read() }[0];
+        let end = unsafe { (&raw const (*layout).written).read() }[0];
         let (at, count) = bridge::log::piece(from, end, LOG as u32, out.len());
         for (i, byte) in out[..count].iter_mut().enumerate() {
             // SAFETY: likewise, and within the array.
-            *byte = unsafe { (&raw const (*kept).log).cast::<u8>().add((at as usize + i) % LOG).read() };
+            *byte = unsafe { (&raw const (*layout).log).cast::<u8>().add((at as usize + i) % LOG).read() };
         }
         (at, end, count)
     })

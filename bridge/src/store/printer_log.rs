@@ -9,7 +9,7 @@ use super::NUMBERS;
 use super::flash::{Flash, PAGE, SECTOR};
 use protocol::link::frame::checksum;
 
-/// Sectors of the diary, the first of the area.
+/// Sectors of the printer log, the first of the area.
 pub(super) const SECTORS: u32 = 2;
 
 const RECORD: u32 = 32;
@@ -41,8 +41,8 @@ pub struct Note {
     pub stored: u32,
 }
 
-/// The diary. The flash is lent to each call.
-pub(super) struct Diary {
+/// The printer log. The flash is lent to each call.
+pub(super) struct PrinterLog {
     last: Note,
     number: u32,
     sector: u32,
@@ -50,26 +50,25 @@ pub(super) struct Diary {
     next: u32,
 }
 
-impl Diary {
+impl PrinterLog {
     /// Reads what is there.
-    pub(super) fn open(flash: &impl Flash) -> Diary {
+    pub(super) fn open(flash: &impl Flash) -> PrinterLog {
         let last = Note { standing: Standing::Clear, job: 0, stored: 0 };
-        let mut diary = Diary { last, number: 0, sector: 1, next: RECORDS };
+        let mut log = PrinterLog { last, number: 0, sector: 1, next: RECORDS };
         for sector in 0..SECTORS {
             for at in 0..RECORDS {
                 if let Some((number, note)) = read(flash, sector, at)
-                    && number > diary.number
+                    && number > log.number
                 {
-                    (diary.number, diary.last, diary.sector) = (number, note, sector);
+                    (log.number, log.last, log.sector) = (number, note, sector);
                 }
             }
         }
-        if diary.number > 0 {
+        if log.number > 0 {
             // Behind everything, whole or not.
-            diary.next =
-                (0..RECORDS).rev().find(|&at| !is_blank(flash, diary.sector, at)).map_or(0, |at| at + 1);
+            log.next = (0..RECORDS).rev().find(|&at| !is_blank(flash, log.sector, at)).map_or(0, |at| at + 1);
         }
-        diary
+        log
     }
 
     /// The last record.
