@@ -17,7 +17,7 @@ mod judge;
 mod knots;
 pub mod lab;
 mod library;
-pub mod linear;
+pub mod linalg;
 mod lobes;
 pub mod model;
 pub mod names;

@@ -12,16 +12,16 @@ use press::sheet::DotMap;
 use serde::{Deserialize, Serialize};
 
 use crate::MeasureError;
-use crate::card::{self, Calibration};
-use crate::geometry::{Scene, Unknown};
-use crate::merge::{self, Exposure, Frames, Shot};
-use crate::patches::{Chart, Region};
-use crate::photo;
-use crate::pictures::Copy;
-use crate::reduce::{self, Kind, Pixel, Reduced, Row};
+use crate::camera::merge::{self, Exposure, Frames, Shot};
+use crate::camera::photo;
+use crate::camera::residual_shift::ResidualShifts;
+use crate::curves::card::{self, Calibration};
+use crate::curves::patches::{Chart, Region};
+use crate::curves::pictures::Copy;
+use crate::curves::reduce::{self, Kind, Pixel, Reduced, Row};
+use crate::geometry::correction::{self, Measure, Sample, Solved};
+use crate::geometry::scene::{Scene, Unknown};
 use crate::setup::{Setup, Shape, Trust};
-use crate::slips::Slips;
-use crate::solve::{self, Measure, Sample, Solved};
 
 /// Pixels that correct the geometry.
 const SOLVING: usize = 6000;
@@ -175,12 +175,12 @@ pub fn measure(
         };
         let pixels =
             regions.iter().map(|at| reduce::pixels(&radiance, scene, card.scale, light, at)).collect();
-        let outline = solve::outline(scene, &radiance, light);
+        let outline = correction::outline(scene, &radiance, light);
         seen.push(Seen { series: Series { shots, card }, copy, outline, pixels });
     }
     observer.end();
     let Some((_, scene)) = scene else { return Err(MeasureError::Scene("no photographs".into())) };
-    let scene = scene.with_slips(Slips::new(seen.iter().map(|seen| exposures(&seen.series.shots))));
+    let scene = scene.with_slips(ResidualShifts::new(seen.iter().map(|seen| exposures(&seen.series.shots))));
     covered(&scene, &stacks, &seen)?;
     finish(setup, &scene, &stacks, seen, observer)
 }
@@ -375,7 +375,7 @@ fn mistakes(
         let mut outside: Vec<f64> =
             outline.iter().map(|p| tape.outside_outline(p[0], p[1]) * tape.pixel_mm()).collect();
         let seen = outline.len() >= OUTLINED;
-        let outside = crate::linear::median(&mut outside);
+        let outside = crate::linalg::median(&mut outside);
         let allowed = 2.0 * measures[k].1.hypot(setup.sample.centre_tolerance_mm);
         if far(k) || (seen && outside.abs() > allowed) {
             let fits = if seen { given + outside } else { found };
@@ -409,7 +409,7 @@ fn finish(
     observer.begin("fitting the geometry", 1);
     let measures = measures(setup, &seen);
     let outline: Vec<[f64; 2]> = seen.iter().flat_map(|seen| seen.outline.iter().copied()).collect();
-    let solved = solve::solve(tape, &samples(tape, &seen, patches.len()), &outline, &measures);
+    let solved = correction::solve(tape, &samples(tape, &seen, patches.len()), &outline, &measures);
     mistakes(setup, tape, &outline, &measures, &solved)?;
     observer.end();
     let trusted = setup.geometry == Trust::Known;
@@ -426,7 +426,7 @@ fn finish(
     let doubts: Vec<(Scene, Vec<f64>)> = if trusted {
         Vec::new()
     } else {
-        let doubtful = solved.uncertain.iter().map(|column| solve::apply(tape, &measures, column));
+        let doubtful = solved.uncertain.iter().map(|column| correction::apply(tape, &measures, column));
         doubtful
             .map(|other| {
                 let relative = scales(&other).iter().zip(&factors).map(|(a, b)| a / b).collect();

@@ -15,8 +15,8 @@ use appearance::gamut::{self, Mapped, Printable};
 use appearance::materials::Materials;
 use inks::{Library, Stack, ggx};
 use made::{Camera, Curves, DOTS_PER_MM, EYE, STACKS, V, chart, lit, stack, truth};
+use measure::curves::reduce::Kind;
 use measure::measure;
-use measure::reduce::Kind;
 use measure::setup::Setup;
 use observe::Silent;
 use press::layout::{Layout, arrange};
@@ -190,7 +190,7 @@ fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
     }
     let mine = folder.path().join("mine");
     fs::create_dir(&mine).unwrap();
-    measure::library::write(&taken, &mine).unwrap();
+    measure::curves::library::write(&taken, &mine).unwrap();
     // Paper is not on the chart: that of the true library takes its place in both.
     let real = written(&folder.path().join("real"));
     let text = fs::read_to_string(mine.join("library.toml")).unwrap();

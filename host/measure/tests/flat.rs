@@ -8,8 +8,8 @@ mod made;
 use std::fmt::Write as _;
 
 use made::{Camera, Curves, DOTS_PER_MM, EYE, STACKS, V, chart, dot, lit, truth};
+use measure::curves::reduce::Kind;
 use measure::measure;
-use measure::reduce::Kind;
 use measure::setup::Setup;
 use observe::Silent;
 use press::sheet::DotMap;

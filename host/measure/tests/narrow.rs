@@ -3,8 +3,8 @@
 //! Pixels are made here: each is the mean of rays through its area, under a lamp without extent.
 
 use inks::ggx;
-use measure::geometry::Scene;
-use measure::reduce::{Kind, Pixel, Row, reduce};
+use measure::curves::reduce::{Kind, Pixel, Row, reduce};
+use measure::geometry::scene::Scene;
 use measure::setup::Setup;
 use rayon::prelude::*;
 

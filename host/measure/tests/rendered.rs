@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use measure::reduce::Kind;
+use measure::curves::reduce::Kind;
 use measure::setup::Setup;
 use measure::{Taken, measure};
 use observe::Silent;

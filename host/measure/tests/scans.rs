@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use inks::{Library, Stack};
-use measure::{ramp, registration};
+use measure::scans::{ramp, registration};
 use observe::Silent;
 use press::chart;
 use press::halftone::Method;

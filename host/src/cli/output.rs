@@ -59,7 +59,7 @@ impl Kind {
             Kind::Dots => Some("dots.toml"),
             Kind::Sheet => Some("sheet.toml"),
             Kind::Passes => Some("passes.toml"),
-            Kind::Measured => Some(measure::library::FIGURES),
+            Kind::Measured => Some(measure::curves::library::FIGURES),
             Kind::Predicted => Some(inks::archive::PREDICTION),
             Kind::Pictures | Kind::Maps => None,
         }

@@ -22,7 +22,7 @@ use self::figures::Slot;
 use self::least_squares::{Matrix, Normal};
 use crate::curve::Curve;
 use crate::library::Library;
-use crate::linear::Cholesky;
+use crate::linalg::Cholesky;
 use crate::model::{ModelError, Optics};
 use crate::stack::Stack;
 use crate::uncertainty::SampleKind;

@@ -14,8 +14,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::flat::Window;
-use crate::geometry::{Vector, along, cross, dot, unit};
-use crate::linear::Cholesky;
+use crate::geometry::scene::{Vector, along, cross, dot, unit};
+use crate::linalg::Cholesky;
 
 /// What makes factors unique where stacks always come together, relative to a stack that covers everything.
 const HELD: f64 = 1e-8;

@@ -1,7 +1,7 @@
 //! Photographs of a printed sheet beside what was predicted of it.
 //!
-//! In the order of the data: [`Setup`] says where lamps stood; `sheet` finds the camera marks of the dots that were printed, and
-//! [`crate::marks`] those of each photograph, which says whether it shows this sheet; [`crate::camera`] solves for lens and
+//! In the order of the data: [`Setup`] says where lamps stood; `geometry::sheet_marks` finds the camera marks of the dots that were printed, and
+//! [`geometry::marks`](crate::geometry::marks) those of each photograph, which says whether it shows this sheet; [`geometry::pose`](crate::geometry::pose) solves for lens and
 //! poses; the paper around the marks, or a grey card, gives exposure and white balance; `picture` lays the
 //! photograph flat; `scenery` shows document, mixture and dots from the same place under the same lamp; `figures` compares them,
 //! and [`page`] shows all of it.
@@ -13,7 +13,6 @@ pub mod page;
 pub(crate) mod picture;
 mod scenery;
 mod setup;
-pub(crate) mod sheet;
 
 use std::path::{Path, PathBuf};
 
@@ -28,12 +27,12 @@ pub use figures::{Errors, Factor};
 pub use setup::{Card, Setup, White};
 
 use crate::MeasureError;
-use crate::camera::{self, Camera, Known, Seen};
-use crate::marks::Mark;
-use crate::photo;
+use crate::camera::photo;
+use crate::geometry::marks::Mark;
+use crate::geometry::pose::{self, Camera, Known, Seen};
+use crate::geometry::sheet_marks::{PrintedMark, SheetMarks};
 use picture::Picture;
 use scenery::Scenery;
-use sheet::Marks;
 
 /// Corners that lie farther than this from where a flat sheet has them, in pixels and in picture widths, are not on one.
 const MOST_RESIDUAL: (f64, f64) = (1.0, 6e-4);
@@ -153,7 +152,7 @@ struct Shot {
     light: usize,
     size: (usize, usize),
     bent: bool,
-    marks: Vec<(Mark, sheet::Printed)>,
+    marks: Vec<(Mark, PrintedMark)>,
 }
 
 /// Compares the photographs in a folder with what was printed.
@@ -166,7 +165,7 @@ pub fn compare(
     printed: &Printed<'_>,
     observer: &dyn Observer,
 ) -> Result<(Comparison, Vec<Pictures>), MeasureError> {
-    let sheet = Marks::of(printed.sheet, printed.library)?;
+    let sheet = SheetMarks::find(printed.sheet, printed.library)?;
     let paths = photo::list(folder)?;
     if paths.len() > MOST_PHOTOS {
         return Err(MeasureError::Scene(format!(
@@ -275,7 +274,7 @@ fn together(photos: &[PhotoFigures]) -> Errors {
 }
 
 /// Reads a photograph and finds the sheet's marks in it.
-fn read(path: &Path, setup: &Setup, sheet: &Marks) -> Result<Shot, MeasureError> {
+fn read(path: &Path, setup: &Setup, sheet: &SheetMarks) -> Result<Shot, MeasureError> {
     let wrong = |problem: String| Err(MeasureError::photo(path, problem));
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let Some(light) = setup.light_of(&name) else {
@@ -302,7 +301,7 @@ fn solved(first: &Path, setup: &Setup, shots: &[Shot]) -> Result<Camera, Measure
     let seen: Vec<Vec<Seen>> = shots
         .iter()
         .map(|shot| {
-            let corners = |(mark, known): &(Mark, sheet::Printed)| {
+            let corners = |(mark, known): &(Mark, PrintedMark)| {
                 let (mark, known) = (*mark, *known);
                 (0..4).map(move |i| Seen { sheet: known.corners[i], pixel: mark.corners[i] })
             };
@@ -320,7 +319,7 @@ fn solved(first: &Path, setup: &Setup, shots: &[Shot]) -> Result<Camera, Measure
         focal,
         position: setup.camera.position_mm.map(|at| (at, setup.camera.tolerance_mm.unwrap_or(20.0))),
     };
-    let Some(camera) = camera::solve(&seen, (width, height), &known) else {
+    let Some(camera) = pose::solve(&seen, (width, height), &known) else {
         return Err(MeasureError::Scene(
             "no camera explains where the marks are; check that the photographs are not mirrored or cropped, and that \
              camera.field_of_view_deg and camera.position_mm are right"

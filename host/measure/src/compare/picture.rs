@@ -10,11 +10,11 @@ use rayon::prelude::*;
 
 use super::flat::{Flat, Window};
 use crate::MeasureError;
-use crate::camera::{Lens, Pose};
-use crate::marks::Grey;
-use crate::merge::Radiance;
-use crate::photo::{self, Values};
-use crate::probe::CLIPPED;
+use crate::camera::merge::Radiance;
+use crate::camera::photo::{self, Values};
+use crate::camera::probe::CLIPPED;
+use crate::geometry::marks::Grey;
+use crate::geometry::pose::{Lens, Pose};
 
 /// A photograph, linear in light.
 pub(crate) struct Picture {

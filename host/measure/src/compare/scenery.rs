@@ -23,9 +23,9 @@ use super::flat::{Flat, Window};
 use super::picture::Picture;
 use super::{Card, PhotoFigures, Pictures, Printed, Setup, Shot, White, space};
 use crate::MeasureError;
-use crate::camera::{Camera, Lens, Pose};
-use crate::card;
-use crate::linear::{median, spread};
+use crate::curves::card;
+use crate::geometry::pose::{Camera, Lens, Pose};
+use crate::linalg::{median, spread};
 
 /// Quality of the pictures: differences of a percent stay visible.
 const QUALITY: u8 = 88;

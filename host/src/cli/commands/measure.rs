@@ -14,7 +14,7 @@ use inks::Library;
 use crate::cli::console::{print_job, show};
 use crate::cli::output::{Kind, Staged};
 use measure::Measurement;
-use measure::reduce::Kind as Origin;
+use measure::curves::reduce::Kind as Origin;
 use measure::setup::Setup;
 use observe::Observer;
 use press::sheet::Sheet;
@@ -77,7 +77,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
 
 fn curves(photos: &Path, setup: &Path, output: &Path, observer: &dyn Observer) -> Result<()> {
     let setup = Setup::read(setup)?;
-    if let Some(added) = measure::library::added(output) {
+    if let Some(added) = measure::curves::library::added(output) {
         bail!(
             "{}: holds {added}, which this would delete; measure into another folder (-o), and copy those tables and curves over",
             output.display()
@@ -87,14 +87,14 @@ fn curves(photos: &Path, setup: &Path, output: &Path, observer: &dyn Observer) -
     let sheet = setup.sample.chart.as_deref().map(|path| chart(path, observer)).transpose()?;
     let taken = measure::measure(photos, &setup, sheet.as_ref().map(Sheet::dots), observer)?;
     let folder = staged.create()?;
-    measure::library::write(&taken, folder)?;
+    measure::curves::library::write(&taken, folder)?;
     Library::from_dir(folder).context("the measured curves cannot be used as an ink library")?;
     staged.commit()?;
     show(&summary(&taken.measurement, output))
 }
 
 fn report(dir: &Path, output: Option<&Path>) -> Result<()> {
-    let page = measure::report::html(dir)?;
+    let page = measure::curves::report::html(dir)?;
     let target = output.map_or_else(|| dir.join("report.html"), Path::to_path_buf);
     let staged = Staged::file(&target)?;
     std::fs::write(staged.path(), page).with_context(|| format!("cannot write {}", target.display()))?;
@@ -108,7 +108,7 @@ fn summary(measurement: &Measurement, output: &Path) -> String {
         format!("{:<12} {:>9} {:>9} {:>15}  uncertain by\n", "stack", "f(2)", "f(30)", "half angles");
     for stack in &measurement.stacks {
         let near = |degrees: f64| {
-            let off = |row: &&measure::reduce::Row| (row.theta_deg - degrees).abs();
+            let off = |row: &&measure::curves::reduce::Row| (row.theta_deg - degrees).abs();
             stack.rows.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
         };
         let at = |degrees: f64| near(degrees).map_or(0.0, |row| row.rgb[1]);

@@ -12,7 +12,7 @@
 
 use super::choose::{Metric, NOISE};
 use crate::halftone::search::Point;
-use inks::linear::Cholesky;
+use inks::linalg::Cholesky;
 
 /// The largest difference of a debt above the first row of a tone, in cells, for a stack of share p: times root of p (1 - p).
 const SPREAD: f32 = 1.25;

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use appearance::document;
 use inks::{Curve, Stack, archive};
-use measure::library::{curve_name, quoted};
-use measure::readings;
+use measure::curves::library::{curve_name, quoted};
+use measure::curves::readings;
 use observe::Observer;
 
 use super::page::file_name_of;

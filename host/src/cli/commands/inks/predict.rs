@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use appearance::brdf::{Space, compare};
 use inks::predict::{FittedFigure, LeftOut, Predicted, Prediction};
 use inks::{Curve, FILE_NAME, Library, Provenance, Stack, archive};
-use measure::library::{curve_name, quoted};
+use measure::curves::library::{curve_name, quoted};
 use observe::Observer;
 use serde::Serialize;
 

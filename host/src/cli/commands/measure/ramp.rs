@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use inks::Library;
-use measure::library::quoted;
-use measure::ramp::{self, Dots, LINEAR, Owner, Ramp, Series};
+use measure::curves::library::quoted;
+use measure::scans::ramp::{self, Dots, LINEAR, Owner, Ramp, Series};
 use observe::Observer;
 use press::sheet::dots_in_words;
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use inks::Library;
-use measure::registration::{self, Registration};
+use measure::scans::registration::{self, Registration};
 use observe::Observer;
 
 use crate::cli::commands::profile::{in_words, save_profile};

@@ -4,8 +4,8 @@
 //! merged. Method: blocks of pixels become one, with their mean and their largest value; noise is the second difference
 //! along rows, which smooth shading does not enter. Cost: one pass over each photograph.
 
-use crate::linear::median;
-use crate::photo::{Photo, Values};
+use super::photo::{Photo, Values};
+use crate::linalg::median;
 
 /// Pixels across a small copy, at most.
 const ACROSS: usize = 640;

@@ -7,8 +7,9 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use super::reduce::Row;
+use crate::MeasureError;
 use crate::measurement::{Measurement, Taken};
-use crate::{MeasureError, reduce::Row};
 
 /// The file with all figures.
 pub const FIGURES: &str = "measurement.json";

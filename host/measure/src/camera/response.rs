@@ -4,9 +4,9 @@
 //! ln E_i + ln t_j` in least squares with a smooth g over 256 levels and weights that fall toward black and white. Cost: one
 //! system of 256 + `PIXELS` unknowns for each channel. Limits: needs several exposures; absolute levels come from the card.
 
+use super::probe::Probe;
 use crate::MeasureError;
-use crate::linear::Cholesky;
-use crate::probe::Probe;
+use crate::linalg::Cholesky;
 
 const LEVELS: usize = 256;
 /// Pixels that take part.
@@ -157,7 +157,7 @@ fn channel(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photo::{Photo, Values};
+    use crate::camera::photo::{Photo, Values};
 
     fn taken(curve: impl Fn(f64) -> f64, exposure: f64) -> Photo {
         let (width, height) = (256, 64);

@@ -11,8 +11,8 @@ use inks::Library;
 use press::layout::camera::{Name, SIDE};
 use press::sheet::{Area, DOTS_PER_MM, DotMap};
 
+use super::marks::{self, Grey, Mark};
 use crate::MeasureError;
-use crate::marks::{self, Grey, Mark};
 
 /// Dots along a side of a pixel in which marks are looked for.
 const FACTOR: usize = 3;
@@ -27,7 +27,7 @@ pub(crate) const FEWEST: usize = 3;
 
 /// A mark of the sheet.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Printed {
+pub(crate) struct PrintedMark {
     pub(crate) name: Name,
     /// Its corners in mm of the sheet's frame: top left, top right, bottom right, bottom left.
     pub(crate) corners: [[f64; 2]; 4],
@@ -35,17 +35,17 @@ pub(crate) struct Printed {
 
 /// The marks of a sheet.
 #[derive(Clone, Debug)]
-pub(crate) struct Marks {
-    pub(crate) marks: Vec<Printed>,
+pub(crate) struct SheetMarks {
+    pub(crate) marks: Vec<PrintedMark>,
     /// The frame's origin in dots: the middle of all marks.
     origin: [f64; 2],
     /// The dots between them.
     pub(crate) between: Area,
 }
 
-impl Marks {
+impl SheetMarks {
     /// Finds the marks of a sheet.
-    pub(crate) fn of(dots: &DotMap, library: &Library) -> Result<Marks, MeasureError> {
+    pub(crate) fn find(dots: &DotMap, library: &Library) -> Result<SheetMarks, MeasureError> {
         let found = marks::find(&picture(dots, library));
         let mut marks: Vec<(Name, [f64; 2])> = Vec::new();
         for Mark { name, corners } in &found {
@@ -85,10 +85,10 @@ impl Marks {
             width: (right - left) as usize,
             length: (bottom - top) as usize,
         };
-        let mut sheet = Marks { marks: Vec::new(), origin, between };
+        let mut sheet = SheetMarks { marks: Vec::new(), origin, between };
         sheet.marks = marks
             .iter()
-            .map(|&(name, [x, y])| Printed {
+            .map(|&(name, [x, y])| PrintedMark {
                 name,
                 corners: [[x, y], [x + side, y], [x + side, y + side], [x, y + side]].map(|p| sheet.place(p)),
             })
@@ -107,9 +107,9 @@ impl Marks {
     }
 
     /// The sheet's marks in a picture, each with itself as printed.
-    pub(crate) fn seen(&self, path: &Path, picture: &Grey) -> Result<Vec<(Mark, Printed)>, MeasureError> {
+    pub(crate) fn seen(&self, path: &Path, picture: &Grey) -> Result<Vec<(Mark, PrintedMark)>, MeasureError> {
         let wrong = |problem: String| Err(MeasureError::photo(path, problem));
-        let own = |found: &[Mark]| -> Vec<(Mark, Printed)> {
+        let own = |found: &[Mark]| -> Vec<(Mark, PrintedMark)> {
             let known = |mark: &Mark| self.marks.iter().find(|known| known.name == mark.name);
             found.iter().filter_map(|mark| Some((*mark, *known(mark)?))).collect()
         };

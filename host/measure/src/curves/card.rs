@@ -11,9 +11,9 @@ use std::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
 use crate::MeasureError;
-use crate::geometry::Scene;
-use crate::linear::spread;
-use crate::merge::Radiance;
+use crate::camera::merge::Radiance;
+use crate::geometry::scene::Scene;
+use crate::linalg::spread;
 use crate::setup;
 
 /// Pixels across the copy in which the card is looked for.
@@ -207,7 +207,7 @@ pub fn steps_of(rectangle: [f64; 4], radiance: &Radiance) -> [[f64; 4]; 3] {
     let brightness = |step: &Rectangle| {
         let mut values: Vec<f64> =
             inside(radiance, *step).map(|(_, _, i)| f64::from(radiance.value[3 * i + 1])).collect();
-        crate::linear::median(&mut values)
+        crate::linalg::median(&mut values)
     };
     if brightness(&steps[0]) < brightness(&steps[2]) {
         steps.reverse();

@@ -8,10 +8,10 @@ use base64::engine::general_purpose::STANDARD;
 use plotters::prelude::*;
 use press::html::{self, escape};
 
+use super::library;
+use super::reduce::Kind;
 use crate::MeasureError;
-use crate::library;
 use crate::measurement::{Measured, Measurement, seconds};
-use crate::reduce::Kind;
 
 const COLOURS: [(u8, u8, u8); 3] = [(208, 48, 48), (32, 140, 64), (48, 88, 220)];
 /// The largest picture that is put into a page, in bytes.
@@ -172,7 +172,7 @@ fn curves(stack: &Measured) -> Drawn {
             .draw()?;
         for (c, (r, g, b)) in COLOURS.into_iter().enumerate() {
             let colour = RGBColor(r, g, b);
-            let point = |row: &crate::reduce::Row, by: f64| {
+            let point = |row: &super::reduce::Row, by: f64| {
                 (row.theta_deg.sqrt(), (row.rgb[c] + by * row.sigma[c]).clamp(low, high))
             };
             let band = stack.rows.iter().map(|row| point(row, 2.0));

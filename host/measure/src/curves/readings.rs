@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_readings_of_the_guide_are_readings() {
-        let guide = include_str!("../../../docs/measuring-inks.md");
+        let guide = include_str!("../../../../docs/measuring-inks.md");
         let example = guide.split("```toml readings\n").nth(1).unwrap().split("```").next().unwrap();
         let found = file(example).unwrap();
         assert!((0.1..0.14).contains(&found.width.alpha) && found.width.misfit < 0.15, "{:?}", found.width);

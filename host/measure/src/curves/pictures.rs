@@ -2,7 +2,7 @@
 
 use image::{Rgb, RgbImage};
 
-use crate::merge::Radiance;
+use crate::camera::merge::Radiance;
 
 /// Pixels across a picture, at most.
 const ACROSS: usize = 900;

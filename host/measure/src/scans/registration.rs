@@ -14,12 +14,12 @@ use press::sheet::{DOTS_PER_MM, Sheet};
 use protocol::paper::LEFT;
 use serde::Serialize;
 
+use super::resolution;
+use super::scan::Scan;
 use crate::MeasureError;
-use crate::compare::sheet::Marks;
-use crate::linear::{Cholesky, median};
-use crate::marks::{Grey, Line, profile};
-use crate::resolution;
-use crate::scan::Scan;
+use crate::geometry::marks::{Grey, Line, profile};
+use crate::geometry::sheet_marks::SheetMarks;
+use crate::linalg::{Cholesky, median};
 
 /// Profiles across an edge of the sheet.
 const PROFILES: usize = 160;
@@ -76,7 +76,7 @@ pub fn measure(
     dpi: Option<f64>,
     observer: &dyn Observer,
 ) -> Result<Registration, MeasureError> {
-    let marks = Marks::of(sheet.dots(), library)?;
+    let marks = SheetMarks::find(sheet.dots(), library)?;
     observer.begin("scans", scans.len() as u64);
     let mut placed = Vec::new();
     for path in scans {
@@ -99,7 +99,7 @@ pub fn measure(
     Ok(Registration { scans: placed, profile, apart_mm })
 }
 
-fn one(path: &Path, sheet: &Sheet, marks: &Marks, dpi: Option<f64>) -> Result<Placed, MeasureError> {
+fn one(path: &Path, sheet: &Sheet, marks: &SheetMarks, dpi: Option<f64>) -> Result<Placed, MeasureError> {
     let wrong = |problem: String| MeasureError::photo(path, problem);
     let scan = Scan::read(path, marks, None)?;
     let shown = scan.scales();

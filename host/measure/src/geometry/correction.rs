@@ -8,9 +8,9 @@
 //! Cost: some thousand pixels, ten measures, a hundred evaluations. Limits: a lamp's distance is seen poorly, and matters as
 //! little; what the pictures cannot tell stays as the tape says.
 
-use crate::geometry::{Scene, Unknown};
-use crate::linear::{Cholesky, spread};
-use crate::merge::Radiance;
+use super::scene::{Scene, Unknown};
+use crate::camera::merge::Radiance;
+use crate::linalg::{Cholesky, spread};
 
 /// Nodes of a stack's curve over the square root of the angle.
 const NODES: usize = 48;

@@ -7,7 +7,7 @@
 
 /// How far each photograph lies aside from where it was aligned to, for each lamp's series, longest exposure first.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Slips(Vec<Series>);
+pub(crate) struct ResidualShifts(Vec<Series>);
 
 #[derive(Clone, Debug)]
 struct Series {
@@ -16,11 +16,11 @@ struct Series {
     aside: Vec<[f64; 2]>,
 }
 
-impl Slips {
+impl ResidualShifts {
     /// Relative exposures of each lamp's photographs.
-    pub(crate) fn new(exposures: impl IntoIterator<Item = Vec<f64>>) -> Slips {
+    pub(crate) fn new(exposures: impl IntoIterator<Item = Vec<f64>>) -> ResidualShifts {
         let still = |exposures: Vec<f64>| Series { aside: vec![[0.0; 2]; exposures.len()], exposures };
-        Slips(exposures.into_iter().map(still).collect())
+        ResidualShifts(exposures.into_iter().map(still).collect())
     }
 
     /// Moves a photograph by so many pixels along an axis.
@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn pixels_lie_where_their_photographs_do() {
-        let mut slips = Slips::new([vec![4.0, 2.0, 1.0], vec![1.0]]);
+        let mut slips = ResidualShifts::new([vec![4.0, 2.0, 1.0], vec![1.0]]);
         slips.shift(0, 1, 0, 0.7);
         slips.shift(0, 2, 1, 0.3);
         for (first, expected) in

@@ -7,7 +7,7 @@
 
 use press::sheet::DotMap;
 
-use crate::scan::Window;
+use super::scan::Window;
 
 /// Dots in either direction.
 pub(crate) const FAR: f64 = 2.0;

@@ -13,10 +13,10 @@ use press::sheet::{Area, DOTS_PER_MM};
 
 use crate::MeasureError;
 use crate::compare::picture::Picture;
-use crate::compare::sheet::Marks;
-use crate::linear::{Cholesky, spread};
-use crate::marks::{Grey, Mark};
-use crate::plane::Plane;
+use crate::geometry::homography::Homography;
+use crate::geometry::marks::{Grey, Mark};
+use crate::geometry::sheet_marks::SheetMarks;
+use crate::linalg::{Cholesky, spread};
 
 /// The fewest pixels a millimetre: 150 dpi.
 const FEWEST_PIXELS: f64 = 5.5;
@@ -37,9 +37,9 @@ const CONTRAST: f64 = 0.06;
 pub(crate) struct Scan {
     picture: Picture,
     /// From dots of the sheet to pixels.
-    to_pixels: Plane,
+    to_pixels: Homography,
     /// And back.
-    to_dots: Plane,
+    to_dots: Homography,
     /// The picture as marks are found in it.
     pub(crate) grey: Grey,
     /// The marks, with their corners in dots of the sheet.
@@ -49,7 +49,7 @@ pub(crate) struct Scan {
 impl Scan {
     /// Reads a scan of the sheet with these marks. `linear` says whether values are proportional to light [default: those of 16 bits and
     /// OpenEXR are].
-    pub(crate) fn read(path: &Path, sheet: &Marks, linear: Option<bool>) -> Result<Scan, MeasureError> {
+    pub(crate) fn read(path: &Path, sheet: &SheetMarks, linear: Option<bool>) -> Result<Scan, MeasureError> {
         let picture = Picture::read(path, linear)?;
         let grey = picture.grey();
         let marks: Vec<(Mark, [[f64; 2]; 4])> = sheet
@@ -59,7 +59,7 @@ impl Scan {
             .collect();
         let dots: Vec<[f64; 2]> = marks.iter().flat_map(|(_, corners)| *corners).collect();
         let pixels: Vec<[f64; 2]> = marks.iter().flat_map(|(mark, _)| mark.corners).collect();
-        let fitted = Plane::fit(&dots, &pixels).zip(Plane::fit(&pixels, &dots));
+        let fitted = Homography::fit(&dots, &pixels).zip(Homography::fit(&pixels, &dots));
         let Some((to_pixels, to_dots)) = fitted else {
             return Err(MeasureError::photo(path, "its camera marks lie in one line; take it again"));
         };

@@ -3,13 +3,13 @@
 //! Method: the eight unknowns of a homography with its last entry 1, by least squares over points that are first brought to unit
 //! size (Hartley 1997). Cost: one 8 x 8 system. Limits: planes through the eye have none.
 
-use crate::linear::Cholesky;
+use crate::linalg::Cholesky;
 
 /// A map between planes, row by row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Plane(pub(crate) [f64; 9]);
+pub(crate) struct Homography(pub(crate) [f64; 9]);
 
-impl Plane {
+impl Homography {
     /// The image of a point.
     pub(crate) fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let h = &self.0;
@@ -18,12 +18,12 @@ impl Plane {
     }
 
     /// The map that takes four points to four others.
-    pub(crate) fn through(from: [[f64; 2]; 4], to: [[f64; 2]; 4]) -> Option<Plane> {
-        Plane::fit(&from, &to)
+    pub(crate) fn through(from: [[f64; 2]; 4], to: [[f64; 2]; 4]) -> Option<Homography> {
+        Homography::fit(&from, &to)
     }
 
     /// The map that takes points nearest to others. At least four.
-    pub(crate) fn fit(from: &[[f64; 2]], to: &[[f64; 2]]) -> Option<Plane> {
+    pub(crate) fn fit(from: &[[f64; 2]], to: &[[f64; 2]]) -> Option<Homography> {
         if from.len() < 4 || from.len() != to.len() {
             return None;
         }
@@ -49,7 +49,7 @@ impl Plane {
         let h = times(&b.back(), &times(&h, &a.forth()));
         let scale = h[8];
         (scale.is_finite() && scale.abs() > 1e-12 && h.iter().all(|v| v.is_finite()))
-            .then(|| Plane(h.map(|v| v / scale)))
+            .then(|| Homography(h.map(|v| v / scale)))
     }
 }
 
@@ -92,15 +92,15 @@ mod tests {
 
     #[test]
     fn points_come_back_through_a_steep_view() {
-        let truth = Plane([410.0, -35.0, 800.0, 52.0, 377.0, 650.0, 0.11, -0.08, 1.0]);
+        let truth = Homography([410.0, -35.0, 800.0, 52.0, 377.0, 650.0, 0.11, -0.08, 1.0]);
         let from: Vec<[f64; 2]> = (0..12).map(|i| [f64::from(i % 4) - 1.3, f64::from(i / 4) * 0.8]).collect();
         let to: Vec<[f64; 2]> = from.iter().map(|p| truth.at(*p)).collect();
-        let found = Plane::fit(&from, &to).unwrap();
+        let found = Homography::fit(&from, &to).unwrap();
         for p in [[0.3, 0.4], [-1.0, 2.0]] {
             let (a, b) = (found.at(p), truth.at(p));
             assert!((a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6, "{a:?} {b:?}");
         }
         let line = [[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]];
-        assert!(Plane::through(line, line).is_none());
+        assert!(Homography::through(line, line).is_none());
     }
 }

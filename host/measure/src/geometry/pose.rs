@@ -8,9 +8,9 @@
 //! Limits: square pixels, no decentring. Photographs taken straight on do not tell focal length from distance; tilt some of
 //! them, or state the angle of view.
 
-use crate::geometry::{Vector, along, cross, dot, unit};
-use crate::linear::Cholesky;
-use crate::plane::Plane;
+use super::homography::Homography;
+use super::scene::{Vector, along, cross, dot, unit};
+use crate::linalg::Cholesky;
 
 /// A point of the sheet in mm (x right, y up), and where it is in the picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +66,7 @@ impl Pose {
         let angle = dot(axis, axis).sqrt();
         let columns: [Vector; 3] = std::array::from_fn(|c| {
             let v = [self.rotation[0][c], self.rotation[1][c], self.rotation[2][c]];
-            if angle < 1e-300 { v } else { crate::geometry::turned(v, unit(axis), angle) }
+            if angle < 1e-300 { v } else { super::scene::turned(v, unit(axis), angle) }
         });
         Pose {
             rotation: std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r])),
@@ -142,13 +142,13 @@ const LENS: usize = 3;
 /// `None` if points lie on a line or no camera sees them so.
 pub fn solve(photos: &[Vec<Seen>], (width, height): (usize, usize), known: &Known) -> Option<Camera> {
     let middle = [width as f64 / 2.0, height as f64 / 2.0];
-    let planes: Vec<Plane> = photos
+    let planes: Vec<Homography> = photos
         .iter()
         .map(|points| {
             let from: Vec<[f64; 2]> = points.iter().map(|p| p.sheet).collect();
             let to: Vec<[f64; 2]> =
                 points.iter().map(|p| [p.pixel[0] - middle[0], p.pixel[1] - middle[1]]).collect();
-            Plane::fit(&from, &to)
+            Homography::fit(&from, &to)
         })
         .collect::<Option<_>>()?;
     let focal = known.focal.map_or_else(|| focal(&planes, width.max(height) as f64), |(focal, _)| focal);
@@ -359,14 +359,14 @@ impl State {
 
 fn spread(residuals: &[Vec<f64>]) -> f64 {
     let mut all: Vec<f64> = residuals.iter().flatten().map(|r| r.abs()).collect();
-    1.4826 * crate::linear::median(&mut all)
+    1.4826 * crate::linalg::median(&mut all)
 }
 
 /// The focal length that makes the images of the sheet's axes perpendicular and equally long, as nearly as all photographs
 /// allow; that of an ordinary lens where they do not tell.
-fn focal(planes: &[Plane], longest: f64) -> f64 {
+fn focal(planes: &[Homography], longest: f64) -> f64 {
     let (mut top, mut bottom) = (0.0, 0.0);
-    for Plane(h) in planes {
+    for Homography(h) in planes {
         // Columns scaled alike, so that photographs count alike.
         let scale = 1.0 / (h[0].hypot(h[3]).max(h[1].hypot(h[4]))).max(1e-300);
         let a = [h[0], h[3], h[6]].map(|v| v * scale);
@@ -392,7 +392,7 @@ fn focal(planes: &[Plane], longest: f64) -> f64 {
 }
 
 /// The pose that a homography (sheet in mm to pixels from the middle) means for a focal length.
-fn pose(plane: &Plane, focal: f64) -> Option<Pose> {
+fn pose(plane: &Homography, focal: f64) -> Option<Pose> {
     let h = &plane.0;
     let column = |k: usize| [h[k] / focal, h[3 + k] / focal, h[6 + k]];
     let (a, b, t) = (column(0), column(1), column(2));

@@ -6,9 +6,9 @@
 //! with the constant as a third unknown. Cost: some million comparisons a pair. Limits: shifts only; a camera that was turned does
 //! not match.
 
-use crate::linear::{Cholesky, spread};
-use crate::probe::{CLIPPED, Noise, Probe};
-use crate::response::Response;
+use super::probe::{CLIPPED, Noise, Probe};
+use super::response::Response;
+use crate::linalg::{Cholesky, spread};
 
 /// How far shifts are searched, in picture widths.
 const SEARCH: f64 = 0.06;
@@ -285,7 +285,7 @@ fn search(a: &Logs, b: &Logs) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photo::{Photo, Values};
+    use crate::camera::photo::{Photo, Values};
 
     /// Soft discs on a ground, moved by a shift, at an exposure.
     fn scene(shift: [f64; 2], exposure: f64, other: f64) -> Tones {

@@ -16,11 +16,11 @@ use inks::ggx;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Scene, View};
-use crate::linear::spread;
-use crate::merge::Radiance;
-use crate::patches::Region;
-use crate::smooth::{falling_then_rising, smooth};
+use super::patches::Region;
+use super::smooth::{falling_then_rising, smooth};
+use crate::camera::merge::Radiance;
+use crate::geometry::scene::{Scene, View};
+use crate::linalg::spread;
 
 /// Samples of a curve.
 pub const BINS: usize = 64;
@@ -252,7 +252,7 @@ pub fn reduce(scene: &Scene, pixels: &[Pixel], doubts: &[(Scene, Vec<f64>)], car
     for (b, bin) in bins.iter().enumerate().filter(|(_, bin)| bin.len() >= FEWEST) {
         for c in 0..3 {
             let mut ratios: Vec<f64> = bin.iter().map(|(p, v)| p.value[c] / v.irradiance).collect();
-            curve[c][b] = crate::linear::median(&mut ratios).max(1e-7).ln();
+            curve[c][b] = crate::linalg::median(&mut ratios).max(1e-7).ln();
         }
     }
     fill(&mut curve);
@@ -338,7 +338,7 @@ fn correct(scene: &Scene, bin: &[(Pixel, View)], curve: &Logs) -> (Bin, [f64; 3]
     let blur =
         bin.iter().zip(&predictions).map(|((_, v), m)| m[1] / (value(curve, v.theta)[1] * v.irradiance));
     let mut blur: Vec<f64> = blur.collect();
-    let blur = crate::linear::median(&mut blur);
+    let blur = crate::linalg::median(&mut blur);
     result.blurred = !(1.0 / BLURRED..=BLURRED).contains(&blur);
     (result, ratio, deviations)
 }
@@ -391,7 +391,7 @@ fn shifts(scene: &Scene, pixels: &[Pixel], curve: &Logs, doubts: &[(Scene, Vec<f
                 (values.len() >= FEWEST / 2).then(|| {
                     std::array::from_fn(|c| {
                         let mut channel: Vec<f64> = values.iter().map(|v| v[c]).collect();
-                        crate::linear::median(&mut channel)
+                        crate::linalg::median(&mut channel)
                     })
                 })
             })

@@ -6,8 +6,8 @@
 //! light from anywhere else.
 
 use crate::MeasureError;
+use crate::camera::residual_shift::ResidualShifts;
 use crate::setup::{Setup, Shape};
-use crate::slips::Slips;
 
 pub(crate) type Vector = [f64; 3];
 
@@ -114,7 +114,7 @@ pub struct Scene {
     lights: Vec<Vector>,
     diameters: Vec<f64>,
     card: (Vector, Vector),
-    slips: Slips,
+    slips: ResidualShifts,
 }
 
 impl Scene {
@@ -180,7 +180,7 @@ impl Scene {
             lights: setup.light.iter().map(|light| light.position_mm).collect(),
             diameters: setup.light.iter().map(|light| light.diameter_mm).collect(),
             card: (setup.card.position_mm.unwrap_or(sample.centre_mm), unit(facing)),
-            slips: Slips::default(),
+            slips: ResidualShifts::default(),
         })
     }
 
@@ -201,7 +201,7 @@ impl Scene {
 
     /// The same scene for photographs that may lie aside from where they were aligned to.
     #[must_use]
-    pub(crate) fn with_slips(self, slips: Slips) -> Scene {
+    pub(crate) fn with_slips(self, slips: ResidualShifts) -> Scene {
         Scene { slips, ..self }
     }
 

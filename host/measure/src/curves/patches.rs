@@ -11,11 +11,11 @@ use inks::Stack;
 use press::sheet::{Area, DOTS_PER_MM, DotMap};
 
 use crate::MeasureError;
-use crate::compare::sheet::Marks;
-use crate::geometry::Scene;
-use crate::linear::Cholesky;
-use crate::marks::Grey;
-use crate::merge::Radiance;
+use crate::camera::merge::Radiance;
+use crate::geometry::marks::Grey;
+use crate::geometry::scene::Scene;
+use crate::geometry::sheet_marks::SheetMarks;
+use crate::linalg::Cholesky;
 
 /// The shortest side of a patch in mm.
 const LEAST: f64 = 6.0;
@@ -88,14 +88,14 @@ fn solid(sheet: &DotMap) -> Vec<(Stack, Area)> {
 
 /// A chart: its marks and its patches.
 pub(crate) struct Chart {
-    marks: Marks,
+    marks: SheetMarks,
     patches: Vec<(Stack, Area)>,
 }
 
 impl Chart {
     /// Finds marks and patches of a sheet.
     pub(crate) fn new(sheet: &DotMap) -> Result<Chart, MeasureError> {
-        let marks = Marks::of(sheet, &inks::Library::builtin())?;
+        let marks = SheetMarks::find(sheet, &inks::Library::builtin())?;
         let between = marks.between;
         let inside =
             |area: &Area| area.top >= between.top && area.top + area.length <= between.top + between.length;

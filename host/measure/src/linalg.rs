@@ -1,6 +1,6 @@
 //! Systems of linear equations, and what is typical of some values.
 
-pub(crate) use inks::linear::Cholesky;
+pub(crate) use inks::linalg::Cholesky;
 
 /// The median; 0 for no values. Reorders them.
 pub(crate) fn median(values: &mut [f64]) -> f64 {

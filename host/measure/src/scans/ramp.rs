@@ -19,10 +19,10 @@ use protocol::ink::Ink;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::edges::{Edges, FAR};
+use super::scan::{Between, Scan, Window};
 use crate::MeasureError;
-use crate::compare::sheet::Marks;
-use crate::edges::{Edges, FAR};
-use crate::scan::{Between, Scan, Window};
+use crate::geometry::sheet_marks::SheetMarks;
 
 /// What is left out at the edges of a patch, in dots, and over how many its weight rises.
 const INSET: usize = 10;
@@ -154,7 +154,7 @@ pub fn measure(
     linear: Option<bool>,
     observer: &dyn Observer,
 ) -> Result<Ramp, MeasureError> {
-    let marks = Marks::of(sheet, library)?;
+    let marks = SheetMarks::find(sheet, library)?;
     let chart = Chart::find(sheet, &marks)?;
     observer.begin("scans", scans.len() as u64);
     let mut seen: Vec<Seen> = Vec::new();
@@ -185,7 +185,7 @@ fn patch(area: &Area) -> Window {
 }
 
 impl<'a> Chart<'a> {
-    fn find(sheet: &'a DotMap, marks: &Marks) -> Result<Chart<'a>, MeasureError> {
+    fn find(sheet: &'a DotMap, marks: &SheetMarks) -> Result<Chart<'a>, MeasureError> {
         let no_chart = || {
             MeasureError::Scene(
                 "the job is not a ramp chart with all its camera marks; print one with `foilpress chart ramp`, on a4 or letter, \

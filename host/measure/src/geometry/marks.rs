@@ -13,7 +13,7 @@ use press::layout::camera::{CELLS, Name};
 use rayon::prelude::*;
 
 use self::squares::{Sums, quad, regions};
-use crate::plane::Plane;
+use super::homography::Homography;
 
 /// Windows of the mean, in parts of the picture's longer side.
 const WINDOWS: [f64; 3] = [1.0 / 12.0, 1.0 / 28.0, 1.0 / 70.0];
@@ -89,9 +89,9 @@ pub struct Mark {
 
 impl Mark {
     /// From the mark's own plane, in which its corners are those of the square from 0 to 8, to the picture.
-    pub(crate) fn plane(&self) -> Option<Plane> {
+    pub(crate) fn plane(&self) -> Option<Homography> {
         let side = CELLS as f64;
-        Plane::through([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]], self.corners)
+        Homography::through([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]], self.corners)
     }
 }
 
@@ -172,7 +172,7 @@ impl Line {
             }
             let off = |p: &[f64; 2]| ((p[0] - at[0]) * line.along[1] - (p[1] - at[1]) * line.along[0]).abs();
             let mut all: Vec<f64> = points.iter().map(off).collect();
-            let limit = (3.0 * 1.4826 * crate::linear::median(&mut all)).max(0.02);
+            let limit = (3.0 * 1.4826 * crate::linalg::median(&mut all)).max(0.02);
             points.retain(|p| off(p) <= limit);
         }
         None
@@ -249,7 +249,7 @@ pub(crate) fn profile(picture: &Grey, at: [f64; 2], out: [f64; 2], reach: f64) -
 /// Reads the cells of a square.
 fn read(picture: &Grey, corners: [[f64; 2]; 4]) -> Option<Mark> {
     let side = CELLS as f64;
-    let plane = Plane::through([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]], corners)?;
+    let plane = Homography::through([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]], corners)?;
     let cell = |x: f64, y: f64| -> Option<f64> {
         let mut sum = 0.0;
         for dy in [-0.2, 0.0, 0.2] {
@@ -266,7 +266,7 @@ fn read(picture: &Grey, corners: [[f64; 2]; 4]) -> Option<Mark> {
     };
     let (mut frame, mut paper) = (ring(0, CELLS as i32 - 1)?, ring(-1, CELLS as i32)?);
     let (dark, bright) =
-        (crate::linear::median(&mut frame.clone()), crate::linear::median(&mut paper.clone()));
+        (crate::linalg::median(&mut frame.clone()), crate::linalg::median(&mut paper.clone()));
     let middle = 0.5 * (dark + bright);
     frame.retain(|&v| v >= middle);
     paper.retain(|&v| v <= middle);
@@ -298,8 +298,8 @@ mod tests {
     /// What a picture is made with: from cells of the sheet to the pixel, blur in pixels, noise, fall-off of light across it.
     struct Taken {
         /// The pixel of a place in cells; its inverse is not needed here, since the picture is made by searching the sheet.
-        plane: Plane,
-        back: Plane,
+        plane: Homography,
+        back: Homography,
         blur: f64,
         noise: f64,
         fall: f64,
@@ -327,8 +327,8 @@ mod tests {
         /// A picture of 900 x 700 pixels whose corners show these places.
         fn new(corners: [[f64; 2]; 4], blur: f64, noise: f64, fall: f64) -> Taken {
             let frame = [[0.0, 0.0], [900.0, 0.0], [900.0, 700.0], [0.0, 700.0]];
-            let back = Plane::through(frame, corners).unwrap();
-            let plane = Plane::through(corners, frame).unwrap();
+            let back = Homography::through(frame, corners).unwrap();
+            let plane = Homography::through(corners, frame).unwrap();
             Taken { plane, back, blur, noise, fall }
         }
 

@@ -5,7 +5,7 @@
 //! once (pool adjacent violators from both sides): lobes fall from the peak, and rise only as 1 / cos toward grazing. Cost: one
 //! system of some sixty unknowns for each of twenty lambdas.
 
-use crate::linear::Cholesky;
+use crate::linalg::Cholesky;
 
 /// The smoothed samples and their standard deviations. `weight` is 1 / variance, 0 for a missing sample.
 pub(crate) fn smooth(y: &[f64], weight: &[f64]) -> (Vec<f64>, Vec<f64>) {
@@ -17,7 +17,7 @@ pub(crate) fn smooth(y: &[f64], weight: &[f64]) -> (Vec<f64>, Vec<f64>) {
         return (z, weight.iter().map(|w| if *w > 0.0 { w.powf(-0.5) } else { 1.0 }).collect());
     }
     let mut largest: Vec<f64> = weight.iter().copied().filter(|w| *w > 0.0).collect();
-    let typical = crate::linear::median(&mut largest);
+    let typical = crate::linalg::median(&mut largest);
     let mut best: Option<(f64, Vec<f64>, Vec<f64>)> = None;
     for power in -6..14 {
         let lambda = typical * 10f64.powf(f64::from(power) / 2.0);

@@ -14,11 +14,11 @@ use observe::Observer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::align::{Match, Tones};
+use super::photo::{self, Exif, Photo, Values};
+use super::probe::{CLIPPED, Noise, Probe, white};
+use super::response::Response;
 use crate::MeasureError;
-use crate::align::{Match, Tones};
-use crate::photo::{self, Exif, Photo, Values};
-use crate::probe::{CLIPPED, Noise, Probe, white};
-use crate::response::Response;
 
 /// The largest shift that is aligned, in picture widths.
 const MOST_SHIFT: f64 = 0.02;
