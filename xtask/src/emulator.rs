@@ -94,7 +94,7 @@ pub fn run(root: &Path, program: &Path) -> Result<()> {
         Err(missing) => tools::skip(Need::Usb, &format!("{missing:#}")).map(|()| false)?,
     };
     // A test each for the board, the program and the printer: two at a time keep two cores at work.
-    let args = ["test", "--workspace", "--test", "emulator", "--locked", "--", "--test-threads=2"];
+    let args = ["test", "--workspace", "--test", "it", "--locked", "--", "--test-threads=2", "emulator::"];
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_IMAGE", &bench.image)

@@ -235,8 +235,8 @@ fn try_here(root: &Path) -> Result<()> {
     ensure!(version.starts_with("foilpress "), "`foilpress --version` said {version}");
     let page = said(command("man", &["foilpress-queue"]).env("MANWIDTH", "100").env("LC_ALL", "C.UTF-8"))?;
     ensure!(page.contains("SYNOPSIS"), "`man foilpress-queue` shows {page}");
-    let mut queues = cargo(&["test", "--workspace", "--test", "queue", "--locked", "--quiet"]);
-    succeed(queues.args(["--", "--ignored", "system::"]).current_dir(root))
+    let mut queues = cargo(&["test", "--workspace", "--test", "it", "--locked", "--quiet"]);
+    succeed(queues.args(["--", "--ignored", "queue::system::"]).current_dir(root))
 }
 
 fn said(command: &mut Command) -> Result<String> {

@@ -30,7 +30,7 @@ pub fn run(root: &Path) -> Result<()> {
     succeed(node.command("npm", &["exec", "--", "tsc", "--project", "."]).current_dir(&scripts))?;
     let lint = [ESLINT, "--config", "tests/browser/eslint.config.js", "--max-warnings", "0", "host", "tests"];
     succeed(node.command("node", &lint).current_dir(root))?;
-    let args = ["test", "--workspace", "--test", "browser", "--locked", "--", "--test-threads=1"];
+    let args = ["test", "--workspace", "--test", "it", "--locked", "--", "--test-threads=1", "browser::"];
     let mut test = cargo(&args);
     test.current_dir(root)
         .env("FOILPRESS_CHROMIUM", found()?)

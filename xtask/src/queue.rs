@@ -49,7 +49,7 @@ pub fn install() -> Result<()> {
 /// The tests of print queues alone.
 pub fn run() -> Result<()> {
     install()?;
-    let mut tests = cargo(&["test", "--workspace", "--test", "queue", "--locked"]);
+    let mut tests = cargo(&["test", "--workspace", "--test", "it", "--locked", "queue::"]);
     if !tests.status()?.success() {
         bail!("the tests of print queues failed");
     }
