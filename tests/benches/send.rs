@@ -3,8 +3,8 @@
 //! Run `cargo bench --bench send`. `read_the_job` is what any sender has to do before the first byte; the bridge here
 //! takes everything at once, so that only the host is timed.
 
-use device::send::session::{Outcome, Record, Session};
-use device::send::{check, streams};
+use device::forms::{check, streams};
+use device::transit::session::{Outcome, Record, Session};
 use divan::Bencher;
 use divan::counter::BytesCount;
 use foilpress_tests::planes::{ROWS, WIDTH, planes};

@@ -22,7 +22,7 @@ use protocol::link::frame::checksum;
 use protocol::link::message::{JobState, PastJob, Progress};
 use serde::{Deserialize, Serialize};
 
-use crate::send::journal::{Journal, JournalError};
+use crate::transit::journal::{Journal, JournalError};
 
 /// A fact is far smaller.
 const LARGEST: u64 = 4096;

@@ -23,11 +23,13 @@ use std::time::Duration;
 use super::call::{Call, Exit};
 use super::messages::Messages;
 use super::uri;
+use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed};
+use device::forms::{self, Checked};
 use device::printers::{Printer, Printers};
-use device::send::journal::{Entry, Journal, OpenJob};
-use device::send::session::{Outcome, Phase, SessionError};
-use device::send::{self, Address, Checked, Destination};
+use device::transit::journal::{Entry, Journal, OpenJob};
+use device::transit::raw::RawError;
+use device::transit::session::{Outcome, Phase, SessionError};
 use observe::Silent;
 use press::inspect::sheets;
 use press::process::Process;
@@ -89,7 +91,7 @@ impl<W: Write + Send> Backend<'_, W> {
         let checked: Vec<Checked> = (1..)
             .zip(&places)
             .map(|(number, place)| {
-                send::check(&job[place.clone()], &Silent).map_err(|error| {
+                forms::check(&job[place.clone()], &Silent).map_err(|error| {
                     self.fail(
                         Exit::Cancel,
                         &format!("sheet {number} of {}: {}", places.len(), observe::with_causes(&error)),
@@ -244,7 +246,7 @@ impl<W: Write + Send> Backend<'_, W> {
                 let what = if matches!(owed.printer, Printer::Device(_)) { SWITCH } else { RESET };
                 self.hold(folder, &text, what)
             }
-            Failure::Raw(send::raw::RawError::Write { .. }) => self.hold(folder, &text, SWITCH),
+            Failure::Raw(RawError::Write { .. }) => self.hold(folder, &text, SWITCH),
             Failure::NotAlps(_) => self.fail(
                 Exit::Stop,
                 &format!("not sent: {text}. Connect the right one, then start the queue again (cupsenable)"),

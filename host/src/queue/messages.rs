@@ -12,7 +12,7 @@ use protocol::ink::Ink;
 use protocol::link::message::Fault;
 use protocol::status::Complaint;
 
-use device::send::status::Status;
+use device::questions::status::Status;
 use observe::Observer;
 
 /// Why a printer does not print, or soon will not.
@@ -190,7 +190,7 @@ impl<W: Write> Messages<W> {
         if status.stale || status.cartridges.is_empty() {
             return;
         }
-        let each = |say: &dyn Fn(&device::send::status::CartridgeStatus) -> String| {
+        let each = |say: &dyn Fn(&device::questions::status::CartridgeStatus) -> String| {
             status.cartridges.iter().map(say).collect::<Vec<_>>().join(",")
         };
         // Of IPP's levels: -3 some is left, 0 none.

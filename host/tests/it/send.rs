@@ -4,7 +4,7 @@ use std::fs;
 use std::process::{Command, Output, Stdio};
 
 use device::printers::{Printer, Printers};
-use device::send::journal::{Journal, NewJob};
+use device::transit::journal::{Journal, NewJob};
 use observe::Silent;
 use press::job::stream::write_job;
 use press::separate::{Pass, Plane};

@@ -7,8 +7,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::{Delivery, Failure, Job, News, Question, ResetOwed};
 use crate::printers::Printer;
-use crate::send::Wish;
-use crate::send::raw::{self, RawError};
+use crate::transit::Wish;
+use crate::transit::raw::{self, RawError};
 
 impl Delivery<'_> {
     /// Sends a job to a device. False if the caller ended it early, so that the sheet comes out unfinished and the printer is ready

@@ -9,12 +9,13 @@ use serde_json::{Value, json};
 use crate::cli::commands::bridge::{Found, ask};
 use crate::cli::commands::resume::{as_json, line};
 use crate::cli::console::{chain, permission, show};
+use device::connection::find::{self, Candidate};
+use device::connection::{Address, OpenError};
 use device::flash::{drive, usb};
-use device::send::find::{self, Candidate};
-use device::send::journal::Journal;
-use device::send::query::is_alps;
-use device::send::session::Phase;
-use device::send::{Address, OpenError, words};
+use device::questions::query::is_alps;
+use device::transit::journal::Journal;
+use device::transit::session::Phase;
+use device::transit::words;
 use observe::with_causes;
 
 /// Arguments of `doctor`.

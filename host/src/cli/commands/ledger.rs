@@ -9,7 +9,7 @@ use protocol::ink::Ink;
 use crate::cli::console::show;
 use device::ledger::{self, Event, Ledger, Line, totals};
 use device::printers::Printers;
-use device::send::journal::Journal;
+use device::transit::journal::Journal;
 use press::job::cost::Price;
 use press::job::ribbon;
 use press::layout::Mm;

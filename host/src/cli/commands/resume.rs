@@ -11,10 +11,11 @@ use crate::cli::commands::bridge;
 use crate::cli::console::show;
 use crate::cli::console::terminal::agreed;
 use crate::cli::printing::deliver::{are_copies, go_on};
-use device::send::journal::{Entry, Journal, JournalError};
-use device::send::query::Query;
-use device::send::session::Phase;
-use device::send::{Address, words};
+use device::connection::Address;
+use device::questions::query::Query;
+use device::transit::journal::{Entry, Journal, JournalError};
+use device::transit::session::Phase;
+use device::transit::words;
 use observe::Observer;
 use serde_json::json;
 

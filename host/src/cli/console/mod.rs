@@ -13,10 +13,10 @@ use std::path::Path;
 use anyhow::{Context, Error, Result, bail};
 use clap::error::ErrorKind;
 
+use device::connection::OpenError;
 use device::deliver::Failure;
 use device::flash::FlashError;
-use device::send::OpenError;
-use device::send::query::QueryError;
+use device::questions::query::QueryError;
 use observe::{Observer, with_causes};
 use press::sheet::Sheet;
 use press::simulate;
@@ -88,10 +88,11 @@ mod tests {
     use device::flash::drive::DriveError;
     use device::flash::image::ImageError;
     use device::flash::picoboot::WriteError;
+    use device::forms::Unsendable;
     use device::printers::PrintersError;
-    use device::send::journal::JournalError;
-    use device::send::raw::RawError;
-    use device::send::{RunError, Unsendable};
+    use device::transit::RunError;
+    use device::transit::journal::JournalError;
+    use device::transit::raw::RawError;
     use inks::CurveError;
     use press::files::FileError;
     use press::inspect::StreamError;

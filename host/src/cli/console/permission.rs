@@ -2,10 +2,10 @@
 
 use std::io;
 
+use device::connection::OpenError;
+use device::connection::usb::UDEV_RULES;
 use device::deliver::Failure;
 use device::flash::FlashError;
-use device::send::OpenError;
-use device::send::usb::UDEV_RULES;
 
 /// Whether the operating system refused an access that a rule would allow.
 pub fn is_missing(error: &anyhow::Error) -> bool {

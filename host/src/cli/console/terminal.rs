@@ -11,10 +11,11 @@ use protocol::link::message::JobKind;
 
 use crate::cli::output;
 use device::deliver::{Caller, Cartridges, News, Question};
+use device::forms::PassPlace;
 use device::printers::Printer;
-use device::send::cartridges::Found;
-use device::send::journal::{Entry, PassPlace};
-use device::send::{Event, words};
+use device::questions::cartridges::Found;
+use device::transit::journal::Entry;
+use device::transit::{Event, words};
 use observe::Observer;
 
 /// The caller of a delivery that a person started.

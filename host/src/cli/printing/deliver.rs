@@ -11,12 +11,12 @@ use crate::cli::commands::bridge::shelf_text;
 use crate::cli::console::show;
 use crate::cli::console::terminal::{Terminal, cartridges_needed, cartridges_text, size_text};
 use crate::cli::output::{self, Staged};
+use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
 use device::printers::Printers;
-use device::send::finish::Sheet;
-use device::send::journal::{Journal, OpenJob};
-use device::send::session::Outcome;
-use device::send::{Address, Destination};
+use device::transit::finish::Sheet;
+use device::transit::journal::{Journal, OpenJob};
+use device::transit::session::Outcome;
 use observe::Observer;
 
 /// Where a job goes, how often, and whether it was asked for.
@@ -56,7 +56,7 @@ impl DeliverArgs {
             None | Some(Destination::File(_)) => return Ok(()),
             Some(to) => to,
         };
-        let checked = device::send::check(bytes, observer)?;
+        let checked = device::forms::check(bytes, observer)?;
         if let Destination::Bridge(address) = to {
             let cartridges = find_cartridges(address, &checked.inks, &Printers::of_system()?);
             show(&format!("{}\n", cartridges_text(&cartridges)))?;

@@ -12,9 +12,9 @@ use protocol::status;
 
 use crate::queue::messages::{Messages, Reason};
 use device::deliver::{Caller, Cartridges, Failure, News, Question};
-use device::send::cartridges::Found;
-use device::send::journal::PassPlace;
-use device::send::{Event, Wish, words};
+use device::forms::PassPlace;
+use device::questions::cartridges::Found;
+use device::transit::{Event, Wish, words};
 use observe::Observer;
 
 /// How long a cancelled job may take to come to its end; the print system kills after 30 s.

@@ -28,7 +28,7 @@
 
 use super::process::random_job;
 use device::printers::{Printer, Printers};
-use device::send::journal::{Journal, NewJob};
+use device::transit::journal::{Journal, NewJob};
 use foilpress_tests::served::{Bridge, Port};
 use observe::Silent;
 use press::inspect::{inspect, sheets};
@@ -254,8 +254,8 @@ impl Bench {
     /// Puts a job into the journal, as a `send` does that is interrupted right behind it.
     fn wait_on_disk(&self) -> u32 {
         let job = fs::read(self.path("job.rgl")).unwrap();
-        let checked = device::send::check(&job, &Silent).unwrap();
-        let streams = device::send::streams::of_job(&job, &Silent).unwrap();
+        let checked = device::forms::check(&job, &Silent).unwrap();
+        let streams = device::forms::streams::of_job(&job, &Silent).unwrap();
         let journal = Journal::at(&self.path("user-0/jobs")).unwrap();
         let queued = journal.queue(NewJob {
             name: "leaf",

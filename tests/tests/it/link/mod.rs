@@ -10,7 +10,7 @@ mod paper;
 mod process;
 mod wire;
 
-use device::send::session::{Outcome, Record, Session, SessionError};
+use device::transit::session::{Outcome, Record, Session, SessionError};
 use model::{ALL, Job, Mischief, NONE, is_a_whole_job, seeded};
 use protocol::link::message::JobKind;
 use rand::RngExt;

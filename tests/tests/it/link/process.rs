@@ -1,11 +1,13 @@
 //! Real processes, a real socket, a real journal: the sender is killed with SIGKILL again and again.
 
-use device::send::journal::{Journal, NewJob};
-use device::send::query::{Query, QueryError, Reply};
-use device::send::session::{Outcome, Phase, Session};
-use device::send::status::Status;
-use device::send::transport::{Transport, pair};
-use device::send::{self, Address, streams};
+use device::connection::Address;
+use device::connection::transport::{Transport, pair};
+use device::forms::{self, streams};
+use device::questions::query::{Query, QueryError, Reply};
+use device::questions::status::Status;
+use device::transit;
+use device::transit::journal::{Journal, NewJob};
+use device::transit::session::{Outcome, Phase, Session};
 use foilpress_tests::served::{Bridge, Port};
 use model::{Planes, is_a_whole_job, seeded};
 use observe::Silent;
@@ -37,7 +39,7 @@ fn resume(folder: &Path, cancel: bool) -> Outcome {
     if cancel {
         session.cancel();
     }
-    send::run(&mut session, &mut || address.open(), &mut |record| job.save(record), &mut |_| {}).unwrap()
+    transit::run(&mut session, &mut || address.open(), &mut |record| job.save(record), &mut |_| {}).unwrap()
 }
 
 /// The sending process; in an ordinary run of the tests there is nothing for it to do.
@@ -84,7 +86,7 @@ impl Bench {
 
     /// Puts the job into the journal.
     fn queue(self, kind: JobKind) -> Bench {
-        let checked = send::check(&self.job, &Silent).unwrap();
+        let checked = forms::check(&self.job, &Silent).unwrap();
         let streams = streams::of_job(&self.job, &Silent).unwrap();
         Journal::at(&self.jobs())
             .unwrap()

@@ -2,7 +2,7 @@
 //! virtual time.
 
 use bridge::engine::{Checkpoint, Engine, Identity, Outcome as Done, Task};
-use device::send::session::{Outcome, Record, Session, SessionError};
+use device::transit::session::{Outcome, Record, Session, SessionError};
 use model::{Board, Damages, Job, Mischief, chance, damage};
 use protocol::link::frame::{MAX, Reader};
 use protocol::link::message::{Answer, Fault, Lines};

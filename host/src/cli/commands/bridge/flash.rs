@@ -9,9 +9,9 @@ use clap::Args as ClapArgs;
 
 use crate::cli::console::show;
 use crate::cli::output;
+use device::connection::Address;
 use device::flash::image::Firmware;
 use device::flash::{self, FlashError, ThisComputer};
-use device::send::Address;
 use observe::Observer;
 
 /// Arguments of `bridge flash`.

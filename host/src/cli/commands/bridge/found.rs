@@ -7,15 +7,16 @@ use indicatif::HumanBytes;
 use protocol::link::message::{Fault, JobState, Lines, PastJob, Progress, Usage};
 use serde_json::json;
 
+use device::connection::Address;
+use device::connection::Bridge;
+use device::connection::find::{self, Candidate};
+use device::connection::transport::Transport;
 use device::deliver::ask::{self, Negotiate};
 use device::flash::image::Firmware;
 use device::printers::Printers;
-use device::send::find::{self, Candidate};
-use device::send::query::{Query, Reply, Shelf, is_alps};
-use device::send::session::Bridge;
-use device::send::status::Status;
-use device::send::transport::Transport;
-use device::send::{Address, words};
+use device::questions::query::{Query, Reply, Shelf, is_alps};
+use device::questions::status::Status;
+use device::transit::words;
 use observe::with_causes;
 
 /// How long to wait for a bridge to answer.

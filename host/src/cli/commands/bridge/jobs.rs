@@ -10,9 +10,9 @@ use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only, shelf_text};
 use crate::cli::console::show;
-use device::send::Address;
-use device::send::journal::fresh_number;
-use device::send::query::{Query, Shelf, Stored};
+use device::connection::Address;
+use device::questions::query::{Query, Shelf, Stored};
+use device::transit::journal::fresh_number;
 
 /// Arguments of `bridge jobs`.
 #[derive(ClapArgs, Debug)]

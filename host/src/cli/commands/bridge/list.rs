@@ -9,10 +9,10 @@ use serde_json::json;
 use super::found::{Found, ask, doing, newer_firmware};
 use crate::cli::console::chain;
 use crate::cli::console::permission;
+use device::connection::find::{self, Candidate};
 use device::flash::{drive, usb};
-use device::send::find::{self, Candidate};
-use device::send::query::is_alps;
-use device::send::words;
+use device::questions::query::is_alps;
+use device::transit::words;
 
 /// Arguments of `bridge list`.
 #[derive(ClapArgs, Debug)]

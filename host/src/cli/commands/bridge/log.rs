@@ -8,10 +8,10 @@ use clap::Args as ClapArgs;
 use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only};
+use device::connection::Address;
 use device::flash::image::Firmware;
-use device::send::Address;
-use device::send::log;
-use device::send::query::Query;
+use device::questions::log;
+use device::questions::query::Query;
 
 /// The ELF file of the firmware has a few megabytes.
 const LARGEST: u64 = 64 << 20;

@@ -13,10 +13,10 @@ use protocol::link::message::{Fault, JobState};
 use super::found::{PATIENCE, doing, named_or_only};
 use crate::cli::console::show;
 use crate::cli::console::terminal::agreed;
+use device::connection::Address;
 use device::deliver;
 use device::printers::Printers;
-use device::send::Address;
-use device::send::query::Query;
+use device::questions::query::Query;
 
 /// Arguments of `bridge reset`.
 #[derive(ClapArgs, Debug)]

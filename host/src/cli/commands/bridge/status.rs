@@ -7,8 +7,8 @@ use clap::Args as ClapArgs;
 
 use super::found::{Found, named_or_only};
 use super::watch;
+use device::connection::Address;
 use device::deliver::ask::Negotiate;
-use device::send::Address;
 
 /// Arguments of `bridge status`.
 #[derive(ClapArgs, Debug)]

@@ -11,9 +11,9 @@ use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only};
 use crate::cli::output::say_on_interrupt;
-use device::send::Address;
-use device::send::query::{Query, QueryError};
-use device::send::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
+use device::connection::Address;
+use device::questions::query::{Query, QueryError};
+use device::questions::wiring::{self, Levels, OUTPUTS, Plug, Seen, Verdict};
 
 /// Time between two checks whether the plug has been moved.
 const POLL: Duration = Duration::from_millis(300);

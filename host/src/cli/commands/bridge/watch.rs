@@ -10,11 +10,11 @@ use serde_json::json;
 
 use super::found::{Found, PATIENCE, PRINTER_PATIENCE};
 use crate::cli::console::chain;
+use device::connection::Address;
+use device::connection::transport::Transport;
 use device::deliver::ask::{self, Negotiate};
 use device::printers::Printers;
-use device::send::Address;
-use device::send::query::{Query, Reply};
-use device::send::transport::Transport;
+use device::questions::query::{Query, Reply};
 
 /// Time between two questions to the bridge.
 const POLL: Duration = Duration::from_secs(1);

@@ -4,10 +4,10 @@
 
 use protocol::ink::Ink;
 
-use super::journal::PassPlace;
 use observe::Observer;
 use press::inspect::{StreamError, inspect};
 use press::job::ribbon;
+use serde::{Deserialize, Serialize};
 
 /// Why a job is not sent. No byte has left.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +18,15 @@ pub enum Unsendable {
     /// More than positions on the link can say.
     #[error("not sent: {0} bytes are more than 2 GB")]
     TooLarge(u64),
+}
+
+/// A pass of a job, as much as is needed to speak of it.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct PassPlace {
+    /// Code of its ink in the printer's language.
+    pub ink: u8,
+    /// Offset of its first byte at the port.
+    pub offset: u64,
 }
 
 /// A job that may be sent.

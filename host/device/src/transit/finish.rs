@@ -10,10 +10,10 @@ use std::time::Duration;
 
 use protocol::link::message::{Ask, Fault};
 
-use super::address::OpenError;
-use super::query::{Query, QueryError, Reply};
-use super::status::Status;
-use super::transport::Transport;
+use crate::connection::OpenError;
+use crate::connection::transport::Transport;
+use crate::questions::query::{Query, QueryError, Reply};
+use crate::questions::status::Status;
 
 /// Between two questions: the vendor's monitor asks every four seconds.
 pub(crate) const EVERY: Duration = Duration::from_secs(4);

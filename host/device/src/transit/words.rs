@@ -3,8 +3,9 @@
 use protocol::ink::Ink;
 use protocol::link::message::{Defect, DefectKind, Fault, JobState, Progress};
 
-use super::journal::{Entry, PassPlace};
+use super::journal::Entry;
 use super::session::{Outcome, Phase};
+use crate::forms::PassPlace;
 
 /// What to do about a fault, with `ink` in the pass that was being printed.
 ///

@@ -53,7 +53,7 @@ impl Attached {
                 handle.read_string_descriptor(language, index, NAME_PATIENCE).ok()
             })
         };
-        let printable = |text: String| super::session::printable(&text);
+        let printable = |text: String| super::printable(&text);
         Attached {
             maker: told("manufacturer", |d| d.manufacturer_string_index()).map(printable),
             product: told("product", |d| d.product_string_index()).map(printable),

@@ -9,8 +9,8 @@ use protocol::link::message::{
     ToBridge, ToHost, Usage, VERSION,
 };
 
-use super::session::{Bridge, other_version, printable, stranger};
-use super::transport::Transport;
+use crate::connection::transport::Transport;
+use crate::connection::{Bridge, other_version, printable, stranger};
 
 /// A question is repeated after this long: frames may be lost.
 const REPEAT: Duration = Duration::from_millis(400);
@@ -509,7 +509,7 @@ mod tests {
 
     /// What a program says that greets a bridge which answers with these messages.
     fn greets(messages: &[&[u8]]) -> Result<u8, String> {
-        use crate::send::transport::pair;
+        use crate::connection::transport::pair;
         let (mut host, mut board) = pair();
         for message in messages {
             let sum = frame::checksum(message).to_le_bytes();

@@ -19,11 +19,11 @@ use protocol::link::frame::{self, MAX, Read, Reader};
 #[cfg(doc)]
 use protocol::link::message::NAME_MAX;
 use protocol::link::message::{
-    DATA_MAX, Fault, JobState, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION, hello_version,
+    DATA_MAX, Fault, JobState, PastJob, Progress, Refusal, SCHEMA, ToBridge, ToHost, VERSION,
 };
-use serde::Serialize;
 
 pub use super::record::{Outcome, Phase, Record};
+use crate::connection::{Bridge, other_version, printable, stranger};
 
 /// A question that is not answered is repeated after this long.
 const REPEAT: Duration = Duration::from_millis(300);
@@ -36,19 +36,6 @@ const DEAD: Duration = Duration::from_secs(5);
 const CONVINCED: u8 = 3;
 /// Bytes to give out at once; what comes back is looked at in between.
 const BURST: usize = 8 * MAX;
-
-/// Who is at the other end.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
-pub struct Bridge {
-    /// Version of its messages.
-    pub version: u8,
-    /// Differs after every restart.
-    pub boot: u32,
-    /// The board's own number.
-    pub serial: u64,
-    /// Version of the firmware.
-    pub firmware: String,
-}
 
 /// Why a job cannot go on over this link. The job itself stays as it is, to be resumed.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -92,21 +79,6 @@ pub enum SessionError {
     /// The bridge takes no job at all.
     #[error("the bridge has no memory for a job; flash the firmware that came with this program")]
     NoMemory,
-}
-
-/// What to do about a bridge of another version.
-pub(super) fn other_version(found: u8) -> &'static str {
-    if found < VERSION {
-        "`foilpress bridge flash` puts the firmware that came with this program on it"
-    } else {
-        "install the foilpress its firmware came with, or put this program's firmware on it with `foilpress bridge flash`"
-    }
-}
-
-/// The bridge that has sent a Hello of a version this program does not know.
-pub(super) fn stranger(message: &[u8]) -> Option<Bridge> {
-    let version = hello_version(message).filter(|&version| version != VERSION)?;
-    Some(Bridge { version, boot: 0, serial: 0, firmware: "of another release".into() })
 }
 
 /// One job's conversation.
@@ -548,9 +520,4 @@ fn push(message: &ToBridge<'_>, out: &mut Vec<u8>) {
     if let Ok(length) = frame::write(message, &mut buffer) {
         out.extend_from_slice(&buffer[..length]);
     }
-}
-
-/// Text from a cable, fit for a terminal.
-pub(super) fn printable(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).take(120).collect()
 }

@@ -1,7 +1,7 @@
 //! Byte pipes to a bridge: a serial port, a socket, memory.
 //!
 //! They promise nothing but order within one connection: bytes may be lost or damaged, and the pipe may end at any
-//! time. Everything else is the [session](super::session)'s business. Neither direction ever waits long, so that one
+//! time. Everything else is the [session](crate::transit::session)'s business. Neither direction ever waits long, so that one
 //! thread can serve both.
 
 use std::collections::VecDeque;

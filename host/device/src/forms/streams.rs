@@ -17,7 +17,7 @@ use protocol::rgl::{
 use protocol::runs::{self, Decoder, Header, MAX_BAND, MAX_HEADER, band_bytes, encode, stride};
 use rayon::prelude::*;
 
-use super::picture::Traces;
+use super::frame_search::Traces;
 use observe::Observer;
 
 /// The pass streams that stand for this job, or nothing if none do.
@@ -311,7 +311,7 @@ mod tests {
         let mut plain = job.clone();
         plain.splice(from..from + 8, data.iter().copied());
         plain[at + 3] = 0;
-        assert!(crate::send::check(&plain, &Silent).is_ok(), "legal all the same");
+        assert!(crate::forms::check(&plain, &Silent).is_ok(), "legal all the same");
         assert_eq!(of_job(&plain, &Silent), None);
         assert_eq!(of_job(b"text", &Silent), None);
         assert_eq!(of_job(b"", &Silent), None);
@@ -327,7 +327,7 @@ mod tests {
         put(writer.next_pass(&mut out).unwrap(), &out);
         put(writer.row(&[1, 2, 3], &mut out).unwrap(), &out);
         put(writer.end(&mut out).unwrap(), &out);
-        assert!(crate::send::check(&job, &Silent).is_ok());
+        assert!(crate::forms::check(&job, &Silent).is_ok());
         assert_eq!(of_job(&job, &Silent), None);
     }
 

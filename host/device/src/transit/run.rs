@@ -8,10 +8,9 @@ use std::time::{Duration, Instant};
 
 use protocol::link::message::{Fault, Progress};
 
-use super::address::{Address, OpenError};
-use super::find;
-use super::session::{Bridge, Outcome, Record, Session, SessionError};
-use super::transport::Transport;
+use super::session::{Outcome, Record, Session, SessionError};
+use crate::connection::transport::Transport;
+use crate::connection::{Address, Bridge, OpenError, find};
 use observe::with_causes;
 
 /// How long to wait for bytes when there is nothing to send.

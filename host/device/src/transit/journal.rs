@@ -6,7 +6,7 @@
 //! A lock on the folder keeps two processes from sending the same job. What a job may have left in the printer is no matter of
 //! one user's journal: see [`crate::printers`].
 //!
-//! Cost: two file syncs for each saved step; [`run`](super::run) saves at the steps that matter and once a second.
+//! Cost: two file syncs for each saved step; [`run`](super::run()) saves at the steps that matter and once a second.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
@@ -18,27 +18,19 @@ use protocol::link::message::{ALONE, JobKind};
 use serde::{Deserialize, Serialize};
 
 use super::record::{Phase, Record};
+use crate::forms::PassPlace;
 
 /// Ended jobs whose records are kept.
 const KEPT: usize = 20;
 /// A record is far smaller.
 const LARGEST_RECORD: u64 = 1 << 20;
 
-/// A pass of a job, as much as is needed to speak of it.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub struct PassPlace {
-    /// Code of its ink in the printer's language.
-    pub ink: u8,
-    /// Offset of its first byte at the port.
-    pub offset: u64,
-}
-
 /// What the journal knows of a job.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Entry {
     /// What people call it.
     pub name: String,
-    /// Where it goes, as an [`Address`](super::Address) is written.
+    /// Where it goes, as an [`Address`](crate::connection::Address) is written.
     pub to: String,
     /// When it was queued, in seconds since 1970.
     pub queued: u64,
@@ -335,7 +327,7 @@ fn sync_folder(folder: &Path) -> Result<(), JournalError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::send::session::Outcome;
+    use crate::transit::session::Outcome;
 
     fn job(data: &[u8]) -> NewJob<'_> {
         NewJob {

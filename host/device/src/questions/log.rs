@@ -10,7 +10,7 @@ use defmt_decoder::{DecodeError, Table};
 use serde::Serialize;
 
 use super::query::{Query, QueryError};
-use super::session::printable;
+use crate::connection::printable;
 
 /// The most of a log that is read: a bridge keeps far less, and one that sends without end is not one.
 const MOST: usize = 1 << 20;
