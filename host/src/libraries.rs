@@ -6,9 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use files::scratch::{self, Scratch};
 use inks::archive::{self, Member};
 use inks::{FILE_NAME, Library};
-use press::scratch::{self, Scratch};
 
 use crate::folders;
 

@@ -2,9 +2,9 @@
 
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
+use halftone::{Method, Settings, halftone};
 use inks::Stack;
 use observe::Silent;
-use press::halftone::{Method, Settings, halftone};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use std::sync::OnceLock;

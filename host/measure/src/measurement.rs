@@ -8,8 +8,8 @@ use std::path::Path;
 use image::RgbImage;
 use inks::Stack;
 use observe::Observer;
-use press::sheet::DotMap;
 use serde::{Deserialize, Serialize};
+use sheet::DotMap;
 
 use crate::MeasureError;
 use crate::camera::merge::{self, Exposure, Frames, Shot};

@@ -27,9 +27,9 @@ use crate::job::plan::{Plan, Subject};
 use crate::job::stream::{self, StreamError};
 use crate::layout::{self, Arranged, Laid, Layout, LayoutError};
 use crate::separate::{self, Check, Pass, SeparateError, Separation};
-use crate::sheet::{DotMap, Sheet};
 use crate::simulate::{self, Difference, Printout, PrintoutError, SimulateError};
 use observe::Observer;
+use sheet::{DotMap, Sheet};
 
 /// What is to be printed, and how.
 #[derive(Clone, Copy, Debug)]

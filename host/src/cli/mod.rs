@@ -50,7 +50,7 @@ pub fn main() -> ExitCode {
     // The renderer of drawings may fail on hostile ones; the reader of art tells that as an error.
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        if std::thread::current().name() != Some(press::layers::DRAWING) {
+        if std::thread::current().name() != Some(art::DRAWING) {
             usual(panic);
         }
     }));

@@ -9,10 +9,10 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use ::files::scratch::{self, Scratch};
 use anyhow::{Context, Result, bail};
 use appearance::edit;
-use press::process;
-use press::scratch::{self, Scratch};
+use art::process;
 use press::separate::files;
 use protocol::ink::Ink;
 
@@ -409,7 +409,7 @@ mod tests {
     fn pictures_of_passes_do_not_take_the_place_of_art() {
         let folder = tempfile::tempdir().unwrap();
         let target = folder.path().join("art");
-        let plane = press::separate::Plane { width: 8, length: 8, stride: 1, bits: vec![0; 8] };
+        let plane = sheet::Plane { width: 8, length: 8, stride: 1, bits: vec![0; 8] };
         for _ in 0..2 {
             let staged = Staged::folder(&target, Kind::Pictures).unwrap();
             files::save_plane(&plane, (600, 600), &staged.create().unwrap().join("01-white.png")).unwrap();

@@ -23,6 +23,7 @@ use std::time::Duration;
 use super::call::{Call, Exit};
 use super::messages::Messages;
 use super::uri;
+use art::process::Process;
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed};
 use device::forms::{self, Checked};
@@ -32,7 +33,6 @@ use device::transit::raw::RawError;
 use device::transit::session::{Outcome, Phase, SessionError};
 use observe::Silent;
 use press::inspect::sheets;
-use press::process::Process;
 use system::System;
 
 /// The most bytes of a job: dozens of pages.
@@ -372,10 +372,11 @@ mod tests {
     use super::*;
     use press::inspect::inspect;
     use press::job::stream::write_job;
-    use press::separate::{Pass, Plane};
+    use press::separate::Pass;
     use protocol::ink::Ink;
     use protocol::paper::Paper;
     use protocol::rgl::Page;
+    use sheet::Plane;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     fn job(ink: Ink, rows: usize) -> Vec<u8> {

@@ -27,13 +27,13 @@ use tempfile::NamedTempFile;
 
 use super::options::{Choices, NoChoice, Spots};
 use super::raster::{self, RasterError};
+use art::pdf::{Interpreter, Survey};
+use art::process::MOST_PAGES;
+use art::{LayersError, Page};
 use drawing::Drawing;
 use observe::Observer;
 use page::Press;
-use press::layers::pdf::{Interpreter, Survey};
-use press::layers::{self, LayersError, Page};
 use press::pipeline::JobError;
-use press::process::MOST_PAGES;
 
 /// The largest document.
 const LARGEST: u64 = 1 << 30;
@@ -217,25 +217,25 @@ fn pictures(document: impl Read, press: &mut Press<'_>) -> Result<(), FilterErro
 /// The pages of a PDF or PostScript file.
 fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
     let dpi = press.choices.dpi;
-    if let Some(doubt) = layers::pdf::cut_short(path) {
+    if let Some(doubt) = art::pdf::cut_short(path) {
         press.observer.note(&doubt);
     }
     let suspected = Suspected::of(path)?;
     let whole = |interpreter| Survey { spots: Vec::new(), interpreter };
     let Survey { spots, interpreter } = match press.choices.spots {
-        Spots::None if suspected.gradients => whole(layers::pdf::interpreter(path)),
+        Spots::None if suspected.gradients => whole(art::pdf::interpreter(path)),
         Spots::None => whole(Interpreter::Usual),
         _ if suspected.spots => {
-            layers::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
+            art::pdf::survey(path, press.observer).map_err(|error| match of_document(error) {
                 error @ LayersError::UnknownInk { .. } => FilterError::Spot(error),
                 error => FilterError::Plates(error),
             })?
         }
-        _ if suspected.gradients => whole(layers::pdf::interpreter(path)),
+        _ if suspected.gradients => whole(art::pdf::interpreter(path)),
         _ => whole(Interpreter::Usual),
     };
     if interpreter == Interpreter::Older {
-        press.observer.note(layers::pdf::OLDER);
+        press.observer.note(art::pdf::OLDER);
     }
     if spots.iter().all(Vec::is_empty) {
         return drawn((path, interpreter), None, press);
@@ -247,7 +247,7 @@ fn pages(path: &Path, press: &mut Press<'_>) -> Result<(), FilterError> {
         }
         press.observer.note(&format!("page {number}: {} printed as inks", plates.join(", ")));
         let in_page = |error| FilterError::Layers { page: number, source: of_document(error) };
-        let page = layers::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
+        let page = art::pdf::separated(path, interpreter, number, dpi.into()).map_err(in_page)?;
         let paper = page::paper(number, page.size, dpi, press.choices)?;
         if let Some(view) = press.view(number, paper, (page.size, dpi), page.bounds(), false) {
             let art =
@@ -295,9 +295,9 @@ fn drawn(
     let said = drawing.end()?;
     if number == first {
         let page = only.and_then(|page| u32::try_from(page).ok());
-        return Err(FilterError::NoPage(layers::pdf::no_page(&said, page)));
+        return Err(FilterError::NoPage(art::pdf::no_page(&said, page)));
     }
-    if let Some(damage) = layers::pdf::damaged(&said) {
+    if let Some(damage) = art::pdf::damaged(&said) {
         press.observer.note(&damage);
     }
     Ok(())
@@ -326,7 +326,7 @@ fn picture(
 struct Suspected {
     /// Spot colours; also if it is a program.
     spots: bool,
-    /// Gradients that not every interpreter draws ([`layers::pdf::interpreter`]).
+    /// Gradients that not every interpreter draws ([`art::pdf::interpreter`]).
     gradients: bool,
 }
 

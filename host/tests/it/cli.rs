@@ -4,7 +4,7 @@ use std::fs;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use press::sheet::Sheet;
+use sheet::Sheet;
 use testing::program::{Bench, entries, small_document};
 
 #[test]

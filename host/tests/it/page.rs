@@ -3,9 +3,9 @@
 use std::fs;
 
 use observe::Silent;
-use press::sheet::Sheet;
 use press::simulate;
 use serde_json::Value;
+use sheet::Sheet;
 
 use testing::program::{Bench, small_document, text};
 

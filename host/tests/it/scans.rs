@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use image::{GrayImage, Luma};
-use press::sheet::Sheet;
+use sheet::Sheet;
 use testing::program::{Bench, text};
 
 /// The sheet of A4 at 200 dpi with black around it: paper, ink at its dots, `moved` by so many pixels.

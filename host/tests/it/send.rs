@@ -7,11 +7,12 @@ use device::printers::{Printer, Printers};
 use device::transit::journal::{Journal, NewJob};
 use observe::Silent;
 use press::job::stream::write_job;
-use press::separate::{Pass, Plane};
+use press::separate::Pass;
 use protocol::ink::Ink;
 use protocol::link::message::JobKind;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
+use sheet::Plane;
 use tempfile::TempDir;
 
 /// A folder with a small job, and a journal of its own.

@@ -15,8 +15,8 @@
 
 use std::f64::consts::TAU;
 
+use halftone::eye::{degree, sensitivity};
 use observe::Observer;
-use press::halftone::eye::{degree, sensitivity};
 use press::preview::{LONGEST_SIDE, Radiance};
 use rayon::prelude::*;
 use rustfft::FftPlanner;

@@ -348,7 +348,7 @@ mod tests {
     /// Dots of three stacks, a flat grey each, without order, and what is lit with maps of `places`.
     fn print(side: usize, places: usize) -> (Vec<u8>, Lit) {
         use appearance::brdf::{Space, Table};
-        use press::sheet::{Area, DotMap};
+        use sheet::{Area, DotMap};
         let space = Space::half_angle(16);
         let mut stacks = Table::new(space.columns());
         [0.2, 0.05, 0.01].iter().for_each(|grey| stacks.push(&vec![*grey; space.columns()]));

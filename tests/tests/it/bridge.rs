@@ -3,12 +3,11 @@
 use appearance::gamut::InkMix;
 use appearance::weights::{WeightMaps, quantise};
 use bridge::engine::{Engine, Identity, Memory};
+use halftone::{Settings, halftone};
 use inks::Stack;
 use observe::Silent;
-use press::halftone::{Settings, halftone};
 use press::job::stream::write_job;
 use press::separate::{Pass, separate};
-use press::sheet::Sheet;
 use press::simulate::{Carousel, Cartridge, Lever, Printer, Setup, Stock, difference, print};
 use protocol::ink::Ink;
 use protocol::link::frame::{self, MAX, Reader};
@@ -17,6 +16,7 @@ use protocol::paper::Paper;
 use protocol::rgl::Page;
 use protocol::runs::{Decoder, Header, MAX_BAND, MAX_HEADER, encode};
 use protocol::walk::Placed;
+use sheet::Sheet;
 
 const PAPER: Paper = Paper::Custom { width: 900, length: 610 };
 const INKS: [Ink; 3] = [Ink::MetallicSilver, Ink::Cyan, Ink::Finish];

@@ -9,12 +9,13 @@ use appearance::{factor, sample};
 use inks::{InkSet, Library, Stack};
 use observe::Silent;
 use press::job::Handling;
-use press::layout::{Layout, Size};
+use press::layout::Layout;
 use press::pipeline::document::{Halftoned, Settings, halftoned};
 use press::pipeline::{self, Job, Request};
-use press::sheet::Sheet;
 use protocol::paper::Paper;
 use protocol::rgl::Media;
+use sheet::Sheet;
+use sheet::Size;
 
 /// A document, its job, and the sheet that the simulated printer made of it.
 struct Print {

@@ -5,7 +5,7 @@ use embedded_graphics::mono_font::ascii::FONT_10X20;
 use embedded_graphics::pixelcolor::BinaryColor;
 use embedded_graphics::prelude::*;
 use embedded_graphics::text::Text;
-use press::halftone::Method;
+use halftone::Method;
 use protocol::packbits;
 use protocol::paper::Paper;
 use protocol::runs::{MAX_BAND, encode, stride};

@@ -217,10 +217,11 @@ mod tests {
     use super::*;
     use observe::Silent;
     use press::job::stream::write_job;
-    use press::separate::{Pass, Plane};
+    use press::separate::Pass;
     use proptest::prelude::*;
     use protocol::paper::Paper;
     use protocol::rgl::{JobSetup, Media};
+    use sheet::Plane;
 
     fn pass(ink: Ink, page: &Page, dots: &[(u16, u16)]) -> Pass {
         let (width, length) = (usize::from(page.width()), usize::from(page.length()));

@@ -16,11 +16,11 @@ mod setup;
 
 use std::path::{Path, PathBuf};
 
+use ::sheet::{Area, DotMap};
 use appearance::brdf::Space;
 use appearance::factor::Factored;
 use inks::Library;
 use observe::Observer;
-use press::sheet::{Area, DotMap};
 use serde::Serialize;
 
 pub use figures::{Errors, Factor};

@@ -15,7 +15,7 @@ use image::codecs::jpeg::JpegEncoder;
 use inks::{Curve, Stack};
 use observe::Observer;
 use press::preview::{Radiance, Source, ToneCurve, picture as picture_of};
-use press::sheet::Area;
+use sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
 use super::figures::{self, Cover, Lighting, Scale, Spots, Steps};

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use inks::Stack;
-use press::sheet::{Area, DOTS_PER_MM, DotMap};
+use sheet::{Area, DOTS_PER_MM, DotMap};
 
 use crate::MeasureError;
 use crate::camera::merge::Radiance;

@@ -9,7 +9,7 @@ use std::path::Path;
 use appearance::brdf::{Space, reflectances};
 use inks::Library;
 use press::layout::camera::{Name, SIDE};
-use press::sheet::{Area, DOTS_PER_MM, DotMap};
+use sheet::{Area, DOTS_PER_MM, DotMap};
 
 use super::marks::{self, Grey, Mark};
 use crate::MeasureError;

@@ -5,7 +5,7 @@
 //! places whose distance is at most `g` (a dilation by a disc, an erosion where `g` is negative). A histogram of
 //! distances answers for all `g` at once. Cost: 25 places a dot near edges, one elsewhere. Limits: two dots in either direction (85 um).
 
-use press::sheet::DotMap;
+use sheet::DotMap;
 
 use super::scan::Window;
 
@@ -120,8 +120,8 @@ impl Edges {
 mod tests {
     use super::*;
     use inks::Stack;
-    use press::sheet::Area;
     use protocol::ink::Ink;
+    use sheet::Area;
 
     /// Squares of `side` dots every `pitch`.
     fn squares(side: usize, pitch: usize) -> DotMap {

@@ -14,10 +14,10 @@ use inks::{Library, Stack};
 use observe::Observer;
 use press::chart::ramp::{self, MOST};
 use press::layout::camera::{QUIET, SIDE};
-use press::sheet::{Area, DOTS_PER_MM, DotMap};
 use protocol::ink::Ink;
 use rayon::prelude::*;
 use serde::Serialize;
+use sheet::{Area, DOTS_PER_MM, DotMap};
 
 use super::edges::{Edges, FAR};
 use super::scan::{Between, Scan, Window};

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use inks::Library;
 use observe::Observer;
 use press::layout::Profile;
-use press::sheet::{DOTS_PER_MM, Sheet};
 use protocol::paper::LEFT;
 use serde::Serialize;
+use sheet::{DOTS_PER_MM, Sheet};
 
 use super::resolution;
 use super::scan::Scan;

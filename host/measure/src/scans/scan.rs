@@ -9,7 +9,7 @@
 
 use std::path::Path;
 
-use press::sheet::{Area, DOTS_PER_MM};
+use sheet::{Area, DOTS_PER_MM};
 
 use crate::MeasureError;
 use crate::compare::picture::Picture;

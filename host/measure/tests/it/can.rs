@@ -18,8 +18,8 @@ use measure::measure;
 use measure::setup::Setup;
 use observe::Silent;
 use press::layout::{Layout, arrange};
-use press::sheet::DotMap;
 use protocol::paper::Paper;
+use sheet::DotMap;
 use std::f64::consts::PI;
 
 const CAMERA: Camera =

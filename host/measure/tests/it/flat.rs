@@ -10,7 +10,7 @@ use measure::curves::reduce::Kind;
 use measure::measure;
 use measure::setup::Setup;
 use observe::Silent;
-use press::sheet::DotMap;
+use sheet::DotMap;
 
 const CAMERA: Camera = Camera { size: (900, 380), field_deg: 11.4, times: &[0.25, 0.03, 0.004], rays: 2 };
 const TILT_DEG: f64 = 40.0;

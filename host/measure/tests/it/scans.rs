@@ -7,16 +7,16 @@
 use std::fs;
 use std::path::PathBuf;
 
+use halftone::Method;
 use inks::{Library, Stack};
 use measure::scans::{ramp, registration};
 use observe::Silent;
 use press::chart;
-use press::halftone::Method;
 use press::layout::{Layout, arrange};
-use press::sheet::{DotMap, Sheet};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use rayon::prelude::*;
+use sheet::{DotMap, Sheet};
 
 const DOTS_PER_MM: f64 = 600.0 / 25.4;
 

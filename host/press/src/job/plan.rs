@@ -16,8 +16,8 @@ use super::ribbon::{self, Use};
 use super::thin::thin;
 use crate::layout::{Cut, Laid, Mm, paper};
 use crate::separate::{Check, MOST_CARTRIDGES, Pass as Dots, Planned, Separation};
-use crate::sheet::colours::colours;
-use crate::sheet::{Area, Sheet};
+use sheet::colours::colours;
+use sheet::{Area, Sheet};
 
 /// Lines of foil thinner than this many dots (0.17 mm) may not stick: foil fails on screens finer than about 100 an inch,
 /// whose smaller dots are of this size.

@@ -160,10 +160,10 @@ pub fn write_job(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::separate::Plane;
     use observe::Silent;
     use protocol::paper::Paper;
     use protocol::rgl::{Command, Resolution, Step, parse};
+    use sheet::Plane;
 
     const PAPER: Paper = Paper::Custom { width: 40, length: 30 };
 

@@ -13,8 +13,8 @@ use super::camera::{self, Name, QUIET, SIDE};
 use super::length::Mm;
 use super::rect::Rect;
 use super::settings::{Layout, LayoutError};
-use crate::sheet::DotMap;
-use crate::sheet::order::passes_of;
+use sheet::DotMap;
+use sheet::order::passes_of;
 
 /// From the block to a mark, in millimetres.
 const AWAY: f64 = 1.5;

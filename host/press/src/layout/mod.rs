@@ -25,14 +25,14 @@ pub use length::{Mm, NoLength, Point};
 pub use profile::Profile;
 pub use rect::Cut;
 pub use settings::{Layout, LayoutError, MOST_REPEATS, Position, Repeat};
-pub use size::{Size, SizeError};
+pub use size::SizeError;
 
-use crate::sheet::{self, Area, DotMap, Sheet, order};
 use block::Block;
 use observe::Observer;
 use page::Page;
 use rect::Rect;
 use serde::{Deserialize, Serialize};
+use sheet::{Area, DotMap, Sheet, order};
 
 /// A page, and where things are on it.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,8 +6,8 @@ use super::block::Block;
 use super::marks::Mark;
 use super::rect::Rect;
 use super::settings::Layout;
-use crate::sheet::{Area, DotMap};
 use observe::Observer;
+use sheet::{Area, DotMap};
 
 /// The ideal page.
 pub(super) struct Page<'a> {

@@ -7,17 +7,18 @@ use std::borrow::Cow;
 
 use inks::{InkSet, Library};
 
-use crate::halftone::{self, HalftoneError, halftone};
-use crate::layout::{self, Layout, LayoutError, Size, SizeError, size};
+use crate::layout::{self, Layout, LayoutError, SizeError, size};
 use crate::preview::{EYE, spot_mm};
-use crate::sheet::{DOTS_PER_MM, DotMap};
 use appearance::document::{Document, Materials};
 use appearance::factor::{self, FactorError, Factored};
 use appearance::gamut::{self, Doubt, Gain, GamutError, Mapped, Printable};
 use appearance::materials::{Reduced, resolution};
 use appearance::weights::WeightError;
+use halftone::{HalftoneError, halftone};
 use observe::Observer;
 use protocol::ink::Ink;
+use sheet::Size;
+use sheet::{DOTS_PER_MM, DotMap};
 
 /// What the user may choose.
 #[derive(Clone, Debug)]

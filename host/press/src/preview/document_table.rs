@@ -25,12 +25,12 @@ use rayon::prelude::*;
 use super::light_table::{errors_of_balls, probes, twelve};
 use super::probe::Probe;
 use super::{EYE, Source, fidelity};
-use crate::halftone::{self, halftone};
 use crate::job::Handling;
 use crate::layout::{Layout, size};
 use crate::pipeline::document::StageError;
 use crate::pipeline::{Request, draft};
-use crate::sheet::Area;
+use halftone::halftone;
+use sheet::Area;
 
 /// Side of the windows in which contrast is kept or lost.
 const WINDOW: usize = 16;

@@ -11,10 +11,10 @@
 
 use rayon::prelude::*;
 
-use crate::sheet::DOTS_PER_MM;
 use appearance::brdf::Space;
 use appearance::wide::wide;
 use observe::Observer;
+use sheet::DOTS_PER_MM;
 
 use super::error::PreviewError;
 use super::source::{Lines, Scratch, Source};
@@ -201,13 +201,13 @@ fn blurred(lines: &Lines, first: usize, count: usize) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sheet::{Area, Sheet};
     use appearance::brdf::Table;
     use appearance::document::Materials;
     use inks::Stack;
     use observe::Silent;
     use proptest::prelude::*;
     use protocol::paper::Paper;
+    use sheet::{Area, Sheet};
 
     /// A document with one row everywhere.
     struct Uniform(Space, Vec<f64>);

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use crate::sheet::{DOTS_PER_MM, DotMap};
+use sheet::{DOTS_PER_MM, DotMap};
 
 /// Side of a window in dots.
 const WINDOW: usize = 256;

@@ -15,7 +15,7 @@ use protocol::paper::Paper;
 use rayon::prelude::*;
 
 use crate::separate::Pass;
-use crate::sheet::{Sheet, SheetError};
+use sheet::{Sheet, SheetError};
 
 /// Why a printout cannot become a [`Sheet`].
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

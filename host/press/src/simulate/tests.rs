@@ -8,10 +8,11 @@ use protocol::rgl::{Command, Compression, Fault, Media, Mode, Page, PaperCode, R
 
 use super::*;
 use crate::job::stream::write_job;
-use crate::separate::{Pass, Plane};
-use crate::sheet::Sheet;
+use crate::separate::Pass;
 use inks::Stack;
 use observe::Silent;
+use sheet::Plane;
+use sheet::Sheet;
 
 const SMALL: Paper = Paper::Custom { width: 100, length: 80 };
 

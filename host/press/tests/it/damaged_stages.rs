@@ -5,13 +5,13 @@ use protocol::paper::Paper;
 
 use appearance::gamut::{self, InkMix};
 use appearance::weights::{ONE, WeightMaps};
+use halftone::halftone;
 use observe::Silent;
-use press::halftone::{self, halftone};
 use press::layout::{self, Arranged, Layout};
 use press::separate;
-use press::sheet::{DotMap, Sheet};
 use proptest::prelude::*;
 use proptest::sample::Index;
+use sheet::{DotMap, Sheet};
 use testing::damage::{damages, survives};
 
 /// A mix, its dots, their page and the page's passes.

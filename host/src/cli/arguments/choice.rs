@@ -7,9 +7,9 @@ use std::str::FromStr;
 use appearance::document::ColourSpace;
 use appearance::factor::Method;
 use appearance::gamut::{self, Intent};
+use art::{Accept, Finish, White};
 use clap::builder::{OsStringValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 use inks::Trust;
-use press::layers::{Accept, Finish, White};
 
 /// An enum whose values have names on the command line.
 pub trait Choice: Copy + Send + Sync + 'static {
@@ -134,29 +134,29 @@ impl Choice for Intent {
     ];
 }
 
-impl Choice for press::halftone::Method {
-    const ALL: &'static [(press::halftone::Method, &'static str, &'static str)] = &[
-        (press::halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
-        (press::halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
-        (press::halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
-        (press::halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
+impl Choice for halftone::Method {
+    const ALL: &'static [(halftone::Method, &'static str, &'static str)] = &[
+        (halftone::Method::Walk, "walk", "Runs along a space-filling curve: the paper's rule"),
+        (halftone::Method::Cells, "cells", "Compact clusters, no part thinner than its ink holds"),
+        (halftone::Method::Best, "best", "Cells, rearranged to lessen the error the eye sees; slower"),
+        (halftone::Method::Blue, "blue", "Single scattered dots (blue noise); for process inks alone"),
     ];
 }
 
-impl Choice for press::layers::Intent {
-    const ALL: &'static [(press::layers::Intent, &'static str, &'static str)] = &[
+impl Choice for art::Intent {
+    const ALL: &'static [(art::Intent, &'static str, &'static str)] = &[
         (
-            press::layers::Intent::Auto,
+            art::Intent::Auto,
             "auto",
             "Perceptual for pictures, colorimetric for text and drawings; tints of cyan, magenta, yellow, red, green and blue keep those inks there",
         ),
         (
-            press::layers::Intent::Perceptual,
+            art::Intent::Perceptual,
             "perceptual",
             "Saturated colours move closer together, and differences between them survive",
         ),
         (
-            press::layers::Intent::Colorimetric,
+            art::Intent::Colorimetric,
             "colorimetric",
             "Printable colours are kept; others become the nearest printable colour of their hue",
         ),

@@ -10,8 +10,9 @@ use appearance::document::Document;
 use appearance::factor::{self, Factored};
 use appearance::gamut::{self, Gain, Intent};
 use observe::Observer;
-use press::layout::{Layout, Size};
+use press::layout::Layout;
 use press::pipeline::document::{self, Halftoned, Settings};
+use sheet::Size;
 
 /// Bases of a document whose print needs none, so that the picture of it is close.
 const BASES: usize = 12;

@@ -13,7 +13,6 @@ use inks::{InkSet, InkSetError, Library, Trust};
 use appearance::document::{self, ColourSpace, Document};
 use appearance::factor::{self, Method};
 use appearance::gamut::{self, Intent};
-use press::{halftone, layers};
 
 use crate::cli::arguments::choice::{Metric, choice, name, utf8, whole};
 use crate::cli::console::usage;
@@ -48,7 +47,7 @@ impl DocumentArgs {
         };
         let mut document = match document::open(&self.document, &options, observer) {
             Ok(document) => document,
-            Err(error) if layers::is_art(Path::new(&self.document)) => {
+            Err(error) if art::is_art(Path::new(&self.document)) => {
                 return Err(anyhow::Error::new(error).context(format!(
                     "{0} is artwork, not a document of materials: `foilpress layers {0}` prints it, `foilpress plan layers {0}` plans it",
                     self.document

@@ -10,12 +10,12 @@ use crate::cli::arguments::layout::MediaArgs;
 use crate::cli::arguments::{HalftoneArg, InkArgs};
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::{Artwork, JobArgs, ResultArgs};
+use art::names::typed;
 use observe::Observer;
 use press::chart;
-use press::layers::names::typed;
 use press::layout::{Layout, paper};
 use press::separate::MOST_CARTRIDGES;
-use press::sheet::DotMap;
+use sheet::DotMap;
 
 /// Arguments of `chart`.
 #[derive(ClapArgs, Debug)]

@@ -18,8 +18,8 @@ use measure::compare::{
 };
 use observe::Observer;
 use press::layout::{Layout, arrange};
-use press::sheet::{Area, DotMap};
 use press::simulate;
+use sheet::{Area, DotMap};
 use view::mapped;
 
 /// Arguments of `compare`.

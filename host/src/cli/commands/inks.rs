@@ -25,7 +25,7 @@ use crate::cli::output::Staged;
 use crate::libraries;
 use appearance::brdf::plot;
 use observe::Observer;
-use press::sheet::dots_in_words;
+use sheet::dots_in_words;
 
 /// The library of inks and stacks.
 #[derive(clap::Args, Debug)]

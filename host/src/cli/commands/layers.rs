@@ -18,15 +18,15 @@ use crate::cli::console::usage;
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::plan_output::PlanOutputArgs;
 use crate::cli::printing::{Artwork, ResultArgs};
+use art::{
+    Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, RESOLUTIONS, Room, White, names,
+};
 use observe::Observer;
 use press::job::plan::{Suggestion, grouped};
-use press::layers::{
-    self, Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, RESOLUTIONS, Room, White,
-    names,
-};
-use press::layout::{self, Layout, Mm, NoLength, Size};
+use press::layout::{self, Layout, Mm, NoLength};
 use press::pipeline;
-use press::sheet::DOTS_PER_MM;
+use sheet::DOTS_PER_MM;
+use sheet::Size;
 
 /// What to read and how it becomes layers of ink.
 #[derive(ClapArgs, Debug)]
@@ -182,9 +182,9 @@ impl LayersArgs {
     }
 
     /// How the art is read.
-    pub fn options(&self, size: Option<Size>, layout: &Layout) -> Result<layers::Options> {
+    pub fn options(&self, size: Option<Size>, layout: &Layout) -> Result<art::Options> {
         let (width, length) = layout.largest();
-        Ok(layers::Options {
+        Ok(art::Options {
             size,
             dpi: self.dpi,
             reserved: self.reserved || self.white == Some(White::Reserved),
@@ -202,13 +202,13 @@ impl LayersArgs {
     }
 
     /// How layers become stacks.
-    pub fn settings(&self) -> Result<layers::Settings> {
-        Ok(layers::Settings {
+    pub fn settings(&self) -> Result<art::Settings> {
+        Ok(art::Settings {
             inks: self.inks()?,
             order: self.order.clone().unwrap_or_default(),
             passes: self.passes.clone(),
             knockout: match self.knockout.as_deref() {
-                None => layers::Settings::default().knockout,
+                None => art::Settings::default().knockout,
                 Some("none") => InkSet::EMPTY,
                 Some(text) => set("--knockout", text)?,
             },
@@ -225,9 +225,9 @@ impl LayersArgs {
     /// Notes on options that have no effect on this art.
     fn idle(
         &self,
-        art: &layers::Artwork,
-        options: &layers::Options,
-        settings: &layers::Settings,
+        art: &art::Artwork,
+        options: &art::Options,
+        settings: &art::Settings,
         composed: &Composed,
     ) -> Vec<String> {
         let mut notes = Vec::new();
@@ -245,10 +245,10 @@ impl LayersArgs {
             let mut plain = |option: &str| {
                 notes.push(format!("the art has layers alone and no colours, so {option} has no effect"));
             };
-            if settings.gamma != layers::Settings::default().gamma {
+            if settings.gamma != art::Settings::default().gamma {
                 plain("--gamma");
             }
-            if settings.intent != layers::Settings::default().intent {
+            if settings.intent != art::Settings::default().intent {
                 plain("--intent");
             }
         }
@@ -331,10 +331,10 @@ impl Work {
         let layout = Layout { resolution: self.resolution, ..self.layout.layout(observer)? };
         let options = self.layers.options(self.size, &layout)?;
         let settings = self.layers.settings()?;
-        let art = layers::open(&self.layers.art, &options, observer)?;
+        let art = art::open(&self.layers.art, &options, observer)?;
         // Before the long work.
         layout::check(art.width / usize::from(self.resolution.across(1)), art.length, &layout)?;
-        let mut composed = layers::compose(&art, &settings, &library, observer)?;
+        let mut composed = art::compose(&art, &settings, &library, observer)?;
         for note in self.layers.idle(&art, &options, &settings, &composed) {
             observer.note(&note);
             composed.report.notes.push(note);
@@ -374,7 +374,7 @@ pub fn plan(args: &PlanArgs, observer: &dyn Observer) -> Result<()> {
 fn suggestions(composed: &Composed, allowed: &InkSet) -> Vec<Suggestion> {
     let suggestions = composed.suggestions.iter();
     suggestions
-        .map(|layers::Suggestion { text, remedy, dots }| Suggestion {
+        .map(|art::Suggestion { text, remedy, dots }| Suggestion {
             text: text.clone(),
             how: advice::options_of(remedy, allowed),
             dots: *dots,

@@ -35,13 +35,13 @@ enum Command {
     /// Record a new cartridge of an ink and restart its count
     New {
         /// Ink of the cartridge
-        #[arg(value_parser = press::layers::names::typed)]
+        #[arg(value_parser = art::names::typed)]
         ink: Ink,
     },
     /// Record the price of a cartridge; plans and the ledger then say what the ribbon costs
     Price {
         /// Ink of the cartridge
-        #[arg(value_parser = press::layers::names::typed)]
+        #[arg(value_parser = art::names::typed)]
         ink: Ink,
         /// Price of one cartridge
         #[arg(value_parser = amount)]

@@ -17,7 +17,7 @@ use measure::Measurement;
 use measure::curves::reduce::Kind as Origin;
 use measure::setup::Setup;
 use observe::Observer;
-use press::sheet::Sheet;
+use sheet::Sheet;
 
 /// Arguments of `measure`.
 #[derive(ClapArgs, Debug)]

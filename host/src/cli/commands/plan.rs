@@ -19,8 +19,8 @@ use observe::Observer;
 use press::job::plan::{Plan, Subject};
 use press::layout::Laid;
 use press::separate::{self, Pass, Planned};
-use press::sheet::{Area, Sheet};
 use press::simulate;
+use sheet::{Area, Sheet};
 
 /// Arguments of `plan`: a job or a document, or the sub-command for art.
 #[derive(Debug)]

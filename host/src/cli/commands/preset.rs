@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cli::console::{chain, show, usage};
 use crate::folders;
-use press::files::{read_toml, write_toml};
+use files::{read_toml, write_toml};
 
 /// `--preset`, for commands whose options a preset can hold.
 #[derive(ClapArgs, Debug)]

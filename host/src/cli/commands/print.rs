@@ -22,13 +22,12 @@ use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::{self, Places, ResultArgs};
 use appearance::brdf::reflectances;
 use appearance::gamut::InkMix;
+use halftone::metrics::{self, Look, Tone};
 use observe::Observer;
-use press::halftone;
-use press::halftone::metrics::{self, Look, Tone};
 use press::layout::Mm;
 use press::pipeline::{self, Draft, Request};
 use press::preview::{self, EYE, Panels, Probe, STANDARD_LIGHTS, Source, Spectrum, Swatch};
-use press::sheet::Area;
+use sheet::Area;
 
 /// Pixels of the longer side of a panel in `sheet.png`.
 const PANEL: usize = 480;

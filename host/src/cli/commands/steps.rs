@@ -16,15 +16,15 @@ use crate::cli::output::{self, Kind, Staged};
 use appearance::document::{self, ColourSpace, foil};
 use appearance::gamut::files::Provenance;
 use appearance::gamut::{self, GamutError, Printable};
+use halftone::metrics;
 use observe::Observer;
-use press::halftone;
-use press::halftone::metrics;
-use press::layout::{self, Size};
+use press::layout;
 use press::pipeline::{self, document as stages};
 use press::separate;
-use press::sheet::DotMap;
 use protocol::paper::Paper;
 use protocol::rgl::Resolution;
+use sheet::DotMap;
+use sheet::Size;
 
 /// Where a result goes: the place named, else the current folder under the name of what it is made from.
 fn named(output: &Option<PathBuf>, from: &Path, ending: &str) -> PathBuf {

@@ -1,9 +1,9 @@
 //! Which options help: libraries name what is wrong or what they suggest, only the command line knows its options.
 
+use art::{Accept, LayersError, Remedy, Setting, Settings};
+use halftone::HalftoneError;
 use inks::InkSet;
 use press::chart::ChartError;
-use press::halftone::HalftoneError;
-use press::layers::{Accept, LayersError, Remedy, Setting, Settings};
 use press::layout::{LayoutError, SizeError};
 use press::pipeline::JobError;
 use press::pipeline::document::StageError;

@@ -18,8 +18,8 @@ use device::deliver::Failure;
 use device::flash::FlashError;
 use device::questions::query::QueryError;
 use observe::{Observer, with_causes};
-use press::sheet::Sheet;
 use press::simulate;
+use sheet::Sheet;
 
 /// The largest stream that is read: several times a page of noise in seven passes.
 const LARGEST_JOB: u64 = 256 << 20;
@@ -85,6 +85,7 @@ mod tests {
     use appearance::gamut::{GamutError, MixError};
     use appearance::solve::MixtureError;
     use appearance::weights::WeightError;
+    use art::LayersError;
     use device::flash::drive::DriveError;
     use device::flash::image::ImageError;
     use device::flash::picoboot::WriteError;
@@ -93,10 +94,9 @@ mod tests {
     use device::transit::RunError;
     use device::transit::journal::JournalError;
     use device::transit::raw::RawError;
+    use files::FileError;
     use inks::CurveError;
-    use press::files::FileError;
     use press::inspect::StreamError;
-    use press::layers::LayersError;
     use press::pipeline::JobError;
     use press::pipeline::document::StageError;
     use press::simulate::{CarouselError, SimulateError};

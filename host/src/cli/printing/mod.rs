@@ -25,7 +25,7 @@ use press::layout::Layout;
 use press::pipeline::{self, Draft, Job, Request};
 use press::preview::inks::{Ground, save_pass, save_sheet};
 use press::separate;
-use press::sheet::DotMap;
+use sheet::DotMap;
 
 /// What is made of dots, and where it goes.
 #[derive(Args, Debug)]

@@ -15,7 +15,7 @@ use press::job::plan::Plan;
 use press::pipeline::Draft;
 use press::preview::inks::{Ground, pass_thumbnail, thumbnail};
 use press::separate::Pass;
-use press::sheet::{Area, Sheet};
+use sheet::{Area, Sheet};
 
 /// Pixels of the longer side of the sheet on the plan's page.
 const THUMBNAIL: usize = 640;

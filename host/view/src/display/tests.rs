@@ -3,8 +3,8 @@
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::materials::Materials;
 use inks::{Library, Stack};
-use press::sheet::DOTS_PER_MM;
 use proptest::prelude::*;
+use sheet::DOTS_PER_MM;
 
 use super::solve::within;
 use super::*;

@@ -10,7 +10,7 @@ use image::{ImageFormat, RgbImage};
 use inks::{Curve, Library, Stack};
 use observe::Silent;
 use press::preview::{Probe, Source, ToneCurve, picture};
-use press::sheet::{Area, DotMap};
+use sheet::{Area, DotMap};
 use testing::browser::Browser;
 use view::page::{LONGEST, Subject, Target, page};
 use view::{Camera, Light, Lit, Pose, Renderer, Scene, direction};

@@ -17,11 +17,12 @@ use std::time::{Duration, Instant};
 use foilpress_tests::emulated::{Desk, Emulated};
 use observe::Silent;
 use press::job::stream::write_job;
-use press::separate::{self, Pass, Plane};
+use press::separate::{self, Pass};
 use press::simulate::{Carousel, Cartridge, Lever, Printer, Stock, Trouble, difference, print};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
+use sheet::Plane;
 use testing::needs::Need;
 
 /// Nothing here takes longer, unless it never ends.

@@ -10,13 +10,14 @@ use observe::Silent;
 use press::inspect::{inspect, sheets};
 use press::job::stream::write_job;
 use press::layout::Profile;
-use press::separate::{Pass, Plane};
+use press::separate::Pass;
 use press::simulate::{Setup, print};
 use protocol::ink::Ink;
 use protocol::paper::Paper;
 use protocol::rgl::Page;
 use rand::Rng;
 use server::Server;
+use sheet::Plane;
 use std::fs;
 use std::sync::atomic::Ordering;
 

@@ -11,9 +11,9 @@ use inks::{Stack, ggx};
 use observe::Silent;
 use press::chart;
 use press::layout::{Layout, arrange};
-use press::sheet::{DotMap, Sheet};
 use protocol::paper::Paper;
 use rayon::prelude::*;
+use sheet::{DotMap, Sheet};
 
 pub type V = [f64; 3];
 

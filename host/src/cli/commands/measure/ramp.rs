@@ -8,7 +8,7 @@ use inks::Library;
 use measure::curves::library::quoted;
 use measure::scans::ramp::{self, Dots, LINEAR, Owner, Ramp, Series};
 use observe::Observer;
-use press::sheet::dots_in_words;
+use sheet::dots_in_words;
 
 use crate::cli::commands::inks::place;
 use crate::cli::console::show;

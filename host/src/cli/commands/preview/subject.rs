@@ -18,7 +18,7 @@ use inks::Library;
 use observe::Observer;
 use press::layout::{Mm, Repeat};
 use press::preview::{Probe, Radiance, Source, ToneCurve, mix_in_words, picture};
-use press::sheet::{Area, DotMap, Sheet};
+use sheet::{Area, DotMap, Sheet};
 
 use super::view::{Show, ViewArgs};
 use super::wear::Told;

@@ -8,8 +8,8 @@ use clap::Args;
 use inks::Library;
 use press::layout::Mm;
 use press::preview::{Wear, Worn};
-use press::sheet::DotMap;
 use serde_json::{Value, json};
+use sheet::DotMap;
 
 /// The largest root mean square shift, in millimetres: beyond it there is no print to look at.
 const MOST_SHIFT: f64 = 10.0;

@@ -9,7 +9,7 @@ use std::fmt::{self, Write as _};
 use anyhow::Result;
 use appearance::brdf::{Space, plot};
 use appearance::gamut::{Doubt, MaterialReport};
-use press::halftone::metrics::{Look, Tone};
+use halftone::metrics::{Look, Tone};
 use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
 use press::preview::{Report as Fidelity, Spectrum, mix_in_words};
@@ -267,9 +267,9 @@ mod tests {
     use press::job::Handling;
     use press::layout::Layout;
     use press::pipeline::{Request, draft};
-    use press::sheet::DotMap;
     use protocol::paper::Paper;
     use protocol::rgl::Media;
+    use sheet::DotMap;
 
     #[test]
     fn names_from_documents_stay_text_and_every_part_is_there() {
