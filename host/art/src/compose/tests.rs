@@ -1,9 +1,9 @@
 use super::*;
-use crate::separate;
 use crate::{Colour, Layer};
 use Ink::{Black, Cyan, GoldFoil, MetallicGold, SilverFoil};
 use halftone::Method;
 use observe::Silent;
+use press::separate;
 use proptest::prelude::*;
 use sheet::Sheet;
 
