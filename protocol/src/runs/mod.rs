@@ -51,6 +51,32 @@
 //! row or the band. Each kind has a count and a sum for its first runs (4 and 32), its off and its on runs (4 and 32 in
 //! dots, 4 and 8 in cells); the numbers of rows have one pair (4 and 8). A row is complete when it has as many dots as the
 //! page is wide, and what would go beyond is cut.
+//!
+//! # Example
+//!
+//! A plane of two bands, of which the first is blank, takes its way through a stream. A band of unknown form is a defect:
+//!
+//! ```
+//! use protocol::runs::{self, Decoder, Defect, MAX_BAND, Step};
+//! use protocol::walk::Placed;
+//!
+//! let walk = Placed::whole(128, 128);
+//! let mut plane = vec![0; 128 / 8 * 128];
+//! plane[16 * 64..].fill(0b1111_0000);
+//! let mut stream = Vec::new();
+//! runs::encode(&walk, &plane, &mut vec![0; MAX_BAND], |band| stream.extend(band)).unwrap();
+//! assert!(stream.len() < 16);
+//!
+//! let (mut decoder, mut memory) = (Decoder::new(walk), vec![0; runs::band_bytes(128)]);
+//! let (read, step) = decoder.step(&stream, &mut memory).unwrap();
+//! assert_eq!(step, Step::Blank { y: 0, rows: 64 });
+//! let (_, step) = decoder.step(&stream[read..], &mut memory).unwrap();
+//! assert_eq!(step, Step::Band { y: 64, rows: 64, reach: 16 });
+//! assert_eq!(memory, plane[16 * 64..]);
+//!
+//! decoder.restart();
+//! assert_eq!(decoder.step(&[9], &mut memory), Err(Defect::Form));
+//! ```
 
 mod across;
 mod canvas;
