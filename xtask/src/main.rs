@@ -2,6 +2,8 @@
 //!
 //! `cargo xtask test` is the whole gate ([`gate`]); the other tasks are its steps and what people do by hand.
 
+#[cfg(test)]
+mod documents;
 mod elf;
 mod emulator;
 mod firmware;
