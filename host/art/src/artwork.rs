@@ -11,7 +11,7 @@ use super::colour::Colour;
 use super::coverage::{Coverage, Scan};
 use super::flat::Flat;
 use super::options::Options;
-use super::{bits, names, resample};
+use super::{bitplane, names, resample};
 use sheet::Plane;
 
 /// Least coverage of a dot that is ink.
@@ -84,7 +84,7 @@ impl Artwork {
             length,
             layers: Vec::new(),
             colour: None,
-            drawn: bits::blank(width, length),
+            drawn: bitplane::blank(width, length),
             opaque: None,
             notes: Vec::new(),
         }
@@ -105,9 +105,9 @@ impl Artwork {
         }
         let (layer, mut notes) = layer(scan, name, named, plate, (self.width, self.length), options);
         match &layer.shape {
-            Shape::Solid(plane) => bits::add(&mut self.drawn, plane),
+            Shape::Solid(plane) => bitplane::add(&mut self.drawn, plane),
             Shape::Tone(tones) => {
-                bits::add(&mut self.drawn, &bits::from_bytes(self.width, tones, |c| c > PLAIN))
+                bitplane::add(&mut self.drawn, &bitplane::from_bytes(self.width, tones, |c| c > PLAIN))
             }
         }
         self.layers.push(layer);
@@ -193,7 +193,7 @@ fn shape(width: usize, coverage: Vec<u8>, tones: bool) -> Shape {
     if tones {
         Shape::Tone(coverage)
     } else {
-        Shape::Solid(bits::from_bytes(width, &coverage, |c| c >= THRESHOLD))
+        Shape::Solid(bitplane::from_bytes(width, &coverage, |c| c >= THRESHOLD))
     }
 }
 

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::colour::Colour;
 use super::flat::{BLACK, Flat, WHITE, is_tone};
-use super::kinds::Kind;
+use super::kinds::ObjectType;
 
 /// What counts of the pixels under one of an average.
 #[derive(Default)]
@@ -65,7 +65,7 @@ impl Codes {
 /// The colours of pixels averaged to at most one pixel for two dots along each side; `pixel` says what drew one, in which colour,
 /// and `fixed` whether one besides white and black does not count.
 pub(super) fn averaged(
-    pixel: impl Fn(usize) -> (Kind, [u8; 3]) + Sync,
+    pixel: impl Fn(usize) -> (ObjectType, [u8; 3]) + Sync,
     fixed: impl Fn(usize) -> bool + Sync,
     flat: &Flat,
     size: (usize, usize),
@@ -77,7 +77,7 @@ pub(super) fn averaged(
     gathered(flat, (size, to), &codes, |_, under| {
         let toned = under.clone().find(|&at| counts(at));
         // Flat colours are drawn wherever they come from, and so are shadings.
-        let drawn = toned.is_some_and(|at| !is_tone(flat.index[at]) || pixel(at).0 != Kind::Picture);
+        let drawn = toned.is_some_and(|at| !is_tone(flat.index[at]) || pixel(at).0 != ObjectType::Picture);
         let mut part = Part { drawn, plain: toned.is_none(), ..Part::default() };
         for at in under.filter(|&at| toned.is_none() || counts(at)) {
             part.add(codes.light(pixel(at).1), 1);
@@ -301,8 +301,11 @@ mod tests {
             // More greys than a palette holds, so that they are tones.
             let shading = |at: usize| [ground + (at / 40 / 2) as u8; 3].map(|v| v - (at % 40 / 2 % 13) as u8);
             let pixel = |at: usize| {
-                let ([r, g, b], tag) =
-                    if is_letter(at) { (letter, Kind::TEXT) } else { (shading(at), Kind::PICTURE) };
+                let ([r, g, b], tag) = if is_letter(at) {
+                    (letter, ObjectType::TEXT)
+                } else {
+                    (shading(at), ObjectType::PICTURE)
+                };
                 [tag, r, g, b]
             };
             let page: Vec<[u8; 4]> = (0..40 * 40).map(pixel).collect();

@@ -17,7 +17,7 @@ use protocol::ink::Ink;
 use rayon::prelude::*;
 
 use super::averages::{averaged, joined};
-use super::bits;
+use super::bitplane;
 use super::compose::Settings;
 use super::error::LayersError;
 use super::flat::{BLACK, Flat, INKED, TONE, is_tone, split};
@@ -72,7 +72,7 @@ impl Colour {
         let flat = Flat::of(pixels, size.0 as usize);
         if flat.is_black_and_white() {
             let flat = flat.at_dots(size, dots);
-            return Some(Colour::black(bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
+            return Some(Colour::black(bitplane::from_bytes(dots.0, &flat.index, |dot| dot == BLACK)));
         }
         if !flat.has_tones() {
             return Colour::of_flat(flat.at_dots(size, dots), dots);
@@ -92,7 +92,7 @@ impl Colour {
     /// Flat colours alone; `None` if all are white.
     pub(super) fn of_flat(flat: Flat, dots: (usize, usize)) -> Option<Colour> {
         if flat.is_black_and_white() {
-            let black = bits::from_bytes(dots.0, &flat.index, |dot| dot == BLACK);
+            let black = bitplane::from_bytes(dots.0, &flat.index, |dot| dot == BLACK);
             return (black.dots() > 0).then(|| Colour::black(black));
         }
         Some(Colour { flat, ..Colour::default() })
@@ -320,11 +320,11 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::super::intent::{Light, difference, oklab};
-    use super::super::kinds::Kind;
+    use super::super::kinds::ObjectType;
     use super::super::treatments::{Shape, Treatment};
     use super::*;
     use observe::Silent;
-    use protocol::ink::Kind as InkKind;
+    use protocol::ink::Kind;
 
     /// The mixture of pictures' pixels by an intent, with the reflectance of the stacks.
     fn mixed(pixels: &[[u8; 3]], intent: Intent) -> (InkMix, Printable) {
@@ -344,7 +344,7 @@ mod tests {
     }
 
     fn process() -> InkSet {
-        InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process))
+        InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == Kind::Process))
     }
 
     /// What is printed for each pixel, between black and paper in linear light.
@@ -487,7 +487,7 @@ mod tests {
             ([0, 204, 255], "C+M", "C", 0.2),
         ];
         let pixels: Vec<[u8; 4]> =
-            tints.iter().flat_map(|&([r, g, b], ..)| [[Kind::DRAWING, r, g, b]; 4]).collect();
+            tints.iter().flat_map(|&([r, g, b], ..)| [[ObjectType::DRAWING, r, g, b]; 4]).collect();
         let colour = Colour::of(&pixels, (16, 1), (16, 1)).unwrap();
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
@@ -504,7 +504,7 @@ mod tests {
     /// It was 0.6 over the last sixteenth: a dark band at the end.
     #[test]
     fn a_shading_that_ends_in_a_tint_of_two_inks_has_no_step() {
-        let colour = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let colour = Colour::of(&[[ObjectType::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
         let space = Space::half_angle(SAMPLES);
         let printable = Printable::from_library(&Library::builtin(), &process(), &space);
         let solids = Solids::new(&printable, &space);
@@ -536,7 +536,7 @@ mod tests {
             [204, 204, 204],
         ];
         let mut pixels: Vec<[u8; 4]> =
-            names.iter().flat_map(|&[r, g, b]| [[Kind::DRAWING, r, g, b]; 8]).collect();
+            names.iter().flat_map(|&[r, g, b]| [[ObjectType::DRAWING, r, g, b]; 8]).collect();
         pixels.push([0, 255, 255, 255]);
         let colour = Colour::of(&pixels, (pixels.len() as u32, 1), (pixels.len(), 1)).unwrap();
         let space = Space::half_angle(SAMPLES);

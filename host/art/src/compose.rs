@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::artwork::{Artwork, Shape};
-use super::bits;
+use super::bitplane;
 use super::error::LayersError;
 use super::size::MM;
 use super::white::White;
@@ -159,15 +159,15 @@ fn drawn_slots(
             return Ok(slots);
         }
         let planes = colour.planes((art.width, art.length), &process, settings, library, observer)?;
-        let mut spot = bits::blank(art.width, art.length);
-        slots.iter().for_each(|slot| bits::add(&mut spot, &slot.plane));
+        let mut spot = bitplane::blank(art.width, art.length);
+        slots.iter().for_each(|slot| bitplane::add(&mut spot, &slot.plane));
         for (ink, mut plane) in planes {
             if !colour.overprints {
                 // Dots of a layer, such as a reserved colour, keep that ink alone.
-                bits::merge(&mut plane, &spot, |dots, spot| dots & !spot);
+                bitplane::merge(&mut plane, &spot, |dots, spot| dots & !spot);
             }
             match slots.iter_mut().find(|slot| slot.ink == ink) {
-                Some(slot) => bits::add(&mut slot.plane, &plane),
+                Some(slot) => bitplane::add(&mut slot.plane, &plane),
                 None => slots.push(Slot { ink, from: COLOURS.into(), place: None, plane, passes: 1 }),
             }
         }
@@ -205,7 +205,7 @@ fn tone(
     });
     let fixed: Vec<u8> = fixed.collect();
     let dots = halftone(&mix, (width, height), Some(&fixed), &toning, observer)?;
-    Ok(bits::from_bytes(art.width, dots.index(), |stack| stack == 1))
+    Ok(bitplane::from_bytes(art.width, dots.index(), |stack| stack == 1))
 }
 
 /// The inks on a dot with the slots of `mask`, from the paper up.

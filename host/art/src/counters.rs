@@ -34,7 +34,7 @@ pub(super) fn counters(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinds::Kind;
+    use crate::kinds::ObjectType;
     use crate::shapes::shapes;
 
     /// The colours of dots as characters say: `#` is a letter, others are a tint, and a blank is paper.
@@ -49,7 +49,11 @@ mod tests {
                 _ => 2,
             })
             .collect();
-        let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (Kind::Drawing, [128; 3])];
+        let colours = vec![
+            (ObjectType::Picture, [255; 3]),
+            (ObjectType::Picture, [0; 3]),
+            (ObjectType::Drawing, [128; 3]),
+        ];
         let flat = Flat { colours, index };
         let mut shaped = [false; 256];
         shaped[2] = true;

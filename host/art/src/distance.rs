@@ -11,7 +11,7 @@
 
 use rayon::prelude::*;
 
-use super::bits;
+use super::bitplane;
 use sheet::Plane;
 
 /// The plane and every dot at most `sqrt(square)` from it, measured between the middles of dots. `square` is the squared
@@ -29,7 +29,7 @@ pub(super) fn grow(plane: &Plane, square: u32) -> Plane {
         let (done, row) = above.split_at_mut(y * width);
         for (x, gap) in row[..width].iter_mut().enumerate() {
             let last = if y > 0 { done[(y - 1) * width + x] } else { far };
-            *gap = step(last, bits::at(plane, x, y));
+            *gap = step(last, bitplane::at(plane, x, y));
         }
     }
     for y in (0..length.saturating_sub(1)).rev() {
@@ -38,7 +38,7 @@ pub(super) fn grow(plane: &Plane, square: u32) -> Plane {
             *gap = (*gap).min(below + 1);
         }
     }
-    let mut grown = bits::blank(width, length);
+    let mut grown = bitplane::blank(width, length);
     grown.bits.par_chunks_mut(grown.stride).zip(above.par_chunks_exact(width)).for_each_init(
         || Vec::with_capacity(width),
         |hull, (bits, gaps)| {
@@ -98,19 +98,19 @@ pub(super) fn shrink(plane: &Plane, square: u32) -> Plane {
         return plane.clone();
     }
     let (width, length) = (plane.width + 2, plane.length + 2);
-    let mut rest = bits::blank(width, length);
+    let mut rest = bitplane::blank(width, length);
     for y in 0..length {
         for x in 0..width {
             let inside = (1..=plane.width).contains(&x) && (1..=plane.length).contains(&y);
-            if !(inside && bits::at(plane, x - 1, y - 1)) {
+            if !(inside && bitplane::at(plane, x - 1, y - 1)) {
                 rest.bits[y * rest.stride + x / 8] |= 0x80 >> (x % 8);
             }
         }
     }
     let rest = grow(&rest, square);
-    let mut left = bits::blank(plane.width, plane.length);
+    let mut left = bitplane::blank(plane.width, plane.length);
     left.bits.par_chunks_mut(left.stride).enumerate().for_each(|(y, row)| {
-        for x in (0..plane.width).filter(|x| !bits::at(&rest, x + 1, y + 1)) {
+        for x in (0..plane.width).filter(|x| !bitplane::at(&rest, x + 1, y + 1)) {
             row[x / 8] |= 0x80 >> (x % 8);
         }
     });
@@ -127,7 +127,7 @@ mod tests {
         (0..plane.length).any(|v| {
             (0..plane.width).any(|u| {
                 let distance = (x.abs_diff(u) * x.abs_diff(u) + y.abs_diff(v) * y.abs_diff(v)) as u32;
-                bits::at(plane, u, v) && distance <= square
+                bitplane::at(plane, u, v) && distance <= square
             })
         })
     }
@@ -135,7 +135,7 @@ mod tests {
     fn plane(width: usize, length: usize, seed: u32, dense: u32) -> Plane {
         let random = |i: usize| (i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11;
         let bytes: Vec<u8> = (0..width * length).map(|i| u8::from(random(i) % 100 < dense)).collect();
-        bits::from_bytes(width, &bytes, |byte| byte == 1)
+        bitplane::from_bytes(width, &bytes, |byte| byte == 1)
     }
 
     proptest! {
@@ -147,7 +147,7 @@ mod tests {
             let grown = grow(&plane, square);
             for y in 0..length {
                 for x in 0..width {
-                    prop_assert_eq!(bits::at(&grown, x, y), near(&plane, x, y, square), "({}, {})", x, y);
+                    prop_assert_eq!(bitplane::at(&grown, x, y), near(&plane, x, y, square), "({}, {})", x, y);
                 }
             }
         }
@@ -164,9 +164,9 @@ mod tests {
                     let whole = (-r..=r).all(|v| (-r..=r).all(|u| {
                         let inside = (0..width as i64).contains(&(x + u)) && (0..length as i64).contains(&(y + v));
                         u * u + v * v > i64::from(square)
-                            || inside && bits::at(&plane, (x + u) as usize, (y + v) as usize)
+                            || inside && bitplane::at(&plane, (x + u) as usize, (y + v) as usize)
                     }));
-                    prop_assert_eq!(bits::at(&shrunk, x as usize, y as usize), whole, "({}, {})", x, y);
+                    prop_assert_eq!(bitplane::at(&shrunk, x as usize, y as usize), whole, "({}, {})", x, y);
                 }
             }
         }

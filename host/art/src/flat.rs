@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::kinds::{K_OF_PICTURES, Kind};
+use super::kinds::{K_OF_PICTURES, ObjectType};
 use super::masks::Masks;
 use super::palette::{palette, sort};
 use super::{resample, translucent};
@@ -32,7 +32,7 @@ const HALF: u8 = 188;
 pub(super) const SIMILAR: u8 = 12;
 
 /// What draws in a colour, and its sRGB.
-pub(super) type Drawn = (Kind, [u8; 3]);
+pub(super) type Drawn = (ObjectType, [u8; 3]);
 
 /// Flat colours and where they are.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -71,10 +71,10 @@ impl Touching {
     }
 }
 
-/// Kind and colour of a pixel of three bytes, or of four with a tag before them.
+/// ObjectType and colour of a pixel of three bytes, or of four with a tag before them.
 #[inline(always)]
-pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (Kind, [u8; 3]) {
-    let kind = if N == 4 { Kind::of(pixel[0]) } else { Kind::Picture };
+pub(super) fn split<const N: usize>(pixel: &[u8; N]) -> (ObjectType, [u8; 3]) {
+    let kind = if N == 4 { ObjectType::of(pixel[0]) } else { ObjectType::Picture };
     (kind, [pixel[N - 3], pixel[N - 2], pixel[N - 1]])
 }
 
@@ -96,16 +96,16 @@ pub(super) fn similar(a: [u8; 3], b: [u8; 3]) -> bool {
 impl Flat {
     /// The flat colours of pixels.
     pub(super) fn of<const N: usize>(pixels: &[[u8; N]], width: usize) -> Flat {
-        let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
+        let mut colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3])];
         let masks = Masks::of(pixels, width);
         let letters = translucent::letters(pixels, width);
         let (palette, shaded) = palette(pixels, width, (&masks, &letters));
         colours.extend(palette);
-        let numbers: HashMap<(Kind, [u8; 3]), u8> = colours.iter().copied().zip(0..).skip(2).collect();
+        let numbers: HashMap<(ObjectType, [u8; 3]), u8> = colours.iter().copied().zip(0..).skip(2).collect();
         let number = |pixel: &[u8; N]| match split(pixel) {
             (_, [255, 255, 255]) => WHITE,
             (_, [0, 0, 0]) => BLACK,
-            (Kind::Picture, colour) => tone(colour),
+            (ObjectType::Picture, colour) => tone(colour),
             key => numbers.get(&key).copied().unwrap_or_else(|| tone(key.1)),
         };
         let mut index = vec![WHITE; pixels.len()];
@@ -123,12 +123,14 @@ impl Flat {
                 K_OF_PICTURES if N == 4 => BLACK,
                 [255, 255, 255] => WHITE,
                 [0, 0, 0] => BLACK,
-                colour => numbers.get(&(Kind::Drawing, colour)).copied().unwrap_or_else(|| tone(colour)),
+                colour => {
+                    numbers.get(&(ObjectType::Drawing, colour)).copied().unwrap_or_else(|| tone(colour))
+                }
             };
             index[stretch].fill(number);
         }
         for (stretch, colour) in letters {
-            if let Some(&number) = numbers.get(&(Kind::Text, colour)) {
+            if let Some(&number) = numbers.get(&(ObjectType::Text, colour)) {
                 index[stretch].fill(number);
             }
         }
@@ -140,14 +142,17 @@ impl Flat {
 
     /// The palette of colours that have so many dots each, and the number of each colour in it. There are no tones, and no more colours
     /// than a palette holds.
-    pub(super) fn ordered(colours: &[(Kind, [u8; 3])], counts: &[u64]) -> (Vec<(Kind, [u8; 3])>, Vec<u8>) {
+    pub(super) fn ordered(
+        colours: &[(ObjectType, [u8; 3])],
+        counts: &[u64],
+    ) -> (Vec<(ObjectType, [u8; 3])>, Vec<u8>) {
         let plain = |rgb: [u8; 3]| rgb == [255; 3] || rgb == [0; 3];
         let drawn = colours.iter().zip(counts).filter(|&(&(_, rgb), &dots)| dots > 0 && !plain(rgb));
-        let mut found: Vec<((Kind, [u8; 3]), u64)> = drawn.map(|(&key, &dots)| (key, dots)).collect();
+        let mut found: Vec<((ObjectType, [u8; 3]), u64)> = drawn.map(|(&key, &dots)| (key, dots)).collect();
         sort(&mut found);
-        let mut palette = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
+        let mut palette = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3])];
         palette.extend(found.into_iter().map(|(key, _)| key));
-        let number = |&(kind, rgb): &(Kind, [u8; 3])| match rgb {
+        let number = |&(kind, rgb): &(ObjectType, [u8; 3])| match rgb {
             [255, 255, 255] => WHITE,
             [0, 0, 0] => BLACK,
             _ => palette.iter().position(|&known| known == (kind, rgb)).unwrap_or_default() as u8,
@@ -169,7 +174,7 @@ impl Flat {
                 (0..width).map(move |x| (x, y)).filter(move |&(x, y)| {
                     let at = y * width + x;
                     index[at] <= BLACK
-                        && split(&pixels[at]).0 == Kind::Picture
+                        && split(&pixels[at]).0 == ObjectType::Picture
                         && is_noise(index, width, (x, y))
                 })
             })
@@ -272,7 +277,7 @@ mod tests {
         let (blue, photo) = ([4, 0, 0, 200], [2, 90, 20, 160]);
         let row = [[0, 255, 255, 255], blue, [1, 0, 0, 200], [1, 0, 0, 0], photo, photo, [1, 255, 255, 255]];
         let flat = Flat::of(&row, 7);
-        assert_eq!(flat.colours[2..], [(Kind::Text, [0, 0, 200]), (Kind::Drawing, [0, 0, 200])]);
+        assert_eq!(flat.colours[2..], [(ObjectType::Text, [0, 0, 200]), (ObjectType::Drawing, [0, 0, 200])]);
         assert_eq!(flat.index, [WHITE, 3, 2, BLACK, INKED, INKED, WHITE]);
     }
 
@@ -300,7 +305,7 @@ mod tests {
         pixels.extend([shading(1000); 20]);
         let flat = Flat::of(&pixels, pixels.len());
         let [_, colour @ ..] = shading(1000);
-        assert_eq!(flat.colours[2..], [(Kind::Drawing, colour)]);
+        assert_eq!(flat.colours[2..], [(ObjectType::Drawing, colour)]);
         // The shading itself is a drawing's tone, mixed like the area.
         let drawn = super::super::colour::Colour::of(&pixels, (2020, 1), (4040, 2)).unwrap();
         let mixed = drawn.averages((4040, 2), None);
@@ -320,7 +325,7 @@ mod tests {
             .collect();
         let flat = Flat::of(&pixels, 300);
         let panel = flat.index[250];
-        assert_eq!(flat.colours[usize::from(panel)], (Kind::Drawing, [150, 77, 77]));
+        assert_eq!(flat.colours[usize::from(panel)], (ObjectType::Drawing, [150, 77, 77]));
         for (at, &dot) in flat.index.iter().enumerate() {
             let (x, y) = (at % 300, at / 300);
             let wanted = if x >= 200 && y < 400 {
@@ -342,7 +347,10 @@ mod tests {
         pixels.extend([[1, 200, 10, 10]; 3]);
         pixels.extend([[4, 10, 200, 10]; 3]);
         let flat = Flat::of(&pixels, pixels.len());
-        assert_eq!(flat.colours[2..], [(Kind::Text, [200, 10, 10]), (Kind::Drawing, [10, 200, 10])]);
+        assert_eq!(
+            flat.colours[2..],
+            [(ObjectType::Text, [200, 10, 10]), (ObjectType::Drawing, [10, 200, 10])]
+        );
         assert_eq!(flat.index.iter().filter(|&&dot| is_tone(dot)).count(), 6000);
     }
 
@@ -363,7 +371,7 @@ mod tests {
             })
             .collect();
         let flat = Flat::of(&pixels, 300);
-        let grey = flat.colours.iter().position(|&colour| colour == (Kind::Drawing, [187; 3])).unwrap();
+        let grey = flat.colours.iter().position(|&colour| colour == (ObjectType::Drawing, [187; 3])).unwrap();
         for (at, &dot) in flat.index.iter().enumerate() {
             let (x, y) = (at % 300, at / 300);
             match (y < 400, is_line(x, y)) {

@@ -9,7 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::RangeInclusive;
 
 use super::flat::{Flat, INKED, is_tone, similar};
-use super::kinds::Kind;
+use super::kinds::ObjectType;
 use super::looks::{Looks, Seen, is_faint, is_hidden};
 use super::shapes::{Run, continues};
 use super::softened::along;
@@ -58,8 +58,8 @@ pub(super) fn lies(
 ) -> HashMap<u32, Lies> {
     let borders = borders(flat, width, (runs, rows), takes_part);
     // Of what is not tagged as text it is not known whether it is a part of the tone beside it.
-    let has_ink = |beside: u8, kind: Kind| match beside {
-        INKED => kind == Kind::Text,
+    let has_ink = |beside: u8, kind: ObjectType| match beside {
+        INKED => kind == ObjectType::Text,
         colour => has_ink(treatments.get(usize::from(colour)).copied()),
     };
     let judge = |root: u32, border: HashMap<u8, u32>| {
@@ -70,7 +70,7 @@ pub(super) fn lies(
         let inked: u32 = inked.iter().map(|&(_, dots)| dots).sum();
         // Beside what filters sharpened there are ripples in all tints. What is no colour is a shading or a picture.
         let is_ripple = |&(beside, _): &(u8, u32)| {
-            let is_like = |&(_, colour): &(Kind, [u8; 3])| similar(colour, own);
+            let is_like = |&(_, colour): &(ObjectType, [u8; 3])| similar(colour, own);
             treatments.get(usize::from(beside)) != Some(&Treatment::Solid(PAPER))
                 && flat.colours.get(usize::from(beside)).is_none_or(is_like)
         };

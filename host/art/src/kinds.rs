@@ -23,7 +23,7 @@ pub(super) const K_OF_PICTURES: [u8; 3] = [35, 31, 32];
 
 /// What drew a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-pub enum Kind {
+pub enum ObjectType {
     /// Letters.
     Text,
     /// Lines, areas and shadings.
@@ -32,7 +32,7 @@ pub enum Kind {
     Picture,
 }
 
-impl Kind {
+impl ObjectType {
     /// Tag of pixels that something was drawn on, but not text or a picture.
     pub(super) const DRAWING: u8 = 4;
     /// Tag of pixels of a picture.
@@ -42,12 +42,12 @@ impl Kind {
 
     /// The kind that one of Ghostscript's tags means.
     #[inline]
-    pub(super) fn of(tag: u8) -> Kind {
+    pub(super) fn of(tag: u8) -> ObjectType {
         match tag {
-            tag if tag & Kind::PICTURE != 0 => Kind::Picture,
-            tag if tag & Kind::TEXT != 0 => Kind::Text,
-            tag if tag & Kind::DRAWING != 0 => Kind::Drawing,
-            _ => Kind::Picture,
+            tag if tag & ObjectType::PICTURE != 0 => ObjectType::Picture,
+            tag if tag & ObjectType::TEXT != 0 => ObjectType::Text,
+            tag if tag & ObjectType::DRAWING != 0 => ObjectType::Drawing,
+            _ => ObjectType::Picture,
         }
     }
 }
@@ -170,8 +170,8 @@ mod tests {
 
     #[test]
     fn a_picture_under_or_over_something_transparent_is_a_picture() {
-        let kinds = [0, 1, 2, 4, 5, 6, 7].map(Kind::of);
-        use Kind::*;
+        let kinds = [0, 1, 2, 4, 5, 6, 7].map(ObjectType::of);
+        use ObjectType::*;
         assert_eq!(kinds, [Picture, Text, Picture, Drawing, Text, Picture, Picture]);
     }
 

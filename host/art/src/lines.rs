@@ -236,7 +236,7 @@ impl Look<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinds::Kind;
+    use crate::kinds::ObjectType;
     use crate::shapes::shapes;
 
     const SIDE: usize = 80;
@@ -250,7 +250,11 @@ mod tests {
     /// The same on another ground than paper.
     fn drawn_on(ground: u8, is: impl Fn(usize, usize) -> bool) -> Vec<bool> {
         let index = (0..SIDE * SIDE).map(|at| if is(at % SIDE, at / SIDE) { 2 } else { ground }).collect();
-        let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (Kind::Drawing, [128; 3])];
+        let colours = vec![
+            (ObjectType::Picture, [255; 3]),
+            (ObjectType::Picture, [0; 3]),
+            (ObjectType::Drawing, [128; 3]),
+        ];
         let mut shaped = [false; 256];
         shaped[2] = true;
         let flat = Flat { colours, index };
@@ -306,8 +310,11 @@ mod tests {
                     (x * sin + y * cos).abs() < across / 2.0 && (x * cos - y * sin).abs() < 36.0
                 };
                 let index = (0..SIDE * SIDE).map(|at| 2 * u8::from(is(at))).collect();
-                let colours =
-                    vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (Kind::Drawing, [128; 3])];
+                let colours = vec![
+                    (ObjectType::Picture, [255; 3]),
+                    (ObjectType::Picture, [0; 3]),
+                    (ObjectType::Drawing, [128; 3]),
+                ];
                 let flat = Flat { colours, index };
                 let mut shaped = [false; 256];
                 shaped[2] = true;

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::flat::split;
 use super::islands::without;
-use super::kinds::Kind;
+use super::kinds::ObjectType;
 use super::main_colours;
 use super::pens::Page;
 use super::posters::{self, Known, Poster, Span};
@@ -282,8 +282,8 @@ impl Stretch {
 /// The stretches of a row.
 fn stretches_of<const N: usize>(row: &[[u8; N]]) -> impl Iterator<Item = Stretch> {
     let drawn = |pixel: &[u8; N]| match split(pixel) {
-        (Kind::Picture, [0, 0, 0] | [255, 255, 255]) => false,
-        (kind, _) => kind == Kind::Picture,
+        (ObjectType::Picture, [0, 0, 0] | [255, 255, 255]) => false,
+        (kind, _) => kind == ObjectType::Picture,
     };
     let mut at = 0;
     std::iter::from_fn(move || {

@@ -27,7 +27,7 @@ use super::beside::{PaleLines, at_the_rim, is_ridge, needs_rim};
 use super::counters::counters;
 use super::flat::{Flat, SIMILAR, TONE};
 use super::grounds::{Grounds, Lies, PAPER, lies, steps};
-use super::kinds::Kind;
+use super::kinds::ObjectType;
 use super::lines::{lines, slanting};
 use super::looks::Looks;
 use super::pieces::pieces;
@@ -144,7 +144,8 @@ pub(super) fn fixed(flat: &Flat, width: usize, treatments: &[Treatment], looks: 
                     let side = runs[root as usize].side;
                     let is_hairline = !shape.dark && side <= HAIR && !is_letter[root as usize];
                     let (kind, _) = flat.colours[usize::from(run.colour)];
-                    if !shape.dark && kind != Kind::Text && lies.get(&root) != Some(&Lies::OnOneColour) {
+                    if !shape.dark && kind != ObjectType::Text && lies.get(&root) != Some(&Lies::OnOneColour)
+                    {
                         if side < STROKE {
                             for (x, dot) in (start..).zip(&mut fixed[start..end]) {
                                 let ink = pale.has_ink((x, y), side, HAIR);
@@ -274,7 +275,7 @@ fn drawn_larger<'a>(flat: &'a Flat, runs: &[Run], small: &[bool]) -> impl Fn(&Ru
 }
 
 fn is_text(flat: &Flat, run: &Run) -> bool {
-    flat.colours[usize::from(run.colour)].0 == Kind::Text
+    flat.colours[usize::from(run.colour)].0 == ObjectType::Text
 }
 
 /// For each run that is the root of a shape, whether the shape is text or as small as a letter, and whether it is a drawing as small and as slender.

@@ -2,7 +2,7 @@
 //!
 //! Problem: print systems hand over whole sheets, most of which is bare, at four bytes a pixel; and most pages are black text.
 //! Method: as long as a page is black and white alone, it is kept as one bit a pixel while it is read: what drew a black pixel
-//! does not matter. With the first other colour, its pixels become numbers of colours (`numbered`), and with the first tone of a
+//! does not matter. With the first other colour, its pixels become numbers of colours (`indexed_page`), and with the first tone of a
 //! picture, pixels. The window around everything drawn is cut out and read as a picture.
 //! Cost: 1 ns a pixel; a bit, a byte or four bytes. Limits: no transparency.
 
@@ -13,11 +13,11 @@ use super::artwork::Artwork;
 use super::colour::Colour;
 use super::error::{LayersError, wrong};
 use super::flat::WHITE;
-use super::kinds::{BYTES, Kind, Order};
-use super::numbered::Numbered;
+use super::indexed_page::Numbered;
+use super::kinds::{BYTES, ObjectType, Order};
 use super::options::Options;
 use super::window::Window;
-use super::{bits, kinds, picture, size};
+use super::{bitplane, kinds, picture, size};
 use sheet::Plane;
 
 /// Rows that are read at once: they stay in the cache.
@@ -50,7 +50,7 @@ impl Page {
     /// # Errors
     /// Those of reading.
     pub fn read(input: &mut impl Read, order: Order, (width, height): (usize, usize)) -> io::Result<Page> {
-        let mut plane = bits::blank(width, height);
+        let mut plane = bitplane::blank(width, height);
         let mut numbered: Option<Numbered> = None;
         let mut strip = vec![0; BYTES * width * ROWS.min(height)];
         let mut last = vec![0; BYTES * width];
@@ -84,7 +84,7 @@ impl Page {
     /// The window around everything that is not white; `None` for a blank page.
     pub fn bounds(&self) -> Option<Window> {
         match &self.0 {
-            Pixels::Black(plane) => bits::bounds(plane),
+            Pixels::Black(plane) => bitplane::bounds(plane),
             Pixels::Numbered(page) => page.bounds(),
             Pixels::Plain(rgb, width) => Window::around(rgb, *width, 3, 255),
             Pixels::Tagged(pixels, width) => kinds::bounds(pixels, *width),
@@ -119,7 +119,7 @@ impl Page {
         let size = (side(wide)?, side(high)?);
         Ok(match self.0 {
             Pixels::Black(plane) if dpi == DOTS && !options.reserved => {
-                let drawn = bits::cut(&plane, window);
+                let drawn = bitplane::cut(&plane, window);
                 let colour = Some(Colour::black(drawn.clone()));
                 Artwork { drawn, colour, ..Artwork::blank(name, dots) }
             }
@@ -130,7 +130,7 @@ impl Page {
             }
             Pixels::Numbered(page) if dpi == DOTS && !options.reserved => {
                 let flat = page.flat(window);
-                let drawn = bits::from_bytes(wide, &flat.index, |dot| dot != WHITE);
+                let drawn = bitplane::from_bytes(wide, &flat.index, |dot| dot != WHITE);
                 let colour = Colour::of_flat(flat, dots);
                 Artwork { drawn, colour, ..Artwork::blank(name, dots) }
             }
@@ -172,7 +172,7 @@ fn expand(plane: &Plane, pixels: &mut [u8]) {
     for (row, bits) in rows.zip(plane.bits.chunks_exact(plane.stride.max(1))) {
         for (x, pixel) in row.as_chunks_mut::<BYTES>().0.iter_mut().enumerate() {
             let is_black = bits[x / 8] & 0x80 >> (x % 8) != 0;
-            *pixel = if is_black { [Kind::DRAWING, 0, 0, 0] } else { [0, 255, 255, 255] };
+            *pixel = if is_black { [ObjectType::DRAWING, 0, 0, 0] } else { [0, 255, 255, 255] };
         }
     }
 }

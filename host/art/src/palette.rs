@@ -13,7 +13,7 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::flat::{Drawn, INKED, similar, split};
-use super::kinds::Kind;
+use super::kinds::ObjectType;
 use super::masks::Masks;
 use super::posters::Span;
 
@@ -36,7 +36,7 @@ pub(super) fn palette<const N: usize>(
     width: usize,
     (masks, letters): (&Masks, &[Span]),
 ) -> (Vec<Drawn>, Vec<Drawn>) {
-    type Counts = HashMap<(Kind, [u8; 3]), u64>;
+    type Counts = HashMap<(ObjectType, [u8; 3]), u64>;
     let add = |counts: &mut Counts, key, dots| {
         if counts.len() < GATHERED || counts.contains_key(&key) {
             *counts.entry(key).or_default() += dots;
@@ -48,7 +48,7 @@ pub(super) fn palette<const N: usize>(
             let mut counts = Counts::new();
             for run in pixels.chunk_by(|a, b| a == b) {
                 match split(&run[0]) {
-                    (Kind::Picture, _) | (_, [255, 255, 255] | [0, 0, 0]) => {}
+                    (ObjectType::Picture, _) | (_, [255, 255, 255] | [0, 0, 0]) => {}
                     key => add(&mut counts, key, run.len() as u64),
                 }
             }
@@ -60,12 +60,12 @@ pub(super) fn palette<const N: usize>(
         .colours
         .iter()
         .filter(|(colour, _)| !plain(**colour))
-        .map(|(&colour, &dots)| ((Kind::Drawing, colour), dots))
+        .map(|(&colour, &dots)| ((ObjectType::Drawing, colour), dots))
         .collect();
     // Letters through which a picture shows have many colours, and stay letters.
     let translucent: HashSet<[u8; 3]> = letters.iter().map(|(_, colour)| *colour).collect();
     for (stretch, colour) in letters {
-        add(&mut counts, (Kind::Text, *colour), stretch.len() as u64);
+        add(&mut counts, (ObjectType::Text, *colour), stretch.len() as u64);
     }
     for part in gathered {
         // In a fixed order, because the number of colours is limited.
@@ -73,7 +73,7 @@ pub(super) fn palette<const N: usize>(
         part.sort_unstable();
         part.into_iter().for_each(|(key, dots)| add(&mut counts, key, dots));
     }
-    let mut colours: Vec<((Kind, [u8; 3]), u64)> = counts.into_iter().collect();
+    let mut colours: Vec<((ObjectType, [u8; 3]), u64)> = counts.into_iter().collect();
     sort(&mut colours);
     colours.truncate(JUDGED);
     let mut shaded = Vec::new();
@@ -87,7 +87,7 @@ pub(super) fn palette<const N: usize>(
                 .filter(|&&((other, near), _)| other == kind && near != colour && similar(near, colour))
                 .peekable();
             let may_be_shaded =
-                kind != Kind::Text || wide.contains(&colour) && !translucent.contains(&colour);
+                kind != ObjectType::Text || wide.contains(&colour) && !translucent.contains(&colour);
             let is_shaded = may_be_shaded && similar.peek().is_some();
             // What lies in pictures has no border here. It is flat art, which has no shadings.
             let is_band = || {
@@ -108,7 +108,7 @@ pub(super) fn palette<const N: usize>(
 /// The colours of letters whose strokes are wide along rows, in the mean: what is fine is not read if it is screened.
 fn in_wide_strokes<const N: usize>(pixels: &[[u8; N]], width: usize) -> HashSet<[u8; 3]> {
     let mut strokes: HashMap<[u8; 3], [u64; 2]> = HashMap::new();
-    let is_text = |pixel: &[u8; N]| split(pixel).0 == Kind::Text;
+    let is_text = |pixel: &[u8; N]| split(pixel).0 == ObjectType::Text;
     for row in pixels.chunks(width) {
         for stroke in row.chunk_by(|a, b| is_text(a) == is_text(b)).filter(|stroke| is_text(&stroke[0])) {
             for run in stroke.chunk_by(|a, b| a == b) {
@@ -168,7 +168,7 @@ fn borders<const N: usize>(
 }
 
 /// Text first, then the most frequent.
-pub(super) fn sort(colours: &mut [((Kind, [u8; 3]), u64)]) {
+pub(super) fn sort(colours: &mut [((ObjectType, [u8; 3]), u64)]) {
     colours.sort_unstable_by_key(|&((kind, colour), dots)| (kind, std::cmp::Reverse(dots), colour));
 }
 
@@ -184,17 +184,20 @@ mod tests {
             let pixel = |at: usize| {
                 let step = (at / width / 2) as u8;
                 match at % width {
-                    x if x < stroke => [Kind::TEXT, 30 + step / 3, 60 + (step + 1) / 3, 90 + (step + 5) / 3],
+                    x if x < stroke => {
+                        [ObjectType::TEXT, 30 + step / 3, 60 + (step + 1) / 3, 90 + (step + 5) / 3]
+                    }
                     _ => [0, 255, 255, 255],
                 }
             };
             // Of two rows each; half as many again in a drawing, which alone are too many.
             let mut pixels: Vec<[u8; 4]> = (0..width * 400).map(pixel).collect();
             pixels.extend(
-                (0..width * 300).map(|at| [Kind::DRAWING, 200, (at / 64 % 256) as u8, (at / 64 / 256) as u8]),
+                (0..width * 300)
+                    .map(|at| [ObjectType::DRAWING, 200, (at / 64 % 256) as u8, (at / 64 / 256) as u8]),
             );
             let found = palette(&pixels, width, (&Masks::of(&pixels, width), &[])).0;
-            let letters = found.iter().filter(|(kind, _)| *kind == Kind::Text).count();
+            let letters = found.iter().filter(|(kind, _)| *kind == ObjectType::Text).count();
             assert_eq!(letters > 150, stay, "{stroke}: {letters}");
             // The last step borders on something else.
             assert!(stay || letters <= 2, "{stroke}: {letters}");

@@ -20,7 +20,7 @@ use super::error::{LayersError, io, wrong};
 use super::options::Options;
 use super::resolution::Dpi;
 use super::size::{self, Unstated};
-use super::{bits, kinds, resample, reserved, scans};
+use super::{bitplane, kinds, resample, reserved, scans};
 use sheet::Plane;
 
 /// A picture in sRGB with straight alpha.
@@ -214,7 +214,7 @@ pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), optio
 /// every dot is drawn.
 pub(super) fn drawing(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
     let mut art = artwork_of(name, pixels, dots, options);
-    art.opaque.get_or_insert_with(|| bits::full(dots.0, dots.1));
+    art.opaque.get_or_insert_with(|| bitplane::full(dots.0, dots.1));
     art
 }
 
@@ -259,8 +259,8 @@ pub(super) fn plane_of<const N: usize>(
 ) -> Plane {
     let pixels = pixels.as_chunks::<N>().0;
     if (size.0 as usize, size.1 as usize) == dots {
-        return bits::from(dots.0, pixels, is);
+        return bitplane::from(dots.0, pixels, is);
     }
     let bytes: Vec<u8> = pixels.par_iter().map(|pixel| u8::from(is(pixel))).collect();
-    bits::from_bytes(dots.0, &resample::classes(bytes, size, dots), |byte| byte > 0)
+    bitplane::from_bytes(dots.0, &resample::classes(bytes, size, dots), |byte| byte > 0)
 }

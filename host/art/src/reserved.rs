@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::artwork::{Layer, Shape};
 use super::options::Options;
-use super::{bits, resample};
+use super::{bitplane, resample};
 use classes::{BLOCK, Classes, LOOSE, OTHER, PAPER};
 
 /// A reserved colour.
@@ -112,7 +112,7 @@ pub(super) fn take(rgb: &mut [u8], size: (u32, u32), dots: (usize, usize), optio
     counts.iter_mut().zip(pixels_of).for_each(|(count, pixels)| count.0 = pixels);
     let class = resample::classes(class, size, dots);
     let layers = (1..).zip(&table).filter(|&(at, _)| counts[usize::from(at)].0 > 0).map(|(at, entry)| {
-        let plane = bits::from_bytes(dots.0, &class, |class| class == at);
+        let plane = bitplane::from_bytes(dots.0, &class, |class| class == at);
         let colour = entry.colour.map(|v| v.to_string()).join(",");
         let name = format!("the reserved colour {colour}");
         Layer { ink: entry.ink, name, place: None, shape: Shape::Solid(plane) }

@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::flat::split;
-use super::kinds::Kind;
+use super::kinds::ObjectType;
 
 /// Paper with noise has at least so much in each of red, green and blue, and ink at most so much.
 const PAPER: u8 = 225;
@@ -31,11 +31,13 @@ impl Counts {
     fn of<const N: usize>(pixels: &[[u8; N]]) -> Counts {
         let mut counts = Counts::default();
         let is_paper = |pixel: Option<&[u8; N]>| {
-            pixel.is_none_or(|pixel| split(pixel).0 != Kind::Picture || plain(split(pixel).1) == [255; 3])
+            pixel.is_none_or(|pixel| {
+                split(pixel).0 != ObjectType::Picture || plain(split(pixel).1) == [255; 3]
+            })
         };
         for (at, pixel) in pixels.iter().enumerate() {
             let (kind, colour) = split(pixel);
-            if kind != Kind::Picture {
+            if kind != ObjectType::Picture {
                 continue;
             }
             match plain(colour) {
@@ -86,7 +88,7 @@ pub(super) fn clean<const N: usize>(pixels: &mut [[u8; N]]) -> bool {
     let counts = pixels.par_chunks(1 << 16).map(Counts::of).reduce(Counts::default, Counts::and);
     let clean = |pixel: &mut [u8; N]| {
         let (kind, colour) = split(pixel);
-        if kind == Kind::Picture {
+        if kind == ObjectType::Picture {
             pixel[N - 3..].copy_from_slice(&plain(colour));
         }
     };
@@ -212,8 +214,8 @@ mod tests {
     #[test]
     fn text_and_drawings_beside_a_scan_keep_their_colours() {
         let scan: Vec<[u8; 4]> =
-            through_jpeg([0; 3], [255; 3]).iter().map(|&[r, g, b]| [Kind::PICTURE, r, g, b]).collect();
-        let panel = [Kind::DRAWING, 240, 240, 240];
+            through_jpeg([0; 3], [255; 3]).iter().map(|&[r, g, b]| [ObjectType::PICTURE, r, g, b]).collect();
+        let panel = [ObjectType::DRAWING, 240, 240, 240];
         let mut page = scan;
         page[0] = panel;
         assert!(clean(&mut page));

@@ -118,7 +118,7 @@ pub(super) fn shapes(flat: &Flat, width: usize, (shaped, large): (&[bool; 256], 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinds::Kind;
+    use crate::kinds::ObjectType;
     use proptest::prelude::*;
 
     proptest! {
@@ -128,7 +128,7 @@ mod tests {
         ) {
             let random = |i: usize| (i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11;
             let is = |x: usize, y: usize| random(y * width + x) % 100 < dense;
-            let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (Kind::Text, [128; 3])];
+            let colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3]), (ObjectType::Text, [128; 3])];
             let index: Vec<u8> = (0..width * length).map(|at| 2 * u8::from(is(at % width, at / width))).collect();
             let flat = Flat { colours, index };
             let mut shaped = [false; 256];

@@ -4,7 +4,7 @@
 //! Method: the drawing is rendered again without its text, and again without its pictures. A pixel that differs shows text,
 //! or a picture. Cost: a look at each pixel. Limits: text that looks like what is beneath it is no text, which nobody sees.
 
-use super::kinds::{BYTES, Kind};
+use super::kinds::{BYTES, ObjectType};
 
 /// A rendered drawing on white, with the kind of each pixel ([`kinds`](super::kinds)); what is transparent has no kind.
 /// `rgba` is the drawing in straight alpha, `no_text` and `no_pictures` are the same without these, if it has any.
@@ -17,9 +17,9 @@ pub(super) fn tagged(rgba: &[u8], no_text: Option<&[u8]>, no_pictures: Option<&[
         };
         let tag = match alpha {
             0 => 0,
-            _ if shows(no_pictures) => Kind::PICTURE,
-            _ if shows(no_text) => Kind::TEXT,
-            _ => Kind::DRAWING,
+            _ if shows(no_pictures) => ObjectType::PICTURE,
+            _ if shows(no_text) => ObjectType::TEXT,
+            _ => ObjectType::DRAWING,
         };
         let alpha = u32::from(alpha);
         let on_white = |v: u8| ((u32::from(v) * alpha + 255 * (255 - alpha) + 127) / 255) as u8;
@@ -44,7 +44,7 @@ mod tests {
         let flat = |pixels: [[u8; 4]; 6]| pixels.concat();
         let pixels = tagged(&flat(all), Some(&flat(no_text)), Some(&flat(no_pictures)));
         let tags: Vec<u8> = pixels.as_chunks::<4>().0.iter().map(|pixel| pixel[0]).collect();
-        assert_eq!(tags, [0, 4, 2, 2, Kind::TEXT, 4]);
+        assert_eq!(tags, [0, 4, 2, 2, ObjectType::TEXT, 4]);
         assert_eq!(pixels[..8], [0, 255, 255, 255, 4, 0, 0, 200]);
         assert_eq!(pixels[20..], [4, 127, 127, 127]);
     }

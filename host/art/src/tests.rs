@@ -75,7 +75,7 @@ fn refused(paths: &[PathBuf]) -> String {
 /// Columns and rows of the dots of a layer: first and last of each, and how many dots.
 fn extent(layer: &Layer) -> (usize, usize, usize, usize, u64) {
     let Shape::Solid(plane) = &layer.shape else { panic!("{} has tones", layer.name) };
-    let inked = |&(x, y): &(usize, usize)| bits::at(plane, x, y);
+    let inked = |&(x, y): &(usize, usize)| bitplane::at(plane, x, y);
     let all = || (0..plane.length).flat_map(|y| (0..plane.width).map(move |x| (x, y))).filter(inked);
     let (xs, ys) = (all().map(|p| p.0), all().map(|p| p.1));
     (xs.clone().min().unwrap(), ys.clone().min().unwrap(), xs.max().unwrap(), ys.max().unwrap(), plane.dots())

@@ -11,14 +11,14 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::flat::{similar, split};
-use super::kinds::{BYTES, Kind};
+use super::kinds::{BYTES, ObjectType};
 use super::looks::apart;
 use super::main_colours::WHITE_AND_BLACK;
 use super::posters::Span;
 use sheet::forest::{Forest, beside};
 
 /// The tag of such a letter.
-const BOTH: u8 = Kind::TEXT | Kind::PICTURE;
+const BOTH: u8 = ObjectType::TEXT | ObjectType::PICTURE;
 /// The most that the colours of a letter may differ in each of red, green and blue.
 const EVEN: u8 = 80;
 /// How far a letter must be from what is beside it.
@@ -118,7 +118,7 @@ mod tests {
         let pixel = |at: usize| {
             let (x, y) = (at % 60, at / 60);
             let (tag, [r, g, b]) =
-                if is_letter(at) { (BOTH, letter(x, y)) } else { (Kind::PICTURE, ground(x, y)) };
+                if is_letter(at) { (BOTH, letter(x, y)) } else { (ObjectType::PICTURE, ground(x, y)) };
             [tag, r, g, b]
         };
         (0..60 * 20).map(pixel).collect()

@@ -209,7 +209,7 @@ mod tests {
     use super::super::compose::Settings;
     use super::super::flat::TONE;
     use super::super::intent::oklab;
-    use super::super::kinds::Kind;
+    use super::super::kinds::ObjectType;
     use super::super::looks::Looks;
     use super::super::outline::fixed;
     use super::*;
@@ -218,30 +218,30 @@ mod tests {
     use appearance::gamut::Printable;
     use inks::{InkSet, Library};
     use observe::Silent;
-    use protocol::ink::Kind as InkKind;
+    use protocol::ink::Kind;
 
     fn process_inks() -> (Printable, Space) {
-        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == InkKind::Process));
+        let process = InkSet::of(InkSet::default().iter().filter(|ink| ink.kind() == Kind::Process));
         let space = Space::half_angle(SAMPLES);
         (Printable::from_library(&Library::builtin(), &process, &space), space)
     }
 
     fn fit(printable: &Printable, solids: &Solids<'_>, space: &Space) -> Fit {
-        let drawn = Colour::of(&[[Kind::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
+        let drawn = Colour::of(&[[ObjectType::DRAWING, 1, 2, 3]; 4], (4, 1), (4, 1)).unwrap();
         drawn.fit((printable, solids), space.clone(), &Settings::default(), &Silent).unwrap()
     }
 
     /// A ground with a bar of another colour, seven dots wide: what each is printed as in the middle, and the bar at its edge.
-    fn printed(fit: &mut Fit, solids: &Solids<'_>, kind: Kind, [ground, bar]: [[u8; 3]; 2]) -> [u8; 3] {
-        let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
-        let mut number = |kind: Kind, rgb: [u8; 3]| {
+    fn printed(fit: &mut Fit, solids: &Solids<'_>, kind: ObjectType, [ground, bar]: [[u8; 3]; 2]) -> [u8; 3] {
+        let mut colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3])];
+        let mut number = |kind: ObjectType, rgb: [u8; 3]| {
             let plain = colours.iter().position(|&(_, known)| known == rgb);
             plain.unwrap_or_else(|| {
                 colours.push((kind, rgb));
                 colours.len() - 1
             }) as u8
         };
-        let (under, over) = (number(Kind::Drawing, ground), number(kind, bar));
+        let (under, over) = (number(ObjectType::Drawing, ground), number(kind, bar));
         let inside = |at: usize| (20..27).contains(&(at % 60)) && (10..40).contains(&(at / 60));
         let index = (0..60 * 50).map(|at| if inside(at) { over } else { under }).collect();
         let flat = Flat { colours, index };
@@ -264,7 +264,7 @@ mod tests {
         let mut turned = Vec::new();
         for &ground in &colours {
             for &bar in colours.iter().filter(|&&bar| difference(light(bar), light(ground)) > 0.1) {
-                for kind in [Kind::Text, Kind::Drawing] {
+                for kind in [ObjectType::Text, ObjectType::Drawing] {
                     let [under, over, _] = printed(&mut fit, &solids, kind, [ground, bar]);
                     if over != TONE {
                         solid += 1;
@@ -318,12 +318,12 @@ mod tests {
         ] {
             let (nearest, ..) = alone(pale, &mut fit, &solids);
             assert_ne!(nearest, "K", "{pale:?}");
-            let [under, middle, edge] = printed(&mut fit, &solids, Kind::Text, [[255; 3], pale]);
+            let [under, middle, edge] = printed(&mut fit, &solids, ObjectType::Text, [[255; 3], pale]);
             assert_eq!((under, middle), (0, TONE), "{pale:?}");
             assert!(edge != TONE && edge > 0, "{pale:?} has no edge");
         }
         // Pale, but an ink is much nearer than paper.
-        let [_, over, _] = printed(&mut fit, &solids, Kind::Text, [[255; 3], [255, 240, 120]]);
+        let [_, over, _] = printed(&mut fit, &solids, ObjectType::Text, [[255; 3], [255, 240, 120]]);
         assert_eq!(fit.stacks[usize::from(over)].to_string(), "Y");
     }
 
@@ -338,7 +338,7 @@ mod tests {
             ([34, 150, 94], [33, 151, 95]),
             ([90, 122, 153], [90, 122, 153]),
         ] {
-            let [_, over, _] = printed(&mut fit, &solids, Kind::Text, [ground, text]);
+            let [_, over, _] = printed(&mut fit, &solids, ObjectType::Text, [ground, text]);
             assert_eq!(over, TONE, "{text:?} on {ground:?}");
         }
     }
@@ -350,10 +350,10 @@ mod tests {
         let solids = Solids::new(&printable, &space);
         let mut fit = fit(&printable, &solids, &space);
         let colours = vec![
-            (Kind::Picture, [255; 3]),
-            (Kind::Picture, [0; 3]),
-            (Kind::Text, [16, 96, 192]),
-            (Kind::Text, [136, 136, 170]),
+            (ObjectType::Picture, [255; 3]),
+            (ObjectType::Picture, [0; 3]),
+            (ObjectType::Text, [16, 96, 192]),
+            (ObjectType::Text, [136, 136, 170]),
         ];
         let width = 40;
         // Letters of several forms, each with a shadow to the right and below.
@@ -397,7 +397,7 @@ mod tests {
         let (printable, space) = process_inks();
         let solids = Solids::new(&printable, &space);
         let mut fit = fit(&printable, &solids, &space);
-        for kind in [Kind::Text, Kind::Drawing] {
+        for kind in [ObjectType::Text, ObjectType::Drawing] {
             for dark in [[32; 3], [51; 3], [28, 8, 8], [74, 13, 13], [10, 58, 10], [92, 74, 36]] {
                 let [_, over, _] = printed(&mut fit, &solids, kind, [[0; 3], dark]);
                 assert!(over == TONE || fit.stacks[usize::from(over)].to_string() == "K", "{dark:?}: {over}");
@@ -456,7 +456,7 @@ mod tests {
         // A screen shows no difference between black and what is nearly black: it is no white letter in it.
         let black = fit.stacks.iter().position(|stack| stack.to_string() == "K").map(|at| at as u8);
         for nearly in [2, 5, 10] {
-            for kind in [Kind::Text, Kind::Drawing] {
+            for kind in [ObjectType::Text, ObjectType::Drawing] {
                 let printed = printed(&mut fit, &solids, kind, [[0; 3], [nearly; 3]]);
                 assert_eq!(printed.map(Some), [black; 3], "{nearly} on black");
             }

@@ -11,7 +11,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::bits;
+use super::bitplane;
 use sheet::Plane;
 use sheet::forest::Forest;
 
@@ -101,7 +101,7 @@ pub(super) fn silhouette(drawn: &Plane) -> Plane {
         }
     }
     let regions = regions.roots();
-    let mut filled = bits::full(width, length);
+    let mut filled = bitplane::full(width, length);
     for (y, row) in filled.bits.chunks_exact_mut(drawn.stride.max(1)).take(length).enumerate() {
         let here = rows[y]..rows[y + 1];
         for (run, _) in runs[here.clone()].iter().zip(&regions[here]).filter(|(_, root)| **root == 0) {
@@ -130,7 +130,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn plane(width: usize, rows: &[&str]) -> Plane {
-        bits::from_bytes(width, rows.concat().as_bytes(), |byte| byte == b'#')
+        bitplane::from_bytes(width, rows.concat().as_bytes(), |byte| byte == b'#')
     }
 
     /// Walks from the border step by step.
@@ -142,7 +142,7 @@ mod tests {
             .filter(|&(x, y)| x == 0 || y == 0 || x + 1 == width || y + 1 == length)
             .collect();
         while let Some((x, y)) = stack.pop() {
-            if outside[y * width + x] || bits::at(drawn, x, y) {
+            if outside[y * width + x] || bitplane::at(drawn, x, y) {
                 continue;
             }
             outside[y * width + x] = true;
@@ -156,7 +156,7 @@ mod tests {
     fn the_white_of_an_eye_is_inside_and_a_gap_in_the_outline_leaks() {
         let eye = plane(7, &[".......", ".#####.", ".#...#.", ".#.#.#.", ".#...#.", ".#####.", "......."]);
         let filled = silhouette(&eye);
-        assert!((2..5).all(|y| (1..6).all(|x| bits::at(&filled, x, y))) && filled.dots() == 25);
+        assert!((2..5).all(|y| (1..6).all(|x| bitplane::at(&filled, x, y))) && filled.dots() == 25);
         let open = plane(7, &[".......", ".##.##.", ".#...#.", ".#.#.#.", ".#...#.", ".#####.", "......."]);
         assert_eq!(silhouette(&open), open);
         // Outlines hold at corners: the walk outside takes no diagonal steps.
@@ -171,10 +171,10 @@ mod tests {
         ) {
             let random = |i: usize| (i as u32 ^ seed).wrapping_mul(0x9e37_79b1) >> 11;
             let bytes: Vec<u8> = (0..width * length).map(|i| u8::from(random(i) % 100 < dense)).collect();
-            let drawn = bits::from_bytes(width, &bytes, |byte| byte == 1);
+            let drawn = bitplane::from_bytes(width, &bytes, |byte| byte == 1);
             let (filled, outside) = (silhouette(&drawn), flooded(&drawn));
             for (dot, outside) in outside.into_iter().enumerate() {
-                prop_assert_eq!(bits::at(&filled, dot % width, dot / width), !outside, "dot {}", dot);
+                prop_assert_eq!(bitplane::at(&filled, dot % width, dot / width), !outside, "dot {}", dot);
             }
         }
     }

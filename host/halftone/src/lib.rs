@@ -4,11 +4,10 @@
 //! on the paper.
 //! Method: what the art gives wholly to one stack is printed as that stack (`solids`); the tones between are halftoned by one
 //! of these:
-//! - [`Method::Cells`], the default: compact cells and halves of them with error diffusion (`cells`).
-//! - [`Method::Best`]: the same, then exchanged where the eye sees less of it (`search`, `eye`).
-//! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk ([`protocol::walk`]) of the
-//!   document's rectangle, by the rule in `rule` on the mix sampled by `mix`; among solids region by region (`regions`). The
-//!   walk is cut into strips of 16 bands, which are diffused independently. A strip drops a few dots of debt at its end.
+//! - [`Method::Cells`], the default: compact cells and halves of them with error diffusion (`clustered`).
+//! - [`Method::Best`]: the same, then exchanged where the eye sees less of it (`dbs`, `contrast_sensitivity`).
+//! - [`Method::Walk`]: section 4.2 of the 2009 paper: error diffusion along the band walk of the document's rectangle
+//!   (`hilbert`).
 //! - [`Method::Blue`]: the diffusion of the cells on single dots, for process inks alone.
 //!
 //! Cost and memory: see each module; the map itself has one byte a dot. Limits: minimum clusters of 1 to [`LARGEST`] dots.
@@ -25,20 +24,17 @@
               stacks in u8), and checked casts in loops over dots would cost time and hide the arithmetic"
 )]
 
-mod cells;
-pub mod eye;
+mod axis;
+mod clustered;
+pub mod contrast_sensitivity;
+mod dbs;
+mod hilbert;
 pub mod metrics;
-mod mix;
-mod regions;
-mod rule;
-mod search;
 mod solids;
 pub mod thin;
 
 use inks::{Library, Stack};
 use protocol::ink::{Ink, Kind};
-use protocol::walk::{Band, MOST, Tile, Walk};
-use rayon::prelude::*;
 
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::gamut::InkMix;
@@ -53,9 +49,6 @@ pub const LARGEST: u16 = 64;
 
 /// Dots across and rows of the largest map: half as much again as the longest page, so that art for A3 can be cropped.
 pub const LARGEST_MAP: (u16, u16) = (11_640, 11_640);
-
-/// Bands in a strip; the last strip has up to twice as many.
-const STRIP: usize = 16;
 
 /// How the stack of each dot is chosen.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -301,136 +294,18 @@ pub fn halftone(
     let solids = Solids::new(mix, width, length, fixed);
     let points = || {
         let table = settings.reflectance.as_ref()?;
-        Some(eye::Tangent::of_mix(mix, &Space::half_angle(SAMPLES), table).leading())
+        Some(contrast_sensitivity::Tangent::of_mix(mix, &Space::half_angle(SAMPLES), table).leading())
     };
     let cells = |minimum: &[u16], points: Option<&[_]>, searched| {
-        cells::cells(mix, (width, length), minimum, &solids, points, searched, observer)
+        clustered::cells(mix, (width, length), minimum, &solids, points, searched, observer)
     };
     let index = match settings.method {
-        Method::Walk => walked(mix, size, &settings.minimum, &solids, observer),
+        Method::Walk => hilbert::walked(mix, size, &settings.minimum, &solids, observer),
         Method::Cells => cells(&settings.minimum, points().as_deref(), false),
         Method::Best => cells(&settings.minimum, points().as_deref(), true),
         Method::Blue => cells(&vec![1; mix.stacks.len()], None, false),
     };
     Ok(DotMap::new(width, length, mix.stacks.clone(), index)?)
-}
-
-/// The dots by the rule of the paper.
-fn walked(
-    mix: &InkMix,
-    size: (u16, u16),
-    minimum: &[u16],
-    solids: &Solids,
-    observer: &dyn Observer,
-) -> Vec<u8> {
-    let walk = Walk::new(size.0, size.1);
-    let lattice = mix::Lattice::new(mix, &walk);
-    let minimum: Vec<u16> = lattice.stacks.iter().map(|&q| minimum[usize::from(q)]).collect();
-
-    let (width, length) = (usize::from(size.0), usize::from(size.1));
-    let mut index = vec![0u8; width * length];
-    let mut rest = &mut index[..];
-    let bands: Vec<Band> = walk.bands().collect();
-    let count = (bands.len() / STRIP).max(1);
-    let mut strips = Vec::with_capacity(count);
-    for i in 0..count {
-        let bands = &bands[i * STRIP..if i + 1 == count { bands.len() } else { (i + 1) * STRIP }];
-        let height: usize = bands.iter().map(|band| usize::from(band.height)).sum();
-        let (rows, below) = rest.split_at_mut(height * width);
-        rest = below;
-        strips.push((bands, rows));
-    }
-
-    observer.begin("halftone", u64::from(walk.len()));
-    let none = solids.none();
-    strips.into_par_iter().for_each(|(bands, rows)| {
-        let top = bands.first().map_or(0, |band| usize::from(band.y));
-        if !none && solids.any(0..width, top..top + rows.len() / width) {
-            let mut rest = rows;
-            for band in bands {
-                let (rows, below) = rest.split_at_mut(usize::from(band.height) * width);
-                rest = below;
-                regions::band(band, &lattice, &minimum, solids, rows, observer);
-            }
-            return;
-        }
-        let tiles = || bands.iter().flat_map(|band| band.tiles());
-        let dots = bands.iter().map(|band| band.len()).sum();
-        let mut rule = rule::Rule::new(&minimum, dots, rule::ABSENT);
-        let mut source = lattice.along(tiles());
-        let mut paint = Paint {
-            lattice: &lattice,
-            observer,
-            rows,
-            stride: width,
-            top,
-            tiles: tiles(),
-            tile: None,
-            line: [0; MOST + SLACK],
-            filled: 0,
-        };
-        rule::walk(&mut rule, &mut source, &mut paint);
-    });
-    observer.end();
-    index
-}
-
-/// Places beyond the end of a tile that a short run may overwrite.
-const SLACK: usize = 16;
-
-/// Writes runs along the walk to rows of the map, tile by tile.
-struct Paint<'a, T> {
-    lattice: &'a mix::Lattice<'a>,
-    observer: &'a dyn Observer,
-    rows: &'a mut [u8],
-    stride: usize,
-    top: usize,
-    tiles: T,
-    tile: Option<Tile>,
-    /// The dots of the tile in the order of its curve.
-    line: [u8; MOST + SLACK],
-    filled: usize,
-}
-
-impl<T: Iterator<Item = Tile>> rule::Sink for Paint<'_, T> {
-    #[inline(always)]
-    fn run(&mut self, k: usize, dots: u32) {
-        let stack = self.lattice.stacks[k];
-        let mut dots = dots as usize;
-        while dots > 0 {
-            if self.tile.is_none() {
-                self.tile = self.tiles.next();
-            }
-            let Some(tile) = self.tile else { return };
-            let area = usize::from(tile.area());
-            let step = dots.min(area - self.filled);
-            // Most runs are short, so one store of fixed length comes first; the next run overwrites the excess.
-            self.line[self.filled..self.filled + SLACK].fill(stack);
-            if step > SLACK {
-                self.line[self.filled + SLACK..self.filled + step].fill(stack);
-            }
-            self.filled += step;
-            dots -= step;
-            if self.filled == area {
-                self.lay(&tile);
-                (self.tile, self.filled) = (None, 0);
-            }
-        }
-    }
-}
-
-impl<T> Paint<'_, T> {
-    fn lay(&mut self, tile: &Tile) {
-        let shape = self.lattice.shape(tile);
-        let (width, x) = (usize::from(tile.w), usize::from(tile.x));
-        for (row, order) in shape.order.chunks_exact(width).enumerate() {
-            let start = (usize::from(tile.y) - self.top + row) * self.stride + x;
-            for (dot, &position) in self.rows[start..start + width].iter_mut().zip(order) {
-                *dot = self.line[usize::from(position) % MOST];
-            }
-        }
-        self.observer.advance(u64::from(tile.area()));
-    }
 }
 
 #[cfg(test)]

@@ -11,12 +11,12 @@ use protocol::walk::{Tile, Walk};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::cells::field::Field;
-use super::eye::{self, Eye, Tangent};
-use super::mix::Lattice;
+use super::clustered::field::Field;
+use super::contrast_sensitivity::{self, Eye, Tangent};
+use super::hilbert::mix::Lattice;
 use super::solids::Solids;
 use super::thin;
-use super::{HalftoneError, SAMPLES, Settings, TONE, cells, check};
+use super::{HalftoneError, SAMPLES, Settings, TONE, check, clustered};
 use appearance::brdf::Space;
 use appearance::gamut::InkMix;
 use appearance::wide::wide;
@@ -271,7 +271,7 @@ impl Window<'_> {
             #[inline(always)]
             || self.errors(&index, points),
         );
-        let side = |stack: u8| cells::plan::size_of(settings.minimum[usize::from(stack)]);
+        let side = |stack: u8| clustered::plan::size_of(settings.minimum[usize::from(stack)]);
         let free = |at: usize| solids.at(self.corner.0 + at % width, self.corner.1 + at / width) != TONE;
         let tones = (0..index.len()).filter(|&at| !free(at)).count() as u64;
         let flat = shares.and_then(|shares| {
@@ -279,11 +279,14 @@ impl Window<'_> {
             let rare = rare.min_by(|&a, &b| shares[a].total_cmp(&shares[b]))?;
             let (stack, side) = (rare as u8, side(rare as u8));
             let near = 3.0 * side as f64 / f64::from(shares[rare]).sqrt();
-            let (rows, columns) = eye::swing(width, &index, stack, side);
-            Some((eye::peak(width, &index, stack, near, width.min(length) / 4).0, rows.max(columns)))
+            let (rows, columns) = contrast_sensitivity::swing(width, &index, stack, side);
+            Some((
+                contrast_sensitivity::peak(width, &index, stack, near, width.min(length) / 4).0,
+                rows.max(columns),
+            ))
         });
         Measured {
-            seen: eye::errors_seen(&planes, self.eye),
+            seen: contrast_sensitivity::errors_seen(&planes, self.eye),
             tones,
             thin: thin::thin(width, &index, |stack| settings.minimum[usize::from(stack)].into(), free),
             flat,

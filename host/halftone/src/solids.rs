@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::TONE;
-use super::mix::Axis;
+use super::axis::Axis;
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 

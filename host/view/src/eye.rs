@@ -15,7 +15,7 @@
 
 use std::f64::consts::TAU;
 
-use halftone::eye::{degree, sensitivity};
+use halftone::contrast_sensitivity::{degree, sensitivity};
 use observe::Observer;
 use press::preview::{LONGEST_SIDE, Radiance};
 use rayon::prelude::*;

@@ -6,7 +6,7 @@ use super::super::artwork::Artwork;
 use super::super::error::{LayersError, Setting};
 use super::super::size::MM;
 use super::super::white::{self, White};
-use super::super::{bits, distance};
+use super::super::{bitplane, distance};
 use super::settings::{Finish, Settings};
 use super::slot::Slot;
 use sheet::Plane;
@@ -28,7 +28,7 @@ pub(super) fn lay_white(
         // The art's own white becomes part of the bed, so that there is one layer of white.
         if let Some(at) = slots.iter().position(|slot| slot.ink == Ink::White) {
             let drawn = slots.remove(at);
-            bits::add(&mut bed, &drawn.plane);
+            bitplane::add(&mut bed, &drawn.plane);
         }
         let from = format!("white setting: {mode}");
         slots.push(Slot { ink: Ink::White, from, place: Some(0), plane: bed, passes: 1 });
@@ -55,9 +55,12 @@ fn white_bed(
             return Ok(None);
         }
         White::Under => {
-            let mut under = bits::blank(art.width, art.length);
+            let mut under = bitplane::blank(art.width, art.length);
             let clear = |ink: Ink| matches!(ink.kind(), Kind::Finish | Kind::Primer);
-            slots.iter().filter(|slot| !clear(slot.ink)).for_each(|slot| bits::add(&mut under, &slot.plane));
+            slots
+                .iter()
+                .filter(|slot| !clear(slot.ink))
+                .for_each(|slot| bitplane::add(&mut under, &slot.plane));
             under
         }
         White::Opaque => art.drawn.clone(),
@@ -125,16 +128,16 @@ pub(super) fn lay_finish(
         None | Some(Finish::None) => return Ok(()),
         Some(Finish::Artwork) => {
             let mut coat = art.drawn.clone();
-            slots.iter().for_each(|slot| bits::add(&mut coat, &slot.plane));
+            slots.iter().for_each(|slot| bitplane::add(&mut coat, &slot.plane));
             coat
         }
-        Some(Finish::All) => bits::full(art.width, art.length),
+        Some(Finish::All) => bitplane::full(art.width, art.length),
     };
     if !settings.inks.contains(Ink::Finish) {
         return refused(Setting::Finish, "finish is not among the allowed inks");
     }
     match slots.iter_mut().find(|slot| slot.ink == Ink::Finish) {
-        Some(slot) => bits::add(&mut slot.plane, &coat),
+        Some(slot) => bitplane::add(&mut slot.plane, &coat),
         None => slots.push(Slot {
             ink: Ink::Finish,
             from: "finish setting".into(),

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use sheet::Sheet;
 
 fn plane(width: usize, rows: &[&str]) -> Plane {
-    bits::from_bytes(width, rows.concat().as_bytes(), |byte| byte == b'#')
+    bitplane::from_bytes(width, rows.concat().as_bytes(), |byte| byte == b'#')
 }
 
 /// Art of these layers, in pictures of `#`.
@@ -17,7 +17,7 @@ fn art(layers: &[(Ink, &[&str])]) -> Artwork {
     let mut art = Artwork::blank("test", (width, length));
     for &(ink, rows) in layers {
         let plane = plane(width, rows);
-        bits::add(&mut art.drawn, &plane);
+        bitplane::add(&mut art.drawn, &plane);
         let (name, shape) = (ink.name().to_owned(), Shape::Solid(plane));
         art.layers.push(Layer { ink, name, place: None, shape });
     }
@@ -95,7 +95,7 @@ fn metal_on_process_ink_knocks_it_out_and_not_the_white_beneath() {
 fn art_in_white_alone_names_the_remedy() {
     let mut art = Artwork::blank("ghost", (8, 8));
     assert!(refused(&art, &with(|_| ())).contains("ghost is white or transparent everywhere"));
-    art.opaque = Some(bits::full(8, 8));
+    art.opaque = Some(bitplane::full(8, 8));
     assert!(refused(&art, &with(|_| ())).contains("ghost is drawn in nothing but white"));
     let composed = composed(&art, &with(|s| s.white = Some(White::Alpha)));
     assert_eq!(composed.dots.index().iter().filter(|&&dot| dot > 0).count(), 64);
@@ -116,7 +116,7 @@ fn white_goes_where_its_mode_says() {
     assert_eq!(white(&eye, White::Opaque), 18, "finish is drawn, too");
     assert!(refused(&eye, &with(|s| s.white = Some(White::Alpha))).contains("has no transparency"));
     assert!(refused(&eye, &with(|s| s.white = Some(White::Reserved))).contains("230,230,230"));
-    eye.opaque = Some(bits::full(7, 7));
+    eye.opaque = Some(bitplane::full(7, 7));
     assert_eq!(white(&eye, White::Alpha), 49);
     let none = art(&[(Ink::White, &["##"]), (Black, &[".#"])]);
     assert_eq!(dots(&composed(&none, &with(|s| s.white = Some(White::None)))), ["substrate", "K"]);
@@ -233,7 +233,7 @@ fn colours_keep_off_the_dots_of_reserved_inks_and_white_paper_stays_bare() {
     let rgb = (0..width * length).flat_map(|dot| if dot % width < 32 { [255; 3] } else { [120, 20, 30] });
     art.colour = Some(Colour { width, height: length, rgb: rgb.collect(), ..Colour::default() });
     let gold: Vec<u8> = (0..width * length).map(|dot| u8::from(dot % width >= 64)).collect();
-    let shape = Shape::Solid(bits::from_bytes(width, &gold, |byte| byte == 1));
+    let shape = Shape::Solid(bitplane::from_bytes(width, &gold, |byte| byte == 1));
     art.layers.push(Layer { ink: MetallicGold, name: "gold".into(), place: None, shape });
     let stacks = dots(&composed(&art, &with(|_| ())));
     for (dot, stack) in stacks.iter().enumerate() {
@@ -257,7 +257,7 @@ fn naive(layers: &[Layer], order: &[Ink], passes: &[(Ink, u8)], x: usize, y: usi
     for &ink in order {
         let layer = layers.iter().find(|layer| layer.ink == ink).unwrap();
         let Shape::Solid(plane) = &layer.shape else { unreachable!() };
-        if bits::at(plane, x, y) {
+        if bitplane::at(plane, x, y) {
             if ink.kind() == Kind::Metallic {
                 stack.retain(|below| below.kind() != Kind::Process);
             }
@@ -279,7 +279,7 @@ proptest! {
         for (at, &ink) in inks.iter().enumerate() {
             let random = |i: usize| (i as u32 ^ seed.rotate_left(at as u32)).wrapping_mul(0x9e37_79b1) >> 11;
             let bytes: Vec<u8> = (0..width * length).map(|i| u8::from(random(i) % 100 < dense)).collect();
-            let mut plane = bits::from_bytes(width, &bytes, |byte| byte == 1);
+            let mut plane = bitplane::from_bytes(width, &bytes, |byte| byte == 1);
             plane.bits[0] |= 0x80;
             art.layers.push(Layer { ink, name: ink.name().into(), place: None, shape: Shape::Solid(plane) });
         }

@@ -25,11 +25,11 @@ const LIGHT: Treatment = Treatment::Shape(Shape {
 /// Paper, black, then a colour of this kind with this treatment, at all dots that satisfy `is`.
 fn drawn(
     (width, length): (usize, usize),
-    kind: Kind,
+    kind: ObjectType,
     treatment: Treatment,
     is: impl Fn(usize, usize) -> bool,
 ) -> Vec<u8> {
-    let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (kind, [128; 3])];
+    let colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3]), (kind, [128; 3])];
     let index = (0..width * length).map(|at| 2 * u8::from(is(at % width, at / width))).collect();
     fixed(
         &Flat { colours, index },
@@ -43,10 +43,10 @@ fn drawn(
 #[test]
 fn a_pale_stroke_on_ink_is_paper_and_beside_paper_keeps_its_rim() {
     let colours = vec![
-        (Kind::Picture, [255; 3]),
-        (Kind::Picture, [0; 3]),
-        (Kind::Text, [235; 3]),
-        (Kind::Drawing, [60; 3]),
+        (ObjectType::Picture, [255; 3]),
+        (ObjectType::Picture, [0; 3]),
+        (ObjectType::Text, [235; 3]),
+        (ObjectType::Drawing, [60; 3]),
     ];
     for (bar, fill) in [(0..60, Some(PAPER)), (10..60, None), (0..0, None)] {
         let index = (0..60 * 50).map(|at| match (at % 60, at / 60) {
@@ -75,11 +75,11 @@ fn a_pale_stroke_on_ink_is_paper_and_beside_paper_keeps_its_rim() {
 #[test]
 fn pale_text_on_a_shading_with_more_ink_than_paper_is_paper() {
     for (kind, ground, printed) in [
-        (Kind::Text, INKED, [PAPER, PAPER]),
-        (Kind::Text, TONE, [7, TONE]),
-        (Kind::Drawing, INKED, [TONE, TONE]),
+        (ObjectType::Text, INKED, [PAPER, PAPER]),
+        (ObjectType::Text, TONE, [7, TONE]),
+        (ObjectType::Drawing, INKED, [TONE, TONE]),
     ] {
-        let colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3]), (kind, [235; 3])];
+        let colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3]), (kind, [235; 3])];
         let is_stroke = |at: usize| (20..27).contains(&(at % 60)) && (4..40).contains(&(at / 60));
         let index = (0..60 * 50).map(|at| if is_stroke(at) { 2 } else { ground }).collect();
         let fixed = fixed(
@@ -98,10 +98,10 @@ fn pale_text_on_a_shading_with_more_ink_than_paper_is_paper() {
 fn a_step_of_a_shading_is_screened_and_a_line_between_areas_is_not() {
     for (inner, step) in [([200; 3], true), ([90; 3], false), ([160, 160, 20], false)] {
         let colours = vec![
-            (Kind::Picture, [255; 3]),
-            (Kind::Picture, [0; 3]),
-            (Kind::Drawing, [160; 3]),
-            (Kind::Drawing, inner),
+            (ObjectType::Picture, [255; 3]),
+            (ObjectType::Picture, [0; 3]),
+            (ObjectType::Drawing, [160; 3]),
+            (ObjectType::Drawing, inner),
         ];
         // A square of 200 dots on black, with a border of seven.
         let index = (0..300 * 300)
@@ -125,7 +125,7 @@ fn short_stripes_are_printed_like_long_ones() {
         let is = move |x: usize, y: usize| {
             y % 30 < 14 && lengths.get(y / 30).is_some_and(|&long| (10..10 + long).contains(&x))
         };
-        drawn((300, 150), Kind::Drawing, DARK, is)
+        drawn((300, 150), ObjectType::Drawing, DARK, is)
     };
     let (alone, beside) = (stripes(&[100]), stripes(&[100, 200, 200]));
     assert_eq!(alone[7 * 300 + 50], 7);
@@ -139,10 +139,10 @@ fn a_thin_stroke_is_solid_and_a_wide_one_keeps_its_rim() {
     // A drawing no larger than a letter is one.
     let small = SMALL as usize;
     for (kind, most, long) in [
-        (Kind::Text, LETTER, 50),
-        (Kind::Drawing, LETTER, small),
-        (Kind::Text, LETTER, small + 1),
-        (Kind::Drawing, STROKE, small + 1),
+        (ObjectType::Text, LETTER, 50),
+        (ObjectType::Drawing, LETTER, small),
+        (ObjectType::Text, LETTER, small + 1),
+        (ObjectType::Drawing, STROKE, small + 1),
     ] {
         let most = usize::from(most);
         for (wide, solid) in [(most - 1, true), (most, false)] {
@@ -177,7 +177,7 @@ fn a_small_drawing_unlike_its_solid_is_screened_within_its_rim() {
         rank: 9,
     });
     let cut = |kind| drawn((60, 50), kind, unlike, |x, _| (5..17).contains(&x))[25 * 60..26 * 60].to_vec();
-    let (drawing, text) = (cut(Kind::Drawing), cut(Kind::Text));
+    let (drawing, text) = (cut(ObjectType::Drawing), cut(ObjectType::Text));
     assert_eq!([4, 5, 6, 15, 16, 17].map(|x| drawing[x]), [0, 7, TONE, TONE, 7, 0]);
     assert_eq!([4, 5, 6, 15, 16, 17].map(|x| text[x]), [0, 7, 7, 7, 7, 0]);
 }
@@ -193,10 +193,10 @@ fn a_wide_shape_has_its_rim_beside_paper_and_what_would_fray_its_edge() {
         (DARK, false),
     ] {
         let colours = vec![
-            (Kind::Picture, [255; 3]),
-            (Kind::Picture, [0; 3]),
-            (Kind::Drawing, [128; 3]),
-            (Kind::Drawing, [60; 3]),
+            (ObjectType::Picture, [255; 3]),
+            (ObjectType::Picture, [0; 3]),
+            (ObjectType::Drawing, [128; 3]),
+            (ObjectType::Drawing, [60; 3]),
         ];
         let index = (0..300 * 200).map(|at| if at % 300 < 150 { 2 } else { 3 }).collect();
         let own = Treatment::Shape(Shape {
@@ -220,10 +220,10 @@ fn a_wide_shape_has_its_rim_beside_paper_and_what_would_fray_its_edge() {
 #[test]
 fn a_piece_of_a_fill_is_printed_like_the_fill() {
     let colours = vec![
-        (Kind::Picture, [255; 3]),
-        (Kind::Picture, [0; 3]),
-        (Kind::Drawing, [128; 3]),
-        (Kind::Drawing, [60; 3]),
+        (ObjectType::Picture, [255; 3]),
+        (ObjectType::Picture, [0; 3]),
+        (ObjectType::Drawing, [128; 3]),
+        (ObjectType::Drawing, [60; 3]),
     ];
     let long = SMALL as usize + 1;
     for (gap, piece) in [(3, TONE), (0, 7)] {
@@ -252,10 +252,10 @@ fn a_piece_of_a_fill_is_printed_like_the_fill() {
 #[test]
 fn a_pale_line_between_colours_is_decided_by_both_sides_of_it() {
     let colours = vec![
-        (Kind::Picture, [255; 3]),
-        (Kind::Picture, [0; 3]),
-        (Kind::Drawing, [190; 3]),
-        (Kind::Drawing, [240; 3]),
+        (ObjectType::Picture, [255; 3]),
+        (ObjectType::Picture, [0; 3]),
+        (ObjectType::Drawing, [190; 3]),
+        (ObjectType::Drawing, [240; 3]),
     ];
     let printed = |[left, right]: [u8; 2], wide: usize| -> Vec<u8> {
         // The other half of its length lies between the same colours the other way round.
@@ -286,13 +286,13 @@ fn letters_of_a_word_are_printed_alike() {
         [([limit, limit - 1, limit - 2, limit - 3], true), ([limit - 1, limit, limit + 1, limit + 2], false)]
     {
         let stroke = |x: usize| (x % 60 < widths[x / 60 % 4]).then_some(x / 60);
-        let fixed = drawn((240, 60), Kind::Text, DARK, |x, _| stroke(x).is_some());
+        let fixed = drawn((240, 60), ObjectType::Text, DARK, |x, _| stroke(x).is_some());
         for x in (0..240).filter(|&x| stroke(x).is_some()) {
             let rim = x % 60 == 0 || x % 60 + 1 == widths[x / 60];
             assert_eq!(fixed[30 * 240 + x], if solid || rim { 7 } else { TONE }, "{widths:?} at {x}");
         }
         // Lines are decided by themselves.
-        let lines = drawn((240, SMALL as usize + 1), Kind::Drawing, DARK, |x, _| {
+        let lines = drawn((240, SMALL as usize + 1), ObjectType::Drawing, DARK, |x, _| {
             x % 60 < usize::from(STROKE) - x / 60 % 2
         });
         assert_eq!((lines[30 * 240 + 4], lines[30 * 240 + 64]), (TONE, 7));
@@ -306,26 +306,26 @@ fn a_pale_letter_keeps_its_rim_and_a_pale_hairline_its_edge() {
         drawn((20, long), kind, LIGHT, |x, _| (5..5 + wide).contains(&x))[20..40].to_vec()
     };
     let rim = [0, 7, TONE, TONE, TONE, TONE, 7, 0];
-    for (kind, long) in [(Kind::Text, 20), (Kind::Drawing, 20), (Kind::Drawing, long)] {
+    for (kind, long) in [(ObjectType::Text, 20), (ObjectType::Drawing, 20), (ObjectType::Drawing, long)] {
         assert_eq!(cut(kind, long, 6)[4..12], rim, "{kind:?}, {long}");
     }
-    assert_eq!(cut(Kind::Drawing, long, 12)[4..8], [0, TONE, TONE, TONE], "a wide one is a tint");
+    assert_eq!(cut(ObjectType::Drawing, long, 12)[4..8], [0, TONE, TONE, TONE], "a wide one is a tint");
     for (wide, middle) in (1..=usize::from(HAIR)).zip([5, 5, 6, 6]) {
-        let line = cut(Kind::Drawing, long, wide);
+        let line = cut(ObjectType::Drawing, long, wide);
         let printed: Vec<usize> = (0..20).filter(|&x| line[x] != 0).collect();
         assert!(printed == [middle] && line[middle] == 7, "{wide}: {printed:?}");
     }
     // A cross is whole.
-    let cross = drawn((long, long), Kind::Drawing, LIGHT, |x, y| x / 2 == 30 || y / 2 == 20);
+    let cross = drawn((long, long), ObjectType::Drawing, LIGHT, |x, y| x / 2 == 30 || y / 2 == 20);
     let row = |y: usize| (0..long).filter(|x| cross[y * long + x] == 7).count();
     assert_eq!([row(39), row(40), row(41)], [1, long, 2]);
     // On a shading, and on a tint that is like it, it is no line.
     for (ground, beside) in [(255, TONE), (3, TONE)] {
         let colours = vec![
-            (Kind::Picture, [255; 3]),
-            (Kind::Picture, [0; 3]),
-            (Kind::Drawing, [230; 3]),
-            (Kind::Drawing, [238; 3]),
+            (ObjectType::Picture, [255; 3]),
+            (ObjectType::Picture, [0; 3]),
+            (ObjectType::Drawing, [230; 3]),
+            (ObjectType::Drawing, [238; 3]),
         ];
         let index = (0..20 * long).map(|at| if (5..7).contains(&(at % 20)) { 2 } else { ground }).collect();
         let flat = Flat { colours, index };
@@ -335,10 +335,10 @@ fn a_pale_letter_keeps_its_rim_and_a_pale_hairline_its_edge() {
     }
     // A soft edge lies beside ink.
     let colours = vec![
-        (Kind::Picture, [255; 3]),
-        (Kind::Picture, [0; 3]),
-        (Kind::Drawing, [230; 3]),
-        (Kind::Drawing, [60; 3]),
+        (ObjectType::Picture, [255; 3]),
+        (ObjectType::Picture, [0; 3]),
+        (ObjectType::Drawing, [230; 3]),
+        (ObjectType::Drawing, [60; 3]),
     ];
     let index = (0..40 * long).map(|at| [3, 3, 2, 2, 0].get(at % 40 / 2).copied().unwrap_or(0)).collect();
     let flat = Flat { colours, index };
@@ -361,7 +361,7 @@ fn a_pale_hairline_has_no_gap() {
             let (x, y) = (x as f64 + 0.5 - SIDE as f64 / 2.0, y as f64 + 0.5 - SIDE as f64 / 2.0);
             (x * sin - y * cos).abs() < 1.5 && (x * cos + y * sin).abs() < 90.0
         };
-        let fixed = drawn((SIDE, SIDE), Kind::Drawing, LIGHT, inside);
+        let fixed = drawn((SIDE, SIDE), ObjectType::Drawing, LIGHT, inside);
         let dots: Vec<usize> = (0..SIDE * SIDE).filter(|&at| fixed[at] == 7).collect();
         let middle = |&&at: &&usize| (at % SIDE).abs_diff(SIDE / 2) + (at / SIDE).abs_diff(SIDE / 2);
         let first = *dots.iter().min_by_key(middle).unwrap();
@@ -386,10 +386,10 @@ fn a_pale_hairline_has_no_gap() {
 /// A letter of treatment [`DARK`] or [`LIGHT`] on a ground that is printed so, `share` of its border on it and the rest on paper.
 fn on_a_ground(letter: Treatment, wide: usize, ground: Treatment, share: f64) -> Vec<u8> {
     let colours = vec![
-        (Kind::Picture, [255; 3]),
-        (Kind::Picture, [0; 3]),
-        (Kind::Text, [128; 3]),
-        (Kind::Drawing, [60; 3]),
+        (ObjectType::Picture, [255; 3]),
+        (ObjectType::Picture, [0; 3]),
+        (ObjectType::Text, [128; 3]),
+        (ObjectType::Drawing, [60; 3]),
     ];
     let index = (0..60 * 60)
         .map(|at| match (at % 60, at / 60) {
@@ -444,8 +444,8 @@ fn what_lies_on_its_own_solid_is_printed_in_the_next() {
 #[test]
 fn the_bands_of_a_shading_are_one_wide_shape() {
     // Bands of three dots, each a little lighter.
-    let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
-    colours.extend((0..20).map(|step| (Kind::Drawing, [40 + 4 * step; 3])));
+    let mut colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3])];
+    colours.extend((0..20).map(|step| (ObjectType::Drawing, [40 + 4 * step; 3])));
     let index = (0..60 * 40).map(|at| 2 + (at % 60 / 3) as u8).collect();
     let mut treatments = vec![Treatment::Solid(0), Treatment::Solid(1)];
     treatments.extend([DARK; 20]);
@@ -460,8 +460,8 @@ fn the_bands_of_a_shading_are_one_wide_shape() {
 #[test]
 fn a_letter_that_is_filled_with_a_shading_is_screened_and_a_fine_one_has_one_colour() {
     let steps = 24;
-    let mut colours = vec![(Kind::Picture, [255; 3]), (Kind::Picture, [0; 3])];
-    colours.extend((0..steps).map(|at| (Kind::Text, [255 - 8 * at, 120, 8 * at])));
+    let mut colours = vec![(ObjectType::Picture, [255; 3]), (ObjectType::Picture, [0; 3])];
+    colours.extend((0..steps).map(|at| (ObjectType::Text, [255 - 8 * at, 120, 8 * at])));
     let Treatment::Shape(dark) = DARK else { panic!() };
     // One half in one solid, the other in another.
     let treatment =

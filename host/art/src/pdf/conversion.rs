@@ -127,7 +127,7 @@ mod tests {
     use proptest::prelude::*;
     use testing::needs::ghostscript;
 
-    use super::super::super::kinds::{self, Kind};
+    use super::super::super::kinds::{self, ObjectType};
     use super::super::{Interpreter, command, order};
     use super::*;
     use crate::process::{Process, limit};
@@ -177,7 +177,7 @@ mod tests {
             }
             for (pixels, [c, m, y, k]) in drawn(&marks)[4 * 240..].chunks(10).zip(asked) {
                 let [tag, rgb @ ..] = pixels[5];
-                prop_assert_eq!(Kind::of(tag), Kind::Drawing);
+                prop_assert_eq!(ObjectType::of(tag), ObjectType::Drawing);
                 for (found, ink) in rgb.into_iter().zip([c, m, y]) {
                     let wanted = 255.0 * (1.0 - ink - k).max(0.0);
                     prop_assert!((f64::from(found) - wanted).abs() < 10.0, "{found} for {ink} with {k} of K");
@@ -198,11 +198,11 @@ mod tests {
              gsave 100 0 translate 10 10 scale 1 1 8 [1 0 0 1 0 0] { <000000ff> } false 4 colorimage grestore",
         );
         let row = &pixels[5 * 240..6 * 240];
-        let [drawing, text] = [Kind::DRAWING, Kind::TEXT];
+        let [drawing, text] = [ObjectType::DRAWING, ObjectType::TEXT];
         assert_eq!([row[5], row[15]], [[drawing, 0, 255, 255], [drawing, 255, 255, 0]]);
         assert_eq!([row[25], row[35]], [[drawing, 255, 0, 0], [drawing, 0, 0, 0]]);
         assert!(row[40..60].contains(&[text, 204, 204, 204]), "{:?}", &row[40..60]);
-        assert_eq!(row[105][0], Kind::PICTURE);
+        assert_eq!(row[105][0], ObjectType::PICTURE);
         assert!(row[105][1..].iter().all(|&level| level > 20), "{:?}", row[105]);
         // Of these alone nothing tells the order.
         let dark = drawn("0 setgray 0 0 240 10 rectfill");

@@ -31,7 +31,7 @@ fn an_eps_file_has_the_size_and_the_place_of_its_bounding_box() {
         let art = read(&[bench.write(name, bytes)], &Options::default());
         assert_eq!((art.width, art.length), size, "{name}");
         assert!(near(art.drawn.dots(), 300.0 * 100.0, 0.03), "{name}: {}", art.drawn.dots());
-        let left = (0..art.width).find(|&x| (0..art.length).any(|y| bits::at(&art.drawn, x, y))).unwrap();
+        let left = (0..art.width).find(|&x| (0..art.length).any(|y| bitplane::at(&art.drawn, x, y))).unwrap();
         // Of the finer box half a point is cut off at the left.
         assert!(left.abs_diff(if name == "fine.eps" { 96 } else { 100 }) <= 1, "{name}: {left}");
     }

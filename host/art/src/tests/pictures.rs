@@ -43,7 +43,7 @@ proptest! {
             let Shape::Solid(plane) = &layer.shape else { panic!("tones") };
             for (dot, &ink) in ink.iter().enumerate() {
                 let (x, y) = (dot % width as usize, dot / width as usize);
-                prop_assert_eq!(bits::at(plane, x, y), ink, "{} at ({}, {})", layer.name, x, y);
+                prop_assert_eq!(bitplane::at(plane, x, y), ink, "{} at ({}, {})", layer.name, x, y);
             }
         }
     }

@@ -18,7 +18,7 @@ fn plane(content: &str) -> Plane {
 fn across(plane: &Plane, along: usize, column: bool) -> usize {
     let count = if column { plane.length } else { plane.width };
     (0..count)
-        .filter(|&at| if column { bits::at(plane, along, at) } else { bits::at(plane, at, along) })
+        .filter(|&at| if column { bitplane::at(plane, along, at) } else { bitplane::at(plane, at, along) })
         .count()
 }
 

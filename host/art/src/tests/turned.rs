@@ -48,7 +48,7 @@ fn shown(art: &Artwork, wanted: &str) -> String {
     let (across, down) = (wanted.split('/').next().unwrap().len(), wanted.split('/').count());
     let at = |x: usize, y: usize| {
         let (x, y) = ((2 * x + 1) * art.width / (2 * across), (2 * y + 1) * art.length / (2 * down));
-        if bits::at(&art.drawn, x, y) { '#' } else { '.' }
+        if bitplane::at(&art.drawn, x, y) { '#' } else { '.' }
     };
     (0..down).map(|y| (0..across).map(|x| at(x, y)).collect::<String>()).collect::<Vec<_>>().join("/")
 }

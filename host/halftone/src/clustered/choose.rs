@@ -12,7 +12,7 @@
 
 use super::cell::{Cell, fits_half};
 use super::field::LANES;
-use crate::search::Point;
+use crate::dbs::Point;
 use appearance::weights::ONE;
 
 /// What a stack's own debt weighs, against the mean square of the distance of stacks from the mean of the page: with less, tones

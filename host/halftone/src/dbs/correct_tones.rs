@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use super::moves::{dot, minus, plus, times};
 use super::{BLOCK, FIXED, Part, Place, Point, REACH};
-use crate::cells::cell::Cell;
+use crate::clustered::cell::Cell;
 
 /// How often all cells are looked at: each pass changes stacks that differ by a quarter of the most or more.
 const PASSES: usize = 8;
@@ -37,7 +37,7 @@ struct Gift {
 impl Part<'_> {
     /// Brings tones to what is asked by changes in these rows of blocks, of which the last part of a page may have none.
     #[inline(always)]
-    pub(super) fn settle(&mut self, rows: Range<usize>) {
+    pub(super) fn correct_tones(&mut self, rows: Range<usize>) {
         if rows.is_empty() {
             return;
         }

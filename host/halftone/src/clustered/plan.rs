@@ -20,12 +20,7 @@ use super::super::TONE;
 use super::cell::fits_half;
 use super::evenness::{Evenness, varying};
 use super::field::Field;
-
-/// Side of a block in dots. The sides of cells are its divisors.
-pub(crate) const BLOCK: usize = 24;
-
-/// All dots of a row of a block.
-const FULL: u32 = (1 << BLOCK) - 1;
+use super::mask::{BLOCK, FULL, Mask, bits, span};
 
 /// Sides a cell can have.
 const SIZES: [usize; 8] = [1, 2, 3, 4, 6, 8, 12, 24];
@@ -44,9 +39,6 @@ pub(super) fn halved_size_of(minimum: u16) -> usize {
     };
     SIZES.into_iter().min_by_key(|&size| dots(size)).unwrap_or(BLOCK)
 }
-
-/// Some dots of a block, row by row, the leftmost in the lowest bit.
-pub(super) type Mask = [u32; BLOCK];
 
 pub(super) struct Block {
     /// Side of its cells.
@@ -423,19 +415,6 @@ impl Plan {
             }
         }
     }
-}
-
-/// Bits of so many dots from `left`.
-fn span(left: usize, dots: usize) -> u32 {
-    (FULL >> (BLOCK - dots)) << left
-}
-
-pub(super) fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let bit = mask.trailing_zeros();
-        mask &= mask.wrapping_sub(1);
-        (bit < u32::BITS).then_some(bit as usize)
-    })
 }
 
 /// The tones 4-connected to a dot within its cell.

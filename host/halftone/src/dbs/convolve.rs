@@ -8,7 +8,7 @@
 
 use super::kernel::Kernel;
 use super::{BLOCK, Point, REACH, Zone};
-use crate::cells::cell::Cell;
+use crate::clustered::cell::Cell;
 
 /// Cells of which sums and errors take 8 kB. The loop over them is long enough to be compiled to vectors.
 const BESIDE: usize = 256;

@@ -2,7 +2,7 @@
 //!
 //! Problem: runs along a walk hold their minimum in area but may be one dot thin, and the walk locks on flat tones.
 //! Method: the page is cut into square cells, each as large as its stacks ask for ([`plan`]); each prints one stack, or two
-//! in halves that hold them ([`cell`]), chosen ([`choose`]) in error diffusion of the whole vector of stacks ([`diffuse`]) on
+//! in halves that hold them ([`cell`]), chosen ([`choose`]) in error diffusion of the whole vector of stacks ([`error_diffusion`]) on
 //! its exact mean mixture ([`field`]). Dots the
 //! document gives wholly to one stack are printed as that stack, and no debt crosses them. Strips of [`STRIP`] block
 //! rows are diffused at the same time; the page alone decides where they are cut, so the dots do not depend on the
@@ -15,23 +15,25 @@ mod arrange;
 mod border;
 pub(super) mod cell;
 mod choose;
-mod diffuse;
+mod error_diffusion;
 mod evenness;
 pub(super) mod field;
+pub(super) mod mask;
 pub(super) mod plan;
 
 use rayon::prelude::*;
 
-use super::search::{self, Point};
+use super::dbs::{self, Point};
 use super::solids::Solids;
 use appearance::gamut::InkMix;
 use appearance::wide::wide;
 use observe::Observer;
 
 use choose::Metric;
-use diffuse::{Strip, Target};
+use error_diffusion::{Strip, Target};
 use field::Field;
-use plan::{BLOCK, Plan};
+use mask::BLOCK;
+use plan::Plan;
 
 /// Block rows in a strip: A4 is six strips that are nearly equal.
 const STRIP: usize = 45;
@@ -44,7 +46,7 @@ const ABOVE: usize = 4;
 
 /// Halftones a checked mixture on `width` x `height` dots: a stack of the mixture for each. `minimum` is the smallest
 /// cluster of each stack. With a point for each stack, their distances decide which may stand in for another, and `searched` exchanges cells to
-/// lessen the error seen ([`search`]).
+/// lessen the error seen ([`dbs`]).
 pub(super) fn cells(
     mix: &InkMix,
     (width, height): (usize, usize),
@@ -89,7 +91,7 @@ pub(super) fn cells(
     });
     plan.print_fragments(&mut index);
     if let Some(points) = points.filter(|_| searched) {
-        search::search(&field, &plan, &points, &least, &mut index);
+        dbs::search(&field, &plan, &points, &least, &mut index);
     }
     observer.end();
     index

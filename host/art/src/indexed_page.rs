@@ -4,12 +4,12 @@
 //! did. Most pages that are not black alone are text in a few colours.
 //! Method: what draws a pixel and its colour have a number in the order in which they are first met; bare paper is 0. A
 //! page stays numbered while it has no tones of pictures and no more colours than a palette ([`Flat`]) holds.
-//! Cost: 0.1 ns a pixel of bare paper, 2 ns others. Limits: of a tag nothing is kept but its [`Kind`].
+//! Cost: 0.1 ns a pixel of bare paper, 2 ns others. Limits: of a tag nothing is kept but its [`ObjectType`].
 
 use std::collections::HashMap;
 
 use super::flat::{Flat, INKED, WHITE, split};
-use super::kinds::{BYTES, Kind};
+use super::kinds::{BYTES, ObjectType};
 use super::window::Window;
 use sheet::Plane;
 
@@ -20,14 +20,14 @@ type Pixel = [u8; BYTES];
 const BLOCK: usize = 16;
 /// Pixels whose numbers are found without a search.
 const CACHED: usize = 256;
-const PAPER: (Kind, [u8; 3]) = (Kind::Picture, [255; 3]);
-const BLACK: (Kind, [u8; 3]) = (Kind::Drawing, [0; 3]);
+const PAPER: (ObjectType, [u8; 3]) = (ObjectType::Picture, [255; 3]);
+const BLACK: (ObjectType, [u8; 3]) = (ObjectType::Drawing, [0; 3]);
 
 /// The numbers of a page's pixels, row by row from the top.
 pub(super) struct Numbered {
     /// What draws in each colour, and the colour.
-    colours: Vec<(Kind, [u8; 3])>,
-    numbers: HashMap<(Kind, [u8; 3]), u8>,
+    colours: Vec<(ObjectType, [u8; 3])>,
+    numbers: HashMap<(ObjectType, [u8; 3]), u8>,
     /// By a hash, the last pixel with it and its number.
     cache: Vec<(Pixel, u8)>,
     index: Vec<u8>,
@@ -105,11 +105,11 @@ impl Numbered {
     }
 
     /// The number of a colour; `None` for a tone and if there are too many.
-    fn number(&mut self, key: (Kind, [u8; 3])) -> Option<u8> {
+    fn number(&mut self, key: (ObjectType, [u8; 3])) -> Option<u8> {
         if let Some(&number) = self.numbers.get(&key) {
             return Some(number);
         }
-        let tone = key.0 == Kind::Picture && key.1 != [255; 3] && key.1 != [0; 3];
+        let tone = key.0 == ObjectType::Picture && key.1 != [255; 3] && key.1 != [0; 3];
         let number = u8::try_from(self.colours.len()).ok().filter(|&number| !tone && number < INKED)?;
         self.numbers.insert(key, number);
         self.colours.push(key);
@@ -122,10 +122,10 @@ impl Numbered {
 
     /// The first pixels of the page, with tags.
     pub fn expand(&self, pixels: &mut [u8]) {
-        let pixel = |&(kind, [r, g, b]): &(Kind, [u8; 3])| match kind {
-            Kind::Text => [Kind::TEXT, r, g, b],
-            Kind::Drawing => [Kind::DRAWING, r, g, b],
-            Kind::Picture => [Kind::PICTURE, r, g, b],
+        let pixel = |&(kind, [r, g, b]): &(ObjectType, [u8; 3])| match kind {
+            ObjectType::Text => [ObjectType::TEXT, r, g, b],
+            ObjectType::Drawing => [ObjectType::DRAWING, r, g, b],
+            ObjectType::Picture => [ObjectType::PICTURE, r, g, b],
         };
         let table: Vec<Pixel> = self.colours.iter().map(pixel).collect();
         for (pixel, &number) in pixels.as_chunks_mut::<BYTES>().0.iter_mut().zip(&self.index) {

@@ -18,7 +18,8 @@ use super::border::{Usual, begin};
 use super::cell::Cell;
 use super::choose::{Chooser, Metric, NOISE, disturbing, halves_lock, textured};
 use super::field::{Field, LANES, Row};
-use super::plan::{BLOCK, Block, Plan};
+use super::mask::BLOCK;
+use super::plan::{Block, Plan};
 
 /// Part of an absent stack's debt that each cell hands to the stacks present.
 const FORGET: f32 = 1.0 / 512.0;

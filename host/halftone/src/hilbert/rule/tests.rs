@@ -255,7 +255,8 @@ proptest! {
 /// The whole halftone of a mix without solids is the literal rule along the walk, at one dot a pixel.
 #[test]
 fn a_mix_without_solids_is_walked_by_the_literal_rule() {
-    use crate::{Method, Settings, halftone, mix::Lattice};
+    use crate::hilbert::mix::Lattice;
+    use crate::{Method, Settings, halftone};
     use appearance::weights::{ONE, WeightMaps, quantise};
     use inks::Stack;
     use protocol::{ink::Ink, walk::Walk};

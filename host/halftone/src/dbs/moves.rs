@@ -11,7 +11,7 @@
 
 use super::lines::Around;
 use super::{FIXED, NEAR, Part, Place, Point};
-use crate::cells::cell::Cell;
+use crate::clustered::cell::Cell;
 
 /// No cell.
 const NONE: usize = usize::MAX;

@@ -8,10 +8,10 @@
 
 use std::ops::Range;
 
-use super::super::mix::Axis;
 use super::super::solids::Solids;
 use super::evenness::{Evenness, FLAT};
-use super::plan::{BLOCK, Mask, bits};
+use super::mask::{BLOCK, Mask, bits};
+use crate::axis::Axis;
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 

@@ -7,7 +7,7 @@ use super::*;
 fn strips_leave_no_seams() {
     let mix = plain(1, 1, 3, |_, _| vec![0.85, 0.05, 0.1]);
     let (width, height) = (2400, 1600);
-    let seam = super::super::STRIP * super::super::plan::BLOCK;
+    let seam = super::super::STRIP * super::super::mask::BLOCK;
     let dots = cells(&mix, (width, height), &[9, 9, 9], None, &Silent);
     let tone = |row: usize| {
         let rows = &dots[row * width..(row + 24) * width];
@@ -24,7 +24,7 @@ fn strips_leave_no_seams() {
 #[test]
 fn faint_tones_begin_where_they_begin() {
     let mix = plain(1, 1, 2, |_, _| vec![0.98, 0.02]);
-    let seam = super::super::STRIP * super::super::plan::BLOCK;
+    let seam = super::super::STRIP * super::super::mask::BLOCK;
     let (width, height) = (4800, seam + 72);
     let dots = cells(&mix, (width, height), &[9, 9], None, &Silent);
     for top in [0, 24, seam - 24, seam, seam + 24] {
@@ -98,7 +98,7 @@ fn rare_stacks_far_from_others_keep_their_share_at_borders() {
                 check(place, stack, part(&dots[rows.start * long..rows.end * long], stack), 0.3);
             }
         }
-        let (width, seam) = (12_000, super::super::STRIP * super::super::plan::BLOCK);
+        let (width, seam) = (12_000, super::super::STRIP * super::super::mask::BLOCK);
         let dots = printed(shares, points, (width, seam + 60));
         for &stack in &rare {
             for top in (seam - 24..seam + 60).step_by(12) {
@@ -155,7 +155,7 @@ fn usual_debts_are_those_in_the_midst_of_a_tone() {
 fn faint_tones_are_kept_in_the_first_and_last_columns() {
     const ACROSS: usize = 33;
     let (width, strips) = (3 * ACROSS, 200);
-    let strip = super::super::STRIP * super::super::plan::BLOCK;
+    let strip = super::super::STRIP * super::super::mask::BLOCK;
     let (_, rare, points) = MATERIALS[0];
     let faint: (&[f64], Option<&[Point]>) = (&[0.03, 0.97], None);
     for (shares, points) in [faint, (rare, Some(points))] {

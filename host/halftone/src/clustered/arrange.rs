@@ -8,7 +8,7 @@
 
 use super::cell::Cell;
 use super::choose::Metric;
-use crate::search::Point;
+use crate::dbs::Point;
 
 /// What the error of an upper corner counts on either axis, against 1 for the cells beside and above.
 const CORNER: f32 = 0.25;

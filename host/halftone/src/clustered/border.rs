@@ -6,12 +6,12 @@
 //! what differs from it stays inside. So a tone neither begins too light nor ends in a line of what was left over.
 //! Where stacks are not equally far apart, the means come from the metric ([`Lean`]). At the page's own border nothing is
 //! assumed: rows above the first and cells beyond the ends of rows are diffused and thrown away, and what is owed below the last
-//! row is let go ([`super::diffuse`]).
+//! row is let go ([`super::error_diffusion`]).
 //! Cost: a few operations a stack, and a system of four unknowns, for cells beside a border. Limits: cells that may be cut into
 //! halves are taken to be among stacks that are equally far apart.
 
 use super::choose::{Metric, NOISE};
-use crate::search::Point;
+use crate::dbs::Point;
 use inks::linalg::Cholesky;
 
 /// The largest difference of a debt above the first row of a tone, in cells, for a stack of share p: times root of p (1 - p).

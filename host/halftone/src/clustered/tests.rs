@@ -5,7 +5,7 @@ mod flat;
 mod parts;
 mod tables;
 
-use super::super::eye::{Eye, Tangent, error_planes, errors_seen, peak, swing};
+use super::super::contrast_sensitivity::{Eye, Tangent, error_planes, errors_seen, peak, swing};
 use super::super::solids::Solids;
 use super::super::thin::thin;
 use super::super::{Method, Settings, TONE, halftone};

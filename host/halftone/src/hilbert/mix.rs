@@ -10,11 +10,10 @@
 //! Cost: channels x stacks multiplications a stretch, eight at a time; stacks and channels without any weight are
 //! left out. Memory: a table of a few bytes for each half dot of the two sides.
 
-use std::ops::Range;
-
 use protocol::walk::{EDGE, MOST, Tile, Walk};
 
 use super::rule::{LANES, Lanes, Source, UNIT, blocks};
+use crate::axis::Axis;
 use appearance::gamut::InkMix;
 use appearance::weights::ONE;
 
@@ -25,10 +24,10 @@ const WEIGHT: u32 = 1 << 16;
 const LINE: usize = 32;
 
 /// The curve of all tiles with one size and orientation, as tables.
-pub(super) struct Shape {
+pub(crate) struct Shape {
     tile: Tile,
     /// Position on the curve of each dot, row by row.
-    pub(super) order: Vec<u16>,
+    pub(crate) order: Vec<u16>,
     /// The middle of each stretch in half dots from the tile's corner, and its number of dots.
     stretches: Vec<(u8, u8, u8)>,
 }
@@ -63,88 +62,11 @@ impl Shape {
     }
 }
 
-/// Maps positions along one side of the rectangle to the document's pixels.
-pub(super) enum Axis {
-    /// For each half dot: the pixel before it, and the weight of the next pixel in 1/256.
-    Between(Vec<(u32, u16)>),
-    /// For each dot: its first pixel and its range of `parts`. The parts of a dot sum to [`Axis::FULL`].
-    Over { spans: Vec<(u32, u32, u32)>, parts: Vec<u32> },
-}
-
-impl Axis {
-    pub(super) const FULL: u32 = 1 << 12;
-
-    pub(super) fn between(dots: usize, pixels: usize) -> Axis {
-        let last = 256 * (pixels as i64 - 1);
-        let place = |half: usize| {
-            // (half / 2) * pixels / dots - 1/2 pixels, in 1/256, to the nearest.
-            let numerator = 256 * half as i64 * pixels as i64 - 256 * dots as i64;
-            let at = (numerator + dots as i64).div_euclid(2 * dots as i64).clamp(0, last);
-            ((at / 256) as u32, (at % 256) as u16)
-        };
-        Axis::Between((0..=2 * dots).map(place).collect())
-    }
-
-    pub(super) fn over(dots: usize, pixels: usize) -> Axis {
-        let (mut spans, mut parts) = (Vec::with_capacity(dots), Vec::new());
-        for dot in 0..dots {
-            // In units of 1/dots pixel: the dot covers [dot * pixels, (dot + 1) * pixels), a pixel is `dots` wide.
-            let (from, to) = (dot * pixels, (dot + 1) * pixels);
-            let (first, end) = (from / dots, to.div_ceil(dots));
-            let start = parts.len();
-            let mut before = 0;
-            for pixel in first..end {
-                // Differences of rounded sums keep the total exact.
-                let covered = ((pixel + 1) * dots).min(to) - from;
-                let sum = (covered as u64 * u64::from(Axis::FULL) + pixels as u64 / 2) / pixels as u64;
-                parts.push(sum as u32 - before);
-                before = sum as u32;
-            }
-            spans.push((first as u32, start as u32, parts.len() as u32));
-        }
-        Axis::Over { spans, parts }
-    }
-
-    /// The first pixel under a range of dots, and into `out` what falls on it and on each of the next.
-    pub(super) fn sum(&self, dots: Range<usize>, out: &mut Vec<u64>) -> usize {
-        out.clear();
-        let mut first = usize::MAX;
-        for dot in dots {
-            self.parts(2 * dot + 1, |pixel, part| {
-                first = first.min(pixel);
-                out.resize(out.len().max(pixel - first + 1), 0);
-                out[pixel - first] += part;
-            });
-        }
-        first
-    }
-
-    /// Calls `with(pixel, part)`; the parts sum to [`Axis::FULL`].
-    pub(super) fn parts(&self, half: usize, mut with: impl FnMut(usize, u64)) {
-        match self {
-            Axis::Between(table) => {
-                let (pixel, fraction) = table[half];
-                let next = u64::from(fraction) * u64::from(Axis::FULL) / 256;
-                with(pixel as usize, u64::from(Axis::FULL) - next);
-                if next > 0 {
-                    with(pixel as usize + 1, next);
-                }
-            }
-            Axis::Over { spans, parts } => {
-                let (first, from, to) = spans[half / 2];
-                for (i, &part) in parts[from as usize..to as usize].iter().enumerate() {
-                    with(first as usize + i, u64::from(part));
-                }
-            }
-        }
-    }
-}
-
 /// Everything about a document on a rectangle of dots that is constant along the walk.
-pub(super) struct Lattice<'a> {
+pub(crate) struct Lattice<'a> {
     mix: &'a InkMix,
     /// Numbers in `mix.stacks` of the stacks with weight, ascending.
-    pub(super) stacks: Vec<u8>,
+    pub(crate) stacks: Vec<u8>,
     /// Channels with weight.
     channels: Vec<usize>,
     /// For each group of eight of these stacks, the shares of each of these channels.
@@ -156,7 +78,7 @@ pub(super) struct Lattice<'a> {
 
 impl<'a> Lattice<'a> {
     /// For a walk over the dots of the document. The mix has been checked.
-    pub(super) fn new(mix: &'a InkMix, walk: &Walk) -> Lattice<'a> {
+    pub(crate) fn new(mix: &'a InkMix, walk: &Walk) -> Lattice<'a> {
         let maps = &mix.maps;
         let (width, height) = (usize::from(walk.width()), usize::from(walk.height()));
         let mut sums = vec![0u16; maps.channels()];
@@ -209,7 +131,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The tables of a tile of the walk.
-    pub(super) fn shape(&self, tile: &Tile) -> &Shape {
+    pub(crate) fn shape(&self, tile: &Tile) -> &Shape {
         // `new` made a shape for every tile of the walk.
         self.shapes.iter().find(|shape| shape.fits(tile)).unwrap_or(&self.shapes[0])
     }
@@ -233,7 +155,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The mix along these tiles, from a dot of the curve of the first.
-    pub(super) fn along_from<T: Iterator<Item = Tile>>(&self, mut tiles: T, offset: usize) -> Along<'_, T> {
+    pub(crate) fn along_from<T: Iterator<Item = Tile>>(&self, mut tiles: T, offset: usize) -> Along<'_, T> {
         let tile = tiles.next().map(|tile| {
             let shape = self.shape(&tile);
             // All stretches but the last are equally long.
@@ -246,7 +168,7 @@ impl<'a> Lattice<'a> {
     }
 
     /// The mix along these tiles.
-    pub(super) fn along<T: Iterator<Item = Tile>>(&self, tiles: T) -> Along<'_, T> {
+    pub(crate) fn along<T: Iterator<Item = Tile>>(&self, tiles: T) -> Along<'_, T> {
         Along {
             lattice: self,
             tiles,
@@ -260,7 +182,7 @@ impl<'a> Lattice<'a> {
 
     /// What a tile asks for of each of `stacks`, in dots: the sum over its dots, each at its own place. Every pixel is read once.
     #[inline(always)]
-    pub(super) fn asked(&self, tile: &Tile) -> Vec<f64> {
+    pub(crate) fn asked(&self, tile: &Tile) -> Vec<f64> {
         let maps = &self.mix.maps;
         let (mut across, mut down) = (Vec::new(), Vec::new());
         let range = |from: u16, dots: u16| usize::from(from)..usize::from(from) + usize::from(dots);
@@ -369,7 +291,7 @@ impl<'a> Lattice<'a> {
 }
 
 /// The mix along some tiles, stretch by stretch.
-pub(super) struct Along<'a, T> {
+pub(crate) struct Along<'a, T> {
     lattice: &'a Lattice<'a>,
     tiles: T,
     tile: Option<(Tile, &'a Shape, usize)>,

@@ -21,10 +21,10 @@ use std::collections::HashMap;
 use observe::Observer;
 use protocol::walk::{Band, MOST, Tile};
 
-use super::TONE;
 use super::mix::Lattice;
 use super::rule::{self, LANES, Lanes, Rule, Source, UNIT, blocks};
-use super::solids::Solids;
+use crate::TONE;
+use crate::solids::Solids;
 use sheet::forest::Forest;
 
 /// No segment.

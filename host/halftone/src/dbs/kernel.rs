@@ -6,7 +6,7 @@
 //! Memory: 100 kB for each side of cells, of which a search in cells of one side reads a quarter.
 
 use super::{REACH, lines};
-use crate::cells::plan::BLOCK;
+use crate::clustered::mask::BLOCK;
 
 /// From how far the eye looks, `a` in dots: 0.3 m and 0.5 m.
 const SCALES: [f32; 2] = [7.62, 12.7];

@@ -1,12 +1,12 @@
 //! Direct binary search on cells: neighbours change places while that lessens the error the eye sees.
 //!
 //! Problem: error diffusion decides each cell once and never looks back.
-//! Method: stacks are points whose distances are those of what they reflect ([`super::eye::Tangent`]). The error of all
+//! Method: stacks are points whose distances are those of what they reflect ([`super::contrast_sensitivity::Tangent`]). The error of all
 //! cells, convolved with the autocorrelation of the eye's response ([`Kernel`]), gives what a change would make of it in a
 //! few products (Analoui and Allebach 1992). The best change of a cell is made if it lessens the error: it or a half of it
 //! changes places with one of its eight neighbours or a half of that, or its own halves are arranged in another way
 //! ([`moves`]); each pair is looked at once a round. So every stack keeps its dots, and tones need no term of their own: what the
-//! diffusion dropped is brought back after the first round ([`settle`]).
+//! diffusion dropped is brought back after the first round ([`correct_tones`]).
 //! Whole columns and rows are kept even by a small price on their sums ([`lines`]).
 //! Parts of at most [`PART`] block rows are searched at the same time, each but for its [`MARGIN`] rows at either end, which are
 //! only looked at; then parts that lie over the ends of these. The dots do not depend on the number of threads.
@@ -16,10 +16,10 @@
 //! as they are, and so do all stacks after the 64th. What is seen from a half is interpolated between cells.
 
 mod convolve;
+mod correct_tones;
 mod kernel;
 mod lines;
 mod moves;
-mod settle;
 
 use std::ops::Range;
 
@@ -27,9 +27,10 @@ use rayon::prelude::*;
 
 use appearance::wide::wide;
 
-use super::cells::cell::{Cell, fits_half};
-use super::cells::field::{Field, Row};
-use super::cells::plan::{BLOCK, Plan};
+use super::clustered::cell::{Cell, fits_half};
+use super::clustered::field::{Field, Row};
+use super::clustered::mask::BLOCK;
+use super::clustered::plan::Plan;
 
 use kernel::Kernel;
 use lines::Lines;
@@ -157,7 +158,7 @@ pub(super) fn search(field: &Field, plan: &Plan, points: &[Point], minimum: &[u1
                             part.block_row(row);
                         }
                         if round == 0 && !again {
-                            part.settle(first..end);
+                            part.correct_tones(first..end);
                         }
                     }
                     part.print(field, dots);
