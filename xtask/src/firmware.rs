@@ -45,6 +45,14 @@ const BOARDS: [Board; 2] = [
     },
 ];
 
+/// What is installed with the program: the images, and the programs they were made of.
+pub const INSTALLED: [&str; 4] = [
+    "foilpress-bridge.uf2",
+    "foilpress-bridge.elf",
+    "foilpress-bridge-pico2.uf2",
+    "foilpress-bridge-pico2.elf",
+];
+
 /// The board that plays the printer.
 const RIG: Board = Board {
     folder: "tests/rig/firmware",

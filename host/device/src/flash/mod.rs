@@ -8,6 +8,7 @@
 
 pub mod drive;
 pub mod image;
+pub mod installed;
 pub mod picoboot;
 #[cfg(test)]
 mod rom;

@@ -12,7 +12,7 @@ use device::connection::Bridge;
 use device::connection::find::{self, Candidate};
 use device::connection::transport::Transport;
 use device::deliver::ask::{self, Negotiate};
-use device::flash::image::Firmware;
+use device::flash::installed;
 use device::printers::Printers;
 use device::questions::query::{Query, Reply, Shelf, is_alps};
 use device::questions::status::Status;
@@ -70,12 +70,12 @@ fn levels(lines: Lines) -> Vec<&'static str> {
     .collect()
 }
 
-/// A hint about a bridge that works but runs other firmware than this program includes.
+/// A hint about a bridge that works but runs other firmware than came with this program.
 pub fn newer_firmware(bridge: &Bridge) -> Option<String> {
-    let ours = Firmware::embedded_for(&bridge.firmware)?;
+    let ours = installed::image_for(&bridge.firmware)?.firmware;
     (ours.version() != bridge.firmware).then(|| {
         format!(
-            "this program includes firmware {}; `foilpress bridge flash` installs it on the bridge",
+            "firmware {} came with this program; `foilpress bridge flash` installs it on the bridge",
             ours.version()
         )
     })

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::found::{PATIENCE, named_or_only};
 use device::connection::Address;
-use device::flash::image::Firmware;
+use device::flash::installed;
 use device::questions::log;
 use device::questions::query::Query;
 
@@ -26,7 +26,7 @@ pub struct Args {
     /// Address of the bridge [default: the only one]
     #[arg(long, value_name = "WHERE")]
     to: Option<Address>,
-    /// ELF file of the firmware on the bridge [default: the firmware included in this program]
+    /// ELF file of the firmware on the bridge [default: the one that came with this program]
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
     /// Print JSON, one object on a line for each entry
@@ -39,22 +39,16 @@ pub fn run(args: &Args) -> Result<()> {
     let address = named_or_only(args.to.as_ref())?;
     let mut link = address.open()?;
     let mut query = Query::new(&mut *link, PATIENCE)?;
-    let program = match &args.elf {
-        Some(path) => {
-            let what = || format!("cannot read {}", path.display());
-            if std::fs::metadata(path).with_context(what)?.len() > LARGEST {
-                bail!("{} is larger than {} MB, so it is not firmware", path.display(), LARGEST >> 20);
-            }
-            std::fs::read(path).with_context(what)?
-        }
-        None => match Firmware::embedded_program_for(&query.bridge().firmware) {
-            Some(program) => program.to_vec(),
-            None => bail!(
-                "this program was built without firmware; name the ELF file of the bridge's firmware with --elf (`cargo xtask \
-                 firmware` writes foilpress-bridge.elf)"
-            ),
-        },
-    };
+    let came_with_us = || installed::image_for(&query.bridge().firmware).map(|installed| installed.elf());
+    let path = args.elf.clone().or_else(came_with_us).context(
+        "no firmware for this bridge came with this program; name the ELF file of the bridge's firmware with --elf (`cargo xtask \
+         firmware` writes foilpress-bridge.elf)",
+    )?;
+    let what = || format!("cannot read {}", path.display());
+    if std::fs::metadata(&path).with_context(what)?.len() > LARGEST {
+        bail!("{} is larger than {} MB, so it is not firmware", path.display(), LARGEST >> 20);
+    }
+    let program = std::fs::read(&path).with_context(what)?;
     let raw = log::read(&mut query, PATIENCE)?;
     let log = log::decode(&raw, &program)?;
     let mut out = std::io::stdout().lock();
