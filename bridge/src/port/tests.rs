@@ -78,7 +78,7 @@ fn a_timing() -> impl Strategy<Value = Timing> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(48))]
 
     #[test]
     fn every_byte_crosses_once_and_no_time_is_cut_short(

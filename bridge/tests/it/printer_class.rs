@@ -85,7 +85,7 @@ impl Rig {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(40))]
 
     /// A slow or a quick host, a slow or a quick printer, packets of any length, empty ones among them.
     #[test]

@@ -178,7 +178,7 @@ fn every_sector_is_erased_as_often_as_the_others() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(testing::cases(48))]
     #[test]
     fn room_is_what_fits_to_the_byte(sectors in 1usize..12, seed in any::<u64>(), jobs in 0u32..5) {
         let mut random = seeded(seed);

@@ -182,7 +182,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(200))]
+        #![proptest_config(testing::cases(200))]
         #[test]
         fn no_change_to_a_file_panics(changes in prop::collection::vec((2usize..CMYK.len(), any::<u8>()), 1..4), cut in 0usize..40) {
             let mut bytes = CMYK.to_vec();

@@ -137,7 +137,7 @@ fn single_dots_are_for_process_inks_alone() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(testing::cases(48))]
     #[test]
     fn no_cluster_is_smaller_than_its_minimum(
         (width, height) in (1u16..150, 1u16..150),

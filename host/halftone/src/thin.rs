@@ -161,7 +161,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(64))]
+        #![proptest_config(testing::cases(64))]
 
         /// Blots of three stacks on a ground, some of them exempt.
         #[test]

@@ -229,7 +229,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(32))]
+        #![proptest_config(testing::cases(32))]
         #[test]
         fn a_sheet_comes_back_dot_by_dot(width in 1u16..90, length in 1u16..90, stacks in 1usize..40, seed: u32) {
             let folder = tempfile::tempdir().unwrap();

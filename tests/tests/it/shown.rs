@@ -1,5 +1,7 @@
-//! Commands that the README, the guides and the help show, run as they stand.
+//! Commands that the README, the guides and the help show, run on small documents, or as they stand where
+//! [everything is tried](testing::is_full).
 //!
+//! Small is a third of every length on paper and of every picture's side; each word of a command is there, in its order.
 //! A document's commands run in order, in a copy of the folders that it speaks of, so that later lines find what earlier
 //! ones made. What goes to a bridge goes to one that this test serves: only the address is another. [`ELSEWHERE`] names the
 //! commands that need more than that, and who runs them.
@@ -9,6 +11,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use appearance::document::write_sample;
+use appearance::sample::SAMPLES;
 use foilpress_tests::served::{Bridge, Port};
 use observe::Silent;
 use protocol::ink::Ink;
@@ -111,6 +115,41 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
+/// What every length is divided by.
+const SMALLER: f64 = 3.0;
+
+/// The command with the numbers behind this option smaller.
+fn scaled(command: &str, option: &str) -> String {
+    let option = format!(" {option} ");
+    let Some((before, rest)) = command.split_once(&option) else { return command.to_owned() };
+    let (value, after) = rest.split_at(rest.find(' ').unwrap_or(rest.len()));
+    let unit = value.trim_start_matches(|c: char| c.is_ascii_digit() || ".x".contains(c));
+    let numbers = value[..value.len() - unit.len()].split('x').map(|number| {
+        let number: f64 = number.parse().expect("a number");
+        (number / SMALLER).round().to_string()
+    });
+    format!("{before}{option}{}{unit}{after}", numbers.collect::<Vec<_>>().join("x"))
+}
+
+/// Makes a sample's maps and its size on paper smaller.
+fn shrink(folder: &Path) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|ending| ending == "png") {
+            let map = image::open(&path).unwrap();
+            let side = |side: u32| (f64::from(side) / SMALLER).ceil() as u32;
+            let filter = image::imageops::FilterType::Triangle;
+            map.resize_exact(side(map.width()), side(map.height()), filter).save(&path).unwrap();
+        }
+    }
+    let path = folder.join("material.toml");
+    let mut settings: toml::Table = toml::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+    for side in settings["size_mm"].as_array_mut().expect("two sides") {
+        *side = toml::Value::Float(side.as_float().expect("a length") / SMALLER);
+    }
+    fs::write(&path, settings.to_string()).unwrap();
+}
+
 /// A folder to type commands in, and a bridge.
 struct Desk {
     folder: tempfile::TempDir,
@@ -131,12 +170,32 @@ impl Desk {
             [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::MetallicSilver, Ink::Finish, Ink::White];
         let (bridge, address) =
             Bridge::on_tcp(([127, 0, 0, 1], 0).into(), Port::new(&inks, 1 << 20)).unwrap();
-        Desk { folder, bridge, address: format!("tcp:{address}") }
+        let desk = Desk { folder, bridge, address: format!("tcp:{address}") };
+        if !testing::is_full() {
+            for sample in SAMPLES {
+                let folder = desk.folder.path().join("samples").join(sample.name);
+                fs::create_dir_all(&folder).unwrap();
+                write_sample(&sample, &folder).unwrap();
+                shrink(&folder);
+            }
+        }
+        desk
     }
 
-    /// The command with this desk's addresses for those of a real one.
+    /// The command with this desk's addresses for those of a real one, and this desk's documents.
     fn here(&self, command: &str) -> String {
         let mut command = command.strip_prefix("sudo ").unwrap_or(command).to_owned();
+        if !testing::is_full() {
+            let samples = self.folder.path().join("samples");
+            command = command.replace("sample:", &format!("{}/", samples.display()));
+            for (option, of) in
+                [("--size", "foilpress"), ("--middle", "foilpress"), ("--pixels", "foilpress preview")]
+            {
+                if command.contains(of) {
+                    command = scaled(&command, option);
+                }
+            }
+        }
         if let Some(rest) = command.strip_prefix("cargo run --release -- ") {
             command = format!("foilpress {rest}");
         }
@@ -184,6 +243,12 @@ impl Desk {
         let _ = child.stdin.take().map(|mut stdin| stdin.write_all(b"\n\n\n"));
         let output = child.wait_with_output().unwrap();
         if output.status.success() {
+            if let Some(written) =
+                command.strip_prefix("foilpress sample ").and_then(|rest| rest.split(" -o ").nth(1))
+                && !testing::is_full()
+            {
+                shrink(&folder.join(written));
+            }
             return Ok(());
         }
         Err(format!(

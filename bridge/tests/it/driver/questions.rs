@@ -30,7 +30,7 @@ fn the_status_comes_back_whole_wherever_the_answer_breaks_and_however_late_it_is
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(24))]
 
     /// Whatever the printer's times are, it gets the question once, and its answer arrives if it comes in time.
     #[test]

@@ -246,7 +246,7 @@ fn cobs(bytes: &[u8], out: &mut [u8]) -> usize {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(40))]
 
     #[test]
     fn byte_by_byte_is_the_same_as_whole(seed in any::<u64>(), sizes in prop::collection::vec(1usize..200, 1..20)) {

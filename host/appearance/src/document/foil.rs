@@ -309,7 +309,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(16))]
+        #![proptest_config(testing::cases(16))]
         #[test]
         fn reading_gives_back_what_was_written(
             width in 1usize..9, height in 1usize..9, bases in 1usize..6, seed in any::<u32>(),

@@ -398,7 +398,7 @@ fn invalid_documents_are_errors() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(testing::cases(24))]
     #[test]
     fn any_reflectances_factor_into_a_partition_of_unity(
         values in prop::collection::vec(prop_oneof![3 => 0.0f32..2.0, 1 => Just(0.0), 1 => 0.0f32..1e5], 12 * 9),

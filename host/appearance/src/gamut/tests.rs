@@ -117,7 +117,7 @@ fn is_printable(mix: &InkMix, most: usize) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(testing::cases(24))]
 
     /// Convex combinations of convex combinations are convex combinations, in exact arithmetic.
     #[test]

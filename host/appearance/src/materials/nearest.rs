@@ -243,7 +243,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(testing::cases(24))]
         /// A surface of the workflow comes back from its curve, and so do its base colour and metalness.
         #[test]
         fn surfaces_come_back_from_their_curves(
@@ -272,7 +272,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(testing::cases(24))]
         /// Among prepared widths is one nearly as good as the best of all, for two surfaces side by side, too.
         #[test]
         fn prepared_widths_are_nearly_as_good(

@@ -269,7 +269,7 @@ fn naive(layers: &[Layer], order: &[Ink], passes: &[(Ink, u8)], x: usize, y: usi
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
+    #![proptest_config(testing::cases(48))]
     #[test]
     fn every_dot_has_its_layers_in_order_and_the_passes_print_them(
         width in 1usize..50, length in 1usize..20, seed: u32, dense in 1u32..90,

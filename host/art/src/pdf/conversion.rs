@@ -154,7 +154,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(8))]
+        #![proptest_config(testing::cases(8))]
 
         /// As Ghostscript reads the profile, against the formula: of colours near the kink, too.
         #[test]

@@ -65,7 +65,7 @@ fn a_picture_of_any_format_that_was_cut_short_says_so() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(testing::cases(200))]
     #[test]
     fn no_bytes_panic(kind in 0usize..4, at in 0usize..400, value: u8, cut in 0usize..500) {
         let bench = Bench::new();

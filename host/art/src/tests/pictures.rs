@@ -4,7 +4,7 @@ use super::*;
 use proptest::prelude::*;
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(testing::cases(24))]
     #[test]
     fn whatever_the_kind_of_png_dark_is_ink(width in 1u32..40, height in 1u32..20, seed: u32) {
         use png::{BitDepth, ColorType};

@@ -408,7 +408,7 @@ fn pages() -> impl Strategy<Value = (Paper, Vec<Ink>, Vec<u32>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(testing::cases(48))]
 
     #[test]
     fn the_sheet_that_was_sent_comes_out_dot_for_dot((paper, inks, sets) in pages()) {

@@ -39,7 +39,7 @@ fn folders() -> tempfile::TempDir {
 fn damaged_mixes_sheets_and_passes_are_answered() {
     let folders = folders();
     let path = |name: &str| folders.path().join(name);
-    proptest!(ProptestConfig::with_cases(500), |(which in any::<Index>(), damages in damages())| {
+    proptest!(testing::cases(500), |(which in any::<Index>(), damages in damages())| {
         survives(&path("mix"), which, &damages, gamut::files::load);
         survives(&path("dots"), which, &damages, DotMap::load);
         survives(&path("sheet"), which, &damages, Sheet::load);

@@ -6,6 +6,7 @@
 mod care;
 mod flash;
 mod found;
+mod image;
 mod rig;
 
 use std::fs;

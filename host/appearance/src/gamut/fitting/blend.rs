@@ -141,7 +141,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(40))]
+        #![proptest_config(testing::cases(40))]
         #[test]
         fn box_means_are_the_plain_means(
             width in 1usize..20,

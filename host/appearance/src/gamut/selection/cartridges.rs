@@ -164,7 +164,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(6))]
+        #![proptest_config(testing::cases(6))]
 
         /// Against every set of three of seven inks, each fitted from nothing.
         #[test]

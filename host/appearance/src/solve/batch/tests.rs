@@ -45,7 +45,7 @@ fn problems() -> impl Strategy<Value = (Vec<Vec<f64>>, Vec<Vec<f64>>)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(testing::cases(200))]
 
     /// Feasible, certified, and as near as the solver of one pixel; the certificate is checked against a gradient of its own.
     #[test]

@@ -91,7 +91,7 @@ fn nothing_repeats_where_chance_is_small() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(8))]
+    #![proptest_config(testing::cases(8))]
     /// Flat mixtures of any tones: the ink of whole columns and rows varies no more than that of independent cells.
     #[test]
     fn columns_and_rows_of_flat_tones_are_even(

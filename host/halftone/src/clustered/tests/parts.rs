@@ -4,7 +4,7 @@
 use super::*;
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(32))]
+    #![proptest_config(testing::cases(32))]
     /// Tones alone, with a minimum for each stack: the border of the page is the only edge.
     #[test]
     fn no_part_is_thinner_than_its_minimum_asks(

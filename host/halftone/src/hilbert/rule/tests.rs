@@ -175,7 +175,7 @@ fn document(stacks: std::ops::Range<usize>) -> impl Strategy<Value = Document> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(testing::cases(2000))]
     #[test]
     fn argmax_windows_and_jumps_give_the_literal_rule((stretches, minimum, absent) in document(1..12)) {
         prop_assert_eq!(fast(&stretches, &minimum, absent), literal(&stretches, &minimum, absent as usize));
@@ -244,7 +244,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(60))]
+    #![proptest_config(testing::cases(60))]
     /// Groups of eight stacks, some of them not full, and more than fit in arrays.
     #[test]
     fn many_stacks_follow_the_literal_rule((stretches, minimum, absent) in document(9..80)) {

@@ -158,7 +158,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(24))]
+        #![proptest_config(testing::cases(24))]
 
         /// A vector that is the same everywhere is its own mean in every region, and so around every pixel.
         #[test]
