@@ -3,23 +3,20 @@
 mod borders;
 mod flat;
 mod parts;
-mod tables;
 
-use super::super::contrast_sensitivity::{Eye, Tangent, error_planes, errors_seen, peak, swing};
+use super::super::contrast_sensitivity::{Eye, errors_seen, peak, swing};
 use super::super::solids::Solids;
 use super::super::thin::thin;
 use super::super::{Method, Settings, TONE, halftone};
 use super::Point;
 use super::cell::{Cell, fits_half};
 use super::plan::{halved_size_of, size_of};
-use appearance::brdf::{Space, reflectances};
 use appearance::gamut::InkMix;
 use appearance::weights::{ONE, WeightMaps, quantise};
 use inks::{Library, Stack};
 use observe::Silent;
 use proptest::prelude::*;
 use protocol::ink::Ink;
-use protocol::paper::Paper;
 use sheet::clusters::{Touch, smallest_clusters};
 
 fn stacks(count: usize) -> Vec<Stack> {
@@ -51,10 +48,6 @@ fn cells(
 ) -> Vec<u8> {
     let solids = Solids::new(mix, width, height, None);
     super::cells(mix, (width, height), minimum, &solids, points, points.is_some(), observer)
-}
-
-fn side(minimum: u16) -> usize {
-    (1..).find(|side| side * side >= usize::from(minimum)).unwrap()
 }
 
 fn noise(seed: u64, x: usize, y: usize, q: usize) -> f64 {

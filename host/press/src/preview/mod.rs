@@ -10,15 +10,11 @@
 //! [`Panels`] and [`materials_picture()`] lay the results out.
 
 mod canvas;
-#[cfg(test)]
-mod document_table;
 mod error;
 mod fidelity;
 mod fine;
 mod flat;
 pub mod inks;
-#[cfg(test)]
-mod light_table;
 mod light_tree;
 mod materials_picture;
 mod probe;

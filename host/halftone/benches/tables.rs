@@ -1,6 +1,43 @@
-//! The tables of docs/decisions/cells.md.
+//! The tables of `docs/decisions/cells.md`: `cargo bench -p foilpress-halftone --bench tables -- methods`, `times` or `documents`.
 
-use super::*;
+use appearance::brdf::{Space, reflectances};
+use appearance::gamut::InkMix;
+use appearance::weights::{ONE, WeightMaps, quantise};
+use halftone::contrast_sensitivity::{Eye, Tangent, error_planes, errors_seen, peak, swing};
+use halftone::thin::thin;
+use halftone::{Method, Settings, halftone, metrics};
+use inks::{Library, Stack};
+use observe::Silent;
+use protocol::ink::Ink;
+use protocol::paper::Paper;
+
+fn main() {
+    for table in std::env::args().skip(1) {
+        match table.as_str() {
+            "methods" => methods(),
+            "times" => times(),
+            "documents" => documents(),
+            // Cargo's own.
+            "--bench" => {}
+            other => eprintln!("there is no table `{other}`; there are methods, times, documents"),
+        }
+    }
+}
+
+/// The bare paper, single inks, then pairs of them.
+fn stacks(count: usize) -> Vec<Stack> {
+    let pairs = (0..169).map(|i| Stack::new([Ink::ALL[i % 13], Ink::ALL[i / 13]]));
+    std::iter::once(Stack::SUBSTRATE)
+        .chain(Ink::ALL.map(|ink| Stack::new([ink])))
+        .chain(pairs)
+        .take(count)
+        .collect()
+}
+
+/// The side of the smallest square of so many dots.
+fn side(minimum: u16) -> usize {
+    (1..).find(|side| side * side >= usize::from(minimum)).unwrap()
+}
 
 /// The patches of the table: name, stacks, minima, shares of each stack at (u, v) of 0 to 1.
 type Patch = (&'static str, [&'static str; 5], [u16; 5], fn(f64, f64) -> [f64; 5]);
@@ -24,9 +61,7 @@ const PATCHES: [Patch; 10] = [
 
 /// Prints how each method does on each patch. With a folder in `FOILPRESS_LOOK` it writes
 /// the patches there as pictures of one pixel a dot.
-#[test]
-#[ignore = "a table for docs/decisions/cells.md; takes minutes"]
-fn table_of_methods() {
+fn methods() {
     const SIDE: usize = 1024;
     let (library, space) = (Library::builtin(), Space::half_angle(32));
     let colours: [[u8; 3]; 5] = [[255, 255, 255], [0, 160, 220], [220, 0, 120], [250, 220, 0], [20, 20, 20]];
@@ -38,8 +73,15 @@ fn table_of_methods() {
         let flat = shares(0.0, 0.0) == shares(1.0, 1.0);
         let pixels = if flat { 1 } else { 256 };
         let at = |i: usize| (i as f64 + 0.5) / pixels as f64;
-        let mut mix = plain(pixels, pixels, 5, |x, y| shares(at(x), at(y)).to_vec());
-        mix.stacks = names.map(|name| name.parse().unwrap()).to_vec();
+        let mut data = vec![0; pixels * pixels * 5];
+        for (pixel, out) in data.chunks_exact_mut(5).enumerate() {
+            quantise(&shares(at(pixel % pixels), at(pixel / pixels)), out);
+        }
+        let mix = InkMix {
+            stacks: names.map(|name| name.parse().unwrap()).to_vec(),
+            maps: WeightMaps::new(pixels, pixels, 5, data).unwrap(),
+            matrix: (0..5).map(|i| (0..5).map(|q| if q == i { ONE } else { 0 }).collect()).collect(),
+        };
         let table = reflectances(&mix.stacks, &library, &space);
         let mean: Vec<f64> = (0..5)
             .map(|q| {
@@ -89,9 +131,7 @@ fn table_of_methods() {
 }
 
 /// Prints how long A4 takes, with stacks that print by cells of 3 x 3 dots and by cells of 4 x 4 in halves.
-#[test]
-#[ignore = "figures for docs/decisions/cells.md; takes minutes"]
-fn table_of_times() {
+fn times() {
     let (library, space) = (Library::builtin(), Space::half_angle(32));
     for (count, minimum) in [(8, 9), (8, 8), (57, 9)] {
         let mix = a4(count);
@@ -138,9 +178,7 @@ fn a4(count: usize) -> InkMix {
 }
 
 /// Prints how each method does on documents: the folders of `foilpress map` in `FOILPRESS_MIXES`, separated by colons.
-#[test]
-#[ignore = "a table for docs/decisions/cells.md; needs mapped documents"]
-fn table_of_documents() {
+fn documents() {
     // 120 and 20 mm.
     const SIDES: [u16; 2] = [2835, 472];
     let Some(folders) = std::env::var_os("FOILPRESS_MIXES") else { return };
@@ -155,8 +193,8 @@ fn table_of_documents() {
             let start = std::time::Instant::now();
             let sheet = halftone(&mix, (side, side), None, &settings, &Silent).unwrap();
             let took = start.elapsed();
-            let look = crate::metrics::look(&mix, &sheet, &settings).unwrap().unwrap();
-            let tones = crate::metrics::tones(&mix, &sheet, &Silent).unwrap();
+            let look = metrics::look(&mix, &sheet, &settings).unwrap().unwrap();
+            let tones = metrics::tones(&mix, &sheet, &Silent).unwrap();
             let worst = tones.iter().map(|tone| (tone.printed - tone.asked).abs()).fold(0.0, f64::max);
             let seen: Vec<f64> = look.seen.iter().map(|seen| seen.1).collect();
             walked = if walked.is_empty() { seen.clone() } else { walked };

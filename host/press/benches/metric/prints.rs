@@ -5,11 +5,11 @@
 //! ratio of printed to wanted deviations from the mean of each window of 16 x 16 pixels, in the metric, and their correlation;
 //! the same for the windows outside the gamut, which clamping prints at d > 0.02 on average.
 //!
-//! `FOILPRESS_DATA=... cargo test -p foilpress-press --lib table_of_prints -- --ignored --nocapture` prints the tables of
-//! `docs/decisions/metric-that-knows-light.md` and `contrast-between-neighbours.md`: a quarter of an hour.
+//! Tables of `docs/decisions/metric-that-knows-light.md` and `contrast-between-neighbours.md`: a quarter of an hour.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
+use std::path::Path;
 
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::{self, Document, Materials, Options, Surface};
@@ -22,14 +22,13 @@ use protocol::paper::Paper;
 use protocol::rgl::Media;
 use rayon::prelude::*;
 
-use super::light_table::{errors_of_balls, probes, twelve};
-use super::probe::Probe;
-use super::{EYE, Source, fidelity};
-use crate::job::Handling;
-use crate::layout::{Layout, size};
-use crate::pipeline::document::StageError;
-use crate::pipeline::{Request, draft};
+use super::light::{errors_of_balls, probes, twelve};
 use halftone::halftone;
+use press::job::Handling;
+use press::layout::{Layout, size};
+use press::pipeline::document::StageError;
+use press::pipeline::{Request, draft};
+use press::preview::{EYE, Probe, Source, fidelity};
 use sheet::Area;
 
 /// Side of the windows in which contrast is kept or lost.
@@ -247,7 +246,7 @@ impl Print<'_> {
         let (library, allowed) = (self.library, *self.inks);
         let request = Request { name: "table", dots: &dots, layout: &layout, handling, allowed, library };
         let plan = draft(&request, &Silent).unwrap().plan;
-        let share = |share: &crate::job::plan::Share| format!("{} {:.1}", share.stack, 100.0 * share.share);
+        let share = |share: &press::job::plan::Share| format!("{} {:.1}", share.stack, 100.0 * share.share);
         let most: Vec<String> = plan.stacks.iter().take(6).map(share).collect();
         let mut warned: Vec<String> = (plan.checks.iter())
             .filter(|check| check.severity >= Severity::Warning)
@@ -296,11 +295,9 @@ fn table(name: &str, pixels: &dyn Materials, own: Option<(f64, f64)>, probes: &[
     }
 }
 
-#[test]
-#[ignore = "prints a table"]
-fn table_of_prints() {
-    let Some(data) = testing::needs::data() else { return };
-    let probes = probes(&data);
+/// Every metric and every intent.
+pub fn prints(data: &Path) {
+    let probes = probes(data);
     println!(
         "| document | inks | way | d | p95 | l | contrast | outside | eye, in light | balls: Venice, studio, soft | stacks | inks | warnings |"
     );

@@ -5,8 +5,7 @@
 //! right: the columns of its hull are the pixels of the balls themselves, beside those of distance d, with a weight that is
 //! raised until d is what the metric pays.
 //!
-//! `FOILPRESS_DATA=... cargo test -p foilpress-press --lib table_of_weights -- --ignored --nocapture`, `table_of_bounds`
-//! and `table_of_widths` print the tables of `docs/decisions/metric-that-knows-light.md`.
+//! `weights`, `bounds` and `widths` are tables of `docs/decisions/metric-that-knows-light.md`.
 
 use std::path::Path;
 
@@ -18,9 +17,8 @@ use inks::{InkSet, Library};
 use observe::Silent;
 use protocol::ink::Ink;
 
-use super::Radiance;
-use super::probe::Probe;
-use super::sphere::under_probe;
+use press::preview::sphere::under_probe;
+use press::preview::{Probe, Radiance, mix_in_words};
 
 /// One material on one pixel.
 struct One(Space, Vec<f32>);
@@ -45,7 +43,7 @@ fn surface(space: &Space, diffuse: [f32; 3], f0: [f32; 3], alpha: f32) -> Vec<f6
 }
 
 /// Root mean square difference of the cube roots of two balls, relative to that of the first from black.
-fn off(target: &super::Radiance, printed: &super::Radiance) -> f64 {
+fn off(target: &Radiance, printed: &Radiance) -> f64 {
     let (mut sum, mut all) = (0.0, 0.0);
     for (a, b) in target.pixels.iter().zip(&printed.pixels).filter(|(a, _)| a[3] == 1.0) {
         for c in 0..3 {
@@ -58,7 +56,7 @@ fn off(target: &super::Radiance, printed: &super::Radiance) -> f64 {
 }
 
 /// Twelve pixels of a document, evenly spread down its length.
-pub(super) fn twelve(pixels: &dyn Materials) -> impl Iterator<Item = usize> {
+pub fn twelve(pixels: &dyn Materials) -> impl Iterator<Item = usize> {
     let (width, total) = (pixels.width(), pixels.width() * pixels.height());
     (0..12).map(move |i| (2 * i + 1) * total / 24 + i * 37 % width)
 }
@@ -77,7 +75,7 @@ fn materials(path: &Path, space: &Space) -> Table {
 }
 
 /// Error of balls under each probe, root mean square over materials: each target is followed by its print.
-pub(super) fn errors_of_balls(space: &Space, both: &Table, probes: &[Probe; 3]) -> [f64; 3] {
+pub fn errors_of_balls(space: &Space, both: &Table, probes: &[Probe; 3]) -> [f64; 3] {
     probes.each_ref().map(|probe| {
         let balls = under_probe(space, both, probe, 48, &Silent).unwrap();
         let sum: f64 = balls.chunks(2).map(|pair| off(&pair[0], &pair[1]).powi(2)).sum();
@@ -107,18 +105,16 @@ fn documents(data: &Path, space: &Space) -> Vec<(String, Table)> {
 }
 
 /// Two measured light probes and the built-in one.
-pub(super) fn probes(data: &Path) -> [Probe; 3] {
+pub fn probes(data: &Path) -> [Probe; 3] {
     let measured = |name: &str| Probe::read(&data.join("env").join(name)).unwrap().resized(64);
     [measured("studio.hdr"), measured("venice.hdr"), Probe::studio(64)]
 }
 
-#[test]
-#[ignore = "prints a table"]
-fn table_of_weights() {
-    let Some(data) = testing::needs::data() else { return };
+/// What each weight buys.
+pub fn weights(data: &Path) {
     let space = Space::half_angle(32);
-    let documents = documents(&data, &space);
-    let probes = probes(&data);
+    let documents = documents(data, &space);
+    let probes = probes(data);
     let library = Library::builtin();
     for (inks, set) in [("default", InkSet::default()), ("all", InkSet::of(Ink::ALL))] {
         let printable = Printable::from_library(&library, &set, &space);
@@ -136,7 +132,7 @@ fn table_of_weights() {
                     d += material.distance.powi(2);
                     l += material.light.powi(2);
                     if targets.len() == 1 {
-                        words = super::materials_picture::mix_in_words(&material.weights);
+                        words = mix_in_words(&material.weights);
                     }
                     both.push(row);
                     both.push(&material.printed);
@@ -154,13 +150,10 @@ fn table_of_weights() {
 }
 
 /// What a wider lobe alone costs: silver that reflects as much as the target's, its lobe as wide as printed foil or narrower.
-#[test]
-#[ignore = "prints a table"]
-fn table_of_widths() {
-    let Some(data) = testing::needs::data() else { return };
+pub fn widths(data: &Path) {
     let space = Space::half_angle(32);
     let silver = |alpha| surface(&space, [0.0; 3], [0.972, 0.960, 0.915], alpha);
-    let probes = probes(&data);
+    let probes = probes(data);
     for alpha in [0.025, 0.03, 0.035, 0.04, 0.045, 0.06] {
         let mut both = Table::new(space.columns());
         both.push(&silver(0.02));
@@ -315,12 +308,10 @@ impl Bench {
     }
 }
 
-#[test]
-#[ignore = "prints a table"]
-fn table_of_bounds() {
-    let Some(data) = testing::needs::data() else { return };
+/// How near the metric comes to the best that any could do.
+pub fn bounds(data: &Path) {
     let space = Space::half_angle(32);
-    let (documents, probes) = (documents(&data, &space), probes(&data));
+    let (documents, probes) = (documents(data, &space), probes(data));
     let library = Library::builtin();
     let each = [1.0 / 3.0; 3];
     let words = |f: &Figures| format!("d {:.4} {:.3?} mean {:.4}", f.d, f.balls, f.mean());
