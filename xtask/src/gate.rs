@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use crate::firmware::{self, BARE_METAL};
+use crate::firmware::BARE_METAL;
 use crate::runner::{self, Runner};
 use crate::{cargo, command, emulator, package, preview, queue, succeed};
 
@@ -119,8 +119,7 @@ fn bring(root: &Path, gate: &Gate) -> Vec<(&'static str, std::ffi::OsString)> {
         succeed(&mut command("rustup", &[&["target", "add"][..], &BARE_METAL].concat()))
     });
     let browser = gate.step("browser and its scripts", || preview::bring(root));
-    gate.step("lints of the firmware", || firmware::lint(root));
-    let emulator = gate.step("firmware and emulator", || emulator::bring(root));
+    let emulator = gate.step("firmware with its lints, and emulator", || emulator::bring(root));
     [browser, emulator].into_iter().flatten().flatten().collect()
 }
 
