@@ -4,21 +4,8 @@ use super::across::{Across, Stop};
 use super::canvas::{Canvas, Laid};
 use super::rice::{Ahead, ESCAPE, Mean};
 use super::rows::{Inked, Rows};
-use super::{MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
+use super::{Defect, MOST_RUNS, PLAIN_BITS, band_bytes, form, stride};
 use crate::walk::{Placed, PlacedBand, Tile};
-
-/// What is wrong with a stream.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Defect {
-    /// A band begins with an unknown form.
-    Form,
-    /// A count of bands or rows is 0 or more than remain, or the side of cells is 0.
-    Count,
-    /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
-    Row,
-    /// The memory for a band is smaller than [`band_bytes`].
-    Memory,
-}
 
 /// The result of [`Decoder::step`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

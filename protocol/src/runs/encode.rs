@@ -1,8 +1,9 @@
 //! A plane as a pass stream.
 
+use super::bit_writer::BitWriter;
 use super::encode_across::put_across;
 use super::rice::{ESCAPE, Mean};
-use super::{PLAIN_BITS, band_bytes, form, stride};
+use super::{MAX_STRIDE, PLAIN_BITS, band_bytes, form, stride};
 use crate::packbits;
 use crate::walk::{EDGE, MOST, Placed, PlacedBand, Tile};
 use heapless::Vec;
@@ -13,8 +14,6 @@ pub const MAX_BAND: usize = 1 + EDGE as usize * (2 + MAX_STRIDE);
 
 /// How many times shorter than packed rows runs have to be.
 const WORTH: usize = 2;
-
-pub(super) const MAX_STRIDE: usize = 1235;
 
 /// A buffer is too small, a page wider than 9880 dots, or `bits` shorter than the plane.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -166,7 +165,7 @@ fn put_runs(
     let [head, codes @ ..] = out else { return None };
     let [least, codes @ ..] = codes else { return None };
     (*head, *least) = (form::RUNS, u8::try_from(minimum).unwrap_or(u8::MAX));
-    let mut bits = Bits::new(codes);
+    let mut bits = BitWriter::new(codes);
     let mut means = [Mean::START; 2];
     let mut index = 0;
     for_each_run(band, rows, stride, table, |length| {
@@ -189,38 +188,6 @@ fn put_runs(
         Some(())
     })?;
     bits.end().map(|length| 2 + length)
-}
-
-/// Writes bits from the top of each byte.
-pub(super) struct Bits<'o> {
-    out: &'o mut [u8],
-    at: usize,
-    pending: u32,
-    held: u32,
-}
-
-impl<'o> Bits<'o> {
-    pub(super) fn new(out: &'o mut [u8]) -> Bits<'o> {
-        Bits { out, at: 0, pending: 0, held: 0 }
-    }
-
-    /// Puts the low `count` (at most 21) bits of `value`, which has no others.
-    pub(super) fn put(&mut self, value: u32, count: u32) -> Option<()> {
-        self.pending = self.pending << count | value;
-        self.held += count;
-        while self.held >= 8 {
-            self.held -= 8;
-            *self.out.get_mut(self.at)? = (self.pending >> self.held & 0xff) as u8;
-            self.at += 1;
-        }
-        Some(())
-    }
-
-    pub(super) fn end(mut self) -> Option<usize> {
-        let rest = (8 - self.held % 8) % 8;
-        self.put(0, rest)?;
-        Some(self.at)
-    }
 }
 
 /// How a row is written.

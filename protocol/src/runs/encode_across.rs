@@ -5,9 +5,9 @@
 //! side of the cells is estimated from how many runs are multiples of each.
 
 use super::across::{CELLS, DIFFERENCE, KIND_BITS, LENGTH_BITS, Model, ONES, in_cells};
-use super::encode::{Bits, MAX_STRIDE};
+use super::bit_writer::BitWriter;
 use super::rice::Mean;
-use super::{form, stride};
+use super::{MAX_STRIDE, form, stride};
 use heapless::Vec;
 
 /// Columns at which a row changes between off and on.
@@ -29,7 +29,7 @@ pub(super) fn put_across(rows: &[u8], width: u16, out: &mut [u8]) -> Option<usiz
     let side = side(rows, stride, &mut changes);
     let [head, unit, codes @ ..] = out else { return None };
     (*head, *unit) = (form::ACROSS, side);
-    let mut bits = Bits::new(codes);
+    let mut bits = BitWriter::new(codes);
     let mut model = Model::START;
     let mut difference = Changes::new();
     let mut above: &[u8] = &[];

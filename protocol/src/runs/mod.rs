@@ -79,6 +79,7 @@
 //! ```
 
 mod across;
+mod bit_writer;
 mod canvas;
 mod decode;
 mod encode;
@@ -87,7 +88,7 @@ mod header;
 mod rice;
 mod rows;
 
-pub use decode::{Decoder, Defect, Step};
+pub use decode::{Decoder, Step};
 pub use encode::{MAX_BAND, NoRoom, encode};
 pub use header::{Header, HeaderError, MAX_HEADER};
 
@@ -101,6 +102,19 @@ pub fn band_bytes(width: u16) -> usize {
     stride(width) * usize::from(crate::walk::EDGE)
 }
 
+/// What is wrong with a stream.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Defect {
+    /// A band begins with an unknown form.
+    Form,
+    /// A count of bands or rows is 0 or more than remain, or the side of cells is 0.
+    Count,
+    /// A row is longer than the page is wide, has dots beyond its width, or ends in the middle of a run.
+    Row,
+    /// The memory for a band is smaller than [`band_bytes`].
+    Memory,
+}
+
 /// First byte of a band.
 mod form {
     pub const BLANK: u8 = 0;
@@ -108,6 +122,9 @@ mod form {
     pub const ROWS: u8 = 2;
     pub const ACROSS: u8 = 3;
 }
+
+/// Bytes of the widest row.
+const MAX_STRIDE: usize = 1235;
 
 /// Runs that are decoded before others may run: 6 µs each at most on a microcontroller.
 const MOST_RUNS: u32 = 64;
