@@ -4,12 +4,13 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::{Listing, MOST_CURVE_BYTES, parse_stack, provenance, text};
+use super::fields::{MOST_CURVE_BYTES, parse_stack, provenance, text};
 use crate::curve::{Curve, CurveError};
 use crate::format::MeasuredTable;
 use crate::problem::{Findings, Problem};
 use crate::provenance::Provenance;
 use crate::rule::Severity;
+use crate::stack::Stack;
 use crate::uncertainty::Uncertainty;
 
 /// A measured or predicted curve as it was read.
@@ -18,6 +19,13 @@ pub(super) struct Measured {
     pub uncertainty: Option<Uncertainty>,
     pub provenance: Provenance,
     pub file: PathBuf,
+}
+
+/// A listed stack and its position in the text.
+pub(super) struct Listing {
+    pub stack: Stack,
+    pub offset: Option<usize>,
+    pub measured: Option<Measured>,
 }
 
 /// Reads a `measured` or `predicted` curve and assigns it to its stack, which is appended to the list if it is new.
