@@ -13,7 +13,7 @@ use crate::MeasureError;
 use crate::camera::merge::Radiance;
 use crate::camera::photo::{self, Values};
 use crate::camera::probe::CLIPPED;
-use crate::geometry::marks::Grey;
+use crate::geometry::grey::Grey;
 use crate::geometry::pose::{Lens, Pose};
 
 /// A photograph, linear in light.
@@ -57,7 +57,7 @@ impl Picture {
 
     /// The picture as marks are found in it.
     pub(crate) fn grey(&self) -> Grey {
-        Grey::of(&self.values, self.width, self.height)
+        Grey::darkest(&self.values, self.width, self.height)
     }
 
     /// The same for the search of the grey card. Noise is not known here, and not needed.

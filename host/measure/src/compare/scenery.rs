@@ -18,10 +18,12 @@ use press::preview::{Radiance, Source, ToneCurve, picture as picture_of};
 use sheet::Area;
 use view::{Light, Lit, Renderer, Scene};
 
+use super::comparison::{PhotoFigures, Pictures};
 use super::figures::{self, Cover, Lighting, Scale, Spots, Steps};
 use super::flat::{Flat, Window};
+use super::inputs::{Printed, SheetPhoto, space};
 use super::picture::Picture;
-use super::{Card, PhotoFigures, Pictures, Printed, Setup, Shot, White, space};
+use super::setup::{Card, Setup, White};
 use crate::MeasureError;
 use crate::curves::card;
 use crate::geometry::pose::{Camera, Lens, Pose};
@@ -68,7 +70,7 @@ impl Scenery {
         area: Area,
         middle: [f64; 2],
         size: [f64; 2],
-        shot: &Shot,
+        shot: &SheetPhoto,
         camera: &Camera,
     ) -> Result<Scenery, MeasureError> {
         let Printed { sheet, library, document } = printed;
@@ -99,7 +101,7 @@ impl Scenery {
     /// One photograph beside its prediction.
     pub(super) fn compared(
         &self,
-        shot: &Shot,
+        shot: &SheetPhoto,
         number: usize,
         camera: &Camera,
         setup: &Setup,
@@ -189,7 +191,7 @@ impl Scenery {
     /// from them. Marks that differ leave the factors uncertain.
     fn paper_scale(
         &self,
-        shot: &Shot,
+        shot: &SheetPhoto,
         picture: &Picture,
         lighting: &Lighting,
     ) -> Result<(Scale, f64), MeasureError> {
@@ -244,7 +246,7 @@ impl Scenery {
 
 /// The factors that make the middle step of a grey card in the sheet's plane as bright as it is.
 fn card_scale(
-    shot: &Shot,
+    shot: &SheetPhoto,
     picture: &Picture,
     stated: &Card,
     lighting: &Lighting,

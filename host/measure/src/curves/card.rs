@@ -45,6 +45,27 @@ pub struct Calibration {
     pub deviation: [[f64; 3]; 2],
 }
 
+impl Calibration {
+    /// The irradiance of the middle step under a light.
+    pub(crate) fn irradiance(&self, scene: &Scene, light: usize) -> f64 {
+        let [left, top, right, bottom] = self.steps[1];
+        scene.card_irradiance(0.5 * (left + right), 0.5 * (top + bottom), light)
+    }
+
+    /// What a second try under lamp `lamp` should do otherwise.
+    pub(crate) fn advice(&self, lamp: usize) -> Option<String> {
+        let deviations = self.deviation.iter().flatten();
+        let worst = deviations.fold(0.0f64, |a, d| if d.abs() > a.abs() { *d } else { a });
+        (worst.abs() > LINEAR).then(|| {
+            format!(
+                "lamp {lamp}: a step of the grey card is off by {:.0} %: keep other light from the card, and bright things out of the \
+                 picture; see that the files have no tone curve",
+                100.0 * worst
+            )
+        })
+    }
+}
+
 type Rectangle = [f64; 4];
 
 /// An even region of the small copy.

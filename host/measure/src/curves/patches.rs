@@ -12,7 +12,7 @@ use sheet::{Area, DOTS_PER_MM, DotMap};
 
 use crate::MeasureError;
 use crate::camera::merge::Radiance;
-use crate::geometry::marks::Grey;
+use crate::geometry::grey::Grey;
 use crate::geometry::scene::Scene;
 use crate::geometry::sheet_marks::SheetMarks;
 use crate::linalg::Cholesky;
@@ -205,7 +205,7 @@ fn affine(pairs: &[([f64; 2], [f64; 2])]) -> Option<[[f64; 3]; 2]> {
 
 /// The merged photographs as marks are found in them.
 fn grey(radiance: &Radiance) -> Grey {
-    let grey = Grey::of(&radiance.value, radiance.width, radiance.height);
+    let grey = Grey::darkest(&radiance.value, radiance.width, radiance.height);
     let cut = |v: &f32| if v.is_finite() { v.min(BRIGHT) } else { BRIGHT };
     Grey { values: grey.values.iter().map(cut).collect(), ..grey }
 }

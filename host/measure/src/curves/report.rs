@@ -11,7 +11,8 @@ use press::html::{self, escape};
 use super::library;
 use super::reduce::Kind;
 use crate::MeasureError;
-use crate::measurement::{Measured, Measurement, seconds};
+use crate::camera::series::seconds;
+use crate::measurement::{Measured, Measurement};
 
 const COLOURS: [(u8, u8, u8); 3] = [(208, 48, 48), (32, 140, 64), (48, 88, 220)];
 /// The largest picture that is put into a page, in bytes.

@@ -11,7 +11,8 @@ use inks::Library;
 use press::layout::camera::{Name, SIDE};
 use sheet::{Area, DOTS_PER_MM, DotMap};
 
-use super::marks::{self, Grey, Mark};
+use super::grey::Grey;
+use super::marks::{self, Mark};
 use crate::MeasureError;
 
 /// Dots along a side of a pixel in which marks are looked for.

@@ -17,7 +17,8 @@ use sheet::{DOTS_PER_MM, Sheet};
 use super::resolution;
 use super::scan::Scan;
 use crate::MeasureError;
-use crate::geometry::marks::{Grey, Line, profile};
+use crate::geometry::grey::Grey;
+use crate::geometry::marks::{Line, profile};
 use crate::geometry::sheet_marks::SheetMarks;
 use crate::linalg::{Cholesky, median};
 

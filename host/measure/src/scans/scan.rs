@@ -13,8 +13,9 @@ use sheet::{Area, DOTS_PER_MM};
 
 use crate::MeasureError;
 use crate::compare::picture::Picture;
+use crate::geometry::grey::Grey;
 use crate::geometry::homography::Homography;
-use crate::geometry::marks::{Grey, Mark};
+use crate::geometry::marks::Mark;
 use crate::geometry::sheet_marks::SheetMarks;
 use crate::linalg::{Cholesky, spread};
 

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use super::{Grey, distance};
+use crate::geometry::grey::Grey;
 
 /// Darker than this part of the mean is dark.
 const DARK: f32 = 0.75;
@@ -162,4 +162,8 @@ pub(super) fn quad(hull: &[[f64; 2]]) -> Option<[[f64; 2]; 4]> {
         found > 0.85 * area(hull).abs() && least > 0.4 * most && most >= SMALLEST && least >= 0.5 * SMALLEST;
     // In the order of the clock, as rows grow downward.
     square.then(|| if area(&corners) > 0.0 { corners } else { [a, d, c, b] })
+}
+
+pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
 }
