@@ -33,7 +33,7 @@ mod uncertainty;
 
 pub use curve::{Curve, CurveError};
 pub use format::{Caution, FILE_NAME};
-pub use knots::{Knots, Place};
+pub use knots::{KnotPosition, Knots};
 pub use library::{Cartridge, Dots, Entry, Library, Origins};
 pub use lobes::{Lobe, Lobes};
 pub use open::LibraryError;

@@ -12,7 +12,7 @@ use std::path::Path;
 use protocol::ink::Ink;
 use toml::Spanned;
 
-use self::curves::{Listing, Measured};
+use self::curves::{Listing, ReadCurve};
 use self::fields::{parse_stack, provenance, text};
 use crate::albedo::{self, Albedo, INCIDENCES};
 use crate::format::{DotsOf, DotsTable, FILE_NAME, FORMAT, File, InkTable, MOST_BYTES, MeasuredTable};
@@ -93,7 +93,7 @@ struct Parts {
 }
 
 impl Parts {
-    fn of(base: Library) -> Parts {
+    fn from_base(base: Library) -> Parts {
         Parts {
             name: Some(format!("{}, changed", base.name)),
             about: Some("Modelled where it was not measured.".into()),
@@ -119,7 +119,7 @@ fn build(
     folder: Option<&Path>,
     findings: &mut Findings,
 ) -> Option<Library> {
-    let mut parts = base.map_or_else(Parts::default, Parts::of);
+    let mut parts = base.map_or_else(Parts::default, Parts::from_base);
     // Only the figures of this text are checked; those of a base were checked when it was read.
     if let Some(paper) = file.paper {
         ranges("paper", &paper.figures(), findings);
@@ -405,7 +405,7 @@ fn entry(
     let Listing { stack, offset, measured } = want;
     let field = format!("stack {stack}");
     let (curve, uncertainty, lobes, provenance) = match measured {
-        Some(Measured { curve, uncertainty, provenance, file }) => {
+        Some(ReadCurve { curve, uncertainty, provenance, file }) => {
             if provenance.is_measured() {
                 judge::curve(&stack, &file, &curve, uncertainty.as_ref(), findings);
             }
@@ -425,7 +425,7 @@ fn entry(
     for (quadrature, degrees) in quadratures.iter().zip(INCIDENCES) {
         let albedo = match &lobes {
             Some(lobes) => quadrature.sum(|t| lobes.at(t)),
-            None => quadrature.of(&curve),
+            None => quadrature.of_curve(&curve),
         };
         let albedo = albedo.into_iter().fold(0.0, f64::max);
         if albedo > 1.0 {

@@ -203,8 +203,11 @@ impl Colour {
         };
         let lattice = Lattice::new(space, printable, intents, settings.gamma);
         // A colour is the light of the whole surface: its rows are flat, so the light would only count it twice.
-        let clamp =
-            gamut::Settings { intent: gamut::Intent::Clamp, light: 0.0, ..gamut::Settings::default() };
+        let clamp = gamut::GamutSettings {
+            intent: gamut::Intent::Clamp,
+            light: 0.0,
+            ..gamut::GamutSettings::default()
+        };
         let mut mix = gamut::clamped(&lattice, printable, &clamp, observer)?.mix;
         let of_drawings = intents.len() - 1;
         if of_drawings > 0 {

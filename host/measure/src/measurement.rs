@@ -17,10 +17,10 @@ use crate::camera::residual_shift::ResidualShifts;
 use crate::camera::series;
 use crate::curves::card::{self, Calibration};
 use crate::curves::coverage;
-use crate::curves::patches::{Chart, Region};
+use crate::curves::patches::{ChartOnSample, Region};
 use crate::curves::pictures::Copy;
-use crate::curves::reduce::{self, Pixel, Reduced, Row};
-use crate::geometry::correction::{self, Sample};
+use crate::curves::reduce::{self, CurveRow, Pixel, Reduced};
+use crate::geometry::correction::{self, GeometrySample};
 use crate::geometry::measures::{self, Corrected};
 use crate::geometry::scene::Scene;
 use crate::setup::{Setup, Trust};
@@ -38,18 +38,18 @@ pub struct Measurement {
     /// How, in a sentence.
     pub setup: String,
     /// One for each lamp.
-    pub series: Vec<Series>,
+    pub series: Vec<PhotoSeries>,
     /// What stood where.
-    pub geometry: Geometry,
+    pub geometry: GeometryFigures,
     /// The stacks.
-    pub stacks: Vec<Measured>,
+    pub stacks: Vec<MeasuredStack>,
     /// What to photograph again, and why.
     pub again: Vec<String>,
 }
 
 /// The photographs under one lamp.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Series {
+pub struct PhotoSeries {
     /// The photographs, longest exposure first.
     pub shots: Vec<Shot>,
     /// What the grey card says.
@@ -58,7 +58,7 @@ pub struct Series {
 
 /// What stood where.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Geometry {
+pub struct GeometryFigures {
     /// Whether it was corrected from the pictures.
     pub solved: bool,
     /// Radius of the can in mm.
@@ -75,11 +75,11 @@ pub struct Geometry {
 
 /// A stack's curve.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Measured {
+pub struct MeasuredStack {
     /// The stack, from the bottom up.
     pub stack: String,
     /// Its samples.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CurveRow>,
 }
 
 /// A measurement with its pictures: name and picture.
@@ -91,8 +91,8 @@ pub struct Taken {
 }
 
 /// What is kept of a series.
-struct Seen {
-    series: Series,
+struct SeriesRecord {
+    series: PhotoSeries,
     copy: Copy,
     outline: Vec<[f64; 2]>,
     /// For each stack.
@@ -110,7 +110,7 @@ pub fn measure(
     observer: &dyn Observer,
 ) -> Result<Taken, MeasureError> {
     let series = series::series(folder, setup)?;
-    let chart = chart.map(Chart::new).transpose()?;
+    let chart = chart.map(ChartOnSample::new).transpose()?;
     let stacks = match &chart {
         Some(chart) => chart.stacks(),
         None => {
@@ -151,7 +151,7 @@ pub fn measure(
         let pixels =
             regions.iter().map(|at| reduce::pixels(&radiance, scene, card.scale, light, at)).collect();
         let outline = correction::outline(scene, &radiance, light);
-        seen.push(Seen { series: Series { shots, card }, copy, outline, pixels });
+        seen.push(SeriesRecord { series: PhotoSeries { shots, card }, copy, outline, pixels });
     }
     observer.end();
     let Some((_, scene)) = scene else { return Err(MeasureError::Scene("no photographs".into())) };
@@ -171,8 +171,8 @@ fn regions(setup: &Setup) -> Vec<Region> {
 
 /// The photographs of each lamp with their exposures.
 /// Some pixels of every stack, spread over the half angles.
-fn samples(scene: &Scene, seen: &[Seen], patches: usize) -> Vec<Sample> {
-    let mut bins: Vec<Vec<Sample>> = vec![Vec::new(); patches * reduce::BINS];
+fn samples(scene: &Scene, seen: &[SeriesRecord], patches: usize) -> Vec<GeometrySample> {
+    let mut bins: Vec<Vec<GeometrySample>> = vec![Vec::new(); patches * reduce::BINS];
     for (patch, pixel) in seen
         .iter()
         .flat_map(|seen| seen.pixels.iter().enumerate().flat_map(|(i, p)| p.iter().map(move |p| (i, p))))
@@ -185,7 +185,7 @@ fn samples(scene: &Scene, seen: &[Seen], patches: usize) -> Vec<Sample> {
         let variance: f64 =
             pixel.value.iter().zip(&pixel.variance).map(|(v, r)| (v / 3.0 / mean).powi(2) * r).sum();
         let bin = ((view.theta / std::f64::consts::FRAC_PI_2).sqrt() * reduce::BINS as f64) as usize;
-        bins[patch * reduce::BINS + bin.min(reduce::BINS - 1)].push(Sample {
+        bins[patch * reduce::BINS + bin.min(reduce::BINS - 1)].push(GeometrySample {
             x: pixel.x,
             y: pixel.y,
             light: pixel.light,
@@ -209,7 +209,7 @@ fn finish(
     setup: &Setup,
     tape: &Scene,
     patches: &[Stack],
-    mut seen: Vec<Seen>,
+    mut seen: Vec<SeriesRecord>,
     observer: &dyn Observer,
 ) -> Result<Taken, MeasureError> {
     observer.begin("fitting the geometry", 1);
@@ -223,7 +223,7 @@ fn finish(
     let scene = if trusted { tape.clone() } else { solved.scene.clone() };
     // The card's irradiance follows the lamp.
     let scales = |scene: &Scene| -> Vec<f64> {
-        let factor = |(light, seen): (usize, &Seen)| {
+        let factor = |(light, seen): (usize, &SeriesRecord)| {
             seen.series.card.irradiance(scene, light) / seen.series.card.irradiance(tape, light)
         };
         seen.iter().enumerate().map(factor).collect()
@@ -252,7 +252,7 @@ fn finish(
         let error = seen.iter().map(|seen| seen.series.card.error).fold(0.0, f64::max);
         let Reduced { rows, used: of_stack } = reduce::reduce(&scene, &pixels, &doubts, error.hypot(0.005));
         used.extend(of_stack);
-        stacks.push(Measured { stack: stack.to_string(), rows });
+        stacks.push(MeasuredStack { stack: stack.to_string(), rows });
         observer.advance(1);
     }
     observer.end();
@@ -263,7 +263,7 @@ fn finish(
         pictures.push((format!("mask-{}.png", light + 1), seen.copy.mask(&here, &seen.series.card.steps)));
         pictures.push((format!("residuals-{}.png", light + 1), seen.copy.residuals(&here)));
     }
-    let geometry = Geometry {
+    let geometry = GeometryFigures {
         solved: !trusted,
         radius_mm: scene.radius(),
         lights_mm: scene.lights().to_vec(),
@@ -271,7 +271,7 @@ fn finish(
         misfit: if trusted { solved.before } else { solved.misfit },
         misfit_before: solved.before,
     };
-    let series: Vec<Series> = seen.into_iter().map(|seen| seen.series).collect();
+    let series: Vec<PhotoSeries> = seen.into_iter().map(|seen| seen.series).collect();
     let mut measurement = Measurement {
         by: setup.by.clone(),
         when: setup.when.clone(),

@@ -14,7 +14,7 @@ use crate::stack::Stack;
 use crate::uncertainty::Uncertainty;
 
 /// A measured or predicted curve as it was read.
-pub(super) struct Measured {
+pub(super) struct ReadCurve {
     pub curve: Curve,
     pub uncertainty: Option<Uncertainty>,
     pub provenance: Provenance,
@@ -25,7 +25,7 @@ pub(super) struct Measured {
 pub(super) struct Listing {
     pub stack: Stack,
     pub offset: Option<usize>,
-    pub measured: Option<Measured>,
+    pub measured: Option<ReadCurve>,
 }
 
 /// Reads a `measured` or `predicted` curve and assigns it to its stack, which is appended to the list if it is new.
@@ -67,7 +67,7 @@ pub(super) fn given(
         findings.error(Some(offset), owner, problem);
     }
     wanted[place].offset.get_or_insert(offset);
-    wanted[place].measured = Some(Measured { curve, uncertainty, provenance, file });
+    wanted[place].measured = Some(ReadCurve { curve, uncertainty, provenance, file });
 }
 
 /// The path of a file inside the folder; names that lead out of it are errors.

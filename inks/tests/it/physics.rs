@@ -15,7 +15,7 @@ fn no_stack_creates_light_and_plain_paper_reflects_most_of_it() {
     let mut most = (0.0, Stack::SUBSTRATE, 0.0);
     for (quadrature, degrees) in albedo::standard().iter().zip(INCIDENCES) {
         for entry in library.entries() {
-            for share in quadrature.of(&entry.curve) {
+            for share in quadrature.of_curve(&entry.curve) {
                 if share > most.0 {
                     most = (share, entry.stack.clone(), degrees);
                 }

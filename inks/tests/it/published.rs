@@ -218,7 +218,7 @@ fn real_measurements_are_read_and_judged_by_their_energy() {
             }
             count += 1;
             let curve = inks::Curve::read_csv(&path).unwrap();
-            let most = quadratures.iter().flat_map(|q| q.of(&curve)).fold(0.0, f64::max);
+            let most = quadratures.iter().flat_map(|q| q.of_curve(&curve)).fold(0.0, f64::max);
             let folder = tempfile::tempdir().unwrap();
             std::fs::copy(&path, folder.path().join("c.csv")).unwrap();
             let text = "format = 1\nbased_on = \"built-in\"\n[[measured]]\nstack = \"C\"\ncurve = \"c.csv\"\n\

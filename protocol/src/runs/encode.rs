@@ -89,7 +89,7 @@ impl Table {
         Table { shape: None, dots: [0; MOST] }
     }
 
-    fn of(&mut self, tile: &Tile) -> &[u16] {
+    fn dots_of(&mut self, tile: &Tile) -> &[u16] {
         let shape = Tile { x: 0, y: 0, ..*tile };
         if self.shape != Some(shape) {
             tile.fill(&mut self.dots);
@@ -133,7 +133,7 @@ fn for_each_run(
             length += u32::from(tile.area());
             continue;
         }
-        for &dot in table.of(&tile) {
+        for &dot in table.dots_of(&tile) {
             let bit = columns[usize::from(dot / EDGE)] >> (EDGE - 1 - dot % EDGE) & 1;
             if bit != on {
                 run(length)?;
@@ -191,26 +191,26 @@ fn put_runs(
 }
 
 /// How a row is written.
-enum Row {
+enum RowForm {
     Same,
     Packed(usize),
     Plain(usize),
 }
 
 /// Calls `row` for each row of a band with how it is written and its bytes. The caller counts equal rows.
-fn for_each_row(rows: &[u8], stride: usize, mut row: impl FnMut(Row, &[u8]) -> Option<()>) -> Option<()> {
+fn for_each_row(rows: &[u8], stride: usize, mut row: impl FnMut(RowForm, &[u8]) -> Option<()>) -> Option<()> {
     let mut packed = [0; MAX_STRIDE];
     let mut above: &[u8] = &[];
     for bits in rows.chunks_exact(stride) {
         let trimmed = &bits[..bits.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1)];
         if trimmed == above {
-            row(Row::Same, &[])?;
+            row(RowForm::Same, &[])?;
         } else if trimmed.is_empty() {
-            row(Row::Packed(0), &[])?;
+            row(RowForm::Packed(0), &[])?;
         } else {
             match packbits::pack_into(trimmed, &mut packed[..trimmed.len() - 1]) {
-                Some(length) => row(Row::Packed(length), &packed[..length])?,
-                None => row(Row::Plain(trimmed.len()), trimmed)?,
+                Some(length) => row(RowForm::Packed(length), &packed[..length])?,
+                None => row(RowForm::Plain(trimmed.len()), trimmed)?,
             }
         }
         above = trimmed;
@@ -222,12 +222,12 @@ fn rows_length(rows: &[u8], stride: usize) -> usize {
     let (mut length, mut same) = (1, false);
     for_each_row(rows, stride, |row, _| {
         length += match row {
-            Row::Same if same => 0,
-            Row::Same => 2,
-            Row::Packed(bytes) => varint(2 * bytes + 1).len() + bytes,
-            Row::Plain(bytes) => varint(2 * bytes).len() + bytes,
+            RowForm::Same if same => 0,
+            RowForm::Same => 2,
+            RowForm::Packed(bytes) => varint(2 * bytes + 1).len() + bytes,
+            RowForm::Plain(bytes) => varint(2 * bytes).len() + bytes,
         };
-        same = matches!(row, Row::Same);
+        same = matches!(row, RowForm::Same);
         Some(())
     });
     length
@@ -239,7 +239,7 @@ fn put_rows(rows: &[u8], stride: usize, out: &mut [u8]) -> Option<usize> {
     let mut same = 0u8;
     for_each_row(rows, stride, |row, data| {
         let head = match row {
-            Row::Same => {
+            RowForm::Same => {
                 // At most 64 rows, so the count never overflows.
                 if same == 0 {
                     *out.get_mut(at)? = 0;
@@ -249,8 +249,8 @@ fn put_rows(rows: &[u8], stride: usize, out: &mut [u8]) -> Option<usize> {
                 *out.get_mut(at - 1)? = same;
                 return Some(());
             }
-            Row::Packed(length) => varint(2 * length + 1),
-            Row::Plain(length) => varint(2 * length),
+            RowForm::Packed(length) => varint(2 * length + 1),
+            RowForm::Plain(length) => varint(2 * length),
         };
         same = 0;
         let end = at + head.len() + data.len();

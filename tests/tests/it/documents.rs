@@ -28,8 +28,8 @@ fn print(spec: &str, intent: Intent, inks: InkSet) -> Print {
     let document =
         document::open(spec, &Options::default(), &Silent).unwrap_or_else(|e| panic!("{spec}: {e}"));
     let settings = Settings {
-        factor: factor::Settings { bases: Some(4), ..Default::default() },
-        gamut: gamut::Settings { intent, ..Default::default() },
+        factor: factor::FactorSettings { bases: Some(4), ..Default::default() },
+        gamut: gamut::GamutSettings { intent, ..Default::default() },
         inks,
         halftone: Default::default(),
         size: Some(Size { width: 80.0, height: Some(80.0) }),

@@ -7,7 +7,7 @@ use observe::Observer;
 
 use super::content::{ColourSpace, Content, Document};
 use super::error::DocumentError;
-use super::folder::{SETTINGS, Settings, Workflow};
+use super::folder::{FolderSettings, SETTINGS, Workflow};
 use super::source::Source;
 use crate::brdf::Space;
 use crate::sample::{Finish, Sample};
@@ -26,7 +26,7 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
             .write_image(&data, painting.width as u32, painting.height as u32, colour)
             .map_err(|error| io(&path)(std::io::Error::other(error)))?;
     }
-    let settings = Settings {
+    let settings = FolderSettings {
         name: Some(sample.name.into()),
         size_mm: Some(painting.size_mm()),
         colour_space: Some(ColourSpace::Srgb),
@@ -34,7 +34,7 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
             Finish::Metallic { .. } => Workflow::MetallicRoughness,
             Finish::Specular { .. } => Workflow::SpecularGlossiness,
         }),
-        ..Settings::default()
+        ..FolderSettings::default()
     };
     let path = folder.join(SETTINGS);
     let text = toml::to_string(&settings).map_err(|error| io(&path)(std::io::Error::other(error)))?;

@@ -45,7 +45,7 @@ struct Start {
 
 /// The solver for one matrix, and its workspace. Each thread needs its own: a clone.
 #[derive(Clone, Debug)]
-pub struct Lanes {
+pub struct SimplexBatch {
     gram: Gram,
     /// The rows of the matrix in chunks of a lane; the last is filled up with zeros.
     rows: Vec<Lane>,
@@ -76,13 +76,13 @@ enum Verdict {
     Hard,
 }
 
-impl Lanes {
+impl SimplexBatch {
     /// A solver. `typical` are the inner products (one per row of the matrix each) of some pixels whose solutions are to be
     /// starts: a few dozen from all over the document.
     ///
     /// # Errors
     /// If `typical` does not consist of rows of that length, or something is not finite.
-    pub fn new(gram: &Gram, typical: &[f64]) -> Result<Lanes, SimplexError> {
+    pub fn new(gram: &Gram, typical: &[f64]) -> Result<SimplexBatch, SimplexError> {
         let n = gram.len();
         let chunks = n.div_ceil(LANES);
         let mut rows = vec![[0.0; LANES]; n * chunks];
@@ -91,7 +91,7 @@ impl Lanes {
                 rows[i * chunks + j / LANES][j % LANES] = product;
             }
         }
-        let mut lanes = Lanes {
+        let mut lanes = SimplexBatch {
             gram: gram.clone(),
             rows,
             starts: Vec::new(),
@@ -130,7 +130,8 @@ impl Lanes {
     fn start(&mut self, weights: &[(u32, f64)]) {
         let known = self.supports.len();
         let points = weights.iter().map(|&(k, _)| k).collect();
-        let Some(support) = self.supports.of(&self.gram, points).filter(|&new| new as usize == known) else {
+        let Some(support) = self.supports.index_of(&self.gram, points).filter(|&new| new as usize == known)
+        else {
             return;
         };
         let mut quadratic = 0.0;
@@ -159,7 +160,7 @@ impl Lanes {
     /// are not negative and sum to one starts from their support.
     ///
     /// # Errors
-    /// Those of [`Lanes::solve`].
+    /// Those of [`SimplexBatch::solve`].
     pub fn solve_from(&mut self, h: &[f64], a: &mut [f64]) -> Result<Certificate, SimplexError> {
         let n = self.gram.len();
         if n == 0 || h.len() != a.len() || !h.len().is_multiple_of(n) {
@@ -293,7 +294,7 @@ impl Lanes {
             return None;
         }
         let points = (0..).zip(a).filter(|(_, a)| **a > 0.0).map(|(k, _)| k).collect();
-        self.supports.of(&self.gram, points)
+        self.supports.index_of(&self.gram, points)
     }
 
     /// Has a pixel wait at a support.

@@ -1,6 +1,6 @@
 //! Constrained least squares, the problem behind factoring, gamut mapping and clamping.
 //!
-//! [`Simplex`] solves the convex quadratic problem exactly, [`Lanes`] the same for many pixels at once. [`Mixer`] solves the perceptual problem (eq. 1) by a short
+//! [`Simplex`] solves the convex quadratic problem exactly, [`SimplexBatch`] the same for many pixels at once. [`Mixer`] solves the perceptual problem (eq. 1) by a short
 //! sequence of such quadratics.
 
 mod batch;
@@ -14,7 +14,7 @@ mod simplex;
 mod supports;
 pub(crate) mod vector;
 
-pub use batch::Lanes;
+pub use batch::SimplexBatch;
 pub use columns::Columns;
 pub use gram::Gram;
 pub(crate) use hull::LAYER_PRICE;

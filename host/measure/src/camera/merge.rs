@@ -199,7 +199,7 @@ pub fn merge(
     if eight {
         observer.note("photographs of 8 bits: the camera's response is recovered, and fine tones are lost; RAW or 16-bit TIFF is better");
     }
-    let noise = Noise::of(&probes, white[1]);
+    let noise = Noise::estimate(&probes, white[1]);
     let tones: Vec<Tones> = probes
         .iter()
         .zip(&relative)

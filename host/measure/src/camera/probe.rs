@@ -100,7 +100,7 @@ impl Noise {
     }
 
     /// Fits the noise of photographs with the same sensor and sensitivity.
-    pub(crate) fn of(probes: &[Probe], white: f32) -> Noise {
+    pub(crate) fn estimate(probes: &[Probe], white: f32) -> Noise {
         let top = if white.is_finite() { white } else { f32::MAX };
         let mut samples: Vec<(f32, f32)> = probes
             .iter()
@@ -170,12 +170,12 @@ mod tests {
         let probe = Probe::new(&ramp(0.5, 9000.0));
         let white = white(&[probe]);
         assert_eq!(white, [50_000.0; 3]);
-        let noise = Noise::of(&[Probe::new(&ramp(0.5, 9000.0))], white[1]);
+        let noise = Noise::estimate(&[Probe::new(&ramp(0.5, 9000.0))], white[1]);
         assert!(
             (noise.gain / 0.5 - 1.0).abs() < 0.1 && (noise.read / 9000.0 - 1.0).abs() < 0.15,
             "{noise:?}"
         );
-        let quiet = Noise::of(&[Probe::new(&ramp(0.0, 0.0))], 65_535.0);
+        let quiet = Noise::estimate(&[Probe::new(&ramp(0.0, 0.0))], 65_535.0);
         assert!(quiet.read > 0.0 && quiet.gain < 1.0, "{quiet:?}");
     }
 

@@ -7,10 +7,10 @@
 
 /// How far each photograph lies aside from where it was aligned to, for each lamp's series, longest exposure first.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct ResidualShifts(Vec<Series>);
+pub(crate) struct ResidualShifts(Vec<ShiftSeries>);
 
 #[derive(Clone, Debug)]
-struct Series {
+struct ShiftSeries {
     exposures: Vec<f64>,
     /// For each photograph, where pixels lie of which it is the first that is not full.
     aside: Vec<[f64; 2]>,
@@ -19,13 +19,13 @@ struct Series {
 impl ResidualShifts {
     /// Relative exposures of each lamp's photographs.
     pub(crate) fn new(exposures: impl IntoIterator<Item = Vec<f64>>) -> ResidualShifts {
-        let still = |exposures: Vec<f64>| Series { aside: vec![[0.0; 2]; exposures.len()], exposures };
+        let still = |exposures: Vec<f64>| ShiftSeries { aside: vec![[0.0; 2]; exposures.len()], exposures };
         ResidualShifts(exposures.into_iter().map(still).collect())
     }
 
     /// Moves a photograph by so many pixels along an axis.
     pub(crate) fn shift(&mut self, light: usize, shot: usize, axis: usize, by: f64) {
-        let Some(Series { exposures, aside }) = self.0.get_mut(light) else { return };
+        let Some(ShiftSeries { exposures, aside }) = self.0.get_mut(light) else { return };
         for (first, aside) in aside.iter_mut().enumerate().take(shot + 1) {
             aside[axis] += by * exposures[shot] / exposures[first..].iter().sum::<f64>();
         }

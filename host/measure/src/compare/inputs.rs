@@ -11,13 +11,13 @@ use crate::geometry::marks::Mark;
 use crate::geometry::sheet_marks::PrintedMark;
 
 /// What was printed, and of what.
-pub struct Printed<'a> {
+pub struct ComparedPrint<'a> {
     /// The dots of the whole sheet, marks included.
     pub sheet: &'a DotMap,
     /// The library that predicts them.
     pub library: &'a Library,
     /// The document, where there is one.
-    pub document: Option<Document<'a>>,
+    pub document: Option<ComparedDocument<'a>>,
 }
 
 /// The tabulation of stacks: so fine that reading between its angles is exact to a thousandth, as a document's own is not.
@@ -26,7 +26,7 @@ pub fn space() -> Space {
 }
 
 /// A document and where it is on the sheet.
-pub struct Document<'a> {
+pub struct ComparedDocument<'a> {
     /// The document.
     pub document: &'a Factored,
     /// Its mixture of stacks, tabulated as [`space`] says.

@@ -1,6 +1,6 @@
 //! Photographs of a printed sheet beside what was predicted of it.
 //!
-//! In the order of the data: [`Setup`] says where lamps stood; `geometry::sheet_marks` finds the camera marks of the dots that were printed, and
+//! In the order of the data: [`CompareSetup`] says where lamps stood; `geometry::sheet_marks` finds the camera marks of the dots that were printed, and
 //! [`geometry::marks`](crate::geometry::marks) those of each photograph, which says whether it shows this sheet; [`geometry::pose`](crate::geometry::pose) solves for lens and
 //! poses; the paper around the marks, or a grey card, gives exposure and white balance; `picture` lays the
 //! photograph flat; `scenery` shows document, mixture and dots from the same place under the same lamp; `figures` compares them,
@@ -22,13 +22,13 @@ use observe::Observer;
 
 pub use comparison::{Comparison, LensFigures, PhotoFigures, Pictures};
 pub use figures::{Errors, Factor};
-pub use inputs::{Document, Printed, space};
-pub use setup::{Card, Setup, White};
+pub use inputs::{ComparedDocument, ComparedPrint, space};
+pub use setup::{Card, CompareSetup, White};
 
 use crate::MeasureError;
 use crate::camera::photo;
 use crate::geometry::marks::Mark;
-use crate::geometry::pose::{self, Camera, Known, Seen};
+use crate::geometry::pose::{self, Known, MarkPoint, SolvedCamera};
 use crate::geometry::sheet_marks::{PrintedMark, SheetMarks};
 use inputs::SheetPhoto;
 use picture::Picture;
@@ -49,8 +49,8 @@ const MOST_PHOTOS: usize = 64;
 /// Photographs that cannot be read, do not show the sheet, differ in size or are too bright; a sheet without marks.
 pub fn compare(
     folder: &Path,
-    setup: &Setup,
-    printed: &Printed<'_>,
+    setup: &CompareSetup,
+    printed: &ComparedPrint<'_>,
     observer: &dyn Observer,
 ) -> Result<(Comparison, Vec<Pictures>), MeasureError> {
     let sheet = SheetMarks::find(printed.sheet, printed.library)?;
@@ -162,7 +162,7 @@ fn together(photos: &[PhotoFigures]) -> Errors {
 }
 
 /// Reads a photograph and finds the sheet's marks in it.
-fn read(path: &Path, setup: &Setup, sheet: &SheetMarks) -> Result<SheetPhoto, MeasureError> {
+fn read(path: &Path, setup: &CompareSetup, sheet: &SheetMarks) -> Result<SheetPhoto, MeasureError> {
     let wrong = |problem: String| Err(MeasureError::photo(path, problem));
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let Some(light) = setup.light_of(&name) else {
@@ -184,14 +184,14 @@ fn read(path: &Path, setup: &Setup, sheet: &SheetMarks) -> Result<SheetPhoto, Me
 }
 
 /// Solves for the camera.
-fn solved(first: &Path, setup: &Setup, shots: &[SheetPhoto]) -> Result<Camera, MeasureError> {
+fn solved(first: &Path, setup: &CompareSetup, shots: &[SheetPhoto]) -> Result<SolvedCamera, MeasureError> {
     let (width, height) = shots[0].size;
-    let seen: Vec<Vec<Seen>> = shots
+    let seen: Vec<Vec<MarkPoint>> = shots
         .iter()
         .map(|shot| {
             let corners = |(mark, known): &(Mark, PrintedMark)| {
                 let (mark, known) = (*mark, *known);
-                (0..4).map(move |i| Seen { sheet: known.corners[i], pixel: mark.corners[i] })
+                (0..4).map(move |i| MarkPoint { sheet: known.corners[i], pixel: mark.corners[i] })
             };
             shot.marks.iter().flat_map(corners).collect()
         })

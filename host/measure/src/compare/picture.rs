@@ -8,7 +8,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::flat::{Flat, Window};
+use super::flat::{ComparedArea, Flat};
 use crate::MeasureError;
 use crate::camera::merge::Radiance;
 use crate::camera::photo::{self, Values};
@@ -106,7 +106,7 @@ impl Picture {
     /// Means over the window's spots, with each channel multiplied by `scale`; `None` where a part is not seen, or full.
     pub(crate) fn spots(
         &self,
-        window: &Window,
+        window: &ComparedArea,
         lens: &Lens,
         pose: &Pose,
         scale: [f64; 3],
@@ -150,7 +150,7 @@ impl Picture {
     }
 
     /// The window laid flat, with each channel multiplied by `scale`.
-    pub(crate) fn flat(&self, window: &Window, lens: &Lens, pose: &Pose, scale: [f64; 3]) -> Flat {
+    pub(crate) fn flat(&self, window: &ComparedArea, lens: &Lens, pose: &Pose, scale: [f64; 3]) -> Flat {
         let pixels = window.size[0] / window.width as f64 * lens.density(pose, window.middle);
         let parts = (pixels.ceil() as usize + 1).clamp(2, 8);
         let share = 1.0 / (parts * parts) as f64;

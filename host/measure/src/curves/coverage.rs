@@ -5,7 +5,7 @@
 
 use inks::Stack;
 
-use super::reduce::{Kind, Pixel, Row};
+use super::reduce::{CurveRow, Pixel, SampleOrigin};
 use crate::MeasureError;
 use crate::geometry::scene::Scene;
 
@@ -43,14 +43,14 @@ pub(crate) fn check<'p>(
 }
 
 /// Whether a curve's highlight is full in every photograph.
-pub(crate) fn is_clipped(rows: &[Row]) -> bool {
-    rows.iter().any(|row| row.kind == Kind::Clipped)
+pub(crate) fn is_clipped(rows: &[CurveRow]) -> bool {
+    rows.iter().any(|row| row.kind == SampleOrigin::Clipped)
 }
 
 /// What a second try should do for a stack's curve.
-pub(crate) fn advice(stack: &str, rows: &[Row]) -> Vec<String> {
+pub(crate) fn advice(stack: &str, rows: &[CurveRow]) -> Vec<String> {
     let mut again = Vec::new();
-    let seen: Vec<&Row> = rows.iter().filter(|row| row.kind != Kind::Extrapolated).collect();
+    let seen: Vec<&CurveRow> = rows.iter().filter(|row| row.kind != SampleOrigin::Extrapolated).collect();
     let (first, last) =
         (seen.first().map_or(90.0, |r| r.theta_deg), seen.last().map_or(0.0, |r| r.theta_deg));
     if first > 1.5 || last < 60.0 {
@@ -59,7 +59,7 @@ pub(crate) fn advice(stack: &str, rows: &[Row]) -> Vec<String> {
              sheet, and a lamp beside the camera more than one far from it"
         ));
     }
-    if seen.iter().any(|row| row.kind == Kind::Blurred) {
+    if seen.iter().any(|row| row.kind == SampleOrigin::Blurred) {
         again.push(format!(
             "stack {stack}: the peak is narrower than a pixel or the lamp: use a smaller lamp, and let the can fill the picture"
         ));

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use super::reduce::Row;
+use super::reduce::CurveRow;
 use crate::MeasureError;
 use crate::measurement::{Measurement, Taken};
 
@@ -26,7 +26,7 @@ pub fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-fn curve(rows: &[Row]) -> Result<Vec<u8>, csv::Error> {
+fn curve(rows: &[CurveRow]) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(["theta_h_deg", "r", "g", "b", "r_sigma", "g_sigma", "b_sigma", "pixels", "kind"])?;
     for row in rows {

@@ -87,14 +87,14 @@ fn solid(sheet: &DotMap) -> Vec<(Stack, Area)> {
 }
 
 /// A chart: its marks and its patches.
-pub(crate) struct Chart {
+pub(crate) struct ChartOnSample {
     marks: SheetMarks,
     patches: Vec<(Stack, Area)>,
 }
 
-impl Chart {
+impl ChartOnSample {
     /// Finds marks and patches of a sheet.
-    pub(crate) fn new(sheet: &DotMap) -> Result<Chart, MeasureError> {
+    pub(crate) fn new(sheet: &DotMap) -> Result<ChartOnSample, MeasureError> {
         let marks = SheetMarks::find(sheet, &inks::Library::builtin())?;
         let between = marks.between;
         let inside =
@@ -115,7 +115,7 @@ impl Chart {
                 "sample.chart: its sheet has two patches of {stack}; print it once"
             )));
         }
-        Ok(Chart { marks, patches })
+        Ok(ChartOnSample { marks, patches })
     }
 
     /// The stacks.
@@ -225,7 +225,7 @@ mod tests {
             let dots = chart::stacks(&stacks, Paper::A4, strips).unwrap();
             let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
             let sheet = arrange(&dots, &layout, &Silent).unwrap().sheet;
-            let chart = Chart::new(sheet.dots()).unwrap();
+            let chart = ChartOnSample::new(sheet.dots()).unwrap();
             assert_eq!(chart.stacks(), stacks[1..]);
             let wide = if strips { 90.0 } else { 20.0 };
             for (_, area) in &chart.patches {
@@ -240,7 +240,7 @@ mod tests {
             chart::registration(&[protocol::ink::Ink::Black, protocol::ink::Ink::Cyan], Paper::A4).unwrap();
         let layout = Layout { camera_marks: true, ..Layout::centred(Paper::A4) };
         let sheet = arrange(&dots, &layout, &Silent).unwrap().sheet;
-        let said = Chart::new(sheet.dots()).err().unwrap().to_string();
+        let said = ChartOnSample::new(sheet.dots()).err().unwrap().to_string();
         assert!(said.contains("sample.chart") && said.contains("foilpress chart stacks"), "{said}");
     }
 }

@@ -52,7 +52,7 @@ const GRAZING: f64 = 1.31;
 /// How a sample was obtained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum SampleOrigin {
     /// From pixels.
     Measured,
     /// From pixels, but the peak is narrower than a pixel or the lamp.
@@ -63,21 +63,21 @@ pub enum Kind {
     Extrapolated,
 }
 
-impl Kind {
+impl SampleOrigin {
     /// The word in files.
     pub fn word(self) -> &'static str {
         match self {
-            Kind::Measured => "measured",
-            Kind::Blurred => "blurred",
-            Kind::Clipped => "clipped",
-            Kind::Extrapolated => "extrapolated",
+            SampleOrigin::Measured => "measured",
+            SampleOrigin::Blurred => "blurred",
+            SampleOrigin::Clipped => "clipped",
+            SampleOrigin::Extrapolated => "extrapolated",
         }
     }
 }
 
 /// A sample of a curve.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Row {
+pub struct CurveRow {
     /// Half angle in degrees.
     pub theta_deg: f64,
     /// Reflectance in 1/sr.
@@ -87,7 +87,7 @@ pub struct Row {
     /// Pixels it is from.
     pub pixels: usize,
     /// How it was obtained.
-    pub kind: Kind,
+    pub kind: SampleOrigin,
 }
 
 /// A pixel of a stack.
@@ -112,7 +112,7 @@ pub struct Pixel {
 /// A curve from pixels.
 pub struct Reduced {
     /// Its samples, from 0 to 90 degrees.
-    pub rows: Vec<Row>,
+    pub rows: Vec<CurveRow>,
     /// Pixels that took part: x, y, series, and the deviation of ln f from the curve; those left out have none.
     pub used: Vec<(f64, f64, usize, Option<f64>)>,
 }
@@ -415,22 +415,24 @@ fn shifts(scene: &Scene, pixels: &[Pixel], curve: &Logs, doubts: &[(Scene, Vec<f
 }
 
 /// The samples of the curve: smoothed, extended, with their deviations.
-fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> Vec<Row> {
+fn rows(curve: &Logs, found: &[Bin; BINS], geometry: &[[f64; 3]], card: f64) -> Vec<CurveRow> {
     let measured = |b: usize| found[b].pixels >= FEWEST && angle(b) <= GRAZING;
     let first = (0..BINS).find(|&b| measured(b));
     let last = (0..BINS).rev().find(|&b| measured(b));
-    let mut rows: Vec<Row> = (0..BINS)
+    let mut rows: Vec<CurveRow> = (0..BINS)
         .map(|b| {
             let inside = first <= Some(b) && Some(b) <= last;
             let kind = match (measured(b), found[b].blurred) {
-                (true, _) if found[b].clipped.contains(&true) => Kind::Clipped,
-                (true, true) => Kind::Blurred,
-                (true, false) => Kind::Measured,
+                (true, _) if found[b].clipped.contains(&true) => SampleOrigin::Clipped,
+                (true, true) => SampleOrigin::Blurred,
+                (true, false) => SampleOrigin::Measured,
                 // A gap of a bin or two is bridged by the smoother.
-                (false, _) if inside && (b > 0 && measured(b - 1) || measured(b + 1)) => Kind::Measured,
-                _ => Kind::Extrapolated,
+                (false, _) if inside && (b > 0 && measured(b - 1) || measured(b + 1)) => {
+                    SampleOrigin::Measured
+                }
+                _ => SampleOrigin::Extrapolated,
             };
-            Row {
+            CurveRow {
                 theta_deg: angle(b).to_degrees(),
                 rgb: [0.0; 3],
                 sigma: [0.0; 3],

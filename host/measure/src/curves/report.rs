@@ -9,10 +9,10 @@ use plotters::prelude::*;
 use press::html::{self, escape};
 
 use super::library;
-use super::reduce::Kind;
+use super::reduce::SampleOrigin;
 use crate::MeasureError;
 use crate::camera::series::seconds;
-use crate::measurement::{Measured, Measurement};
+use crate::measurement::{MeasuredStack, Measurement};
 
 const COLOURS: [(u8, u8, u8); 3] = [(208, 48, 48), (32, 140, 64), (48, 88, 220)];
 /// The largest picture that is put into a page, in bytes.
@@ -147,7 +147,7 @@ fn geometry(m: &Measurement, page: &mut String) -> std::fmt::Result {
 type Drawn = Result<String, Box<dyn std::error::Error>>;
 
 /// The curves of a stack over the square root of the angle, where its samples are evenly spaced.
-fn curves(stack: &Measured) -> Drawn {
+fn curves(stack: &MeasuredStack) -> Drawn {
     let values = || stack.rows.iter().flat_map(|row| row.rgb).filter(|v| *v > 0.0 && v.is_finite());
     let (least, most) = (values().fold(f64::MAX, f64::min), values().fold(0.0, f64::max));
     if most <= 0.0 || stack.rows.is_empty() {
@@ -173,7 +173,7 @@ fn curves(stack: &Measured) -> Drawn {
             .draw()?;
         for (c, (r, g, b)) in COLOURS.into_iter().enumerate() {
             let colour = RGBColor(r, g, b);
-            let point = |row: &super::reduce::Row, by: f64| {
+            let point = |row: &super::reduce::CurveRow, by: f64| {
                 (row.theta_deg.sqrt(), (row.rgb[c] + by * row.sigma[c]).clamp(low, high))
             };
             let band = stack.rows.iter().map(|row| point(row, 2.0));
@@ -181,7 +181,7 @@ fn curves(stack: &Measured) -> Drawn {
                 band.chain(stack.rows.iter().rev().map(|row| point(row, -2.0))).collect();
             chart.draw_series(std::iter::once(Polygon::new(band, colour.mix(0.18).filled())))?;
             for part in stack.rows.windows(2) {
-                let sure = part.iter().all(|row| row.kind == Kind::Measured);
+                let sure = part.iter().all(|row| row.kind == SampleOrigin::Measured);
                 let line: Vec<(f64, f64)> = part.iter().map(|row| point(row, 0.0)).collect();
                 if sure {
                     chart.draw_series(LineSeries::new(line, colour.stroke_width(2)))?;
@@ -196,7 +196,7 @@ fn curves(stack: &Measured) -> Drawn {
 }
 
 /// How many pixels each sample is from.
-fn coverage(stack: &Measured) -> Drawn {
+fn coverage(stack: &MeasuredStack) -> Drawn {
     let most = stack.rows.iter().map(|row| row.pixels).max().unwrap_or(0).max(10) as f64;
     let mut text = String::new();
     {
@@ -218,8 +218,11 @@ fn coverage(stack: &Measured) -> Drawn {
         let half = 0.45 * 90f64.sqrt() / stack.rows.len() as f64;
         chart.draw_series(stack.rows.iter().filter(|row| row.pixels > 0).map(|row| {
             let (x, top) = (row.theta_deg.sqrt(), row.pixels as f64);
-            let colour =
-                if row.kind == Kind::Measured { RGBColor(90, 90, 90) } else { RGBColor(230, 150, 40) };
+            let colour = if row.kind == SampleOrigin::Measured {
+                RGBColor(90, 90, 90)
+            } else {
+                RGBColor(230, 150, 40)
+            };
             Rectangle::new([(x - half, 0.8), (x + half, top)], colour.filled())
         }))?;
         area.present()?;

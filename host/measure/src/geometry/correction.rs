@@ -27,7 +27,7 @@ const STEPS: usize = 14;
 
 /// A pixel that takes part.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample {
+pub(crate) struct GeometrySample {
     pub(crate) x: f64,
     pub(crate) y: f64,
     pub(crate) light: usize,
@@ -70,7 +70,7 @@ fn node(theta: f64) -> f64 {
 }
 
 /// Deviations of ln f from each stack's curve for this scene. Pixels without light get 0.
-fn deviations(scene: &Scene, samples: &[Sample], weights: &[f64], patches: usize) -> Vec<f64> {
+fn deviations(scene: &Scene, samples: &[GeometrySample], weights: &[f64], patches: usize) -> Vec<f64> {
     let seen: Vec<Option<(f64, f64)>> = samples
         .iter()
         .map(|s| {
@@ -119,7 +119,12 @@ fn huber(residual: f64) -> f64 {
 }
 
 /// Finds the corrections.
-pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], measures: &[Measure]) -> Solved {
+pub(crate) fn solve(
+    scene: &Scene,
+    samples: &[GeometrySample],
+    outline: &[[f64; 2]],
+    measures: &[Measure],
+) -> Solved {
     let patches = samples.iter().map(|s| s.patch + 1).max().unwrap_or(0);
     let n = measures.len();
     let flat: Vec<f64> = samples.iter().map(|s| 1.0 / (s.sigma * s.sigma + 0.02 * 0.02)).collect();
@@ -136,7 +141,7 @@ pub(crate) fn solve(scene: &Scene, samples: &[Sample], outline: &[[f64; 2]], mea
         let now = apply(scene, measures, &moved);
         let plain = deviations(&now, samples, &flat, patches);
         misfit = spread(&plain).1.max(LEAST_MISFIT);
-        let sigma = |s: &Sample| (s.sigma * s.sigma + misfit * misfit).sqrt();
+        let sigma = |s: &GeometrySample| (s.sigma * s.sigma + misfit * misfit).sqrt();
         let weights: Vec<f64> = samples
             .iter()
             .zip(&plain)
@@ -279,7 +284,7 @@ mod tests {
     }
 
     /// Pixels of a glossy can under exact geometry.
-    fn samples(truth: &Scene) -> Vec<Sample> {
+    fn samples(truth: &Scene) -> Vec<GeometrySample> {
         let mut samples = Vec::new();
         for y in (60..300).step_by(4) {
             for x in (160..320).step_by(2) {
@@ -288,7 +293,7 @@ mod tests {
                     continue;
                 };
                 let f = 0.05 + inks::ggx::lobe(view.theta, 0.1);
-                samples.push(Sample {
+                samples.push(GeometrySample {
                     x,
                     y,
                     light: 0,

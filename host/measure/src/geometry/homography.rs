@@ -27,7 +27,7 @@ impl Homography {
         if from.len() < 4 || from.len() != to.len() {
             return None;
         }
-        let (a, b) = (Unit::of(from)?, Unit::of(to)?);
+        let (a, b) = (UnitFrame::fit(from)?, UnitFrame::fit(to)?);
         let (mut normal, mut right) = (vec![0.0; 64], vec![0.0; 8]);
         for (p, q) in from.iter().zip(to) {
             let ([x, y], [u, v]) = (a.to(*p), b.to(*q));
@@ -54,17 +54,17 @@ impl Homography {
 }
 
 /// Moves points to their middle and scales them to unit size.
-struct Unit {
+struct UnitFrame {
     middle: [f64; 2],
     scale: f64,
 }
 
-impl Unit {
-    fn of(points: &[[f64; 2]]) -> Option<Unit> {
+impl UnitFrame {
+    fn fit(points: &[[f64; 2]]) -> Option<UnitFrame> {
         let n = points.len() as f64;
         let middle = points.iter().fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]).map(|v| v / n);
         let size = points.iter().map(|p| (p[0] - middle[0]).hypot(p[1] - middle[1])).sum::<f64>() / n;
-        (size > 1e-9 && size.is_finite()).then(|| Unit { middle, scale: 1.0 / size })
+        (size > 1e-9 && size.is_finite()).then(|| UnitFrame { middle, scale: 1.0 / size })
     }
 
     fn to(&self, p: [f64; 2]) -> [f64; 2] {

@@ -11,7 +11,7 @@ use super::scene::{Scene, Unknown};
 use crate::MeasureError;
 use crate::camera::merge::Shot;
 use crate::linalg::median;
-use crate::setup::{Setup, Shape};
+use crate::setup::{SampleShape, Setup};
 
 /// A correction beyond this many tolerances is a mistake.
 const MISTAKE: f64 = 3.0;
@@ -43,13 +43,13 @@ pub(crate) fn measures(setup: &Setup, series: &[&[Shot]]) -> Vec<Measure> {
     let tilt = sample.tilt_tolerance_deg.to_radians();
     let mut measures = vec![(Unknown::Nod, tilt), (Unknown::Depth, sample.centre_tolerance_mm)];
     match sample.shape {
-        Shape::Cylinder => {
+        SampleShape::Cylinder => {
             let radius = sample.radius_mm.unwrap_or(1.0);
             measures.push((Unknown::Radius, sample.radius_tolerance_mm.unwrap_or(0.015 * radius)));
             measures.push((Unknown::Lean, tilt));
             measures.push((Unknown::Across, sample.centre_tolerance_mm));
         }
-        Shape::Flat => measures.push((Unknown::Turn, tilt)),
+        SampleShape::Flat => measures.push((Unknown::Turn, tilt)),
     }
     for (i, light) in setup.light.iter().enumerate() {
         measures.extend((0..3).map(|axis| (Unknown::Light(i, axis), light.tolerance_mm)));

@@ -14,7 +14,7 @@ use crate::linalg::Cholesky;
 
 /// A point of the sheet in mm (x right, y up), and where it is in the picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct MarkPoint {
     /// On the sheet.
     pub sheet: [f64; 2],
     /// In the picture.
@@ -115,7 +115,7 @@ impl Lens {
 
 /// The solved camera.
 #[derive(Clone, Debug)]
-pub struct Camera {
+pub struct SolvedCamera {
     /// The lens.
     pub lens: Lens,
     /// A pose for each photograph.
@@ -140,7 +140,11 @@ const LENS: usize = 3;
 /// Solves for the camera from what each photograph of `width` x `height` pixels shows. Each has at least eight points.
 ///
 /// `None` if points lie on a line or no camera sees them so.
-pub fn solve(photos: &[Vec<Seen>], (width, height): (usize, usize), known: &Known) -> Option<Camera> {
+pub fn solve(
+    photos: &[Vec<MarkPoint>],
+    (width, height): (usize, usize),
+    known: &Known,
+) -> Option<SolvedCamera> {
     let middle = [width as f64 / 2.0, height as f64 / 2.0];
     let planes: Vec<Homography> = photos
         .iter()
@@ -247,7 +251,7 @@ impl State {
         next
     }
 
-    fn residuals_of(&self, photo: usize, points: &[Seen]) -> Option<Vec<f64>> {
+    fn residuals_of(&self, photo: usize, points: &[MarkPoint]) -> Option<Vec<f64>> {
         let mut out = Vec::with_capacity(2 * points.len());
         for p in points {
             let [x, y] = self.lens.project(&self.poses[photo], [p.sheet[0], p.sheet[1], 0.0])?;
@@ -256,14 +260,14 @@ impl State {
         out.iter().all(|v| v.is_finite()).then_some(out)
     }
 
-    fn residuals(&self, photos: &[Vec<Seen>]) -> Option<Vec<Vec<f64>>> {
+    fn residuals(&self, photos: &[Vec<MarkPoint>]) -> Option<Vec<Vec<f64>>> {
         photos.iter().enumerate().map(|(i, points)| self.residuals_of(i, points)).collect()
     }
 
     /// Normal equations by differences. A photograph depends on the lens and its own pose.
     fn gather(
         &self,
-        photos: &[Vec<Seen>],
+        photos: &[Vec<MarkPoint>],
         base: &[Vec<f64>],
         weights: &[Vec<f64>],
         normal: &mut [f64],
@@ -323,7 +327,7 @@ impl State {
         priors
     }
 
-    fn finished(self, photos: &[Vec<Seen>], normal: &[f64]) -> Option<Camera> {
+    fn finished(self, photos: &[Vec<MarkPoint>], normal: &[f64]) -> Option<SolvedCamera> {
         let n = LENS + 6 * photos.len();
         let residuals = self
             .residuals(photos)?
@@ -347,7 +351,7 @@ impl State {
             }
         }
         let forward = self.poses.iter().all(|pose| pose.position()[2] > 0.0);
-        forward.then(|| Camera {
+        forward.then(|| SolvedCamera {
             lens: self.lens,
             residuals,
             uncertain_mm: position.into_iter().map(f64::sqrt).collect(),
@@ -440,7 +444,7 @@ mod tests {
     }
 
     /// Photographs of the marks with noise of `error` pixels.
-    fn photos(lens: &Lens, poses: &[Pose], error: f64, seed: u64) -> Vec<Vec<Seen>> {
+    fn photos(lens: &Lens, poses: &[Pose], error: f64, seed: u64) -> Vec<Vec<MarkPoint>> {
         let mut state = seed;
         let mut noise = || {
             // A sum of four even numbers is nearly normal.
@@ -458,7 +462,7 @@ mod tests {
                     .into_iter()
                     .map(|sheet| {
                         let [x, y] = lens.project(pose, [sheet[0], sheet[1], 0.0]).unwrap();
-                        Seen { sheet, pixel: [x + noise(), y + noise()] }
+                        MarkPoint { sheet, pixel: [x + noise(), y + noise()] }
                     })
                     .collect()
             })
@@ -540,9 +544,9 @@ mod tests {
 
     #[test]
     fn points_on_a_line_are_no_sheet() {
-        let line: Vec<Seen> = (0..8)
+        let line: Vec<MarkPoint> = (0..8)
             .map(f64::from)
-            .map(|i| Seen { sheet: [i, 2.0 * i], pixel: [10.0 * i, 20.0 * i] })
+            .map(|i| MarkPoint { sheet: [i, 2.0 * i], pixel: [10.0 * i, 20.0 * i] })
             .collect();
         assert!(solve(&[line], (200, 100), &Known::default()).is_none());
     }

@@ -7,7 +7,7 @@
 
 use crate::MeasureError;
 use crate::camera::residual_shift::ResidualShifts;
-use crate::setup::{Setup, Shape};
+use crate::setup::{SampleShape, Setup};
 
 pub(crate) type Vector = [f64; 3];
 
@@ -37,7 +37,7 @@ pub(crate) fn turned(v: Vector, axis: Vector, angle: f64) -> Vector {
 
 /// A pinhole camera.
 #[derive(Clone, Copy, Debug)]
-struct Camera {
+struct Pinhole {
     position: Vector,
     right: Vector,
     up: Vector,
@@ -47,7 +47,7 @@ struct Camera {
     middle: [f64; 2],
 }
 
-impl Camera {
+impl Pinhole {
     /// Direction of the ray through a place in the picture; pixel centres are at halves. Not of unit length.
     fn ray(&self, x: f64, y: f64) -> Vector {
         let (u, v) = ((x - self.middle[0]) / self.focal, (self.middle[1] - y) / self.focal);
@@ -104,7 +104,7 @@ pub(crate) enum Unknown {
 /// Camera, sample, card and lights.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    camera: Camera,
+    camera: Pinhole,
     /// Radius in mm; None for a flat sample.
     radius: Option<f64>,
     centre: Vector,
@@ -136,7 +136,7 @@ impl Scene {
             ));
         }
         let (forward, right) = (unit(forward), unit(right));
-        let camera = Camera {
+        let camera = Pinhole {
             position: setup.camera.position_mm,
             right,
             up: cross(right, forward),
@@ -155,7 +155,7 @@ impl Scene {
         let axis = unit(sample.axis);
         let across = unit(side);
         let normal = cross(across, axis);
-        let radius = sample.radius_mm.filter(|_| sample.shape == Shape::Cylinder);
+        let radius = sample.radius_mm.filter(|_| sample.shape == SampleShape::Cylinder);
         let half = [sample.width_mm.map_or(radius.unwrap_or(0.0), |w| 0.5 * w), 0.5 * sample.height_mm];
         for (name, p) in std::iter::once(("camera.position_mm", setup.camera.position_mm))
             .chain(setup.light.iter().map(|light| ("light.position_mm", light.position_mm)))

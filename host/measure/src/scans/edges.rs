@@ -7,7 +7,7 @@
 
 use sheet::DotMap;
 
-use super::scan::Window;
+use super::scan::TonePatch;
 
 /// Dots in either direction.
 pub(crate) const FAR: f64 = 2.0;
@@ -46,7 +46,7 @@ fn neighbours(u: f64, v: f64) -> Neighbours {
 
 impl Edges {
     /// Measures a window of the sheet. `inked` says of each number of a stack whether it is ink.
-    pub(crate) fn of(sheet: &DotMap, inked: &[bool], window: &Window) -> Edges {
+    pub(crate) fn measure(sheet: &DotMap, inked: &[bool], window: &TonePatch) -> Edges {
         let (width, length) = (sheet.width() as i64, sheet.length() as i64);
         // Beyond the sheet everything goes on as at its edge.
         let ink = |x: i64, y: i64| {
@@ -138,8 +138,8 @@ mod tests {
             let dots = squares(side, pitch);
             let size = 10 * pitch;
             let window =
-                Window { area: Area { left: pitch, top: pitch, width: size, length: size }, soft: 1e-9 };
-            let edges = Edges::of(&dots, &[false, true], &window);
+                TonePatch { area: Area { left: pitch, top: pitch, width: size, length: size }, soft: 1e-9 };
+            let edges = Edges::measure(&dots, &[false, true], &window);
             let (a, all) = (side as f64, (pitch * pitch) as f64);
             assert!((edges.printed - a * a / all).abs() < 1e-9);
             for reach in [-0.4, -0.2, 0.0, 0.1, 0.37, 0.8, 1.3, 1.9] {

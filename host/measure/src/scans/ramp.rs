@@ -20,7 +20,7 @@ use serde::Serialize;
 use sheet::{Area, DOTS_PER_MM, DotMap};
 
 use super::edges::{Edges, FAR};
-use super::scan::{Between, Scan, Window};
+use super::scan::{Between, Scan, TonePatch};
 use crate::MeasureError;
 use crate::geometry::sheet_marks::SheetMarks;
 
@@ -46,7 +46,7 @@ pub struct Ramp {
     /// The scans.
     pub scans: Vec<String>,
     /// Clusters of the first stack in the second, and of the second in the first.
-    pub series: [Series; 2],
+    pub series: [RampSeries; 2],
     /// The ramp, from all of the first stack downward.
     pub tones: Vec<Tone>,
     /// The tone at half ink minus a half.
@@ -59,7 +59,7 @@ pub struct Ramp {
 
 /// Clusters of one stack in another.
 #[derive(Clone, Debug, Serialize)]
-pub struct Series {
+pub struct RampSeries {
     /// The stack of the clusters.
     pub stack: String,
     /// The stack around them.
@@ -134,7 +134,7 @@ pub struct Tone {
 }
 
 /// The chart on its sheet.
-struct Chart<'a> {
+struct RampChart<'a> {
     sheet: &'a DotMap,
     parts: ramp::Parts,
     /// Its stacks and their numbers.
@@ -155,9 +155,9 @@ pub fn measure(
     observer: &dyn Observer,
 ) -> Result<Ramp, MeasureError> {
     let marks = SheetMarks::find(sheet, library)?;
-    let chart = Chart::find(sheet, &marks)?;
+    let chart = RampChart::find(sheet, &marks)?;
     observer.begin("scans", scans.len() as u64);
-    let mut seen: Vec<Seen> = Vec::new();
+    let mut seen: Vec<ScannedTones> = Vec::new();
     for path in scans {
         let scan = Scan::read(path, &marks, linear)?;
         seen.push(chart.read(&scan, path)?);
@@ -169,23 +169,23 @@ pub fn measure(
 }
 
 /// The tones of a scan: of each patch, and along the ramp.
-struct Seen {
+struct ScannedTones {
     patches: [Vec<f64>; 2],
     ramp: Vec<f64>,
 }
 
-fn patch(area: &Area) -> Window {
+fn patch(area: &Area) -> TonePatch {
     let area = Area {
         left: area.left + INSET,
         top: area.top + INSET,
         width: area.width - 2 * INSET,
         length: area.length - 2 * INSET,
     };
-    Window { area, soft: SOFT }
+    TonePatch { area, soft: SOFT }
 }
 
-impl<'a> Chart<'a> {
-    fn find(sheet: &'a DotMap, marks: &SheetMarks) -> Result<Chart<'a>, MeasureError> {
+impl<'a> RampChart<'a> {
+    fn find(sheet: &'a DotMap, marks: &SheetMarks) -> Result<RampChart<'a>, MeasureError> {
         let no_chart = || {
             MeasureError::Scene(
                 "the job is not a ramp chart with all its camera marks; print one with `foilpress chart ramp`, on a4 or letter, \
@@ -232,14 +232,14 @@ impl<'a> Chart<'a> {
         if stacks[0].1 == stacks[1].1 {
             return Err(no_chart());
         }
-        Ok(Chart { sheet, parts, stacks })
+        Ok(RampChart { sheet, parts, stacks })
     }
 
-    fn tones(&self) -> Vec<Window> {
+    fn tones(&self) -> Vec<TonePatch> {
         let ramp = self.parts.ramp;
         let step = ramp.width / TONES;
         (0..TONES)
-            .map(|i| Window {
+            .map(|i| TonePatch {
                 area: Area {
                     left: ramp.left + i * step,
                     top: ramp.top + (ramp.length - BAND) / 2,
@@ -251,33 +251,34 @@ impl<'a> Chart<'a> {
             .collect()
     }
 
-    fn read(&self, scan: &Scan, path: &Path) -> Result<Seen, MeasureError> {
+    fn read(&self, scan: &Scan, path: &Path) -> Result<ScannedTones, MeasureError> {
         let names = self.stacks.each_ref().map(|(stack, _)| stack.to_string());
         let between = Between::fit(scan, path, &self.parts.solids, [&names[0], &names[1]])?;
-        let share = |window: Window| between.share(scan, path, &window);
+        let share = |window: TonePatch| between.share(scan, path, &window);
         let row = |k: usize| -> Result<Vec<f64>, MeasureError> {
             let own = |share: f64| if k == 0 { share } else { 1.0 - share };
             self.parts.clusters[k].par_iter().map(|area| share(patch(area)).map(own)).collect()
         };
         let patches = [row(0)?, row(1)?];
         let ramp = self.tones().into_par_iter().map(share).collect::<Result<_, _>>()?;
-        Ok(Seen { patches, ramp })
+        Ok(ScannedTones { patches, ramp })
     }
 
-    fn edges(&self, k: usize, windows: &[Window]) -> Vec<Edges> {
+    fn edges(&self, k: usize, windows: &[TonePatch]) -> Vec<Edges> {
         let mut inked = vec![false; self.sheet.stacks().len()];
         inked[usize::from(self.stacks[k].1)] = true;
-        windows.par_iter().map(|window| Edges::of(self.sheet, &inked, window)).collect()
+        windows.par_iter().map(|window| Edges::measure(self.sheet, &inked, window)).collect()
     }
 
-    fn reduced(&self, scans: Vec<String>, seen: &[Seen]) -> Ramp {
-        let mean = |of: &dyn Fn(&Seen) -> f64| seen.iter().map(of).sum::<f64>() / seen.len().max(1) as f64;
+    fn reduced(&self, scans: Vec<String>, seen: &[ScannedTones]) -> Ramp {
+        let mean =
+            |of: &dyn Fn(&ScannedTones) -> f64| seen.iter().map(of).sum::<f64>() / seen.len().max(1) as f64;
         let series = [0, 1].map(|k| {
-            let windows: Vec<Window> = self.parts.clusters[k].iter().map(patch).collect();
+            let windows: Vec<TonePatch> = self.parts.clusters[k].iter().map(patch).collect();
             let edges = self.edges(k, &windows);
             let tones: Vec<f64> = (0..MOST).map(|i| mean(&|seen| seen.patches[k][i])).collect();
             let (own, other) = (&self.stacks[k].0, &self.stacks[1 - k].0);
-            Series::of(own, other, &edges, &tones)
+            RampSeries::fit(own, other, &edges, &tones)
         });
         // What the gain of the first stack's clusters makes of the ramp; if they do not hold, that of the second's.
         let reach = match (series[0].minimum_cluster, series[1].minimum_cluster) {
@@ -362,8 +363,8 @@ fn reach(windows: &[(&Edges, f64)]) -> f64 {
     0.5 * (low + high)
 }
 
-impl Series {
-    fn of(stack: &Stack, ground: &Stack, edges: &[Edges], seen: &[f64]) -> Series {
+impl RampSeries {
+    fn fit(stack: &Stack, ground: &Stack, edges: &[Edges], seen: &[f64]) -> RampSeries {
         let sizes = |g: f64| -> Vec<Size> {
             let size = |(i, (edges, seen)): (usize, (&Edges, &f64))| Size {
                 dots: i + 1,
@@ -389,7 +390,7 @@ impl Series {
         let n = each.len() as f64;
         let variance = each.iter().map(|own| (own - g).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
         let um = 1000.0 / DOTS_PER_MM;
-        Series {
+        RampSeries {
             stack: stack.to_string(),
             ground: ground.to_string(),
             owner: owner(stack, ground),

@@ -90,7 +90,7 @@ fn directory(path: &Path) -> std::io::Result<Option<[f64; 2]>> {
 mod tests {
     use super::*;
 
-    fn of(name: &str, bytes: &[u8]) -> Option<[f64; 2]> {
+    fn dpi_of(name: &str, bytes: &[u8]) -> Option<[f64; 2]> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
@@ -106,10 +106,10 @@ mod tests {
             png.extend(data);
             png.extend([0; 4]);
         }
-        let found = of("a.png", &png).unwrap();
+        let found = dpi_of("a.png", &png).unwrap();
         assert!(found.iter().all(|v| (v - 600.0).abs() < 0.02), "{found:?}");
         let jpeg = [&[0xff, 0xd8, 0xff, 0xe0, 0, 16][..], b"JFIF\0", &[1, 1, 1, 1, 44, 2, 88, 0, 0]].concat();
-        assert_eq!(of("a.jpg", &jpeg), Some([300.0, 600.0]));
+        assert_eq!(dpi_of("a.jpg", &jpeg), Some([300.0, 600.0]));
         // Little-endian TIFF: x and y as fractions, in dots per centimetre.
         let mut tiff = b"II*\0\x08\0\0\0\x03\0".to_vec();
         for (tag, kind, value) in [(282u16, 5u16, 50u32), (283, 5, 58), (296, 3, 3)] {
@@ -120,7 +120,7 @@ mod tests {
         }
         tiff.extend([0; 4]);
         [2362u32, 10, 1181, 10].iter().for_each(|v| tiff.extend(v.to_le_bytes()));
-        let found = of("a.tif", &tiff).unwrap();
+        let found = dpi_of("a.tif", &tiff).unwrap();
         assert!((found[0] - 599.95).abs() < 0.01 && (found[1] - 299.97).abs() < 0.01, "{found:?}");
     }
 
@@ -133,7 +133,7 @@ mod tests {
             &[0xff, 0xd8, 0xff, 0xe0, 0, 16, b'J'],
             b"II*\0\xff\xff\xff\xff",
         ] {
-            assert_eq!(of("a", bytes), None, "{bytes:?}");
+            assert_eq!(dpi_of("a", bytes), None, "{bytes:?}");
         }
     }
 }

@@ -116,7 +116,7 @@ impl Scan {
     }
 
     /// The mean light in a window and the shares of full and of empty values; `None` if part of it is outside of the picture.
-    fn mean(&self, window: &Window) -> Option<([f64; 3], [f64; 2])> {
+    fn mean(&self, window: &TonePatch) -> Option<([f64; 3], [f64; 2])> {
         let Area { left, top, width, length } = window.area;
         let (right, bottom) = ((left + width) as f64, (top + length) as f64);
         let (left, top) = (left as f64, top as f64);
@@ -147,14 +147,14 @@ impl Scan {
 
 /// A rectangle of dots whose edges are soft.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Window {
+pub(crate) struct TonePatch {
     /// All of it, in dots of the sheet.
     pub(crate) area: Area,
     /// Over how many dots its weight rises from 0 to 1.
     pub(crate) soft: f64,
 }
 
-impl Window {
+impl TonePatch {
     /// The weight of a place in dots of the sheet: 0 outside, 1 in the middle.
     pub(crate) fn weight(&self, [x, y]: [f64; 2]) -> f64 {
         let rise = |at: f64, start: usize, side: usize| {
@@ -263,7 +263,7 @@ impl Between {
                         width: step,
                         length: strip.length - 2 * INSET,
                     };
-                    let window = Window { area, soft: 2.0 };
+                    let window = TonePatch { area, soft: 2.0 };
                     let Some((rgb, at)) = scan.mean(&window) else {
                         return Err(cropped(path));
                     };
@@ -307,7 +307,7 @@ impl Between {
     }
 
     /// How much of a window the first of the two stacks covers, as light tells.
-    pub(crate) fn share(&self, scan: &Scan, path: &Path, window: &Window) -> Result<f64, MeasureError> {
+    pub(crate) fn share(&self, scan: &Scan, path: &Path, window: &TonePatch) -> Result<f64, MeasureError> {
         let Some((seen, _)) = scan.mean(window) else { return Err(cropped(path)) };
         let [a, b] = [0, 1].map(|k| self.surfaces[k].at(window.middle()));
         let (mut top, mut bottom) = (0.0, 0.0);

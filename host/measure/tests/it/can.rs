@@ -13,7 +13,7 @@ use appearance::brdf::Space;
 use appearance::gamut::{self, Mapped, Printable};
 use appearance::materials::Materials;
 use inks::{Library, Stack, ggx};
-use measure::curves::reduce::Kind;
+use measure::curves::reduce::SampleOrigin;
 use measure::measure;
 use measure::setup::Setup;
 use observe::Silent;
@@ -163,7 +163,7 @@ fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
     assert_eq!(taken.measurement.stacks.iter().map(|s| s.stack.as_str()).collect::<Vec<_>>(), STACKS);
     for measured in &taken.measurement.stacks {
         let (mut worst, mut sum, mut count) = (0.0f64, 0.0, 0.0);
-        let rows = measured.rows.iter().filter(|row| row.kind != Kind::Extrapolated);
+        let rows = measured.rows.iter().filter(|row| row.kind != SampleOrigin::Extrapolated);
         for row in rows.filter(|row| (2.0..50.0).contains(&row.theta_deg)) {
             let real = truth(&measured.stack, row.theta_deg.to_radians());
             for (found, real) in row.rgb.iter().zip(real) {
@@ -202,7 +202,7 @@ fn a_library_measured_from_a_can_prints_as_well_as_the_true_one() {
     let print = |library: &Library| {
         let rows = appearance::brdf::reflectances(&stacks(), library, &target.space);
         let printable = Printable::new(stacks(), rows);
-        let mapped = gamut::clamped(&target, &printable, &gamut::Settings::default(), &Silent).unwrap();
+        let mapped = gamut::clamped(&target, &printable, &gamut::GamutSettings::default(), &Silent).unwrap();
         fidelity(&target, &mapped, &real)
     };
     let (best, measured, modelled) = (print(&real), print(&mine), print(&Library::builtin()));

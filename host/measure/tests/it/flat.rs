@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use crate::made::{Camera, Curves, DOTS_PER_MM, EYE, STACKS, V, chart, dot, lit, truth};
-use measure::curves::reduce::Kind;
+use measure::curves::reduce::SampleOrigin;
 use measure::measure;
 use measure::setup::Setup;
 use observe::Silent;
@@ -102,7 +102,8 @@ fn measured(geometry: &str, off: f64, limit: f64) {
     for measured in &taken.measurement.stacks {
         let (mut worst, mut sum, mut covered, mut count) = (0.0f64, 0.0, 0.0, 0.0);
         let (mut first, mut last) = (90.0f64, 0.0f64);
-        for row in measured.rows.iter().filter(|row| row.kind != Kind::Extrapolated && row.theta_deg <= 60.0)
+        for row in
+            measured.rows.iter().filter(|row| row.kind != SampleOrigin::Extrapolated && row.theta_deg <= 60.0)
         {
             (first, last) = (first.min(row.theta_deg), last.max(row.theta_deg));
             let real = truth(&measured.stack, row.theta_deg.to_radians());

@@ -3,7 +3,7 @@
 //! Pixels are made here: each is the mean of rays through its area, under a lamp without extent.
 
 use inks::ggx;
-use measure::curves::reduce::{Kind, Pixel, Row, reduce};
+use measure::curves::reduce::{CurveRow, Pixel, SampleOrigin, reduce};
 use measure::geometry::scene::Scene;
 use measure::setup::Setup;
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ fn mirror(theta: f64, alpha: f64) -> f64 {
 }
 
 /// The curve of a can of this mirror around its highlight.
-fn measured(alpha: f64) -> Vec<Row> {
+fn measured(alpha: f64) -> Vec<CurveRow> {
     let scene = scene();
     let pixels: Vec<Pixel> = (0..SIZE.0 * SIZE.1)
         .into_par_iter()
@@ -65,7 +65,7 @@ fn what_is_called_measured_is_true_however_narrow_the_mirror() {
     // A pixel is 0.7 degrees of the can, the lobe of alpha 0.01 as wide; printed foil has 0.045.
     for (alpha, resolved) in [(0.0005, false), (0.001, false), (0.003, false), (0.01, true), (0.03, true)] {
         let rows = measured(alpha);
-        let blurred = rows.iter().filter(|row| row.kind == Kind::Blurred).count();
+        let blurred = rows.iter().filter(|row| row.kind == SampleOrigin::Blurred).count();
         assert_eq!(blurred == 0, resolved, "alpha {alpha}: {blurred} rows are blurred");
         for row in rows.iter().filter(|row| row.theta_deg < WIDEST_DEG - 1.0) {
             let (found, sigma) = (row.rgb[1], row.sigma[1] / row.rgb[1]);
@@ -78,9 +78,9 @@ fn what_is_called_measured_is_true_however_narrow_the_mirror() {
                 100.0 * off,
                 100.0 * sigma
             );
-            let limit = if row.kind == Kind::Measured { 0.07 } else { 0.3 };
+            let limit = if row.kind == SampleOrigin::Measured { 0.07 } else { 0.3 };
             assert!(off.abs() <= limit || off.abs() <= 2.0 * sigma || sigma >= 1.0, "alpha {alpha}: {row:?}");
-            assert!(row.kind != Kind::Measured || off.abs() <= 0.25, "alpha {alpha}: {row:?}");
+            assert!(row.kind != SampleOrigin::Measured || off.abs() <= 0.25, "alpha {alpha}: {row:?}");
         }
     }
 }

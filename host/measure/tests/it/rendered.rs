@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::renderer::{MATERIALS, Material, Picture, Raw, Rendered, render, renderer};
-use measure::curves::reduce::Kind;
+use measure::curves::reduce::SampleOrigin;
 use measure::setup::Setup;
 use measure::{Taken, measure};
 use observe::Silent;
@@ -65,7 +65,7 @@ struct Score {
 fn score(taken: &Taken, material: &Material) -> Score {
     let (mut worst, mut sum, mut covered, mut count, mut all) = (0.0f64, 0.0, 0.0, 0.0, 0.0);
     for row in &taken.measurement.stacks[0].rows {
-        if row.kind == Kind::Extrapolated || row.theta_deg > 60.0 {
+        if row.kind == SampleOrigin::Extrapolated || row.theta_deg > 60.0 {
             continue;
         }
         let truth = material.at(row.theta_deg.to_radians());
@@ -217,15 +217,15 @@ fn a_clipped_peak_is_never_silent() {
             measure(&rendered.photos(), &setup(&EXACT, material.stack, &rendered.times), None, &Silent)
                 .unwrap();
         let rows = &taken.measurement.stacks[0].rows;
-        let clipped: Vec<_> = rows.iter().filter(|row| row.kind == Kind::Clipped).collect();
+        let clipped: Vec<_> = rows.iter().filter(|row| row.kind == SampleOrigin::Clipped).collect();
         assert!(clipped.len() > 3, "{} clipped rows", clipped.len());
         for row in rows.iter().filter(|row| row.theta_deg < 60.0) {
             let truth = material.at(row.theta_deg.to_radians());
             for c in 0..3 {
                 let low = row.rgb[c] < 0.95 * truth[c];
-                assert!(row.kind != Kind::Measured || !low, "{row:?}, truth {truth:?}");
+                assert!(row.kind != SampleOrigin::Measured || !low, "{row:?}, truth {truth:?}");
                 assert!(
-                    row.kind == Kind::Measured || row.rgb[c] + 2.0 * row.sigma[c] > 0.7 * truth[c],
+                    row.kind == SampleOrigin::Measured || row.rgb[c] + 2.0 * row.sigma[c] > 0.7 * truth[c],
                     "{row:?}, truth {truth:?}"
                 );
             }
@@ -275,7 +275,7 @@ fn a_flat_sheet_under_several_lamps() {
     // The sheet covers x from -60 to 60 mm and the card begins at 75 mm.
     let taken = measure(&photos, &Setup::parse(&(text + &times)).unwrap(), None, &Silent).unwrap();
     let (mut worst, mut first, mut last) = (0.0f64, 90.0f64, 0.0f64);
-    for row in taken.measurement.stacks[0].rows.iter().filter(|row| row.kind != Kind::Extrapolated) {
+    for row in taken.measurement.stacks[0].rows.iter().filter(|row| row.kind != SampleOrigin::Extrapolated) {
         let truth = material.at(row.theta_deg.to_radians());
         (first, last) = (first.min(row.theta_deg), last.max(row.theta_deg));
         for c in 0..3 {

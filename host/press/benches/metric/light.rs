@@ -11,7 +11,7 @@ use std::path::Path;
 
 use appearance::brdf::{Space, Table};
 use appearance::document::{self, Materials, Options, Surface};
-use appearance::gamut::{self, Intent, LIGHT, Printable, Settings};
+use appearance::gamut::{self, GamutSettings, Intent, LIGHT, Printable};
 use appearance::solve::{Hull, Mixer};
 use inks::{InkSet, Library};
 use observe::Silent;
@@ -120,8 +120,12 @@ pub fn weights(data: &Path) {
         let printable = Printable::from_library(&library, &set, &space);
         for (name, targets) in &documents {
             for light in [0.0, 0.2, LIGHT, 0.3, 0.4] {
-                let settings =
-                    Settings { intent: Intent::Clamp, light, most_cartridges: 13, ..Settings::default() };
+                let settings = GamutSettings {
+                    intent: Intent::Clamp,
+                    light,
+                    most_cartridges: 13,
+                    ..GamutSettings::default()
+                };
                 let mut both = Table::new(space.columns());
                 let (mut d, mut l) = (0.0, 0.0);
                 let mut words = String::new();

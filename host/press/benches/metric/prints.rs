@@ -14,7 +14,7 @@ use std::path::Path;
 use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::{self, Document, Materials, Options, Surface};
 use appearance::factor::{self, Factored};
-use appearance::gamut::{self, InkMix, Intent, LIGHT, Mapped, Printable, Settings};
+use appearance::gamut::{self, GamutSettings, InkMix, Intent, LIGHT, Mapped, Printable};
 use inks::{InkSet, Library, Severity};
 use observe::Silent;
 use protocol::ink::Ink;
@@ -272,9 +272,9 @@ fn table(name: &str, pixels: &dyn Materials, own: Option<(f64, f64)>, probes: &[
         let printable = Printable::combined(&library, &inks, pixels.space());
         let mut outside: Vec<bool> = Vec::new();
         for (way, intent, light) in WAYS {
-            let settings = Settings { intent, light, ..Settings::default() };
+            let settings = GamutSettings { intent, light, ..GamutSettings::default() };
             let bases = || {
-                let found = factor::factor(pixels, &factor::Settings::default(), &Silent);
+                let found = factor::factor(pixels, &factor::FactorSettings::default(), &Silent);
                 Ok::<_, StageError>(Cow::Borrowed(factored.get_or_init(|| found.unwrap().factored)))
             };
             let mapped = gamut::map(pixels, bases, &printable, &settings, &Silent).unwrap();

@@ -73,7 +73,7 @@ fn raw(resolution: Resolution, width: u16, ink: Ink, row: &[u8]) -> Vec<u8> {
         Command::SelectRgl,
         Command::Resolution(resolution),
         Command::Media(Media::Plain),
-        Command::Paper(PaperCode::of(SMALL)),
+        Command::Paper(PaperCode::from_paper(SMALL)),
         Command::Length(80),
         Command::Width(width),
         Command::CurlCorrection(true),

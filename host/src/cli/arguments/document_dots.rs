@@ -49,10 +49,10 @@ pub struct DocumentDots {
 
 impl DocumentDots {
     /// How the document's bases for pictures of it are found, unless it came with bases.
-    pub fn factoring(&self) -> factor::Settings {
+    pub fn factoring(&self) -> factor::FactorSettings {
         let uses_bases = self.halftoned.mapped.report.intent.uses_bases();
         let bases = self.settings.factor.bases.or((!uses_bases).then_some(BASES));
-        factor::Settings { bases, ..self.settings.factor }
+        factor::FactorSettings { bases, ..self.settings.factor }
     }
 
     /// The document's bases for pictures of it.
@@ -105,7 +105,7 @@ impl DotsArgs {
 }
 
 /// What foils would bring to what the intent maps, if that can be seen.
-fn foils_in_words(gain: &Gain, intent: Intent, settings: &gamut::Settings) -> Option<String> {
+fn foils_in_words(gain: &Gain, intent: Intent, settings: &gamut::GamutSettings) -> Option<String> {
     /// Share of the difference that is worth the trouble.
     const WORTH: f64 = 0.1;
     let share = 1.0 - gain.after / gain.before;

@@ -89,12 +89,12 @@ impl FactorArgs {
     }
 
     /// The settings meant.
-    pub fn settings(&self) -> factor::Settings {
-        factor::Settings {
+    pub fn settings(&self) -> factor::FactorSettings {
+        factor::FactorSettings {
             method: self.method,
             bases: self.bases,
             seed: self.seed,
-            ..factor::Settings::default()
+            ..factor::FactorSettings::default()
         }
     }
 }
@@ -182,12 +182,12 @@ pub struct GamutArgs {
 
 impl GamutArgs {
     /// The settings meant.
-    pub fn settings(&self, seed: u64) -> gamut::Settings {
-        gamut::Settings {
+    pub fn settings(&self, seed: u64) -> gamut::GamutSettings {
+        gamut::GamutSettings {
             intent: self.intent,
             light: self.metric.light(),
             seed,
-            ..gamut::Settings::default()
+            ..gamut::GamutSettings::default()
         }
     }
 }

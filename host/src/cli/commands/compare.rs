@@ -14,7 +14,8 @@ use crate::cli::console::{print_job, show};
 use crate::cli::output::Staged;
 use appearance::factor::Factored;
 use measure::compare::{
-    Comparison, Document, Errors, Factor, PhotoFigures, Printed, Setup, compare, page, space,
+    CompareSetup, ComparedDocument, ComparedPrint, Comparison, Errors, Factor, PhotoFigures, compare, page,
+    space,
 };
 use observe::Observer;
 use press::layout::{Layout, arrange};
@@ -72,17 +73,17 @@ struct Work {
 
 /// Runs `compare`.
 pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
-    let setup = Setup::read(&args.camera)?;
+    let setup = CompareSetup::read(&args.camera)?;
     if !args.photos.is_dir() {
         bail!("{}: not a folder; expected the folder of the photographs", args.photos.display());
     }
     let output = args.output.clone().unwrap_or_else(|| args.photos.join("compare.html"));
     let staged = Staged::file(&output)?;
     let work = args.work(observer)?;
-    let printed = Printed {
+    let printed = ComparedPrint {
         sheet: &work.sheet,
         library: &work.library,
-        document: work.document.as_ref().map(|(document, mapped, area)| Document {
+        document: work.document.as_ref().map(|(document, mapped, area)| ComparedDocument {
             document,
             mapped,
             area: *area,

@@ -160,7 +160,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     observer.begin("solving masks", sources.len() as u64);
     let mut frames = Vec::with_capacity(sources.len() + 1);
     for (source, name) in sources.iter().zip(&args.images) {
-        let frame = Frame::of(&grid, *source, &library).with_context(|| name.clone())?;
+        let frame = Frame::for_image(&grid, *source, &library).with_context(|| name.clone())?;
         frames.push((shown_name(name), frame));
         observer.advance(1);
     }

@@ -286,7 +286,7 @@ fn list(library: &Library, inks: Option<InkSet>, json: bool) -> anyhow::Result<S
             library.words(&entry.stack)
         )?;
     }
-    let origins = Origins::of(entries.iter().copied());
+    let origins = Origins::count(entries.iter().copied());
     writeln!(text, "\n{origins}. f is the luminance of the reflectance, in 1/sr.")?;
     Ok(text)
 }

@@ -14,7 +14,7 @@ use inks::Library;
 use crate::cli::console::{print_job, show};
 use crate::cli::output::{Kind, Staged};
 use measure::Measurement;
-use measure::curves::reduce::Kind as Origin;
+use measure::curves::reduce::SampleOrigin;
 use measure::setup::Setup;
 use observe::Observer;
 use sheet::Sheet;
@@ -108,12 +108,13 @@ fn summary(measurement: &Measurement, output: &Path) -> String {
         format!("{:<12} {:>9} {:>9} {:>15}  uncertain by\n", "stack", "f(2)", "f(30)", "half angles");
     for stack in &measurement.stacks {
         let near = |degrees: f64| {
-            let off = |row: &&measure::curves::reduce::Row| (row.theta_deg - degrees).abs();
+            let off = |row: &&measure::curves::reduce::CurveRow| (row.theta_deg - degrees).abs();
             stack.rows.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
         };
         let at = |degrees: f64| near(degrees).map_or(0.0, |row| row.rgb[1]);
-        let seen =
-            || stack.rows.iter().filter(|row| row.kind != Origin::Extrapolated).map(|row| row.theta_deg);
+        let seen = || {
+            stack.rows.iter().filter(|row| row.kind != SampleOrigin::Extrapolated).map(|row| row.theta_deg)
+        };
         let (first, last) = (seen().fold(90.0, f64::min), seen().fold(0.0, f64::max));
         let doubt = near(30.0).map_or(0.0, |row| 200.0 * row.sigma[1] / row.rgb[1].max(1e-12));
         let angles = format!("{first:.1} to {last:.0}");

@@ -23,8 +23,8 @@ use std::cell::RefCell;
 fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
     let document = document::open("sample:leaf", &Options::default(), &Silent).unwrap();
     let settings = Settings {
-        factor: factor::Settings::default(),
-        gamut: gamut::Settings::default(),
+        factor: factor::FactorSettings::default(),
+        gamut: gamut::GamutSettings::default(),
         inks: inks::InkSet::default(),
         halftone: Default::default(),
         size: Some("12x9mm".parse().unwrap()),

@@ -2,7 +2,7 @@
 //!
 //! Problem: a million constrained fits in the perceptual metric, which takes hours or days according to the 2009 paper.
 //! Method: each distinct material, in reading order, starts from the mixture of the most similar one of the last few hundred
-//! ([`Recent`]). Two or three steps, with half a dozen stacks in the quadratic and the gradient of all stacks, reach a gap below
+//! ([`WarmStarts`]). Two or three steps, with half a dozen stacks in the quadratic and the gradient of all stacks, reach a gap below
 //! 1e-7 in squared distance. Weights below 0.5 % are pruned and the others solved again. Each thread takes whole runs of fixed
 //! length, so the result does not depend on the number of threads.
 //! Cost: about 7 microseconds per distinct material and core. Limits: the start matters where E is not convex; there the
@@ -10,7 +10,7 @@
 
 use rayon::prelude::*;
 
-use super::warm_start::Recent;
+use super::warm_start::WarmStarts;
 use crate::brdf::{Space, Table};
 use crate::gamut::candidates::Candidates;
 use crate::gamut::error::GamutError;
@@ -45,7 +45,7 @@ pub(crate) fn map(
     observer: &dyn Observer,
 ) -> Result<Clamped, GamutError> {
     let (width, k) = (pixels.width(), candidates.len());
-    let distinct = Distinct::of(pixels);
+    let distinct = Distinct::find(pixels);
     let count = distinct.first().len();
     let mut shares = vec![0u16; count * k];
     let mut distance = vec![0f32; count];
@@ -131,7 +131,7 @@ struct Walker {
     /// The mixture, before and after pruning.
     start: Vec<f64>,
     weights: Vec<f64>,
-    recent: Recent,
+    recent: WarmStarts,
     measure: f64,
 }
 
@@ -144,7 +144,7 @@ impl Walker {
             row: vec![0.0; space.columns()],
             start: vec![0.0; k],
             weights: vec![0.0; k],
-            recent: Recent::default(),
+            recent: WarmStarts::default(),
             measure: space.weight().iter().map(|w| w * w).sum(),
         }
     }

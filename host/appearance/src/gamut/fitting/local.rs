@@ -23,7 +23,7 @@ mod tests;
 use observe::Observer;
 use rayon::prelude::*;
 
-use self::regions::{CELL, Place, Regions, Sums};
+use self::regions::{CELL, Membership, Regions, Sums};
 use super::clamp::Clamped;
 use super::refit::{Solver, in_pixel};
 use crate::brdf::Table;
@@ -124,7 +124,7 @@ fn run(
     let rows = shares.zip(seen).zip(free.par_chunks(length)).enumerate();
     rows.map(|(row, ((shares, (distance, light)), free))| {
         let mut solver = Solver::new(candidates, pixels);
-        let mut place = Place::default();
+        let mut place = Membership::default();
         let mut sums = regions.sums(row);
         let seen = distance.iter_mut().zip(light);
         for (i, ((shares, (distance, light)), &free)) in

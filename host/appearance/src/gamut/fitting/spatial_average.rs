@@ -33,7 +33,7 @@ const LEAST: f64 = 2.0;
 
 /// Moves clamped pixels of a document, of which `spot` pixels make a side of the square that the eye averages over. Returns the
 /// share of pixels that keep their clamped mixture.
-pub(crate) fn please(
+pub(crate) fn match_averages(
     candidates: &Candidates,
     pixels: &dyn Materials,
     clamped: &mut Clamped,
@@ -290,7 +290,7 @@ mod tests {
         let mut clamped = clamp::map(&candidates, &document, &Silent).unwrap();
         let before = missed(&document, &levels(&clamped), 8);
         assert!((before - 0.03).abs() < 1e-3, "{before}");
-        let kept = please(&candidates, &document, &mut clamped, 8.0, &Silent).unwrap();
+        let kept = match_averages(&candidates, &document, &mut clamped, 8.0, &Silent).unwrap();
         let after = missed(&document, &levels(&clamped), 8);
         assert!(kept == 0.0 && after < 0.6 * before, "{kept} {after} {before}");
         // The distances are those of the mixtures.
@@ -314,7 +314,7 @@ mod tests {
             let document = Greys(space.clone(), 23, levels);
             let mut moved = clamp::map(&candidates, &document, &Silent).unwrap();
             let before = moved.shares.clone();
-            please(&candidates, &document, &mut moved, spot, &Silent).unwrap();
+            match_averages(&candidates, &document, &mut moved, spot, &Silent).unwrap();
             assert_eq!(moved.shares, before, "{name}");
         }
     }

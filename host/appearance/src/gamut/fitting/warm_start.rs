@@ -19,7 +19,7 @@ const LANES: usize = 8;
 
 /// Solutions to start from.
 #[derive(Default)]
-pub(crate) struct Recent {
+pub(crate) struct WarmStarts {
     summaries: Vec<[f32; NUMBERS]>,
     /// The weights of each, one after the other.
     weights: Vec<f64>,
@@ -27,7 +27,7 @@ pub(crate) struct Recent {
     oldest: usize,
 }
 
-impl Recent {
+impl WarmStarts {
     /// Copies the solution for the most similar target to `start`. False if there is none yet.
     pub fn start(&self, hull: &Hull, target: &Target, start: &mut [f64]) -> bool {
         let summary = target.summary(hull);
@@ -96,7 +96,7 @@ mod tests {
         curves.push(&row(0.01));
         curves.push(&row(0.3));
         let hull = Hull::new(&space, &curves, &[0.0; 2], 0.2).unwrap();
-        let mut recent = Recent::default();
+        let mut recent = WarmStarts::default();
         let mut start = [0.0; 2];
         let target = |level: f64| hull.target(&row(level)).unwrap();
         assert!(!recent.start(&hull, &target(0.1), &mut start));

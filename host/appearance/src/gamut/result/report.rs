@@ -13,7 +13,7 @@ pub struct Mapped {
     /// The input of the halftoner.
     pub mix: InkMix,
     /// The report.
-    pub report: Report,
+    pub report: GamutReport,
     /// What cartridges were chosen by.
     pub judged: Judged,
 }
@@ -31,7 +31,7 @@ pub struct Judged {
 
 /// The report of a mapping.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
+pub struct GamutReport {
     /// The intent used: never [`Intent::Auto`].
     pub intent: Intent,
     /// The inks of the result, in the order of their codes.
@@ -67,7 +67,7 @@ pub struct MaterialReport {
     /// The share of the document that it stands for: the mean weight of a basis, or the share of the sampled pixels that are
     /// nearest to a typical material.
     pub share: f64,
-    /// The target (1/sr), with scaled gloss if [`Report::gloss_scale`] is set.
+    /// The target (1/sr), with scaled gloss if [`GamutReport::gloss_scale`] is set.
     pub target: Vec<f64>,
     /// The reflectance of the mixture (1/sr), from the weights as rounded for the halftoner.
     pub printed: Vec<f64>,
@@ -107,6 +107,6 @@ pub struct PixelReport {
     /// Share of sampled pairs of pixels that differ (d > 0.03) but are printed at less than a quarter of that distance.
     pub merged: f64,
     /// Mean weight of the clamped mixture in the result: 1 for clamp; for contrast, and with
-    /// [`Settings::eye`](crate::gamut::Settings::eye), the share of pixels that keep it.
+    /// [`GamutSettings::eye`](crate::gamut::GamutSettings::eye), the share of pixels that keep it.
     pub clamped: f64,
 }

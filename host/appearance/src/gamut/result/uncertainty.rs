@@ -23,7 +23,7 @@ const BAND: f64 = 2.0;
 
 /// What the uncertainty of the curves means for a print.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Doubt {
+pub struct DistanceUncertainty {
     /// Root mean square distance d of the sampled pixels from their mixtures.
     pub distance: f64,
     /// Root mean square distance d between the mixtures and what they may be: one standard deviation of every curve.
@@ -34,7 +34,7 @@ pub struct Doubt {
     pub known: f64,
 }
 
-impl std::fmt::Display for Doubt {
+impl std::fmt::Display for DistanceUncertainty {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
@@ -50,7 +50,12 @@ impl std::fmt::Display for Doubt {
 /// Compares sampled pixels of a document with their mixtures; `None` if no curve in use has standard deviations.
 ///
 /// `mix` has the resolution of `pixels`, whose space is one of half angles.
-pub fn doubt(pixels: &dyn Materials, mix: &InkMix, library: &Library, seed: u64) -> Option<Doubt> {
+pub fn distance_uncertainty(
+    pixels: &dyn Materials,
+    mix: &InkMix,
+    library: &Library,
+    seed: u64,
+) -> Option<DistanceUncertainty> {
     let space = pixels.space();
     let curves = reflectances(&mix.stacks, library, space);
     let deviations: Vec<Option<Vec<f64>>> = mix
@@ -78,7 +83,7 @@ pub fn doubt(pixels: &dyn Materials, mix: &InkMix, library: &Library, seed: u64)
         }
     }
     let count = sampled.len() as f64;
-    (known > 0.0).then(|| Doubt {
+    (known > 0.0).then(|| DistanceUncertainty {
         distance: (all / count).sqrt(),
         deviation: (own / count).sqrt(),
         within: if all > 0.0 { within / all } else { 1.0 },
@@ -118,7 +123,7 @@ fn differences<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gamut::{Printable, Settings, clamped};
+    use crate::gamut::{GamutSettings, Printable, clamped};
     use crate::materials::Surface;
     use inks::Stack;
     use observe::Silent;
@@ -152,9 +157,9 @@ mod tests {
     }
 
     /// 8 x 8 materials from dark to light and from dull to glossy, some of them beyond what the stacks reach.
-    struct Document(Space);
+    struct MeasuredDocument(Space);
 
-    impl Materials for Document {
+    impl Materials for MeasuredDocument {
         fn width(&self) -> usize {
             8
         }
@@ -176,14 +181,14 @@ mod tests {
         }
     }
 
-    fn document() -> Document {
-        Document(Space::half_angle(32))
+    fn document() -> MeasuredDocument {
+        MeasuredDocument(Space::half_angle(32))
     }
 
-    fn mapped(library: &Library, document: &Document) -> InkMix {
+    fn mapped(library: &Library, document: &MeasuredDocument) -> InkMix {
         let stacks: Vec<Stack> = STACKS.map(|stack| stack.parse().unwrap()).to_vec();
         let rows = reflectances(&stacks, library, document.space());
-        clamped(document, &Printable::new(stacks, rows), &Settings::default(), &Silent).unwrap().mix
+        clamped(document, &Printable::new(stacks, rows), &GamutSettings::default(), &Silent).unwrap().mix
     }
 
     fn normal(random: &mut impl Rng) -> f64 {
@@ -197,7 +202,7 @@ mod tests {
         let library = library(|q, theta| 0.03 + 0.02 * q as f64 + if theta < 5.0 { 0.05 } else { 0.0 });
         let document = document();
         let mix = mapped(&library, &document);
-        let found = doubt(&document, &mix, &library, 1).unwrap();
+        let found = distance_uncertainty(&document, &mix, &library, 1).unwrap();
         let space = document.space();
         let curves = reflectances(&mix.stacks, &library, space);
         let pixels: Vec<usize> = (0..64).collect();
@@ -245,13 +250,14 @@ mod tests {
     #[test]
     fn the_share_goes_from_nothing_to_everything() {
         let document = document();
-        let of = |library: &Library| doubt(&document, &mapped(library, &document), library, 1);
+        let of = |library: &Library| distance_uncertainty(&document, &mapped(library, &document), library, 1);
         let exact = of(&library(|_, _| 0.0)).unwrap();
         assert_eq!((exact.deviation, exact.within), (0.0, 0.0));
         let vague = of(&library(|_, _| 5.0)).unwrap();
         assert!(vague.within > 0.999, "{vague:?}");
         assert_eq!(of(&Library::builtin()), None);
-        let words = Doubt { distance: 0.03, deviation: 0.006, within: 0.124, known: 0.96 }.to_string();
+        let words =
+            DistanceUncertainty { distance: 0.03, deviation: 0.006, within: 0.124, known: 0.96 }.to_string();
         assert!(
             words.starts_with("12 % of the difference") && words.contains("96 %") && words.contains("0.006"),
             "{words}"

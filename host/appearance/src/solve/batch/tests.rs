@@ -53,7 +53,7 @@ proptest! {
         let (table, gram, h) = problem(&rows, &targets);
         let n = rows.len();
         let mut a = vec![0.0; h.len()];
-        let mut lanes = Lanes::new(&gram, &h[..known.min(targets.len()) * n]).unwrap();
+        let mut lanes = SimplexBatch::new(&gram, &h[..known.min(targets.len()) * n]).unwrap();
         let certificate = lanes.solve(&h, &mut a).unwrap();
         prop_assert!(certificate.gap < 1e-11, "{certificate:?}");
         for ((a, h), t) in a.chunks_exact(n).zip(h.chunks_exact(n)).zip(&targets) {
@@ -73,7 +73,7 @@ proptest! {
     fn starts_do_not_decide((rows, targets) in problems(), turn in 0usize..40, odd in prop::sample::select(vec![f64::NAN, -1.0, 7.0])) {
         let (table, gram, h) = problem(&rows, &targets);
         let n = rows.len();
-        let mut lanes = Lanes::new(&gram, &[]).unwrap();
+        let mut lanes = SimplexBatch::new(&gram, &[]).unwrap();
         let mut cold = vec![0.0; h.len()];
         lanes.solve(&h, &mut cold).unwrap();
         let mut warm = cold.clone();
@@ -91,7 +91,7 @@ proptest! {
     fn company_changes_nothing((rows, targets) in problems(), known in 0usize..10) {
         let (_, gram, h) = problem(&rows, &targets);
         let n = rows.len();
-        let fresh = Lanes::new(&gram, &h[..known.min(targets.len()) * n]).unwrap();
+        let fresh = SimplexBatch::new(&gram, &h[..known.min(targets.len()) * n]).unwrap();
         let mut together = vec![0.0; h.len()];
         let mut used = fresh.clone();
         used.solve(&h, &mut together).unwrap();
@@ -123,7 +123,7 @@ proptest! {
         }
         let mut gram = Gram::empty();
         gram.refill_products(5, |i, j| values[5 * i + j]);
-        let mut lanes = Lanes::new(&gram, &[]).unwrap();
+        let mut lanes = SimplexBatch::new(&gram, &[]).unwrap();
         for h in [h, large] {
             let mut a = vec![0.0; h.len()];
             match lanes.solve(&h, &mut a) {
@@ -140,7 +140,7 @@ proptest! {
         let mut a = [0.0; 5];
         lanes.solve(&[0.0; 5], &mut a).unwrap();
         let mut fresh = [0.0; 5];
-        Lanes::new(&gram, &[]).unwrap().solve(&[0.0; 5], &mut fresh).unwrap();
+        SimplexBatch::new(&gram, &[]).unwrap().solve(&[0.0; 5], &mut fresh).unwrap();
         prop_assert_eq!(a, fresh);
     }
 }
@@ -157,7 +157,7 @@ fn long_documents_are_solved_like_short_ones() {
     let targets: Vec<Vec<f64>> =
         (0..2 * BATCH + 100).map(|_| (0..9).map(|_| 0.7 * number()).collect()).collect();
     let (_, gram, h) = problem(&rows, &targets);
-    let mut lanes = Lanes::new(&gram, &h[..40 * 16]).unwrap();
+    let mut lanes = SimplexBatch::new(&gram, &h[..40 * 16]).unwrap();
     let mut a = vec![0.0; h.len()];
     assert!(lanes.solve(&h, &mut a).unwrap().gap < 1e-13);
     assert!(lanes.supports.len() > 500, "{}", lanes.supports.len());
@@ -180,7 +180,7 @@ fn ordinary_pixels_stay_in_their_lanes() {
     let targets: Vec<Vec<f64>> =
         (0..500).map(|i| (0..12).map(|j| f64::from((i * 13 + j * j * 5) % 97) / 97.0).collect()).collect();
     let (_, gram, h) = problem(&rows, &targets);
-    let mut lanes = Lanes::new(&gram, &[]).unwrap();
+    let mut lanes = SimplexBatch::new(&gram, &[]).unwrap();
     lanes.solve(&h, &mut vec![0.0; h.len()]).unwrap();
     assert!(lanes.hard.is_empty(), "{}", lanes.hard.len());
 }
@@ -188,11 +188,11 @@ fn ordinary_pixels_stay_in_their_lanes() {
 #[test]
 fn wrong_lengths_are_refused() {
     let (_, gram, h) = problem(&[vec![1.0], vec![2.0]], &[vec![1.5]]);
-    let mut lanes = Lanes::new(&gram, &h).unwrap();
+    let mut lanes = SimplexBatch::new(&gram, &h).unwrap();
     let error = lanes.solve(&[1.0; 3], &mut [0.0; 3]).unwrap_err();
     assert_eq!(error, SimplexError::Size { points: 2, products: 3, weights: 3 });
     assert!(lanes.solve(&[1.0; 4], &mut [0.0; 2]).is_err());
-    assert!(Lanes::new(&gram, &[1.0]).is_err());
-    assert!(Lanes::new(&Gram::empty(), &[]).is_err());
+    assert!(SimplexBatch::new(&gram, &[1.0]).is_err());
+    assert!(SimplexBatch::new(&Gram::empty(), &[]).is_err());
     assert_eq!(lanes.solve(&[], &mut []).unwrap(), Certificate { gap: 0.0, steps: 0 });
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use appearance::gamut::{self, Choice, GivenUp, Printable, Settings};
+use appearance::gamut::{self, Choice, GamutSettings, GivenUp, Printable};
 use observe::Observer;
 use press::separate::MOST_CARTRIDGES;
 use serde_json::{Value, json};
@@ -35,7 +35,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     let document = args.document.open(observer)?;
     let materials = document.materials();
     let printable = Printable::combined(&library, &set, materials.space());
-    let settings = Settings { most_cartridges: args.cartridges, ..Settings::default() };
+    let settings = GamutSettings { most_cartridges: args.cartridges, ..GamutSettings::default() };
     let choice = gamut::choose(materials, &printable, &settings, observer)?;
     if args.json {
         return Ok(serde_json::to_string_pretty(&report(&choice))? + "\n");

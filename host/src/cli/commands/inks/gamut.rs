@@ -8,7 +8,7 @@ use anyhow::Result;
 use appearance::brdf::{Space, plot};
 use appearance::document;
 use appearance::gamut::{
-    self, GamutError, Gloss, Intent, LIGHT, LeftOut, MaterialReport, Printable, Settings,
+    self, GamutError, GamutSettings, Gloss, Intent, LIGHT, LeftOut, MaterialReport, Printable,
 };
 use inks::{InkSet, Stack};
 use observe::Observer;
@@ -72,11 +72,11 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<String> {
     let space = &factored.space;
     let printable = Printable::combined(&library, &set, space);
     // All inks at once: what the library can print, not what seven cartridges can.
-    let settings = Settings {
+    let settings = GamutSettings {
         intent: Intent::Basis,
         gloss: Gloss::Keep,
         most_cartridges: Ink::ALL.len(),
-        ..Settings::default()
+        ..GamutSettings::default()
     };
     let bases = || Ok::<_, GamutError>(Cow::Borrowed(&*factored));
     let mapped = gamut::map(&*factored, bases, &printable, &settings, observer)?;

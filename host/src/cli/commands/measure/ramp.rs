@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use inks::Library;
 use measure::curves::library::quoted;
-use measure::scans::ramp::{self, Dots, LINEAR, Owner, Ramp, Series};
+use measure::scans::ramp::{self, Dots, LINEAR, Owner, Ramp, RampSeries};
 use observe::Observer;
 use sheet::dots_in_words;
 
@@ -123,7 +123,7 @@ fn summary(ramp: &Ramp) -> String {
 }
 
 /// What to make of a series. `least` is the smallest cluster of the ramp.
-fn advice(series: &Series, least: u32) -> String {
+fn advice(series: &RampSeries, least: u32) -> String {
     let stack = &series.stack;
     match series.minimum_cluster {
         None => format!(

@@ -8,7 +8,7 @@ use std::fmt::{self, Write as _};
 
 use anyhow::Result;
 use appearance::brdf::{Space, plot};
-use appearance::gamut::{Doubt, MaterialReport};
+use appearance::gamut::{DistanceUncertainty, MaterialReport};
 use halftone::metrics::{Look, Tone};
 use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
@@ -39,7 +39,7 @@ pub struct Subject<'a> {
     /// Document and print as an eye sees them, and its distance in metres.
     pub fidelity: (&'a Fidelity, f64),
     /// How much of the distance the measurement of the stacks leaves open, if they were measured.
-    pub doubt: Option<Doubt>,
+    pub doubt: Option<DistanceUncertainty>,
     /// How the halftone looks, if it is large enough.
     pub look: Option<&'a Look>,
     /// Its tones.
@@ -146,7 +146,12 @@ fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) 
     writeln!(page, "</div>")
 }
 
-fn write_errors(fidelity: &Fidelity, eye: f64, doubt: Option<Doubt>, page: &mut String) -> fmt::Result {
+fn write_errors(
+    fidelity: &Fidelity,
+    eye: f64,
+    doubt: Option<DistanceUncertainty>,
+    page: &mut String,
+) -> fmt::Result {
     let row = |name: &str, value: f64| format!("<tr><th>{name}<td class=\"n\">{value:.3}");
     writeln!(
         page,
@@ -316,7 +321,7 @@ mod tests {
             materials: &materials,
             kind: "basis",
             fidelity: (&fidelity, 0.5),
-            doubt: Some(Doubt { distance: 0.03, deviation: 0.006, within: 0.124, known: 0.96 }),
+            doubt: Some(DistanceUncertainty { distance: 0.03, deviation: 0.006, within: 0.124, known: 0.96 }),
             look: None,
             tones: &[],
             spectrum: spectrum.as_ref(),

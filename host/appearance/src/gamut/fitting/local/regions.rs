@@ -35,7 +35,7 @@ pub(super) struct Regions {
 
 /// The regions that a pixel belongs to, and its weight in each; the weights sum to 1.
 #[derive(Default)]
-pub(super) struct Place {
+pub(super) struct Membership {
     regions: Vec<(usize, f32)>,
     kinds: Vec<f64>,
 }
@@ -56,7 +56,7 @@ impl Regions {
     }
 
     /// Finds the regions of a pixel at `x`, `y` that looks like `seen`.
-    pub fn locate(&self, x: usize, y: usize, seen: &[f64], place: &mut Place) {
+    pub fn locate(&self, x: usize, y: usize, seen: &[f64], place: &mut Membership) {
         place.kinds.clear();
         place.kinds.extend(self.kinds.rows().map(|kind| squared(kind, seen)));
         let nearest = place.kinds.iter().copied().fold(f64::INFINITY, f64::min);
@@ -83,7 +83,7 @@ impl Regions {
     }
 
     /// The mean of the vectors around a pixel.
-    pub fn read(&self, place: &Place, out: &mut [f64]) {
+    pub fn read(&self, place: &Membership, out: &mut [f64]) {
         out.fill(0.0);
         for &(region, w) in &place.regions {
             let values = &self.values[region * self.columns..][..self.columns];
@@ -118,7 +118,7 @@ impl Regions {
 
 impl Sums {
     /// Adds the vector of a pixel.
-    pub fn add(&mut self, place: &Place, weight: f32, vector: &[f64]) {
+    pub fn add(&mut self, place: &Membership, weight: f32, vector: &[f64]) {
         let n = vector.len();
         for &(region, w) in &place.regions {
             let out = &mut self.values[(region - self.first) * (n + 1)..][..n + 1];
@@ -213,12 +213,12 @@ mod tests {
     }
 
     /// Regions of a document whose pixels look like `looks` in turn, and the place of each pixel.
-    fn field(width: usize, height: usize, looks: &[f64]) -> (Regions, Vec<Place>) {
+    fn field(width: usize, height: usize, looks: &[f64]) -> (Regions, Vec<Membership>) {
         let mut sample = Table::new(2);
         looks.iter().for_each(|&look| sample.push(&[look, 0.5 * look]));
         let regions = Regions::new(width, height, &sample);
         let places = (0..width * height).map(|pixel| {
-            let mut place = Place::default();
+            let mut place = Membership::default();
             regions.locate(pixel % width, pixel / width, sample.row(pixel % sample.len()), &mut place);
             place
         });
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn materials_far_apart_share_no_region() {
         let (regions, _) = field(4, 4, &[0.0, 0.9]);
-        let (mut one, mut other) = (Place::default(), Place::default());
+        let (mut one, mut other) = (Membership::default(), Membership::default());
         regions.locate(1, 1, &[0.0, 0.0], &mut one);
         regions.locate(2, 1, &[0.9, 0.45], &mut other);
         assert!(one.regions.iter().all(|(a, _)| other.regions.iter().all(|(b, _)| a != b)));

@@ -7,7 +7,7 @@ use protocol::ink::Ink;
 use super::*;
 use crate::brdf::Space;
 use crate::gamut::fitting::clamp;
-use crate::gamut::{Intent, Mapped, Printable, Settings};
+use crate::gamut::{GamutSettings, Intent, Mapped, Printable};
 use crate::materials::Surface;
 use crate::weights::ONE;
 
@@ -72,7 +72,7 @@ fn grain(x: usize, y: usize) -> Surface {
 }
 
 fn mapped(pixels: &Rows, printable: &Printable, intent: Intent) -> Mapped {
-    let settings = Settings { intent, light: 0.0, most_cartridges: 13, ..Settings::default() };
+    let settings = GamutSettings { intent, light: 0.0, most_cartridges: 13, ..GamutSettings::default() };
     let bases = || -> Result<_, GamutError> { unreachable!("neither intent uses bases") };
     crate::gamut::map(pixels, bases, printable, &settings, &Silent).unwrap()
 }
