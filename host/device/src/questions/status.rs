@@ -3,7 +3,7 @@
 use std::fmt;
 
 use protocol::ink::Ink;
-use protocol::status::{self, Complaint, Place};
+use protocol::status::{self, CartridgePlace, Complaint};
 use serde::Serialize;
 
 /// How the printer is, by its own answer.
@@ -55,10 +55,10 @@ impl Status {
             .enumerate()
             .filter_map(|(place, content)| {
                 let (barcode, condition) = match content {
-                    Place::Empty => return None,
-                    Place::Loaded(barcode) => (barcode, "loaded"),
-                    Place::Backwards(barcode) => (barcode, "backwards"),
-                    Place::AtEnd(barcode) => (barcode, "end of ribbon"),
+                    CartridgePlace::Empty => return None,
+                    CartridgePlace::Loaded(barcode) => (barcode, "loaded"),
+                    CartridgePlace::Backwards(barcode) => (barcode, "backwards"),
+                    CartridgePlace::AtEnd(barcode) => (barcode, "end of ribbon"),
                 };
                 let ink = Ink::from_barcode(barcode).map(Ink::name);
                 Some(CartridgeStatus { barcode, ink, on_carriage: place == status::PLACES - 1, condition })

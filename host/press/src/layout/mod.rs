@@ -29,7 +29,7 @@ pub use size::SizeError;
 
 use block::Block;
 use observe::Observer;
-use page::Page;
+use page::IdealPage;
 use rect::Rect;
 use serde::{Deserialize, Serialize};
 use sheet::{Area, DotMap, Sheet, order};
@@ -96,7 +96,7 @@ pub fn arrange(dots: &DotMap, layout: &Layout, observer: &dyn Observer) -> Resul
     let marked = layout.crop_marks || layout.registration_marks || layout.camera_marks;
     let in_use = if marked { order::passes_of(&used(dots)) } else { Vec::new() };
     let (marks, marks_left_out) = marks::marks_of(layout, dots, &in_use, &block, &mut stacks)?;
-    let page = Page { dots, layout, block: &block, marks: &marks };
+    let page = IdealPage { dots, layout, block: &block, marks: &marks };
     let sheet = Sheet::new(in_dots(layout.paper, layout.resolution), stacks, page.render(observer))?;
 
     let room = block.room;

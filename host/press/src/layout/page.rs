@@ -10,14 +10,14 @@ use observe::Observer;
 use sheet::{Area, DotMap};
 
 /// The ideal page.
-pub(super) struct Page<'a> {
+pub(super) struct IdealPage<'a> {
     pub dots: &'a DotMap,
     pub layout: &'a Layout,
     pub block: &'a Block,
     pub marks: &'a [(Mark, u8)],
 }
 
-impl Page<'_> {
+impl IdealPage<'_> {
     /// The dots of the sheet, row by row as they are sent.
     pub fn render(&self, observer: &dyn Observer) -> Vec<u8> {
         let width = usize::from(self.layout.paper.width()) * self.layout.across();

@@ -169,7 +169,7 @@ struct Pictures {
     /// Document and print side by side.
     sheet: Panels<'static>,
     materials: RgbImage,
-    fidelity: preview::Report,
+    fidelity: preview::FidelityReport,
 }
 
 impl Pictures {
@@ -250,7 +250,7 @@ impl Halftone {
 }
 
 /// What the report of a document says beside what every report says.
-fn report(prepared: &DocumentDots, fidelity: &preview::Report, dots: &Halftone) -> Value {
+fn report(prepared: &DocumentDots, fidelity: &preview::FidelityReport, dots: &Halftone) -> Value {
     let DocumentDots { document, settings, halftoned, .. } = prepared;
     let mapped = &halftoned.mapped.report;
     let materials: Vec<_> = mapped

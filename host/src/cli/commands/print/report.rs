@@ -12,7 +12,7 @@ use appearance::gamut::{DistanceUncertainty, MaterialReport};
 use halftone::metrics::{Look, Tone};
 use press::html::{self, escape};
 use press::job::plan::{Plan, grouped};
-use press::preview::{Report as Fidelity, Spectrum, mix_in_words};
+use press::preview::{FidelityReport, Spectrum, mix_in_words};
 
 /// Materials whose curves are drawn: those that stand for most of the document.
 const DRAWN: usize = 8;
@@ -37,7 +37,7 @@ pub struct Subject<'a> {
     /// What a material is: a basis of the document, or a typical one.
     pub kind: &'a str,
     /// Document and print as an eye sees them, and its distance in metres.
-    pub fidelity: (&'a Fidelity, f64),
+    pub fidelity: (&'a FidelityReport, f64),
     /// How much of the distance the measurement of the stacks leaves open, if they were measured.
     pub doubt: Option<DistanceUncertainty>,
     /// How the halftone looks, if it is large enough.
@@ -147,7 +147,7 @@ fn write_gamut(subject: &Subject, plots: &[(usize, String)], page: &mut String) 
 }
 
 fn write_errors(
-    fidelity: &Fidelity,
+    fidelity: &FidelityReport,
     eye: f64,
     doubt: Option<DistanceUncertainty>,
     page: &mut String,
@@ -312,7 +312,7 @@ mod tests {
         materials[..3].iter_mut().for_each(|material| material.share = 0.01);
         let (rmse, p95, max, light_rmse) = (0.02, 0.03, 0.4, 0.05);
         let fidelity =
-            Fidelity { mean: 0.0171, rmse, p95, max, light_rmse, width: 1, height: 1, map: vec![0.0] };
+            FidelityReport { mean: 0.0171, rmse, p95, max, light_rmse, width: 1, height: 1, map: vec![0.0] };
         let spectrum = press::preview::spectrum(&dots, &[0.9, 0.2]);
         assert!(spectrum.is_some());
         let subject = Subject {
