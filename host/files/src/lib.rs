@@ -1,9 +1,10 @@
 //! Small files that appear whole or not at all, and settings and descriptions in TOML.
 //!
 //! A file is written beside its final place and renamed, so nobody ever reads half of one. A text is read up to 1 MB, so
-//! a file that is not one of ours cannot fill the memory.
+//! a file that is not one of ours cannot fill the memory. [`durable`] is for what has to outlive a crash.
 #![deny(unsafe_code)]
 
+pub mod durable;
 pub mod scratch;
 
 use std::io::{BufWriter, Read as _, Write};

@@ -1,7 +1,7 @@
 //! Jobs on disk: what has to survive `kill -9`, a crash and an empty battery.
 //!
 //! A folder for each job, named by its number: `data`, the bytes, and `job.json`, where it stands. A job appears
-//! whole or not at all (written under another name, made durable, renamed), and so does every change of `job.json`.
+//! whole or not at all, and so does every change of `job.json` ([`durable`]).
 //! The bytes are removed when the job has ended; the last records stay, so that a user who asks is told how it ended.
 //! A lock on the folder keeps two processes from sending the same job. What a job may have left in the printer is no matter of
 //! one user's journal: see [`crate::printers`].
@@ -9,7 +9,7 @@
 //! Cost: two file syncs for each saved step; [`run`](super::run()) saves at the steps that matter and once a second.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use super::record::{Phase, Record};
 use crate::forms::PassPlace;
+use files::durable::{self, Access, STAGED};
 
 /// Ended jobs whose records are kept.
 const KEPT: usize = 20;
@@ -147,7 +148,7 @@ impl Journal {
 
     /// The journal in this folder, which is made if need be.
     pub fn at(folder: &Path) -> Result<Journal, JournalError> {
-        fs::create_dir_all(folder).map_err(io_error("make the folder", folder))?;
+        durable::make_folder(folder).map_err(io_error("make the folder", folder))?;
         Ok(Journal { folder: folder.to_path_buf() })
     }
 
@@ -160,11 +161,12 @@ impl Journal {
     pub fn queue(&self, job: NewJob<'_>) -> Result<OpenJob, JournalError> {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let staged = tempfile::Builder::new()
-            .prefix(".new.")
+            .prefix(STAGED)
             .tempdir_in(&self.folder)
             .map_err(io_error("write in", &self.folder))?;
         let checksum = checksum(job.data);
-        write_durably(&staged.path().join("data"), job.data)?;
+        let data = staged.path().join("data");
+        durable::write(&data, job.data, Access::Private).map_err(io_error("write", &data))?;
         let mut number = fresh_number(checksum, self.folder.as_os_str().as_encoded_bytes());
         while self.folder_of(number).exists() {
             // 0 is no job.
@@ -182,9 +184,7 @@ impl Journal {
         };
         write_entry(staged.path(), &entry)?;
         let folder = self.folder_of(number);
-        let staged = staged.keep();
-        fs::rename(&staged, &folder).map_err(io_error("write", &folder))?;
-        sync_folder(&self.folder)?;
+        durable::place(staged.path(), &folder).map_err(io_error("write", &folder))?;
         let lock = lock(&folder, number)?;
         Ok(OpenJob { folder, entry, data: job.data.to_vec(), _lock: lock })
     }
@@ -303,25 +303,7 @@ fn write_entry(folder: &Path, entry: &Entry) -> Result<(), JournalError> {
     let path = folder.join("job.json");
     let text = serde_json::to_vec_pretty(entry)
         .map_err(|error| JournalError::Damaged { path: path.clone(), what: error.to_string() })?;
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(io_error("write in", folder))?;
-    file.write_all(&text).map_err(io_error("write", &path))?;
-    file.as_file().sync_all().map_err(io_error("write", &path))?;
-    file.persist(&path).map_err(|error| io_error("write", &path)(error.error))?;
-    sync_folder(folder)
-}
-
-fn write_durably(path: &Path, bytes: &[u8]) -> Result<(), JournalError> {
-    let mut file = File::create(path).map_err(io_error("write", path))?;
-    file.write_all(bytes).and_then(|()| file.sync_all()).map_err(io_error("write", path))
-}
-
-/// Makes names in a folder durable, where the system has such a thing.
-fn sync_folder(folder: &Path) -> Result<(), JournalError> {
-    #[cfg(unix)]
-    File::open(folder).and_then(|file| file.sync_all()).map_err(io_error("write", folder))?;
-    #[cfg(not(unix))]
-    let _ = folder;
-    Ok(())
+    durable::write(&path, &text, Access::Private).map_err(io_error("write", &path))
 }
 
 #[cfg(test)]

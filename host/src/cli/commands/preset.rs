@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::cli::console::{chain, show, usage};
 use crate::folders;
+use files::durable::{self, Access};
 use files::{read_toml, write_toml};
 
 /// `--preset`, for commands whose options a preset can hold.
@@ -274,7 +275,8 @@ fn apply(name: &str) -> Result<()> {
         };
     }
     let words = Preset::load(name)?.1.join(" ");
-    std::fs::write(&path, format!("{name}\n")).with_context(|| format!("cannot write {}", path.display()))?;
+    durable::write(&path, format!("{name}\n").as_bytes(), Access::Everyone)
+        .with_context(|| format!("cannot write {}", path.display()))?;
     show(&format!("applied from now on: {words}\n"))
 }
 
