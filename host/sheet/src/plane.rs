@@ -16,6 +16,11 @@ pub struct Plane {
 }
 
 impl Plane {
+    /// Whether no dot has ink.
+    pub fn is_blank(&self) -> bool {
+        self.bits.iter().all(|&byte| byte == 0)
+    }
+
     /// How many dots have ink.
     pub fn dots(&self) -> u64 {
         self.bits.iter().map(|byte| u64::from(byte.count_ones())).sum()

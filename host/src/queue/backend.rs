@@ -26,7 +26,7 @@ use super::uri;
 use art::process::Process;
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed};
-use device::forms::{self, Checked};
+use device::forms::{self, Checked, Content};
 use device::printers::{Printer, Printers};
 use device::transit::journal::{Entry, Journal, OpenJob};
 use device::transit::raw::RawError;
@@ -155,7 +155,8 @@ impl<W: Write + Send> Backend<'_, W> {
         checked: &Checked,
         folder: &Path,
     ) -> Result<bool, Stopped> {
-        let job = Job { name: &self.call.title, bytes: &job[place.clone()], checked };
+        let content = Content::Bytes(&job[place.clone()]);
+        let job = Job { name: &self.call.title, content, checked };
         // Whoever releases a job that was held agrees to what it was held for.
         self.system.released(fs::remove_file(folder.join(HELD)).is_ok());
         match &self.call.to {

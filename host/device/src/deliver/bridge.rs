@@ -10,7 +10,7 @@ use super::ask::{self, Negotiate};
 use super::{Cartridges, Delivery, Ended, Failure, Job, News, Packed, Question, ResetOwed, number};
 use crate::connection::Bridge;
 use crate::connection::{Address, find};
-use crate::forms::{self, streams};
+use crate::forms::{self, Content, streams};
 use crate::printers::{Printer, Printers, PrintersError, Standing};
 use crate::questions::query::{Query, Reply, is_alps};
 use crate::transit::finish::{self, Sheet, await_sheet};
@@ -232,9 +232,9 @@ impl Delivery<'_> {
             // It was checked when it was queued, and its checksum has been compared.
             return Err(JournalError::NoSuchJob(old.entry.record.job).into());
         };
-        let job = Job { name, bytes: &bytes, checked: &checked };
+        let job = Job { name, content: Content::Bytes(&bytes), checked: &checked };
         let packed = if kind == JobKind::Raw {
-            Packed { job, kind, data: job.bytes.into() }
+            Packed { job, kind, data: job.content.bytes().into() }
         } else {
             Packed { job, kind, data: data.into() }
         };

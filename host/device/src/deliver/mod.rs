@@ -12,8 +12,8 @@
 //! answer decides where it can; if the bridge has forgotten, the caller has to agree to a reset. The answer holds for one
 //! start of the bridge: if it restarts between question and first byte, the question is asked again.
 //! Cost: the bytes of a job are parsed once to [check](crate::forms::check) that they are one whole legal job, because anything
-//! else wastes a sheet; then [`streams`] reads them twice for their planes and expands the code once, because a bridge
-//! must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
+//! else wastes a sheet. Then [`streams`] codes its planes, which it reads back from bytes that come from elsewhere, and expands
+//! the code once, because a bridge must make exactly these bytes. Nothing is parsed again when a job is resumed: its checksum is compared. Only a job that a bridge
 //! refuses as pass streams is checked once more, as the ledger needs its passes.
 //! Limits: a raw device tells nothing, so nothing can be resumed there. A computer that shares a bridge with another one over the
 //! network knows only its own jobs; the bridge knows how the last sixteen have ended.
@@ -30,7 +30,7 @@ use protocol::ink::Ink;
 use protocol::link::message::{JobKind, Progress};
 
 use crate::connection::{Address, OpenError};
-use crate::forms::{Checked, streams};
+use crate::forms::{Checked, Content, streams};
 use crate::ledger::{self, Ledger, PassUse};
 use crate::printers::{Printer, Printers, PrintersError};
 use crate::questions::cartridges::{self, Found};
@@ -271,8 +271,8 @@ impl Cartridges {
 pub struct Job<'a> {
     /// What people call it.
     pub name: &'a str,
-    /// Its bytes at the port.
-    pub bytes: &'a [u8],
+    /// What is sent.
+    pub content: Content<'a>,
     /// What the [check](crate::forms::check) found.
     pub checked: &'a Checked,
 }
@@ -287,9 +287,10 @@ pub struct Packed<'a> {
 impl<'a> Packed<'a> {
     /// Codes the job, if that gains anything.
     pub fn new(job: Job<'a>, observer: &dyn Observer) -> Packed<'a> {
-        match streams::of_job(job.bytes, observer).filter(|streams| streams.len() < job.bytes.len()) {
+        let (content, bytes) = (job.content, job.content.bytes());
+        match streams::of(content, observer).filter(|streams| streams.len() < bytes.len()) {
             Some(streams) => Packed { job, kind: JobKind::Streams, data: streams.into() },
-            None => Packed { job, kind: JobKind::Raw, data: job.bytes.into() },
+            None => Packed { job, kind: JobKind::Raw, data: bytes.into() },
         }
     }
 
@@ -356,10 +357,10 @@ impl<'a> Delivery<'a> {
             to: to.to_string(),
             kind: *kind,
             data,
-            port_bytes: job.bytes.len() as u64,
+            port_bytes: job.content.bytes().len() as u64,
             passes: job.checked.passes.clone(),
         })?;
-        self.count(&number(&queued.entry), job.checked, job.bytes.len() as u64);
+        self.count(&number(&queued.entry), job.checked, job.content.bytes().len() as u64);
         self.caller.tell(&News::Queued { entry: &queued.entry, data: data.len() as u64 });
         Ok(queued)
     }

@@ -1,15 +1,16 @@
 //! Where on a page the picture lies along whose walk a job was halftoned.
 //!
-//! Problem: pass streams are several times shorter along the walk of the picture than along that of the page, but a job in
-//! the printer's language does not say where its picture begins. Method: runs along the right walk are long, so that few of
+//! Problem: pass streams are several times shorter along the walk of the picture than along that of the page. A job in
+//! the printer's language does not say where its picture begins; one that was just made does, but not whether its dots
+//! follow a walk at all. Method: runs along the right walk are long, so that few of
 //! its steps lead from a dot with ink to one without. Tiles repeat every 64 columns and, since every other band is walked
-//! backwards, every 128 rows. So for each of these 8192 places, the steps with such a change are counted in the densest
-//! windows of each pass; the place with the fewest wins, if it is clearly better than the page's own corner. From there, the
-//! picture is taken to reach as far as there are dots.
+//! backwards, every 128 rows. So for each of these 8192 places, or the one that is known, the steps with such a change are
+//! counted in the densest windows of each pass; the place with the fewest wins, if it is clearly better than the page's own
+//! corner. From there, the picture is taken to reach as far as there are dots.
 //!
-//! Cost: two million comparisons of 64 dots a window, tens of milliseconds for a job. Limits: one picture; of several copies
-//! it finds the place of one. The last tiles at the right and lower edges differ if the picture ends beyond the last dot.
-//! A wrong place makes longer streams, never wrong ones.
+//! Cost: two million comparisons of 64 dots a window, tens of milliseconds for a job; next to nothing if the place is known.
+//! Limits: one picture; of several copies it finds the place of one. The last tiles at the right and lower edges differ if the
+//! picture ends beyond the last dot. A wrong place makes longer streams, never wrong ones.
 
 use protocol::runs::stride;
 use protocol::walk::{EDGE, Frame, MOST, Orientation, Tile};
@@ -26,22 +27,37 @@ const ROWS: usize = 256;
 /// Windows of a pass that are looked at.
 const WINDOWS: usize = 6;
 
+/// Columns and rows where a walk may begin, the page's own corner first, column by column.
+pub(super) struct Places(Vec<(usize, usize)>);
+
+impl Places {
+    /// All that differ.
+    pub(super) fn all() -> Places {
+        Places((0..ACROSS).flat_map(|x| (0..DOWN).map(move |y| (x, y))).collect())
+    }
+
+    /// The page's corner, and that of this picture.
+    pub(super) fn known(picture: Frame) -> Places {
+        Places(vec![(0, 0), (usize::from(picture.x) % ACROSS, usize::from(picture.y) % DOWN)])
+    }
+}
+
 /// What the passes of a job tell about their picture.
 #[derive(Clone)]
 pub(super) struct Traces {
     /// First column and row with a dot, and one beyond the last.
     bounds: Option<[u16; 4]>,
-    /// For each place, column by column, the steps of the walk that lead from a dot with ink to one without, or back.
+    /// For each place the steps of the walk that lead from a dot with ink to one without, or back.
     changes: Vec<u32>,
 }
 
 impl Traces {
-    pub(super) fn none() -> Traces {
-        Traces { bounds: None, changes: vec![0; ACROSS * DOWN] }
+    pub(super) fn none(places: &Places) -> Traces {
+        Traces { bounds: None, changes: vec![0; places.0.len()] }
     }
 
     /// Those of one pass.
-    pub(super) fn of(plane: &[u8], columns: u16) -> Traces {
+    pub(super) fn of(plane: &[u8], columns: u16, places: &Places) -> Traces {
         let stride = stride(columns);
         let rows: Vec<&[u8]> = plane.chunks_exact(stride).collect();
         let mut windows: Vec<Window> = (0..(rows.len() / ROWS))
@@ -51,7 +67,8 @@ impl Traces {
             .collect();
         windows.sort_by_key(|window| std::cmp::Reverse(window.edges));
         windows.truncate(WINDOWS);
-        let changes = windows.par_iter().map(Window::changes).reduce(|| Traces::none().changes, sum);
+        let none = || Traces::none(places).changes;
+        let changes = windows.par_iter().map(|window| window.changes(places)).reduce(none, sum);
         Traces { bounds: bounds(&rows), changes }
     }
 
@@ -65,10 +82,10 @@ impl Traces {
     }
 
     /// The rectangle of the picture; all of a plane of this size if no other is clearly better.
-    pub(super) fn frame(&self, columns: u16, rows: u16) -> Frame {
+    pub(super) fn frame(&self, places: &Places, columns: u16, rows: u16) -> Frame {
         let whole = Frame::whole(columns, rows);
-        let best = self.changes.iter().enumerate().min_by_key(|(_, changes)| **changes);
-        let (Some((place, &fewest)), Some([left, top, right, bottom])) = (best, self.bounds) else {
+        let best = places.0.iter().zip(&self.changes).min_by_key(|(_, changes)| **changes);
+        let (Some((&(across, down), &fewest)), Some([left, top, right, bottom])) = (best, self.bounds) else {
             return whole;
         };
         // One in ten is more than chance makes of thousands of steps.
@@ -79,7 +96,7 @@ impl Traces {
             let place = u16::try_from(place).unwrap_or_default();
             edge.checked_sub(place).map_or(place, |beyond| edge - beyond % period as u16)
         };
-        let (x, y) = (corner(left, place / DOWN, ACROSS), corner(top, place % DOWN, DOWN));
+        let (x, y) = (corner(left, across, ACROSS), corner(top, down, DOWN));
         let frame = Frame { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) };
         if frame.is_within(columns, rows) { frame } else { whole }
     }
@@ -128,14 +145,15 @@ impl Window {
     }
 
     /// The steps with a change for each place: of the tile there and of the one below it, walked backwards.
-    fn changes(&self) -> Vec<u32> {
+    fn changes(&self, places: &Places) -> Vec<u32> {
         let along = Steps::of(Orientation::Along);
         let back = Steps::of(Orientation::Back);
-        let mut changes = Vec::with_capacity(ACROSS * DOWN);
-        for x in 0..ACROSS {
-            let cut = |rows: &[u128]| rows.iter().map(|row| (row << x >> 64) as u64).collect::<Vec<_>>();
+        let mut changes = Vec::with_capacity(places.0.len());
+        for column in places.0.chunk_by(|one, other| one.0 == other.0) {
+            let cut =
+                |rows: &[u128]| rows.iter().map(|row| (row << column[0].0 >> 64) as u64).collect::<Vec<_>>();
             let (right, below) = (cut(&self.right), cut(&self.below));
-            changes.extend((0..DOWN).map(|y| {
+            changes.extend(column.iter().map(|&(_, y)| {
                 along.changes(&right[y..], &below[y..])
                     + back.changes(&right[y + ACROSS..], &below[y + ACROSS..])
             }));
@@ -201,12 +219,16 @@ mod tests {
         for (seed, (x, y)) in (1..).zip([(0, 0), (1, 0), (0, 1), (63, 127), (100, 200), (257, 65)]) {
             let frame = Frame { x, y, width: 700, height: 900 };
             let planes = [seed, seed + 100].map(|seed| halftoned(1200, 1300, frame, seed));
-            let traces = planes.iter().map(|plane| Traces::of(plane, 1200)).reduce(Traces::and).unwrap();
-            let found = traces.frame(1200, 1300);
+            let find = |places: &Places| {
+                let traces = planes.iter().map(|plane| Traces::of(plane, 1200, places));
+                traces.reduce(Traces::and).unwrap().frame(places, 1200, 1300)
+            };
+            let found = find(&Places::all());
             let expected = if (x, y) == (0, 0) { Frame::whole(1200, 1300) } else { frame };
             // Its last dots may be blank.
             assert_eq!((found.x, found.y), (expected.x, expected.y));
             assert!(expected.width - found.width < 16 && expected.height - found.height < 16, "{found:?}");
+            assert_eq!(find(&Places::known(frame)), found, "the same without a search");
         }
     }
 
@@ -222,9 +244,12 @@ mod tests {
             *cell = [0, 0x0f, 0xf0, 0xff][(mixed >> 62) as usize];
         }
         for plane in [&noise, &cells, &vec![0; 150 * 1300], &vec![0xff; 150 * 1300]] {
-            assert_eq!(Traces::of(plane, 1200).frame(1200, 1300), whole);
+            for places in [Places::all(), Places::known(Frame { x: 9, y: 30, width: 5, height: 5 })] {
+                assert_eq!(Traces::of(plane, 1200, &places).frame(&places, 1200, 1300), whole);
+            }
         }
-        assert_eq!(Traces::none().frame(8, 9), Frame::whole(8, 9));
-        assert_eq!(Traces::of(&[0x80], 1).frame(1, 1), Frame::whole(1, 1));
+        let places = Places::all();
+        assert_eq!(Traces::none(&places).frame(&places, 8, 9), Frame::whole(8, 9));
+        assert_eq!(Traces::of(&[0x80], 1, &places).frame(&places, 1, 1), Frame::whole(1, 1));
     }
 }

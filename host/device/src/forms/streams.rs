@@ -1,12 +1,17 @@
-//! A job in the printer's language as the pass streams a bridge makes the same bytes from.
+//! A job as the pass streams a bridge makes the same bytes from.
 //!
 //! Problem: the bytes for a printer are several times those that have to cross the cable to a bridge that can pack rows itself.
-//! Method: the job is read back into its page and planes, these are coded ([`protocol::runs`]), and what a bridge
-//! would make of the code is made here and compared with the job, byte for byte. A job that does not come back the
-//! same (another driver's packing, a leading reset, one plane of black in its own mode) is sent byte for byte instead.
-//! Cost: the job is parsed once for its commands and twice for its dots, and compared once; one plane for each thread is held at a time. Limits: the job must be one whole legal one.
+//! Method: the planes of the job are coded ([`protocol::runs`]), and what a bridge would make of the code is made here and
+//! compared with the job, byte for byte. A job that was just made has its planes, its page and its frame. Of [bytes](of_bytes)
+//! they are read back, and the frame is searched. A job that does not come back the same
+//! (another driver's packing, a leading reset, one plane of black in its own mode) is sent byte for byte instead.
+//! Cost: the job is coded and compared once. Bytes are also parsed once for their commands and twice for their dots; one plane for
+//! each thread is held at a time. Limits: the job must be one whole legal one.
 //! Source: `docs/wire-format.md`, section 4.
 
+use std::borrow::Cow;
+
+use press::pipeline;
 use protocol::ink::{Ink, Kind};
 use protocol::packbits;
 use protocol::rgl::job::{COMMAND_ROOM, ROW_ROOM};
@@ -17,38 +22,76 @@ use protocol::rgl::{
 use protocol::runs::{self, Decoder, Header, MAX_BAND, MAX_HEADER, band_bytes, encode, stride};
 use rayon::prelude::*;
 
-use super::frame_search::Traces;
+use super::Content;
+use super::frame_search::{Places, Traces};
 use observe::Observer;
 
-/// The pass streams that stand for this job, or nothing if none do.
-pub fn of_job(job: &[u8], observer: &dyn Observer) -> Option<Vec<u8>> {
-    let parts = Parts::read(job)?;
-    let (columns, rows) = (parts.header.columns(), parts.header.rows());
-    let drawn = |commands: &[u8]| {
-        let mut plane = vec![0; stride(columns) * usize::from(rows)];
-        draw(commands, columns, &mut plane).map(|()| plane)
-    };
+/// The pass streams that stand for a job, or nothing if none do.
+pub fn of(content: Content<'_>, observer: &dyn Observer) -> Option<Vec<u8>> {
+    match content {
+        Content::Made(job) => of_made(job, observer),
+        Content::Bytes(bytes) => of_bytes(bytes, observer),
+    }
+}
+
+/// The pass streams that stand for a job that was just made, or nothing if none do.
+fn of_made(job: &pipeline::Job, observer: &dyn Observer) -> Option<Vec<u8>> {
+    let page = job.page;
+    if (page.shift_x, page.shift_y) != (0, 0) {
+        // Planes are the page's size, but those of a shifted page end before it.
+        return of_bytes(&job.bytes, observer);
+    }
+    let (inks, planes): (Vec<Ink>, Vec<&[u8]>) =
+        job.passes().map(|pass| (pass.ink, &pass.plane.bits[..])).unzip();
+    let header = header(page, &inks, page.width(), page.length())?;
+    observer.begin("pass streams", 3 * job.bytes.len() as u64);
+    let plane = |number: usize| Some(Cow::Borrowed(planes[number]));
+    coded(header, planes.len(), &plane, &Places::known(job.frame), &job.bytes, observer)
+}
+
+/// The pass streams that stand for the bytes of a job, or nothing if none do.
+pub fn of_bytes(job: &[u8], observer: &dyn Observer) -> Option<Vec<u8>> {
+    let Parts { header, passes } = Parts::read(job)?;
     observer.begin("pass streams", 3 * job.len() as u64);
-    let traces = parts
-        .passes
-        .par_iter()
-        .map(|commands| {
-            observer.advance(commands.len() as u64);
-            drawn(commands).map(|plane| Traces::of(&plane, columns))
+    let plane = |number: usize| {
+        let columns = header.columns();
+        let mut plane = vec![0; stride(columns) * usize::from(header.rows())];
+        draw(passes[number], columns, &mut plane).map(|()| plane.into())
+    };
+    coded(header.clone(), passes.len(), &plane, &Places::all(), job, observer)
+}
+
+/// Codes the planes of a job along the walk that begins at the best of some places, and compares what comes of it.
+fn coded<'p>(
+    header: Header,
+    passes: usize,
+    plane: &(dyn Fn(usize) -> Option<Cow<'p, [u8]>> + Sync),
+    places: &Places,
+    job: &[u8],
+    observer: &dyn Observer,
+) -> Option<Vec<u8>> {
+    let (columns, rows) = (header.columns(), header.rows());
+    // The steps are those of the job's bytes, three times over.
+    let share = job.len() as u64 / passes.max(1) as u64;
+    let traces = (0..passes)
+        .into_par_iter()
+        .map(|number| {
+            let traces = Traces::of(&*plane(number)?, columns, places);
+            observer.advance(share);
+            Some(traces)
         })
-        .try_reduce(Traces::none, |one, other| Some(one.and(other)))?;
-    let header = parts.header.framed(traces.frame(columns, rows))?;
+        .try_reduce(|| Traces::none(places), |one, other| Some(one.and(other)))?;
+    let header = header.framed(traces.frame(places, columns, rows))?;
     let mut head = [0; MAX_HEADER];
     let length = header.write(&mut head);
     let mut streams = head[..length].to_vec();
-    let coded: Option<Vec<Vec<u8>>> = parts
-        .passes
-        .par_iter()
-        .map(|commands| {
-            let plane = drawn(commands)?;
+    let coded: Option<Vec<Vec<u8>>> = (0..passes)
+        .into_par_iter()
+        .map(|number| {
+            let plane = plane(number)?;
             let (mut stream, mut buffer) = (Vec::new(), vec![0; MAX_BAND]);
             encode(header.walk(), &plane, &mut buffer, |band| stream.extend_from_slice(band)).ok()?;
-            observer.advance(commands.len() as u64);
+            observer.advance(share);
             Some(stream)
         })
         .collect();
@@ -66,6 +109,13 @@ pub fn of_job(job: &[u8], observer: &dyn Observer) -> Option<Vec<u8>> {
     .ok()?;
     observer.end();
     (same && left.is_empty()).then_some(streams)
+}
+
+/// The header of a job with these inks, whose planes have so many dots.
+fn header(page: Page, inks: &[Ink], columns: u16, rows: u16) -> Option<Header> {
+    // Whoever sends a job with foil has agreed to it when it was made; a stranger's job is as legal without us.
+    let consent = inks.iter().any(|ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
+    Header::new(page, inks, consent, columns, rows).ok()
 }
 
 /// Bytes that are not the data of a job of pass streams.
@@ -155,14 +205,10 @@ impl<'j> Parts<'j> {
             at += length;
         }
         let page = page(order.declared())?;
-        // Whoever sends a job with foil has agreed to it when it was made; a stranger's job is as legal without us.
-        let consent =
-            inks.iter().any(|ink: &Ink| ink.kind() == Kind::Foil).then(FoilConsent::given_by_the_user);
         let (right, down) = (page.resolution.across(page.shift_x), page.resolution.along(page.shift_y));
         let columns = page.width().checked_sub(right)?;
         let rows = image.or(page.length().checked_sub(down))?;
-        let header = Header::new(page, &inks, consent, columns, rows).ok()?;
-        Some(Parts { header, passes })
+        Some(Parts { header: header(page, &inks, columns, rows)?, passes })
     }
 }
 
@@ -213,6 +259,9 @@ fn draw(mut commands: &[u8], columns: u16, plane: &mut [u8]) -> Option<()> {
 }
 
 #[cfg(test)]
+mod made;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use observe::Silent;
@@ -242,7 +291,7 @@ mod tests {
         job
     }
 
-    fn expanded(streams: &[u8]) -> Vec<u8> {
+    pub(super) fn expanded(streams: &[u8]) -> Vec<u8> {
         let mut job = Vec::new();
         expand(streams, &mut |bytes| {
             job.extend_from_slice(bytes);
@@ -282,7 +331,7 @@ mod tests {
                 passes.push(pass(Ink::Black, &page, &[(0, page.length() - page.resolution.along(page.shift_y) - 1)]));
             }
             let job = written(page, &passes);
-            let streams = of_job(&job, &Silent).expect("streams");
+            let streams = of_bytes(&job, &Silent).expect("streams");
             prop_assert!(expanded(&streams) == job);
         }
     }
@@ -293,7 +342,7 @@ mod tests {
         let inks = [Ink::Cyan, Ink::Magenta, Ink::Yellow, Ink::Black, Ink::White, Ink::GoldFoil];
         let passes = inks.map(|ink| pass(ink, &page, &[(3, 5), (60, 39)]));
         let job = written(page, &passes);
-        assert_eq!(expanded(&of_job(&job, &Silent).unwrap()), job);
+        assert_eq!(expanded(&of_bytes(&job, &Silent).unwrap()), job);
     }
 
     #[test]
@@ -301,10 +350,10 @@ mod tests {
         let page = Page::plain(Paper::Custom { width: 64, length: 40 });
         let row = (0..64).map(|x| (x, 7)).collect::<Vec<_>>();
         let job = written(page, &[pass(Ink::White, &page, &row)]);
-        assert!(of_job(&job, &Silent).is_some());
+        assert!(of_bytes(&job, &Silent).is_some());
         let reset_first = [b"\x1be", &job[..]].concat();
-        assert_eq!(of_job(&reset_first, &Silent), None);
-        assert_eq!(of_job(&job[..job.len() - 2], &Silent), None, "no reset at the end");
+        assert_eq!(of_bytes(&reset_first, &Silent), None);
+        assert_eq!(of_bytes(&job[..job.len() - 2], &Silent), None, "no reset at the end");
         // The row is packed as ff f9; another driver sends it plain.
         let at = job.windows(6).position(|bytes| bytes == b"\x1b*b\x02\0M").unwrap();
         let (row, data) = (b"\x1b*b\x02\0W\xf9\xff", b"\x1b*b\x08\0W\xff\xff\xff\xff\xff\xff\xff\xff");
@@ -313,9 +362,9 @@ mod tests {
         plain.splice(from..from + 8, data.iter().copied());
         plain[at + 3] = 0;
         assert!(crate::forms::check(&plain, &Silent).is_ok(), "legal all the same");
-        assert_eq!(of_job(&plain, &Silent), None);
-        assert_eq!(of_job(b"text", &Silent), None);
-        assert_eq!(of_job(b"", &Silent), None);
+        assert_eq!(of_bytes(&plain, &Silent), None);
+        assert_eq!(of_bytes(b"text", &Silent), None);
+        assert_eq!(of_bytes(b"", &Silent), None);
     }
 
     #[test]
@@ -329,13 +378,13 @@ mod tests {
         put(writer.row(&[1, 2, 3], &mut out).unwrap(), &out);
         put(writer.end(&mut out).unwrap(), &out);
         assert!(crate::forms::check(&job, &Silent).is_ok());
-        assert_eq!(of_job(&job, &Silent), None);
+        assert_eq!(of_bytes(&job, &Silent), None);
     }
 
     #[test]
     fn damaged_streams_are_no_job() {
         let page = Page::plain(Paper::Custom { width: 64, length: 40 });
-        let streams = of_job(&written(page, &[pass(Ink::White, &page, &[(9, 9)])]), &Silent).unwrap();
+        let streams = of_bytes(&written(page, &[pass(Ink::White, &page, &[(9, 9)])]), &Silent).unwrap();
         let outcome = |bytes: &[u8]| expand(bytes, &mut |_| true);
         assert_eq!(outcome(&streams), Ok(()));
         assert_eq!(outcome(&streams[..streams.len() - 1]), Err(NoStreams::Stream));
@@ -353,7 +402,7 @@ mod tests {
             if path.extension().is_some_and(|name| name == "bin") {
                 let job = std::fs::read(&path).unwrap();
                 all += 1;
-                if let Some(streams) = of_job(&job, &Silent) {
+                if let Some(streams) = of_bytes(&job, &Silent) {
                     taken += 1;
                     assert!(expanded(&streams) == job, "{path:?}");
                     println!("{path:?}: {} for {}", streams.len(), job.len());

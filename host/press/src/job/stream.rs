@@ -104,7 +104,7 @@ pub fn write_job(
     fits(page, passes)?;
     let (length, stride) = (usize::from(page.length()), usize::from(page.width()).div_ceil(8));
     let printing: Vec<(usize, &Pass)> =
-        passes.iter().enumerate().filter(|(_, pass)| pass.plane.bits.iter().any(|&byte| byte != 0)).collect();
+        passes.iter().enumerate().filter(|(_, pass)| !pass.plane.is_blank()).collect();
     if printing.is_empty() {
         return Err(StreamError::NothingToPrint);
     }

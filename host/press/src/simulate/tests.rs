@@ -424,11 +424,11 @@ proptest! {
             known.unwrap_or_else(|| { stacks.push(stack); stacks.len() - 1 }) as u8
         }).collect();
         let sent = Sheet::new(paper, stacks, index).unwrap();
-        prop_assume!(passes.iter().any(|pass| pass.plane.bits.iter().any(|&b| b != 0)));
+        prop_assume!(passes.iter().any(|pass| !pass.plane.is_blank()));
 
         let printout = print(&job(paper, &passes), &Setup::default(), &Silent).unwrap();
         let printing: Vec<Pass> =
-            passes.into_iter().filter(|pass| pass.plane.bits.iter().any(|&b| b != 0)).collect();
+            passes.into_iter().filter(|pass| !pass.plane.is_blank()).collect();
         prop_assert_eq!(&printout.passes, &printing);
         let sheet = printout.sheet().unwrap();
         prop_assert_eq!(difference(&sent, &sheet), None);

@@ -57,7 +57,7 @@ pub fn run(args: &Args, observer: &dyn Observer) -> Result<()> {
     for (number, place) in (1..).zip(&places) {
         let sheet = &job[place.clone()];
         let Inspected { inspection, passes } = inspect(sheet, observer);
-        let streams = if inspection.complete { streams::of_job(sheet, observer) } else { None };
+        let streams = if inspection.complete { streams::of_bytes(sheet, observer) } else { None };
         let pass_streams = streams.map(|streams| streams.len()).filter(|&bytes| bytes < sheet.len());
         let summary = Summary { inspection, pass_streams };
         if let Some(inside) = inside {

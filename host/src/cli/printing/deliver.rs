@@ -13,11 +13,13 @@ use crate::cli::console::terminal::{Terminal, cartridges_needed, cartridges_text
 use crate::cli::output::{self, Staged};
 use device::connection::{Address, Destination};
 use device::deliver::{Delivery, Ended, Failure, Job, Packed, find_cartridges};
+use device::forms::{self, Content};
 use device::printers::Printers;
 use device::transit::finish::Sheet;
 use device::transit::journal::{Journal, OpenJob};
 use device::transit::session::Outcome;
 use observe::Observer;
+use press::pipeline;
 
 /// Where a job goes, how often, and whether it was asked for.
 #[derive(Args, Debug)]
@@ -51,12 +53,13 @@ impl DeliverArgs {
     }
 
     /// Sends a job whose plan was shown. A job for a file was written with everything else.
-    pub fn send(&self, name: &str, bytes: &[u8], observer: &dyn Observer) -> Result<()> {
+    pub fn send(&self, job: &pipeline::Job, observer: &dyn Observer) -> Result<()> {
         let to = match &self.to {
             None | Some(Destination::File(_)) => return Ok(()),
             Some(to) => to,
         };
-        let checked = device::forms::check(bytes, observer)?;
+        let name = &job.draft.plan.document;
+        let checked = forms::check(&job.bytes, observer)?;
         if let Destination::Bridge(address) = to {
             let cartridges = find_cartridges(address, &checked.inks, &Printers::of_system()?);
             show(&format!("{}\n", cartridges_text(&cartridges)))?;
@@ -65,7 +68,7 @@ impl DeliverArgs {
             confirm(name)?;
         }
         let order = Order { copies: self.copies, force: self.force, cartridges_shown: true };
-        deliver(Job { name, bytes, checked: &checked }, to, order, observer)
+        deliver(Job { name, content: Content::Made(job), checked: &checked }, to, order, observer)
     }
 }
 
@@ -103,7 +106,7 @@ pub fn deliver(job: Job<'_>, to: &Destination, order: Order, observer: &dyn Obse
     match to {
         Destination::File(path) => {
             let staged = Staged::file(path)?;
-            std::fs::write(staged.path(), job.bytes)
+            std::fs::write(staged.path(), job.content.bytes())
                 .with_context(|| format!("cannot write {}", path.display()))?;
             staged.commit()
         }
@@ -120,7 +123,7 @@ pub fn store(job: Job<'_>, to: &Destination, observer: &dyn Observer) -> Result<
     // Before the job is coded: a mistyped address is told at once.
     let shelf = device::deliver::store::shelf(address).map_err(|failure| not_stored(job.name, failure))?;
     let packed = Packed::new(job, observer);
-    let size = size_text(packed.kind(), packed.data().len() as u64, job.bytes.len() as u64);
+    let size = size_text(packed.kind(), packed.data().len() as u64, job.content.bytes().len() as u64);
     let stored = shelf_text(&shelf).unwrap_or_else(|| "no room for jobs".into());
     observer.note(&format!("{}: {size}; the bridge has {stored}", job.name));
     let terminal = Terminal::new(false, true, observer);
@@ -149,7 +152,7 @@ fn to_device(job: Job<'_>, path: &Path, order: Order, observer: &dyn Observer) -
         observer.note(&format!(
             "{}: the system has taken all {} bytes for the printer; whether they are printed, only the printer shows",
             job.name,
-            job.bytes.len()
+            job.content.bytes().len()
         ));
         if copy < order.copies && !next_sheet(copy, order.copies)? {
             bail!(

@@ -163,12 +163,13 @@ impl Made {
         deliver: &DeliverArgs,
         observer: &dyn Observer,
     ) -> Result<()> {
-        let Made { job: Job { draft: Draft { plan, .. }, bytes }, folder, places } = self;
+        let Made { job, folder, places } = self;
+        let plan = &job.draft.plan;
         let mut report = json!({
             "program": concat!("foilpress ", env!("CARGO_PKG_VERSION")),
             "document": { "name": plan.document },
             "plan": plan,
-            "job": { "bytes": bytes.len() },
+            "job": { "bytes": job.bytes.len() },
         });
         if let Value::Object(more) = more {
             for (name, value) in more {
@@ -178,7 +179,7 @@ impl Made {
         let report = serde_json::to_string_pretty(&report)?;
         write(&folder.join("report.json"), report.as_bytes())?;
         let target = places.target.clone();
-        places.commit(&bytes)?;
+        places.commit(&job.bytes)?;
         if result.json {
             show(&format!("{report}\n"))?;
         } else {
@@ -188,7 +189,7 @@ impl Made {
                 target.join("plan.html").display()
             ))?;
         }
-        deliver.send(&plan.document, &bytes, observer)
+        deliver.send(&job, observer)
     }
 }
 

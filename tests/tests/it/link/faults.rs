@@ -255,7 +255,7 @@ impl Bench {
     fn wait_on_disk(&self) -> u32 {
         let job = fs::read(self.path("job.rgl")).unwrap();
         let checked = device::forms::check(&job, &Silent).unwrap();
-        let streams = device::forms::streams::of_job(&job, &Silent).unwrap();
+        let streams = device::forms::streams::of_bytes(&job, &Silent).unwrap();
         let journal = Journal::at(&self.path("user-0/jobs")).unwrap();
         let queued = journal.queue(NewJob {
             name: "leaf",

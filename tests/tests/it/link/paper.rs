@@ -40,7 +40,7 @@ fn a_document_becomes_the_very_sheet_whatever_happens_on_the_way() {
         library: &library,
     };
     let print = pipeline::job(&request, &Silent).unwrap();
-    let streams = streams::of_job(&print.bytes, &Silent).expect("a job of our own has streams");
+    let streams = streams::of_bytes(&print.bytes, &Silent).expect("a job of our own has streams");
     for seed in 0..4 {
         let mut random = seeded(seed);
         let (kind, data) =

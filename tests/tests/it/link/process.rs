@@ -88,7 +88,7 @@ impl Bench {
     /// Puts the job into the journal.
     fn queue(self, kind: JobKind) -> Bench {
         let checked = forms::check(&self.job, &Silent).unwrap();
-        let streams = streams::of_job(&self.job, &Silent).unwrap();
+        let streams = streams::of_bytes(&self.job, &Silent).unwrap();
         Journal::at(&self.jobs())
             .unwrap()
             .queue(NewJob {
