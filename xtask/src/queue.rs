@@ -1,5 +1,5 @@
 //! What the tests of print queues, of PDF art and of cameras' files need beside Rust, from Debian: a print server with its filters
-//! and clients, Ghostscript, Poppler and programs that develop RAW.
+//! and clients, Ghostscript and programs that develop RAW.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -10,14 +10,13 @@ use crate::command;
 use crate::runner::Runner;
 
 /// Programs the tests start, and the packages they are in.
-const NEEDED: [(&str, &str); 11] = [
+const NEEDED: [(&str, &str); 10] = [
     ("/usr/sbin/cupsd", "cups-daemon"),
     ("/usr/lib/cups/daemon/cups-deviced", "cups"),
     ("/usr/bin/lp", "cups-client"),
     ("/usr/bin/ipptool", "cups-ipp-utils"),
     ("/usr/lib/cups/filter/pdftopdf", "cups-filters"),
     ("/usr/bin/gs", "ghostscript"),
-    ("/usr/bin/pdftocairo", "poppler-utils"),
     ("/usr/bin/man", "man-db"),
     ("/usr/bin/tesseract", "tesseract-ocr"),
     ("/usr/bin/dcraw_emu", "libraw-bin"),

@@ -1,10 +1,10 @@
-//! PDF and PostScript pages, through Ghostscript or Poppler as a process.
+//! PDF and PostScript pages, through Ghostscript as a process.
 //!
 //! Problem: pages have spot plates and transparent backgrounds, and their languages are large. A document has several pages,
 //! and nothing of it may be lost in silence.
 //! Method: drafts of all pages tell which hold art. If several do, the user chooses one, or names an ink for
 //! each. A page with spot colours that name inks is separated at its final number of dots. Any other page is drawn with the
-//! kind of each pixel ([`kinds`](super::kinds)), on a transparent background. Without Ghostscript, Poppler draws PDF, but without plates.
+//! kind of each pixel ([`kinds`](super::kinds)), on a transparent background.
 //! Cost: seconds a page. Limits: a time limit for each page ([`process`](crate::process)).
 
 mod complaint;
@@ -26,7 +26,7 @@ use super::open::no_dot;
 use super::options::{Options, Pages};
 use super::picture;
 use super::size::{self, Unstated};
-use draw::{DRAFT, Drafts, Leaf, Part, Program, Tagged};
+use draw::{DRAFT, Drafts, Leaf, Part, Tagged};
 use files::scratch::Scratch;
 use observe::Observer;
 
@@ -47,17 +47,10 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     let folder = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
     let only = options.page();
     observer.begin("reading pages", 2);
-    let drawn = draw::drafts(path, only, Part::CropBox, &folder);
-    let (Drafts { leaves, said }, program) =
-        match (drawn, ghostscript::is_pdf(path).map_err(io(path, "open it"))?) {
-            (Err(LayersError::Program { .. }), true) => {
-                (Program::Poppler.leaves(path, only, Part::CropBox, &folder)?, Program::Poppler)
-            }
-            (drawn, _) => drawn.map(|(drafts, interpreter)| (drafts, Program::Ghostscript(interpreter)))?,
-        };
+    let (Drafts { leaves, said }, interpreter) = draw::drafts(path, only, Part::CropBox, &folder)?;
     observer.advance(1);
     let first = leaves.first().ok_or_else(|| wrong(path, no_page(&said, only)))?;
-    let document = Document { path, program, folder: &folder, options };
+    let document = Document { path, interpreter, folder: &folder, options };
     let mut art = match &options.pages {
         Pages::Number(_) => document.page(first)?,
         Pages::Only => document.only_page(&leaves)?,
@@ -67,14 +60,8 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
     art.notes.extend(
         damaged(&said).or_else(|| cut_short(path)).map(|doubt| format!("{}: {doubt}", path.display())),
     );
-    if program == Program::Ghostscript(Interpreter::Older) {
+    if interpreter == Interpreter::Older {
         art.notes.push(format!("{}: {OLDER}", path.display()));
-    }
-    if program == Program::Poppler {
-        art.notes.push(format!(
-            "{}: read by Poppler, without spot plates; install Ghostscript to print them in their inks",
-            path.display()
-        ));
     }
     Ok(art)
 }
@@ -82,7 +69,7 @@ pub(super) fn read(path: &Path, options: &Options, observer: &dyn Observer) -> R
 /// A document and how it is read.
 struct Document<'a> {
     path: &'a Path,
-    program: Program,
+    interpreter: Interpreter,
     folder: &'a Scratch,
     options: &'a Options,
 }
@@ -119,7 +106,7 @@ impl Document<'_> {
         if !plates::layers(self.path, &self.path.display(), &leaf.spots, &mut notes)?.is_empty() {
             // The plates tell of the other spots themselves.
             let mut art =
-                plates::separated_part((self.path, self.interpreter()), leaf.number, Part::CropBox, dpi)?
+                plates::separated_part((self.path, self.interpreter), leaf.number, Part::CropBox, dpi)?
                     .whole(&name, self.options);
             if art.layers.is_empty() && art.colour.is_none() {
                 return Err(LayersError::Nothing { reason: "no plate of the page has a dot".into() });
@@ -128,33 +115,15 @@ impl Document<'_> {
             art.notes.append(&mut notes);
             return Ok(art);
         }
-        let mut art = match self.program {
-            Program::Ghostscript(_) => self.drawn(leaf, dpi)?,
-            Program::Poppler => {
-                let pixels =
-                    picture::read(&self.program.picture(self.path, leaf.number, dpi, self.folder)?, None)?;
-                let dots = (pixels.width as usize, pixels.height as usize);
-                let mut art = picture::drawing(&name, pixels, dots, self.options);
-                art.notes.retain(|note| !note.contains("colour profile"));
-                art
-            }
-        };
+        let mut art = self.drawn(leaf, dpi)?;
         art.notes.append(&mut notes);
         Ok(art)
-    }
-
-    /// Ghostscript's interpreter, if that draws the document.
-    fn interpreter(&self) -> Interpreter {
-        match self.program {
-            Program::Ghostscript(interpreter) => interpreter,
-            Program::Poppler => Interpreter::Usual,
-        }
     }
 
     /// What a page draws, with the kind of each pixel.
     fn drawn(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Artwork, LayersError> {
         let Tagged { size, pixels } =
-            draw::tagged((self.path, self.interpreter()), leaf.number, Part::CropBox, dpi, self.folder)?;
+            draw::tagged((self.path, self.interpreter), leaf.number, Part::CropBox, dpi, self.folder)?;
         let dots = (size.0 as usize, size.1 as usize);
         Ok(picture::tagged_artwork(&stem(self.path), size, dots, pixels, self.options))
     }
@@ -215,7 +184,7 @@ impl Document<'_> {
 
     /// A page as coverage.
     fn layer(&self, leaf: &Leaf, dpi: (f64, f64)) -> Result<Scan, LayersError> {
-        let drawn = self.program.picture(self.path, leaf.number, dpi, self.folder)?;
+        let drawn = draw::picture((self.path, self.interpreter), leaf.number, dpi, self.folder)?;
         let pixels = picture::read(&drawn, None)?;
         Ok(Scan::of_page(self.path, (pixels.width, pixels.height), &pixels.rgba))
     }

@@ -210,14 +210,6 @@ pub(super) fn artwork_of(name: &str, pixels: Pixels, dots: (usize, usize), optio
     art
 }
 
-/// Art from a drawing at its number of dots. A drawing has no ground of its own, so its transparency is known even if
-/// every dot is drawn.
-pub(super) fn drawing(name: &str, pixels: Pixels, dots: (usize, usize), options: &Options) -> Artwork {
-    let mut art = artwork_of(name, pixels, dots, options);
-    art.opaque.get_or_insert_with(|| bitplane::full(dots.0, dots.1));
-    art
-}
-
 /// Art from pixels without transparency: three bytes each, or four with a tag before them. `file` is what notes call it.
 pub(super) fn opaque_artwork<const N: usize>(
     name: &str,

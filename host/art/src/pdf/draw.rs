@@ -1,8 +1,8 @@
-//! Ghostscript and Poppler at work on a document: drafts of its pages, and a page as a picture.
+//! Ghostscript at work on a document: drafts of its pages, and a page as a picture.
 //!
 //! Method: a draft at a low resolution tells the size of each page, whether anything is drawn on it, and its plates. Nothing
 //! is anti-aliased. Cost: some 0.1 s a page for drafts, seconds for a page. Limits: the time limit of [`process`] for each
-//! page; Ghostscript can read only the file (its safer mode); Poppler knows no plates.
+//! page; Ghostscript can read only the file (its safer mode).
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -32,7 +32,8 @@ const SAYS_SIZES: &str = "<< /EndPage { exch pop 2 ne dup { (%%PageSize:) print 
     { ( ) print 20 string cvs print } forall (\\n) print flush } if } >> setpagedevice";
 
 /// What to do without Ghostscript.
-const NO_GHOSTSCRIPT: &str = "install it (Debian: apt install ghostscript), or export the page as PNG";
+const NO_GHOSTSCRIPT: &str = "install it (Debian, Ubuntu: apt install ghostscript; macOS: brew install ghostscript), or export the \
+    page as PNG";
 
 /// The most spot colours of a document that have plates of their own; it is ten without this, and never more.
 const SPOTS: &str = "-dMaxSpots=60";
@@ -71,78 +72,37 @@ pub(super) enum Part {
     Sheet,
 }
 
-/// The program that draws.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Program {
-    Ghostscript(Interpreter),
-    Poppler,
-}
-
-impl Program {
-    /// Drafts of all pages, or of one.
-    ///
-    /// # Errors
-    /// A document that cannot be read, that takes too long, or no such program.
-    pub fn leaves(
-        self,
-        path: &Path,
-        only: Option<u32>,
-        part: Part,
-        folder: &Scratch,
-    ) -> Result<Drafts, LayersError> {
-        match self {
-            Program::Ghostscript(interpreter) => ghostscript_leaves((path, interpreter), only, part, folder),
-            Program::Poppler => poppler_leaves(path, only, folder),
-        }
-    }
-
-    /// Draws a page on a transparent ground, as PNG.
-    ///
-    /// # Errors
-    /// As [`Program::leaves`].
-    pub fn picture(
-        self,
-        path: &Path,
-        page: u32,
-        dpi: (f64, f64),
-        folder: &Scratch,
-    ) -> Result<PathBuf, LayersError> {
-        let picture = folder.path().join("page.png");
-        match self {
-            Program::Ghostscript(interpreter) => {
-                let options = [one_page(page), crop(path, Part::CropBox)?].concat();
-                ghostscript((path, interpreter), &options, "pngalpha", dpi, &picture, || false)?;
-            }
-            Program::Poppler => {
-                let (x, y) = dpi;
-                let options = [
-                    ["-singlefile", "-rx", &format!("{x:.4}"), "-ry", &format!("{y:.4}")]
-                        .map(String::from)
-                        .to_vec(),
-                    pages(page),
-                ];
-                poppler(path, &options.concat(), &picture.with_extension(""))?;
-            }
-        }
-        Ok(picture)
-    }
-}
-
-/// Drafts by Ghostscript, and the interpreter that draws most of the document.
+/// Draws a page on a transparent ground, as PNG.
 ///
 /// # Errors
-/// As [`Program::leaves`].
+/// As [`drafts`].
+pub(super) fn picture(
+    (path, interpreter): (&Path, Interpreter),
+    page: u32,
+    dpi: (f64, f64),
+    folder: &Scratch,
+) -> Result<PathBuf, LayersError> {
+    let picture = folder.path().join("page.png");
+    let options = [one_page(page), crop(path, Part::CropBox)?].concat();
+    ghostscript((path, interpreter), &options, "pngalpha", dpi, &picture, || false)?;
+    Ok(picture)
+}
+
+/// Drafts of all pages, or of one, and the interpreter that draws most of the document.
+///
+/// # Errors
+/// A document that cannot be read or that takes too long, or no Ghostscript.
 pub(super) fn drafts(
     path: &Path,
     only: Option<u32>,
     part: Part,
     folder: &Scratch,
 ) -> Result<(Drafts, Interpreter), LayersError> {
-    let usual = ghostscript_leaves((path, Interpreter::Usual), only, part, folder)?;
+    let usual = leaves((path, Interpreter::Usual), only, part, folder)?;
     if complaint::lacks_pattern(&usual.said) {
         let again = Scratch::new().map_err(io(path, "make a folder for its pages"))?;
         // If it fails, there is a drawing already.
-        if let Ok(older) = ghostscript_leaves((path, Interpreter::Older), only, part, &again)
+        if let Ok(older) = leaves((path, Interpreter::Older), only, part, &again)
             && older.leaves.len() == usual.leaves.len()
             && complaint::is_better(&older.said, &usual.said)
         {
@@ -163,7 +123,7 @@ pub(super) struct Tagged {
 /// Draws a page with the kind of each pixel.
 ///
 /// # Errors
-/// As [`Program::leaves`], or too many pixels.
+/// As [`drafts`], or too many pixels.
 pub(super) fn tagged(
     (path, interpreter): (&Path, Interpreter),
     page: u32,
@@ -184,7 +144,7 @@ pub(super) fn tagged(
     check_pixels(path, size.0, size.1)?;
     let mut pixels = vec![0; kinds::BYTES * width * height];
     file.read_exact(&mut pixels).map_err(io(path, "read its page"))?;
-    let order = ghostscript::order(&pixels).map_err(|error| failed(path, error, NO_GHOSTSCRIPT))?;
+    let order = ghostscript::order(&pixels).map_err(|error| failed(path, error))?;
     order.turn(&mut pixels);
     Ok(Tagged { size, pixels })
 }
@@ -212,11 +172,7 @@ fn crop(path: &Path, part: Part) -> Result<Vec<String>, LayersError> {
     Ok([vec!["-dUseCropBox".into()], cropped].concat())
 }
 
-fn pages(page: u32) -> Vec<String> {
-    vec!["-f".into(), page.to_string(), "-l".into(), page.to_string()]
-}
-
-fn ghostscript_leaves(
+fn leaves(
     (path, interpreter): (&Path, Interpreter),
     only: Option<u32>,
     part: Part,
@@ -286,25 +242,6 @@ fn exact(draft: (f64, f64), stated: Option<&(f64, f64)>) -> Option<(f64, f64)> {
     // A page may lie on its side.
     let ways = stated.into_iter().flat_map(|&(x, y)| [(x / points, y / points), (y / points, x / points)]);
     ways.into_iter().find(near)
-}
-
-fn poppler_leaves(path: &Path, only: Option<u32>, folder: &Scratch) -> Result<Drafts, LayersError> {
-    let options = [vec!["-r".into(), DRAFT.to_string()], only.map_or_else(Vec::new, pages)];
-    let said = poppler(path, &options.concat(), &folder.path().join("draft"))?;
-    let listing = std::fs::read_dir(folder.path()).map_err(io(path, "list its pages"))?;
-    let mut drafts: Vec<(u32, PathBuf)> = listing
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter_map(|file| Some((stem(&file).strip_prefix("draft-")?.parse().ok()?, file)))
-        .collect();
-    drafts.sort();
-    let leaf = |(number, file): (u32, PathBuf)| {
-        let scan = coverage::scan(&file, None)?;
-        let drawn = scan.coverage.iter().any(|&c| c > 0);
-        let size = (scan.width.into(), scan.height.into());
-        Ok(Leaf { number, size, rounded_mm: ROUNDED_MM, drawn, spots: Vec::new() })
-    };
-    let leaves = drafts.into_iter().map(leaf).collect::<Result<_, LayersError>>()?;
-    Ok(Drafts { leaves, said })
 }
 
 /// The names and files of the plates beside a separated page, such as `page(Gold Foil).tif` or `page(Wei%DF).tif`.
@@ -378,35 +315,20 @@ fn ghostscript(
     ];
     let folder = to.parent().unwrap_or(Path::new("."));
     let command = ghostscript::command(path, interpreter, folder, drawing.iter().chain(options));
-    run(path, command, NO_GHOSTSCRIPT, progressed)
+    run(path, command, progressed)
 }
 
-/// Runs Poppler on a PDF.
-fn poppler(path: &Path, options: &[String], to: &Path) -> Result<String, LayersError> {
-    let file = std::path::absolute(path).map_err(io(path, "find it"))?;
-    let mut command = Command::new("pdftocairo");
-    command.args(["-png", "-transp", "-cropbox", "-antialias", "none"]).args(options).arg(file).arg(to);
-    let install =
-        "install it (Debian: apt install ghostscript), or Poppler (poppler-utils), or export the page as PNG";
-    run(path, command, install, || false)
-}
-
-/// Runs a program to its end and returns what it said. `install` is what to do if it is not installed.
-fn run(
-    path: &Path,
-    mut command: Command,
-    install: &'static str,
-    progressed: impl FnMut() -> bool,
-) -> Result<String, LayersError> {
+/// Runs a program to its end and returns what it said.
+fn run(path: &Path, mut command: Command, progressed: impl FnMut() -> bool) -> Result<String, LayersError> {
     let begun = Process::start(command.stdout(Stdio::null()), process::limit());
-    begun.and_then(|process| process.end(progressed)).map_err(|error| failed(path, error, install))
+    begun.and_then(|process| process.end(progressed)).map_err(|error| failed(path, error))
 }
 
 /// Why a document cannot be drawn.
-fn failed(path: &Path, error: ProcessError, install: &'static str) -> LayersError {
+fn failed(path: &Path, error: ProcessError) -> LayersError {
     match error {
         ProcessError::Start(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            LayersError::Program { path: path.to_path_buf(), program: "Ghostscript", install }
+            LayersError::Program { path: path.to_path_buf(), program: "Ghostscript", install: NO_GHOSTSCRIPT }
         }
         ProcessError::Start(source) => {
             LayersError::Io { path: path.to_path_buf(), attempt: "start a program to read it", source }
