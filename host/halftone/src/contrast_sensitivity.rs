@@ -12,11 +12,9 @@
 
 use std::f64::consts::PI;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
-
 use appearance::brdf::{Space, Table};
 use appearance::gamut::InkMix;
+use spectra::{Complex, transform};
 
 /// Dots of a metre.
 const DOTS: f64 = 600.0 / 0.0254;
@@ -251,24 +249,6 @@ pub fn swing(width: usize, index: &[u8], stack: u8, side: usize) -> (f64, f64) {
         if independent > 0.0 { (variance / independent).sqrt() } else { 0.0 }
     };
     (spread(&rows, width), spread(&columns, height))
-}
-
-/// Discrete Fourier transform of rows of `width`, in place.
-fn transform(image: &mut [Complex<f64>], width: usize) {
-    let height = image.len() / width;
-    let mut planner = FftPlanner::new();
-    planner.plan_fft_forward(width).process(image);
-    let down = planner.plan_fft_forward(height);
-    let mut column = vec![Complex::default(); height];
-    for x in 0..width {
-        for (y, value) in column.iter_mut().enumerate() {
-            *value = image[y * width + x];
-        }
-        down.process(&mut column);
-        for (y, value) in column.iter().enumerate() {
-            image[y * width + x] = *value;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -19,8 +19,7 @@ use halftone::contrast_sensitivity::{degree, sensitivity};
 use observe::Observer;
 use press::preview::{LONGEST_SIDE, Radiance};
 use rayon::prelude::*;
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use spectra::{Complex, fast_side};
 
 use crate::error::ViewError;
 use crate::render::Renderer;
@@ -31,9 +30,6 @@ const FAINT: f64 = 0.01;
 
 /// The most pixels that are rendered for a picture with fewer.
 const MOST_PIXELS: usize = 1 << 24;
-
-/// Columns that are transformed together: what lies side by side in memory is read at once.
-const STRIP: usize = 32;
 
 /// The margin around a picture in units of the eye's spread: beyond it lie 2 % of what a point becomes.
 const MARGIN: f64 = 48.0;
@@ -86,7 +82,7 @@ impl Renderer<'_> {
 fn blur(radiance: &mut Radiance, pixel: f64, observer: &dyn Observer) {
     let (width, height) = (radiance.width, radiance.height);
     let spread = slope().abs() / TAU / pixel;
-    let side = |side: usize| smooth(side + ((MARGIN * spread).ceil() as usize).min(side));
+    let side = |side: usize| fast_side(side + ((MARGIN * spread).ceil() as usize).min(side));
     let (wide, high) = (side(width), side(height));
     let mut plane = vec![Complex::default(); wide * high];
     // Two real pictures are one complex one, since the filter weighs frequencies the same both ways.
@@ -95,7 +91,7 @@ fn blur(radiance: &mut Radiance, pixel: f64, observer: &dyn Observer) {
         for (row, pixels) in plane.chunks_exact_mut(wide).zip(radiance.pixels.chunks_exact(width)) {
             row.iter_mut().zip(pixels).for_each(|(out, p)| *out = Complex::new(p[first], p[second]));
         }
-        filter(&mut plane, wide, height, pixel);
+        spectra::filter(&mut plane, wide, height, &|cycles| sensitivity(cycles / pixel));
         observer.advance(1);
         let rows = plane.chunks_exact(wide).take(height);
         rows.flat_map(|row| &row[..width]).copied().collect::<Vec<_>>()
@@ -110,50 +106,6 @@ fn blur(radiance: &mut Radiance, pixel: f64, observer: &dyn Observer) {
             (0..3).for_each(|c| p[c] = (part * seen[c]).max(0.0));
         }
     });
-}
-
-/// Filters rows of `wide`, of which all after the first `rows` are empty and mean nothing afterwards.
-fn filter(plane: &mut [Complex<f32>], wide: usize, rows: usize, pixel: f64) {
-    let high = plane.len() / wide;
-    let mut planner = FftPlanner::<f32>::new();
-    let forward = [planner.plan_fft_forward(wide), planner.plan_fft_forward(high)];
-    let back = [planner.plan_fft_inverse(wide), planner.plan_fft_inverse(high)];
-    plane[..rows * wide].par_chunks_exact_mut(wide).for_each(|row| forward[0].process(row));
-    // Cycles in a pixel.
-    let cycles = |i: usize, side: usize| i.min(side - i) as f64 / side as f64;
-    let whole = plane.len() as f64;
-    let mut columns = vec![Complex::default(); STRIP * high];
-    for left in (0..wide).step_by(STRIP) {
-        let across = STRIP.min(wide - left);
-        for (y, row) in plane.chunks_exact(wide).enumerate() {
-            (0..across).for_each(|x| columns[x * high + y] = row[left + x]);
-        }
-        columns.par_chunks_exact_mut(high).take(across).enumerate().for_each(|(x, column)| {
-            forward[1].process(column);
-            let fx = cycles(left + x, wide);
-            for (y, value) in column.iter_mut().enumerate() {
-                *value *= (sensitivity(fx.hypot(cycles(y, high)) / pixel) / whole) as f32;
-            }
-            back[1].process(column);
-        });
-        for (y, row) in plane.chunks_exact_mut(wide).enumerate() {
-            (0..across).for_each(|x| row[left + x] = columns[x * high + y]);
-        }
-    }
-    plane[..rows * wide].par_chunks_exact_mut(wide).for_each(|row| back[0].process(row));
-}
-
-/// The least number from `least` on whose transform is fast: it has no prime factor above 5.
-fn smooth(least: usize) -> usize {
-    let rest = |mut n: usize| {
-        for factor in [2, 3, 5] {
-            while n.is_multiple_of(factor) {
-                n /= factor;
-            }
-        }
-        n
-    };
-    (least.max(1)..).find(|&n| rest(n) == 1).unwrap_or(least)
 }
 
 /// The means of `finer` x `finer` pixels.
@@ -301,10 +253,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn sides_of_transforms_have_small_factors() {
-        assert_eq!([1, 7, 97, 1024, 1025, 8193].map(smooth), [1, 8, 100, 1024, 1080, 8640]);
     }
 }
