@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use super::decode::{decode, undecodable};
 use super::error::{LayersError, io, resolution_in_words, wrong};
 use super::orientation::Turn;
-use super::resolution::{Dpi, of_png};
 use super::size::{MOST_BYTES, check_pixels};
+use pictures::resolution::{Dpi, of_png};
 
 /// The rule that gave the coverage.
 ///

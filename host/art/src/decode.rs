@@ -5,14 +5,15 @@
 //! that was cut short lacks, so the end of the picture is looked for first.
 
 use std::fmt::Display;
-use std::io::{Cursor, ErrorKind, Read};
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat};
+use image::{DynamicImage, ImageError, ImageFormat};
+use pictures::Bounds;
+use pictures::resolution::{self, Dpi};
 
 use super::error::{LayersError, io, wrong};
 use super::orientation::Turn;
-use super::resolution::{self, Dpi};
 use super::size::{MOST_BYTES, MOST_PIXELS, check_pixels};
 use super::tiff_pages;
 
@@ -68,17 +69,14 @@ pub(super) fn decode(path: &Path, mut file: impl Read, page: Option<u32>) -> Res
         let cause = if let ImageError::IoError(cause) = &error { Some(cause) } else { None };
         undecodable(path, &error, cause)
     };
-    let mut reader = image::ImageReader::with_format(Cursor::new(&bytes[..]), format);
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(8 * MOST_PIXELS);
-    reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(bad)?;
-    let (width, height) = decoder.dimensions();
+    let bounds = Bounds { side: None, bytes: 8 * MOST_PIXELS };
+    let mut opened = pictures::open(&bytes, format, bounds).map_err(bad)?;
+    let (width, height) = opened.size();
     check_pixels(path, width, height)?;
-    let profile = decoder.icc_profile().ok().flatten();
-    let turn = decoder.orientation().map_or_else(|_| Turn::of_tag(None), Turn);
+    let profile = opened.profile();
+    let turn = Turn(opened.orientation());
     let dpi = turn.dpi(resolution::of_file(&bytes, format));
-    let mut image = DynamicImage::from_decoder(decoder).map_err(bad)?;
+    let mut image = opened.decode().map_err(bad)?;
     image.apply_orientation(turn.0);
     Ok(Decoded { image, dpi, profile })
 }

@@ -18,9 +18,9 @@ use super::error::{LayersError, NamedPart, io, wrong};
 use super::names::{self, stem};
 use super::options::{Options, Pages};
 use super::picture::Looks;
-use super::resolution::Dpi;
 use super::size::{self, MOST_BYTES, Unstated};
 use super::{cmyk, pdf, picture, svg, tiff, tiff_pages};
+use pictures::resolution::Dpi;
 
 /// File extensions of pictures.
 const PICTURES: [&str; 11] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "pbm", "ppm", "bmp", "gif", "webp"];

@@ -18,9 +18,9 @@ use super::colour::Colour;
 use super::decode::decode;
 use super::error::{LayersError, io, wrong};
 use super::options::Options;
-use super::resolution::Dpi;
 use super::size::{self, Unstated};
 use super::{bitplane, kinds, resample, reserved, scans};
+use pictures::resolution::Dpi;
 use sheet::Plane;
 
 /// A picture in sRGB with straight alpha.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::error::{LayersError, wrong};
 use super::options::{Options, Room};
-use super::resolution::Dpi;
+use pictures::resolution::Dpi;
 use sheet::Size;
 
 /// The most pixels of a picture: a page at 1200 dpi.

@@ -23,9 +23,9 @@ use super::names::{self, stem};
 use super::options::Options;
 use super::orientation::Turn;
 use super::picture::{self, Pixels};
-use super::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 use super::size::{self, MOST_BYTES, Unstated};
 use super::tiff_pages;
+use pictures::resolution::{TiffDecoder, of_tiff, tiff_decoder};
 
 const INK_SET: Tag = Tag::Unknown(332);
 const PHOTOSHOP: Tag = Tag::Unknown(34377);

@@ -1,8 +1,8 @@
 //! A sample as a document: opened from memory, or written as a folder of texture maps.
 
+use std::io::Write as _;
 use std::path::Path;
 
-use image::{ImageEncoder, codecs::png::PngEncoder};
 use observe::Observer;
 
 use super::content::{ColourSpace, Content, Document};
@@ -21,10 +21,10 @@ pub fn write_sample(sample: &Sample, folder: &Path) -> Result<(), DocumentError>
     let painting = sample.draw();
     for (file, data, colour) in painting.maps() {
         let path = folder.join(file);
-        let output = std::fs::File::create_new(&path).map_err(io(&path))?;
-        PngEncoder::new(std::io::BufWriter::new(output))
-            .write_image(&data, painting.width as u32, painting.height as u32, colour)
+        let mut output = std::fs::File::create_new(&path).map_err(io(&path))?;
+        let picture = pictures::png(&data, (painting.width as u32, painting.height as u32), colour)
             .map_err(|error| io(&path)(std::io::Error::other(error)))?;
+        output.write_all(&picture).map_err(io(&path))?;
     }
     let settings = FolderSettings {
         name: Some(sample.name.into()),

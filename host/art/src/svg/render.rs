@@ -13,6 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use image::{ImageError, ImageFormat};
 use percent_encoding::percent_decode_str;
+use pictures::{Bounds, Opened};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{self, ImageHrefResolver, ImageKind};
 
@@ -185,7 +186,7 @@ fn is_whole(picture: &ImageKind, known: &Known) -> bool {
         let ends = format != ImageFormat::Jpeg || whole_jpeg(Path::new(""), bytes).is_ok();
         // What is too large to look at is not damaged.
         ends && matches!(
-            image::load_from_memory_with_format(bytes, format),
+            pictures::open(bytes, format, Bounds { side: None, bytes: 512 << 20 }).and_then(Opened::decode),
             Ok(_) | Err(ImageError::Limits(_) | ImageError::Unsupported(_))
         )
     })

@@ -5,14 +5,15 @@
 //! photograph, two minutes for the developer.
 
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read as _};
+use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use exif::{In, Tag};
+use image::DynamicImage;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder as _, ImageReader};
+use pictures::Bounds;
 
 use crate::MeasureError;
 
@@ -176,22 +177,16 @@ fn decode(bytes: &[u8], path: &Path, turn: bool) -> Result<Photo, MeasureError> 
             format!("not a readable photograph ({error}); expected TIFF, PNG, OpenEXR or JPEG"),
         )
     };
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(&e))?;
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(16 * MOST_PIXELS);
-    reader.limits(limits);
-    let mut decoder = reader.into_decoder().map_err(|e| wrong(&e))?;
-    let (width, height) = decoder.dimensions();
+    let format = image::guess_format(bytes).map_err(|e| wrong(&e))?;
+    let bounds = Bounds { side: None, bytes: 16 * MOST_PIXELS };
+    let mut opened = pictures::open(bytes, format, bounds).map_err(|e| wrong(&e))?;
+    let (width, height) = opened.size();
     if u64::from(width) * u64::from(height) > MOST_PIXELS {
         let problem = format!("{width} x {height} pixels; the limit is {} million", MOST_PIXELS / 1_000_000);
         return Err(MeasureError::photo(path, problem));
     }
-    let side = if turn {
-        decoder.orientation().unwrap_or(Orientation::NoTransforms)
-    } else {
-        Orientation::NoTransforms
-    };
-    let mut picture = DynamicImage::from_decoder(decoder).map_err(|e| wrong(&e))?;
+    let side = if turn { opened.orientation() } else { Orientation::NoTransforms };
+    let mut picture = opened.decode().map_err(|e| wrong(&e))?;
     picture.apply_orientation(side);
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let values = match picture {

@@ -18,10 +18,9 @@ use crate::cli::console::usage;
 use crate::cli::printing::deliver::DeliverArgs;
 use crate::cli::printing::plan_output::PlanOutputArgs;
 use crate::cli::printing::{Artwork, ResultArgs};
-use art::{
-    Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, RESOLUTIONS, Room, White, names,
-};
+use art::{Accept, Composed, Finish, GAMMAS, Intent, MOST_CHOKE_MM, Order, Pages, Room, White, names};
 use observe::Observer;
+use pictures::resolution::RESOLUTIONS;
 use press::job::plan::{Suggestion, grouped};
 use press::layout::{self, Layout, Mm, NoLength};
 use press::pipeline;

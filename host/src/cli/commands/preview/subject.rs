@@ -13,7 +13,7 @@ use appearance::brdf::{Space, Table, reflectances};
 use appearance::document::{SAMPLES, name_of};
 use appearance::factor::{Factored, Method};
 use appearance::gamut::InkMix;
-use image::ImageFormat;
+use image::ExtendedColorType;
 use inks::Library;
 use observe::Observer;
 use press::layout::{Mm, Repeat};
@@ -260,9 +260,8 @@ pub fn printed_name(path: &Path) -> String {
 
 /// A picture as PNG.
 pub fn png(radiance: &Radiance, tone: ToneCurve) -> Result<Vec<u8>> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture(radiance, tone)?.write_to(&mut bytes, ImageFormat::Png)?;
-    Ok(bytes.into_inner())
+    let picture = picture(radiance, tone)?;
+    Ok(pictures::png(&picture, picture.dimensions(), ExtendedColorType::Rgb8)?)
 }
 
 #[cfg(test)]

@@ -12,10 +12,10 @@ use ::tiff::tags::Tag;
 use image::ImageFormat;
 
 /// Pixels per inch, across and down.
-pub(super) type Dpi = (f64, f64);
+pub type Dpi = (f64, f64);
 
 /// The resolution in a file of this format.
-pub(super) fn of_file(bytes: &[u8], format: ImageFormat) -> Option<Dpi> {
+pub fn of_file(bytes: &[u8], format: ImageFormat) -> Option<Dpi> {
     match format {
         ImageFormat::Png => {
             let decoder = png::Decoder::new(Cursor::new(bytes));
@@ -30,7 +30,7 @@ pub(super) fn of_file(bytes: &[u8], format: ImageFormat) -> Option<Dpi> {
 }
 
 /// The resolution in the header of a PNG.
-pub(super) fn of_png(dims: png::PixelDimensions) -> Option<Dpi> {
+pub fn of_png(dims: png::PixelDimensions) -> Option<Dpi> {
     let inch = |per_metre: u32| f64::from(per_metre) * 0.0254;
     (dims.unit == png::Unit::Meter).then(|| (inch(dims.xppu), inch(dims.yppu))).filter(plausible)
 }
@@ -79,10 +79,10 @@ fn of_exif(bytes: &[u8]) -> Option<Dpi> {
 }
 
 /// A TIFF decoder over bytes in memory.
-pub(super) type TiffDecoder<'a> = Decoder<Cursor<&'a [u8]>>;
+pub type TiffDecoder<'a> = Decoder<Cursor<&'a [u8]>>;
 
 /// A TIFF decoder with limits; `None` if the header is damaged.
-pub(super) fn tiff_decoder(bytes: &[u8]) -> Option<TiffDecoder<'_>> {
+pub fn tiff_decoder(bytes: &[u8]) -> Option<TiffDecoder<'_>> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = 1 << 30;
     limits.intermediate_buffer_size = 1 << 30;
@@ -90,7 +90,7 @@ pub(super) fn tiff_decoder(bytes: &[u8]) -> Option<TiffDecoder<'_>> {
 }
 
 /// The resolution in the tags of a TIFF's first image.
-pub(super) fn of_tiff(decoder: &mut TiffDecoder<'_>) -> Option<Dpi> {
+pub fn of_tiff(decoder: &mut TiffDecoder<'_>) -> Option<Dpi> {
     let inch = match decoder.find_tag_unsigned::<u16>(Tag::ResolutionUnit).ok()? {
         None | Some(2) => 1.0,
         Some(3) => 2.54,
